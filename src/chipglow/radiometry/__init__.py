@@ -1,0 +1,6 @@
+"""Radiometry: Planck's law, spectral bands, in-band radiance and radiance temperature."""
+
+from chipglow.radiometry.band import Band
+from chipglow.radiometry.planck import spectral_radiance
+
+__all__ = ["Band", "spectral_radiance"]

@@ -1,0 +1,227 @@
+"""A camera's spectral band: in-band radiance (Equation 1) and its inverse, radiance temperature."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from math import ceil, isfinite, log
+from typing import Final, TypeAlias
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import ArrayLike, NDArray
+
+from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT, spectral_radiance
+
+Response: TypeAlias = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+"""Relative spectral response of a camera: wavelengths in m to values of 0 or more."""
+
+TABLE_COLDEST: Final = 200.0
+TABLE_HOTTEST: Final = 4000.0
+_NODES_PER_PANEL: Final = 16
+_TEMPERATURE_STEP: Final = 0.25
+_INVERSE_NODES: Final = 4096
+_CHUNK: Final = 65536
+
+
+@dataclass(frozen=True)
+class Band:
+    """A spectral band of a camera.
+
+    Parameters
+    ----------
+    lower, upper : float
+        Limits of the band in m.
+    response : callable, optional
+        Relative spectral response R(λ), wavelengths in m to values; 1 inside the band by default.
+
+    Raises
+    ------
+    ValueError
+        If the limits are not positive, finite and in order, or the response is negative,
+        not finite or zero everywhere.
+
+    Notes
+    -----
+    In-band radiance is L(T) = ∫ R(λ) c1L λ⁻⁵ / (exp(c2/(λT)) − 1) dλ: Equation 1 of Heigel and
+    Whitenton (2010). It is tabulated once by Gauss-Legendre quadrature; between 250 K and 3000 K
+    the look-up is within 1e-6 of the integral. Outside the table the integral itself is evaluated.
+    """
+
+    lower: float
+    upper: float
+    response: Response | None = None
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.lower) and isfinite(self.upper) and 0 < self.lower < self.upper):
+            raise ValueError(
+                f"band: expected 0 < lower < upper in m, got lower={self.lower!r}, "
+                f"upper={self.upper!r}"
+            )
+        if self.upper > 1e-3:
+            raise ValueError(
+                f"band: upper={self.upper!r} m is longer than 1 mm; "
+                "wavelengths are in m (3.8 um is 3.8e-6)"
+            )
+        weights = self._quadrature[1]
+        if not np.isfinite(weights).all() or (weights < 0).any() or not weights.any():
+            raise ValueError("band: response must be finite, 0 or more, and not 0 everywhere")
+
+    def radiance(self, temperature: ArrayLike) -> NDArray[np.floating]:
+        """In-band radiance of a black body.
+
+        Parameters
+        ----------
+        temperature : array_like
+            Temperature in K, of any shape.
+
+        Returns
+        -------
+        ndarray
+            Radiance in W/(m² sr), of the same shape, float32 for float32 and else float64;
+            NaN where the temperature is not positive.
+        """
+        values = _as_floats(temperature)
+        result = np.empty_like(values)
+        _look_up_radiance(values.ravel(), self.radiance_table, result.ravel())
+        outside = (values > 0) & ~((values >= TABLE_COLDEST) & (values <= TABLE_HOTTEST))
+        if outside.any():
+            result[outside] = self._integrate(values[outside].astype(np.float64))
+        return result
+
+    def temperature(self, radiance: ArrayLike) -> NDArray[np.floating]:
+        """Radiance temperature: that of the black body which gives this in-band radiance.
+
+        Parameters
+        ----------
+        radiance : array_like
+            In-band radiance in W/(m² sr), of any shape.
+
+        Returns
+        -------
+        ndarray
+            Radiance temperature in K, of the same shape, float32 for float32 and else float64;
+            NaN where the radiance is not positive and finite.
+        """
+        values = _as_floats(radiance)
+        result = np.empty_like(values)
+        first, step, nodes, slopes = self._inverse_table
+        _look_up_temperature(values.ravel(), first, step, nodes, slopes, result.ravel())
+        last = first + step * (nodes.size - 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            logarithm = np.log(values.astype(np.float64))
+        outside = np.isfinite(logarithm) & ~((logarithm >= first) & (logarithm <= last))
+        if outside.any():
+            result[outside] = self._invert(values[outside].astype(np.float64))
+        return result
+
+    @cached_property
+    def radiance_table(self) -> NDArray[np.float64]:
+        """Radiance and its derivative at every 0.25 K from 200 K to 4000 K, shape (n, 2)."""
+        count = round((TABLE_HOTTEST - TABLE_COLDEST) / _TEMPERATURE_STEP) + 1
+        temperature = TABLE_COLDEST + _TEMPERATURE_STEP * np.arange(count, dtype=np.float64)
+        return np.stack([self._integrate(temperature), self._derivative(temperature)], axis=1)
+
+    @cached_property
+    def _quadrature(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Wavelengths and weights (response included), in panels over which Planck is smooth."""
+        fall = SECOND_RADIATION_CONSTANT / TABLE_COLDEST * (1 / self.lower - 1 / self.upper)
+        panels = max(1, ceil(fall / 10.0))
+        if self.response is not None:
+            panels = max(panels, 64)
+        # Over 1/λ the integrand is a cubic times an exponential: smooth however wide the band.
+        edges = np.linspace(1 / self.upper, 1 / self.lower, panels + 1)
+        node, weight = np.polynomial.legendre.leggauss(_NODES_PER_PANEL)
+        middle, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
+        wavelength = 1.0 / (middle[:, None] + half[:, None] * node).ravel()
+        weights = (half[:, None] * weight).ravel() * wavelength**2
+        if self.response is not None:
+            weights = weights * np.asarray(self.response(wavelength), dtype=np.float64)
+        return wavelength, weights
+
+    @cached_property
+    def _inverse_table(self) -> tuple[float, float, NDArray[np.float64], NDArray[np.float64]]:
+        """1/T and its slope at even steps of ln L: nearly a straight line, so cubics are exact."""
+        ends = self._integrate(np.array([TABLE_COLDEST, TABLE_HOTTEST]))
+        first, last = log(ends[0]), log(ends[1])
+        logarithm = np.linspace(first, last, _INVERSE_NODES)
+        step = (last - first) / (_INVERSE_NODES - 1)
+        temperature = self._invert(np.exp(logarithm))
+        relative_slope = self._derivative(temperature) / self._integrate(temperature)
+        slopes = -step / (temperature**2 * relative_slope)
+        return first, step, 1.0 / temperature, slopes
+
+    def _integrate(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+        wavelength, weights = self._quadrature
+        result = np.empty_like(temperature)
+        for at in range(0, temperature.size, _CHUNK // 64):
+            part = slice(at, at + _CHUNK // 64)
+            result[part] = spectral_radiance(wavelength, temperature[part, None]) @ weights
+        return result
+
+    def _derivative(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+        """dL/dT in W/(m² sr K)."""
+        wavelength, weights = self._quadrature
+        exponent = SECOND_RADIATION_CONSTANT / (wavelength * temperature[:, None])
+        growth = exponent / -np.expm1(-exponent) / temperature[:, None]
+        return np.asarray(
+            (spectral_radiance(wavelength, temperature[:, None]) * growth) @ weights,
+            dtype=np.float64,
+        )
+
+    def _invert(self, radiance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Newton's method on ln L over 1/T, which is nearly straight."""
+        target = np.log(radiance)
+        inverse = np.full_like(target, 1e-3)
+        for _ in range(60):
+            temperature = 1.0 / inverse
+            value = self._integrate(temperature)
+            slope = -self._derivative(temperature) * temperature**2 / value
+            step = (np.log(value) - target) / slope
+            inverse = np.maximum(inverse - step, 0.2 * inverse)
+            if (np.abs(step) <= 1e-14 * inverse).all():
+                break
+        return 1.0 / inverse
+
+
+def _as_floats(values: ArrayLike) -> NDArray[np.floating]:
+    array = np.asarray(values)
+    kind = np.float32 if array.dtype == np.float32 else np.float64
+    return np.asarray(array, dtype=kind, order="C")
+
+
+@njit(inline="always")
+def table_radiance(temperature, table):  # type: ignore[no-untyped-def]
+    """Cubic Hermite look-up of in-band radiance, for kernels; NaN outside the table."""
+    position = (temperature - TABLE_COLDEST) / _TEMPERATURE_STEP
+    if not (0.0 <= position <= table.shape[0] - 1):
+        return np.nan
+    i = min(int(position), table.shape[0] - 2)
+    s = position - i
+    r = 1.0 - s
+    value = r * r * (1.0 + 2.0 * s) * table[i, 0] + s * s * (3.0 - 2.0 * s) * table[i + 1, 0]
+    bend = r * table[i, 1] - s * table[i + 1, 1]
+    return value + _TEMPERATURE_STEP * s * r * bend
+
+
+@njit(cache=True, parallel=True)
+def _look_up_radiance(temperature, table, radiance):  # type: ignore[no-untyped-def]
+    for chunk in prange((temperature.size + _CHUNK - 1) // _CHUNK):
+        for i in range(chunk * _CHUNK, min((chunk + 1) * _CHUNK, temperature.size)):
+            radiance[i] = table_radiance(temperature[i], table)
+
+
+@njit(cache=True, parallel=True)
+def _look_up_temperature(radiance, first, step, nodes, slopes, temperature):  # type: ignore[no-untyped-def]
+    for chunk in prange((radiance.size + _CHUNK - 1) // _CHUNK):
+        for i in range(chunk * _CHUNK, min((chunk + 1) * _CHUNK, radiance.size)):
+            temperature[i] = np.nan
+            if not 0.0 < radiance[i] < np.inf:
+                continue
+            position = (np.log(radiance[i]) - first) / step
+            if not (0.0 <= position <= nodes.size - 1):
+                continue
+            k = min(int(position), nodes.size - 2)
+            s = position - k
+            r = 1.0 - s
+            value = r * r * (1.0 + 2.0 * s) * nodes[k] + s * s * (3.0 - 2.0 * s) * nodes[k + 1]
+            temperature[i] = 1.0 / (value + s * r * (r * slopes[k] - s * slopes[k + 1]))

@@ -1,0 +1,89 @@
+"""In-band radiance against values computed with 30 digits, and its inverse."""
+
+import csv
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chipglow import Band
+from chipglow.radiometry.planck import FIRST_RADIATION_CONSTANT, SECOND_RADIATION_CONSTANT
+
+REFERENCE = Path(__file__).parent / "reference" / "inband_radiance.csv"
+MID_WAVE = Band(3.8e-6, 5.1e-6)
+
+
+def reference_bands():
+    lines = [line for line in REFERENCE.read_text().splitlines() if not line.startswith("#")]
+    rows = list(csv.DictReader(lines))
+    for limits, group in groupby(rows, key=lambda row: (row["lower_um"], row["upper_um"])):
+        values = [(float(row["temperature_K"]), float(row["radiance"])) for row in group]
+        yield pytest.param(limits, np.array(values), id="-".join(limits))
+
+
+@pytest.mark.parametrize(("limits", "values"), list(reference_bands()))
+def test_radiance_against_30_digits(limits, values):
+    band = Band(float(limits[0]) * 1e-6, float(limits[1]) * 1e-6)
+    temperature, radiance = values.T
+    # design: under 1e-6, relative
+    np.testing.assert_allclose(band.radiance(temperature), radiance, rtol=1e-6)
+    np.testing.assert_allclose(band.temperature(radiance), temperature, atol=1e-3, rtol=0)
+
+
+@given(st.floats(250.0, 3000.0))
+def test_round_trip(temperature):
+    # design: under 1 mK
+    assert abs(MID_WAVE.temperature(MID_WAVE.radiance(temperature)) - temperature) < 1e-3
+
+
+def test_table_is_as_good_as_the_integral_between_its_nodes():
+    temperature = np.random.default_rng(1).uniform(250, 3000, 5000)
+    exact = MID_WAVE._integrate(temperature)
+    np.testing.assert_allclose(MID_WAVE.radiance(temperature), exact, rtol=1e-9)
+
+
+@pytest.mark.parametrize("temperature", [60.0, 150.0, 5000.0, 20000.0])
+def test_beyond_the_table_the_integral_is_used(temperature):
+    radiance = MID_WAVE.radiance(temperature)
+    assert radiance > 0
+    assert MID_WAVE.temperature(radiance) == pytest.approx(temperature, rel=1e-9)
+
+
+def test_float32_stays_float32_and_keeps_the_shape():
+    temperature = np.linspace(300, 1500, 12, dtype=np.float32).reshape(3, 4)
+    radiance = MID_WAVE.radiance(temperature)
+    assert radiance.dtype == np.float32
+    assert radiance.shape == (3, 4)
+    # float32 has 24 bits: at 1500 K its step is 0.1 mK, and the radiance adds as much.
+    np.testing.assert_allclose(MID_WAVE.temperature(radiance), temperature, atol=1e-3)
+
+
+def test_what_has_no_answer_is_nan():
+    assert np.isnan(MID_WAVE.radiance([0.0, -5.0, np.nan])).all()
+    assert np.isnan(MID_WAVE.temperature([0.0, -1.0, np.nan, np.inf])).all()
+
+
+def test_response_is_applied():
+    whole = Band(3e-6, 5e-6, response=lambda w: np.where(w > 4e-6, 1.0, 0.0))
+    # A step inside one of 64 panels: an error of less than a panel's share of the radiance.
+    assert whole.radiance(900.0) == pytest.approx(Band(4e-6, 5e-6).radiance(900.0), rel=0.01)
+    half = Band(3e-6, 5e-6, response=lambda w: np.full_like(w, 0.5))
+    assert half.radiance(900.0) == pytest.approx(0.5 * Band(3e-6, 5e-6).radiance(900.0), rel=1e-12)
+
+
+def test_wide_band_obeys_stefan_boltzmann():
+    wide = Band(0.1e-6, 999e-6)
+    sigma_over_pi = FIRST_RADIATION_CONSTANT * np.pi**4 / 15 / SECOND_RADIATION_CONSTANT**4
+    # All but 1e-6 of the radiation of 1000 K lies in the band.
+    assert wide.radiance(1000.0) == pytest.approx(sigma_over_pi * 1000.0**4, rel=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper"), [(5.1e-6, 3.8e-6), (0, 1e-6), (3.8, 5.1), (np.nan, 1e-6), (-1e-6, 1e-6)]
+)
+def test_impossible_bands_are_refused(lower, upper):
+    with pytest.raises(ValueError, match="band"):
+        Band(lower, upper)
