@@ -1,0 +1,7 @@
+"""The scene: fields on a regular grid over time, and the tool in it."""
+
+from chipglow.scene.raster import Raster
+from chipglow.scene.scene import FIELD_UNITS, Frame, Material, Scene, SceneError
+from chipglow.scene.tool import ToolGeometry
+
+__all__ = ["FIELD_UNITS", "Frame", "Material", "Raster", "Scene", "SceneError", "ToolGeometry"]

@@ -1,0 +1,66 @@
+"""The regular grid of a scene's samples (the paper's sub-pixels)."""
+
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Raster:
+    """A regular grid of square samples, row 0 at the top.
+
+    Parameters
+    ----------
+    left, top : float
+        Outer corner of the first sample in m.
+    spacing : float
+        Side of a sample in m.
+    rows, columns : int
+        Number of samples down and across.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite, or spacing or a count is not positive.
+    """
+
+    left: float
+    top: float
+    spacing: float
+    rows: int
+    columns: int
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.left) and isfinite(self.top)):
+            raise ValueError(f"raster: corner must be finite, got {self.left!r}, {self.top!r}")
+        if not (isfinite(self.spacing) and self.spacing > 0):
+            raise ValueError(f"raster: spacing must be over 0 m, got {self.spacing!r}")
+        if self.rows < 1 or self.columns < 1:
+            raise ValueError(f"raster: expected 1 sample or more, got {self.rows} x {self.columns}")
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Centres of the columns in m, ascending."""
+        return self.left + self.spacing * (np.arange(self.columns, dtype=np.float64) + 0.5)
+
+    @property
+    def y(self) -> NDArray[np.float64]:
+        """Centres of the rows in m, descending: row 0 is at the top."""
+        return self.top - self.spacing * (np.arange(self.rows, dtype=np.float64) + 0.5)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.rows, self.columns
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom and top edge in m."""
+        return (
+            self.left,
+            self.left + self.spacing * self.columns,
+            self.top - self.spacing * self.rows,
+            self.top,
+        )

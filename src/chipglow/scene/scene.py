@@ -1,0 +1,297 @@
+"""The scene: what is truly there, as fields on a regular grid over time."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from enum import IntEnum
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from chipglow.scene.raster import Raster
+from chipglow.scene.tool import ToolGeometry
+
+FIELD_UNITS: Final[Mapping[str, str]] = {
+    "temperature": "K",
+    "plastic_strain": "1",
+    "plastic_strain_rate": "1/s",
+    "velocity_x": "m/s",
+    "velocity_y": "m/s",
+    "material": "1",
+}
+"""The fields that every scene has, and their units."""
+
+MATERIAL_COORDINATE_UNITS: Final[Mapping[str, str]] = {"material_x": "m", "material_y": "m"}
+"""Where each point was before the cut: optional, both or none."""
+
+FORCE_UNITS: Final[Mapping[str, str]] = {"cutting_force": "N/m", "thrust_force": "N/m"}
+"""Force history on `force_time`, per width of cut: optional, both or none."""
+
+COLDEST_PLAUSIBLE: Final = 200.0
+HOTTEST_PLAUSIBLE: Final = 6000.0
+
+
+class Material(IntEnum):
+    """What a sample of the scene shows."""
+
+    VOID = 0
+    WORKPIECE = 1
+    TOOL = 2
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The fields of a scene at one time, each of shape (y, x); see `FIELD_UNITS`."""
+
+    time: float
+    temperature: NDArray[np.float32]
+    plastic_strain: NDArray[np.float32]
+    plastic_strain_rate: NDArray[np.float32]
+    velocity_x: NDArray[np.float32]
+    velocity_y: NDArray[np.float32]
+    material: NDArray[np.uint8]
+    material_x: NDArray[np.float32] | None = None
+    material_y: NDArray[np.float32] | None = None
+
+
+class Scene:
+    """Fields of temperature, strain, strain rate, velocity and material over time.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Fields of `FIELD_UNITS` with dimensions (time, y, x) and a ``units`` attribute each;
+        coordinates ``time`` in s, ascending; ``x`` in m, ascending; ``y`` in m, descending.
+        Optional: ``material_x`` and ``material_y`` in m, where each point was before the cut;
+        ``cutting_force`` and ``thrust_force`` in N/m over ``force_time`` in s.
+
+    Raises
+    ------
+    SceneError
+        If the data break the contract; the message names the field, the value and what was
+        expected.
+
+    Notes
+    -----
+    Fields in memory are checked whole. Fields that are read lazily from a file are checked in
+    their first and last frame now, and every frame when it is read.
+    """
+
+    def __init__(self, data: xr.Dataset) -> None:
+        _check_structure(data)
+        self.data = data
+        last = len(self.times) - 1
+        lazy = any(not isinstance(data[name].variable._data, np.ndarray) for name in self._fields)
+        for index in {0, last} if lazy else range(last + 1):
+            self.frame(index)
+
+    @classmethod
+    def from_fields(
+        cls,
+        raster: Raster,
+        times: ArrayLike,
+        fields: Mapping[str, ArrayLike],
+        tool: ToolGeometry | None = None,
+        attributes: Mapping[str, Any] | None = None,
+    ) -> "Scene":
+        """Scene from arrays in SI units.
+
+        Parameters
+        ----------
+        raster : Raster
+            Where the samples are.
+        times : array_like
+            Times of the frames in s, shape (time,).
+        fields : mapping
+            Arrays of shape (time, y, x) by the names of `FIELD_UNITS`, and optionally of
+            `MATERIAL_COORDINATE_UNITS`.
+        tool : ToolGeometry, optional
+            The tool's outline, for the analyses that need the rake face.
+        attributes : mapping, optional
+            Further attributes of the dataset, such as provenance.
+        """
+        units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS}
+        unknown = sorted(set(fields) - set(units))
+        if unknown:
+            raise SceneError(f"scene: unknown field {unknown[0]!r}, expected one of {list(units)}")
+        data = xr.Dataset(
+            {
+                name: (
+                    ("time", "y", "x"),
+                    np.asarray(values, dtype=np.uint8 if name == "material" else np.float32),
+                    {"units": units[name]},
+                )
+                for name, values in fields.items()
+            },
+            coords=raster_coordinates(raster, np.asarray(times, dtype=np.float64)),
+            attrs={**(attributes or {}), **(tool_attributes(tool) if tool else {})},
+        )
+        return cls(data)
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Times of the frames in s."""
+        return np.asarray(self.data["time"].values, dtype=np.float64)
+
+    @property
+    def frame_spacing(self) -> float:
+        """Mean time between frames in s; 0 for a single frame."""
+        times = self.times
+        return float((times[-1] - times[0]) / max(len(times) - 1, 1))
+
+    @cached_property
+    def raster(self) -> Raster:
+        """The grid of the samples."""
+        x, y = self.data["x"].values, self.data["y"].values
+        spacing = float((x[-1] - x[0]) / (len(x) - 1))
+        return Raster(
+            left=float(x[0]) - spacing / 2,
+            top=float(y[0]) + spacing / 2,
+            spacing=spacing,
+            rows=len(y),
+            columns=len(x),
+        )
+
+    @property
+    def tool(self) -> ToolGeometry | None:
+        """The tool's outline, if the scene says it."""
+        names = list(asdict(ToolGeometry()))
+        if not all(f"tool_{name}" in self.data.attrs for name in names):
+            return None
+        return ToolGeometry(**{name: float(self.data.attrs[f"tool_{name}"]) for name in names})
+
+    @property
+    def has_material_coordinates(self) -> bool:
+        """Whether the scene says where each point was before the cut."""
+        return "material_x" in self.data
+
+    def frame(self, index: int) -> Frame:
+        """Read and check one frame.
+
+        Parameters
+        ----------
+        index : int
+            Number of the frame.
+
+        Raises
+        ------
+        SceneError
+            If a value of the frame breaks the contract.
+        """
+        fields = {name: self.data[name][index].values for name in self._fields}
+        time = float(self.times[index])
+        for name, values in fields.items():
+            if name == "material":
+                _check_material(values, time)
+            else:
+                fields[name] = values = np.asarray(values, dtype=np.float32)
+                _check_field(name, values, time)
+        return Frame(time=time, **fields)
+
+    def frames(self, indices: range | None = None) -> Iterator[Frame]:
+        """Read frames one after the other."""
+        for index in indices or range(len(self.times)):
+            yield self.frame(index)
+
+    @property
+    def _fields(self) -> list[str]:
+        optional = MATERIAL_COORDINATE_UNITS if self.has_material_coordinates else {}
+        return [*FIELD_UNITS, *optional]
+
+
+class SceneError(ValueError):
+    """Fields that break the contract of a scene."""
+
+
+def raster_coordinates(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:
+    """Coordinates of a scene's or a measurement's dataset, with units."""
+    return {
+        "time": ("time", times, {"units": "s", "long_name": "time"}),
+        "y": ("y", raster.y, {"units": "m", "long_name": "height above the cut surface"}),
+        "x": ("x", raster.x, {"units": "m", "long_name": "position along the cut"}),
+    }
+
+
+def tool_attributes(tool: ToolGeometry) -> dict[str, float]:
+    """The tool's outline as attributes of a dataset: angles in rad, lengths in m."""
+    return {f"tool_{name}": value for name, value in asdict(tool).items()}
+
+
+def _check_structure(data: xr.Dataset) -> None:
+    for name in ("time", "y", "x"):
+        if name not in data.coords:
+            raise SceneError(f"scene: coordinate {name!r} is missing")
+        values = np.asarray(data[name].values, dtype=np.float64)
+        if not np.isfinite(values).all():
+            raise SceneError(f"scene: coordinate {name!r} is not finite everywhere")
+        _check_unit(name, data[name], "s" if name == "time" else "m")
+    times = data["time"].values
+    if times.size < 1 or (np.diff(times) <= 0).any():
+        raise SceneError("scene: time must ascend, each frame later than the one before")
+    _check_even("x", data["x"].values, ascending=True)
+    _check_even("y", data["y"].values, ascending=False)
+    if not np.isclose(np.diff(data["x"].values).mean(), -np.diff(data["y"].values).mean()):
+        raise SceneError("scene: samples must be square, but the steps of x and y differ")
+    for name, unit in FIELD_UNITS.items():
+        if name not in data:
+            raise SceneError(f"scene: field {name!r} is missing")
+        _check_unit(name, data[name], unit)
+    for pair in (MATERIAL_COORDINATE_UNITS, FORCE_UNITS):
+        present = [name for name in pair if name in data]
+        if present and len(present) < len(pair):
+            raise SceneError(f"scene: {present[0]!r} needs the other of {list(pair)}")
+        for name in present:
+            _check_unit(name, data[name], pair[name])
+    for name in (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS):
+        if name in data and data[name].dims != ("time", "y", "x"):
+            raise SceneError(
+                f"scene: {name!r} has dimensions {data[name].dims}, expected ('time', 'y', 'x')"
+            )
+
+
+def _check_even(name: str, values: NDArray[np.float64], *, ascending: bool) -> None:
+    if values.size < 2:
+        raise SceneError(f"scene: {name} has {values.size} samples, expected 2 or more")
+    steps = np.diff(values) if ascending else -np.diff(values)
+    if (steps <= 0).any():
+        raise SceneError(
+            f"scene: {name} must {'ascend' if ascending else 'descend (row 0 on top)'}"
+        )
+    if not np.allclose(steps, steps.mean(), rtol=1e-3):
+        raise SceneError(f"scene: {name} must have even steps")
+
+
+def _check_unit(name: str, values: xr.DataArray, unit: str) -> None:
+    found = values.attrs.get("units")
+    if found != unit:
+        raise SceneError(f"scene: {name!r} has units {found!r}, expected {unit!r}")
+
+
+def _check_field(name: str, values: NDArray[np.float32], time: float) -> None:
+    if not np.isfinite(values).all():
+        raise SceneError(f"scene: {name!r} is not finite everywhere at {time:.9g} s")
+    lowest, highest = float(values.min()), float(values.max())
+    if name == "temperature" and lowest < COLDEST_PLAUSIBLE:
+        hint = "; it looks like °C, add 273.15" if -100.0 < lowest < 200.0 else ""
+        raise SceneError(
+            f"scene: temperature {lowest:.6g} at {time:.9g} s, expected kelvin of "
+            f"{COLDEST_PLAUSIBLE:g} to {HOTTEST_PLAUSIBLE:g}{hint}"
+        )
+    if name == "temperature" and highest > HOTTEST_PLAUSIBLE:
+        raise SceneError(
+            f"scene: temperature {highest:.6g} at {time:.9g} s, expected kelvin of "
+            f"{COLDEST_PLAUSIBLE:g} to {HOTTEST_PLAUSIBLE:g}"
+        )
+    if name in ("plastic_strain", "plastic_strain_rate") and lowest < 0:
+        raise SceneError(f"scene: {name!r} is {lowest:.6g} at {time:.9g} s, expected 0 or more")
+
+
+def _check_material(values: NDArray[Any], time: float) -> None:
+    highest = int(values.max())
+    if values.dtype != np.uint8 or highest > max(Material):
+        raise SceneError(
+            f"scene: material has value {highest} of type {values.dtype} at {time:.9g} s, expected "
+            f"uint8 of {', '.join(f'{m.value} ({m.name.lower()})' for m in Material)}"
+        )
