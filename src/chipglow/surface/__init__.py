@@ -1,5 +1,27 @@
 """Surfaces: emissivity maps that follow the material."""
 
+from chipglow.surface.feature import (
+    CHIP_1,
+    CHIP_2,
+    Emissivity,
+    FeatureField,
+    FeatureSurface,
+    chip_share,
+    shear_band_share,
+)
 from chipglow.surface.surface import EmissivityField, Surface, UniformSurface
+from chipglow.surface.texture import Texture
 
-__all__ = ["EmissivityField", "Surface", "UniformSurface"]
+__all__ = [
+    "CHIP_1",
+    "CHIP_2",
+    "Emissivity",
+    "EmissivityField",
+    "FeatureField",
+    "FeatureSurface",
+    "Surface",
+    "Texture",
+    "UniformSurface",
+    "chip_share",
+    "shear_band_share",
+]

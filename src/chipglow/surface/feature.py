@@ -1,0 +1,311 @@
+"""Emissivity by feature: workpiece, chip, shear band and tool, as the paper maps it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Final, Literal
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import ArrayLike, NDArray
+
+from chipglow.scene import Frame, Material, Raster, Scene
+from chipglow.surface.surface import EmissivityField, Surface
+from chipglow.surface.texture import Texture, texture_value
+
+STRAIN_OF_WORKPIECE: Final = 0.3
+"""Plastic strain up to which the workpiece's map holds alone."""
+STRAIN_OF_CHIP: Final = 0.5
+"""Plastic strain from which the chip's map holds alone."""
+RATE_OF_CHIP: Final = 6_000.0
+"""Plastic strain rate in 1/s up to which the shear band's map has no share."""
+RATE_OF_SHEAR_BAND: Final = 30_000.0
+"""Plastic strain rate in 1/s from which the shear band's map holds alone."""
+UNDEFORMED_STRAIN: Final = 0.01
+"""Plastic strain under which material is not affected by the cut."""
+
+FEATURES: Final = ("workpiece", "chip", "shear_band", "tool")
+_VOID, _TOOL = int(Material.VOID), int(Material.TOOL)
+
+
+@dataclass(frozen=True)
+class Emissivity:
+    """Mean and standard deviation of a feature's emissivity.
+
+    Raises
+    ------
+    ValueError
+        If the mean is not within 0 to 1, or the deviation not within 0 to 0.5.
+    """
+
+    mean: float
+    deviation: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.mean <= 1.0:
+            raise ValueError(f"emissivity: expected a mean of 0 to 1, got {self.mean!r}")
+        if not 0.0 <= self.deviation <= 0.5:
+            raise ValueError(
+                f"emissivity: expected a deviation of 0 to 0.5, got {self.deviation!r}"
+            )
+
+
+@dataclass(frozen=True)
+class FeatureSurface(Surface):
+    """Emissivity of workpiece, chip, shear band and tool, each with a random texture.
+
+    Parameters
+    ----------
+    chip, shear_band, workpiece, tool : Emissivity
+        What each feature has. Workpiece and tool default to the paper's.
+    grain : float
+        Size of one deviate of the textures in m.
+    follow : {"material", "mean"}
+        How the textures move. "material": each point keeps its own, by the scene's material
+        coordinates. "mean": the paper's way, each map is shifted by its feature's mean velocity.
+    seed : int
+        Seed of the textures; each feature has an independent stream of it.
+    restore_deviation : bool
+        Make up for the deviation that enlarging takes from a map of deviates.
+
+    Raises
+    ------
+    ValueError
+        If the grain is not positive, the seed is negative or `follow` is unknown.
+
+    Notes
+    -----
+    "Create emissivity maps for each feature" and what follows in Heigel and Whitenton (2010). The
+    chip's share rises linearly from 0 at a plastic strain of 0.3 to 1 at 0.5; over that blend of
+    chip and workpiece the shear band's rises from 0 at a plastic strain rate of 6 000 /s to 1 at
+    30 000 /s. The tool's map is fixed. The void has emissivity 0.
+    """
+
+    chip: Emissivity
+    shear_band: Emissivity
+    workpiece: Emissivity = field(default_factory=lambda: Emissivity(0.40, 0.03))
+    tool: Emissivity = field(default_factory=lambda: Emissivity(0.58, 0.06))
+    grain: float = 20e-6
+    follow: Literal["material", "mean"] = "material"
+    seed: int = 1
+    restore_deviation: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0 < self.grain < np.inf:
+            raise ValueError(f"grain: expected over 0 m, got {self.grain!r} m")
+        if self.follow not in ("material", "mean"):
+            raise ValueError(f"follow: expected 'material' or 'mean', got {self.follow!r}")
+        if self.seed < 0:
+            raise ValueError(f"seed: expected 0 or more, got {self.seed!r}")
+
+    @cached_property
+    def textures(self) -> Mapping[str, Texture]:
+        """Textures by the names of `FEATURES`; their ``deviation`` is the realised one."""
+        streams = np.random.SeedSequence(self.seed).spawn(len(FEATURES))
+        return {
+            name: self._texture(getattr(self, name), np.random.default_rng(stream))
+            for name, stream in zip(FEATURES, streams, strict=True)
+        }
+
+    def on(self, scene: Scene) -> "FeatureField":
+        """Lay the textures on a scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            With `follow` "mean", all its frames are read once.
+
+        Raises
+        ------
+        ValueError
+            If the textures shall follow the material, and the scene has no material coordinates.
+        """
+        if self.follow == "material" and not scene.has_material_coordinates:
+            raise ValueError(
+                "follow: the scene has no material coordinates for 'material', expected 'mean'"
+            )
+        times, shifts = scene.times, np.zeros((len(scene.times), 3, 2))
+        if self.follow == "mean":
+            shifts = _mean_shifts(scene)
+        return FeatureField(self, scene.raster, times, shifts)
+
+    def _texture(self, emissivity: Emissivity, generator: np.random.Generator) -> Texture:
+        return Texture.random(
+            emissivity.mean,
+            emissivity.deviation,
+            self.grain,
+            generator,
+            restore_deviation=self.restore_deviation,
+        )
+
+
+CHIP_1: Final = FeatureSurface(chip=Emissivity(0.42, 0.07), shear_band=Emissivity(0.53, 0.05))
+"""The thinly oxidised chip of the paper's Table 1."""
+CHIP_2: Final = FeatureSurface(chip=Emissivity(0.77, 0.03), shear_band=Emissivity(0.85, 0.02))
+"""The more oxidised chip of the paper's Table 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureField(EmissivityField):
+    """A `FeatureSurface` on one scene; made by `FeatureSurface.on`.
+
+    Parameters
+    ----------
+    surface : FeatureSurface
+        What is laid on the scene.
+    raster : Raster
+        The scene's samples.
+    times : ndarray
+        Times of the scene's frames in s, shape (time,).
+    shifts : ndarray
+        Shift right and up in m of the maps of workpiece, chip and shear band, shape (time, 3, 2).
+    """
+
+    surface: FeatureSurface
+    raster: Raster
+    times: NDArray[np.float64]
+    shifts: NDArray[np.float64]
+
+    def shift(self, time: float) -> NDArray[np.float64]:
+        """Shift of the maps of workpiece, chip and shear band at a time in s, shape (3, 2) in m."""
+        flat = self.shifts.reshape(len(self.times), 6)
+        return np.array([np.interp(time, self.times, column) for column in flat.T]).reshape(3, 2)
+
+    def emissivity(self, frame: Frame) -> NDArray[np.float32]:
+        """Emissivity of every sample of a frame, shape (y, x).
+
+        Raises
+        ------
+        ValueError
+            If the frame is not of the scene's shape, or lacks the material coordinates.
+        """
+        if frame.material.shape != self.raster.shape:
+            raise ValueError(
+                f"frame: has shape {frame.material.shape}, expected {self.raster.shape}"
+            )
+        result = np.empty(self.raster.shape, dtype=np.float32)
+        _blend(
+            frame.material,
+            frame.plastic_strain,
+            frame.plastic_strain_rate,
+            *self._positions(frame),
+            self.shift(frame.time),
+            1.0 / self.surface.grain,
+            self._maps,
+            self._tool_map,
+            result,
+        )
+        return result
+
+    def _positions(self, frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        if self.surface.follow == "mean":
+            return self._sample_positions
+        if frame.material_x is None or frame.material_y is None:
+            raise ValueError("frame: has no material coordinates, expected them for 'material'")
+        return frame.material_x, frame.material_y
+
+    @cached_property
+    def _sample_positions(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        x, y = np.meshgrid(self.raster.x, self.raster.y)
+        return x.astype(np.float32), y.astype(np.float32)
+
+    @cached_property
+    def _maps(self) -> NDArray[np.float32]:
+        return np.stack([self.surface.textures[name].nodes for name in FEATURES[:3]])
+
+    @cached_property
+    def _tool_map(self) -> NDArray[np.float32]:
+        return self.surface.textures["tool"].at(self.raster.x[None, :], self.raster.y[:, None])
+
+
+def chip_share(plastic_strain: ArrayLike) -> NDArray[np.float64]:
+    """Share of the chip's map over the workpiece's, 0 to 1, by plastic strain."""
+    strain = np.asarray(plastic_strain, dtype=np.float64)
+    share = (strain - STRAIN_OF_WORKPIECE) / (STRAIN_OF_CHIP - STRAIN_OF_WORKPIECE)
+    return np.asarray(np.clip(share, 0.0, 1.0))
+
+
+def shear_band_share(plastic_strain_rate: ArrayLike) -> NDArray[np.float64]:
+    """Share of the shear band's map over the others, 0 to 1, by plastic strain rate in 1/s."""
+    rate = np.asarray(plastic_strain_rate, dtype=np.float64)
+    return np.asarray(np.clip((rate - RATE_OF_CHIP) / (RATE_OF_SHEAR_BAND - RATE_OF_CHIP), 0, 1))
+
+
+def _mean_shifts(scene: Scene) -> NDArray[np.float64]:
+    """Integral over time of the features' mean velocities, shape (time, 3, 2) in m."""
+    height = scene.raster.y
+    velocity = np.array([_mean_velocities(frame, height) for frame in scene.frames()])
+    velocity = velocity.reshape(len(scene.times), 6)
+    for column in velocity.T:
+        known = np.isfinite(column)
+        # A feature that no frame shows has nothing to shift; in a gap it keeps moving.
+        column[:] = np.interp(scene.times, scene.times[known], column[known]) if known.any() else 0
+    step = np.diff(scene.times)[:, None] * (velocity[1:] + velocity[:-1]) / 2
+    shifts = np.concatenate([np.zeros((1, 6)), np.cumsum(step, axis=0)])
+    return shifts.reshape(-1, 3, 2)
+
+
+def _mean_velocities(frame: Frame, height: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean velocity of workpiece, chip and shear band in m/s, shape (3, 2); NaN if not there."""
+    rows = np.empty((len(height), 3, 3))
+    _sum_velocities(
+        frame.material,
+        frame.plastic_strain,
+        frame.plastic_strain_rate,
+        frame.velocity_x,
+        frame.velocity_y,
+        height,
+        rows,
+    )
+    sums = rows.sum(axis=0)
+    weight = np.where(sums[:, 2:] > 0, sums[:, 2:], np.nan)
+    velocity = sums[:, :2] / weight
+    velocity[0, 1] = 0.0  # the paper shifts the workpiece's map along the cut only
+    return np.asarray(velocity)
+
+
+@njit(inline="always")
+def _share(value, none, full):  # type: ignore[no-untyped-def]
+    share = (value - np.float32(none)) * np.float32(1.0 / (full - none))
+    return min(max(share, np.float32(0.0)), np.float32(1.0))
+
+
+@njit(cache=True, parallel=True)
+def _blend(material, strain, rate, x, y, shift, scale, maps, tool_map, result):  # type: ignore[no-untyped-def]
+    rows, columns = material.shape
+    for r in prange(rows):
+        for c in range(columns):
+            kind = material[r, c]
+            if kind == _VOID:
+                result[r, c] = 0.0
+                continue
+            if kind == _TOOL:
+                result[r, c] = tool_map[r, c]
+                continue
+            chip = _share(strain[r, c], STRAIN_OF_WORKPIECE, STRAIN_OF_CHIP)
+            band = _share(rate[r, c], RATE_OF_CHIP, RATE_OF_SHEAR_BAND)
+            value, rest = np.float32(0.0), np.float32(1.0) - band
+            for k, share in ((0, rest - rest * chip), (1, rest * chip), (2, band)):
+                if share > 0:
+                    u = (x[r, c] - shift[k, 0]) * scale
+                    v = (y[r, c] - shift[k, 1]) * scale
+                    value += share * texture_value(maps[k], u, v)
+            result[r, c] = value
+
+
+@njit(cache=True, parallel=True)
+def _sum_velocities(material, strain, rate, vx, vy, height, sums):  # type: ignore[no-untyped-def]
+    """Weighted velocities and weights of the three features, summed along each row."""
+    rows, columns = material.shape
+    for r in prange(rows):
+        sums[r] = 0.0
+        for c in range(columns):
+            if material[r, c] == _VOID or material[r, c] == _TOOL:
+                continue
+            band = _share(rate[r, c], RATE_OF_CHIP, RATE_OF_SHEAR_BAND)
+            undeformed = strain[r, c] < UNDEFORMED_STRAIN
+            formed = strain[r, c] >= STRAIN_OF_CHIP and band == 0 and height[r] > 0
+            for k, weight in ((0, np.float32(undeformed)), (1, np.float32(formed)), (2, band)):
+                sums[r, k, 0] += weight * vx[r, c]
+                sums[r, k, 1] += weight * vy[r, c]
+                sums[r, k, 2] += weight
