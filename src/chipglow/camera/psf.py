@@ -1,0 +1,314 @@
+"""Point spread functions of an infrared camera."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from math import ceil, inf, isfinite, log, pi, sqrt
+from pathlib import Path
+from typing import Any, Final, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import cumulative_trapezoid
+from scipy.optimize import brentq
+from scipy.special import erf, erfinv, j1
+
+from chipglow.camera.sampling import overlap_lengths
+
+GAUSSIAN_ENERGY: Final = 0.9999
+"""Share of a Gaussian's energy that its kernel holds before it is scaled to 1."""
+
+ANNULAR_ENERGY: Final = 0.99
+"""The same for diffraction, whose energy beyond a radius r falls only as 1/r."""
+
+_LARGEST_KERNEL: Final = 4097
+_FWHM_PER_SIGMA: Final = 2 * sqrt(2 * log(2))
+
+
+class PointSpreadFunction(ABC):
+    """How the light of a point is spread over the scene's plane.
+
+    Attributes
+    ----------
+    fwhm : float
+        Full width at half maximum in m.
+    """
+
+    fwhm: float
+
+    @abstractmethod
+    def kernel(self, spacing: float) -> NDArray[np.float64]:
+        """Shares of a point's light on a grid of squares.
+
+        Parameters
+        ----------
+        spacing : float
+            Side of a square in m. The point is in the middle of the middle square.
+
+        Returns
+        -------
+        ndarray
+            The share that falls on each square, of sum 1; a square array of odd side, first row
+            on top.
+
+        Raises
+        ------
+        ValueError
+            If the spacing is not positive, or so fine that the kernel would be too large.
+        """
+
+
+@final
+@dataclass(frozen=True)
+class GaussianPSF(PointSpreadFunction):
+    """A round Gaussian.
+
+    Parameters
+    ----------
+    fwhm : float
+        Full width at half maximum in m.
+
+    Raises
+    ------
+    ValueError
+        If the width is not positive, or longer than 1 mm.
+    """
+
+    fwhm: float
+
+    def __post_init__(self) -> None:
+        _check_length("fwhm", self.fwhm)
+
+    def kernel(self, spacing: float) -> NDArray[np.float64]:
+        """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
+        deviation = self.fwhm / _FWHM_PER_SIGMA
+        reach = sqrt(2) * deviation * float(erfinv(sqrt(GAUSSIAN_ENERGY)))
+        half = _half_size(reach, spacing)
+        edges = spacing * (np.arange(-half, half + 2) - 0.5)
+        line = np.diff(erf(edges / (sqrt(2) * deviation)))
+        return _normalised(np.outer(line, line))
+
+
+@final
+@dataclass(frozen=True)
+class AnnularAperturePSF(PointSpreadFunction):
+    """Diffraction of a round pupil with a round obstruction in its middle.
+
+    Parameters
+    ----------
+    wavelength : float
+        Wavelength in m; by default the middle of the paper's band.
+    numerical_aperture : float
+        Sine of the half angle of the light that the objective takes in.
+    obscuration : float
+        Diameter of the obstruction over that of the pupil, 0 for none.
+
+    Attributes
+    ----------
+    fwhm : float
+        Full width at half maximum in m.
+
+    Raises
+    ------
+    ValueError
+        If a number is outside its range.
+
+    Notes
+    -----
+    The closed form, with v = 2π NA r / λ and the obscuration o, is
+    [2 J1(v)/v − o² 2 J1(ov)/(ov)]² / (1 − o²)² (Born and Wolf, Principles of Optics, 8.6.2).
+    It holds no aberration and nothing of the sensor.
+
+    The paper prints the point spread function of its camera as a picture only (Figure 2). The
+    default values are an assumption: those usual for a reflecting (Schwarzschild) microscope
+    objective of 15 times.
+    """
+
+    wavelength: float = 4.5e-6
+    numerical_aperture: float = 0.28
+    obscuration: float = 0.35
+    fwhm: float = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        _check_length("wavelength", self.wavelength)
+        if not 0.0 < self.numerical_aperture <= 1.0:
+            raise ValueError(
+                f"psf: numerical_aperture is {self.numerical_aperture!r}, expected over 0 to 1"
+            )
+        if not 0.0 <= self.obscuration <= 0.9:
+            raise ValueError(f"psf: obscuration is {self.obscuration!r}, expected 0 to 0.9")
+        half = brentq(lambda v: float(self._profile(np.array(v))) - 0.5, 0.1, 3.0)
+        object.__setattr__(self, "fwhm", 2 * float(half) * self._unit)
+
+    def kernel(self, spacing: float) -> NDArray[np.float64]:
+        """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
+        half = _half_size(self._reach * self._unit, spacing)
+        # Gauss nodes: two, and three more for every ring (π in v) that a square spans.
+        count = 2 + ceil(3 * spacing / (pi * self._unit))
+        node, weight = np.polynomial.legendre.leggauss(count)
+        line = ((np.arange(half + 1)[:, None] + node / 2) * spacing / self._unit).ravel()
+        weights = np.tile(weight, half + 1)
+        quadrant = np.empty((half + 1, half + 1))
+        for row in range(half + 1):
+            part = slice(row * count, (row + 1) * count)
+            value = self._profile(np.hypot(line[part, None], line)) * weights
+            quadrant[row] = weight @ value.reshape(count, half + 1, count).sum(axis=2)
+        return _normalised(np.pad(quadrant, ((half, 0), (half, 0)), mode="reflect"))
+
+    @property
+    def _unit(self) -> float:
+        """Radius in m where v is 1."""
+        return self.wavelength / (2 * pi * self.numerical_aperture)
+
+    @property
+    def _reach(self) -> float:
+        """Radius, as v, that encircles `ANNULAR_ENERGY`."""
+        # Beyond the rings' first few, the share outside is 2 / (π v (1 − o)).
+        far = 4 / (pi * (1 - self.obscuration) * (1 - ANNULAR_ENERGY))
+        v = np.linspace(0.0, far, ceil(20 * far))
+        clear = 1 - self.obscuration**2
+        inside = cumulative_trapezoid(clear / 2 * self._profile(v) * v, v, initial=0.0)
+        return float(v[np.searchsorted(inside, ANNULAR_ENERGY)])
+
+    def _profile(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Irradiance over that in the middle."""
+        inner = self.obscuration**2
+        amplitude = (_jinc(v) - inner * _jinc(self.obscuration * v)) / (1 - inner)
+        return np.asarray(amplitude**2)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class MeasuredPSF(PointSpreadFunction):
+    """A measured kernel, such as one found with a knife edge.
+
+    Parameters
+    ----------
+    weights : array_like
+        Share of a point's light on each square of a grid, in any unit; a square array of odd
+        side, first row on top, the point in the middle of the middle square.
+    spacing : float
+        Side of those squares in m, on the scene.
+
+    Attributes
+    ----------
+    fwhm : float
+        Full width at half maximum in m: the mean of the middle row's and the middle column's.
+
+    Raises
+    ------
+    ValueError
+        If the array is not such a kernel, or the spacing is not a length.
+
+    Notes
+    -----
+    At another spacing the light is taken as even within each measured square and shared among
+    the new squares by area: nothing is lost and nothing is made up between the measured values.
+    """
+
+    weights: NDArray[np.float64] = field(repr=False)
+    spacing: float
+    fwhm: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        _check_length("spacing", self.spacing)
+        weights = _normalised(_checked_weights(self.weights))
+        weights.flags.writeable = False
+        object.__setattr__(self, "weights", weights)
+        middle = weights.shape[0] // 2
+        widths = [_half_maximum_width(line) for line in (weights[middle], weights[:, middle])]
+        object.__setattr__(self, "fwhm", float(np.mean(widths)) * self.spacing)
+
+    @classmethod
+    def from_file(cls, path: str | Path, spacing: float) -> "MeasuredPSF":
+        """Read a kernel.
+
+        Parameters
+        ----------
+        path : str or Path
+            A NumPy array (``.npy``) or a table of numbers, separated by commas (``.csv``).
+        spacing : float
+            Side of the kernel's squares in m, on the scene.
+
+        Raises
+        ------
+        ValueError
+            If the file is of another kind, or does not hold a kernel; the message names it.
+        OSError
+            If it can't be read.
+        """
+        path = Path(path)
+        readers = {".npy": _read_npy, ".csv": _read_csv}
+        if path.suffix.lower() not in readers:
+            raise ValueError(f"psf: {path} is of kind {path.suffix!r}, expected .npy or .csv")
+        try:
+            return cls(readers[path.suffix.lower()](path), spacing)
+        except (ValueError, EOFError, MemoryError) as error:
+            raise ValueError(f"psf: {path} is not a kernel: {error}") from error
+
+    def kernel(self, spacing: float) -> NDArray[np.float64]:
+        """Share the measured light among squares of side `spacing`."""
+        samples = self.weights.shape[0]
+        width = samples * self.spacing
+        half = _half_size(width / 2, spacing)
+        left = width / 2 + spacing * (np.arange(-half, half + 1) - 0.5)
+        share = overlap_lengths(left, spacing, samples, self.spacing) / self.spacing
+        return _normalised(np.einsum("ij,jk,lk->il", share, self.weights, share, optimize=True))
+
+
+def _jinc(v: NDArray[np.float64]) -> NDArray[np.float64]:
+    """2 J1(v) / v."""
+    safe = np.where(v == 0.0, 1.0, v)
+    return np.where(v == 0.0, 1.0, 2 * j1(safe) / safe)
+
+
+def _normalised(kernel: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(kernel / kernel.sum())
+
+
+def _half_size(reach: float, spacing: float) -> int:
+    """Number of squares on each side of the middle one that hold what is within `reach`."""
+    _check_length("spacing", spacing)
+    # A kernel that ends on a square's edge but for rounding needs no square more.
+    half = max(0, ceil(reach / spacing - 0.5 - 1e-9))
+    if 2 * half + 1 > _LARGEST_KERNEL:
+        raise ValueError(
+            f"psf: spacing is {spacing:g} m, expected {2 * reach / _LARGEST_KERNEL:.3g} m or more "
+            f"for a kernel of {2 * reach:.3g} m"
+        )
+    return half
+
+
+def _half_maximum_width(line: NDArray[np.float64]) -> float:
+    """Full width at half maximum of a line of samples, in samples."""
+    padded = np.pad(line, 1)
+    level = padded.max() / 2
+    above = np.flatnonzero(padded >= level)
+    first, last = int(above[0]), int(above[-1])
+    rise = (padded[first] - level) / (padded[first] - padded[first - 1])
+    fall = (padded[last] - level) / (padded[last] - padded[last + 1])
+    return float(last - first + rise + fall)
+
+
+def _check_length(name: str, value: float) -> None:
+    if not (isfinite(value) and 0.0 < value <= 1e-3):
+        raise ValueError(f"psf: {name} is {value!r}, expected over 0 to 1e-3 m; 8 um is 8e-6")
+
+
+def _checked_weights(weights: ArrayLike) -> NDArray[np.float64]:
+    array = np.asarray(weights, dtype=np.float64)
+    if array.ndim != 2 or array.shape[0] != array.shape[1] or array.shape[0] % 2 == 0:
+        raise ValueError(f"psf: kernel has shape {array.shape}, expected a square of odd side")
+    if not (array >= 0.0).all() or not 0.0 < array.sum() < inf:
+        raise ValueError("psf: kernel must be finite, 0 or more, and not 0 everywhere")
+    return array
+
+
+def _read_npy(path: Path) -> NDArray[Any]:
+    with path.open("rb") as file:
+        return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
+
+
+def _read_csv(path: Path) -> NDArray[np.float64]:
+    lines = path.read_text(encoding="utf-8-sig").splitlines()
+    rows = [[float(cell) for cell in line.split(",")] for line in lines if line.strip()]
+    return np.array(rows, dtype=np.float64)

@@ -1,0 +1,118 @@
+"""Size of source: what each sensor integrates, by exact area weights."""
+
+from math import sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from chipglow.scene import Raster
+
+_ROUNDING: Final = 1e-6
+"""Share of a sensor by which it may stick out of the scene: rounding of lengths, no more."""
+
+
+def overlap_lengths(
+    left: NDArray[np.float64], width: float, samples: int, spacing: float
+) -> NDArray[np.float64]:
+    """Length that each interval shares with each sample of a line.
+
+    Parameters
+    ----------
+    left : ndarray
+        Where the intervals begin in m from the beginning of the first sample, shape (n,).
+    width : float
+        Length of every interval in m.
+    samples : int
+        Number of samples of the line.
+    spacing : float
+        Length of a sample in m.
+
+    Returns
+    -------
+    ndarray
+        Lengths in m, shape (n, samples).
+    """
+    edges = spacing * np.arange(samples + 1, dtype=np.float64)
+    begin = np.maximum(left[:, None], edges[None, :-1])
+    end = np.minimum(left[:, None] + width, edges[None, 1:])
+    return np.asarray(np.maximum(end - begin, 0.0))
+
+
+def sensor_raster(
+    scene: Raster, pitch: float, offset: tuple[float, float], shape: tuple[int, int] | None
+) -> Raster:
+    """Where the sensors lie on a scene.
+
+    Parameters
+    ----------
+    scene : Raster
+        The scene's samples.
+    pitch : float
+        Distance between sensors in m, on the scene.
+    offset : tuple of float
+        Corner of the first sensor in m, right of and down from the scene's upper left corner.
+    shape : tuple of int, optional
+        Rows and columns of sensors; as many whole sensors as fit by default.
+
+    Raises
+    ------
+    ValueError
+        If not one sensor fits, or `shape` reaches beyond the scene.
+    """
+    left, right, bottom, top = scene.extent
+    room = (top - bottom - offset[1], right - left - offset[0])
+    rows, columns = (int(length / pitch + _ROUNDING) for length in room)
+    if min(offset) < 0 or min(rows, columns) < 1:
+        raise ValueError(
+            f"camera: pitch of {pitch:g} m at an offset of {offset[0]:g}, {offset[1]:g} m does not "
+            f"fit the scene of {right - left:g} x {top - bottom:g} m"
+        )
+    if shape is not None and (shape[0] > rows or shape[1] > columns):
+        raise ValueError(
+            f"camera: shape is {shape[0]} x {shape[1]} sensors, but only {rows} x {columns} of "
+            f"{pitch:g} m fit the scene of {right - left:g} x {top - bottom:g} m"
+        )
+    rows, columns = shape or (rows, columns)
+    return Raster(left + offset[0], top - offset[1], pitch, rows, columns)
+
+
+def integrate(
+    radiance: NDArray[np.float64], scene: Raster, sensors: Raster, fill_factor: float
+) -> NDArray[np.float64]:
+    """Mean radiance over the sensitive square of every sensor.
+
+    Parameters
+    ----------
+    radiance : ndarray
+        Radiance of the scene's samples in W/(m² sr), shape `scene.shape`.
+    scene, sensors : Raster
+        Where the samples and the sensors are.
+    fill_factor : float
+        Share of a sensor's square that is sensitive: a square in its middle.
+
+    Returns
+    -------
+    ndarray
+        Radiance in W/(m² sr), shape `sensors.shape`.
+    """
+    down = _line_weights(
+        scene.top - sensors.top, scene.rows, sensors.rows, scene, sensors, fill_factor
+    )
+    across = _line_weights(
+        sensors.left - scene.left, scene.columns, sensors.columns, scene, sensors, fill_factor
+    )
+    # Sparse products are summed in one order, whatever the number of threads.
+    return np.asarray((across @ (down @ radiance).T).T)
+
+
+def _line_weights(
+    begin: float, samples: int, count: int, scene: Raster, sensors: Raster, fill_factor: float
+) -> sparse.csr_array:
+    """Weights of a line of samples in a line of sensors, each row of sum 1."""
+    side = sensors.spacing * sqrt(fill_factor)
+    first = begin + (sensors.spacing - side) / 2
+    left = first + sensors.spacing * np.arange(count, dtype=np.float64)
+    lengths = overlap_lengths(left, side, samples, scene.spacing)
+    return sparse.csr_array(lengths / lengths.sum(axis=1, keepdims=True))
