@@ -1,0 +1,42 @@
+"""Analysis: errors of the measurement, the rake face, the shear band and the segments."""
+
+from chipglow.analysis.band_error import BandErrors, band_errors
+from chipglow.analysis.error import (
+    ErrorImages,
+    ReferenceKind,
+    error_images,
+    reference_temperature,
+)
+from chipglow.analysis.lines import Line, sample, straight_line
+from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
+from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
+from chipglow.analysis.segmentation import Segmentation, segmentation
+from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
+from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear_band
+
+__all__ = [
+    "PAPER",
+    "BandErrors",
+    "ErrorImages",
+    "Line",
+    "NoShearBandError",
+    "Plan",
+    "RakeErrors",
+    "ReferenceKind",
+    "Segmentation",
+    "Sensitivity",
+    "Setting",
+    "ShearBand",
+    "StudyResult",
+    "analyse",
+    "band_errors",
+    "contact_length",
+    "error_images",
+    "find_shear_band",
+    "rake_errors",
+    "reference_temperature",
+    "sample",
+    "segmentation",
+    "sensitivity",
+    "straight_line",
+]

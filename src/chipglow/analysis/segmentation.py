@@ -1,0 +1,143 @@
+"""Segmentation of the chip as the cutting force tells it."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import nan, sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import detrend, find_peaks
+
+_WEAKEST_CORRELATION: Final = 0.2
+
+
+@dataclass(frozen=True)
+class Segmentation:
+    """Segments in a force history.
+
+    Parameters
+    ----------
+    start : float
+        Time in s from which the history counts: what is before is the first build-up of the chip.
+    period : float
+        Mean time from one force peak to the next in s; NaN if the force shows no period.
+    period_uncertainty : float
+        Standard uncertainty of the period in s: the deviation of the intervals over the root of
+        their number; NaN for less than two intervals.
+    correlation_period : float
+        The period in s from the autocorrelation of the whole history, as a check.
+    peaks : ndarray
+        Times of the force peaks in s.
+    cutting_mean, thrust_mean : float
+        Mean forces per width of cut from `start` on in N/m.
+    cutting_swing, thrust_swing : float
+        Mean height of the forces' peaks over the valleys between them in N/m; NaN without peaks.
+    """
+
+    start: float
+    period: float
+    period_uncertainty: float
+    correlation_period: float
+    peaks: NDArray[np.float64]
+    cutting_mean: float
+    thrust_mean: float
+    cutting_swing: float
+    thrust_swing: float
+
+    @property
+    def segments(self) -> int:
+        """Number of whole segments: peaks of the cutting force."""
+        return int(self.peaks.size)
+
+
+def segmentation(
+    time: ArrayLike, cutting_force: ArrayLike, thrust_force: ArrayLike
+) -> Segmentation:
+    """Period and swing of the segments from the history of the forces.
+
+    Parameters
+    ----------
+    time : array_like
+        Times in s, at even steps, shape (n,).
+    cutting_force, thrust_force : array_like
+        Forces per width of cut in N/m, shape (n,).
+
+    Raises
+    ------
+    ValueError
+        If the times do not ascend evenly or there are fewer than 16.
+
+    Notes
+    -----
+    The history counts from where the cutting force first reaches the median of its second half.
+    The autocorrelation of what remains gives a first period; the force is smoothed over a
+    fifteenth of it, and its peaks, at least six tenths of a period apart and a third of the swing
+    high, give the period and its uncertainty.
+    """
+    times = np.asarray(time, dtype=np.float64)
+    cutting = np.asarray(cutting_force, dtype=np.float64)
+    thrust = np.asarray(thrust_force, dtype=np.float64)
+    steps = np.diff(times)
+    if times.size < 16 or (steps <= 0).any() or not np.allclose(steps, steps.mean(), rtol=0.01):
+        raise ValueError("force history: expected 16 or more times at even ascending steps")
+    step = float(steps.mean())
+    first = int(np.argmax(cutting >= np.median(cutting[cutting.size // 2 :])))
+    times, cutting, thrust = times[first:], cutting[first:], thrust[first:]
+    coarse = _correlation_period(cutting, step)
+    peaks = np.zeros(0, dtype=np.int64)
+    swings = [nan, nan]
+    if np.isfinite(coarse):
+        smooth = [gaussian_filter1d(force, coarse / step / 15) for force in (cutting, thrust)]
+        peaks = _peaks(smooth[0], coarse / step)
+        swings = [_swing(force, peaks) for force in smooth]
+    intervals = np.diff(times[peaks])
+    return Segmentation(
+        start=float(times[0]),
+        period=float(intervals.mean()) if intervals.size else coarse,
+        period_uncertainty=(
+            float(intervals.std(ddof=1)) / sqrt(intervals.size) if intervals.size > 1 else nan
+        ),
+        correlation_period=coarse,
+        peaks=times[peaks],
+        cutting_mean=float(cutting.mean()),
+        thrust_mean=float(thrust.mean()),
+        cutting_swing=swings[0],
+        thrust_swing=swings[1],
+    )
+
+
+def _correlation_period(force: NDArray[np.float64], step: float) -> float:
+    """Lag of the first high peak of the unbiased autocorrelation; NaN if there is none."""
+    if force.size < 8:
+        return nan
+    swing = detrend(force)
+    spectrum = np.fft.rfft(swing, 2 * swing.size)
+    raw = np.fft.irfft(np.abs(spectrum) ** 2)[: swing.size]
+    if not raw[0] > 0:
+        return nan
+    lags = slice(0, swing.size * 2 // 3)
+    correlation = (raw / np.arange(swing.size, 0, -1))[lags]
+    correlation /= correlation[0]
+    correlation = gaussian_filter1d(correlation, 2.0)
+    down = np.flatnonzero(correlation < 0)
+    if down.size == 0:
+        return nan
+    peaks, _ = find_peaks(correlation, height=_WEAKEST_CORRELATION)
+    peaks = peaks[peaks > down[0]]
+    return float(peaks[0] * step) if peaks.size else nan
+
+
+def _peaks(force: NDArray[np.float64], period: float) -> NDArray[np.int64]:
+    low, high = np.percentile(force, [5.0, 95.0])
+    peaks, _ = find_peaks(force, distance=max(0.6 * period, 1.0), prominence=(high - low) / 3)
+    return np.asarray(peaks, dtype=np.int64)
+
+
+def _swing(force: NDArray[np.float64], peaks: NDArray[np.int64]) -> float:
+    """Mean height of the peaks over the valleys between them."""
+    if peaks.size < 2:
+        return nan
+    heights = [max(force[a], force[b]) - force[a:b].min() for a, b in pairwise(peaks)]
+    return float(np.mean(heights))
