@@ -1,0 +1,23 @@
+"""Studies: what to cut, look at and analyse, as a YAML file or in Python."""
+
+from chipglow.study.cache import CachedScene, cache_folder, cached_scenes, clear_cache
+from chipglow.study.files import StudyError, load_study
+from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, run
+from chipglow.study.schema import Study
+from chipglow.study.template import study_text
+
+__all__ = [
+    "CUTTING_STEP",
+    "CachedScene",
+    "Progress",
+    "Study",
+    "StudyError",
+    "cache_folder",
+    "cached_scenes",
+    "clear_cache",
+    "cut",
+    "is_cut",
+    "load_study",
+    "run",
+    "study_text",
+]

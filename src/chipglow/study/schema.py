@@ -1,0 +1,546 @@
+"""What a study says: its sections and fields, the paper's study as defaults, what they mean."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal, Self
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    Strict,
+    ValidationInfo,
+    WrapSerializer,
+    field_validator,
+    model_validator,
+)
+
+from chipglow.analysis.paper import Plan
+from chipglow.camera import (
+    AnnularAperturePSF,
+    Camera,
+    GaussianPSF,
+    MeasuredPSF,
+    PointSpreadFunction,
+)
+from chipglow.cutting import (
+    AISI_1045,
+    CARBIDE,
+    CuttingConditions,
+    CuttingSimulation,
+    Friction,
+    Numerics,
+    OutputWindow,
+    ToolMaterial,
+    WorkpieceMaterial,
+)
+from chipglow.radiometry import Band
+from chipglow.scene import Raster, ToolGeometry
+from chipglow.study.units import (
+    Angle,
+    CutLength,
+    Frequency,
+    Length,
+    Position,
+    Speed,
+    Temperature,
+    Time,
+    Wavelength,
+    WavelengthRange,
+)
+from chipglow.surface import CHIP_1, CHIP_2, Emissivity, FeatureSurface
+
+WORKPIECES: Final[Mapping[str, WorkpieceMaterial]] = {"aisi-1045": AISI_1045}
+"""Materials of the workpiece by the names of a study."""
+TOOL_MATERIALS: Final[Mapping[str, ToolMaterial]] = {"carbide": CARBIDE}
+"""Materials of the tool by the names of a study."""
+CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2}
+"""Chips of the paper's Table 1 by the names of a study."""
+
+
+def _none_of_text(value: object) -> object:
+    return None if value == "none" else value
+
+
+def _text_of_none(value: object, handler: SerializerFunctionWrapHandler) -> object:
+    return "none" if value is None else handler(value)
+
+
+_NONE: Final = (BeforeValidator(_none_of_text), WrapSerializer(_text_of_none, when_used="json"))
+
+
+def _field(default: object, description: str) -> Any:
+    """Field with its default as a YAML file would give it and the comment of the template."""
+    return Field(default, description=description, validate_default=True)
+
+
+class Section(BaseModel):
+    """A section of a study. Unknown keys are refused, an empty section means the defaults."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, data: object) -> object:
+        if data is None:
+            return {}
+        if isinstance(data, Section):
+            return data
+        known = ", ".join(cls.model_fields)
+        if not isinstance(data, Mapping):
+            raise ValueError(f"{data!r} is no section, expected keys of {known}")
+        for key in data:
+            if key not in cls.model_fields:
+                close = get_close_matches(str(key), list(cls.model_fields), n=1)
+                hint = f"did you mean {close[0]!r}?" if close else f"expected one of {known}"
+                raise ValueError(f"unknown key {key!r}, {hint}")
+        return data
+
+
+class Part(Section):
+    """A section that describes one object of the library, which says what is possible."""
+
+    @abstractmethod
+    def build(self) -> Any:
+        """The object that this section describes."""
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        self.build()
+        return self
+
+
+class ToolSection(Part):
+    """The cutting tool."""
+
+    rake_angle: Angle = _field("-7 deg", "Rake angle; negative: the rake face leans over the chip.")
+    clearance_angle: Angle = _field("7 deg", "Angle between the tool's flank and the cut surface.")
+    edge_radius: Length = _field("20 um", "Radius of the cutting edge.")
+    material: str = _field("carbide", f"Material of the tool: {', '.join(TOOL_MATERIALS)}.")
+
+    @field_validator("material")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return _known_name(name, TOOL_MATERIALS)
+
+    def build(self) -> ToolGeometry:
+        """The tool's outline."""
+        return ToolGeometry(self.rake_angle, self.clearance_angle, self.edge_radius)
+
+
+class FrictionSection(Part):
+    """Friction between chip and tool."""
+
+    coefficient: float = _field(0.5, "Coulomb's coefficient.")
+    shear_fraction: float = _field(
+        1.0, "Limit of the friction stress, as a share of the chip's shear flow stress."
+    )
+
+    def build(self) -> Friction:
+        """The law of friction."""
+        return Friction(coefficient=self.coefficient, shear_fraction=self.shear_fraction)
+
+
+class NumericsSection(Part):
+    """How finely the cut is computed."""
+
+    cell: Length = _field("10 um", "Side of a cell of the grid; half of it takes eight times long.")
+    mass_scaling: float = _field(
+        100.0, "Factor on the density in the equation of motion, for longer time steps."
+    )
+    courant: float = _field(0.35, "Time step as a share of the time that sound takes for a cell.")
+    points_per_side: int = _field(2, "Material points along the side of a cell.")
+
+    def build(self) -> Numerics:
+        """Settings of the solver."""
+        return Numerics(
+            cell=self.cell,
+            mass_scaling=self.mass_scaling,
+            courant=self.courant,
+            points_per_side=self.points_per_side,
+        )
+
+
+class WindowSection(Part):
+    """The part of the cut that becomes the scene."""
+
+    start: CutLength = _field("1.579 mm", "Length of cut at the first frame.")
+    end: CutLength = _field("1.958 mm", "Length of cut at the last frame.")
+    interval: Time = _field("0.2 us", "Time between frames.")
+
+    def build(self) -> OutputWindow:
+        """When the solver hands out frames."""
+        return OutputWindow(start=self.start, end=self.end, interval=self.interval)
+
+
+class FieldOfViewSection(Part):
+    """Where the scene is sampled. The tip of the tool is near the origin, y points up."""
+
+    left: Position = _field("-420 um", "Left edge of the scene.")
+    top: Position = _field("460 um", "Upper edge of the scene.")
+    spacing: Length = _field("0.66667 um", "Side of a sample; the paper has 9 to a sensor.")
+    rows: int = _field(810, "Samples from top to bottom.")
+    columns: int = _field(900, "Samples from left to right.")
+
+    def build(self) -> Raster:
+        """The grid of samples."""
+        return Raster(self.left, self.top, self.spacing, self.rows, self.columns)
+
+
+class CuttingSection(Part):
+    """The cutting simulation; the paper's Table 2."""
+
+    speed: Speed = _field("250 m/min", "Cutting speed.")
+    feed: CutLength = _field("0.3 mm", "Feed: thickness of the uncut chip.")
+    length_of_cut: CutLength = _field("1.958 mm", "Length of cut, from the first contact.")
+    initial_temperature: Temperature = _field("20 degC", "Temperature before the cut.")
+    workpiece: str = _field("aisi-1045", f"Material of the workpiece: {', '.join(WORKPIECES)}.")
+    tool: ToolSection = _field({}, "The cutting tool.")
+    friction: FrictionSection = _field({}, "Friction between chip and tool.")
+    numerics: NumericsSection = _field({}, "How finely the cut is computed.")
+    window: WindowSection = _field({}, "The part of the cut that becomes the scene.")
+    field_of_view: FieldOfViewSection = _field(
+        {}, "Where the scene is sampled: the tool's tip is near the origin, y points up."
+    )
+
+    @field_validator("workpiece")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        return _known_name(name, WORKPIECES)
+
+    @model_validator(mode="after")
+    def _window_within_cut(self) -> Self:
+        if self.window.end > self.length_of_cut * (1 + 1e-9):
+            raise ValueError(
+                f"window.end: {self.window.end * 1e3:g} mm is beyond length_of_cut, "
+                f"expected up to {self.length_of_cut * 1e3:g} mm"
+            )
+        return self
+
+    @property
+    def duration(self) -> float:
+        """Time in s from the first to the last frame."""
+        return (self.window.end - self.window.start) / self.speed
+
+    def build(self) -> CuttingConditions:
+        """Conditions of the cut."""
+        return CuttingConditions(
+            speed=self.speed,
+            feed=self.feed,
+            length_of_cut=self.length_of_cut,
+            initial_temperature=self.initial_temperature,
+        )
+
+    def simulation(self) -> CuttingSimulation:
+        """The simulation that this section describes."""
+        return CuttingSimulation(
+            conditions=self.build(),
+            tool=self.tool.build(),
+            workpiece=WORKPIECES[self.workpiece],
+            tool_material=TOOL_MATERIALS[self.tool.material],
+            friction=self.friction.build(),
+            numerics=self.numerics.build(),
+        )
+
+
+class EmissivitySection(Part):
+    """Emissivity of one feature."""
+
+    mean: float = Field(description="Mean emissivity.")
+    deviation: float = Field(description="Standard deviation over the surface.")
+
+    def build(self) -> Emissivity:
+        """Mean and deviation."""
+        return Emissivity(self.mean, self.deviation)
+
+
+def _numbers(emissivity: Emissivity) -> dict[str, float]:
+    return {"mean": emissivity.mean, "deviation": emissivity.deviation}
+
+
+class ChipSection(Section):
+    """Emissivity of one chip."""
+
+    body: EmissivitySection = Field(description="Body of the segments.")
+    shear_band: EmissivitySection = Field(description="Shear bands: the fissures of the chip.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _preset(cls, data: object) -> object:
+        if not isinstance(data, str):
+            return data
+        preset = CHIPS[_known_name(data, CHIPS)]
+        return {"body": _numbers(preset.chip), "shear_band": _numbers(preset.shear_band)}
+
+
+class SurfaceSection(Section):
+    """Emissivity maps."""
+
+    chips: dict[str, ChipSection] = _field(
+        {"chip 1": "chip-1", "chip 2": "chip-2"},
+        "Chips by name, each laid on the same scene. A chip is chip-1 or chip-2 (the paper's\n"
+        "Table 1), or the numbers of its body and shear bands.",
+    )
+    workpiece: EmissivitySection = _field(
+        _numbers(CHIP_1.workpiece), "The uncut workpiece; the paper assumed these numbers."
+    )
+    tool: EmissivitySection = _field(_numbers(CHIP_1.tool), "The tool's side.")
+    grain: Length = _field("20 um", "Size of a grain of the emissivity's texture.")
+    follow: Literal["material", "mean"] = _field(
+        "material",
+        "How textures move: material (each point keeps its own) or mean (the paper's shift by\n"
+        "the feature's mean velocity).",
+    )
+    restore_deviation: bool = _field(
+        True, "Make up for the deviation that is lost when a texture is enlarged."
+    )
+
+    @field_validator("chips")
+    @classmethod
+    def _at_least_one(cls, chips: dict[str, ChipSection]) -> dict[str, ChipSection]:
+        if not chips:
+            raise ValueError("{} is empty, expected one chip or more, such as chip 1: chip-1")
+        return chips
+
+    def build(self, seed: int) -> dict[str, FeatureSurface]:
+        """The surfaces by name.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of the textures, the same for every chip: they differ by their numbers only.
+        """
+        return {
+            name: FeatureSurface(
+                chip=chip.body.build(),
+                shear_band=chip.shear_band.build(),
+                workpiece=self.workpiece.build(),
+                tool=self.tool.build(),
+                grain=self.grain,
+                follow=self.follow,
+                seed=seed,
+                restore_deviation=self.restore_deviation,
+            )
+            for name, chip in self.chips.items()
+        }
+
+
+class AnnularApertureSection(Part):
+    """Diffraction of a reflecting microscope objective."""
+
+    kind: Literal["annular-aperture"] = _field(
+        "annular-aperture",
+        "Diffraction of a reflecting microscope objective. Other kinds:\n"
+        "  {kind: gaussian, fwhm: 12 um}  full width at half maximum\n"
+        "  {kind: measured, file: psf.npy, spacing: 1 um}  .npy or .csv, side of its samples",
+    )
+    wavelength: Wavelength = _field("4.5 um", "Wavelength of the diffraction.")
+    numerical_aperture: float = _field(0.28, "Numerical aperture of the objective.")
+    obscuration: float = _field(0.35, "Diameter of the central obstruction, as a share.")
+
+    def build(self) -> PointSpreadFunction:
+        """The point spread function."""
+        return AnnularAperturePSF(self.wavelength, self.numerical_aperture, self.obscuration)
+
+
+class GaussianSection(Part):
+    """A Gaussian."""
+
+    kind: Literal["gaussian"] = _field("gaussian", "A Gaussian.")
+    fwhm: Length = Field(description="Full width at half maximum.")
+
+    def build(self) -> PointSpreadFunction:
+        """The point spread function."""
+        return GaussianPSF(self.fwhm)
+
+
+class MeasuredSection(Part):
+    """A kernel from a file."""
+
+    kind: Literal["measured"] = _field("measured", "A kernel from a file.")
+    file: str = Field(description="File of the kernel, .npy or .csv.")
+    spacing: Length = Field(description="Side of the kernel's samples.")
+
+    @field_validator("file")
+    @classmethod
+    def _beside_the_study(cls, file: str, info: ValidationInfo) -> str:
+        folder = (info.context or {}).get("folder")
+        return str(Path(folder or ".", file).resolve())
+
+    def build(self) -> PointSpreadFunction:
+        """The point spread function."""
+        try:
+            return MeasuredPSF.from_file(self.file, self.spacing)
+        except OSError as error:
+            raise ValueError(f"file: {self.file}: {error.strerror}") from None
+
+
+PSFSection = Annotated[
+    AnnularApertureSection | GaussianSection | MeasuredSection, Field(discriminator="kind")
+]
+
+
+class CameraSection(Part):
+    """The infrared camera."""
+
+    band: WavelengthRange = _field("3.8-5.1 um", "Spectral band.")
+    pitch: Length = _field("6 um", "Distance between sensors, as seen on the scene.")
+    fill_factor: float = _field(1.0, "Share of a sensor's square that takes light.")
+    offset_right: Position = _field("0 um", "First sensor's corner from the scene's left edge.")
+    offset_down: Position = _field("0 um", "First sensor's corner from the scene's upper edge.")
+    psf: Annotated[PSFSection | None, *_NONE] = _field(
+        {"kind": "annular-aperture"},
+        "Point spread function of the optics, or none.",
+    )
+    psf_order: Literal["optics", "sensor"] = _field(
+        "sensor",
+        "sensor (the paper's: on the sensors' values) or optics (on the samples, before the\n"
+        "sensors integrate).",
+    )
+    integration_time: Time = _field("10 us", "Exposure.")
+    frame_rate: Frequency = _field("600 Hz", "Frames a second.")
+    floor: Annotated[Temperature | None, *_NONE] = _field(
+        "300 degC", "Radiance temperatures under this are flagged, not returned; or none."
+    )
+    reflected: Annotated[Temperature | None, *_NONE] = _field(
+        "none", "Temperature of the surroundings that the surface reflects, or none."
+    )
+
+    def build(self) -> Camera:
+        """The camera."""
+        return Camera(
+            band=Band(*self.band),
+            pitch=self.pitch,
+            offset=(self.offset_right, self.offset_down),
+            fill_factor=self.fill_factor,
+            psf=None if self.psf is None else self.psf.build(),
+            psf_order=self.psf_order,
+            integration_time=self.integration_time,
+            frame_rate=self.frame_rate,
+            floor=self.floor,
+            reflected=self.reflected,
+        )
+
+
+class AnalysisSection(Part):
+    """What is computed from the simulated measurement."""
+
+    instants: int = _field(9, "Exposures, spread evenly over the scene.")
+    rake_chip: str = _field(
+        "chip 2", "Chip whose errors are read at the rake face; the paper took its chip 2."
+    )
+    band_chip: str = _field(
+        "chip 1", "Chip whose errors are read at the shear band; the paper took its chip 1."
+    )
+    reference: Literal["maximum", "mean", "centre", "true"] = _field(
+        "maximum",
+        "What a pixel's measured temperature is compared with, in its square during the exposure:\n"
+        "the greatest radiance temperature (maximum, the paper's), that of the mean radiance\n"
+        "(mean), that in the middle of both (centre) or the greatest true temperature (true).",
+    )
+    psf_widths: Annotated[tuple[Length, ...], Strict(False)] = _field(
+        [f"{width} um" for width in range(4, 21)],
+        "Full widths at half maximum of Gaussians for which the headline errors are shown.",
+    )
+
+    def build(self) -> Plan:
+        """What to analyse."""
+        return Plan(
+            instants=self.instants,
+            rake_surface=self.rake_chip,
+            band_surface=self.band_chip,
+            psf_widths=self.psf_widths,
+            reference=self.reference,
+        )
+
+
+class Study(Section):
+    """A study: the paper's by default.
+
+    Sections take what a YAML file would give: text with units, or plain numbers where there is no
+    unit. Values are held in SI.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        If a field is unknown or its value impossible; a ValueError.
+
+    Examples
+    --------
+    >>> study = Study(camera={"pitch": "5 um"})
+    >>> study.camera.pitch
+    5e-06
+    """
+
+    title: str = _field(
+        "The effects of emissivity and camera point spread function (Heigel and Whitenton 2010)",
+        "What the report is headed with.",
+    )
+    seed: int = _field(2010, "Seed of all random numbers.")
+    cutting: CuttingSection = _field({}, "The cutting simulation; defaults: the paper's Table 2.")
+    surface: SurfaceSection = _field({}, "Emissivity maps; defaults: the paper's Table 1.")
+    camera: CameraSection = _field({}, "The infrared camera.")
+    analysis: AnalysisSection = _field({}, "What is computed from the simulated measurement.")
+
+    @classmethod
+    def quick(cls) -> Self:
+        """The paper's study on a coarse cell and coarse samples, for a first look and for tests."""
+        return cls.model_validate(
+            {
+                "title": "Quick look at the study of Heigel and Whitenton (2010)",
+                "cutting": {
+                    "numerics": {"cell": "20 um"},
+                    "window": {"interval": "0.5 us"},
+                    "field_of_view": {"spacing": "1.33333 um", "rows": 405, "columns": 450},
+                },
+                "analysis": {"instants": 5, "psf_widths": ["4 um", "8 um", "12 um", "20 um"]},
+            }
+        )
+
+    @field_validator("seed")
+    @classmethod
+    def _not_negative(cls, seed: int) -> int:
+        if seed < 0:
+            raise ValueError(f"{seed} is negative, expected 0 or more")
+        return seed
+
+    @model_validator(mode="after")
+    def _chips_are_there(self) -> Self:
+        for field in ("rake_chip", "band_chip"):
+            name = getattr(self.analysis, field)
+            if name not in self.surface.chips:
+                known = ", ".join(self.surface.chips)
+                raise ValueError(f"analysis.{field}: {name!r} is unknown, expected one of {known}")
+        return self
+
+    @model_validator(mode="after")
+    def _camera_fits_scene(self) -> Self:
+        camera, cutting = self.camera, self.cutting
+        if camera.integration_time > cutting.duration:
+            raise ValueError(
+                f"camera.integration_time: {camera.integration_time * 1e6:g} us is longer than the "
+                f"scene, expected up to the {cutting.duration * 1e6:.4g} us of cutting.window"
+            )
+        if cutting.window.interval > camera.integration_time:
+            raise ValueError(
+                f"cutting.window.interval: {cutting.window.interval * 1e6:g} us is longer than the "
+                f"exposure, expected up to {camera.integration_time * 1e6:g} us"
+            )
+        view = cutting.field_of_view
+        extent = view.spacing * min(view.rows, view.columns)
+        if camera.pitch > extent * (1 + 1e-9):
+            raise ValueError(
+                f"camera.pitch: {camera.pitch * 1e6:g} um is larger than the field of view, "
+                f"expected up to the {extent * 1e6:g} um of cutting.field_of_view"
+            )
+        return self
+
+
+def _known_name(name: str, names: Mapping[str, object]) -> str:
+    if name not in names:
+        raise ValueError(f"{name!r} is unknown, expected one of {', '.join(names)}")
+    return name

@@ -1,0 +1,49 @@
+"""Studies as commented YAML."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+import yaml
+from pydantic import BaseModel
+
+from chipglow.study.schema import Section, Study
+
+_HEADER: Final = """\
+# A study of chipglow. Run it with: chipglow run FILE --out FOLDER
+# Quantities carry their unit, in any unit of their kind: 10 us, 0.3 mm, 250 m/min, 391 degC.
+# What is left out has the value of the paper's study: Heigel and Whitenton (2010).
+"""
+
+
+def study_text(study: Study) -> str:
+    """A study as YAML, every field with a comment; `load_study` reads the same study from it."""
+    return "\n".join([_HEADER, *_section_lines(study, study.model_dump(mode="json"), "")]) + "\n"
+
+
+def _section_lines(section: Section, values: Mapping[str, Any], indent: str) -> Iterator[str]:
+    for name, field in type(section).model_fields.items():
+        value = getattr(section, name)
+        if not indent and isinstance(value, BaseModel):
+            yield ""
+        for line in (field.description or "").splitlines():
+            yield f"{indent}# {line}"
+        yield from _entry_lines(name, value, values[name], indent)
+
+
+def _entry_lines(name: str, value: object, plain: Any, indent: str) -> Iterator[str]:
+    if isinstance(value, Section):
+        yield f"{indent}{_scalar(name)}:"
+        yield from _section_lines(value, plain, indent + "  ")
+    elif isinstance(value, Mapping):
+        yield f"{indent}{_scalar(name)}:"
+        for key, item in value.items():
+            yield from _entry_lines(key, item, plain[key], indent + "  ")
+    else:
+        yield f"{indent}{_scalar(name)}: {_scalar(plain)}"
+
+
+def _scalar(value: Any) -> str:
+    text: str = yaml.safe_dump(
+        value, default_flow_style=True, allow_unicode=True, width=float("inf"), sort_keys=False
+    )
+    return text.removesuffix("\n").removesuffix("\n...")

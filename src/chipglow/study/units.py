@@ -1,0 +1,174 @@
+"""Quantities with units at the border: text such as ``10 us`` to SI numbers and back."""
+
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import cache
+from math import isfinite
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+if TYPE_CHECKING:
+    from pint import UnitRegistry
+
+_NUMBER: Final = r"\d{1,40}(?:\.\d{0,40})?(?:[eE][+-]?\d{1,3})?|\.\d{1,40}(?:[eE][+-]?\d{1,3})?"
+_UNIT: Final = r"[A-Za-z°µμ][A-Za-z0-9°µμ/*^ .-]{0,60}"
+_QUANTITY: Final = re.compile(rf"\s*([-+−]?(?:{_NUMBER}))\s*({_UNIT})\s*")
+_RANGE: Final = re.compile(rf"\s*({_NUMBER})\s*[-–]\s*({_NUMBER})\s*({_UNIT})?\s*")
+_BARE: Final = re.compile(rf"\s*[-+−]?(?:{_NUMBER})\s*")
+_MOST_DIGITS: Final = 21
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """How a field of a study is written: which kind of quantity, and in which unit.
+
+    An annotation of pydantic fields: they take text and hold SI floats.
+
+    Parameters
+    ----------
+    kind : str
+        Name of the quantity with its article, as errors call it.
+    base : str
+        The SI unit of the value.
+    unit : str
+        The unit in which the value is written.
+    example : str
+        A value as errors show it.
+    positive : bool
+        Whether the value in SI must be over 0.
+    """
+
+    kind: str
+    base: str
+    unit: str
+    example: str
+    positive: bool = True
+
+    def parse(self, value: object) -> float:
+        """SI number of a text such as ``10 us``.
+
+        Raises
+        ------
+        ValueError
+            If the text has no unit, another quantity's unit, or a value that is out of range.
+        """
+        if is_bare_number(value):
+            raise ValueError(f"{value} has no unit, {self.expected}")
+        match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
+        if match is None:
+            raise ValueError(self._not_this_kind(value))
+        return self._to_base(str(value), match[1], match[2])
+
+    def parse_range(self, value: object) -> tuple[float, float]:
+        """SI limits of a text such as ``3.8-5.1 um``.
+
+        Raises
+        ------
+        ValueError
+            As `parse`, and if the lower limit does not come first.
+        """
+        match = _RANGE.fullmatch(value) if isinstance(value, str) else None
+        if match is None or not match[3]:
+            raise ValueError(
+                f"{value} has no unit, {self.expected}" if match else self._not_this_kind(value)
+            )
+        lower, upper = (self._to_base(str(value), match[i], match[3]) for i in (1, 2))
+        if not lower < upper:
+            raise ValueError(f"{value} is reversed, {self.expected}, the lower limit first")
+        return lower, upper
+
+    def text(self, value: float) -> str:
+        """Shortest text in this quantity's unit that is read back as the same number."""
+        return f"{self._number(value)} {self.unit}"
+
+    def range_text(self, limits: tuple[float, float]) -> str:
+        """Text of a range that is read back as the same numbers."""
+        return f"{self._number(limits[0])}-{self._number(limits[1])} {self.unit}"
+
+    @property
+    def expected(self) -> str:
+        """What a field of this quantity expects, as errors say it."""
+        return f"expected {self.kind} such as {self.example}"
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Schema of a field with this annotation: one number, or a pair of limits."""
+        one = (self.parse, self.text)
+        parse, text = one if source is float else (self.parse_range, self.range_text)
+        return core_schema.no_info_plain_validator_function(
+            parse,
+            serialization=core_schema.plain_serializer_function_ser_schema(text, when_used="json"),
+        )
+
+    def _to_base(self, value: str, number: str, unit: str) -> float:
+        decimal = Decimal(number.replace("−", "-"))
+        try:
+            result = float(_registry().Quantity(decimal, _unit(unit)).to(self.base).magnitude)
+        # A malformed or foreign unit ends in pint as anything from AssertionError to TokenError.
+        except Exception:
+            raise ValueError(self._not_this_kind(value)) from None
+        if not isfinite(result):
+            raise ValueError(f"{value} is not finite, {self.expected}")
+        if self.positive and result <= 0:
+            raise ValueError(f"{value} is not over 0{self._zero}, {self.expected}")
+        return result
+
+    def _not_this_kind(self, value: object) -> str:
+        return f"{value!r} is not {self.kind}, expected one such as {self.example}"
+
+    @property
+    def _zero(self) -> str:
+        return " K" if self.base == "K" else ""
+
+    def _number(self, value: float) -> str:
+        exact = _registry().Quantity(Decimal(repr(value)), self.base).to(self.unit).magnitude
+        for digits in range(1, _MOST_DIGITS):
+            rounded = Decimal(f"{exact:.{digits}g}")
+            number = f"{rounded:f}" if -7 < rounded.adjusted() < 12 else f"{rounded:g}"
+            if self._reads_back(number, value):
+                return number
+        raise ValueError(f"{value!r} {self.base} cannot be written in {self.unit}")
+
+    def _reads_back(self, number: str, value: float) -> bool:
+        decimal = Decimal(number)
+        return float(_registry().Quantity(decimal, self.unit).to(self.base).magnitude) == value
+
+
+def is_bare_number(value: object) -> bool:
+    """Whether a value from a YAML file is a number without a unit."""
+    if isinstance(value, str):
+        return _BARE.fullmatch(value) is not None
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+Length = Annotated[float, Quantity("a length", "m", "um", "6 um")]
+Position = Annotated[float, Quantity("a position", "m", "um", "-420 um", positive=False)]
+CutLength = Annotated[float, Quantity("a length", "m", "mm", "0.3 mm")]
+Wavelength = Annotated[float, Quantity("a wavelength", "m", "um", "4.5 um")]
+WavelengthRange = Annotated[
+    tuple[float, float], Quantity("a band of wavelengths", "m", "um", "3.8-5.1 um")
+]
+TIME: Final = Quantity("a time", "s", "us", "10 us")
+Time = Annotated[float, TIME]
+Frequency = Annotated[float, Quantity("a frequency", "Hz", "Hz", "600 Hz")]
+Speed = Annotated[float, Quantity("a speed", "m/s", "m/min", "250 m/min")]
+Angle = Annotated[float, Quantity("an angle", "rad", "deg", "-7 deg", positive=False)]
+Temperature = Annotated[float, Quantity("a temperature", "K", "degC", "300 degC")]
+
+
+@cache
+def _registry() -> "UnitRegistry[Decimal]":
+    # Loading pint takes a third of a second: only who reads or writes quantities pays for it.
+    # Decimals make 10 us exactly the float 1e-5; binary floats would miss by a rounding.
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Decimal)
+
+
+@cache
+def _unit(text: str) -> Any:
+    return _registry().parse_units(text.strip())

@@ -1,0 +1,498 @@
+import os
+import threading
+from dataclasses import replace
+from math import isfinite, radians
+from pathlib import Path
+
+import numpy as np
+import pytest
+from analytic_chip import AnalyticChip
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from chipglow.analysis.paper import Plan
+from chipglow.camera import Camera, GaussianPSF, MeasuredPSF
+from chipglow.cutting import (
+    CuttingConditions,
+    CuttingSimulation,
+    ForceHistory,
+    Friction,
+    Numerics,
+    OutputWindow,
+)
+from chipglow.io import open_scene
+from chipglow.scene import ToolGeometry
+from chipglow.study import (
+    Study,
+    StudyError,
+    cached_scenes,
+    clear_cache,
+    cut,
+    is_cut,
+    load_study,
+    study_text,
+    units,
+)
+from chipglow.study.schema import Section
+from chipglow.surface import CHIP_1, CHIP_2
+
+
+def quantity(annotation):
+    return annotation.__metadata__[0]
+
+
+LENGTH, TEMPERATURE = quantity(units.Length), quantity(units.Temperature)
+QUANTITIES = [
+    quantity(getattr(units, name))
+    for name in [
+        "Length",
+        "Position",
+        "CutLength",
+        "Wavelength",
+        "Time",
+        "Frequency",
+        "Speed",
+        "Angle",
+        "Temperature",
+    ]
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "value"),
+    [
+        ("Time", "10 us", 10e-6),
+        ("Time", "0.2us", 0.2e-6),
+        ("Length", "6 um", 6e-6),
+        ("Length", "6 µm", 6e-6),
+        ("Length", "6000 nm", 6e-6),
+        ("CutLength", "1.579 mm", 1.579e-3),
+        ("Position", "-420 um", -420e-6),
+        ("Position", "−420 um", -420e-6),
+        ("Speed", "250 m/min", 250 / 60),
+        ("Angle", "-7 deg", radians(-7)),
+        ("Angle", "7°", radians(7)),
+        ("Temperature", "391 degC", 664.15),
+        ("Temperature", "300 °C", 573.15),
+        ("Temperature", "293 K", 293.0),
+        ("Frequency", "600 Hz", 600.0),
+        ("Frequency", "0.6 kHz", 600.0),
+        ("Length", "6e-3 mm", 6e-6),
+    ],
+)
+def test_quantities_are_exactly_the_float_that_python_writes(kind, text, value):
+    assert quantity(getattr(units, kind)).parse(text) == value
+
+
+def test_a_range_has_one_unit_for_both_limits():
+    assert quantity(units.WavelengthRange).parse_range("3.8-5.1 um") == (3.8e-6, 5.1e-6)
+
+
+@given(
+    st.sampled_from(QUANTITIES),
+    st.floats(min_value=1e-9, max_value=1e9, allow_nan=False),
+    st.booleans(),
+)
+def test_a_quantity_is_read_back_from_its_text_as_the_same_float(kind, value, negative):
+    if kind.base == "K":
+        value += 1.0  # nearer to 0 K, 25 digits of degC would be needed
+    if negative and not kind.positive:
+        value = -value
+    assert kind.parse(kind.text(value)) == value
+
+
+@given(st.lists(st.floats(min_value=1e-8, max_value=1e-3), min_size=2, max_size=2, unique=True))
+def test_a_range_is_read_back_from_its_text_as_the_same_floats(limits):
+    band = quantity(units.WavelengthRange)
+    pair = tuple(sorted(limits))
+    assert band.parse_range(band.range_text(pair)) == pair
+
+
+@given(
+    st.text()
+    | st.from_regex(r"[-+]?[0-9.e]{1,8} ?[a-zA-Z/*^ .0-9°µ]{0,9}", fullmatch=True)
+    | st.none()
+    | st.floats()
+    | st.lists(st.integers())
+)
+def test_any_other_value_is_one_line_of_error(value):
+    try:
+        assert isfinite(LENGTH.parse(value))
+    except ValueError as error:
+        assert "expected" in str(error)
+        assert "6 um" in str(error)
+
+
+def test_the_default_study_has_the_librarys_defaults():
+    study = Study()
+    cutting, camera = study.cutting, study.camera.build()
+    assert cutting.build() == CuttingConditions()
+    assert cutting.tool.build() == ToolGeometry()
+    assert cutting.friction.build() == Friction()
+    assert cutting.numerics.build() == Numerics()
+    assert cutting.window.build() == OutputWindow()
+    assert camera == Camera(psf_order="sensor")
+    plan = study.analysis.build()
+    # The same widths, but for the rounding of n * 1e-6.
+    assert plan == replace(Plan(), psf_widths=plan.psf_widths)
+    np.testing.assert_allclose(plan.psf_widths, Plan().psf_widths, rtol=1e-15)
+    chips = study.surface.build(seed=1)
+    assert list(chips.values()) == [CHIP_1, CHIP_2]
+
+
+def test_the_default_view_holds_the_papers_sensors():
+    study = Study()
+    raster = study.cutting.field_of_view.build()
+    assert study.camera.build().sensors(raster).shape == (90, 100)
+    frames = study.cutting.duration / study.cutting.window.interval
+    assert round(frames) == 455
+
+
+def test_an_exposure_of_the_quick_study_has_ten_sub_frames_or_more():
+    study = Study.quick()
+    assert study.camera.integration_time / study.cutting.window.interval >= 10
+    view, full = study.cutting.field_of_view.build(), Study().cutting.field_of_view.build()
+    # The quick view is the full one but for the rounding of its spacing to 5 digits.
+    np.testing.assert_allclose(view.extent, full.extent, atol=10e-9)
+
+
+@pytest.mark.parametrize("study", [Study(), Study.quick()], ids=["paper", "quick"])
+def test_the_template_is_read_back_as_the_same_study(study, tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text(study_text(study), encoding="utf-8")
+    assert load_study(path) == study
+
+
+def fields_of(section):
+    for name in type(section).model_fields:
+        value = getattr(section, name)
+        yield name
+        values = value.values() if isinstance(value, dict) else [value]
+        for part in values:
+            if isinstance(part, Section):
+                yield from fields_of(part)
+
+
+def test_every_field_is_in_the_template_after_a_comment():
+    lines = [line.strip() for line in study_text(Study()).splitlines()]
+    for name in fields_of(Study()):
+        places = [i for i, line in enumerate(lines) if line.startswith(f"{name}:")]
+        assert places, name
+        assert all(lines[i - 1].startswith("#") for i in places), name
+
+
+def test_the_template_names_the_other_kinds_of_psf():
+    text = study_text(Study())
+    assert "{kind: gaussian, fwhm: 12 um}" in text
+    assert "{kind: measured, file: psf.npy, spacing: 1 um}" in text
+
+
+def load(text, folder):
+    path = folder / "study.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load_study(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "field", "message"),
+    [
+        ("sede: 3", "", "unknown key 'sede', did you mean 'seed'?"),
+        ("camera: {integration_tme: 10 us}", "camera", "did you mean 'integration_time'?"),
+        ("camera: {zoom: 3}", "camera", "unknown key 'zoom', expected one of band, pitch"),
+        (
+            "camera: {integration_time: 10}",
+            "camera.integration_time",
+            "10 has no unit, expected a time such as 10 us",
+        ),
+        (
+            "cutting: {feed: 0.3}",
+            "cutting.feed",
+            "0.3 has no unit, expected a length such as 0.3 mm",
+        ),
+        ("cutting: {feed: -0.3 mm}", "cutting.feed", "-0.3 mm is not over 0, expected a length"),
+        ("cutting: {feed: 0.3 s}", "cutting.feed", "'0.3 s' is not a length"),
+        (
+            "cutting: {speed: fast}",
+            "cutting.speed",
+            "'fast' is not a speed, expected one such as 250 m/min",
+        ),
+        (
+            "cutting: {initial_temperature: -280 degC}",
+            "cutting.initial_temperature",
+            "-280 degC is not over 0 K",
+        ),
+        (
+            "cutting: {tool: {rake_angle: 80 deg}}",
+            "cutting.tool",
+            "rake_angle: expected -60 to 60 degrees",
+        ),
+        (
+            "cutting: {tool: {material: cheese}}",
+            "cutting.tool.material",
+            "'cheese' is unknown, expected one of carbide",
+        ),
+        (
+            "cutting: {workpiece: cheese}",
+            "cutting.workpiece",
+            "'cheese' is unknown, expected one of aisi-1045",
+        ),
+        ("cutting: {numerics: {cell: 1 m}}", "cutting.numerics", "cell: expected 0.5 um to 100 um"),
+        (
+            "cutting: {field_of_view: {rows: 8.5}}",
+            "cutting.field_of_view.rows",
+            "8.5, expected a valid integer",
+        ),
+        (
+            "cutting: {field_of_view: {rows: 0}}",
+            "cutting.field_of_view",
+            "expected 1 sample or more",
+        ),
+        (
+            "cutting: {window: {end: 3 mm}}",
+            "cutting",
+            "window.end: 3 mm is beyond length_of_cut, expected up to 1.958 mm",
+        ),
+        (
+            "cutting: {window: {start: 1.9 mm, end: 1.8 mm}}",
+            "cutting.window",
+            "expected 0 <= start < end",
+        ),
+        ("cutting: 3", "cutting", "3 is no section, expected keys of speed"),
+        ("camera: {band: 5.1-3.8 um}", "camera.band", "5.1-3.8 um is reversed"),
+        ("camera: {band: 3.8-5.1}", "camera.band", "3.8-5.1 has no unit"),
+        (
+            "camera: {integration_time: 200 us}",
+            "camera.integration_time",
+            "200 us is longer than the scene, expected up to the 90.96 us",
+        ),
+        (
+            "camera: {pitch: 2 mm}",
+            "camera.pitch",
+            "2000 um is larger than the field of view, expected up to the 540",
+        ),
+        ("camera: {fill_factor: 2}", "camera", "fill_factor is 2.0, expected over 0 to 1"),
+        ("camera: {fill_factor: yes}", "camera.fill_factor", "True, expected a valid number"),
+        ("camera: {fill_factor: .nan}", "camera.fill_factor", "nan, expected a finite number"),
+        (
+            "camera: {psf: {kind: lens}}",
+            "camera.psf",
+            "expected kind: annular-aperture, gaussian, measured, or none",
+        ),
+        ("camera: {psf: {kind: gaussian}}", "camera.psf.fwhm", "is missing"),
+        ("camera: {psf: {kind: gaussian, fwhm: 8}}", "camera.psf.fwhm", "8 has no unit"),
+        (
+            "camera: {psf: {kind: measured, file: no.npy, spacing: 1 um}}",
+            "camera.psf",
+            "no.npy: No such file",
+        ),
+        (
+            "camera: {psf_order: sensors}",
+            "camera.psf_order",
+            "'sensors', expected 'optics' or 'sensor'",
+        ),
+        ("surface: {chips: {}}", "surface.chips", "is empty, expected one chip or more"),
+        (
+            "surface: {chips: {a: chip-3}}",
+            "surface.chips.a",
+            "'chip-3' is unknown, expected one of chip-1, chip-2",
+        ),
+        ("surface: {tool: {mean: 1.2, deviation: 0}}", "surface.tool", "expected a mean of 0 to 1"),
+        (
+            "surface: {chips: {a: chip-1}}",
+            "analysis.rake_chip",
+            "'chip 2' is unknown, expected one of a",
+        ),
+        (
+            "analysis: {reference: best}",
+            "analysis.reference",
+            "'best', expected 'maximum', 'mean', 'centre' or 'true'",
+        ),
+        ("analysis: {instants: 0}", "analysis", "instants is 0, expected 1 or more"),
+        ("analysis: {psf_widths: [4]}", "analysis.psf_widths.0", "4 has no unit"),
+        ("seed: -1", "seed", "-1 is negative, expected 0 or more"),
+        ("- 1", "", "[1] is no section"),
+        ("a: [1,", "line 1", "expected YAML"),
+        ("seed: 1\nseed: 2", "line 2", "key 'seed' is there twice"),
+        ("x: !!python/object/apply:os.system [ls]", "line 1", "could not determine a constructor"),
+    ],
+)
+def test_bad_input_is_one_line_with_file_field_value_and_expectation(
+    text, field, message, tmp_path
+):
+    with pytest.raises(StudyError) as caught:
+        load(text, tmp_path)
+    line = str(caught.value)
+    assert "\n" not in line
+    assert line.startswith(f"study.yaml: {field}")
+    assert message in line
+
+
+def test_a_file_that_is_not_text_is_refused(tmp_path):
+    (tmp_path / "study.yaml").write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
+    with pytest.raises(StudyError, match=r"study\.yaml: expected text in UTF-8"):
+        load_study(tmp_path / "study.yaml")
+
+
+def test_an_empty_study_or_section_means_the_defaults(tmp_path):
+    assert load("", tmp_path) == Study()
+    assert load("camera:\nanalysis:\n", tmp_path) == Study()
+
+
+def test_numbers_may_be_whole_or_have_an_exponent(tmp_path):
+    study = load("cutting: {numerics: {mass_scaling: 1e2}, friction: {coefficient: 1}}", tmp_path)
+    assert study.cutting.numerics.mass_scaling == 100.0
+    assert study.cutting.friction.coefficient == 1.0
+
+
+def test_none_means_none(tmp_path):
+    study = load("camera: {psf: none, floor: none}", tmp_path)
+    camera = study.camera.build()
+    assert camera.psf is None
+    assert camera.floor is None
+    assert load(study_text(study), tmp_path) == study
+
+
+def test_other_kinds_of_psf_are_built_and_written(tmp_path):
+    gaussian = load("camera: {psf: {kind: gaussian, fwhm: 12 um}}", tmp_path)
+    assert gaussian.camera.build().psf == GaussianPSF(12e-6)
+    assert load(study_text(gaussian), tmp_path) == gaussian
+    np.save(tmp_path / "psf.npy", np.ones((3, 3)))
+    measured = load("camera: {psf: {kind: measured, file: psf.npy, spacing: 2 um}}", tmp_path)
+    assert isinstance(measured.camera.build().psf, MeasuredPSF)
+    # As run, the study names the file's whole path: it can be run from any folder.
+    assert measured.camera.psf.file == str(tmp_path / "psf.npy")
+    assert load(study_text(measured), tmp_path) == measured
+
+
+def test_a_study_in_python_takes_the_same_text():
+    study = Study(camera={"pitch": "5 um"}, analysis={"instants": 3})
+    assert study.camera.pitch == 5e-6
+    assert study.analysis.instants == 3
+    with pytest.raises(ValidationError, match="has no unit"):
+        Study(camera={"pitch": 5e-6})
+    with pytest.raises(ValidationError, match="frozen"):
+        study.seed = 4
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    folder = tmp_path / "cache"
+    monkeypatch.setenv("CHIPGLOW_CACHE", str(folder))
+    return folder
+
+
+@pytest.fixture
+def runs(monkeypatch):
+    """The cutting simulation replaced by three frames of a chip in closed form."""
+    chip = AnalyticChip(frames=3)
+    calls = []
+
+    def cut_chip(simulation, window, raster, on_frame, on_progress=None):
+        calls.append(simulation)
+        for frame in chip.scene().frames():
+            on_frame(frame)
+        if on_progress:
+            on_progress(1.0)
+        return ForceHistory(*chip.forces())
+
+    monkeypatch.setattr(CuttingSimulation, "run", cut_chip)
+    return calls
+
+
+def small_study(**cutting):
+    raster = AnalyticChip().raster
+    view = {
+        "left": f"{raster.left} m",
+        "top": f"{raster.top} m",
+        "spacing": f"{raster.spacing} m",
+        "rows": raster.rows,
+        "columns": raster.columns,
+    }
+    return Study(cutting={"field_of_view": view, **cutting})
+
+
+def test_a_scene_is_computed_once_for_the_same_inputs(cache, runs):
+    study = small_study()
+    assert not is_cut(study)
+    seen = []
+    path = cut(study, lambda step, fraction: seen.append((step, fraction)))
+    assert seen == [("cutting simulation", 1.0)]
+    assert path.parent == cache
+    assert is_cut(study)
+    other_camera = study.model_copy(update={"camera": Study(camera={"pitch": "5 um"}).camera})
+    assert cut(study) == cut(other_camera) == path
+    assert len(runs) == 1
+    scene = open_scene(path)
+    assert scene.tool == ToolGeometry()
+    assert len(scene.times) == 3
+    np.testing.assert_array_equal(scene.data["cutting_force"], AnalyticChip().forces()[1])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"speed": "251 m/min"},
+        {"friction": {"coefficient": 0.51}},
+        {"numerics": {"cell": "11 um"}},
+        {"window": {"interval": "0.3 us"}},
+        {"tool": {"edge_radius": "21 um"}},
+    ],
+)
+def test_another_cut_is_another_scene(cache, runs, change):
+    assert cut(small_study()) != cut(small_study(**change))
+    assert len(runs) == 2
+
+
+def test_another_solver_is_another_scene(cache, runs, monkeypatch):
+    first = cut(small_study())
+    monkeypatch.setattr("chipglow.study.running.SOLVER_VERSION", "next")
+    assert cut(small_study()) != first
+
+
+def test_a_damaged_scene_in_the_cache_is_computed_anew(cache, runs):
+    path = cut(small_study())
+    os.truncate(path, path.stat().st_size // 2)
+    assert not is_cut(small_study())
+    assert cut(small_study()) == path
+    assert is_cut(small_study())
+    assert len(runs) == 2
+
+
+def test_the_cache_is_listed_and_cleared(cache, runs):
+    assert cached_scenes() == []
+    assert clear_cache() == 0
+    paths = {cut(small_study()), cut(small_study(speed="251 m/min"))}
+    scenes = cached_scenes()
+    assert {scene.path for scene in scenes} == paths
+    assert all(scene.size == scene.path.stat().st_size for scene in scenes)
+    (cache / "notes.txt").write_text("not a scene")
+    assert clear_cache() == sum(scene.size for scene in scenes)
+    assert [path.name for path in cache.iterdir()] == ["notes.txt"]
+
+
+def test_a_failed_cut_leaves_nothing_in_the_cache(cache, monkeypatch):
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(CuttingSimulation, "run", fail)
+    with pytest.raises(OSError, match="No space left"):
+        cut(small_study())
+    assert list(cache.iterdir()) == []
+
+
+def test_runs_at_the_same_time_leave_one_whole_scene(cache, runs):
+    barrier, found = threading.Barrier(2), []
+
+    def work():
+        barrier.wait()
+        found.append(cut(small_study()))
+
+    threads = [threading.Thread(target=work) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(set(found)) == 1
+    assert is_cut(small_study())
+    assert [Path(path) for path in cache.iterdir()] == [found[0]]
