@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from enum import IntEnum
 from functools import cached_property
+from math import isfinite
 from typing import Any, Final
 
 import numpy as np
@@ -180,20 +181,22 @@ class Scene:
         SceneError
             If a value of the frame breaks the contract.
         """
-        fields = {name: self.data[name][index].values for name in self._fields}
-        time = float(self.times[index])
+        fields = {name: self._read(name, index) for name in self._fields}
         for name, values in fields.items():
-            if name == "material":
-                _check_material(values, time)
-            else:
-                fields[name] = values = np.asarray(values, dtype=np.float32)
-                _check_field(name, values, time)
-        return Frame(time=time, **fields)
+            if name != "material":
+                fields[name] = np.asarray(values, dtype=np.float32)
+        frame = Frame(time=float(self.times[index]), **fields)
+        check_frame(frame)
+        return frame
 
     def frames(self, indices: range | None = None) -> Iterator[Frame]:
         """Read frames one after the other."""
-        for index in indices or range(len(self.times)):
+        for index in range(len(self.times)) if indices is None else indices:
             yield self.frame(index)
+
+    def _read(self, name: str, index: int) -> NDArray[Any]:
+        """One field of one frame; a scene in a file has a faster way."""
+        return np.asarray(self.data[name][index].values)
 
     @property
     def _fields(self) -> list[str]:
@@ -203,6 +206,22 @@ class Scene:
 
 class SceneError(ValueError):
     """Fields that break the contract of a scene."""
+
+
+def check_frame(frame: Frame) -> None:
+    """Check the values of a frame against the contract of a scene.
+
+    Raises
+    ------
+    SceneError
+        If a value breaks it; the message names the field, the value and what was expected.
+    """
+    for name in (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS):
+        values = getattr(frame, name)
+        if name == "material":
+            _check_material(values, frame.time)
+        elif values is not None:
+            _check_field(name, values, frame.time)
 
 
 def raster_coordinates(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:
@@ -270,9 +289,10 @@ def _check_unit(name: str, values: xr.DataArray, unit: str) -> None:
 
 
 def _check_field(name: str, values: NDArray[np.float32], time: float) -> None:
-    if not np.isfinite(values).all():
-        raise SceneError(f"scene: {name!r} is not finite everywhere at {time:.9g} s")
+    # Least and greatest show NaN and infinity too, in half the time of looking for them.
     lowest, highest = float(values.min()), float(values.max())
+    if not (isfinite(lowest) and isfinite(highest)):
+        raise SceneError(f"scene: {name!r} is not finite everywhere at {time:.9g} s")
     if name == "temperature" and lowest < COLDEST_PLAUSIBLE:
         hint = "; it looks like °C, add 273.15" if -100.0 < lowest < 200.0 else ""
         raise SceneError(

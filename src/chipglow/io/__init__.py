@@ -1,0 +1,17 @@
+"""Readers and writers: scenes, measurements, and output that is whole or not there."""
+
+from chipglow.io.atomic import atomic_folder, atomic_path
+from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
+from chipglow.io.scene_file import FORMAT_VERSION, SceneWriter, open_scene, write_scene
+
+__all__ = [
+    "FORMAT_VERSION",
+    "SceneWriter",
+    "atomic_folder",
+    "atomic_path",
+    "open_scene",
+    "read_measurement",
+    "write_dataset",
+    "write_measurement",
+    "write_scene",
+]

@@ -1,0 +1,72 @@
+"""Measurements in NetCDF-4 files."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from chipglow.camera.measurement import Measurement
+from chipglow.io.atomic import KeptErrorFile, atomic_path
+
+
+def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) -> None:
+    """Write a measurement to a file: variables, flags and what its attributes tell.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        What to write.
+    path : path-like
+        The file to write; one that is there is replaced at the end. It is compressed with zlib,
+        which every reader of NetCDF-4 knows, and loses nothing.
+    """
+    write_dataset(measurement.data, path)
+
+
+def write_dataset(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
+    """Write a dataset of moderate size to a NetCDF-4 file, compressed without loss.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        What to write.
+    path : path-like
+        The file to write; one that is there is replaced at the end.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written, as on a full disk.
+    """
+    encoding = {
+        str(name): {"zlib": True, "complevel": 4, "shuffle": True}
+        for name, variable in data.data_vars.items()
+        if variable.ndim and np.issubdtype(variable.dtype, np.number)
+    }
+    path = Path(path)
+    with atomic_path(path) as temporary, KeptErrorFile(temporary) as sink:
+        data.drop_encoding().to_netcdf(sink, engine="h5netcdf", encoding=encoding)
+        sink.check(path)
+
+
+def read_measurement(path: str | os.PathLike[str]) -> Measurement:
+    """Read a measurement from a file into memory.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If the file is cut short or not a measurement; the message names the file.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"{path}: there is no such file, expected a measurement")
+    try:
+        return Measurement(xr.load_dataset(path, engine="h5netcdf", decode_times=False))
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        reason = str(error).split("\n", 1)[0]
+        raise ValueError(
+            f"{path}: not a measurement, or cut short, expected a NetCDF-4 file: {reason}"
+        ) from error
