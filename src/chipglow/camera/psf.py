@@ -8,7 +8,7 @@ from typing import Any, Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import cumulative_trapezoid
+from scipy.integrate import cumulative_simpson
 from scipy.optimize import brentq
 from scipy.special import erf, erfinv, j1
 
@@ -166,7 +166,7 @@ class AnnularAperturePSF(PointSpreadFunction):
         far = 4 / (pi * (1 - self.obscuration) * (1 - ANNULAR_ENERGY))
         v = np.linspace(0.0, far, ceil(20 * far))
         clear = 1 - self.obscuration**2
-        inside = cumulative_trapezoid(clear / 2 * self._profile(v) * v, v, initial=0.0)
+        inside = cumulative_simpson(clear / 2 * self._profile(v) * v, x=v, initial=0.0)
         return float(v[np.searchsorted(inside, ANNULAR_ENERGY)])
 
     def _profile(self, v: NDArray[np.float64]) -> NDArray[np.float64]:

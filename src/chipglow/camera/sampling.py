@@ -10,7 +10,7 @@ from scipy import sparse
 from chipglow.scene import Raster
 
 _ROUNDING: Final = 1e-6
-"""Share of a sensor by which it may stick out of the scene: rounding of lengths, no more."""
+"""Share of a sensor or a sample that is taken for rounding of lengths."""
 
 
 def overlap_lengths(
@@ -37,7 +37,8 @@ def overlap_lengths(
     edges = spacing * np.arange(samples + 1, dtype=np.float64)
     begin = np.maximum(left[:, None], edges[None, :-1])
     end = np.minimum(left[:, None] + width, edges[None, 1:])
-    return np.asarray(np.maximum(end - begin, 0.0))
+    # Where edges meet, rounding would leave a trace of the neighbour.
+    return np.asarray(np.where(end - begin > _ROUNDING * min(width, spacing), end - begin, 0.0))
 
 
 def sensor_raster(

@@ -1,0 +1,473 @@
+"""The camera against the paper's loop, and against what can be worked out by hand."""
+
+from dataclasses import replace
+from math import log, sqrt
+
+import numba
+import numpy as np
+import pytest
+import xarray as xr
+from figure6 import figure_6
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import erf
+
+from chipglow.camera import (
+    AnnularAperturePSF,
+    Camera,
+    Exposure,
+    Flag,
+    GaussianPSF,
+    MeasuredPSF,
+    Measurement,
+)
+from chipglow.camera.exposure import expose, frame_weights
+from chipglow.camera.sampling import integrate, overlap_lengths, sensor_raster
+from chipglow.radiometry import Band
+from chipglow.scene import FIELD_UNITS, Raster, Scene
+from chipglow.surface import EmissivityField, Surface, UniformSurface
+
+SPACING = 2e-6 / 3
+STEP = 0.2e-6
+BLACK = UniformSurface(1.0)
+PSFS = [None, GaussianPSF(12e-6), AnnularAperturePSF(), MeasuredPSF(np.ones((3, 3)), 4e-6)]
+
+# Radiance is looked up by straight lines 1/32 K apart and kept within 4e-7 (chipglow.camera);
+# near 1000 K that is under 1e-5 K, as is the step of the float32 fields' own radiance.
+ROUNDING = 1e-4
+
+
+class Painted(Surface, EmissivityField):
+    """Emissivity given for every frame."""
+
+    def __init__(self, times, values):
+        self.times, self.values = times, values
+
+    def on(self, scene):
+        return self
+
+    def emissivity(self, frame):
+        return self.values[int(np.argmin(np.abs(self.times - frame.time)))]
+
+
+def make_scene(temperature, spacing=SPACING, times=None, material=1):
+    temperature = np.asarray(temperature, dtype=np.float32)
+    if times is None:
+        times = STEP * np.arange(temperature.shape[0])
+    fields = {name: np.zeros_like(temperature) for name in FIELD_UNITS}
+    fields["temperature"] = temperature
+    fields["material"] = np.broadcast_to(np.uint8(material), temperature.shape)
+    raster = Raster(-420e-6, 460e-6, spacing, *temperature.shape[1:])
+    return Scene.from_fields(raster, times, fields)
+
+
+def random_scene(frames=6, rows=54, columns=72, seed=0):
+    rng = np.random.default_rng(seed)
+    scene = make_scene(rng.uniform(300, 1500, (frames, rows, columns)))
+    emissivity = rng.uniform(0.3, 0.9, (frames, rows, columns)).astype(np.float32)
+    emissivity[:, :10, :20] = 0.0
+    return scene, Painted(scene.times, emissivity)
+
+
+def temperature_of(measurement):
+    return measurement.radiance_temperature()[0]
+
+
+@pytest.mark.parametrize("psf", PSFS, ids=repr)
+def test_equals_the_loop_of_figure_6(psf):
+    scene, surface = random_scene()
+    camera = Camera(psf=psf, psf_order="sensor", integration_time=6 * STEP, floor=None)
+    expected = figure_6(
+        scene.data["temperature"].values.astype(np.float64),
+        surface.values,
+        camera.band.radiance,
+        camera.band.temperature,
+        np.ones((1, 1)) if psf is None else psf.kernel(camera.pitch),
+    )
+    measured = camera.measure(scene, surface, 0.0)
+    assert expected.shape == (6, 8)
+    np.testing.assert_allclose(temperature_of(measured), expected, atol=ROUNDING, rtol=0)
+
+
+@settings(deadline=None)  # the first call compiles
+@given(
+    temperature=st.floats(600, 1800),
+    pitch=st.floats(0.5e-6, 20e-6),
+    fill=st.floats(0.05, 1.0),
+    offset=st.tuples(st.floats(0, 9e-6), st.floats(0, 9e-6)),
+    psf=st.sampled_from(PSFS),
+    order=st.sampled_from(["optics", "sensor"]),
+)
+def test_a_black_body_measures_its_temperature(temperature, pitch, fill, offset, psf, order):
+    scene = make_scene(np.full((2, 50, 60), temperature))
+    camera = Camera(
+        pitch=pitch,
+        fill_factor=fill,
+        offset=offset,
+        psf=psf,
+        psf_order=order,
+        integration_time=2 * STEP,
+    )
+    measured = temperature_of(camera.measure(scene, BLACK, 0.0))
+    np.testing.assert_allclose(measured, np.float32(temperature), atol=ROUNDING, rtol=0)
+
+
+def test_a_grey_body_measures_its_radiance_temperature():
+    scene, camera = make_scene(np.full((2, 18, 18), 900.0)), Camera(integration_time=STEP)
+    band = camera.band
+    measured = temperature_of(camera.measure(scene, UniformSurface(0.42), 0.0))
+    expected = band.temperature(np.float32(0.42) * band.radiance(900.0))
+    np.testing.assert_allclose(measured, expected, atol=ROUNDING)
+
+
+def test_reflected_surroundings_add_what_the_surface_does_not_emit():
+    scene = make_scene(np.full((1, 18, 18), 900.0))
+    camera = Camera(reflected=800.0)
+    band = camera.band
+    exposure = camera.expose(scene, UniformSurface(0.5), 0.0)
+    # Equation 2; the look-up is within 4e-7.
+    expected = 0.5 * band.radiance(900.0) + 0.5 * band.radiance(800.0)
+    np.testing.assert_allclose(exposure.mean_radiance, expected, rtol=1e-6)
+
+
+def test_where_there_is_no_surface_nothing_is_reflected():
+    scene = make_scene(np.full((1, 18, 18), 900.0), material=0)
+    exposure = Camera(reflected=800.0).expose(scene, BLACK, 0.0)
+    assert (exposure.mean_radiance == 0).all()
+    assert np.isnan(exposure.peak_temperature).all()
+
+
+def test_peaks_and_centre():
+    scene, surface = random_scene(frames=5)
+    band = Camera().band
+    exposure = expose(scene, surface, band, 0.0, 5 * STEP)
+    temperature = scene.data["temperature"].values
+    radiance = surface.values * band.radiance(temperature.astype(np.float64))
+    # float32 has a step of 6e-8, the look-up is within 4e-7
+    np.testing.assert_allclose(exposure.peak_radiance, radiance.max(axis=0), rtol=1e-6)
+    np.testing.assert_allclose(exposure.centre_radiance, radiance[2], rtol=1e-6)
+    peak = np.where(surface.values > 0, temperature, np.nan).max(axis=0)
+    np.testing.assert_array_equal(exposure.peak_temperature, peak)
+
+
+def test_peaks_count_only_what_the_exposure_covers():
+    temperature = np.full((4, 9, 9), 800.0)
+    temperature[3] = 1500.0
+    exposure = expose(make_scene(temperature), BLACK, Camera().band, 0.0, 3 * STEP)
+    assert exposure.peak_temperature.max() == 800.0
+
+
+@given(st.integers(0, 405))
+def test_fifty_sub_frames_of_one_weight(first):
+    times = STEP * np.arange(455)
+    indices, weights = frame_weights(times, STEP, times[first], 10e-6)
+    assert indices == range(first, first + 50)
+    np.testing.assert_allclose(weights, 1 / 50, rtol=1e-9)
+
+
+@given(st.floats(0, 81e-6), st.floats(0.01e-6, 10e-6))
+def test_weights_are_shares_of_the_exposure(start, duration):
+    times = STEP * np.arange(455)
+    indices, weights = frame_weights(times, STEP, start, duration)
+    assert weights.sum() == pytest.approx(1.0, abs=1e-12)
+    assert (weights > 0).all()
+    assert len(indices) == len(weights)
+    # The mean time of the sub-frames' intervals is the middle of the exposure, but for those
+    # that it covers in part: half of an interval at each end.
+    middle = weights @ (times[indices] + STEP / 2)
+    assert abs(middle - (start + duration / 2)) <= STEP / 2 + 1e-15
+
+
+def test_weights_of_uneven_frames_and_parts_of_them():
+    indices, weights = frame_weights(np.array([0.0, 1.0, 3.0]), 1.5, 0.5, 3.0)
+    assert indices == range(3)
+    np.testing.assert_allclose(weights, np.array([0.5, 2.0, 0.5]) / 3.0)
+
+
+def test_a_scene_of_one_frame_does_not_change():
+    scene = make_scene(np.full((1, 18, 18), 700.0))
+    measured = Camera().measure(scene, BLACK, [0.0, 5.0])
+    assert measured.times.tolist() == [0.0, 5.0]
+    np.testing.assert_allclose(measured.radiance_temperature(), 700.0, atol=ROUNDING)
+
+
+@given(
+    pitch=st.floats(0.3e-6, 15e-6),
+    offset=st.floats(0, 5e-6),
+    fill=st.floats(0.01, 1.0),
+)
+def test_sampling_conserves_energy(pitch, offset, fill):
+    scene = Raster(0.0, 0.0, SPACING, 41, 60)
+    sensors = sensor_raster(scene, pitch, (offset, offset), None)
+    radiance = np.random.default_rng(5).uniform(1, 2, scene.shape)
+    np.testing.assert_allclose(
+        integrate(np.ones(scene.shape), scene, sensors, fill), 1.0, rtol=1e-12
+    )
+    whole = integrate(radiance, scene, sensors, 1.0).sum() * pitch**2
+    reach = [
+        overlap_lengths(np.array([offset]), pitch * count, samples, SPACING)[0]
+        for count, samples in zip(sensors.shape, scene.shape, strict=True)
+    ]
+    # The last sensor may stick out by 1e-6 of itself.
+    assert whole == pytest.approx(reach[0] @ radiance @ reach[1], rel=1e-5)
+
+
+@given(pitch=st.floats(1e-6, 9e-6), offset=st.floats(0, 5e-6), fill=st.floats(0.05, 1.0))
+def test_sensors_of_a_plane_read_it_at_their_middles(pitch, offset, fill):
+    scene = Raster(-3e-5, 2e-5, SPACING, 60, 90)
+    sensors = sensor_raster(scene, pitch, (offset, 0.0), None)
+    plane = scene.x + 3 * scene.y[:, None]
+    expected = sensors.x + 3 * sensors.y[:, None]
+    # A sample is even inside: at a sensor's edges that moves the mean by a part of a sample.
+    found = integrate(plane, scene, sensors, fill)
+    np.testing.assert_allclose(found, expected, atol=2.1 * SPACING)
+
+
+def test_sampling_of_whole_groups_is_their_mean():
+    scene = Raster(0.0, 0.0, SPACING, 27, 36)
+    radiance = np.random.default_rng(6).uniform(1, 2, scene.shape)
+    groups = radiance.reshape(3, 9, 4, 9).mean(axis=(1, 3))
+    found = integrate(radiance, scene, sensor_raster(scene, 6e-6, (0.0, 0.0), None), 1.0)
+    np.testing.assert_allclose(found, groups, rtol=1e-9)
+
+
+def test_a_ninth_of_a_sensor_is_its_middle_third():
+    scene = Raster(0.0, 0.0, 1e-6, 9, 9)
+    radiance = np.random.default_rng(7).uniform(1, 2, scene.shape)
+    found = integrate(radiance, scene, sensor_raster(scene, 9e-6, (0.0, 0.0), None), 1 / 9)
+    assert found[0, 0] == pytest.approx(radiance[3:6, 3:6].mean(), rel=1e-9)
+
+
+def test_sensors_lie_where_they_are_said_to():
+    scene = make_scene(np.full((1, 810, 900), 700.0))
+    sensors = Camera().sensors(scene.raster)
+    assert sensors.shape == (90, 100)
+    assert sensors.x[0] == pytest.approx(-417e-6)
+    assert sensors.y[0] == pytest.approx(457e-6)
+    moved = Camera(offset=(12e-6, 6e-6), shape=(3, 4)).sensors(scene.raster)
+    assert moved.shape == (3, 4)
+    assert (moved.left, moved.top) == pytest.approx((-408e-6, 454e-6))
+
+
+def test_motion_blur_of_a_moving_step_is_a_ramp():
+    # A hot front moves three samples in each sub-frame across a cold surface.
+    frames, speed, columns = 24, 3, 108
+    column = np.arange(columns)
+    temperature = np.array(
+        [np.where(column < 18 + speed * k, 1200.0, 700.0) * np.ones((9, 1)) for k in range(frames)]
+    )
+    camera = Camera(pitch=SPACING, psf=None, integration_time=frames * STEP)
+    measured = camera.measure(make_scene(temperature), BLACK, 0.0).radiance[0, 0]
+    hot, cold = camera.band.radiance(1200.0), camera.band.radiance(700.0)
+    share = np.clip((18 + speed * frames - speed - column) / (speed * frames), 0, 1)
+    share = np.ceil(share * frames - 1e-9) / frames
+    np.testing.assert_allclose(measured, cold + share * (hot - cold), rtol=1e-6)
+
+
+def edge_response(order, fwhm, pitch, spacing=0.5e-6, columns=480):
+    """Where the sensors are from a knife edge, in order, and how much of its step they see.
+
+    The edge stands at every sample of one sensor in turn: a slanted edge.
+    """
+    distance, response = [], []
+    for edge in range(columns // 2, columns // 2 + round(pitch / spacing)):
+        temperature = np.where(np.arange(columns) < edge, 600.0, 1300.0)
+        scene = make_scene(np.broadcast_to(temperature, (1, 24, columns)), spacing=spacing)
+        camera = Camera(pitch=pitch, psf=GaussianPSF(fwhm), psf_order=order)
+        measured = camera.measure(scene, BLACK, 0.0)
+        low, high = camera.band.radiance(600.0), camera.band.radiance(1300.0)
+        distance.append(measured.raster.x - (scene.raster.left + spacing * edge))
+        response.append((measured.radiance[0, 1] - low) / (high - low))
+    ascending = np.argsort(np.concatenate(distance))
+    return np.concatenate(distance)[ascending], np.concatenate(response)[ascending]
+
+
+def gaussian_edge(x, fwhm):
+    return (1 + erf(2 * sqrt(log(2)) * x / fwhm)) / 2
+
+
+def test_knife_edge_with_the_optics_first():
+    fwhm, pitch = 14e-6, 6e-6
+    x, response = edge_response("optics", fwhm, pitch)
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    expected = gaussian_edge(x[:, None] + pitch / 2 * nodes, fwhm) @ weights / 2
+    # The kernel leaves out 1e-4 of the energy, and the samples have a width.
+    np.testing.assert_allclose(response, expected, atol=3e-4)
+
+
+def test_knife_edge_with_the_sensors_first():
+    fwhm, pitch = 14e-6, 6e-6
+    x, response = edge_response("sensor", fwhm, pitch)
+    # Sensors see a ramp one sensor wide; the blur from sensor to sensor makes of it straight
+    # lines between the Gaussian's edge at the sensors' middles.
+    middles = pitch * (np.arange(-60, 60) + 0.5)
+    expected = np.interp(x, middles, gaussian_edge(middles, fwhm))
+    np.testing.assert_allclose(response, expected, atol=3e-4)
+
+
+@pytest.mark.parametrize(("order", "footprints"), [("optics", 1), ("sensor", 2)])
+def test_how_often_each_order_counts_the_footprint(order, footprints):
+    fwhm, pitch = 14e-6, 6e-6
+    x, response = edge_response(order, fwhm, pitch)
+    line, middle = np.diff(response), (x[1:] + x[:-1]) / 2
+    expected = fwhm**2 / (8 * log(2)) + footprints * pitch**2 / 12
+    # The energy that the kernel leaves out holds 0.2 % of the variance, a footprint 8 %.
+    assert line @ middle**2 == pytest.approx(expected, rel=5e-3)
+
+
+def test_case_2_comes_from_the_same_exposure():
+    scene, surface = random_scene()
+    camera = Camera(integration_time=6 * STEP, floor=None)
+    exposure = camera.expose(scene, surface, 0.0)
+    case_2 = replace(camera, psf=None)
+    np.testing.assert_array_equal(
+        case_2.develop(exposure).radiance, case_2.measure(scene, surface, 0.0).radiance
+    )
+    assert not np.allclose(case_2.develop(exposure).radiance, camera.develop(exposure).radiance)
+
+
+def test_a_sequence_is_its_frames():
+    scene, surface = random_scene(frames=8)
+    camera = Camera(integration_time=3 * STEP, floor=None)
+    starts = [0.0, 1.5 * STEP, 5 * STEP]
+    measured = camera.measure(scene, surface, starts)
+    assert measured.times.tolist() == starts
+    for index, start in enumerate(starts):
+        one = camera.measure(scene, surface, start)
+        np.testing.assert_array_equal(measured.radiance[index], one.radiance[0])
+
+
+def test_frame_times():
+    np.testing.assert_allclose(Camera().frame_times(1.0, 3), [1.0, 1 + 1 / 600, 1 + 2 / 600])
+
+
+def test_result_does_not_depend_on_the_number_of_threads():
+    scene, surface = random_scene()
+    camera = Camera(integration_time=6 * STEP)
+    before = numba.get_num_threads()
+    try:
+        radiance = []
+        for threads in (1, before):
+            numba.set_num_threads(threads)
+            radiance.append(camera.measure(scene, surface, 0.0).radiance)
+    finally:
+        numba.set_num_threads(before)
+    np.testing.assert_array_equal(*radiance)
+
+
+def test_under_the_floor_is_flagged_not_returned():
+    temperature = np.full((1, 18, 27), 900.0)
+    temperature[:, :, :9] = 500.0
+    measured = Camera(psf=None).measure(make_scene(temperature), BLACK, 0.0)
+    assert measured.flags.dtype == np.uint8
+    np.testing.assert_array_equal(measured.flags[0], [[Flag.BELOW_FLOOR, 0, 0]] * 2)
+    np.testing.assert_array_equal(np.isnan(temperature_of(measured)), measured.flags[0] == 1)
+    np.testing.assert_allclose(
+        measured.radiance_temperature(flagged=True)[0], [[500, 900, 900]] * 2, atol=ROUNDING
+    )
+
+
+def test_without_a_floor_only_darkness_is_flagged():
+    temperature = np.full((1, 9, 18), 500.0)
+    material = np.ones_like(temperature, dtype=np.uint8)
+    material[:, :, :9] = 0
+    scene = make_scene(temperature, material=material)
+    measured = Camera(psf=None, floor=None).measure(scene, BLACK, 0.0)
+    np.testing.assert_array_equal(measured.flags[0], [[Flag.BELOW_FLOOR, 0]])
+
+
+def test_flagged_temperatures_need_the_band():
+    measured = Camera().measure(make_scene(np.full((1, 9, 9), 500.0)), BLACK, 0.0)
+    # A response curve does not fit an attribute.
+    camera = Camera(band=Band(3e-6, 5e-6, response=np.ones_like))
+    measured.data.attrs = camera._attributes()
+    with pytest.raises(ValueError, match="band_lower"):
+        measured.radiance_temperature(flagged=True)
+
+
+def test_measurement_tells_camera_place_and_units():
+    scene = make_scene(np.full((1, 18, 18), 900.0))
+    measured = Camera(psf=GaussianPSF(8e-6)).measure(scene, BLACK, 0.0)
+    assert measured.raster.left == pytest.approx(scene.raster.left)
+    assert measured.raster.top == pytest.approx(scene.raster.top)
+    assert measured.raster.shape == (2, 2)
+    assert measured.data.attrs["psf"] == "GaussianPSF(fwhm=8e-06)"
+    assert measured.data.attrs["integration_time"] == 10e-6
+    assert "reflected" not in measured.data.attrs
+    assert Measurement(measured.data).radiance.shape == (1, 2, 2)
+
+
+@pytest.mark.parametrize("broken", ["radiance", "units", "pitch"])
+def test_broken_measurements_are_refused(broken):
+    data = Camera().measure(make_scene(np.full((1, 9, 9), 900.0)), BLACK, 0.0).data.copy()
+    if broken == "radiance":
+        data = data.drop_vars("radiance")
+    elif broken == "units":
+        data["radiance"] = data["radiance"].assign_attrs(units="W")
+    else:
+        data.attrs = {}
+    assert isinstance(data, xr.Dataset)
+    with pytest.raises(ValueError, match=r"measurement: .*(radiance|pitch)"):
+        Measurement(data)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"pitch": 0.0},
+        {"pitch": 6.0},
+        {"pitch": float("nan")},
+        {"shape": (0, 5)},
+        {"offset": (-1e-6, 0.0)},
+        {"fill_factor": 0.0},
+        {"fill_factor": 1.1},
+        {"psf_order": "both"},
+        {"integration_time": 0.0},
+        {"integration_time": 10e-3},
+        {"integration_time": float("nan")},
+        {"frame_rate": -600.0},
+        {"floor": 20.0},
+        {"reflected": 20.0},
+    ],
+    ids=str,
+)
+def test_impossible_cameras_are_refused(values):
+    with pytest.raises(ValueError, match=f"camera: {next(iter(values))} is .*, expected"):
+        Camera(**values)
+
+
+@pytest.mark.parametrize(
+    ("camera", "start", "message"),
+    [
+        (Camera(pitch=50e-6), 0.0, r"pitch of 5e-05 m .* scene of 1.2e-05 x 1.2e-05 m"),
+        (Camera(offset=(11e-6, 0.0)), 0.0, r"offset of 1.1e-05, 0 m does not fit"),
+        (Camera(shape=(3, 1)), 0.0, r"shape is 3 x 1 sensors, but only 2 x 2"),
+        (Camera(), 0.0, r"0 s to 1e-05 s is not within the scene, which lasts from 0 s to 1e-06"),
+        (Camera(integration_time=STEP), -STEP, "not within the scene"),
+        (Camera(integration_time=STEP), 4.5 * STEP, "not within the scene"),
+        (Camera(integration_time=STEP), float("nan"), "not within the scene"),
+    ],
+)
+def test_what_does_not_fit_the_scene_is_refused(camera, start, message):
+    scene = make_scene(np.full((5, 18, 18), 900.0))
+    with pytest.raises(ValueError, match=message):
+        camera.measure(scene, BLACK, start)
+
+
+@pytest.mark.parametrize(("temperature", "emissivity"), [(4500.0, 1.0), (900.0, 1.5)])
+def test_what_has_no_radiance_is_refused(temperature, emissivity):
+    scene = make_scene(np.full((1, 9, 9), temperature))
+    surface = Painted(scene.times, np.full((1, 9, 9), emissivity, dtype=np.float32))
+    with pytest.raises(ValueError, match="temperature must be 200 to 4000 K and emissivity 0 to 1"):
+        Camera().measure(scene, surface, 0.0)
+
+
+def test_exposures_of_different_grids_are_refused():
+    one = Camera().expose(make_scene(np.full((1, 9, 9), 900.0)), BLACK, 0.0)
+    other = Camera().expose(make_scene(np.full((1, 9, 18), 900.0)), BLACK, 0.0)
+    with pytest.raises(ValueError, match="different grids"):
+        Camera().develop([one, other])
+    with pytest.raises(ValueError, match="expected 1 or more"):
+        Camera().develop([])
+    with pytest.raises(ValueError, match="mean_radiance has shape"):
+        Exposure(**{**vars(one), "mean_radiance": np.zeros((2, 2))})

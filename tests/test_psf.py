@@ -1,0 +1,260 @@
+"""Point spread functions against what optics says of them, and the convolution with them."""
+
+from math import log, pi, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.ndimage import convolve
+from scipy.special import erf, j0, j1
+
+from chipglow.camera import AnnularAperturePSF, GaussianPSF, MeasuredPSF
+from chipglow.camera.convolution import blur
+from chipglow.camera.psf import ANNULAR_ENERGY
+
+FWHM_PER_SIGMA = 2 * sqrt(2 * log(2))
+LOPSIDED = np.array([[0, 1, 2], [3, 8, 1], [0, 2, 1]], dtype=float)
+KINDS = [
+    GaussianPSF(12e-6),
+    AnnularAperturePSF(),
+    AnnularAperturePSF(obscuration=0.0),
+    MeasuredPSF(LOPSIDED, 4e-6),
+]
+
+
+def variance(kernel, spacing):
+    """Variance of a kernel along x, in m²."""
+    x = spacing * (np.arange(kernel.shape[1]) - kernel.shape[1] // 2)
+    line = kernel.sum(axis=0)
+    return float(line @ x**2 - (line @ x) ** 2)
+
+
+def measured_width(kernel, spacing):
+    """Full width at half maximum of a kernel's middle row, by straight lines, in m."""
+    line = kernel[kernel.shape[0] // 2] / kernel.max()
+    right = line[kernel.shape[1] // 2 :]
+    k = int(np.argmax(right < 0.5))
+    return 2 * spacing * (k - 1 + (right[k - 1] - 0.5) / (right[k - 1] - right[k]))
+
+
+@pytest.mark.parametrize("psf", KINDS, ids=repr)
+@pytest.mark.parametrize("spacing", [0.7e-6, 6e-6, 50e-6])
+def test_every_kernel_is_a_share_of_one(psf, spacing):
+    kernel = psf.kernel(spacing)
+    assert kernel.dtype == np.float64
+    assert kernel.shape[0] == kernel.shape[1]
+    assert kernel.shape[0] % 2 == 1
+    assert (kernel >= 0).all()
+    assert kernel.sum() == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("psf", KINDS[:3], ids=repr)
+def test_round_kernels_are_symmetric(psf):
+    kernel = psf.kernel(1e-6)
+    for other in (kernel.T, kernel[::-1], kernel[:, ::-1]):
+        np.testing.assert_allclose(kernel, other, rtol=1e-12)
+
+
+@pytest.mark.parametrize("psf", KINDS[:3], ids=repr)
+def test_width_is_that_of_the_kernel(psf):
+    # Straight lines between samples 1/40 of the width apart, and their own width: under 0.2 %.
+    assert measured_width(psf.kernel(0.2e-6), 0.2e-6) == pytest.approx(psf.fwhm, rel=2e-3)
+
+
+@given(st.floats(2e-6, 30e-6), st.floats(0.3e-6, 10e-6))
+def test_gaussian_variance(fwhm, spacing):
+    # The squares add theirs (spacing² / 12); the energy left out holds 0.2 % of the variance.
+    # Where the Gaussian is much narrower than a square, Sheppard's correction does not hold.
+    sigma = fwhm / FWHM_PER_SIGMA
+    if sigma > 0.5 * spacing:
+        expected = sigma**2 + spacing**2 / 12
+        assert variance(GaussianPSF(fwhm).kernel(spacing), spacing) == pytest.approx(
+            expected, rel=2e-2
+        )
+
+
+def test_gaussians_add_in_quadrature():
+    spacing = 0.5e-6
+    point = np.zeros((161, 161))
+    point[80, 80] = 1.0
+    twice = blur(blur(point, GaussianPSF(6e-6), spacing), GaussianPSF(8e-6), spacing)
+    # The squares of side 0.5 µm are counted twice instead of once: 0.1 % of the width.
+    assert measured_width(twice, spacing) == pytest.approx(10e-6, rel=3e-3)
+
+
+def test_knife_edge_of_a_gaussian():
+    spacing, psf = 0.5e-6, GaussianPSF(9e-6)
+    edge = np.where(np.arange(200) < 100, 0.0, 1.0) * np.ones((50, 1))
+    x = spacing * (np.arange(200) - 99.5)
+    expected = (1 + erf(x / (sqrt(2) * psf.fwhm / FWHM_PER_SIGMA))) / 2
+    # Exact for a field that is even within each sample, but for the energy left out (1e-4).
+    np.testing.assert_allclose(blur(edge, psf, spacing)[25], expected, atol=1e-4)
+
+
+@given(st.floats(1e-6, 12e-6), st.floats(0.05, 1.0))
+def test_airy_first_zero(wavelength, aperture):
+    psf = AnnularAperturePSF(wavelength, aperture, obscuration=0.0)
+    # v = 3.8317 is the first zero of J1: r = 0.61 λ / NA.
+    zero = 0.6098350 * wavelength / aperture
+    assert psf._profile(np.array(zero / psf._unit)) == pytest.approx(0.0, abs=1e-12)
+    assert psf.fwhm == pytest.approx(0.514497 * wavelength / aperture, rel=1e-5)
+
+
+def test_first_dark_ring_is_in_the_kernel():
+    psf, spacing = AnnularAperturePSF(4.5e-6, 0.3, obscuration=0.0), 0.1e-6
+    line = psf.kernel(spacing)
+    middle = line.shape[0] // 2
+    right = line[middle, middle:]
+    dark = int(np.flatnonzero((right[1:-1] < right[:-2]) & (right[1:-1] < right[2:]))[0]) + 1
+    assert dark * spacing == pytest.approx(0.61 * 4.5e-6 / 0.3, abs=spacing)
+
+
+@pytest.mark.parametrize("radius", [1.0, 3.0, 10.0])
+def test_airy_encircled_energy(radius):
+    psf, spacing = AnnularAperturePSF(4.5e-6, 0.3, obscuration=0.0), 0.25e-6
+    kernel = psf.kernel(spacing)
+    x = spacing * (np.arange(kernel.shape[0]) - kernel.shape[0] // 2)
+    inside = kernel[np.hypot(x, x[:, None]) <= radius * psf._unit * 2].sum()
+    v = 2 * radius
+    expected = 1 - j0(v) ** 2 - j1(v) ** 2
+    # The kernel is scaled to 1 (1 % of the energy is left out), and squares are not a circle.
+    assert inside == pytest.approx(expected, abs=1.2e-2)
+
+
+@pytest.mark.parametrize("obscuration", [0.0, 0.35, 0.6])
+def test_kernel_reaches_the_stated_energy(obscuration):
+    psf = AnnularAperturePSF(obscuration=obscuration)
+    v = np.linspace(0, 3000, 600_001)
+    energy = np.cumsum(psf._profile(v) * v) * (v[1] - v[0]) * (1 - obscuration**2) / 2
+    # All of the energy is 1 by Parseval; the part beyond v = 3000 is under 1e-3.
+    assert energy[-1] == pytest.approx(1.0, abs=1e-3)
+    assert energy[np.searchsorted(v, psf._reach)] == pytest.approx(ANNULAR_ENERGY, abs=1e-4)
+
+
+def test_an_obscuration_narrows_the_middle_and_feeds_the_rings():
+    open_pupil = AnnularAperturePSF(obscuration=0.0)
+    ring_pupil = AnnularAperturePSF(obscuration=0.5)
+    assert ring_pupil.fwhm < open_pupil.fwhm
+    first_ring = np.linspace(pi, 7, 200)
+    assert ring_pupil._profile(first_ring).max() > open_pupil._profile(first_ring).max()
+
+
+@pytest.mark.parametrize("psf", [GaussianPSF(10e-6), AnnularAperturePSF()], ids=repr)
+def test_measured_kernel_round_trip(psf):
+    spacing = 2e-6
+    kernel = psf.kernel(spacing)
+    measured = MeasuredPSF(100 * kernel, spacing)
+    np.testing.assert_allclose(measured.kernel(spacing), kernel, rtol=1e-12)
+    # Straight lines between samples a fifth of the width apart.
+    assert measured.fwhm == pytest.approx(psf.fwhm, rel=0.05)
+
+
+@given(st.floats(0.2e-6, 20e-6), st.floats(0.2e-6, 5e-6))
+def test_resampling_keeps_the_middle_and_the_orientation(measured_spacing, spacing):
+    psf = MeasuredPSF(LOPSIDED, measured_spacing)
+    kernel = psf.kernel(spacing)
+    x = spacing * (np.arange(kernel.shape[0]) - kernel.shape[0] // 2)
+    expected = measured_spacing * (LOPSIDED.sum(axis=0) @ [-1, 0, 1]) / LOPSIDED.sum()
+    centroid = kernel.sum(axis=0) @ x
+    # Light that is even in a square is moved to the middle of a coarser one: half of it at most.
+    assert centroid == pytest.approx(expected, abs=spacing / 2)
+
+
+def test_resampling_to_thirds_and_back_changes_nothing():
+    fine = MeasuredPSF(LOPSIDED, 3e-6).kernel(1e-6)
+    assert fine.shape == (9, 9)
+    np.testing.assert_allclose(
+        MeasuredPSF(fine, 1e-6).kernel(3e-6), LOPSIDED / LOPSIDED.sum(), atol=1e-15
+    )
+
+
+def test_a_single_sample_is_as_wide_as_itself():
+    assert MeasuredPSF(np.ones((1, 1)), 5e-6).fwhm == pytest.approx(5e-6)
+
+
+def test_kernel_from_a_file(tmp_path):
+    np.save(tmp_path / "psf.npy", LOPSIDED)
+    np.savetxt(tmp_path / "psf.csv", LOPSIDED, delimiter=",")
+    for name in ("psf.npy", "psf.csv"):
+        psf = MeasuredPSF.from_file(tmp_path / name, 2e-6)
+        np.testing.assert_allclose(psf.kernel(2e-6), LOPSIDED / LOPSIDED.sum())
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("psf.txt", b"1"),
+        ("psf.csv", b""),
+        ("psf.csv", b"1,2\n3\n"),
+        ("psf.csv", b"1,2\n3,4\n"),
+        ("psf.csv", b"a"),
+        ("psf.csv", b"\xff\xfe\x00"),
+        ("psf.csv", b"nan"),
+        ("psf.csv", b"inf"),
+        ("psf.csv", b"-1"),
+        ("psf.csv", b"0"),
+        ("psf.npy", b""),
+        ("psf.npy", b"\x93NUMPY\x01\x00"),
+        ("psf.npy", b"not an array at all"),
+    ],
+)
+def test_files_without_a_kernel_are_refused(tmp_path, name, content):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match=r"psf: .*psf\.(txt|csv|npy)"):
+        MeasuredPSF.from_file(path, 1e-6)
+
+
+def test_pickles_are_not_opened(tmp_path):
+    np.save(tmp_path / "psf.npy", np.array([[object()]]), allow_pickle=True)
+    with pytest.raises(ValueError, match="pickle"):
+        MeasuredPSF.from_file(tmp_path / "psf.npy", 1e-6)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: GaussianPSF(0.0),
+        lambda: GaussianPSF(8.0),
+        lambda: GaussianPSF(float("nan")),
+        lambda: AnnularAperturePSF(wavelength=4.5),
+        lambda: AnnularAperturePSF(numerical_aperture=0.0),
+        lambda: AnnularAperturePSF(numerical_aperture=1.5),
+        lambda: AnnularAperturePSF(obscuration=1.0),
+        lambda: AnnularAperturePSF(obscuration=-0.1),
+        lambda: MeasuredPSF(LOPSIDED, -1e-6),
+        lambda: MeasuredPSF(LOPSIDED[:2], 1e-6),
+        lambda: MeasuredPSF(np.ones((2, 2)), 1e-6),
+        lambda: GaussianPSF(8e-6).kernel(0.0),
+        lambda: GaussianPSF(1e-3).kernel(1e-9),
+    ],
+)
+def test_impossible_values_are_refused(make):
+    with pytest.raises(ValueError, match="psf: "):
+        make()
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (7, 30), (31, 29)])
+@pytest.mark.parametrize("psf", KINDS, ids=repr)
+def test_blur_is_the_direct_sum_and_never_wraps_around(shape, psf):
+    radiance = np.random.default_rng(3).uniform(1, 100, shape)
+    direct = convolve(radiance, psf.kernel(5e-6), mode="nearest")
+    # The transform's rounding: some 1e-16 of the largest value.
+    np.testing.assert_allclose(blur(radiance, psf, 5e-6), direct, rtol=1e-12)
+
+
+def test_blur_of_a_point_is_the_kernel_as_it_stands():
+    point = np.zeros((7, 7))
+    point[3, 3] = 1.0
+    np.testing.assert_allclose(
+        blur(point, MeasuredPSF(LOPSIDED, 1e-6), 1e-6)[2:5, 2:5],
+        LOPSIDED / LOPSIDED.sum(),
+        atol=1e-15,
+    )
+
+
+def test_where_there_is_no_light_there_is_none_after_the_blur():
+    radiance = np.zeros((60, 60))
+    radiance[:, 40:] = 1e4
+    assert (blur(radiance, GaussianPSF(4e-6), 1e-6)[:, :20] == 0).all()
