@@ -1,0 +1,233 @@
+"""The contract of a scene, its raster, and the tool's outline."""
+
+from dataclasses import replace
+from math import cos, radians, sin
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chipglow.scene import FIELD_UNITS, Raster, Scene, SceneError, ToolGeometry
+
+RASTER = Raster(left=-6e-6, top=4e-6, spacing=2e-6, rows=4, columns=5)
+TIMES = np.array([0.0, 0.2e-6, 0.4e-6])
+
+
+def fields(**changed):
+    shape = (len(TIMES), *RASTER.shape)
+    values = {name: np.zeros(shape, dtype=np.float32) for name in FIELD_UNITS}
+    values["temperature"] += 300.0
+    values["material"] = np.ones(shape, dtype=np.uint8)
+    return {**values, **changed}
+
+
+def with_value(name, value, index=(1, 2, 3)):
+    values = fields()[name]
+    values[index] = value
+    return fields(**{name: values})
+
+
+def scene(**changed):
+    return Scene.from_fields(RASTER, TIMES, fields(**changed))
+
+
+def test_raster_gives_the_middles_of_its_samples():
+    np.testing.assert_allclose(RASTER.x, [-5e-6, -3e-6, -1e-6, 1e-6, 3e-6])
+    np.testing.assert_allclose(RASTER.y, [3e-6, 1e-6, -1e-6, -3e-6])
+    assert RASTER.extent == pytest.approx((-6e-6, 4e-6, -4e-6, 4e-6))
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"spacing": 0.0}, "spacing must be over 0 m, got 0.0"),
+        ({"spacing": np.nan}, "spacing must be over 0 m, got nan"),
+        ({"rows": 0}, "expected 1 sample or more, got 0 x 5"),
+        ({"left": np.inf}, "corner must be finite, got inf"),
+    ],
+)
+def test_raster_refuses(changed, message):
+    with pytest.raises(ValueError, match=message):
+        replace(RASTER, **changed)
+
+
+@given(
+    left=st.floats(-1e-3, 1e-3),
+    top=st.floats(-1e-3, 1e-3),
+    spacing=st.floats(1e-7, 1e-4),
+    rows=st.integers(2, 9),
+    columns=st.integers(2, 9),
+)
+@settings(max_examples=30, deadline=None)
+def test_scene_gives_its_raster_back(left, top, spacing, rows, columns):
+    raster = Raster(left, top, spacing, rows, columns)
+    values = {name: np.zeros((1, rows, columns)) for name in FIELD_UNITS}
+    values["temperature"] += 300.0
+    found = Scene.from_fields(raster, [0.0], values).raster
+    assert found.shape == raster.shape
+    # The corner is as exact as the coordinates, doubles of up to 2 mm, divided by few steps.
+    np.testing.assert_allclose(found.extent, raster.extent, rtol=0, atol=1e-17)
+
+
+def test_scene_gives_its_frames():
+    moving = np.arange(60, dtype=np.float32).reshape(3, 4, 5)
+    made = scene(velocity_x=moving)
+    np.testing.assert_array_equal(made.times, TIMES)
+    assert made.frame_spacing == pytest.approx(0.2e-6)
+    assert not made.has_material_coordinates
+    assert made.tool is None
+    frames = list(made.frames())
+    assert [frame.time for frame in frames] == list(TIMES)
+    np.testing.assert_array_equal(frames[2].velocity_x, moving[2])
+    assert frames[0].material.dtype == np.uint8
+    assert frames[0].temperature.dtype == np.float32
+    assert [frame.time for frame in made.frames(range(1, 2))] == [TIMES[1]]
+    assert list(made.frames(range(0))) == []
+
+
+def test_material_coordinates_reach_the_frames():
+    x, y = np.broadcast_arrays(RASTER.x, RASTER.y[:, None])
+    made = scene(material_x=np.stack([x] * 3), material_y=np.stack([y] * 3))
+    assert made.has_material_coordinates
+    np.testing.assert_allclose(made.frame(1).material_y, y, rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("temperature", np.nan, r"'temperature' is not finite everywhere at 2e-07 s"),
+        ("velocity_y", np.inf, r"'velocity_y' is not finite everywhere at 2e-07 s"),
+        ("velocity_x", -np.inf, r"'velocity_x' is not finite everywhere at 2e-07 s"),
+        ("temperature", 25.0, r"temperature 25 at 2e-07 s, expected kelvin .* it looks like °C"),
+        ("temperature", -300.0, r"temperature -300 at 2e-07 s, expected kelvin of 200 to 6000$"),
+        ("temperature", 9000.0, r"temperature 9000 at 2e-07 s, expected kelvin of 200 to 6000"),
+        ("plastic_strain", -0.1, r"'plastic_strain' is -0.1 at 2e-07 s, expected 0 or more"),
+        ("plastic_strain_rate", -5.0, r"'plastic_strain_rate' is -5 at .* expected 0 or more"),
+        ("material", 3, r"material has value 3 .* expected uint8 of 0 \(void\), 1 \(workpiece\)"),
+    ],
+)
+def test_a_wrong_value_is_named(name, value, message):
+    with pytest.raises(SceneError, match=message):
+        Scene.from_fields(RASTER, TIMES, with_value(name, value))
+
+
+def test_wrong_structure_is_named():
+    with pytest.raises(SceneError, match="unknown field 'pressure'"):
+        scene(pressure=np.zeros((3, 4, 5)))
+    data = scene().data
+    with pytest.raises(SceneError, match="field 'velocity_x' is missing"):
+        Scene(data.drop_vars("velocity_x"))
+    with pytest.raises(SceneError, match="coordinate 'time' is missing"):
+        Scene(data.drop_vars("time"))
+    with pytest.raises(SceneError, match="'material_x' needs the other"):
+        Scene(data.assign(material_x=data["temperature"].assign_attrs(units="m")))
+    with pytest.raises(SceneError, match="'temperature' has units '°C', expected 'K'"):
+        Scene(data.assign(temperature=data["temperature"].assign_attrs(units="°C")))
+    with pytest.raises(SceneError, match="'temperature' has dimensions"):
+        Scene(data.assign(temperature=data["temperature"].transpose("y", "time", "x")))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        ("time", [0.0, 2e-7, 2e-7], "time must ascend"),
+        ("time", [0.0, 2e-7, np.nan], "'time' is not finite"),
+        ("x", [-5e-6, -3e-6, -1e-6, 1e-6, 9e-6], "x must have even steps"),
+        ("x", [5e-6, 3e-6, 1e-6, -1e-6, -3e-6], "x must ascend"),
+        ("y", [-3e-6, -1e-6, 1e-6, 3e-6], r"y must descend \(row 0 on top\)"),
+        ("y", [9e-6, 6e-6, 3e-6, 0.0], "samples must be square"),
+    ],
+)
+def test_wrong_coordinates_are_named(name, values, message):
+    data = scene().data
+    changed = data.assign_coords({name: (name, np.array(values), data[name].attrs)})
+    with pytest.raises(SceneError, match=message):
+        Scene(changed)
+
+
+def test_tool_survives_as_attributes():
+    tool = ToolGeometry(radians(6.0), radians(9.0), 35e-6)
+    made = Scene.from_fields(RASTER, TIMES, fields(), tool=tool, attributes={"study": "one"})
+    assert made.tool == tool
+    assert made.data.attrs["study"] == "one"
+
+
+TOOLS = st.builds(
+    ToolGeometry,
+    st.floats(radians(-30.0), radians(30.0)),
+    st.floats(radians(2.0), radians(20.0)),
+    st.floats(2e-6, 60e-6),
+)
+
+
+def polyline_distance(points, line):
+    """Least distance of points to the pieces of a line, by going through them all."""
+    start, piece = line[:-1], np.diff(line, axis=0)
+    relative = points[:, None] - start
+    along = (relative * piece).sum(axis=2) / (piece**2).sum(axis=1)
+    nearest = relative - np.clip(along, 0.0, 1.0)[..., None] * piece
+    return np.hypot(*np.moveaxis(nearest, -1, 0)).min(axis=1)
+
+
+@given(TOOLS, st.integers(0, 2**32))
+@settings(max_examples=50, deadline=None)
+def test_distance_is_that_to_the_outline(tool, seed):
+    points = np.random.default_rng(seed).uniform(-150e-6, 150e-6, (200, 2))
+    distance = tool.signed_distance(points[:, 0], points[:, 1])
+    expected = polyline_distance(points, tool.outline(2e-3))
+    # The arc's 32 chords stay within 0.1 % of the radius of it.
+    np.testing.assert_allclose(np.abs(distance), expected, rtol=0, atol=1e-3 * tool.edge_radius)
+
+
+def test_inside_is_negative():
+    tool = ToolGeometry()
+    assert tool.signed_distance(100e-6, 100e-6) < 0
+    assert tool.signed_distance(-100e-6, 100e-6) > 0
+    assert tool.signed_distance(100e-6, -50e-6) > 0
+    assert tool.signed_distance(*tool.edge_centre) == pytest.approx(-tool.edge_radius)
+
+
+@given(TOOLS, st.floats(0.0, 1e-3))
+@settings(max_examples=50, deadline=None)
+def test_rake_points_lie_on_the_surface(tool, distance):
+    x, y = tool.rake_point(distance)
+    assert abs(tool.signed_distance(x, y)) < 1e-15
+    normal, direction = tool.rake_normal, tool.rake_direction
+    # From the surface along the normal the distance is the way gone, and the chip's side is left.
+    assert tool.signed_distance(x + 5e-6 * normal[0], y + 5e-6 * normal[1]) == pytest.approx(5e-6)
+    assert normal[0] < 0
+    assert direction[1] > 0
+    assert np.dot(normal, direction) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_a_negative_rake_leans_over_the_chip():
+    tool = ToolGeometry(rake_angle=radians(-7.0))
+    bottom, top = tool.rake_point([0.0, 100e-6])
+    assert top[0] - bottom[0] == pytest.approx(-100e-6 * sin(radians(7.0)))
+    assert top[1] - bottom[1] == pytest.approx(100e-6 * cos(radians(7.0)))
+
+
+@given(TOOLS)
+@settings(max_examples=50, deadline=None)
+def test_the_edge_touches_the_cut_surface_and_a_steep_rake_the_upright(tool):
+    radius, outline = tool.edge_radius, tool.outline(1e-4)
+    assert abs(tool.signed_distance(radius, 0.0)) < 1e-18
+    assert outline[:, 1].min() > -1e-18
+    if tool.rake_angle >= 0:  # a negative rake leans over the upright x = 0
+        assert abs(tool.signed_distance(0.0, radius)) < 1e-18
+        assert outline[:, 0].min() > -1e-18
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"rake_angle": radians(80.0)}, "rake_angle: expected -60 to 60 degrees, got 80"),
+        ({"clearance_angle": 0.0}, "clearance_angle: expected over 0 and under 45 degrees, got 0"),
+        ({"rake_angle": radians(50.0), "clearance_angle": radians(40.0)}, "wedge of less than 5"),
+        ({"edge_radius": -1e-6}, "edge_radius: expected over 0 m, got -1e-06 m"),
+    ],
+)
+def test_tool_refuses(changed, message):
+    with pytest.raises(ValueError, match=message):
+        replace(ToolGeometry(), **changed)

@@ -1,0 +1,357 @@
+"""Emissivity maps: textures, blends, and how they move."""
+
+from dataclasses import replace
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene
+from chipglow.surface import (
+    CHIP_1,
+    CHIP_2,
+    Emissivity,
+    FeatureSurface,
+    Texture,
+    UniformSurface,
+    chip_share,
+    shear_band_share,
+)
+from chipglow.surface.texture import MAP_SIZE, cubic_convolution
+
+RASTER = Raster(left=-60e-6, top=80e-6, spacing=2e-6, rows=50, columns=60)
+VOID, WORKPIECE, TOOL = 0, 1, 2
+FLAT = FeatureSurface(
+    chip=Emissivity(0.77),
+    shear_band=Emissivity(0.85),
+    workpiece=Emissivity(0.40),
+    tool=Emissivity(0.58),
+)
+
+
+def texture(mean=0.5, deviation=0.05, grain=20e-6, seed=1, restore=True):
+    generator = np.random.default_rng(seed)
+    return Texture.random(mean, deviation, grain, generator, restore_deviation=restore)
+
+
+def a_scene(times=(0.0,), coordinates=None, raster=RASTER, **changed):
+    """A scene of workpiece at rest; fields that are changed broadcast over (time, y, x)."""
+    shape = (len(times), *raster.shape)
+    values = {**dict.fromkeys(FIELD_UNITS, 0.0), "temperature": 300.0, "material": WORKPIECE}
+    values.update(changed)
+    if coordinates is not None:
+        values["material_x"], values["material_y"] = coordinates
+    fields = {name: np.broadcast_to(value, shape) for name, value in values.items()}
+    return Scene.from_fields(raster, times, fields)
+
+
+def at_rest(raster=RASTER):
+    return np.meshgrid(raster.x, raster.y)
+
+
+def keys_by_hand(nodes, u, v):
+    """Bicubic enlarging, node by node: Keys' kernel across and down, the map repeated."""
+    total = 0.0
+    for i in range(int(np.floor(v)) - 1, int(np.floor(v)) + 3):
+        for j in range(int(np.floor(u)) - 1, int(np.floor(u)) + 3):
+            weight = cubic_convolution(u - j) * cubic_convolution(v - i)
+            total += weight * nodes[i % MAP_SIZE, j % MAP_SIZE]
+    return total
+
+
+def test_the_kernel_is_that_of_keys():
+    # Cubic convolution with a = -1/2: 1 and 0 at the nodes, 9/16 and -1/16 half way between.
+    found = cubic_convolution([0, 1, 2, 3, 0.5, -0.5, 1.5, -1.5])
+    np.testing.assert_allclose(found, [1, 0, 0, 0, 9 / 16, 9 / 16, -1 / 16, -1 / 16])
+
+
+@given(st.floats(-500.0, 500.0), st.floats(-500.0, 500.0))
+@settings(max_examples=100, deadline=None)
+def test_enlarging_is_bicubic(u, v):
+    map_ = texture(grain=1.0)
+    # float32: 24 bits of values and weights below 1.
+    assert map_.at(u, v) == pytest.approx(keys_by_hand(map_.nodes, u, v), abs=1e-6)
+
+
+def test_enlarging_passes_through_the_nodes_and_keeps_a_plane():
+    map_ = texture(grain=1.0)
+    node = np.arange(MAP_SIZE)
+    np.testing.assert_allclose(map_.at(node[None, :], node[:, None]), map_.nodes, atol=1e-7)
+    plane = 0.2 + 0.003 * node[None, :] + 0.002 * node[:, None]
+    inner = Texture(plane.astype(np.float32), 1.0)
+    u, v = np.random.default_rng(2).uniform(2, MAP_SIZE - 3, (2, 500))
+    np.testing.assert_allclose(inner.at(u, v), 0.2 + 0.003 * u + 0.002 * v, atol=1e-6)
+
+
+def test_the_map_repeats():
+    map_ = texture()
+    x, y = np.random.default_rng(3).uniform(-1e-3, 1e-3, (2, 500))
+    assert map_.period == pytest.approx(2.56e-3)
+    shifted = map_.at(x + map_.period, y - 2 * map_.period)
+    # Adding a period moves a position in double precision by 1e-13 of a grain.
+    np.testing.assert_allclose(shifted, map_.at(x, y), atol=1e-6)
+
+
+@pytest.mark.parametrize("restore", [True, False])
+def test_deviation_that_is_told_is_that_of_the_map(restore):
+    map_ = texture(restore=restore)
+    # Ten samples a node, over the whole map: the mean square of products of cubics, by the
+    # trapezoidal rule over a period, is good to 1e-4 of itself.
+    position = np.arange(10 * MAP_SIZE) * map_.grain / 10
+    values = map_.at(position[None, :], position[:, None]).astype(np.float64)
+    assert values.std() == pytest.approx(map_.deviation, rel=1e-3)
+    assert values.mean() == pytest.approx(map_.mean, abs=1e-6)
+
+
+def test_restoring_gives_the_deviation_asked_for():
+    assert texture(0.42, 0.07).deviation == pytest.approx(0.07, rel=1e-6)
+
+
+def test_without_restoring_enlarging_takes_a_fifth():
+    # Over many maps the variance falls by the square of ∫k², which for the cubics is 57/70.
+    # 16384 deviates: 0.55 % standard deviation of a standard deviation; four of it.
+    found = texture(0.5, 0.05, restore=False).deviation
+    assert found == pytest.approx(0.05 * 57 / 70, rel=0.022)
+
+
+@pytest.mark.parametrize("restore", [True, False])
+@pytest.mark.parametrize("seed", range(3))
+def test_mean_is_that_asked_for(restore, seed):
+    map_ = texture(0.42, 0.07, seed=seed, restore=restore)
+    # 16384 deviates, widened by at most a quarter: four standard errors of the mean.
+    assert map_.mean == pytest.approx(0.42, abs=4 * 0.07 * 1.25 / MAP_SIZE)
+
+
+def test_values_stay_within_0_and_1():
+    map_ = texture(0.95, 0.3)
+    values = map_.at(*np.random.default_rng(4).uniform(-1e-3, 1e-3, (2, 5000)))
+    assert values.min() >= 0.0
+    assert values.max() == 1.0
+
+
+def test_texture_refuses():
+    with pytest.raises(ValueError, match=r"nodes have shape \(3, 3\), expected \(128, 128\)"):
+        Texture(np.zeros((3, 3), dtype=np.float32), 1.0)
+    with pytest.raises(ValueError, match=r"grain must be over 0 m, got 0.0 m"):
+        texture(grain=0.0)
+
+
+def test_same_seed_same_maps_and_each_feature_its_own():
+    first, again, other = (
+        CHIP_1.textures,
+        replace(CHIP_1).textures,
+        replace(CHIP_1, seed=2).textures,
+    )
+    for name in first:
+        np.testing.assert_array_equal(first[name].nodes, again[name].nodes)
+        assert not np.array_equal(first[name].nodes, other[name].nodes)
+    deviates = [(t.nodes - t.mean).ravel() / t.deviation for t in first.values()]
+    # Independent streams: correlations of 16384 pairs scatter by 1/128; four of it.
+    correlation = np.corrcoef(deviates) - np.eye(4)
+    assert np.abs(correlation).max() < 4 / MAP_SIZE
+
+
+def test_presets_are_table_1():
+    for surface, chip, band in (
+        (CHIP_1, (0.42, 0.07), (0.53, 0.05)),
+        (CHIP_2, (0.77, 0.03), (0.85, 0.02)),
+    ):
+        assert (surface.chip.mean, surface.chip.deviation) == chip
+        assert (surface.shear_band.mean, surface.shear_band.deviation) == band
+        assert surface.workpiece == Emissivity(0.40, 0.03)
+        assert surface.tool == Emissivity(0.58, 0.06)
+
+
+def test_shares_of_the_blends():
+    np.testing.assert_allclose(chip_share([0, 0.3, 0.35, 0.4, 0.5, 7]), [0, 0, 0.25, 0.5, 1, 1])
+    np.testing.assert_allclose(
+        shear_band_share([0, 6e3, 12e3, 18e3, 30e3, 1e6]), [0, 0, 0.25, 0.5, 1, 1], atol=1e-12
+    )
+
+
+@given(st.integers(0, 2**32))
+@settings(max_examples=10, deadline=None)
+def test_blend_against_plain_numpy(seed):
+    generator = np.random.default_rng(seed)
+    shape = (1, *RASTER.shape)
+    scene = a_scene(
+        coordinates=generator.uniform(-1e-3, 1e-3, (2, *shape)),
+        plastic_strain=generator.uniform(0.0, 0.8, shape),
+        plastic_strain_rate=generator.uniform(0.0, 4e4, shape),
+        material=generator.integers(0, 3, shape).astype(np.uint8),
+    )
+    frame = scene.frame(0)
+    maps = {
+        name: CHIP_1.textures[name].at(frame.material_x, frame.material_y)
+        for name in ("workpiece", "chip", "shear_band")
+    }
+    chip, band = chip_share(frame.plastic_strain), shear_band_share(frame.plastic_strain_rate)
+    expected = (1 - chip) * maps["workpiece"] + chip * maps["chip"]
+    expected = (1 - band) * expected + band * maps["shear_band"]
+    tool = CHIP_1.textures["tool"].at(RASTER.x[None, :], RASTER.y[:, None])
+    expected = np.choose(frame.material, [np.zeros_like(tool), expected, tool])
+    # float32 throughout: a handful of roundings of numbers below 1.
+    found = CHIP_1.on(scene).emissivity(frame)
+    assert found.dtype == np.float32
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6)
+
+
+def test_blend_is_linear_between_its_ends():
+    strain = np.linspace(0.0, 0.8, RASTER.columns)
+    rate = np.linspace(0.0, 4e4, RASTER.rows)[:, None]
+    scene = a_scene(coordinates=at_rest(), plastic_strain=strain, plastic_strain_rate=rate)
+    chip = np.interp(strain, [0.3, 0.5], [0.40, 0.77])
+    share = np.interp(rate, [6e3, 30e3], [0.0, 1.0])
+    found = FLAT.on(scene).emissivity(scene.frame(0))
+    np.testing.assert_allclose(found, chip + share * (0.85 - chip), rtol=0, atol=1e-6)
+
+
+def test_void_is_0_and_the_tool_does_not_move():
+    material = np.full(RASTER.shape, WORKPIECE)
+    material[:, :20], material[:, 40:] = VOID, TOOL
+    x, y = at_rest()
+    times = (0.0, 1e-6, 2e-6)
+    moved = (np.stack([x, x - 4e-6, x - 8e-6]), np.stack([y, y, y]))
+    scene = a_scene(times, moved, material=material, velocity_x=4.0)
+    for follow in ("material", "mean"):
+        field = replace(CHIP_1, follow=follow).on(scene)
+        maps = [field.emissivity(frame) for frame in scene.frames()]
+        tool = CHIP_1.textures["tool"].at(x[:, 40:], y[:, 40:])
+        for found in maps:
+            assert (found[:, :20] == 0).all()
+            np.testing.assert_array_equal(found[:, 40:], tool)
+        assert not np.array_equal(maps[0][:, 20:40], maps[2][:, 20:40])
+
+
+STATES = {"workpiece": (0.0, 0.0), "chip": (0.9, 100.0), "shear_band": (0.9, 5e4)}
+
+
+@pytest.mark.parametrize("feature", STATES)
+@pytest.mark.parametrize("follow", ["material", "mean"])
+def test_texture_moves_with_the_material(feature, follow):
+    # Three columns right a frame, and two rows up; the workpiece's map goes along the cut only.
+    across, up = 3, 0 if feature == "workpiece" else 2
+    step, times = RASTER.spacing, np.array([0.0, 1e-6, 2e-6, 3e-6])
+    velocity = (across * step / 1e-6, up * step / 1e-6)
+    x, y = at_rest()
+    coordinates = [
+        grid - speed * times[:, None, None] for grid, speed in zip((x, y), velocity, strict=True)
+    ]
+    strain, rate = STATES[feature]
+    scene = a_scene(
+        times,
+        coordinates,
+        plastic_strain=strain,
+        plastic_strain_rate=rate,
+        velocity_x=velocity[0],
+        velocity_y=velocity[1],
+    )
+    field = replace(CHIP_1, follow=follow).on(scene)
+    first, *_, last = (field.emissivity(frame) for frame in scene.frames())
+    down, right = RASTER.rows - 3 * up, RASTER.columns - 3 * across
+    # Positions in float32 are good to 1e-11 m, and the texture changes by 0.01 a micrometre.
+    np.testing.assert_allclose(
+        last[:down, 3 * across :], first[3 * up :, :right], rtol=0, atol=2e-6
+    )
+    assert first.std() > 0.01
+
+
+def test_mean_shift_is_velocity_times_time():
+    times = np.array([0.0, 1e-6, 3e-6, 4e-6])
+    upper = (RASTER.y > 0)[:, None]
+    middle = np.abs(RASTER.x) < 20e-6
+    scene = a_scene(
+        times,
+        plastic_strain=np.where(upper, 0.9, 0.0),
+        plastic_strain_rate=np.where(upper & middle, 5e4, 0.0),
+        velocity_x=np.where(upper, np.where(middle, 2.0, 1.0), 4.0),
+        velocity_y=np.where(upper, np.where(middle, 1.5, 3.0), 0.5),
+    )
+    field = replace(CHIP_1, follow="mean").on(scene)
+    velocity = np.array([[4.0, 0.0], [1.0, 3.0], [2.0, 1.5]])
+    for time in (0.0, 0.4e-6, 2e-6, 4e-6):
+        np.testing.assert_allclose(field.shift(time), velocity * time, rtol=1e-6, atol=1e-18)
+
+
+def test_mean_shift_integrates_a_changing_velocity():
+    times = np.linspace(0.0, 4e-6, 5)
+    speed = 2.0 + 1e6 * times
+    scene = a_scene(times, velocity_x=speed[:, None, None])
+    field = replace(CHIP_1, follow="mean").on(scene)
+    # The trapezoidal rule is exact for a velocity that rises linearly.
+    np.testing.assert_allclose(field.shift(4e-6)[0], [2.0 * 4e-6 + 0.5e6 * 4e-6**2, 0.0])
+    np.testing.assert_array_equal(field.shift(4e-6)[1:], 0.0)
+
+
+def test_a_feature_keeps_its_velocity_while_it_is_not_seen():
+    times = np.array([0.0, 1e-6, 2e-6])
+    rate = np.array([5e4, 0.0, 5e4])[:, None, None]
+    scene = a_scene(times, plastic_strain=0.9, plastic_strain_rate=rate, velocity_y=3.0)
+    field = replace(CHIP_1, follow="mean").on(scene)
+    np.testing.assert_allclose(field.shift(2e-6)[2], [0.0, 6e-6])
+
+
+def test_result_does_not_depend_on_the_number_of_threads():
+    strain = np.random.default_rng(5).uniform(0.0, 0.8, RASTER.shape)
+    velocity = np.random.default_rng(6).uniform(0.0, 5.0, RASTER.shape)
+    scene = a_scene((0.0, 1e-6), plastic_strain=strain, velocity_x=velocity, velocity_y=velocity)
+
+    def maps(threads):
+        before = numba.get_num_threads()
+        numba.set_num_threads(threads)
+        try:
+            field = replace(CHIP_2, follow="mean").on(scene)
+            return field.shifts, field.emissivity(scene.frame(1))
+        finally:
+            numba.set_num_threads(before)
+
+    for one, many in zip(maps(1), maps(numba.config.NUMBA_NUM_THREADS), strict=True):
+        np.testing.assert_array_equal(one, many)
+
+
+def test_without_material_coordinates_the_hint_is_given():
+    with pytest.raises(ValueError, match="no material coordinates for 'material', expected 'mean'"):
+        CHIP_1.on(a_scene())
+
+
+def test_a_frame_of_another_scene_is_refused():
+    field = replace(CHIP_1, follow="mean").on(a_scene())
+    other = a_scene(raster=replace(RASTER, rows=10)).frame(0)
+    with pytest.raises(ValueError, match=r"has shape \(10, 60\), expected \(50, 60\)"):
+        field.emissivity(other)
+    bare: Frame = a_scene().frame(0)
+    with pytest.raises(ValueError, match="has no material coordinates"):
+        CHIP_1.on(a_scene(coordinates=at_rest())).emissivity(bare)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"grain": 0.0}, "grain: expected over 0 m, got 0.0 m"),
+        ({"follow": "chip"}, "follow: expected 'material' or 'mean', got 'chip'"),
+        ({"seed": -1}, "seed: expected 0 or more, got -1"),
+    ],
+)
+def test_feature_surface_refuses(changed, message):
+    with pytest.raises(ValueError, match=message):
+        replace(CHIP_1, **changed)
+
+
+def test_emissivities_refuse():
+    with pytest.raises(ValueError, match=r"expected a mean of 0 to 1, got 1.2"):
+        Emissivity(1.2, 0.1)
+    with pytest.raises(ValueError, match=r"expected a deviation of 0 to 0.5, got -0.1"):
+        Emissivity(0.4, -0.1)
+    with pytest.raises(ValueError, match=r"emissivity: expected 0 to 1, got -0.5"):
+        UniformSurface(-0.5)
+
+
+def test_a_uniform_surface_is_black_but_for_the_void():
+    material = np.full(RASTER.shape, WORKPIECE)
+    material[0], material[1] = VOID, TOOL
+    scene = a_scene(material=material)
+    found = UniformSurface().on(scene).emissivity(scene.frame(0))
+    assert (found[0] == 0).all()
+    assert (found[1:] == 1).all()
