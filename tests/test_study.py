@@ -342,6 +342,7 @@ def test_an_empty_study_or_section_means_the_defaults(tmp_path):
 def test_numbers_may_be_whole_or_have_an_exponent(tmp_path):
     study = load("cutting: {numerics: {mass_scaling: 1e2}, friction: {coefficient: 1}}", tmp_path)
     assert study.cutting.numerics.mass_scaling == 100.0
+    assert load("camera: {pitch: 7e-06 m}", tmp_path).camera.pitch == 7e-6
     assert study.cutting.friction.coefficient == 1.0
 
 

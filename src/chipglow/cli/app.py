@@ -1,0 +1,168 @@
+"""The commands. Each imports what it needs when it runs, so that ``--help`` answers at once."""
+
+import sys
+from io import TextIOWrapper
+from pathlib import Path
+from typing import Annotated, Final
+
+import typer
+
+from chipglow.cli.boundary import Boundary
+
+PAPER_FOLDER: Final = Path("chipglow-paper")
+
+app = typer.Typer(
+    cls=Boundary,
+    help="A virtual infrared camera for metal cutting.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+cache_app = typer.Typer(help="Scenes that were computed before.", no_args_is_help=True)
+app.add_typer(cache_app, name="cache")
+
+StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="The study, a YAML file.")]
+ResultFolder = Annotated[
+    Path, typer.Option(metavar="DIR", help="Folder of the results; earlier results are replaced.")
+]
+
+
+def main() -> None:
+    """Run the command ``chipglow``."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            # A terminal that knows no µ or − shall show a question mark, not end the command.
+            stream.reconfigure(errors="replace")
+    app()
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"chipglow {version('chipglow')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _chipglow(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def reproduce(
+    quick: Annotated[
+        bool, typer.Option("--quick", help="On a coarse cell and coarse samples, in a minute.")
+    ] = False,
+    out: ResultFolder = PAPER_FOLDER,
+) -> None:
+    """Do the paper's study anew and set its figures beside the paper's."""
+    from chipglow.cli.results import write_results
+    from chipglow.study import Study
+
+    write_results(Study.quick() if quick else Study(), out)
+
+
+@app.command()
+def init(
+    path: Annotated[Path, typer.Argument(metavar="STUDY", help="The file to write.")] = Path(
+        "study.yaml"
+    ),
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+) -> None:
+    """Write the paper's study as a commented YAML file."""
+    from chipglow.io import atomic_path
+    from chipglow.study import Study, study_text
+
+    if path.exists() and not force:
+        raise FileExistsError(f"{path}: is there already, expected a new name or --force")
+    with atomic_path(path) as temporary:
+        temporary.write_text(study_text(Study()), encoding="utf-8")
+    print(path)
+
+
+@app.command()
+def run(study: StudyFile, out: ResultFolder) -> None:
+    """Run a study: cut, look, analyse, report."""
+    from chipglow.cli.results import write_results
+    from chipglow.study import load_study
+
+    write_results(load_study(study), out)
+
+
+@app.command()
+def cut(
+    study: StudyFile,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The scene to write, NetCDF.")],
+) -> None:
+    """Do only the cutting simulation of a study."""
+    from shutil import copyfile
+
+    from chipglow.cli.progress import progress_bars
+    from chipglow.io import atomic_path
+    from chipglow.study import cut as cut_scene
+    from chipglow.study import load_study
+
+    settings = load_study(study)
+    with atomic_path(out) as temporary, progress_bars() as progress:
+        copyfile(cut_scene(settings, progress), temporary)
+    print(out)
+
+
+@app.command()
+def measure(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a NetCDF file.")],
+    study: Annotated[
+        Path, typer.Option(metavar="STUDY", help="The study that says surface and camera.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The measurement to write, NetCDF.")],
+    start: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME",
+            help="When the first exposure starts, such as '400 us'; by default with the scene.",
+        ),
+    ] = None,
+    chip: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Which of the study's chips; by default the first."),
+    ] = None,
+) -> None:
+    """Do only the camera of a study: look at a scene."""
+    from chipglow.cli.measuring import measure_scene
+    from chipglow.study import load_study
+
+    measure_scene(scene, load_study(study), out, start, chip)
+    print(out)
+
+
+@cache_app.command("list")
+def list_cache() -> None:
+    """Show the cached scenes, the latest first, and their size."""
+    from datetime import datetime
+
+    from chipglow.study.cache import cache_folder, cached_scenes
+
+    scenes = cached_scenes()
+    for scene in scenes:
+        when = datetime.fromtimestamp(scene.modified).strftime("%Y-%m-%d %H:%M")
+        print(f"{when}  {_megabytes(scene.size):>10}  {scene.path.name}")
+    total = _megabytes(sum(scene.size for scene in scenes))
+    print(f"{len(scenes)} scenes, {total} in {cache_folder()}")
+
+
+@cache_app.command("clear")
+def clear() -> None:
+    """Delete the cached scenes."""
+    from chipglow.study.cache import cache_folder, clear_cache
+
+    print(f"{_megabytes(clear_cache())} freed in {cache_folder()}")
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:.1f} MB"

@@ -1,0 +1,55 @@
+"""The camera alone, from a scene's file to a measurement's."""
+
+from math import floor
+from pathlib import Path
+
+from chipglow.camera import Measurement
+from chipglow.cli.progress import progress_bars
+from chipglow.io import open_scene, write_measurement
+from chipglow.study import Study
+from chipglow.study.units import TIME
+
+
+def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: str | None) -> None:
+    """Look at a scene with a study's camera and write the measurement.
+
+    Parameters
+    ----------
+    path : Path
+        The scene's file.
+    study : Study
+        Says surface and camera.
+    out : Path
+        The measurement's file.
+    start : str, optional
+        When the first exposure starts, in the scene's time, with its unit; frames follow at the
+        camera's rate to the end of the scene.
+    chip : str, optional
+        Name of one of the study's chips; the first by default.
+
+    Raises
+    ------
+    ValueError
+        If there is no such chip, or no exposure fits into the scene.
+    """
+    surfaces = study.surface.build(study.seed)
+    name = next(iter(surfaces)) if chip is None else chip
+    if name not in surfaces:
+        raise ValueError(f"--chip: {name!r} is unknown, expected one of {', '.join(surfaces)}")
+    scene, camera = open_scene(path), study.camera.build()
+    first = float(scene.times[0]) if start is None else _start(start)
+    left = float(scene.times[-1]) - first - camera.integration_time
+    count = max(floor(left * camera.frame_rate) + 1, 1)
+    with progress_bars() as progress:
+        progress("measurement", 0.0)
+        starts = camera.frame_times(first, count)
+        measured = camera.measure(scene, surfaces[name], starts).data.assign_attrs(surface=name)
+        progress("measurement", 1.0)
+    write_measurement(Measurement(measured), out)
+
+
+def _start(text: str) -> float:
+    try:
+        return TIME.parse(text)
+    except ValueError as error:
+        raise ValueError(f"--start: {error}") from None

@@ -1,0 +1,273 @@
+import os
+import re
+import resource
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from analytic_chip import AnalyticChip
+from typer.testing import CliRunner
+
+from chipglow.cli import app
+from chipglow.cutting import CuttingSimulation, ForceHistory, SolverError
+from chipglow.io import open_scene, read_measurement, write_scene
+from chipglow.study import Study, load_study
+
+RASTER = AnalyticChip().raster
+STUDY = f"""
+title: A chip in closed form
+cutting:
+  field_of_view:
+    left: {RASTER.left} m
+    top: {RASTER.top} m
+    spacing: {RASTER.spacing} m
+    rows: {RASTER.rows}
+    columns: {RASTER.columns}
+analysis: {{instants: 3, psf_widths: [8 um, 12 um]}}
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("CHIPGLOW_CACHE", str(tmp_path / "cache"))
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
+    (work / "study.yaml").write_text(STUDY)
+    return work
+
+
+@pytest.fixture(scope="module")
+def chip_scene():
+    return AnalyticChip().scene()
+
+
+@pytest.fixture
+def runs(monkeypatch, chip_scene):
+    """The cutting simulation replaced by a chip in closed form."""
+    calls = []
+
+    def cut_chip(simulation, window, raster, on_frame, on_progress=None):
+        calls.append(simulation)
+        for frame in chip_scene.frames():
+            on_frame(frame)
+        on_progress(1.0)
+        return ForceHistory(*AnalyticChip().forces())
+
+    monkeypatch.setattr(CuttingSimulation, "run", cut_chip)
+    return calls
+
+
+@pytest.fixture
+def scene(folder, chip_scene):
+    write_scene(chip_scene, folder / "scene.nc")
+    return folder / "scene.nc"
+
+
+def chipglow(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def assert_refused(result, *parts, code=2):
+    assert result.exit_code == code, result.output
+    lines = [line for line in result.output.splitlines() if line.startswith("chipglow: ")]
+    assert len(lines) == 1, result.output
+    assert "Traceback" not in result.output
+    for part in parts:
+        assert part in lines[0]
+
+
+@contextmanager
+def full_disk(most_bytes):
+    """No file can grow beyond some bytes, as on a disk that fills up."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def test_the_version_is_shown():
+    result = chipglow("--version")
+    assert result.exit_code == 0
+    assert re.fullmatch(r"chipglow \d+\.\d+\.\d+\n", result.output)
+
+
+def test_help_imports_none_of_the_heavy_libraries():
+    code = (
+        "import sys, chipglow\n"
+        "before = set(sys.modules)\n"
+        "from typer.testing import CliRunner\n"
+        "from chipglow.cli import app\n"
+        "result = CliRunner().invoke(app, ['--help'])\n"
+        "assert 'reproduce' in result.output, result.output\n"
+        "print(*{name.split('.')[0] for name in set(sys.modules) - before})\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    heavy = {"numba", "scipy", "xarray", "h5py", "matplotlib", "pint", "pydantic"}
+    assert not heavy & set(done.stdout.split())
+
+
+def test_init_writes_the_papers_study_and_keeps_what_is_there(folder):
+    assert chipglow("init", "paper.yaml").exit_code == 0
+    assert load_study("paper.yaml") == Study()
+    assert_refused(chipglow("init", "study.yaml"), "study.yaml", "is there already", "--force")
+    assert (folder / "study.yaml").read_text() == STUDY
+    assert chipglow("init", "study.yaml", "--force").exit_code == 0
+    assert load_study("study.yaml") == Study()
+
+
+def test_run_writes_a_report_and_prints_the_comparison(folder, runs):
+    result = chipglow("run", "study.yaml", "--out", "results")
+    assert result.exit_code == 0, result.output
+    assert "results/report.html" in result.output
+    for heading in ("quantity", "paper", "here", "difference", "−42", "90"):
+        assert heading in result.output
+    names = {path.name for path in (folder / "results").iterdir()}
+    assert {"report.html", "summary.json", "results.nc", "study.yaml", "figures"} <= names
+    assert load_study("results/study.yaml") == load_study("study.yaml")
+    assert sorted(path.name for path in folder.iterdir()) == ["results", "study.yaml"]
+
+
+def test_a_second_run_finds_the_scene_and_replaces_the_results(folder, runs):
+    assert chipglow("run", "study.yaml", "--out", "results").exit_code == 0
+    (folder / "study.yaml").write_text(STUDY.replace("instants: 3", "instants: 2"))
+    result = chipglow("run", "study.yaml", "--out", "results")
+    assert result.exit_code == 0
+    assert "cache" in result.output
+    assert len(runs) == 1
+    assert load_study("results/study.yaml").analysis.instants == 2
+
+
+def test_reproduce_runs_the_papers_study(folder, monkeypatch):
+    seen = []
+
+    def note(study, out):
+        seen.append((study, str(out)))
+
+    monkeypatch.setattr("chipglow.cli.results.write_results", note)
+    assert chipglow("reproduce").exit_code == 0
+    assert chipglow("reproduce", "--quick", "--out", "quick").exit_code == 0
+    assert seen == [(Study(), "chipglow-paper"), (Study.quick(), "quick")]
+
+
+def test_a_foreign_folder_is_refused_before_anything_is_computed(folder, runs):
+    (folder / "thesis").mkdir()
+    (folder / "thesis" / "chapter.tex").write_text("years of work")
+    assert_refused(chipglow("run", "study.yaml", "--out", "thesis"), "thesis", "expected")
+    assert runs == []
+    assert [path.name for path in (folder / "thesis").iterdir()] == ["chapter.tex"]
+
+
+@pytest.mark.parametrize("command", ["run", "cut"])
+def test_a_place_that_is_not_there_is_refused_before_anything_is_computed(command, runs):
+    assert_refused(chipglow(command, "study.yaml", "--out", "no/where"), "no folder no")
+    assert runs == []
+
+
+def test_a_bad_study_is_refused_and_writes_nothing(folder, runs):
+    (folder / "study.yaml").write_text("cutting: {feed: -0.3 mm}")
+    result = chipglow("run", "study.yaml", "--out", "results")
+    assert_refused(result, "study.yaml: cutting.feed: -0.3 mm is not over 0, expected a length")
+    assert_refused(chipglow("run", "no.yaml", "--out", "results"), "no.yaml: No such file")
+    assert [path.name for path in folder.iterdir()] == ["study.yaml"]
+
+
+def test_cut_writes_the_scene(folder, runs):
+    result = chipglow("cut", "study.yaml", "--out", "scene.nc")
+    assert result.exit_code == 0, result.output
+    assert len(open_scene(folder / "scene.nc").times) == AnalyticChip().frames
+
+
+def test_measure_writes_frames_at_the_camera_rate(folder, scene):
+    (folder / "study.yaml").write_text("camera: {frame_rate: 60 kHz}")
+    result = chipglow("measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc")
+    assert result.exit_code == 0, result.output
+    measurement = read_measurement("m.nc")
+    np.testing.assert_allclose(measurement.times, [0.0, 1 / 60e3], atol=1e-12)
+    assert measurement.data.attrs["surface"] == "chip 1"
+
+
+def test_measure_starts_when_told_with_the_chip_that_is_named(folder, scene):
+    arguments = ("measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc")
+    result = chipglow(*arguments, "--start", "20 us", "--chip", "chip 2")
+    assert result.exit_code == 0, result.output
+    measurement = read_measurement("m.nc")
+    np.testing.assert_allclose(measurement.times, [20e-6])
+    assert measurement.data.attrs["surface"] == "chip 2"
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "message"),
+    [
+        ("--start", "20", "--start: 20 has no unit, expected a time such as 10 us"),
+        ("--start", "35 us", "scene"),
+        ("--chip", "chip 3", "--chip: 'chip 3' is unknown, expected one of chip 1, chip 2"),
+        ("--out", "no/m.nc", "no folder no"),
+    ],
+)
+def test_measure_refuses_what_it_cannot_do_and_writes_nothing(
+    option, value, message, folder, scene
+):
+    arguments = ["measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc"]
+    assert_refused(chipglow(*arguments, option, value), message)
+    assert sorted(path.name for path in folder.iterdir()) == ["scene.nc", "study.yaml"]
+
+
+def test_a_scene_that_is_cut_short_or_no_scene_is_refused(folder, scene):
+    arguments = ("measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc")
+    os.truncate(scene, scene.stat().st_size // 2)
+    assert_refused(chipglow(*arguments), "scene.nc")
+    scene.write_text("no scene at all")
+    assert_refused(chipglow(*arguments), "scene.nc")
+    scene.unlink()
+    assert_refused(chipglow(*arguments), "scene.nc")
+    assert not (folder / "m.nc").exists()
+
+
+@pytest.mark.parametrize("command", ["cut", "run"])
+def test_a_disk_that_fills_up_during_the_cut_leaves_nothing(command, folder, runs, tmp_path):
+    with full_disk(100_000):
+        result = chipglow(command, "study.yaml", "--out", "out")
+    assert_refused(result)
+    assert [path.name for path in folder.iterdir()] == ["study.yaml"]
+    assert list((tmp_path / "cache").iterdir()) == []
+
+
+def test_a_disk_that_fills_up_during_the_report_keeps_the_earlier_results(folder, runs):
+    assert chipglow("run", "study.yaml", "--out", "results").exit_code == 0
+    before = (folder / "results" / "report.html").read_bytes()
+    with full_disk(20_000):
+        assert_refused(chipglow("run", "study.yaml", "--out", "results"))
+    assert (folder / "results" / "report.html").read_bytes() == before
+    assert sorted(path.name for path in folder.iterdir()) == ["results", "study.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "message"),
+    [
+        (KeyboardInterrupt(), 130, "interrupted, nothing was written"),
+        (SolverError("cutting simulation: a point left the grid at 3 us"), 1, "left the grid"),
+        (OSError(28, "No space left on device"), 2, "No space left on device"),
+    ],
+)
+def test_what_stops_a_run_is_one_line_and_an_exit_code(error, code, message, folder, monkeypatch):
+    def stop(*_):
+        raise error
+
+    monkeypatch.setattr(CuttingSimulation, "run", stop)
+    result = chipglow("run", "study.yaml", "--out", "results")
+    assert_refused(result, message, code=code)
+    assert [path.name for path in folder.iterdir()] == ["study.yaml"]
+
+
+def test_the_cache_is_listed_with_its_size_and_cleared(runs, tmp_path):
+    assert chipglow("cut", "study.yaml", "--out", "scene.nc").exit_code == 0
+    listed = chipglow("cache", "list").output
+    assert re.search(r"\d MB  scene-[0-9a-f]{32}\.nc", listed)
+    assert re.search(r"1 scenes, \d+\.\d MB in ", listed)
+    assert re.search(r"\d MB freed", chipglow("cache", "clear").output)
+    assert list((tmp_path / "cache").iterdir()) == []
