@@ -64,7 +64,8 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such file, expected a measurement")
     try:
-        return Measurement(xr.load_dataset(path, engine="h5netcdf", decode_times=False))
+        data = xr.load_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
+        return Measurement(data)
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         reason = str(error).split("\n", 1)[0]
         raise ValueError(

@@ -233,7 +233,9 @@ class StoredScene(Scene):
         self.path = path
         self._file = h5py.File(path, "r")
         self._direct = {name for name in PACKING if self._is_packed(name)}
-        super().__init__(xr.open_dataset(path, engine="h5netcdf", decode_times=False))
+        super().__init__(
+            xr.open_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
+        )
 
     def _is_packed(self, name: str) -> bool:
         stored, packing = self._file.get(name), PACKING[name]

@@ -1,0 +1,454 @@
+"""Files: what comes back, what is refused, and that nothing half-written stays."""
+
+import shutil
+import subprocess
+import sys
+from dataclasses import fields as fields_of
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from chipglow.camera.measurement import Measurement
+from chipglow.io import (
+    SceneWriter,
+    atomic_folder,
+    atomic_path,
+    open_scene,
+    read_measurement,
+    write_measurement,
+    write_scene,
+)
+from chipglow.radiometry import Band
+from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene, SceneError, ToolGeometry
+from chipglow.scene.scene import raster_coordinates
+
+RASTER = Raster(left=-420e-6, top=460e-6, spacing=0.6667e-6, rows=18, columns=27)
+# Half of what the file keeps, and a rounding in float32 for what is unpacked by a product.
+RELATIVE = {
+    "plastic_strain": 2.0**-14,
+    "plastic_strain_rate": 2.0**-12,
+    "velocity_x": 2.0**-11,
+    "velocity_y": 2.0**-11,
+}
+ABSOLUTE = {"temperature": 0.0125 + 1e-4, "material_x": 10e-9 + 1e-9, "material_y": 10e-9 + 1e-9}
+
+
+def a_frame(time=0.0, seed=1, raster=RASTER, **changed):
+    generator = np.random.default_rng(seed)
+
+    def field(lowest, highest):
+        return generator.uniform(lowest, highest, raster.shape).astype(np.float32)
+
+    values = {
+        "temperature": field(290.0, 1500.0),
+        "plastic_strain": field(0.0, 6.0),
+        "plastic_strain_rate": field(0.0, 1e5),
+        "velocity_x": field(-5.0, 5.0),
+        "velocity_y": field(-5.0, 5.0),
+        "material": generator.integers(0, 3, raster.shape).astype(np.uint8),
+        "material_x": field(-2e-3, 0.0),
+        "material_y": field(-5e-4, 5e-4),
+    }
+    return Frame(time=time, **{**values, **changed})
+
+
+def a_file(folder, count=3, name="scene.nc", **options):
+    path = folder / name
+    with SceneWriter(path, RASTER, ToolGeometry(), {"study": "one"}, **options) as writer:
+        for index in range(count):
+            writer.append(a_frame(index * 0.2e-6, seed=index))
+        writer.forces([0.0, 1e-6], [4.0e5, 4.5e5], [1.5e5, 2.0e5])
+    return path
+
+
+def assert_as_kept(found, expected):
+    assert found.time == expected.time
+    for name in (field.name for field in fields_of(Frame) if field.name != "time"):
+        one, other = getattr(found, name), getattr(expected, name)
+        assert (one is None) == (other is None), name
+        if one is not None:
+            assert one.dtype == other.dtype
+            np.testing.assert_allclose(
+                one, other, rtol=RELATIVE.get(name, 0.0), atol=ABSOLUTE.get(name, 0.0), err_msg=name
+            )
+
+
+def leftovers(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.mark.parametrize("portable", [False, True])
+def test_scene_comes_back(tmp_path, portable):
+    scene = open_scene(a_file(tmp_path, portable=portable))
+    np.testing.assert_allclose(scene.raster.extent, RASTER.extent, rtol=1e-12)
+    assert scene.raster.shape == RASTER.shape
+    assert scene.tool == ToolGeometry()
+    assert scene.data.attrs["study"] == "one"
+    np.testing.assert_array_equal(scene.times, np.arange(3) * 0.2e-6)
+    for index, frame in enumerate(scene.frames()):
+        assert_as_kept(frame, a_frame(index * 0.2e-6, seed=index))
+    np.testing.assert_array_equal(scene.data["force_time"], [0.0, 1e-6])
+    np.testing.assert_array_equal(scene.data["cutting_force"], [4.0e5, 4.5e5])
+    np.testing.assert_array_equal(scene.data["thrust_force"], [1.5e5, 2.0e5])
+    assert scene.data["thrust_force"].attrs["units"] == "N/m"
+    assert leftovers(tmp_path) == ["scene.nc"]
+
+
+def test_the_fast_way_reads_what_xarray_reads(tmp_path):
+    scene = open_scene(a_file(tmp_path))
+    for name in (*FIELD_UNITS, "material_x", "material_y"):
+        fast, general = getattr(scene.frame(2), name), scene.data[name][2].values
+        # Scaled values once in float32, once in float64: a rounding of float32.
+        np.testing.assert_allclose(fast, general, rtol=2e-7, atol=1e-12)
+
+
+def test_frames_are_chunks_and_are_read_lazily(tmp_path):
+    path = a_file(tmp_path)
+    assert "velocity_x" in repr(open_scene(path).data)
+    with h5py.File(path) as file:
+        assert all(file[name].chunks == (1, *RASTER.shape) for name in FIELD_UNITS)
+    variable = open_scene(path).data["temperature"].variable
+    assert not isinstance(variable._data, np.ndarray)
+
+
+@settings(
+    max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    temperature=arrays(np.float32, (2, 3), elements=st.floats(200.0, 1838.0, width=32)),
+    strain=arrays(np.float32, (2, 3), elements=st.floats(0.0, 1e3, width=32)),
+    speed=arrays(np.float32, (2, 3), elements=st.floats(-1e3, 1e3, width=32)),
+    position=arrays(np.float32, (2, 3), elements=st.floats(-0.015625, 0.015625, width=32)),
+)
+def test_any_scene_comes_back(tmp_path, temperature, strain, speed, position):
+    raster = Raster(0.0, 0.0, 1e-6, 2, 3)
+    frame = Frame(
+        time=1e-6,
+        temperature=temperature,
+        plastic_strain=strain,
+        plastic_strain_rate=strain * np.float32(1e4),
+        velocity_x=speed,
+        velocity_y=-speed,
+        material=np.ones((2, 3), dtype=np.uint8),
+        material_x=position,
+        material_y=-position,
+    )
+    path = tmp_path / "any.nc"
+    with SceneWriter(path, raster) as writer:
+        writer.append(frame)
+    # Below float32's least normal value, 1e-38, rounding is no longer relative.
+    assert_as_kept(open_scene(path).frame(0), frame)
+
+
+def test_write_scene_keeps_all(tmp_path):
+    scene = open_scene(a_file(tmp_path))
+    write_scene(scene, tmp_path / "copy.nc", portable=True)
+    copy = open_scene(tmp_path / "copy.nc")
+    assert copy.tool == scene.tool
+    assert copy.data.attrs == scene.data.attrs
+    np.testing.assert_array_equal(copy.data["thrust_force"], scene.data["thrust_force"])
+    for one, other in zip(copy.frames(), scene.frames(), strict=True):
+        for name in (*FIELD_UNITS, "material_x", "material_y"):
+            # What was rounded once stays as it is.
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+def test_a_scene_without_material_coordinates(tmp_path):
+    bare = a_frame(material_x=None, material_y=None)
+    with SceneWriter(tmp_path / "bare.nc", RASTER, material_coordinates=False) as writer:
+        writer.append(bare)
+    scene = open_scene(tmp_path / "bare.nc")
+    assert not scene.has_material_coordinates
+    assert_as_kept(scene.frame(0), bare)
+    write_scene(scene, tmp_path / "copy.nc")
+    assert not open_scene(tmp_path / "copy.nc").has_material_coordinates
+
+
+def test_a_pixel_keeps_its_radiance_temperature(tmp_path):
+    band, count = Band(3.8e-6, 5.1e-6), 20
+    with SceneWriter(tmp_path / "scene.nc", RASTER) as writer:
+        for index in range(count):
+            writer.append(a_frame(index * 0.2e-6, seed=index))
+    scene = open_scene(tmp_path / "scene.nc")
+
+    def pixels(frames):
+        radiance = np.mean([band.radiance(frame.temperature) for frame in frames], axis=0)
+        return band.temperature(radiance.reshape(2, 9, 3, 9).mean(axis=(1, 3)))
+
+    found = pixels(scene.frames())
+    expected = pixels(a_frame(index * 0.2e-6, seed=index) for index in range(count))
+    # design: 0.6 mK. The roundings, 7 mK each, average over the 1620 samples of a pixel.
+    np.testing.assert_allclose(found, expected, rtol=0, atol=0.6e-3)
+
+
+def test_portable_needs_no_plugin(tmp_path):
+    path = a_file(tmp_path, portable=True)
+    program = (
+        "import sys, xarray as xr\n"
+        f"data = xr.load_dataset({str(path)!r}, engine='h5netcdf', decode_times=False)\n"
+        "assert 'hdf5plugin' not in sys.modules\n"
+        "print(float(data['temperature'].min()), data['temperature'].attrs['units'])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    coldest, unit = done.stdout.split()
+    assert 290.0 <= float(coldest) < 320.0
+    assert unit == "K"
+
+
+def test_scene_by_xarray_is_read_too(tmp_path):
+    scene = open_scene(a_file(tmp_path))
+    loaded = scene.data.load().drop_encoding()
+    loaded.to_netcdf(tmp_path / "plain.nc", engine="h5netcdf")
+    for one, other in zip(open_scene(tmp_path / "plain.nc").frames(), scene.frames(), strict=True):
+        np.testing.assert_allclose(one.temperature, other.temperature, rtol=1e-6)
+        np.testing.assert_allclose(one.material_x, other.material_x, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"temperature": 25.0}, "looks like °C"),
+        ({"plastic_strain": np.nan}, "'plastic_strain' is not finite everywhere at 1e-06 s"),
+        ({"temperature": 1900.0}, "'temperature' at 1e-06 s: 1900 is beyond the file's range, 200"),
+        ({"material_x": 50.0}, "'material_x' at 1e-06 s: 50 is beyond the file's range"),
+        ({"material_y": None}, r"'material_y' is missing at 1e-06 s, expected \(18, 27\)"),
+    ],
+)
+def test_the_writer_refuses_a_wrong_frame(tmp_path, changed, message):
+    full = {
+        name: value if value is None else np.full(RASTER.shape, value, dtype=np.float32)
+        for name, value in changed.items()
+    }
+    with (
+        pytest.raises(SceneError, match=message),
+        SceneWriter(tmp_path / "scene.nc", RASTER) as writer,
+    ):
+        writer.append(a_frame())
+        writer.append(a_frame(1e-6, **full))
+    assert leftovers(tmp_path) == []
+
+
+def test_the_writer_refuses_wrong_shapes_and_times(tmp_path):
+    path = tmp_path / "scene.nc"
+    other = a_frame(raster=Raster(0.0, 0.0, 1e-6, 4, 5))
+    with (
+        pytest.raises(SceneError, match=r"'temperature' is of shape \(4, 5\)"),
+        SceneWriter(path, RASTER) as writer,
+    ):
+        writer.append(other)
+    with (
+        pytest.raises(SceneError, match=r"frame at 1e-06 s, expected later than 1e-06 s"),
+        SceneWriter(path, RASTER) as writer,
+    ):
+        writer.append(a_frame(1e-6))
+        writer.append(a_frame(1e-6))
+    with (
+        pytest.raises(SceneError, match=r"no frame was written"),
+        SceneWriter(path, RASTER),
+    ):
+        pass
+    with (
+        pytest.raises(SceneError, match=r"'thrust_force' must be finite and have shape \(2,\)"),
+        SceneWriter(path, RASTER) as writer,
+    ):
+        writer.append(a_frame())
+        writer.forces([0.0, 1.0], [1.0, 2.0], [1.0])
+    assert leftovers(tmp_path) == []
+
+
+@pytest.mark.parametrize("kept", [0.02, 0.5, 0.99])
+def test_a_file_cut_short_is_named(tmp_path, kept):
+    path = a_file(tmp_path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(kept * len(whole))])
+    with pytest.raises(SceneError, match=r"scene\.nc: not a scene, or cut short"):
+        open_scene(path)
+
+
+def test_a_foreign_file_is_named(tmp_path):
+    path = tmp_path / "foreign.nc"
+    with pytest.raises(FileNotFoundError, match=r"foreign\.nc: there is no such file"):
+        open_scene(path)
+    path.write_text("not a scene")
+    with pytest.raises(SceneError, match=r"foreign\.nc: not a scene, or cut short") as caught:
+        open_scene(path)
+    assert "\n" not in str(caught.value)
+    xr.Dataset({"a": ("time", [1.0])}).to_netcdf(path, engine="h5netcdf")
+    with pytest.raises(SceneError, match=r"foreign\.nc: scene: coordinate 'time' is missing"):
+        open_scene(path)
+    with h5py.File(path, "w") as file:
+        file["a"] = np.zeros((3, 4))
+    with pytest.raises(SceneError, match=r"foreign\.nc: "):
+        open_scene(path)
+
+
+def test_a_damaged_frame_is_named(tmp_path):
+    path = a_file(tmp_path, portable=True)
+    with h5py.File(path) as file:
+        at = file["temperature"].id.get_chunk_info(1)
+    damaged = bytearray(path.read_bytes())
+    damaged[at.byte_offset : at.byte_offset + at.size] = bytes(at.size)
+    path.write_bytes(damaged)
+    with pytest.raises(SceneError, match=r"scene\.nc: 'temperature' of frame 1 cannot be read"):
+        open_scene(path).frame(1)
+
+
+def test_an_interrupted_writer_leaves_what_was_there(tmp_path):
+    path = a_file(tmp_path)
+    before = path.read_bytes()
+    with pytest.raises(KeyboardInterrupt), SceneWriter(path, RASTER) as writer:
+        writer.append(a_frame())
+        assert len(leftovers(tmp_path)) == 2
+        raise KeyboardInterrupt
+    assert leftovers(tmp_path) == ["scene.nc"]
+    assert path.read_bytes() == before
+
+
+FULL_DISK = """
+import resource, sys
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from test_io import RASTER, a_frame
+from chipglow.io import SceneWriter
+resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
+try:
+    with SceneWriter(Path({folder!r}) / "scene.nc", RASTER) as writer:
+        for index in range({count}):
+            writer.append(a_frame(index * 1e-6))
+except OSError as error:
+    print(index, error)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
+@pytest.mark.parametrize(("limit", "count"), [(20_000, 2000), (4_000, 1)])
+def test_a_full_disk_is_one_clear_error(tmp_path, limit, count):
+    program = FULL_DISK.format(
+        tests=str(Path(__file__).parent), folder=str(tmp_path), limit=limit, count=count
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    index, message = done.stdout.split(maxsplit=1)
+    # HDF5 writes late; but the writer does not go on to the end, unless that is near.
+    assert int(index) <= count // 2
+    assert message.strip().endswith("scene.nc: could not be written: File too large")
+    assert leftovers(tmp_path) == []
+
+
+def test_atomic_path_replaces_at_the_end(tmp_path):
+    path = tmp_path / "figure.png"
+    path.write_text("old")
+    with atomic_path(path) as temporary:
+        assert temporary.parent == path.parent
+        assert temporary.suffix == ".png"
+        temporary.write_text("new")
+        assert path.read_text() == "old"
+    assert path.read_text() == "new"
+    assert leftovers(tmp_path) == ["figure.png"]
+
+
+def test_atomic_path_leaves_nothing_after_an_error(tmp_path):
+    with pytest.raises(OSError, match="disk full"), atomic_path(tmp_path / "a.txt") as temporary:
+        temporary.write_text("half")
+        raise OSError("disk full")
+    assert leftovers(tmp_path) == []
+    with (
+        pytest.raises(FileNotFoundError, match=r"there is no folder"),
+        atomic_path(tmp_path / "nowhere" / "a.txt"),
+    ):
+        pass
+    with pytest.raises(IsADirectoryError, match=r"is a folder"), atomic_path(tmp_path):
+        pass
+
+
+def test_atomic_folder_replaces_results_at_the_end(tmp_path):
+    folder = tmp_path / "results"
+    for text in ("first", "second"):
+        with atomic_folder(folder) as temporary:
+            (temporary / "summary.json").write_text(text)
+            (temporary / f"{text}.txt").write_text(text)
+    assert leftovers(folder) == ["second.txt", "summary.json"]
+    assert leftovers(tmp_path) == ["results"]
+    with pytest.raises(KeyboardInterrupt), atomic_folder(folder) as temporary:
+        (temporary / "summary.json").write_text("third")
+        raise KeyboardInterrupt
+    assert (folder / "summary.json").read_text() == "second"
+    assert leftovers(tmp_path) == ["results"]
+
+
+def test_atomic_folder_replaces_nothing_else(tmp_path):
+    precious = tmp_path / "home"
+    precious.mkdir()
+    with atomic_folder(precious) as temporary:  # an empty folder may be replaced
+        (temporary / "letter.txt").write_text("dear")
+    with pytest.raises(FileExistsError, match="not a result of chipglow"), atomic_folder(precious):
+        pass
+    with (
+        pytest.raises(FileExistsError, match="not a result of chipglow"),
+        atomic_folder(precious / "letter.txt"),
+    ):
+        pass
+    assert (precious / "letter.txt").read_text() == "dear"
+    assert leftovers(tmp_path) == ["home"]
+
+
+def a_measurement():
+    generator = np.random.default_rng(7)
+    raster = Raster(0.0, 5e-4, 6e-6, 4, 5)
+    temperature = generator.uniform(500.0, 1200.0, (2, 4, 5))
+    flags = (temperature < 573.15).astype(np.uint8)
+    dimensions = ("time", "y", "x")
+    data = xr.Dataset(
+        {
+            "radiance_temperature": (
+                dimensions,
+                np.where(flags, np.nan, temperature),
+                {"units": "K"},
+            ),
+            "radiance": (dimensions, temperature**2, {"units": "W m-2 sr-1"}),
+            "flags": (dimensions, flags, {"units": "1"}),
+        },
+        coords=raster_coordinates(raster, np.array([0.0, 1 / 600])),
+        attrs={"pitch": 6e-6, "band_lower": 3.8e-6, "camera": "one"},
+    )
+    return Measurement(data)
+
+
+def test_measurement_comes_back(tmp_path):
+    measurement = a_measurement()
+    write_measurement(measurement, tmp_path / "m.nc")
+    found = read_measurement(tmp_path / "m.nc").data
+    xr.testing.assert_identical(found, measurement.data)
+    assert found["flags"].dtype == np.uint8
+    assert leftovers(tmp_path) == ["m.nc"]
+
+
+def test_a_foreign_measurement_is_named(tmp_path):
+    path = tmp_path / "m.nc"
+    with pytest.raises(FileNotFoundError, match=r"m\.nc: there is no such file"):
+        read_measurement(path)
+    write_measurement(a_measurement(), path)
+    path.write_bytes(path.read_bytes()[:-500])
+    with pytest.raises(ValueError, match=r"m\.nc: not a measurement, or cut short"):
+        read_measurement(path)
+    scene = a_file(tmp_path)
+    shutil.copy(scene, path)
+    with pytest.raises(ValueError, match=r"m\.nc: .*'radiance_temperature' .* is missing"):
+        read_measurement(path)
+
+
+def test_scene_in_memory_goes_to_a_file(tmp_path):
+    frames = [a_frame(index * 1e-6, seed=index) for index in range(2)]
+    names = (*FIELD_UNITS, "material_x", "material_y")
+    fields = {name: np.stack([getattr(frame, name) for frame in frames]) for name in names}
+    write_scene(Scene.from_fields(RASTER, [0.0, 1e-6], fields), tmp_path / "scene.nc")
+    for found, expected in zip(open_scene(tmp_path / "scene.nc").frames(), frames, strict=True):
+        assert_as_kept(found, expected)
