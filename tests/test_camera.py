@@ -137,6 +137,13 @@ def test_where_there_is_no_surface_nothing_is_reflected():
     assert np.isnan(exposure.peak_temperature).all()
 
 
+def test_radiance_is_as_exact_as_it_is_said_to_be():
+    temperature = np.linspace(250, 3000, 100 * 100).reshape(1, 100, 100).astype(np.float32)
+    exposure = Camera().expose(make_scene(temperature), BLACK, 0.0)
+    exact = Camera().band.radiance(temperature[0].astype(np.float64))
+    np.testing.assert_allclose(exposure.mean_radiance, exact, rtol=4e-7)
+
+
 def test_peaks_and_centre():
     scene, surface = random_scene(frames=5)
     band = Camera().band
@@ -421,6 +428,7 @@ def test_broken_measurements_are_refused(broken):
         {"offset": (-1e-6, 0.0)},
         {"fill_factor": 0.0},
         {"fill_factor": 1.1},
+        {"psf": 12e-6},
         {"psf_order": "both"},
         {"integration_time": 0.0},
         {"integration_time": 10e-3},

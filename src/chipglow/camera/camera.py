@@ -91,6 +91,12 @@ class Camera:
             "two lengths of 0 m or more",
         )
         _expect(0.0 < self.fill_factor <= 1.0, "fill_factor", self.fill_factor, "over 0 to 1")
+        _expect(
+            self.psf is None or isinstance(self.psf, PointSpreadFunction),
+            "psf",
+            self.psf,
+            "a PointSpreadFunction, or None",
+        )
         _expect(self.psf_order in PSF_ORDERS, "psf_order", self.psf_order, " or ".join(PSF_ORDERS))
         _expect(
             0.0 < self.frame_rate < float("inf"), "frame_rate", self.frame_rate, "over 0 a second"

@@ -17,7 +17,7 @@ _STEPS_PER_KELVIN: Final = 32.0
 _ROUNDING: Final = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Exposure:
     """What a scene sent toward the camera during one integration time, on the scene's samples.
 
