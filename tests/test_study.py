@@ -1,5 +1,6 @@
 import os
 import threading
+import time
 from dataclasses import replace
 from math import isfinite, radians
 from pathlib import Path
@@ -418,7 +419,7 @@ def test_a_scene_is_computed_once_for_the_same_inputs(cache, runs):
     assert not is_cut(study)
     seen = []
     path = cut(study, lambda step, fraction: seen.append((step, fraction)))
-    assert seen == [("cutting simulation", 1.0)]
+    assert seen == [("cutting simulation", 0.0), ("cutting simulation", 1.0)]
     assert path.parent == cache
     assert is_cut(study)
     other_camera = study.model_copy(update={"camera": Study(camera={"pitch": "5 um"}).camera})
@@ -470,6 +471,18 @@ def test_the_cache_is_listed_and_cleared(cache, runs):
     (cache / "notes.txt").write_text("not a scene")
     assert clear_cache() == sum(scene.size for scene in scenes)
     assert [path.name for path in cache.iterdir()] == ["notes.txt"]
+
+
+def test_what_a_killed_run_left_is_cleared_after_a_day(cache):
+    cache.mkdir()
+    parts = {"old": 2 * 86400, "running": 600}
+    for name, age in parts.items():
+        path = cache / f".scene-{name}.0123abcd.part.nc"
+        path.write_bytes(b"x" * 10)
+        os.utime(path, (time.time() - age,) * 2)
+    assert [scene.path.name for scene in cached_scenes()] == [".scene-old.0123abcd.part.nc"]
+    assert clear_cache() == 10
+    assert [path.name for path in cache.iterdir()] == [".scene-running.0123abcd.part.nc"]
 
 
 def test_a_failed_cut_leaves_nothing_in_the_cache(cache, monkeypatch):

@@ -6,10 +6,14 @@ from dataclasses import dataclass
 from hashlib import sha256
 from json import dumps
 from pathlib import Path
+from time import time
 from typing import Any, Final
 
 FOLDER_VARIABLE: Final = "CHIPGLOW_CACHE"
 """Environment variable that names another folder than the user's cache folder."""
+
+_LONGEST_RUN: Final = 86400.0
+"""Age in s from which an unfinished scene is taken for what a killed run left."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +58,14 @@ def scene_path(inputs: Mapping[str, Any]) -> Path:
 
 
 def cached_scenes() -> list[CachedScene]:
-    """Scenes in the cache, the latest first."""
+    """Scenes in the cache, the latest first; parts of scenes that killed runs left count too."""
     scenes = []
-    for path in cache_folder().glob("scene-*.nc"):
+    for path in cache_folder().glob("*scene-*.nc"):
         try:
             status = path.stat()
         except FileNotFoundError:  # another process cleared it meanwhile
+            continue
+        if path.name.startswith(".") and time() - status.st_mtime < _LONGEST_RUN:
             continue
         scenes.append(CachedScene(path, status.st_size, status.st_mtime))
     return sorted(scenes, key=lambda scene: scene.modified, reverse=True)

@@ -28,7 +28,7 @@ def cut(study: Study, progress: Progress | None = None) -> Path:
     study : Study
         Only its section `cutting` matters.
     progress : callable, optional
-        Told how far the simulation is; not called where the scene is found.
+        Told how far the simulation is; not called if the scene is found.
 
     Returns
     -------
@@ -87,6 +87,8 @@ def _is_whole(path: Path) -> bool:
 
 
 def _compute(study: Study, path: Path, progress: Progress | None) -> None:
+    if progress:
+        progress(CUTTING_STEP, 0.0)
     cutting = study.cutting
     raster = cutting.field_of_view.build()
     attributes: Mapping[str, str] = {"inputs": dumps(_inputs(study), sort_keys=True)}
