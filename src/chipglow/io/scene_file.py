@@ -42,7 +42,7 @@ _LONG_NAMES: Final[Mapping[str, str]] = {
     "thrust_force": "thrust force per width of cut",
 }
 _FAST: Final[Mapping[str, Any]] = dict(
-    hdf5plugin.Blosc2(cname="zstd", clevel=1, filters=hdf5plugin.Blosc2.BITSHUFFLE)
+    hdf5plugin.Blosc2(cname="zstd", clevel=1, filters=hdf5plugin.Blosc2.SHUFFLE)
 )
 _PORTABLE: Final[Mapping[str, Any]] = {
     "compression": "gzip",
@@ -86,8 +86,8 @@ class SceneWriter:
         raster: Raster,
         tool: ToolGeometry | None = None,
         attributes: Mapping[str, Any] | None = None,
-        *,
         material_coordinates: bool = True,
+        *,
         portable: bool = False,
     ) -> None:
         self.path = Path(path)
