@@ -106,7 +106,7 @@ class AnalyticChip:
         friction = self.rake_rise * contact * np.exp(-np.abs(depth) / 25e-6)
         rise = np.where(
             material == Material.TOOL,
-            friction,
+            friction * (1 + 180 / self.rake_rise),
             180 * sheared + self.peak_rise * ridge + friction * sheared,
         )
         solid = material == Material.WORKPIECE

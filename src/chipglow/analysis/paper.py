@@ -110,7 +110,8 @@ class Instant:
     band : ShearBand or None
         Ridge of the strain rate's mean over the exposure; None if there is none.
     temperatures : ndarray
-        Mean true temperature over the exposure along the ridge in K, shape (n,); empty without.
+        Mean true temperature over the exposure along the ridge in K, shape (n,); NaN outside the
+        scene, empty without a band.
     """
 
     start: float
@@ -120,7 +121,8 @@ class Instant:
     @property
     def mean_temperature(self) -> float:
         """Mean of the temperatures along the ridge in K; NaN without a band."""
-        return float(self.temperatures.mean()) if self.temperatures.size else nan
+        known = self.temperatures[np.isfinite(self.temperatures)]
+        return float(known.mean()) if known.size else nan
 
 
 @dataclass(frozen=True)
@@ -191,8 +193,8 @@ class StudyResult:
     developed : int
         Number of the instant with the fully developed shear band: that with the greatest mean
         temperature along the ridge.
-    momentary_width : float
-        Full width at half maximum of the strain rate in `frame`, across the band, in m.
+    momentary_band : ShearBand or None
+        The band in `frame` alone, which motion does not blur; None if there is none.
     sweep : float
         How far the band's middle moves across itself during the developed exposure, in m; NaN
         where it is not found in both the first and the last frame.
@@ -211,7 +213,7 @@ class StudyResult:
     frame: Frame
     instants: tuple[Instant, ...]
     developed: int
-    momentary_width: float
+    momentary_band: ShearBand | None
     sweep: float
     surfaces: Mapping[str, SurfaceResult]
     sensitivity: tuple[Sensitivity, ...]
@@ -285,7 +287,7 @@ def analyse(
         frame=moment.frame,
         instants=instants,
         developed=developed,
-        momentary_width=moment.width,
+        momentary_band=moment.momentary_band,
         sweep=moment.sweep,
         surfaces=results,
         sensitivity=_sensitivities(camera, plan, moment, exposures, tell),
@@ -341,8 +343,7 @@ def _instant(scene: Scene, camera: Camera, start: float) -> Instant:
     except NoShearBandError:
         return Instant(start, None, np.zeros(0))
     temperature = _mean(scene, "temperature", indices, weights)
-    along = sample(temperature, scene.raster, band.ridge.points)
-    return Instant(start, band, along[np.isfinite(along)])
+    return Instant(start, band, sample(temperature, scene.raster, band.ridge.points))
 
 
 def _mean(
@@ -362,7 +363,7 @@ class _Moment:
     tool: ToolGeometry
     band: ShearBand
     contact: float
-    width: float
+    momentary_band: ShearBand | None
     sweep: float
 
     @classmethod
@@ -377,17 +378,17 @@ class _Moment:
             tool=scene.tool,
             band=instant.band,
             contact=contact_length(scene.raster, workpiece, scene.tool, plan.touching),
-            width=_momentary_width(scene.raster, frame, scene.tool),
+            momentary_band=_momentary_band(scene.raster, frame, scene.tool),
             sweep=_sweep(scene, indices, instant.band),
         )
 
 
-def _momentary_width(raster: Raster, frame: Frame, tool: ToolGeometry) -> float:
+def _momentary_band(raster: Raster, frame: Frame, tool: ToolGeometry) -> ShearBand | None:
     workpiece = frame.material == Material.WORKPIECE
     try:
-        return find_shear_band(raster, frame.plastic_strain_rate, workpiece, tool).width
+        return find_shear_band(raster, frame.plastic_strain_rate, workpiece, tool)
     except NoShearBandError:
-        return nan
+        return None
 
 
 def _sweep(scene: Scene, indices: range, band: ShearBand) -> float:

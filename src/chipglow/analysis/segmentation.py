@@ -73,7 +73,7 @@ def segmentation(
     -----
     The history counts from where the cutting force first reaches the median of its second half.
     The autocorrelation of what remains gives a first period; the force is smoothed over a
-    fifteenth of it, and its peaks, at least six tenths of a period apart and a third of the swing
+    fifteenth of it, and its peaks, at least six tenths of a period apart and a fifth of the swing
     high, give the period and its uncertainty.
     """
     times = np.asarray(time, dtype=np.float64)
@@ -131,7 +131,7 @@ def _correlation_period(force: NDArray[np.float64], step: float) -> float:
 
 def _peaks(force: NDArray[np.float64], period: float) -> NDArray[np.int64]:
     low, high = np.percentile(force, [5.0, 95.0])
-    peaks, _ = find_peaks(force, distance=max(0.6 * period, 1.0), prominence=(high - low) / 3)
+    peaks, _ = find_peaks(force, distance=max(0.6 * period, 1.0), prominence=(high - low) / 5)
     return np.asarray(peaks, dtype=np.int64)
 
 

@@ -71,9 +71,18 @@ class ShearBand:
     @property
     def width(self) -> float:
         """Median of the widths over the middle half of the curve in m; NaN where there is none."""
-        share = self.ridge.distance / self.length
-        widths = self.widths[(share > 0.25) & (share < 0.75)]
+        widths = self.widths[self._middle_half]
         return float(np.nanmedian(widths)) if np.isfinite(widths).any() else float("nan")
+
+    @property
+    def middle_rate(self) -> float:
+        """Median of the strain rate on the middle half of the curve in 1/s."""
+        return float(np.median(self.rate[self._middle_half]))
+
+    @property
+    def _middle_half(self) -> NDArray[np.bool_]:
+        share = self.ridge.distance / self.length
+        return np.asarray((share >= 0.25) & (share <= 0.75))
 
     def across(self, half_length: float, step: float) -> Line:
         """Line across the band's middle; the distance grows from the workpiece to the chip.

@@ -1,0 +1,150 @@
+"""How figures look: sizes, colours, images on micrometre axes."""
+
+from pathlib import Path
+from typing import Any, Final
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from numpy.typing import NDArray
+
+from chipglow.scene import Raster, ToolGeometry
+
+WIDTH: Final = 7.2
+"""Width of a figure in inches: a page's text."""
+
+BLUE: Final = "#0072B2"
+VERMILLION: Final = "#D55E00"
+GREEN: Final = "#009E73"
+GREY: Final = "#6b7280"
+VOID: Final = "#e5e7eb"
+
+HEAT: Final = "inferno"
+PLAIN: Final = "cividis"
+SIGNED: Final = "RdBu_r"
+
+KELVIN: Final = 273.15
+
+_STYLE: Final[Any] = {
+    "font.size": 9.5,
+    "axes.titlesize": 10,
+    "axes.labelsize": 9.5,
+    "xtick.labelsize": 9,
+    "ytick.labelsize": 9,
+    "legend.fontsize": 9,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.8,
+    "lines.linewidth": 1.6,
+    "legend.frameon": False,
+    "image.interpolation": "nearest",
+    "svg.hashsalt": "chipglow",
+    "savefig.facecolor": "white",
+}
+
+
+def style() -> Any:
+    """Context in which figures are made."""
+    return matplotlib.rc_context(_STYLE)
+
+
+def new_figure(height: float) -> Figure:
+    """Empty figure of the page's width and a height in inches."""
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def image_figure(raster: Raster, panel_width: float, rows: int) -> Figure:
+    """Empty figure of the page's width for rows of images, as high as they need.
+
+    Parameters
+    ----------
+    raster : Raster
+        What an image shows.
+    panel_width : float
+        Width of an image in inches.
+    rows : int
+        Number of rows of images.
+    """
+    panel = panel_width * raster.rows / raster.columns
+    figure = Figure(figsize=(WIDTH, rows * (panel + 0.35) + 0.45), layout="compressed")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Figure, folder: Path, name: str) -> tuple[Path, Path]:
+    """Write a figure as PNG at 150 dots an inch and as SVG; images in it stay images."""
+    png, svg = folder / f"{name}.png", folder / f"{name}.svg"
+    figure.savefig(png, dpi=150)
+    figure.savefig(svg, dpi=150, metadata={"Date": None})
+    return png, svg
+
+
+def show_image(
+    axes: Axes,
+    image: NDArray[Any],
+    raster: Raster,
+    tool: ToolGeometry,
+    colours: str,
+    limits: tuple[float, float],
+) -> AxesImage:
+    """Image on micrometre axes with the tool's outline; grey where there is no value."""
+    extent = np.array(raster.extent) * 1e6
+    shown = matplotlib.colormaps[colours].with_extremes(bad=VOID)
+    picture = axes.imshow(
+        np.ma.masked_invalid(image),
+        extent=tuple(extent),
+        cmap=shown,
+        vmin=limits[0],
+        vmax=limits[1],
+    )
+    draw_tool(axes, tool)
+    axes.set_xlim(extent[0], extent[1])
+    axes.set_ylim(extent[2], extent[3])
+    axes.set_xlabel("x / µm")
+    axes.set_ylabel("y / µm")
+    return picture
+
+
+def veil(axes: Axes, where: NDArray[np.bool_], raster: Raster) -> None:
+    """Make part of an image paler."""
+    white = np.ones((*where.shape, 4))
+    white[..., 3] = np.where(where, 0.5, 0.0)
+    axes.imshow(white, extent=tuple(np.array(raster.extent) * 1e6))
+
+
+def draw_tool(axes: Axes, tool: ToolGeometry) -> None:
+    """The tool's outline, seen on dark and on light ground."""
+    outline = tool.outline(3e-3) * 1e6
+    axes.plot(*outline.T, color="white", linewidth=2.2)
+    axes.plot(*outline.T, color="black", linewidth=1.0)
+
+
+def draw_line(axes: Axes, points: NDArray[np.float64], colour: str, label: str = "") -> None:
+    """A curve in metres on micrometre axes, seen on dark and on light ground."""
+    axes.plot(*(points * 1e6).T, color="white", linewidth=3.0)
+    axes.plot(*(points * 1e6).T, color=colour, linewidth=1.6, label=label)
+
+
+def colour_bar(figure: Figure, picture: AxesImage, axes: Any, label: str) -> None:
+    """Colour bar beside one or several axes, with its quantity and unit; arrows where it ends."""
+    values, low, high = picture.get_array(), picture.norm.vmin, picture.norm.vmax
+    assert values is not None and low is not None and high is not None
+    under, over = bool(np.any(values < low)), bool(np.any(values > high))
+    extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(
+        (under, over), "neither"
+    )
+    figure.colorbar(picture, ax=axes, label=label, extend=extend, aspect=25)
+
+
+def round_limit(values: NDArray[np.float64], percentile: float, step: float) -> float:
+    """Limit of a scale: a percentile of the magnitudes, up to the next whole step."""
+    known = np.abs(values[np.isfinite(values)])
+    if known.size == 0:
+        return step
+    return max(step, float(np.ceil(np.percentile(known, percentile) / step)) * step)

@@ -1,0 +1,215 @@
+"""The study's arrays and numbers as data: results.nc and summary.json."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chipglow.analysis.paper import StudyResult
+from chipglow.report.comparison import Row
+from chipglow.scene import FIELD_UNITS
+from chipglow.scene.scene import tool_attributes
+
+
+def results_dataset(result: StudyResult, provenance: Mapping[str, str]) -> xr.Dataset:
+    """Arrays behind the figures, in SI units, each with a ``units`` attribute.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    provenance : mapping
+        Goes into the attributes.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions: ``y``, ``x`` the scene's samples; ``sensor_y``, ``sensor_x`` the sensors;
+        ``instant`` the exposures; ``surface`` the surfaces; ``ridge_point`` along the shear band,
+        NaN beyond its end; ``rake_distance`` and ``band_distance`` along the analysis lines;
+        ``contact_distance`` up the rake face; ``psf_order`` and ``psf_width`` the sensitivity;
+        ``force_time`` the force history.
+    """
+    variables = {
+        **_scene(result),
+        **_sensors(result),
+        **_ridges(result),
+        **_lines(result),
+        **_sensitivity(result),
+        **_forces(result),
+    }
+    coordinates = {
+        "surface": list(result.surfaces),
+        "instant": ("instant", [i.start for i in result.instants], {"units": "s"}),
+        "y": ("y", result.raster.y, {"units": "m"}),
+        "x": ("x", result.raster.x, {"units": "m"}),
+        "psf_order": [series.psf_order for series in result.sensitivity],
+        "psf_width": ("psf_width", np.asarray(result.plan.psf_widths), {"units": "m"}),
+    }
+    attributes: dict[str, Any] = {
+        "developed_instant": result.developed,
+        "rake_surface": result.plan.rake_surface,
+        "band_surface": result.plan.band_surface,
+        "error_reference": result.plan.reference,
+        **tool_attributes(result.tool),
+        **{f"provenance_{name.replace(' ', '_')}": text for name, text in provenance.items()},
+    }
+    return xr.Dataset(variables, coords=coordinates, attrs=attributes)
+
+
+def compression(data: xr.Dataset) -> dict[str, dict[str, Any]]:
+    """How the arrays are packed in a file that every reader of NetCDF opens."""
+    return {
+        str(name): {"zlib": True, "complevel": 4}
+        for name, values in data.data_vars.items()
+        if values.ndim > 1
+    }
+
+
+def summary(rows: Sequence[Row], provenance: Mapping[str, str]) -> dict[str, Any]:
+    """Numbers of the study for scripts; a name ends in its unit, what is unknown is None.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        The comparison.
+    provenance : mapping
+        What, when, version, seed and the like.
+    """
+    return {
+        "provenance": dict(provenance),
+        "results": {row.key: row.here for row in rows},
+        "paper": {row.key: row.paper for row in rows if row.paper is not None},
+        "difference": {row.key: row.difference for row in rows if row.paper is not None},
+        "explanation": {row.key: row.explanation for row in rows},
+    }
+
+
+def _scene(result: StudyResult) -> dict[str, Any]:
+    place, surfaces = ("y", "x"), result.surfaces.values()
+    names = ("temperature", "plastic_strain", "plastic_strain_rate", "material")
+    fields = {
+        name: (place, getattr(result.frame, name), {"units": FIELD_UNITS[name]}) for name in names
+    }
+    emissivity = np.stack([surface.emissivity for surface in surfaces])
+    temperature = np.stack([surface.scene_temperature for surface in surfaces])
+    return {
+        **fields,
+        "emissivity": (("surface", *place), emissivity, {"units": "1"}),
+        "scene_radiance_temperature": (
+            ("surface", *place),
+            temperature.astype(np.float32),
+            {"units": "K"},
+        ),
+    }
+
+
+def _sensors(result: StudyResult) -> dict[str, Any]:
+    place, surfaces = ("sensor_y", "sensor_x"), result.surfaces.values()
+    raster = next(iter(surfaces)).errors.raster
+    measured = np.stack([s.measurement.radiance_temperature() for s in surfaces])
+    flags = np.stack([s.measurement.flags for s in surfaces])
+    errors = {
+        "reference_temperature": [s.errors.reference for s in surfaces],
+        "error_case_1": [s.errors.case_1 for s in surfaces],
+        "error_case_2": [s.errors.case_2 for s in surfaces],
+        "error_psf_portion": [s.errors.psf_portion for s in surfaces],
+    }
+    return {
+        "sensor_y": ("sensor_y", raster.y, {"units": "m"}),
+        "sensor_x": ("sensor_x", raster.x, {"units": "m"}),
+        "radiance_temperature": (("surface", "instant", *place), measured, {"units": "K"}),
+        "flags": (("surface", "instant", *place), flags, {"units": "1"}),
+        **{
+            name: (("surface", *place), np.stack(images), {"units": "K"})
+            for name, images in errors.items()
+        },
+    }
+
+
+def _ridges(result: StudyResult) -> dict[str, Any]:
+    bands = [instant.band for instant in result.instants]
+    length = max(band.ridge.distance.size for band in bands if band is not None)
+    place = ("instant", "ridge_point")
+    of_band: dict[str, tuple[Sequence[NDArray[np.float64] | None], str]] = {
+        "ridge_distance": ([b.ridge.distance if b else None for b in bands], "m"),
+        "ridge_x": ([b.ridge.points[:, 0] if b else None for b in bands], "m"),
+        "ridge_y": ([b.ridge.points[:, 1] if b else None for b in bands], "m"),
+        "ridge_strain_rate": ([b.rate if b else None for b in bands], "1/s"),
+        "ridge_width": ([b.widths if b else None for b in bands], "m"),
+        "ridge_temperature": ([i.temperatures for i in result.instants], "K"),
+    }
+    curves = [_padded(surface.curves, length) for surface in result.surfaces.values()]
+    return {
+        **{
+            name: (place, _padded(values, length), {"units": unit})
+            for name, (values, unit) in of_band.items()
+        },
+        "ridge_radiance_temperature": (("surface", *place), np.stack(curves), {"units": "K"}),
+    }
+
+
+def _padded(rows: Sequence[NDArray[np.float64] | None], length: int) -> NDArray[np.float64]:
+    padded = np.full((len(rows), length), np.nan)
+    for i, row in enumerate(rows):
+        if row is not None:
+            padded[i, : row.size] = row
+    return padded
+
+
+def _lines(result: StudyResult) -> dict[str, Any]:
+    rakes = [surface.rake for surface in result.surfaces.values()]
+    bands = [surface.band for surface in result.surfaces.values()]
+    lines = {
+        "rake_distance": rakes[0].line.distance,
+        "contact_distance": rakes[0].contact.distance,
+        "band_distance": bands[0].line.distance,
+    }
+    errors = {
+        "rake_error": ("rake_distance", [r.case_1 for r in rakes]),
+        "rake_psf_portion": ("rake_distance", [r.psf_portion for r in rakes]),
+        "rake_mean_error": ("rake_distance", [r.mean_case_1 for r in rakes]),
+        "contact_error": ("contact_distance", [r.contact_case_1 for r in rakes]),
+        "contact_psf_portion": ("contact_distance", [r.contact_psf_portion for r in rakes]),
+        "band_error": ("band_distance", [b.case_1 for b in bands]),
+        "band_psf_portion": ("band_distance", [b.psf_portion for b in bands]),
+    }
+    return {
+        **{name: (name, values, {"units": "m"}) for name, values in lines.items()},
+        **{
+            name: (("surface", along), np.stack(values), {"units": "K"})
+            for name, (along, values) in errors.items()
+        },
+    }
+
+
+def _sensitivity(result: StudyResult) -> dict[str, Any]:
+    units = {
+        "rake_error": "K",
+        "rake_share": "1",
+        "rake_mean_error": "K",
+        "band_error": "K",
+        "band_share": "1",
+        "band_worst": "K",
+    }
+    return {
+        f"sensitivity_{name}": (
+            ("psf_order", "psf_width"),
+            np.stack([getattr(series, name) for series in result.sensitivity]),
+            {"units": unit},
+        )
+        for name, unit in units.items()
+    }
+
+
+def _forces(result: StudyResult) -> dict[str, Any]:
+    if result.forces is None:
+        return {}
+    history = result.forces
+    return {
+        "force_time": ("force_time", history.time, {"units": "s"}),
+        "cutting_force": ("force_time", history.cutting, {"units": "N/m"}),
+        "thrust_force": ("force_time", history.thrust, {"units": "N/m"}),
+    }

@@ -1,0 +1,397 @@
+"""The analyses against scenes whose answers are known in closed form."""
+
+from dataclasses import replace
+from math import cos, hypot, log, radians, sin
+
+import numpy as np
+import pytest
+from analytic_chip import AnalyticChip
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chipglow.analysis import (
+    NoShearBandError,
+    Plan,
+    analyse,
+    contact_length,
+    error_images,
+    find_shear_band,
+    rake_errors,
+    reference_temperature,
+    sample,
+    segmentation,
+    straight_line,
+)
+from chipglow.analysis.error import ErrorImages
+from chipglow.camera import Camera, Exposure, GaussianPSF
+from chipglow.radiometry import Band
+from chipglow.scene import Material, Raster, ToolGeometry
+from chipglow.surface import CHIP_1, CHIP_2
+
+BAND = Band(3.8e-6, 5.1e-6)
+CAMERA = Camera(band=BAND, pitch=6e-6, psf=GaussianPSF(12e-6), psf_order="sensor")
+GRID = Raster(left=-300e-6, top=300e-6, spacing=2e-6, rows=180, columns=180)
+TOOL = ToolGeometry()
+
+
+def exposure_of(radiance, peak=None, raster=GRID, temperature=None):
+    radiance = np.asarray(radiance, np.float64)
+    peak = radiance if peak is None else peak
+    temperature = np.full(raster.shape, 900.0) if temperature is None else temperature
+    return Exposure(
+        start=0.0,
+        duration=1e-5,
+        raster=raster,
+        mean_radiance=radiance,
+        peak_radiance=np.asarray(peak, np.float32),
+        peak_temperature=np.asarray(temperature, np.float32),
+        centre_radiance=radiance,
+    )
+
+
+def random_exposure(seed):
+    generator = np.random.default_rng(seed)
+    temperature = generator.uniform(500.0, 1300.0, GRID.shape)
+    mean = np.asarray(BAND.radiance(temperature))
+    return exposure_of(mean, mean * generator.uniform(1.0, 1.2, GRID.shape))
+
+
+# Lines
+
+
+@given(
+    gradient=st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6)),
+    angle=st.floats(0.0, 6.28),
+)
+@settings(max_examples=30, deadline=None)
+def test_a_linear_field_is_read_exactly(gradient, angle):
+    x, y = np.meshgrid(GRID.x, GRID.y)
+    image = 500.0 + gradient[0] * x + gradient[1] * y
+    line = straight_line((-120e-6, 90e-6), (cos(angle), sin(angle)), np.linspace(-8e-5, 8e-5, 33))
+    expected = 500.0 + line.points @ np.array(gradient)
+    # Bilinear interpolation is exact for a plane: what is left is rounding of 1e3 by 1e-16.
+    np.testing.assert_allclose(sample(image, GRID, line.points), expected, atol=1e-9)
+
+
+def test_outside_the_image_there_is_no_value():
+    values = sample(np.ones(GRID.shape), GRID, [[-301e-6, 0.0], [0.0, 301e-6], [0.0, 0.0]])
+    assert np.isnan(values[:2]).all() and values[2] == 1.0
+
+
+# Errors
+
+
+def test_a_uniform_scene_has_no_error():
+    errors = error_images(CAMERA, exposure_of(np.full(GRID.shape, float(BAND.radiance(900.0)))))
+    inner = (slice(10, -10), slice(10, -10))
+    # Peak radiance is float32: 6e-8 of the radiance is 1e-5 K here.
+    for image in (errors.case_1, errors.case_2, errors.psf_portion):
+        np.testing.assert_allclose(image[inner], 0.0, atol=1e-4)
+    assert not errors.flagged.any()
+
+
+def test_the_portions_add_up_and_an_ideal_camera_is_all_portion_free():
+    errors = error_images(CAMERA, random_exposure(1))
+    np.testing.assert_array_equal(errors.psf_portion, errors.case_1 - errors.case_2)
+    ideal = error_images(replace(CAMERA, psf=None), random_exposure(1))
+    np.testing.assert_array_equal(ideal.psf_portion, 0.0)
+    np.testing.assert_array_equal(ideal.case_1, errors.case_2)
+
+
+@given(
+    seed=st.integers(0, 1000),
+    pitch=st.floats(3e-6, 12e-6),
+    offset=st.floats(0.0, 9e-6),
+    fill=st.floats(0.4, 1.0),
+)
+@settings(max_examples=20, deadline=None)
+def test_nothing_is_measured_over_the_maximum_without_a_psf(seed, pitch, offset, fill):
+    camera = Camera(band=BAND, pitch=pitch, offset=(offset, offset / 2), fill_factor=fill, psf=None)
+    exposure = random_exposure(seed)
+    errors = error_images(camera, exposure)
+    # A mean of samples is not over their maximum; slivers under 1 % of a sample are let go.
+    assert errors.case_1.max() < 0.5
+    mean = reference_temperature(camera, exposure, "mean")
+    assert (reference_temperature(camera, exposure, "maximum") >= mean - 0.5).all()
+
+
+def test_the_mean_as_reference_leaves_no_error_without_a_psf():
+    errors = error_images(CAMERA, random_exposure(2), "mean")
+    np.testing.assert_allclose(errors.case_2, 0.0, atol=1e-9)
+
+
+def test_references_by_hand():
+    raster = Raster(left=0.0, top=6e-6, spacing=2e-6, rows=3, columns=6)
+    temperature = np.full(raster.shape, 800.0)
+    temperature[0, 0], temperature[1, 4] = 950.0, 870.0
+    radiance = np.asarray(BAND.radiance(temperature))
+    exposure = exposure_of(radiance, raster=raster, temperature=temperature + 100.0)
+    camera = Camera(band=BAND, pitch=6e-6, psf=None)
+    reference = {k: reference_temperature(camera, exposure, k)[0] for k in ("maximum", "centre")}
+    # float32 radiance: 1e-5 K.
+    np.testing.assert_allclose(reference["maximum"], [950.0, 870.0], atol=1e-3)
+    np.testing.assert_allclose(reference["centre"], [800.0, 870.0], atol=1e-3)
+    true = reference_temperature(camera, exposure, "true")[0]
+    np.testing.assert_allclose(true, [1050.0, 970.0])
+    with pytest.raises(ValueError, match="unknown 'median'"):
+        reference_temperature(camera, exposure, "median")
+
+
+def test_errors_under_the_floor_are_given_and_flagged():
+    errors = error_images(CAMERA, exposure_of(np.full(GRID.shape, float(BAND.radiance(500.0)))))
+    assert errors.flagged.all()
+    assert np.isfinite(errors.case_1).all()
+
+
+# Shear band
+
+
+def ridge_scene(angle, width, peak=60e3, noise=0.0, rake_layer=0.0):
+    """Straight Gaussian ridge from the edge to a free surface at y = 200 µm."""
+    x, y = np.meshgrid(GRID.x, GRID.y)
+    edge = np.array(TOOL.edge_centre) - TOOL.edge_radius / np.sqrt(2)
+    across = (x - edge[0]) * sin(angle) + (y - edge[1]) * cos(angle)
+    sigma = width / np.sqrt(8 * log(2))
+    rate = peak * np.exp(-0.5 * (across / sigma) ** 2)
+    depth = TOOL.signed_distance(x, y)
+    rate = rate + rake_layer * np.exp(-(np.maximum(depth, 0.0) / 8e-6))
+    rate = rate * np.random.default_rng(3).lognormal(0.0, noise, rate.shape)
+    workpiece = (y < 200e-6) & (depth > 0)
+    return rate, workpiece, edge
+
+
+@pytest.mark.parametrize("degrees", [36.0, 42.0, 50.0])
+@pytest.mark.parametrize("width", [12e-6, 24e-6])
+def test_a_straight_ridge_is_found_where_it_is(degrees, width):
+    angle = radians(degrees)
+    rate, workpiece, edge = ridge_scene(angle, width)
+    band = find_shear_band(GRID, rate, workpiece, TOOL)
+    offset = band.ridge.points - edge
+    across = offset[:, 0] * sin(angle) + offset[:, 1] * cos(angle)
+    # The parabola through three samples of a Gaussian, 2 µm apart, is within 0.3 µm of its top.
+    # The tool and the surface cut the ridge off aslant; that reaches as far in as the smoothing.
+    inner = (band.ridge.distance > 25e-6) & (band.ridge.distance < band.length - 40e-6)
+    assert np.abs(across[inner]).max() < 0.3e-6
+    assert np.abs(across).max() < width / 2
+    assert band.reaches_surface
+    assert band.length == pytest.approx((200e-6 - edge[1]) / sin(angle), abs=width)
+    # Linear interpolation of the flanks at a sixth of the width: 2 %.
+    assert band.width == pytest.approx(width, rel=0.02)
+    assert band.middle_rate == pytest.approx(60e3, rel=0.01)
+    assert (band.normals @ np.array([sin(angle), cos(angle)]))[2:-2].min() > 0.95
+
+
+def test_noise_and_a_sheared_rake_layer_do_not_lead_the_ridge_astray():
+    angle = radians(38.0)
+    rate, workpiece, edge = ridge_scene(angle, 20e-6, noise=0.3, rake_layer=300e3)
+    band = find_shear_band(GRID, rate, workpiece, TOOL)
+    offset = band.ridge.points - edge
+    across = offset[:, 0] * sin(angle) + offset[:, 1] * cos(angle)
+    far = (band.ridge.distance > 60e-6) & (band.ridge.distance < band.length - 20e-6)
+    # The top of a Gaussian under 30 % noise may be taken a few samples beside it.
+    assert np.abs(across[far]).max() < 6e-6
+
+
+def test_a_band_that_leaves_the_view_says_so():
+    rate, workpiece, _ = ridge_scene(radians(25.0), 16e-6)
+    assert not find_shear_band(GRID, rate, workpiece, TOOL).reaches_surface
+
+
+def test_without_a_band_there_is_none():
+    _, workpiece, _ = ridge_scene(radians(38.0), 16e-6)
+    with pytest.raises(NoShearBandError, match="greatest plastic strain rate"):
+        find_shear_band(GRID, np.full(GRID.shape, 100.0), workpiece, TOOL)
+    with pytest.raises(NoShearBandError, match="no path"):
+        find_shear_band(GRID, np.full(GRID.shape, 1e5), np.zeros(GRID.shape, bool), TOOL)
+
+
+# Rake face
+
+
+@given(length=st.floats(40e-6, 200e-6))
+@settings(max_examples=20, deadline=None)
+def test_the_contact_ends_where_the_chip_leaves(length):
+    x, y = np.meshgrid(GRID.x, GRID.y)
+    depth = TOOL.signed_distance(x, y)
+    points = np.stack([x, y], axis=-1)
+    along = (points - TOOL.rake_point(0.0)) @ np.array(TOOL.rake_direction)
+    chip = (depth > 0) & ((along < length) | (depth > 10e-6))
+    # A sample and a half, and the samples' slant to the face.
+    assert contact_length(GRID, chip, TOOL, 3e-6) == pytest.approx(length, abs=4e-6)
+
+
+def test_no_contact_is_no_length_and_no_line():
+    x, y = np.meshgrid(GRID.x, GRID.y)
+    chip = TOOL.signed_distance(x, y) > 20e-6
+    assert contact_length(GRID, chip, TOOL, 3e-6) == 0.0
+    with pytest.raises(ValueError, match="does not touch"):
+        rake_errors(linear_errors(), 0.0, TOOL, 40e-6, 1e-6)
+
+
+def linear_errors():
+    """Errors that grow by 1 K a µm away from the rake face, a quarter of them the PSF's."""
+    sensors = Raster(left=-300e-6, top=300e-6, spacing=6e-6, rows=60, columns=60)
+    points = np.stack(np.meshgrid(sensors.x, sensors.y), axis=-1)
+    depth = (points - TOOL.rake_point(0.0)) @ np.array(TOOL.rake_normal)
+    case_1 = -40.0 + depth * 1e6
+    return ErrorImages(
+        raster=sensors,
+        reference=np.full(sensors.shape, 900.0),
+        case_1=case_1,
+        case_2=0.75 * case_1,
+        flagged=np.zeros(sensors.shape, bool),
+    )
+
+
+def test_lines_across_the_rake_face_follow_its_normal():
+    rake = rake_errors(linear_errors(), 120e-6, TOOL, 30e-6, 1e-6)
+    # Planes are read exactly, so rounding only.
+    np.testing.assert_allclose(rake.case_1, -40.0 + rake.line.distance * 1e6, atol=1e-9)
+    np.testing.assert_allclose(rake.mean_case_1, rake.case_1, atol=1e-9)
+    np.testing.assert_allclose(rake.contact_case_1, -40.0, atol=1e-9)
+    assert rake.error == pytest.approx(-40.0)
+    assert rake.mean_error == pytest.approx(-40.0)
+    assert rake.psf_share == pytest.approx(0.25)
+    assert rake.contact.distance[-1] == 120e-6
+
+
+# Segments
+
+
+@pytest.mark.parametrize("period", [45e-6, 72e-6, 95e-6])
+@pytest.mark.parametrize("shape", ["sine", "saw"])
+def test_the_period_of_a_synthetic_force_is_found(period, shape):
+    time = np.arange(0.0, 470e-6, 0.25e-6)
+    phase = time / period % 1.0
+    wave = (
+        np.sin(2 * np.pi * phase)
+        if shape == "sine"
+        else 2 * np.minimum(phase / 0.8, 5 - 5 * phase) - 1
+    )
+    noise = np.random.default_rng(5).normal(0.0, 2e3, time.size)
+    rise = 1 - np.exp(-time / 10e-6)
+    cutting = rise * (450e3 + 40e3 * wave) + noise
+    found = segmentation(time, cutting, 0.4 * cutting)
+    assert found.period == pytest.approx(period, rel=0.02)
+    assert found.correlation_period == pytest.approx(period, rel=0.05)
+    assert found.segments >= int((time[-1] - found.start) / period) - 1
+    assert found.cutting_mean == pytest.approx(450e3, rel=0.03)
+    assert found.thrust_mean == pytest.approx(0.4 * found.cutting_mean)
+    # Smoothing over a fifteenth of a period rounds the peaks, most those of a saw.
+    assert found.cutting_swing == pytest.approx(80e3, rel=0.25)
+    assert not found.period_uncertainty > 0.02 * period
+
+
+def test_a_force_without_period_has_none():
+    time = np.arange(0.0, 400e-6, 0.5e-6)
+    steady = 600e3 * (1 - np.exp(-time / 30e-6))
+    found = segmentation(time, steady, steady)
+    assert np.isnan(found.period) and found.segments == 0
+    with pytest.raises(ValueError, match="even ascending steps"):
+        segmentation(time[::-1], steady, steady)
+
+
+# The study
+
+
+@pytest.fixture(scope="module")
+def chip():
+    return AnalyticChip(frames=80)
+
+
+@pytest.fixture(scope="module")
+def study(chip):
+    plan = Plan(instants=5, psf_widths=(6e-6, 12e-6, 18e-6))
+    told = []
+    result = analyse(
+        chip.scene(),
+        {"chip 1": CHIP_1, "chip 2": CHIP_2},
+        CAMERA,
+        plan,
+        lambda label, part: told.append((label, part)),
+    )
+    assert {label for label, part in told if part == 1.0} >= {"shear band", "camera, chip 1"}
+    assert all(0.0 <= part <= 1.0 for _, part in told)
+    return result
+
+
+def test_the_developed_instant_is_the_hottest(study, chip):
+    middles = [instant.start + CAMERA.integration_time / 2 for instant in study.instants]
+    closest = int(np.argmin(np.abs(np.array(middles) - chip.grown_at)))
+    assert study.developed == closest
+    assert study.surfaces["chip 1"].measurement.times.tolist() == [i.start for i in study.instants]
+
+
+def test_the_band_of_the_study_is_the_chips(study, chip):
+    middle = study.instants[study.developed].start + CAMERA.integration_time / 2
+    band = study.band
+    offset = chip.distance_to_band(band.ridge.points, middle)
+    inner = (band.ridge.distance > 25e-6) & (band.ridge.distance < 0.85 * band.length)
+    assert np.abs(offset[inner]).max() < 1e-6
+    assert study.momentary_band is not None
+    assert study.momentary_band.width == pytest.approx(chip.band_width, rel=0.03)
+    drift = chip.shear_angle_drift * CAMERA.integration_time * band.length / 2
+    assert study.sweep == pytest.approx(drift, abs=2e-6)
+
+
+def test_contact_and_errors_of_the_study_make_sense(study, chip):
+    lift = 3e-6 / np.tan(radians(12.0))
+    assert study.rake.contact_length == pytest.approx(chip.contact_length + lift, abs=8e-6)
+    assert study.rake.error < study.rake.psf_error < 0
+    assert study.band_errors.error < study.band_errors.psf_error < 0
+    assert study.band_errors.worst <= study.band_errors.error
+    assert study.surfaces["chip 1"].band_motion <= 0
+
+
+def test_the_sensitivity_meets_the_study_at_its_own_width(study):
+    by_order = {series.psf_order: series for series in study.sensitivity}
+    series = by_order["sensor"]
+    at = int(np.flatnonzero(np.isclose(series.widths, 12e-6))[0])
+    assert series.rake_error[at] == pytest.approx(study.rake.error)
+    assert series.rake_share[at] == pytest.approx(study.rake.psf_share)
+    assert series.band_error[at] == pytest.approx(study.band_errors.error)
+    assert series.band_worst[at] == pytest.approx(study.band_errors.worst)
+    for series in by_order.values():
+        assert (np.diff(series.band_error) < 0).all()
+        assert (np.diff(series.rake_share) > 0).all()
+
+
+def test_the_curves_run_along_the_ridges(study):
+    for surface in study.surfaces.values():
+        for instant, curve in zip(study.instants, surface.curves, strict=True):
+            assert instant.band is not None
+            assert curve.shape == instant.band.ridge.distance.shape
+    ends = study.band.ridge.points[0] - study.band.ridge.points[-1]
+    assert hypot(*ends) < study.band.length * 1.01
+
+
+def test_forces_of_the_study(study, chip):
+    assert study.forces is not None
+    assert study.forces.segmentation.period == pytest.approx(chip.segment_period, rel=0.02)
+
+
+def test_a_study_that_can_not_be_is_refused(chip):
+    scene = AnalyticChip(frames=30).scene()
+    surfaces = {"chip 1": CHIP_1}
+    with pytest.raises(ValueError, match="surface 'chip 2' is not one of"):
+        analyse(scene, surfaces, CAMERA, Plan())
+    plan = Plan(rake_surface="chip 1")
+    with pytest.raises(ValueError, match="expected an exposure's 2e-05 s"):
+        analyse(scene, surfaces, replace(CAMERA, integration_time=2e-5), plan)
+    for name in ("instants", "line_step", "touching"):
+        with pytest.raises(ValueError, match=f"plan: {name}"):
+            Plan(**{name: 0})
+    bare = scene.data.copy()
+    bare.attrs = {}
+    with pytest.raises(ValueError, match="does not tell its tool"):
+        analyse(type(scene)(bare), surfaces, CAMERA, plan)
+    cold = scene.data.copy()
+    cold["plastic_strain_rate"] = cold["plastic_strain_rate"] * 0 + np.float32(1.0)
+    cold["plastic_strain_rate"].attrs["units"] = "1/s"
+    with pytest.raises(NoShearBandError, match="in any of the exposures"):
+        analyse(type(scene)(cold), surfaces, CAMERA, plan)
+
+
+def test_the_scene_of_the_tests_holds_the_contract(chip):
+    frame = chip.scene().frame(10)
+    assert set(np.unique(frame.material)) == set(Material)
