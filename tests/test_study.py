@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -327,6 +327,24 @@ def test_bad_input_is_one_line_with_file_field_value_and_expectation(
     assert "\n" not in line
     assert line.startswith(f"study.yaml: {field}")
     assert message in line
+
+
+TEMPLATE = [line for line in study_text(Study()).splitlines() if line.strip()[:1] not in ("", "#")]
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    number=st.integers(0, len(TEMPLATE) - 1),
+    text=st.text(max_size=12)
+    | st.sampled_from(["-1", "none", "{a: 1}", "{{a: 1}: 2}", "[1 um]", "*a", "!!", "1e400 m"]),
+    value=st.booleans(),
+)
+def test_a_study_with_a_garbled_line_is_read_or_refused_in_one_line(number, text, value, tmp_path):
+    line = f"{TEMPLATE[number].split(':')[0]}: {text}" if value else text
+    try:
+        load("\n".join([*TEMPLATE[:number], line, *TEMPLATE[number + 1 :]]), tmp_path)
+    except StudyError as error:
+        assert len(str(error).splitlines()) == 1
 
 
 def test_a_file_that_is_not_text_is_refused(tmp_path):

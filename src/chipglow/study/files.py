@@ -53,7 +53,7 @@ def problem(error: ValidationError) -> str:
     if first["type"] == "value_error":
         message = str(first["ctx"]["error"])
     elif first["type"] == "missing":
-        message = "is missing"
+        message = "is missing, expected a value"
     elif first["type"] in ("union_tag_invalid", "union_tag_not_found"):
         message = f"{first['input']!r}, expected kind: {', '.join(_PSF_KINDS)}, or none"
     else:
@@ -70,14 +70,13 @@ class _Loader(yaml.SafeLoader):
     """YAML with no key twice in a mapping, and with numbers such as 1e-3 as YAML 1.2 has them."""
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        seen = set()
-        for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)
-            if isinstance(key, str | int | float) and key in seen:
+        seen: set[str] = set()
+        for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
+            if key.value in seen:
                 raise yaml.constructor.ConstructorError(
-                    None, None, f"key {key!r} is there twice", key_node.start_mark
+                    None, None, f"key {key.value!r} is there twice", key.start_mark
                 )
-            seen.add(key)
+            seen.add(key.value)
         return super().construct_mapping(node, deep=deep)
 
 
