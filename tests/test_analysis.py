@@ -177,8 +177,9 @@ def test_a_straight_ridge_is_found_where_it_is(degrees, width):
     assert band.length == pytest.approx((200e-6 - edge[1]) / sin(angle), abs=width)
     # Linear interpolation of the flanks at a sixth of the width: 2 %.
     assert band.width == pytest.approx(width, rel=0.02)
-    assert band.middle_rate == pytest.approx(60e3, rel=0.01)
-    assert (band.normals @ np.array([sin(angle), cos(angle)]))[2:-2].min() > 0.95
+    # Bilinear reading between samples 2 µm apart cuts the top of the narrower one by up to 2 %.
+    assert band.middle_rate == pytest.approx(60e3, rel=0.02)
+    assert (band.normals @ np.array([sin(angle), cos(angle)]))[inner].min() > 0.995
 
 
 def test_noise_and_a_sheared_rake_layer_do_not_lead_the_ridge_astray():
