@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from chipglow.cli import app
 from chipglow.cutting import CuttingSimulation, ForceHistory, SolverError
 from chipglow.io import open_scene, read_measurement, write_scene
-from chipglow.study import Study, load_study
+from chipglow.study import Study, cut, load_study
 
 RASTER = AnalyticChip().raster
 STUDY = f"""
@@ -53,7 +53,8 @@ def runs(monkeypatch, chip_scene):
         calls.append(simulation)
         for frame in chip_scene.frames():
             on_frame(frame)
-        on_progress(1.0)
+        if on_progress:
+            on_progress(1.0)
         return ForceHistory(*AnalyticChip().forces())
 
     monkeypatch.setattr(CuttingSimulation, "run", cut_chip)
@@ -132,14 +133,29 @@ def test_run_writes_a_report_and_prints_the_comparison(folder, runs):
     assert sorted(path.name for path in folder.iterdir()) == ["results", "study.yaml"]
 
 
-def test_a_second_run_finds_the_scene_and_replaces_the_results(folder, runs):
-    assert chipglow("run", "study.yaml", "--out", "results").exit_code == 0
-    (folder / "study.yaml").write_text(STUDY.replace("instants: 3", "instants: 2"))
+@pytest.fixture
+def earlier_results(folder, runs):
+    """Results of an earlier run, of which the cache holds the scene."""
+    cut(load_study("study.yaml"))
+    results = folder / "results"
+    results.mkdir()
+    for name in ("summary.json", "report.html", "old.txt"):
+        (results / name).write_text("earlier")
+    return results
+
+
+def test_a_second_run_finds_the_scene_and_replaces_the_results(earlier_results, runs, monkeypatch):
+    def write_report(result, folder, text, provenance):
+        (folder / "summary.json").write_text(text)
+        return folder / "summary.json"
+
+    monkeypatch.setattr("chipglow.cli.results.write_report", write_report)
     result = chipglow("run", "study.yaml", "--out", "results")
-    assert result.exit_code == 0
+    assert result.exit_code == 0, result.output
     assert "cache" in result.output
     assert len(runs) == 1
-    assert load_study("results/study.yaml").analysis.instants == 2
+    assert [path.name for path in earlier_results.iterdir()] == ["summary.json"]
+    assert load_study(earlier_results / "summary.json") == load_study("study.yaml")
 
 
 def test_reproduce_runs_the_papers_study(folder, monkeypatch):
@@ -237,12 +253,11 @@ def test_a_disk_that_fills_up_during_the_cut_leaves_nothing(command, folder, run
     assert list((tmp_path / "cache").iterdir()) == []
 
 
-def test_a_disk_that_fills_up_during_the_report_keeps_the_earlier_results(folder, runs):
-    assert chipglow("run", "study.yaml", "--out", "results").exit_code == 0
-    before = (folder / "results" / "report.html").read_bytes()
+def test_a_disk_that_fills_up_during_the_report_keeps_the_earlier_results(folder, earlier_results):
     with full_disk(20_000):
         assert_refused(chipglow("run", "study.yaml", "--out", "results"))
-    assert (folder / "results" / "report.html").read_bytes() == before
+    assert (earlier_results / "report.html").read_text() == "earlier"
+    assert len(list(earlier_results.iterdir())) == 3
     assert sorted(path.name for path in folder.iterdir()) == ["results", "study.yaml"]
 
 
