@@ -170,7 +170,7 @@ def test_a_straight_ridge_is_found_where_it_is(degrees, width):
     across = offset[:, 0] * sin(angle) + offset[:, 1] * cos(angle)
     # The parabola through three samples of a Gaussian, 2 µm apart, is within 0.3 µm of its top.
     # The tool and the surface cut the ridge off aslant; that reaches as far in as the smoothing.
-    inner = (band.ridge.distance > 25e-6) & (band.ridge.distance < band.length - 40e-6)
+    inner = (band.ridge.distance > 40e-6) & (band.ridge.distance < band.length - 40e-6)
     assert np.abs(across[inner]).max() < 0.3e-6
     assert np.abs(across).max() < width / 2
     assert band.reaches_surface
@@ -327,7 +327,7 @@ def test_the_band_of_the_study_is_the_chips(study, chip):
     middle = study.instants[study.developed].start + CAMERA.integration_time / 2
     band = study.band
     offset = chip.distance_to_band(band.ridge.points, middle)
-    inner = (band.ridge.distance > 25e-6) & (band.ridge.distance < 0.85 * band.length)
+    inner = (band.ridge.distance > 40e-6) & (band.ridge.distance < 0.85 * band.length)
     assert np.abs(offset[inner]).max() < 1e-6
     assert study.momentary_band is not None
     assert study.momentary_band.width == pytest.approx(chip.band_width, rel=0.03)

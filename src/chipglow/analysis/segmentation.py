@@ -22,7 +22,7 @@ class Segmentation:
     start : float
         Time in s from which the history counts: what is before is the first build-up of the chip.
     period : float
-        Mean time from one force peak to the next in s; NaN if the force shows no period.
+        Mean time from one force peak to the next in s; NaN with less than two peaks.
     period_uncertainty : float
         Standard uncertainty of the period in s: the deviation of the intervals over the root of
         their number; NaN for less than two intervals.
@@ -71,7 +71,8 @@ def segmentation(
 
     Notes
     -----
-    The history counts from where the cutting force first reaches the median of its second half.
+    The history counts from where the cutting force first reaches the median of its second half,
+    and from a fifth of its duration on at the earliest.
     The autocorrelation of what remains gives a first period; the force is smoothed over a
     fifteenth of it, and its peaks, at least six tenths of a period apart and a fifth of the swing
     high, give the period and its uncertainty.
@@ -83,7 +84,8 @@ def segmentation(
     if times.size < 16 or (steps <= 0).any() or not np.allclose(steps, steps.mean(), rtol=0.01):
         raise ValueError("force history: expected 16 or more times at even ascending steps")
     step = float(steps.mean())
-    first = int(np.argmax(cutting >= np.median(cutting[cutting.size // 2 :])))
+    reached = int(np.argmax(cutting >= np.median(cutting[cutting.size // 2 :])))
+    first = max(reached, cutting.size // 5)
     times, cutting, thrust = times[first:], cutting[first:], thrust[first:]
     coarse = _correlation_period(cutting, step)
     peaks = np.zeros(0, dtype=np.int64)
@@ -95,7 +97,7 @@ def segmentation(
     intervals = np.diff(times[peaks])
     return Segmentation(
         start=float(times[0]),
-        period=float(intervals.mean()) if intervals.size else coarse,
+        period=float(intervals.mean()) if intervals.size else nan,
         period_uncertainty=(
             float(intervals.std(ddof=1)) / sqrt(intervals.size) if intervals.size > 1 else nan
         ),
@@ -117,7 +119,7 @@ def _correlation_period(force: NDArray[np.float64], step: float) -> float:
     raw = np.fft.irfft(np.abs(spectrum) ** 2)[: swing.size]
     if not raw[0] > 0:
         return nan
-    lags = slice(0, swing.size * 2 // 3)
+    lags = slice(0, swing.size // 2)
     correlation = (raw / np.arange(swing.size, 0, -1))[lags]
     correlation /= correlation[0]
     correlation = gaussian_filter1d(correlation, 2.0)

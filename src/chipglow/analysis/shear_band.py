@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.signal import savgol_filter
 
 from chipglow.analysis.lines import Line, sample, straight_line
@@ -19,12 +19,13 @@ _RADIUS_STEP: Final = 2e-6
 _ANGLES: Final = 401
 _BELOW_HORIZONTAL: Final = radians(10.0)
 _STEEPEST: Final = 2.0
-_STRAIGHTNESS: Final = 0.02
+_STRAIGHTNESS: Final = 0.2
 _TOLL: Final = 0.8
 _RAKE_LAYER: Final = 25e-6
 _RAKE_LAYER_SHARE: Final = 0.4
 _SMOOTHING: Final = 50e-6
 _SEARCH: Final = 15e-6
+_CLIMB_BLUR: Final = (3.0, 1.5)
 _WIDEST: Final = 80e-6
 
 
@@ -279,7 +280,7 @@ def _climb(
     count = ceil(_SEARCH / raster.spacing)
     offsets = raster.spacing * np.arange(-count, count + 1)
     across = points[:, None] + offsets[:, None] * normals[:, None]
-    values = np.nan_to_num(sample(rate, raster, across))
+    values = gaussian_filter(np.nan_to_num(sample(rate, raster, across)), _CLIMB_BLUR)
     peak = values.argmax(axis=1)
     inside = (peak > 0) & (peak < offsets.size - 1)
     peak = np.clip(peak, 1, offsets.size - 2)

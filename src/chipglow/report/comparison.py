@@ -196,7 +196,7 @@ def _further_rows(result: StudyResult) -> list[Row]:
             "µm",
             rake.contact_length * 1e6,
             0,
-            "From the edge's arc up to where the chip leaves the face.",
+            _contact_text(result),
         ),
         _own(
             "band_width_um",
@@ -226,6 +226,15 @@ def _further_rows(result: StudyResult) -> list[Row]:
             + ("the free surface." if result.band.reaches_surface else "the border of the view."),
         ),
     ]
+
+
+def _contact_text(result: StudyResult) -> str:
+    end = result.rake.contact.points[-1]
+    left, _, _, top = result.raster.extent
+    margin = 3 * result.raster.spacing
+    if end[1] > top - margin or end[0] < left + margin:
+        return "From the edge's arc up to the border of the view: the chip touches beyond it."
+    return "From the edge's arc up to where the chip leaves the face."
 
 
 def _error(key: str, quantity: str, paper: PaperValue, here: float, explanation: str) -> Row:

@@ -41,6 +41,7 @@ def rake_share(result: StudyResult) -> str:
     """Why the PSF's share at the rake face differs."""
     return _join(
         _psf_text(result),
+        _wings_text(result, lambda s: s.rake_share, result.rake.psf_share),
         _reach(result, lambda s: s.rake_share, PAPER.rake_psf_share.value, _percent),
         f"Of the mean error along the contact it is {_percent(result.rake.mean_psf_share)}.",
     )
@@ -69,7 +70,9 @@ def band_share(result: StudyResult) -> str:
             "narrower the band."
         )
     return _join(
-        compared, _reach(result, lambda s: s.band_share, PAPER.band_psf_share.value, _percent)
+        compared,
+        _wings_text(result, lambda s: s.band_share, result.band_errors.psf_share),
+        _reach(result, lambda s: s.band_share, PAPER.band_psf_share.value, _percent),
     )
 
 
@@ -129,6 +132,28 @@ def _psf_text(result: StudyResult) -> str:
     )
 
 
+def _wings_text(
+    result: StudyResult, values: Callable[[Sensitivity], NDArray[np.float64]], ours: float
+) -> str:
+    """What a Gaussian as wide at half maximum as the camera's PSF would make: the rest is wings."""
+    psf, found = result.camera.psf, _same_order(result)
+    if psf is None or not found.widths[0] <= psf.fwhm <= found.widths[-1]:
+        return ""
+    gaussian = float(np.interp(psf.fwhm, found.widths, values(found)))
+    if not (isfinite(ours) and isfinite(gaussian)):
+        return ""
+    return (
+        f"It makes {_percent(ours)} of the error, a Gaussian of the same width {_percent(gaussian)}"
+        ": what it does beyond its half maximum counts too."
+    )
+
+
+def _same_order(result: StudyResult) -> Sensitivity:
+    """The sensitivity for the camera's own order of PSF and sensors."""
+    order = result.camera.psf_order
+    return next(series for series in result.sensitivity if series.psf_order == order)
+
+
 def _reach(
     result: StudyResult,
     values: Callable[[Sensitivity], NDArray[np.float64]],
@@ -136,8 +161,7 @@ def _reach(
     text: Callable[[float], str],
 ) -> str:
     """Which width of a Gaussian PSF gives the paper's figure."""
-    order = result.camera.psf_order
-    found = next(s for s in result.sensitivity if s.psf_order == order)
+    found = _same_order(result)
     series, widths = values(found), found.widths
     if not np.isfinite(series).all():
         return ""

@@ -12,15 +12,14 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.analysis.paper import PAPER, StudyResult, SurfaceResult
-from chipglow.analysis.sensitivity import Sensitivity
 from chipglow.camera import PointSpreadFunction
 from chipglow.report import drawing
 from chipglow.report.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.scene import Material
 
 _ORDER_STYLE: Final = {
-    "sensor": (BLUE, "PSF from sensor to sensor"),
-    "optics": (VERMILLION, "PSF before the sensors"),
+    "sensor": (BLUE, "Gaussian, sensor to sensor"),
+    "optics": (VERMILLION, "Gaussian, before the sensors"),
 }
 
 
@@ -191,16 +190,16 @@ def error_lines(result: StudyResult) -> Figure:
         label="error, mean over the contact",
     )
     paper_rake = PAPER.rake_error.value
-    _draw_paper(left, 0.0, paper_rake, BLUE, "the paper's error")
-    _draw_paper(
+    _draw_point(left, 0.0, paper_rake, BLUE, "the paper's error")
+    _draw_point(
         left, 0.0, paper_rake * PAPER.rake_psf_share.value, VERMILLION, "the paper's PSF portion"
     )
     left.set_title(f"a) across the rake face, {result.plan.rake_surface}")
     left.set_xlabel("distance from the rake face / µm\n← tool      chip →")
     _draw_error_line(right, band.line.distance, band.case_1, band.psf_portion)
     paper_band = PAPER.band_error.value
-    _draw_paper(right, 0.0, paper_band, BLUE, "the paper's error")
-    _draw_paper(
+    _draw_point(right, 0.0, paper_band, BLUE, "the paper's error")
+    _draw_point(
         right,
         0.0,
         paper_band * PAPER.band_psf_share.value,
@@ -285,46 +284,69 @@ def forces(result: StudyResult) -> Figure | None:
 
 def psf_sensitivity(result: StudyResult) -> Figure:
     """Headline errors and the PSF's shares against its width, for both orders."""
-    panels: list[tuple[str, str, Callable[[Sensitivity], NDArray[np.float64]], float]] = [
-        ("a) error at the rake face", "°C", lambda s: s.rake_error, PAPER.rake_error.value),
-        ("b) error at the band's centre", "°C", lambda s: s.band_error, PAPER.band_error.value),
-        (
-            "c) PSF's share, rake face",
-            "%",
-            lambda s: 100 * s.rake_share,
-            100 * PAPER.rake_psf_share.value,
-        ),
-        (
-            "d) PSF's share, band's centre",
-            "%",
-            lambda s: 100 * s.band_share,
-            100 * PAPER.band_psf_share.value,
-        ),
-    ]
     figure = drawing.new_figure(5.2)
     grid = figure.subplots(2, 2, sharex=True)
-    for axes, (title, unit, values, paper) in zip(grid.flat, panels, strict=True):
+    for axes, panel in zip(grid.flat, _sensitivity_panels(result), strict=True):
         for series in result.sensitivity:
             colour, label = _ORDER_STYLE[series.psf_order]
             axes.plot(
                 series.widths * 1e6,
-                values(series),
+                panel.scale * getattr(series, panel.name),
                 color=colour,
                 marker="o",
                 markersize=3.0,
                 label=label,
             )
-        axes.axhline(paper, color="black", linestyle="--", linewidth=1.0, label="the paper")
+        axes.axhline(
+            panel.scale * panel.paper, color="black", linestyle="--", linewidth=1.0, label="paper"
+        )
         if result.camera.psf is not None:
-            axes.axvline(
-                result.camera.psf.fwhm * 1e6, color=GREY, linestyle=":", label="this camera's width"
-            )
-        axes.set_title(title)
-        axes.set_ylabel(unit)
+            width, own = result.camera.psf.fwhm * 1e6, panel.scale * panel.own
+            colour = _ORDER_STYLE[result.camera.psf_order][0]
+            _draw_point(axes, width, own, colour, "this camera's PSF")
+        axes.set_title(panel.title)
+        axes.set_ylabel("%" if panel.scale == 100 else "°C")
     for axes in grid[1]:
         axes.set_xlabel("PSF, full width at half maximum / µm")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
+
+
+@dataclass(frozen=True)
+class _SensitivityPanel:
+    """One quantity of the sensitivity: its name there, the study's value and the paper's."""
+
+    title: str
+    name: str
+    scale: float
+    own: float
+    paper: float
+
+
+def _sensitivity_panels(result: StudyResult) -> tuple[_SensitivityPanel, ...]:
+    rake, band = result.rake, result.band_errors
+    return (
+        _SensitivityPanel(
+            "a) error at the rake face", "rake_error", 1, rake.error, PAPER.rake_error.value
+        ),
+        _SensitivityPanel(
+            "b) error at the band's centre", "band_error", 1, band.error, PAPER.band_error.value
+        ),
+        _SensitivityPanel(
+            "c) PSF's share, rake face",
+            "rake_share",
+            100,
+            rake.psf_share,
+            PAPER.rake_psf_share.value,
+        ),
+        _SensitivityPanel(
+            "d) PSF's share, band's centre",
+            "band_share",
+            100,
+            band.psf_share,
+            PAPER.band_psf_share.value,
+        ),
+    )
 
 
 def _celsius(temperature: NDArray[np.floating], where: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -357,7 +379,7 @@ def _draw_error_line(
     axes.plot(distance * 1e6, portion, color=VERMILLION, label="PSF's portion")
 
 
-def _draw_paper(axes: Axes, at: float, value: float, colour: str, label: str) -> None:
+def _draw_point(axes: Axes, at: float, value: float, colour: str, label: str) -> None:
     axes.plot(
         at,
         value,
@@ -460,7 +482,8 @@ def _sensitivity_caption(result: StudyResult) -> str:
     return (
         "The headline errors with Gaussian PSFs of several widths, applied from sensor to sensor "
         "as in the paper, or to the light before the sensors integrate it. Dashed: the paper's "
-        "figures. The paper does not state its PSF's width."
+        "figures, whose PSF's width is not stated. Diamond: this camera's PSF, which is not a "
+        "Gaussian, at its own width."
     )
 
 
