@@ -21,7 +21,7 @@ and exposure; ``centre``: that of the sample under the sensor's centre in the mi
 exposure; ``true``: the greatest true temperature in the square during the exposure.
 """
 
-_LEAST_OVERLAP: Final = 0.01
+_LEAST_OVERLAP: Final = 1e-3
 
 
 @dataclass(frozen=True)
