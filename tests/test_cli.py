@@ -279,6 +279,29 @@ def test_what_stops_a_run_is_one_line_and_an_exit_code(error, code, message, fol
     assert [path.name for path in folder.iterdir()] == ["study.yaml"]
 
 
+def test_a_run_that_is_ended_from_outside_leaves_nothing(folder, tmp_path):
+    code = (
+        "import sys, time\n"
+        "from chipglow.cli import main\n"
+        "from chipglow.cutting import CuttingSimulation\n"
+        "def run(*_):\n"
+        "    print('cutting', flush=True)\n"
+        "    time.sleep(60)\n"
+        "CuttingSimulation.run = run\n"
+        "sys.argv = ['chipglow', 'run', 'study.yaml', '--out', 'results']\n"
+        "main()\n"
+    )
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", code], text=True, **pipes) as process:
+        assert process.stdout.readline() == "cutting\n"
+        process.terminate()
+        _, errors = process.communicate()
+    assert process.returncode == 130
+    assert "chipglow: interrupted, nothing was written" in errors
+    assert [path.name for path in folder.iterdir()] == ["study.yaml"]
+    assert list((tmp_path / "cache").iterdir()) == []
+
+
 def test_the_cache_is_listed_with_its_size_and_cleared(runs, tmp_path):
     assert chipglow("cut", "study.yaml", "--out", "scene.nc").exit_code == 0
     listed = chipglow("cache", "list").output

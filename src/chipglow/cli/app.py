@@ -1,5 +1,6 @@
 """The commands. Each imports what it needs when it runs, so that ``--help`` answers at once."""
 
+import signal
 import sys
 from io import TextIOWrapper
 from pathlib import Path
@@ -33,6 +34,8 @@ def main() -> None:
         if isinstance(stream, TextIOWrapper):
             # A terminal that knows no µ or − shall show a question mark, not end the command.
             stream.reconfigure(errors="replace")
+    # A job that is ended from outside tidies up as after Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     app()
 
 
