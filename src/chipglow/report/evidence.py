@@ -17,6 +17,19 @@ ORDER_TEXT: Final = {
     "optics": "before the sensors integrate",
 }
 
+REFERENCE_TEXT: Final = {
+    "maximum": "the greatest radiance temperature (emissivity included) in a sensor's square "
+    "during the exposure",
+    "mean": "the radiance temperature of the mean radiance over a sensor's square and the exposure",
+    "centre": "the radiance temperature under a sensor's centre in the middle of the exposure",
+    "true": "the greatest true temperature in a sensor's square during the exposure",
+}
+
+
+def error_definition(result: StudyResult) -> str:
+    """What an error of this study is."""
+    return f"Errors are measured radiance temperature less {REFERENCE_TEXT[result.plan.reference]}."
+
 
 def rake_error(result: StudyResult) -> str:
     """Why the error at the rake face differs."""
@@ -87,7 +100,7 @@ def band_worst(result: StudyResult) -> str:
         f"{_degrees(workpiece_side)} on the workpiece's side and {_degrees(chip_side)} on the "
         f"chip's, within {_micrometres(result.plan.line_reach)} of the ridge.",
         f"The radiance temperature changes there by up to {_degrees(steepest)} over one sensor of "
-        f"{_micrometres(result.camera.pitch)}, and the reference is the hottest sample in it.",
+        f"{_micrometres(result.camera.pitch)}.",
         _reach(result, lambda s: s.band_worst, PAPER.band_worst.value, _degrees),
     )
 

@@ -15,6 +15,7 @@ from chipglow.analysis.paper import PAPER, StudyResult, SurfaceResult
 from chipglow.camera import PointSpreadFunction
 from chipglow.report import drawing
 from chipglow.report.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.report.evidence import error_definition
 from chipglow.scene import Material
 
 _ORDER_STYLE: Final = {
@@ -452,10 +453,9 @@ def _curves_caption(result: StudyResult) -> str:
 
 def _images_caption(result: StudyResult) -> str:
     return (
-        "Measured radiance temperature less the greatest in each sensor's square during the "
-        "exposure, with the band fully developed, and the part of it that the PSF makes. The "
-        "paper's Figure 10. Green: the lines of the next figure. Dashed: the band's ridge. "
-        "Paler: under the camera's floor; the scale is that of the others."
+        f"{error_definition(result)} With the band fully developed; below, the part that the PSF "
+        "makes. The paper's Figure 10. Green: the lines of the next figure. Dashed: the "
+        "band's ridge. Paler: under the camera's floor; the scale is that of the others."
     )
 
 

@@ -33,6 +33,7 @@ _SECTIONS: Final = (
 
 def page(
     rows: Sequence[Row],
+    definition: str,
     figures: Sequence[FigureFile],
     study_text: str,
     provenance: Mapping[str, str],
@@ -43,6 +44,8 @@ def page(
     ----------
     rows : sequence of Row
         The paper's figures beside ours.
+    definition : str
+        What an error is, as a sentence.
     figures : sequence of FigureFile
         Figures, whose PNG files are read.
     study_text : str
@@ -52,7 +55,7 @@ def page(
     """
     links = "".join(f'<a href="#{name}">{escape(title)}</a>' for name, title in _SECTIONS)
     bodies = {
-        "comparison": _table(rows),
+        "comparison": _table(rows, definition),
         "figures": "\n".join(_figure(figure) for figure in figures),
         "study": f"<pre><code>{escape(study_text)}</code></pre>",
         "cite": _citation(),
@@ -93,10 +96,9 @@ def _definitions(provenance: Mapping[str, str]) -> str:
     return f"<dl>\n{items}</dl>"
 
 
-def _table(rows: Sequence[Row]) -> str:
+def _table(rows: Sequence[Row], definition: str) -> str:
     body = "\n".join(_row(row) for row in rows)
-    return f"""<p>Errors are measured radiance temperature less the greatest radiance temperature
-(emissivity included) in a sensor's square during the exposure. PSF: point spread function.</p>
+    return f"""<p>{escape(definition)} PSF: point spread function.</p>
 <div class="scroll"><table>
 <thead><tr><th>Quantity</th><th class="number">Paper</th><th class="number">Here</th>
 <th class="number">Difference</th><th>Why</th></tr></thead>

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from chipglow.analysis.paper import StudyResult
 from chipglow.report.comparison import comparison_rows
+from chipglow.report.evidence import error_definition
 from chipglow.report.figures import draw_figures
 from chipglow.report.html import page
 from chipglow.report.results import compression, results_dataset, summary
@@ -48,5 +49,6 @@ def write_report(
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     (folder / "study.yaml").write_text(study_text, encoding="utf-8")
     report = folder / "report.html"
-    report.write_text(page(rows, figures, study_text, provenance), encoding="utf-8")
+    text = page(rows, error_definition(result), figures, study_text, provenance)
+    report.write_text(text, encoding="utf-8")
     return report
