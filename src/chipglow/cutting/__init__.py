@@ -1,0 +1,36 @@
+"""The embedded cutting simulation."""
+
+from chipglow.cutting.conditions import CuttingConditions, Friction, Numerics, OutputWindow
+from chipglow.cutting.material import (
+    AISI_1045,
+    CARBIDE,
+    DamageSoftening,
+    JohnsonCook,
+    TemperatureTable,
+    ToolMaterial,
+    WorkpieceMaterial,
+)
+from chipglow.cutting.simulation import (
+    SOLVER_VERSION,
+    CuttingSimulation,
+    ForceHistory,
+    SolverError,
+)
+
+__all__ = [
+    "AISI_1045",
+    "CARBIDE",
+    "SOLVER_VERSION",
+    "CuttingConditions",
+    "CuttingSimulation",
+    "DamageSoftening",
+    "ForceHistory",
+    "Friction",
+    "JohnsonCook",
+    "Numerics",
+    "OutputWindow",
+    "SolverError",
+    "TemperatureTable",
+    "ToolMaterial",
+    "WorkpieceMaterial",
+]

@@ -1,0 +1,222 @@
+"""From material points to fields on a regular raster, smooth across free surfaces.
+
+Each field is the quadratic B-spline on the grid that fits the points: a weighted mean to start
+with, then corrections by the residual at the points. A sample shows the workpiece where the
+smoothed share of the area that chip and tool fill is over one half: on a straight surface that is
+the surface.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from chipglow.cutting.momentum import spline, spline_weights
+from chipglow.cutting.points import Grid, Points
+from chipglow.scene import Frame, Material, Raster, ToolGeometry
+from chipglow.scene.tool import wedge_distance
+
+_FIELDS: Final = (
+    "temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y",
+    "material_x", "material_y",
+)  # fmt: skip
+_CORRECTIONS: Final = 2
+_VOID, _WORKPIECE, _TOOL = int(Material.VOID), int(Material.WORKPIECE), int(Material.TOOL)
+_FILL_PASSES: Final = 3
+
+
+class Picture:
+    """Makes the frames of a scene from points and the tool's temperature.
+
+    Parameters
+    ----------
+    grid : Grid
+        The solver's grid.
+    raster : Raster
+        Samples of the frames; the grid must cover them.
+    tool : ToolGeometry
+        Outline of the tool.
+    filled_by_tool : ndarray
+        Share of each node's square that the tool fills, shape (columns, rows).
+    ambient : float
+        Temperature in K of samples that show nothing.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        raster: Raster,
+        tool: ToolGeometry,
+        filled_by_tool: NDArray[np.float64],
+        ambient: float,
+    ) -> None:
+        self._grid, self._raster, self._ambient = grid, raster, ambient
+        self._filled_by_tool = filled_by_tool
+        self._across = _placement((raster.x - grid.left) / grid.cell)
+        self._down = _placement((raster.y - grid.bottom) / grid.cell)
+        self._in_tool = _inside(raster.x, raster.y, tool.coefficients)
+        margin = 3 * grid.cell
+        left, right, bottom, top = raster.extent
+        self._view = (left - margin, right + margin, bottom - margin, top + margin)
+
+    def frame(
+        self,
+        time: float,
+        points: Points,
+        values: Mapping[str, NDArray[np.float64]],
+        tool_temperature: NDArray[np.float64],
+    ) -> Frame:
+        """Fields at one time.
+
+        Parameters
+        ----------
+        time : float
+            In s.
+        points : ndarray
+            The material points.
+        values : mapping
+            Value of every field at the points, by the names of a `Frame`.
+        tool_temperature : ndarray
+            In K on the grid, shape (columns, rows).
+        """
+        left, right, bottom, top = self._view
+        seen = (points["x"] > left) & (points["x"] < right)
+        seen &= (points["y"] > bottom) & (points["y"] < top)
+        fx = (points["x"][seen] - self._grid.left) / self._grid.cell
+        fy = (points["y"][seen] - self._grid.bottom) / self._grid.cell
+        at_points = np.stack([values[name][seen] for name in _FIELDS], axis=1)
+        area = points["volume"][seen] / self._grid.cell**2
+        shape = (self._grid.columns, self._grid.rows)
+        coefficients, filled, known = _fit(fx, fy, at_points, area, *shape, _CORRECTIONS)
+        filled = np.minimum(filled, 1.0) + self._filled_by_tool
+        _fill(coefficients, known, _FILL_PASSES)
+        tool = tool_temperature[..., None].copy()
+        _fill(tool, self._filled_by_tool > 0.0, _FILL_PASSES)
+        nodes = np.concatenate([coefficients, filled[..., None], tool], axis=2)
+        limits = np.stack([at_points.min(axis=0), at_points.max(axis=0)])
+        samples = np.empty((len(_FIELDS), *self._raster.shape), np.float32)
+        material = np.empty(self._raster.shape, np.uint8)
+        empty = np.zeros(len(_FIELDS))
+        empty[0] = self._ambient
+        _sample(nodes, self._across, self._down, self._in_tool, limits, empty, samples, material)
+        return Frame(time=time, material=material, **dict(zip(_FIELDS, samples, strict=True)))
+
+
+def _placement(position: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """First node and the three weights of positions in cells."""
+    first = np.floor(position - 0.5).astype(np.int64)
+    offset = position - first
+    return first, np.stack(spline_weights.py_func(offset), axis=1)
+
+
+@njit(cache=True)
+def _inside(x, y, tool):  # type: ignore[no-untyped-def]
+    result = np.empty((y.size, x.size), np.bool_)
+    for row in range(y.size):
+        for column in range(x.size):
+            result[row, column] = wedge_distance(x[column], y[row], tool)[0] < 0.0
+    return result
+
+
+@njit(cache=True)
+def _fit(fx, fy, values, area, columns, rows, corrections):  # type: ignore[no-untyped-def]
+    """B-spline coefficients (columns, rows, fields), filled share and where points are near."""
+    fields = values.shape[1]
+    weight = np.zeros((columns, rows))
+    result = np.zeros((columns, rows, fields))
+    change = np.zeros((columns, rows, fields))
+    residual = np.empty(fields)
+    for correction in range(corrections + 1):
+        change[:] = 0.0
+        for k in range(fx.size):
+            i, ax = spline(fx[k])
+            j, ay = spline(fy[k])
+            wx, wy = spline_weights(ax), spline_weights(ay)
+            residual[:] = values[k]
+            if correction > 0:
+                for a in range(3):
+                    for b in range(3):
+                        for f in range(fields):
+                            residual[f] -= wx[a] * wy[b] * result[i + a, j + b, f]
+            for a in range(3):
+                for b in range(3):
+                    w = wx[a] * wy[b] * area[k]
+                    if correction == 0:
+                        weight[i + a, j + b] += w
+                    for f in range(fields):
+                        change[i + a, j + b, f] += w * residual[f]
+        for i in range(columns):
+            for j in range(rows):
+                if weight[i, j] > 0.0:
+                    for f in range(fields):
+                        result[i, j, f] += change[i, j, f] / weight[i, j]
+    return result, weight, weight > 0.0
+
+
+@njit(cache=True)
+def _fill(values, known, passes):  # type: ignore[no-untyped-def]
+    """Extend values beyond where they are known: mean of the known neighbours, a few nodes far."""
+    columns, rows, fields = values.shape
+    known = known.copy()
+    for _ in range(passes):
+        before = known.copy()
+        for i in range(1, columns - 1):
+            for j in range(1, rows - 1):
+                if before[i, j]:
+                    continue
+                near = 0
+                for a in range(-1, 2):
+                    for b in range(-1, 2):
+                        near += before[i + a, j + b]
+                if near == 0:
+                    continue
+                for f in range(fields):
+                    total = 0.0
+                    for a in range(-1, 2):
+                        for b in range(-1, 2):
+                            if before[i + a, j + b]:
+                                total += values[i + a, j + b, f]
+                    values[i, j, f] = total / near
+                known[i, j] = True
+
+
+@njit(cache=True, parallel=True)
+def _sample(nodes, across, down, in_tool, limits, empty, samples, material):  # type: ignore[no-untyped-def]
+    """Evaluate the splines on the raster: down each column of nodes first, then across."""
+    fields = limits.shape[1]
+    first_x, weights_x = across
+    first_y, weights_y = down
+    low, high = first_x[0], first_x[-1] + 3
+    for row in prange(samples.shape[1]):
+        line = np.empty((high - low, fields + 2))
+        j = first_y[row]
+        for i in range(low, high):
+            for f in range(fields + 2):
+                line[i - low, f] = (
+                    weights_y[row, 0] * nodes[i, j, f]
+                    + weights_y[row, 1] * nodes[i, j + 1, f]
+                    + weights_y[row, 2] * nodes[i, j + 2, f]
+                )
+        for column in range(samples.shape[2]):
+            i = first_x[column] - low
+            w0, w1, w2 = weights_x[column, 0], weights_x[column, 1], weights_x[column, 2]
+            filled = w0 * line[i, fields] + w1 * line[i + 1, fields] + w2 * line[i + 2, fields]
+            if in_tool[row, column]:
+                material[row, column] = _TOOL
+                for f in range(1, fields):
+                    samples[f, row, column] = 0.0
+                f = fields + 1
+                samples[0, row, column] = (
+                    w0 * line[i, f] + w1 * line[i + 1, f] + w2 * line[i + 2, f]
+                )
+            elif filled > 0.5:
+                material[row, column] = _WORKPIECE
+                for f in range(fields):
+                    value = w0 * line[i, f] + w1 * line[i + 1, f] + w2 * line[i + 2, f]
+                    samples[f, row, column] = min(max(value, limits[0, f]), limits[1, f])
+            else:
+                material[row, column] = _VOID
+                for f in range(fields):
+                    samples[f, row, column] = empty[f]

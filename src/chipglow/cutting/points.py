@@ -1,0 +1,78 @@
+"""Material points: their state, and keeping them sorted by cell."""
+
+from typing import Final, NamedTuple, TypeAlias
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+POINT: Final = np.dtype(
+    [
+        (name, np.float64)
+        for name in (
+            "x", "y", "vx", "vy",
+            "cxx", "cxy", "cyx", "cyy",
+            "dxx", "dyy", "dxy",
+            "strain", "strain_before", "damage", "temperature", "volume",
+            "material_x", "material_y", "contact_time",
+        )
+    ]
+)  # fmt: skip
+"""Position, velocity, velocity gradient, deviator of the Cauchy stress, plastic strain now and at
+the last record, damage, temperature, volume per width, position before the cut, time in contact
+since the last exchange of heat; SI units."""
+
+Points: TypeAlias = NDArray[np.void]
+
+
+class Grid(NamedTuple):
+    """The background grid: node (i, j) is at left + i·cell, bottom + j·cell."""
+
+    left: float
+    bottom: float
+    cell: float
+    columns: int
+    rows: int
+
+
+def block_of_points(
+    x: NDArray[np.float64], y: NDArray[np.float64], spacing: float, temperature: float, speed: float
+) -> Points:
+    """Points on the lattice of columns x and rows y (m), moving along x at `speed` (m/s)."""
+    points = np.zeros(x.size * y.size, POINT)
+    points["x"] = np.repeat(x, y.size)
+    points["y"] = np.tile(y, x.size)
+    points["vx"] = speed
+    points["volume"] = spacing**2
+    points["temperature"] = temperature
+    points["material_x"], points["material_y"] = points["x"], points["y"]
+    return points
+
+
+@njit(cache=True)
+def sort_by_cell(points, count, grid, right, top, target, starts):  # type: ignore[no-untyped-def]
+    """Copy the points within the region into `target`, cell by cell; return how many.
+
+    `starts` (columns·rows + 1) tells where each cell's points begin; a point whose position is not
+    finite makes the result negative.
+    """
+    cells = np.empty(count, np.int64)
+    starts[:] = 0
+    for i in range(count):
+        p = points[i]
+        if not (np.isfinite(p.x) and np.isfinite(p.y)):
+            return -1 - i
+        column = int((p.x - grid.left) / grid.cell)
+        row = int((p.y - grid.bottom) / grid.cell)
+        inside = 2 <= column < grid.columns - 3 and 2 <= row < grid.rows - 3
+        cells[i] = column * grid.rows + row if inside and p.x < right and p.y < top else -1
+        if cells[i] >= 0:
+            starts[cells[i] + 1] += 1
+    for cell in range(starts.size - 1):
+        starts[cell + 1] += starts[cell]
+    cursor = starts[:-1].copy()
+    for i in range(count):
+        if cells[i] >= 0:
+            target[cursor[cells[i]]] = points[i]
+            cursor[cells[i]] += 1
+    return starts[-1]

@@ -1,0 +1,413 @@
+"""The cutting simulation: a workpiece driven against a rigid, conducting tool."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import ceil
+from typing import Final
+
+import numpy as np
+from numba import get_num_threads
+from numpy.typing import NDArray
+
+from chipglow.cutting.conditions import CuttingConditions, Friction, Numerics, OutputWindow
+from chipglow.cutting.flow_stress import Flow
+from chipglow.cutting.heat import ToolHeat, conduct, conduct_tool, heat_contact, return_heat
+from chipglow.cutting.heat import tool_fraction as fraction_of_tool
+from chipglow.cutting.material import AISI_1045, CARBIDE, ToolMaterial, WorkpieceMaterial
+from chipglow.cutting.momentum import Step, advance
+from chipglow.cutting.picture import Picture
+from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
+from chipglow.scene import Frame, Raster, ToolGeometry
+from chipglow.scene.tool import wedge_distance
+
+SOLVER_VERSION: Final = "1"
+"""Changes whenever the same input gives another result."""
+
+_MARGIN: Final = 4
+_CONTACT_STIFFNESS: Final = 50e9
+_CONTACT_DAMPING: Final = 0.2
+_LARGEST_DRIFT: Final = 0.1
+_HEAT_STABILITY: Final = 0.2
+
+
+class SolverError(RuntimeError):
+    """A simulation that went wrong: what, where and when."""
+
+
+@dataclass(frozen=True)
+class ForceHistory:
+    """Force of the tool on the workpiece per width of cut, over the whole cut.
+
+    Parameters
+    ----------
+    time : ndarray
+        Ends of the intervals over which the forces are averaged, in s, shape (n,).
+    cutting, thrust : ndarray
+        Against the motion of the workpiece, and away from the tool into it, in N/m, shape (n,).
+    """
+
+    time: NDArray[np.float64]
+    cutting: NDArray[np.float64]
+    thrust: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CuttingSimulation:
+    """Thermo-mechanical simulation of an orthogonal cut in plane strain.
+
+    Material points (MLS-MPM with affine velocities) carry stress, strain, temperature and their
+    place before the cut; the tool is rigid and conducts heat. The cut starts at time 0, when the
+    workpiece touches the rake face.
+
+    Parameters
+    ----------
+    conditions : CuttingConditions
+        Speed, feed, length of cut.
+    tool : ToolGeometry
+        Outline of the tool.
+    workpiece : WorkpieceMaterial
+        What is cut.
+    tool_material : ToolMaterial
+        What the tool is made of.
+    friction : Friction
+        Friction and heat in the contact.
+    numerics : Numerics
+        How finely it is computed.
+    """
+
+    conditions: CuttingConditions = field(default_factory=CuttingConditions)
+    tool: ToolGeometry = field(default_factory=ToolGeometry)
+    workpiece: WorkpieceMaterial = AISI_1045
+    tool_material: ToolMaterial = CARBIDE
+    friction: Friction = field(default_factory=Friction)
+    numerics: Numerics = field(default_factory=Numerics)
+
+    def run(
+        self,
+        window: OutputWindow,
+        raster: Raster,
+        on_frame: Callable[[Frame], None],
+        on_progress: Callable[[float], None] | None = None,
+    ) -> ForceHistory:
+        """Simulate the cut and hand over its frames.
+
+        Parameters
+        ----------
+        window : OutputWindow
+            Which part of the cut is recorded.
+        raster : Raster
+            Samples of the frames.
+        on_frame : callable
+            Called with every frame of the window, in their order.
+        on_progress : callable, optional
+            Called with the share of the cut that is done, 0 to 1.
+
+        Returns
+        -------
+        ForceHistory
+            Forces averaged over every interval of the window's length, from the start of the cut.
+
+        Raises
+        ------
+        ValueError
+            If the window or the raster reaches beyond what is simulated.
+        SolverError
+            If the simulation goes wrong.
+        """
+        self._check_window(window)
+        state = _State(self, window.interval)
+        self._check_raster(raster, state.grid)
+        picture = Picture(
+            state.grid,
+            raster,
+            self.tool,
+            state.tool_fraction,
+            self.conditions.initial_temperature,
+        )
+        first, last = self.frame_range(window)
+        forces = np.empty((last, 2))
+        for record in range(1, last + 1):
+            forces[record - 1] = state.advance()
+            if record >= first:
+                on_frame(state.frame(picture))
+            state.mark()
+            if on_progress is not None:
+                on_progress(record / last)
+        time = window.interval * np.arange(1, last + 1, dtype=np.float64)
+        return ForceHistory(time, forces[:, 0].copy(), forces[:, 1].copy())
+
+    def frame_range(self, window: OutputWindow) -> tuple[int, int]:
+        """Numbers of the first and the last interval whose ends are recorded as frames."""
+        step = self.conditions.speed * window.interval
+        last = int(np.floor(window.end / step + 1e-9))
+        return max(ceil(window.start / step - 1e-9), 1), last
+
+    def _check_window(self, window: OutputWindow) -> None:
+        if window.end > self.conditions.length_of_cut * (1 + 1e-9):
+            raise ValueError(
+                f"window end: {window.end * 1e3:g} mm is beyond the length of cut of "
+                f"{self.conditions.length_of_cut * 1e3:g} mm"
+            )
+        first, last = self.frame_range(window)
+        if last < first:
+            raise ValueError(
+                f"window: no frame between {window.start * 1e3:g} mm and {window.end * 1e3:g} mm "
+                f"with an interval of {window.interval * 1e6:g} us"
+            )
+
+    def _check_raster(self, raster: Raster, grid: Grid) -> None:
+        left, right, bottom, top = raster.extent
+        edge = 3 * grid.cell
+        inside = (
+            left >= grid.left + edge
+            and bottom >= grid.bottom + edge
+            and right <= grid.left + grid.columns * grid.cell - 2 * edge
+            and top <= grid.bottom + grid.rows * grid.cell - 2 * edge
+        )
+        if not inside:
+            raise ValueError(
+                f"field of view: x {left * 1e6:.0f} to {right * 1e6:.0f} um, "
+                f"y {bottom * 1e6:.0f} to {top * 1e6:.0f} um reaches beyond the simulated region"
+            )
+
+
+class _State:
+    """What changes while the simulation runs."""
+
+    def __init__(self, simulation: CuttingSimulation, interval: float) -> None:
+        conditions, numerics = simulation.conditions, simulation.numerics
+        material = simulation.workpiece
+        cell, spacing = numerics.cell, numerics.cell / numerics.points_per_side
+        self.grid = _grid(numerics)
+        self.tool = simulation.tool.coefficients
+        self.speed, self.spacing = conditions.speed, spacing
+        self.cycles, self.steps, time_step = _time_steps(simulation, interval)
+        self.interval, self.cycle = interval, interval / self.cycles
+        heat_mass = material.density * spacing**2
+        mass = heat_mass * numerics.mass_scaling
+        self.step = Step(
+            mass=mass,
+            heat_mass=heat_mass,
+            volume=spacing**2,
+            time_step=time_step,
+            shear_modulus=material.shear_modulus,
+            bulk_modulus=material.bulk_modulus,
+            heat_share=material.taylor_quinney,
+            stiffness=_CONTACT_STIFFNESS,
+            damping=_CONTACT_DAMPING * 2 * np.sqrt(_CONTACT_STIFFNESS * mass),
+            reach=spacing / 2,
+            area=spacing,
+            friction=simulation.friction.coefficient,
+            shear_fraction=simulation.friction.shear_fraction,
+            floor=-numerics.depth,
+            inflow=-numerics.upstream,
+            ceiling=conditions.feed + 2 * cell,
+            speed=conditions.speed,
+        )
+        self.flow = Flow.of(material)
+        self.capacity = material.heat_capacity.sampled()
+        self.conductivity = material.conductivity.sampled()
+        self.tool_heat = _tool_heat(simulation, spacing)
+        self.tool_fraction = fraction_of_tool(self.grid, self.tool)
+        shape = (self.grid.columns, self.grid.rows)
+        self.velocity = np.zeros((*shape, 2))
+        self.velocity[..., 0] = conditions.speed
+        self.nodes = np.zeros((*shape, 4))
+        self.heat_nodes = np.zeros((*shape, 3))
+        self.increment = np.zeros(shape)
+        self.friction_heat = np.zeros(shape)
+        self.tool_temperature = np.full(shape, conditions.initial_temperature)
+        self.starts = np.zeros(self.grid.columns * self.grid.rows + 1, np.int64)
+        self.right = numerics.downstream
+        self.top = numerics.height
+        self._start_points(conditions, numerics)
+        self.time = 0.0
+        self._cell = cell
+
+    def _start_points(self, conditions: CuttingConditions, numerics: Numerics) -> None:
+        """Fill the region up to where the workpiece's face touches the rake face."""
+        self.temperature = conditions.initial_temperature
+        pad = 2 * numerics.cell
+        layers = ceil((numerics.depth + pad) / self.spacing)
+        above = max(round(conditions.feed / self.spacing), 1)
+        self.rows = self.spacing * (np.arange(-layers, above, dtype=np.float64) + 0.5)
+        self.entry = -numerics.upstream - pad
+        heights = np.linspace(0.0, conditions.feed, 64)
+        self.face = _touching(self.tool, heights)
+        self.columns = 0
+        travel = conditions.length_of_cut + 4 * numerics.cell
+        capacity = int((self.face - self.entry + travel) / self.spacing + 4) * self.rows.size
+        self.points = np.zeros(capacity, POINT)
+        self.spare = np.zeros(capacity, POINT)
+        self.count = 0
+        self._let_in(0.0)
+
+    def _let_in(self, time: float) -> None:
+        """Add the columns of points that have reached the left edge."""
+        first = self.columns
+        at_edge = self.face + self.speed * time - self.entry
+        self.columns = max(int(at_edge / self.spacing - 0.5) + 1, first)
+        original = self.face - self.spacing * (
+            np.arange(first, self.columns, dtype=np.float64) + 0.5
+        )
+        new = block_of_points(original, self.rows, self.spacing, self.temperature, self.speed)
+        new["x"] += self.speed * time
+        self.points[self.count : self.count + new.size] = new
+        self.count += new.size
+
+    def _sort(self) -> None:
+        count = sort_by_cell(
+            self.points, self.count, self.grid, self.right, self.top, self.spare, self.starts
+        )
+        if count < 0:
+            self._fail("a point's position is not finite", -1 - count)
+        self.points, self.spare = self.spare, self.points
+        self.count = count
+
+    def advance(self) -> tuple[float, float]:
+        """Advance by one interval; mean cutting and thrust force in N/m."""
+        forces = np.zeros(2)
+        for _ in range(self.cycles):
+            self._let_in(self.time)
+            self._sort()
+            good = advance(
+                self.steps,
+                self.points,
+                self.starts,
+                self.velocity,
+                self.nodes,
+                self.friction_heat,
+                self.tool,
+                self.grid,
+                self.step,
+                self.flow,
+                self.capacity,
+                forces,
+                get_num_threads(),
+            )
+            self.time += self.cycle
+            if not good:
+                lost = ~np.isfinite(self.points["x"][: self.count])
+                self._fail("a point left the grid", int(np.argmax(lost)))
+            self._conduct()
+        cutting, thrust = -forces / (self.cycles * self.steps)
+        return float(cutting), float(thrust)
+
+    def _conduct(self) -> None:
+        conduct(
+            self.points,
+            self.count,
+            self.heat_nodes,
+            self.increment,
+            self.conductivity,
+            self.capacity,
+            self.step.heat_mass,
+            self.grid,
+            self.cycle,
+        )
+        conduct_tool(
+            self.tool_temperature, self.tool_fraction, self.tool_heat, self.grid, self.cycle
+        )
+        heat_contact(
+            self.points,
+            self.count,
+            self.friction_heat,
+            self.increment,
+            self.heat_nodes,
+            self.tool_temperature,
+            self.tool_fraction,
+            self.tool,
+            self.tool_heat,
+            self.capacity,
+            self.step.heat_mass,
+            self.grid,
+        )
+        return_heat(self.points, self.count, self.increment, self.grid)
+
+    def frame(self, picture: Picture) -> Frame:
+        """Fields now; the strain rate is the mean over the last interval."""
+        points: Points = self.points[: self.count]
+        values = {
+            "temperature": points["temperature"],
+            "plastic_strain": points["strain"],
+            "plastic_strain_rate": (points["strain"] - points["strain_before"]) / self.interval,
+            "velocity_x": points["vx"],
+            "velocity_y": points["vy"],
+            "material_x": points["material_x"],
+            "material_y": points["material_y"],
+        }
+        return picture.frame(self.time, points, values, self.tool_temperature)
+
+    def mark(self) -> None:
+        """Start a new interval of the strain rate."""
+        points = self.points[: self.count]
+        points["strain_before"] = points["strain"]
+
+    def _fail(self, what: str, index: int) -> None:
+        point = self.points[index]
+        raise SolverError(
+            f"cutting simulation: {what} at {self.time * 1e6:.2f} us, "
+            f"x {point['x'] * 1e6:.1f} um, y {point['y'] * 1e6:.1f} um, "
+            f"temperature {point['temperature']:.0f} K; try a smaller courant number"
+        )
+
+
+def _grid(numerics: Numerics) -> Grid:
+    margin = _MARGIN * numerics.cell
+    width = numerics.upstream + numerics.downstream + 2 * margin
+    height = numerics.depth + numerics.height + 2 * margin
+    return Grid(
+        left=-numerics.upstream - margin,
+        bottom=-numerics.depth - margin,
+        cell=numerics.cell,
+        columns=round(width / numerics.cell) + 1,
+        rows=round(height / numerics.cell) + 1,
+    )
+
+
+def _time_steps(simulation: CuttingSimulation, interval: float) -> tuple[int, int, float]:
+    """Cycles in an interval, steps in a cycle, and the time step in s.
+
+    Within a cycle no point may drift far from the cell it was sorted into and explicit conduction
+    must be stable; within a step sound may not cross a cell.
+    """
+    material, numerics = simulation.workpiece, simulation.numerics
+    modulus = material.bulk_modulus + 4 / 3 * material.shear_modulus
+    sound = np.sqrt(modulus / (material.density * numerics.mass_scaling))
+    drift = _LARGEST_DRIFT * numerics.cell / simulation.conditions.speed
+    tool = simulation.tool_material
+    diffusivity = max(
+        tool.conductivity / (tool.density * tool.heat_capacity),
+        max(material.conductivity.values) / (material.density * min(material.heat_capacity.values)),
+    )
+    heat = _HEAT_STABILITY * numerics.cell**2 / diffusivity
+    cycles = ceil(interval / min(drift, heat))
+    steps = ceil(interval / cycles / (numerics.courant * numerics.cell / sound))
+    return cycles, steps, interval / cycles / steps
+
+
+def _tool_heat(simulation: CuttingSimulation, spacing: float) -> ToolHeat:
+    tool, material = simulation.tool_material, simulation.workpiece
+    temperature = simulation.conditions.initial_temperature
+    chip = np.sqrt(
+        material.conductivity.at(temperature)
+        * material.density
+        * material.heat_capacity.at(temperature)
+    )
+    return ToolHeat(
+        capacity=tool.density * tool.heat_capacity,
+        conductivity=tool.conductivity,
+        friction_share=float(tool.effusivity / (tool.effusivity + chip)),
+        conductance=simulation.friction.conductance,
+        area=spacing,
+    )
+
+
+def _touching(tool: tuple[float, ...], heights: NDArray[np.float64]) -> float:
+    """Place of a vertical face that touches the tool from the left."""
+    low, high = -1e-2, 0.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        clear = all(wedge_distance(middle, y, tool)[0] > 0 for y in heights)
+        low, high = (middle, high) if clear else (low, middle)
+    return low

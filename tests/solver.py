@@ -1,0 +1,92 @@
+"""The cutting solver's kernels on blocks of material, without a cut: for the tests."""
+
+from dataclasses import replace
+
+import numpy as np
+from numba import get_num_threads
+
+from chipglow.cutting.flow_stress import Flow
+from chipglow.cutting.material import AISI_1045
+from chipglow.cutting.momentum import Step, advance
+from chipglow.cutting.points import POINT, Grid, block_of_points, sort_by_cell
+from chipglow.scene import ToolGeometry
+
+FAR = 1.0
+ELASTIC = replace(AISI_1045, flow_stress=replace(AISI_1045.flow_stress, yield_stress=1e15))
+
+
+class Block:
+    """A rectangle of material on a grid; the tool, the floor and the inflow are far away."""
+
+    def __init__(self, size, cell=10e-6, material=ELASTIC, courant=0.35, tool=None, **changes):
+        self.cell, self.spacing = cell, cell / 2
+        columns, rows = (round(length / self.spacing) for length in size)
+        margin = 12
+        self.grid = Grid(
+            -margin * cell, -margin * cell, cell, columns // 2 + 2 * margin, rows // 2 + 2 * margin
+        )
+        centres = [self.spacing * (np.arange(count) + 0.5) for count in (columns, rows)]
+        self.points = block_of_points(*centres, self.spacing, 293.0, 0.0)
+        self.count = self.points.size
+        self.sound = np.sqrt(
+            (material.bulk_modulus + 4 / 3 * material.shear_modulus) / material.density
+        )
+        mass = material.density * self.spacing**2
+        self.step = Step(
+            mass=mass,
+            heat_mass=mass,
+            volume=self.spacing**2,
+            time_step=courant * cell / self.sound,
+            shear_modulus=material.shear_modulus,
+            bulk_modulus=material.bulk_modulus,
+            heat_share=material.taylor_quinney,
+            stiffness=50e9,
+            damping=0.0,
+            reach=self.spacing / 2,
+            area=self.spacing,
+            friction=0.0,
+            shear_fraction=1.0,
+            floor=-FAR,
+            inflow=-FAR,
+            ceiling=-FAR,
+            speed=0.0,
+        )._replace(**changes)
+        self.flow = Flow.of(material)
+        self.capacity = material.heat_capacity.sampled()
+        self.conductivity = material.conductivity.sampled()
+        self.tool = tool or (FAR, FAR, *ToolGeometry().coefficients[2:])
+        shape = (self.grid.columns, self.grid.rows)
+        self.velocity = np.zeros((*shape, 2))
+        self.nodes = np.zeros((*shape, 4))
+        self.heat = np.zeros(shape)
+        self.force = np.zeros(2)
+        self.starts = np.zeros(shape[0] * shape[1] + 1, np.int64)
+
+    def set_velocity(self, vx, vy):
+        """Velocity of grid and points as functions of x and y, linear in them."""
+        x = self.grid.left + self.cell * np.arange(self.grid.columns)[:, None]
+        y = self.grid.bottom + self.cell * np.arange(self.grid.rows)[None, :]
+        self.velocity[..., 0], self.velocity[..., 1] = vx(x, y), vy(x, y)
+
+    def advance(self, steps, cycle=20):
+        """Advance, sorting the points every few steps."""
+        while steps > 0:
+            spare = np.zeros_like(self.points, POINT)
+            count = sort_by_cell(self.points, self.count, self.grid, FAR, FAR, spare, self.starts)
+            assert count == self.count
+            self.points = spare
+            self.force[:] = 0.0
+            now = min(steps, cycle)
+            assert advance(
+                now, self.points, self.starts, self.velocity, self.nodes, self.heat, self.tool,
+                self.grid, self.step, self.flow, self.capacity, self.force, get_num_threads(),
+            )  # fmt: skip
+            self.force /= now
+            steps -= now
+
+    def momentum(self):
+        """Momentum of the points, x and y, and their angular momentum (with the affine part)."""
+        p, mass = self.points, self.step.mass
+        orbit = p["x"] * p["vy"] - p["y"] * p["vx"]
+        spin = self.cell**2 / 4 * (p["cyx"] - p["cxy"])
+        return mass * p["vx"].sum(), mass * p["vy"].sum(), mass * (orbit + spin).sum()

@@ -1,0 +1,139 @@
+"""Heat of the cutting simulation: conduction, the contact, and their balance."""
+
+from math import sqrt
+
+import numpy as np
+import pytest
+from scipy.special import erfc
+from solver import Block
+
+from chipglow.cutting.heat import (
+    SMALLEST_FRACTION,
+    ToolHeat,
+    conduct,
+    conduct_tool,
+    heat_contact,
+    return_heat,
+    tool_fraction,
+)
+from chipglow.cutting.material import AISI_1045, CARBIDE
+from chipglow.cutting.points import Grid
+from chipglow.scene import ToolGeometry
+
+
+def conduct_block(block, duration, steps, conductivity, capacity):
+    shape = (block.grid.columns, block.grid.rows)
+    nodes, increment = np.zeros((*shape, 3)), np.zeros(shape)
+    for _ in range(steps):
+        conduct(
+            block.points, block.count, nodes, increment, conductivity, capacity,
+            block.step.heat_mass, block.grid, duration / steps,
+        )  # fmt: skip
+        return_heat(block.points, block.count, increment, block.grid)
+
+
+def constant_properties():
+    size = AISI_1045.conductivity.sampled().size
+    return np.full(size, 45.0), np.full(size, 520.0)
+
+
+def error_against_erf(cell):
+    """Mean error of two half-spaces at 293 K and 893 K after 60 us, in K."""
+    block = Block((600e-6, 3 * cell), cell=cell)
+    x = block.points["x"] - 300e-6
+    diffusivity, start = 45.0 / (AISI_1045.density * 520.0), 40e-6
+    block.points["temperature"] = 293.0 + 300.0 * erfc(-x / sqrt(4 * diffusivity * start))
+    duration = 60e-6
+    steps = round(duration / (0.1 * cell**2 / diffusivity))
+    conduct_block(block, duration, steps, *constant_properties())
+    exact = 293.0 + 300.0 * erfc(-x / sqrt(4 * diffusivity * (start + duration)))
+    return float(np.abs(block.points["temperature"] - exact).mean())
+
+
+def test_conduction_follows_erfc_and_converges_with_second_order():
+    coarse, fine = error_against_erf(10e-6), error_against_erf(5e-6)
+    # 600 K over 90 um: the error of a 10 um cell is of the order of (10/90)² of a few kelvin.
+    assert coarse < 1.0
+    assert np.log2(coarse / fine) > 1.8
+
+
+def test_conduction_keeps_heat_whatever_the_shape():
+    generator = np.random.default_rng(1)
+    block = Block((100e-6, 80e-6))
+    keep = generator.random(block.count) < 0.6
+    block.points, block.count = block.points[keep], int(keep.sum())
+    block.points["temperature"] = generator.uniform(293.0, 1200.0, block.count)
+    conductivity, capacity = constant_properties()
+    before, spread = block.points["temperature"].sum(), block.points["temperature"].std()
+    conduct_block(block, 1e-4, 200, conductivity, capacity)
+    assert block.points["temperature"].sum() == pytest.approx(before, rel=1e-12)
+    assert block.points["temperature"].std() < 0.9 * spread
+
+
+def test_tool_conducts_as_a_half_space_and_keeps_its_heat():
+    grid = Grid(-50e-6, -50e-6, 5e-6, 150, 120)
+    tool = (-20e-6, -1.0, 20e-6, -1.0, 0.0, 0.0, 1.0, 0.0, -1.0, 1.0, 0.0)
+    fraction = tool_fraction(grid, tool)
+    # The face x = -40 um lies in the middle between two nodes.
+    x = grid.left + grid.cell * np.arange(grid.columns) + 40e-6
+    heat = ToolHeat(CARBIDE.density * CARBIDE.heat_capacity, CARBIDE.conductivity, 0.5, 0.0, 1.0)
+    diffusivity, start, duration = heat.conductivity / heat.capacity, 40e-6, 40e-6
+    temperature = np.repeat(
+        (293.0 + 300.0 * np.exp(-(x**2) / (4 * diffusivity * start)))[:, None], grid.rows, axis=1
+    )
+    store = heat.capacity * np.where(fraction > 0, np.maximum(fraction, SMALLEST_FRACTION), 0)
+    before = (store * temperature).sum()
+    steps = round(duration / (0.1 * grid.cell**2 / diffusivity))
+    for _ in range(steps):
+        conduct_tool(temperature, fraction, heat, grid, duration / steps)
+    assert (store * temperature).sum() == pytest.approx(before, rel=1e-12)
+    exact = 293.0 + 300.0 * sqrt(start / (start + duration)) * np.exp(
+        -(x**2) / (4 * diffusivity * (start + duration))
+    )
+    inside = (x > 0) & (x < 500e-6)
+    # The face lies on a node here: its half cell stores and conducts half, which is second order.
+    assert np.abs(temperature[inside, 60] - exact[inside]).max() < 2.0
+
+
+def test_contact_shares_friction_heat_and_loses_none():
+    geometry = ToolGeometry()
+    block = Block((60e-6, 60e-6))
+    block.points["x"] -= 62e-6
+    block.points["y"] += 30e-6
+    block.points["temperature"] = 900.0
+    distance = geometry.signed_distance(block.points["x"], block.points["y"])
+    touching = distance < 4e-6
+    assert touching.sum() > 3
+    block.points["contact_time"][touching] = 1e-7
+    capacity = np.full(AISI_1045.heat_capacity.sampled().size, 520.0)
+    conductivity = AISI_1045.conductivity.sampled()
+    shape = (block.grid.columns, block.grid.rows)
+    fraction = tool_fraction(block.grid, geometry.coefficients)
+    temperature = np.full(shape, 293.0)
+    heat = ToolHeat(CARBIDE.density * CARBIDE.heat_capacity, CARBIDE.conductivity, 0.4, 1e7, 5e-6)
+    nodes, increment, friction = np.zeros((*shape, 3)), np.zeros(shape), np.zeros(shape)
+    conduct(
+        block.points, block.count, nodes, increment, conductivity, capacity,
+        block.step.heat_mass, block.grid, 0.0,
+    )  # fmt: skip
+    near = (nodes[..., 0] > 0.3 * nodes[..., 0].max()) & (fraction > 0.2)
+    friction[near] = 1e-3
+    work = friction.sum()
+    store = heat.capacity * block.grid.cell**2 * np.maximum(fraction, SMALLEST_FRACTION)
+
+    def heat_of_all():
+        chip = block.step.heat_mass * 520.0 * block.points["temperature"].sum()
+        return chip + (store * (temperature - 293.0)).sum()
+
+    before = heat_of_all()
+    heat_contact(
+        block.points, block.count, friction, increment, nodes, temperature, fraction,
+        geometry.coefficients, heat, capacity, block.step.heat_mass, block.grid,
+    )  # fmt: skip
+    return_heat(block.points, block.count, increment, block.grid)
+    assert work > 0
+    assert heat_of_all() - before == pytest.approx(work, rel=1e-9)
+    assert not friction.any()
+    assert not block.points["contact_time"].any()
+    # The chip was hotter: beside its share of the friction heat the tool took some through contact.
+    assert (store * (temperature - 293.0)).sum() > 0.4 * work
