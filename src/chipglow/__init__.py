@@ -1,6 +1,70 @@
 """chipglow: a virtual infrared camera for metal cutting."""
 
-from chipglow.radiometry import Band
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
 
-__all__ = ["Band"]
+if TYPE_CHECKING:
+    from chipglow.analysis import StudyResult, analyse, error_images
+    from chipglow.camera import AnnularAperturePSF, Camera, GaussianPSF, MeasuredPSF, Measurement
+    from chipglow.cutting import CuttingSimulation
+    from chipglow.io import open_scene, read_measurement, write_measurement, write_scene
+    from chipglow.radiometry import Band
+    from chipglow.report import write_report
+    from chipglow.scene import Raster, Scene, ToolGeometry
+    from chipglow.study import Study, cut, load_study, run
+    from chipglow.surface import CHIP_1, CHIP_2, Emissivity, FeatureSurface, UniformSurface
+
+__all__ = [
+    "CHIP_1",
+    "CHIP_2",
+    "AnnularAperturePSF",
+    "Band",
+    "Camera",
+    "CuttingSimulation",
+    "Emissivity",
+    "FeatureSurface",
+    "GaussianPSF",
+    "MeasuredPSF",
+    "Measurement",
+    "Raster",
+    "Scene",
+    "Study",
+    "StudyResult",
+    "ToolGeometry",
+    "UniformSurface",
+    "analyse",
+    "cut",
+    "error_images",
+    "load_study",
+    "open_scene",
+    "read_measurement",
+    "run",
+    "write_measurement",
+    "write_report",
+    "write_scene",
+]
 __version__ = "0.1.0"
+
+_ROOMS: Final = {
+    "analysis": ("StudyResult", "analyse", "error_images"),
+    "camera": ("AnnularAperturePSF", "Camera", "GaussianPSF", "MeasuredPSF", "Measurement"),
+    "cutting": ("CuttingSimulation",),
+    "io": ("open_scene", "read_measurement", "write_measurement", "write_scene"),
+    "radiometry": ("Band",),
+    "report": ("write_report",),
+    "scene": ("Raster", "Scene", "ToolGeometry"),
+    "study": ("Study", "cut", "load_study", "run"),
+    "surface": ("CHIP_1", "CHIP_2", "Emissivity", "FeatureSurface", "UniformSurface"),
+}
+_ROOM_OF: Final = {name: room for room, names in _ROOMS.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a room when one of its names is first used: the command line starts at once."""
+    if name in _ROOM_OF:
+        return getattr(import_module(f"chipglow.{_ROOM_OF[name]}"), name)
+    raise AttributeError(f"module 'chipglow' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -111,7 +111,7 @@ class Numerics:
 
     cell: float = 10e-6
     mass_scaling: float = 100.0
-    courant: float = 0.35
+    courant: float = 0.5
     points_per_side: int = 2
     upstream: float = 0.75e-3
     downstream: float = 0.55e-3

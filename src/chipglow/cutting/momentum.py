@@ -114,8 +114,9 @@ def update_stress(p, step, flow, capacity):  # type: ignore[no-untyped-def]
     dyy = p.dyy - spin * p.dxy + two_g * (p.cyy - third)
     trial = np.sqrt(3.0 * (dxx * dxx + dyy * dyy + dxx * dyy + shear * shear))
     increment = plastic_increment(
-        trial, p.strain, p.temperature, p.damage, step.shear_modulus, dt, flow
+        trial, p.strain, p.temperature, p.damage, p.increment, step.shear_modulus, dt, flow
     )
+    p.increment = increment
     stress = trial
     if increment > 0.0:
         stress = trial - 3.0 * step.shear_modulus * increment
@@ -125,7 +126,7 @@ def update_stress(p, step, flow, capacity):  # type: ignore[no-untyped-def]
         shear *= scale
         p.strain += increment
         if flow.loss > 0.0:
-            mean_stress = step.bulk_modulus * np.log(p.volume / step.volume)
+            mean_stress = step.bulk_modulus * (p.volume / step.volume - 1.0)
             p.damage += increment / strain_to_failure(
                 mean_stress / stress, increment / dt, p.temperature, flow
             )
@@ -147,7 +148,7 @@ def _scatter(p, fx, fy, limit, nodes, grid, step):  # type: ignore[no-untyped-de
     mass = step.mass
     force = 4.0 * inverse * step.time_step * p.volume
     spread = mass * grid.cell
-    tension = step.bulk_modulus * np.log(p.volume / step.volume)
+    tension = step.bulk_modulus * (p.volume / step.volume - 1.0)
     qxx = spread * p.cxx - force * (p.dxx + tension)
     qyy = spread * p.cyy - force * (p.dyy + tension)
     qxy, qyx = spread * p.cxy - force * p.dxy, spread * p.cyx - force * p.dxy

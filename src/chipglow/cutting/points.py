@@ -13,14 +13,14 @@ POINT: Final = np.dtype(
             "x", "y", "vx", "vy",
             "cxx", "cxy", "cyx", "cyy",
             "dxx", "dyy", "dxy",
-            "strain", "strain_before", "damage", "temperature", "volume",
+            "strain", "increment", "strain_before", "damage", "temperature", "volume",
             "material_x", "material_y", "contact_time",
         )
     ]
 )  # fmt: skip
-"""Position, velocity, velocity gradient, deviator of the Cauchy stress, plastic strain now and at
-the last record, damage, temperature, volume per width, position before the cut, time in contact
-since the last exchange of heat; SI units."""
+"""Position, velocity, velocity gradient, deviator of the Cauchy stress; plastic strain, its increment
+in the last step and its value at the last record; damage, temperature, volume per width, position
+before the cut, time in contact since the last exchange of heat; SI units."""
 
 Points: TypeAlias = NDArray[np.void]
 

@@ -152,7 +152,7 @@ class NumericsSection(Part):
     mass_scaling: float = _field(
         100.0, "Factor on the density in the equation of motion, for longer time steps."
     )
-    courant: float = _field(0.35, "Time step as a share of the time that sound takes for a cell.")
+    courant: float = _field(0.5, "Time step as a share of the time that sound takes for a cell.")
     points_per_side: int = _field(2, "Material points along the side of a cell.")
 
     def build(self) -> Numerics:
@@ -180,7 +180,7 @@ class WindowSection(Part):
 class FieldOfViewSection(Part):
     """Where the scene is sampled. The tip of the tool is near the origin, y points up."""
 
-    left: Position = _field("-420 um", "Left edge of the scene.")
+    left: Position = _field("-560 um", "Left edge of the scene.")
     top: Position = _field("460 um", "Upper edge of the scene.")
     spacing: Length = _field("0.66667 um", "Side of a sample; the paper has 9 to a sensor.")
     rows: int = _field(810, "Samples from top to bottom.")
@@ -493,8 +493,9 @@ class Study(Section):
             {
                 "title": "Quick look at the study of Heigel and Whitenton (2010)",
                 "cutting": {
-                    "numerics": {"cell": "20 um"},
-                    "window": {"interval": "0.5 us"},
+                    "length_of_cut": "1.4 mm",
+                    "numerics": {"cell": "15 um"},
+                    "window": {"start": "1.021 mm", "end": "1.4 mm", "interval": "0.5 us"},
                     "field_of_view": {"spacing": "1.33333 um", "rows": 405, "columns": 450},
                 },
                 "analysis": {"instants": 5, "psf_widths": ["4 um", "8 um", "12 um", "20 um"]},
