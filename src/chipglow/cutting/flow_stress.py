@@ -116,8 +116,8 @@ def plastic_increment(  # type: ignore[no-untyped-def]
     if strain > _SMALL_STRAIN:
         slope = weak * flow.hardening * flow.hardening_exponent * power / strain
     bound = (trial - hard) / (stiffness + slope)
-    increment = min(guess, bound) if guess > 0.0 else bound
     slowest = time_step * flow.reference_rate
+    increment = min(guess, bound) if guess > 2.0 * slowest else bound
     for _ in range(_ITERATIONS):
         if increment <= slowest:
             return min(slowest, bound)

@@ -216,9 +216,9 @@ AISI_1045: Final = WorkpieceMaterial(
     young_modulus=205e9,
     poisson_ratio=0.29,
     flow_stress=JohnsonCook(553.1e6, 600.8e6, 0.234, 0.0134, 1.0, 1733.0),
-    # Published constants are 0.06, 3.31, -1.96, 0.0018 and 0.58, for rupture in a tensile test. With
-    # a strain to failure of three tenths of that, and 30 % of the strength left in the end, the chip
-    # is segmented; how far the strength of sheared steel falls is not known better yet.
+    # Published constants are 0.06, 3.31, -1.96, 0.0018 and 0.58, for rupture in a tensile test.
+    # With three tenths of that strain to failure, and 30 % of the strength left in the end, the
+    # chip is segmented; how far the strength of sheared steel really falls is not settled.
     softening=DamageSoftening(0.018, 0.993, -1.96, 0.0018, 0.58, onset=0.15, loss=0.7),
     # Oxley: k = 52.61 − 0.0281 T and c = 420 + 0.504 T, T in °C; held beyond 900 °C.
     conductivity=TemperatureTable((273.15, 1173.15), (52.61, 27.32)),

@@ -18,9 +18,9 @@ POINT: Final = np.dtype(
         )
     ]
 )  # fmt: skip
-"""Position, velocity, velocity gradient, deviator of the Cauchy stress; plastic strain, its increment
-in the last step and its value at the last record; damage, temperature, volume per width, position
-before the cut, time in contact since the last exchange of heat; SI units."""
+"""Position, velocity, velocity gradient, deviator of the Cauchy stress; plastic strain, what the
+last step added to it and what it was at the last record; damage, temperature, volume per width,
+position before the cut, time in contact since the last exchange of heat; SI units."""
 
 Points: TypeAlias = NDArray[np.void]
 
