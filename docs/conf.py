@@ -1,0 +1,44 @@
+"""How the documentation is built: ``sphinx-build -W -b html docs FOLDER``."""
+
+from importlib.metadata import version as installed_version
+from pathlib import Path
+
+from chipglow.study import Study, study_text
+
+HERE = Path(__file__).parent
+GENERATED = HERE / "generated"
+
+project = "chipglow"
+author = "The chipglow developers"
+copyright = "The chipglow developers, Apache-2.0"
+release = version = installed_version("chipglow")
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+]
+templates_path = ["_templates"]
+exclude_patterns = ["generated/*.yaml"]
+default_role = "py:obj"
+
+myst_enable_extensions = ["amsmath", "dollarmath"]
+myst_heading_anchors = 3
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+autosummary_generate = True
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+
+html_theme = "pydata_sphinx_theme"
+html_title = "chipglow"
+html_theme_options = {"show_toc_level": 2, "navigation_with_keys": False}
+html_sidebars = {"index": [], "tutorial": [], "physics": [], "cutting": [], "files": []}
+
+# The page on files shows the paper's study as the program itself writes it.
+GENERATED.mkdir(exist_ok=True)
+(GENERATED / "study.yaml").write_text(study_text(Study()), encoding="utf-8")
