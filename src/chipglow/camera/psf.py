@@ -96,7 +96,7 @@ class AnnularAperturePSF(PointSpreadFunction):
     Parameters
     ----------
     wavelength : float
-        Wavelength in m; by default the middle of the paper's band.
+        Wavelength in m; by default about the middle of the paper's band.
     numerical_aperture : float
         Sine of the half angle of the light that the objective takes in.
     obscuration : float

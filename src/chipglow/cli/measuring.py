@@ -38,7 +38,7 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
         raise ValueError(f"--chip: {name!r} is unknown, expected one of {', '.join(surfaces)}")
     scene, camera = open_scene(path), study.camera.build()
     first = float(scene.times[0]) if start is None else _start(start)
-    left = float(scene.times[-1]) - first - camera.integration_time
+    left = float(scene.times[-1]) + scene.frame_spacing - first - camera.integration_time
     count = max(floor(left * camera.frame_rate) + 1, 1)
     with progress_bars() as progress:
         progress("measurement", 0.0)

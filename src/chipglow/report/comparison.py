@@ -59,8 +59,9 @@ class Row:
 
     @property
     def difference_text(self) -> str:
-        """The difference with its sign and unit, or a dash."""
-        return self._text(self.difference, sign="+")
+        """The difference with its sign and unit, or a dash; of shares in percentage points."""
+        text = self._text(self.difference, sign="+")
+        return text.replace("%", "points")
 
     def _text(self, value: float | None, sign: str = "") -> str:
         if value is None:

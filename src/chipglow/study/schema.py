@@ -496,7 +496,7 @@ class Study(Section):
                     "length_of_cut": "1.4 mm",
                     "numerics": {"cell": "15 um"},
                     "window": {"start": "1.021 mm", "end": "1.4 mm", "interval": "0.5 us"},
-                    "field_of_view": {"spacing": "1.33333 um", "rows": 405, "columns": 450},
+                    "field_of_view": {"spacing": "1.33334 um", "rows": 405, "columns": 450},
                 },
                 "analysis": {"instants": 5, "psf_widths": ["4 um", "8 um", "12 um", "20 um"]},
             }
