@@ -60,34 +60,6 @@ class Exposure:
                 )
 
 
-class _Sums:
-    """The fields that one pass over the sub-frames fills."""
-
-    def __init__(self, shape: tuple[int, int]) -> None:
-        self.radiance = np.zeros(shape)
-        self.peak_radiance = np.zeros(shape, dtype=np.float32)
-        self.peak_temperature = np.zeros(shape, dtype=np.float32)
-
-    def add(
-        self,
-        temperature: NDArray[np.float32],
-        emissivity: NDArray[np.float32],
-        weight: float,
-        band: Band,
-        environment: float,
-    ) -> None:
-        _accumulate(
-            np.ascontiguousarray(temperature),
-            np.ascontiguousarray(emissivity),
-            weight,
-            _fine_table(band),
-            environment,
-            self.radiance,
-            self.peak_radiance,
-            self.peak_temperature,
-        )
-
-
 def expose(
     scene: Scene,
     emissivity: EmissivityField,
@@ -130,28 +102,33 @@ def expose(
     indices, weights = frame_weights(scene.times, scene.frame_spacing, start, duration)
     middle = _frame_at(scene, start + duration / 2, indices)
     environment = 0.0 if reflected is None else float(band.radiance(reflected))
-    sums, centre = _Sums(scene.raster.shape), _Sums(scene.raster.shape)
+    table, shape = _fine_table(band), scene.raster.shape
+    mean, centre = np.zeros(shape), np.zeros(shape)
+    peaks = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
     for index, weight in zip(indices, weights, strict=True):
         frame = scene.frame(index)
-        surface = emissivity.emissivity(frame)
-        sums.add(frame.temperature, surface, weight, band, environment)
+        temperature = np.ascontiguousarray(frame.temperature)
+        surface = np.ascontiguousarray(emissivity.emissivity(frame))
+        _accumulate(temperature, surface, weight, table, environment, mean, *peaks)
         if index == middle:
-            centre.add(frame.temperature, surface, 1.0, band, environment)
-    if not np.isfinite(sums.radiance).all():
+            # Its peaks are in already: to take them again changes nothing.
+            _accumulate(temperature, surface, 1.0, table, environment, centre, *peaks)
+    if not np.isfinite(mean).all():
         raise ValueError(
             f"exposure: from {start:g} s, temperature must be {TABLE_COLDEST:g} to "
             f"{TABLE_HOTTEST:g} K and emissivity 0 to 1, but they are not at "
-            f"{np.count_nonzero(~np.isfinite(sums.radiance))} samples"
+            f"{np.count_nonzero(~np.isfinite(mean))} samples"
         )
-    sums.peak_temperature[sums.peak_temperature == 0.0] = np.nan
+    peak_radiance, peak_temperature = peaks
+    peak_temperature[peak_temperature == 0.0] = np.nan
     return Exposure(
         start=start,
         duration=duration,
         raster=scene.raster,
-        mean_radiance=sums.radiance,
-        peak_radiance=sums.peak_radiance,
-        peak_temperature=sums.peak_temperature,
-        centre_radiance=centre.radiance,
+        mean_radiance=mean,
+        peak_radiance=peak_radiance,
+        peak_temperature=peak_temperature,
+        centre_radiance=centre,
     )
 
 
