@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numba import get_num_threads
 
+from chipglow.cutting.energy import held_energy
 from chipglow.cutting.flow_stress import Flow
 from chipglow.cutting.material import AISI_1045
 from chipglow.cutting.momentum import Step, advance
@@ -59,7 +60,8 @@ class Block:
         self.velocity = np.zeros((*shape, 2))
         self.nodes = np.zeros((*shape, 4))
         self.heat = np.zeros(shape)
-        self.force = np.zeros(2)
+        self.sums = np.zeros(6)
+        self.force = self.sums[:2]
         self.starts = np.zeros(shape[0] * shape[1] + 1, np.int64)
 
     def set_velocity(self, vx, vy):
@@ -75,14 +77,22 @@ class Block:
             count = sort_by_cell(self.points, self.count, self.grid, FAR, FAR, spare, self.starts)
             assert count == self.count
             self.points = spare
-            self.force[:] = 0.0
+            self.sums[:] = 0.0
             now = min(steps, cycle)
             assert advance(
                 now, self.points, self.starts, self.velocity, self.nodes, self.heat, self.tool,
-                self.grid, self.step, self.flow, self.capacity, self.force, get_num_threads(),
+                self.grid, self.step, self.flow, self.capacity, self.sums, get_num_threads(),
             )  # fmt: skip
             self.force /= now
             steps -= now
+
+    def energy(self):
+        """Kinetic and elastic energy in J/m."""
+        step = self.step
+        return held_energy(
+            self.points, self.count, step.mass, step.volume, step.shear_modulus,
+            step.bulk_modulus, self.cell,
+        )  # fmt: skip
 
     def momentum(self):
         """Momentum of the points, x and y, and their angular momentum (with the affine part)."""

@@ -11,7 +11,7 @@ from analytic_chip import AnalyticChip
 from typer.testing import CliRunner
 
 from chipglow.cli import app
-from chipglow.cutting import CuttingSimulation, ForceHistory, SolverError
+from chipglow.cutting import CuttingSimulation, SolverError
 from chipglow.io import open_scene, read_measurement, write_scene
 from chipglow.study import Study, cut, load_study
 
@@ -55,7 +55,7 @@ def runs(monkeypatch, chip_scene):
             on_frame(frame)
         if on_progress:
             on_progress(1.0)
-        return ForceHistory(*AnalyticChip().forces())
+        return AnalyticChip().cut_history()
 
     monkeypatch.setattr(CuttingSimulation, "run", cut_chip)
     return calls

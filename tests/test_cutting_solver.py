@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from solver import ELASTIC, Block
 
+from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow
 from chipglow.cutting.flow_stress import Flow, flow_stress, plastic_increment, strain_to_failure
 from chipglow.cutting.material import AISI_1045
-from chipglow.scene import ToolGeometry
+from chipglow.scene import Raster, ToolGeometry
 
 
 def test_free_rotation_keeps_momentum_and_angular_momentum():
@@ -137,6 +138,43 @@ def test_friction_of_a_block_on_the_rake_face(coefficient):
     work = coefficient * normal * 10 * block.step.time_step * 4.0
     # The light nodes at the face slow down first: the slip is up to a tenth under 4 m/s.
     assert 0.9 * work <= block.heat.sum() <= work
+
+
+def test_energy_of_a_vibrating_block_is_kept_but_for_what_the_transfer_dissipates():
+    block = Block((200e-6, 100e-6), courant=0.2)
+    block.set_velocity(lambda x, y: 2.0 * np.cos(pi * x / 200e-6) + 0 * y, lambda x, y: 0 * x * y)
+    block.advance(1)
+    start = block.energy()
+    assert start[0] > 100 * start[1]
+    turned = []
+    for _ in range(40):
+        block.advance(4, cycle=4)
+        turned.append(block.energy())
+    kinetic, elastic = np.array(turned).T
+    # Kinetic energy becomes elastic energy and comes back; the grid takes some per cent a period,
+    # and positions and velocities half a step apart make the sum swing by about a per cent.
+    assert elastic.max() > 0.6 * start[0]
+    total = (kinetic + elastic) / sum(start)
+    assert total.max() < 1.02
+    assert total.min() > 0.9
+
+
+def test_energy_account_of_a_short_cut_closes():
+    simulation = CuttingSimulation(
+        CuttingConditions(length_of_cut=0.1e-3), numerics=Numerics(cell=30e-6)
+    )
+    raster = Raster(-100e-6, 100e-6, 10e-6, 20, 20)
+    window = OutputWindow(start=0.09e-3, end=0.1e-3, interval=1e-6)
+    history = simulation.run(window, raster, lambda frame: None)
+    energy = history.energy
+    # The force through the tool and the work of the drive are counted apart; inertia is 1 %.
+    work = np.cumsum(history.cutting) * 1e-6 * simulation.conditions.speed
+    assert energy.drive_work[-1] == pytest.approx(work[-1], rel=0.03)
+    # What is left over is the dissipation of the transfer, which only takes.
+    assert 0 < energy.closing_error[-1] < 0.05
+    assert energy.plastic_work[-1] > 0.8 * energy.drive_work[-1]
+    assert (np.diff(energy.plastic_work) >= 0).all()
+    assert (np.diff(energy.friction_work) >= 0).all()
 
 
 def test_result_does_not_depend_on_the_number_of_threads():

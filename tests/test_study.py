@@ -17,7 +17,6 @@ from chipglow.camera import Camera, GaussianPSF, MeasuredPSF
 from chipglow.cutting import (
     CuttingConditions,
     CuttingSimulation,
-    ForceHistory,
     Friction,
     Numerics,
     OutputWindow,
@@ -414,7 +413,7 @@ def runs(monkeypatch):
             on_frame(frame)
         if on_progress:
             on_progress(1.0)
-        return ForceHistory(*chip.forces())
+        return chip.cut_history()
 
     monkeypatch.setattr(CuttingSimulation, "run", cut_chip)
     return calls

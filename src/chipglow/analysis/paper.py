@@ -18,7 +18,7 @@ from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear
 from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.camera.exposure import expose, frame_weights
 from chipglow.radiometry import Band
-from chipglow.scene import Frame, Material, Raster, Scene, ToolGeometry
+from chipglow.scene import ENERGY_UNITS, Frame, Material, Raster, Scene, ToolGeometry
 from chipglow.surface import EmissivityField, Surface
 
 Progress = Callable[[str, float], None]
@@ -164,12 +164,19 @@ class SurfaceResult:
 
 @dataclass(frozen=True)
 class ForceHistory:
-    """Forces per width of cut in N/m over time in s, each of shape (n,), and their segments."""
+    """Forces per width of cut in N/m over time in s, each of shape (n,), and their segments.
+
+    `unaccounted` is the share of the drive's work that the cutting simulation's energy account does
+    not find again in the end, `kinetic_share` that of the kinetic energy (of the scaled mass); NaN
+    where the scene has no account.
+    """
 
     time: NDArray[np.float64]
     cutting: NDArray[np.float64]
     thrust: NDArray[np.float64]
     segmentation: Segmentation
+    unaccounted: float
+    kinetic_share: float
 
 
 @dataclass(frozen=True)
@@ -502,4 +509,16 @@ def _forces(scene: Scene) -> ForceHistory | None:
         np.asarray(scene.data[name].values, dtype=np.float64)
         for name in ("force_time", "cutting_force", "thrust_force")
     )
-    return ForceHistory(time, cutting, thrust, segmentation(time, cutting, thrust))
+    segments = segmentation(time, cutting, thrust)
+    return ForceHistory(time, cutting, thrust, segments, *_energy_shares(scene))
+
+
+def _energy_shares(scene: Scene) -> tuple[float, float]:
+    """What the energy account does not find again, and the kinetic energy, over the work."""
+    if "drive_work" not in scene.data:
+        return nan, nan
+    last = {name: float(scene.data[name][-1]) for name in ENERGY_UNITS}
+    given = last["drive_work"] + last["contact_work"]
+    found = sum(last[name] for name in ENERGY_UNITS if name not in ("drive_work", "contact_work"))
+    work = last["drive_work"]
+    return (given - found) / work, abs(last["kinetic_energy"]) / work

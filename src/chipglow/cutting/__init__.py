@@ -1,6 +1,7 @@
 """The embedded cutting simulation."""
 
 from chipglow.cutting.conditions import CuttingConditions, Friction, Numerics, OutputWindow
+from chipglow.cutting.energy import EnergyHistory
 from chipglow.cutting.material import (
     AISI_1045,
     CARBIDE,
@@ -24,6 +25,7 @@ __all__ = [
     "CuttingConditions",
     "CuttingSimulation",
     "DamageSoftening",
+    "EnergyHistory",
     "ForceHistory",
     "Friction",
     "JohnsonCook",

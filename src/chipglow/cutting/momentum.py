@@ -21,6 +21,9 @@ sorting: blocks two apart must not share a node."""
 MASS, MOMENTUM_X, MOMENTUM_Y, FRICTION_LIMIT = 0, 1, 2, 3
 """What the points gather on a node: in kg/m, kg/s twice, and friction impulse in N s/m."""
 
+FORCE_X, FORCE_Y, BOUNDARY_WORK, CONTACT_WORK, PLASTIC_WORK, FRICTION_WORK = range(6)
+"""What a step adds up: forces on the chip (N/m), and work per width of cut (J/m)."""
+
 _RATE_OF_SLIDING = 1e4
 
 
@@ -103,7 +106,7 @@ def _gather(p, velocity, grid, time_step):  # type: ignore[no-untyped-def]
 def update_stress(p, step, flow, capacity):  # type: ignore[no-untyped-def]
     """Hypo-elastic deviator (Jaumann rate), radial return, plastic work to heat.
 
-    Returns the equivalent stress.
+    Returns the equivalent stress and the plastic work (J/m).
     """
     dt = step.time_step
     two_g = 2.0 * step.shear_modulus * dt
@@ -117,7 +120,7 @@ def update_stress(p, step, flow, capacity):  # type: ignore[no-untyped-def]
         trial, p.strain, p.temperature, p.damage, p.increment, step.shear_modulus, dt, flow
     )
     p.increment = increment
-    stress = trial
+    stress, work = trial, 0.0
     if increment > 0.0:
         stress = trial - 3.0 * step.shear_modulus * increment
         scale = stress / trial
@@ -130,10 +133,11 @@ def update_stress(p, step, flow, capacity):  # type: ignore[no-untyped-def]
             p.damage += increment / strain_to_failure(
                 mean_stress / stress, increment / dt, p.temperature, flow
             )
-        heat = step.heat_share * stress * increment * p.volume
+        work = stress * increment * p.volume
+        heat = step.heat_share * work
         p.temperature += heat / (step.heat_mass * _at(capacity, p.temperature))
     p.dxx, p.dyy, p.dxy = dxx, dyy, shear
-    return stress
+    return stress, work
 
 
 @njit(error_model="numpy", fastmath={"contract", "arcp", "nsz"})
@@ -186,7 +190,7 @@ def _contact(p, stress, tool, step, flow):  # type: ignore[no-untyped-def]
 
 
 @njit(error_model="numpy", fastmath={"contract", "arcp", "nsz"})
-def _work_block(points, starts, block, velocity, nodes, tool, grid, step, flow, capacity, force):  # type: ignore[no-untyped-def]
+def _work_block(points, starts, block, velocity, nodes, tool, grid, step, flow, capacity, sums):  # type: ignore[no-untyped-def]
     """One step of the points of a block; False if a point left the grid."""
     first = block * BLOCK_COLUMNS * grid.rows
     last = min(first + BLOCK_COLUMNS * grid.rows, starts.size - 1)
@@ -207,16 +211,18 @@ def _work_block(points, starts, block, velocity, nodes, tool, grid, step, flow, 
         for k in range(begin, end):
             p = points[k]
             p.volume = volume
-            stress = update_stress(p, step, flow, capacity)
+            stress, work = update_stress(p, step, flow, capacity)
             fx, fy, limit = _contact(p, stress, tool, step, flow)
-            force[block, 0] += fx
-            force[block, 1] += fy
+            sums[block, PLASTIC_WORK] += work
+            sums[block, FORCE_X] += fx
+            sums[block, FORCE_Y] += fy
+            sums[block, CONTACT_WORK] += step.time_step * (fx * p.vx + fy * p.vy)
             on_grid &= _scatter(p, fx, fy, limit, nodes, grid, step)
     return on_grid
 
 
 @njit(error_model="numpy", fastmath={"contract", "arcp", "nsz"})
-def _work_column(i, velocity, nodes, heat, tool, grid, step, force):  # type: ignore[no-untyped-def]
+def _work_column(i, velocity, nodes, heat, tool, grid, step, sums):  # type: ignore[no-untyped-def]
     """New velocities of a column of nodes: driven boundary and friction; sums are reset."""
     x = grid.left + i * grid.cell
     for j in range(grid.rows):
@@ -230,34 +236,37 @@ def _work_column(i, velocity, nodes, heat, tool, grid, step, force):  # type: ig
         limit = node[FRICTION_LIMIT]
         node[MASS] = node[MOMENTUM_X] = node[MOMENTUM_Y] = node[FRICTION_LIMIT] = 0.0
         if y < step.floor or (x < step.inflow and y < step.ceiling):
+            sums[i, BOUNDARY_WORK] += mass * (step.speed - vx) * step.speed
             vx, vy = step.speed, 0.0
         elif limit > 0.0:
             _, nx, ny = wedge_distance(x, y, tool)
             slip = vy * nx - vx * ny
             loss = min(limit / mass, abs(slip))
             change = -loss if slip > 0.0 else loss
-            heat[i, j] += mass * loss * abs(slip + 0.5 * change)
+            work = mass * loss * abs(slip + change)
+            heat[i, j] += work
             vx -= change * ny
             vy += change * nx
-            force[i, 0] -= mass * change * ny / step.time_step
-            force[i, 1] += mass * change * nx / step.time_step
+            sums[i, FRICTION_WORK] += work
+            sums[i, FORCE_X] -= mass * change * ny / step.time_step
+            sums[i, FORCE_Y] += mass * change * nx / step.time_step
         velocity[i, j, 0], velocity[i, j, 1] = vx, vy
 
 
 @njit(cache=True, parallel=True)
 def advance(  # type: ignore[no-untyped-def]
-    steps, points, starts, velocity, nodes, heat, tool, grid, step, flow, capacity, forces, threads
+    steps, points, starts, velocity, nodes, heat, tool, grid, step, flow, capacity, sums, threads
 ):
     """Advance all points by some steps, shared out among some threads.
 
     `velocity` (columns, rows, 2) is the grid's velocity after the last step and is kept for the
     next; `nodes` (columns, rows, 4) is zero before and after; `heat` (columns, rows) gathers
-    friction work (J/m); `forces` (2,) gathers the force on the chip summed over the steps (N/m).
-    Returns False if a point left the grid.
+    friction work (J/m); `sums` (6,) gathers over the steps what `FORCE_X` and so on name. Returns
+    False if a point left the grid.
     """
     blocks = (grid.columns + BLOCK_COLUMNS - 1) // BLOCK_COLUMNS
-    normal = np.zeros((blocks, 2))
-    tangential = np.zeros((grid.columns, 2))
+    of_blocks = np.zeros((blocks, sums.size))
+    of_columns = np.zeros((grid.columns, sums.size))
     good = np.ones(blocks, np.bool_)
     for _ in range(steps):
         for colour in range(2):
@@ -265,14 +274,14 @@ def advance(  # type: ignore[no-untyped-def]
                 for block in range(colour + 2 * thread, blocks, 2 * threads):
                     good[block] &= _work_block(
                         points, starts, block, velocity, nodes, tool, grid, step, flow, capacity,
-                        normal,
+                        of_blocks,
                     )  # fmt: skip
         for thread in prange(threads):
             for i in range(thread, grid.columns, threads):
-                _work_column(i, velocity, nodes, heat, tool, grid, step, tangential)
+                _work_column(i, velocity, nodes, heat, tool, grid, step, of_columns)
         if not good.all():
             return False
-    forces += normal.sum(axis=0) + tangential.sum(axis=0)
+    sums += of_blocks.sum(axis=0) + of_columns.sum(axis=0)
     return True
 
 

@@ -10,17 +10,27 @@ from numba import get_num_threads
 from numpy.typing import NDArray
 
 from chipglow.cutting.conditions import CuttingConditions, Friction, Numerics, OutputWindow
+from chipglow.cutting.energy import ENERGIES, EnergyHistory, held_energy
 from chipglow.cutting.flow_stress import Flow
 from chipglow.cutting.heat import ToolHeat, conduct, conduct_tool, heat_contact, return_heat
 from chipglow.cutting.heat import tool_fraction as fraction_of_tool
 from chipglow.cutting.material import AISI_1045, CARBIDE, ToolMaterial, WorkpieceMaterial
-from chipglow.cutting.momentum import Step, advance
+from chipglow.cutting.momentum import (
+    BOUNDARY_WORK,
+    CONTACT_WORK,
+    FORCE_X,
+    FORCE_Y,
+    FRICTION_WORK,
+    PLASTIC_WORK,
+    Step,
+    advance,
+)
 from chipglow.cutting.picture import Picture
 from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
 from chipglow.scene import Frame, Raster, ToolGeometry
 from chipglow.scene.tool import wedge_distance
 
-SOLVER_VERSION: Final = "1"
+SOLVER_VERSION: Final = "2"
 """Changes whenever the same input gives another result."""
 
 _MARGIN: Final = 4
@@ -44,11 +54,14 @@ class ForceHistory:
         Ends of the intervals over which the forces are averaged, in s, shape (n,).
     cutting, thrust : ndarray
         Against the motion of the workpiece, and away from the tool into it, in N/m, shape (n,).
+    energy : EnergyHistory
+        Where the work went, at the same times.
     """
 
     time: NDArray[np.float64]
     cutting: NDArray[np.float64]
     thrust: NDArray[np.float64]
+    energy: EnergyHistory
 
 
 @dataclass(frozen=True)
@@ -125,16 +138,17 @@ class CuttingSimulation:
             self.conditions.initial_temperature,
         )
         first, last = self.frame_range(window)
-        forces = np.empty((last, 2))
+        records = np.empty((last, 2 + ENERGIES))
         for record in range(1, last + 1):
-            forces[record - 1] = state.advance()
+            records[record - 1] = state.advance()
             if record >= first:
                 on_frame(state.frame(picture))
             state.mark()
             if on_progress is not None:
                 on_progress(record / last)
         time = window.interval * np.arange(1, last + 1, dtype=np.float64)
-        return ForceHistory(time, forces[:, 0].copy(), forces[:, 1].copy())
+        cutting, thrust, *energies = records.T.copy()
+        return ForceHistory(time, cutting, thrust, EnergyHistory(*energies))
 
     def frame_range(self, window: OutputWindow) -> tuple[int, int]:
         """Numbers of the first and the last interval whose ends are recorded as frames."""
@@ -222,7 +236,9 @@ class _State:
         self.top = numerics.height
         self._start_points(conditions, numerics)
         self.time = 0.0
-        self._cell = cell
+        self.work = np.zeros(FRICTION_WORK + 1)
+        self.carried = 0.0
+        self.held_at_start = self._held()
 
     def _start_points(self, conditions: CuttingConditions, numerics: Numerics) -> None:
         """Fill the region up to where the workpiece's face touches the rake face."""
@@ -264,12 +280,14 @@ class _State:
         self.points, self.spare = self.spare, self.points
         self.count = count
 
-    def advance(self) -> tuple[float, float]:
-        """Advance by one interval; mean cutting and thrust force in N/m."""
-        forces = np.zeros(2)
+    def advance(self) -> NDArray[np.float64]:
+        """Advance by one interval; mean forces in N/m, then the energies of `EnergyHistory`."""
+        sums = np.zeros_like(self.work)
         for _ in range(self.cycles):
+            before = self._held().sum()
             self._let_in(self.time)
             self._sort()
+            self.carried += self._held().sum() - before
             good = advance(
                 self.steps,
                 self.points,
@@ -282,7 +300,7 @@ class _State:
                 self.step,
                 self.flow,
                 self.capacity,
-                forces,
+                sums,
                 get_num_threads(),
             )
             self.time += self.cycle
@@ -290,8 +308,26 @@ class _State:
                 lost = ~np.isfinite(self.points["x"][: self.count])
                 self._fail("a point left the grid", int(np.argmax(lost)))
             self._conduct()
-        cutting, thrust = -forces / (self.cycles * self.steps)
-        return float(cutting), float(thrust)
+        self.work += sums
+        forces = -sums[[FORCE_X, FORCE_Y]] / (self.cycles * self.steps)
+        drive = self.work[BOUNDARY_WORK] + self.carried
+        held = self._held() - self.held_at_start
+        used = self.work[[PLASTIC_WORK, FRICTION_WORK]]
+        return np.concatenate([forces, [drive, self.work[CONTACT_WORK]], held, used])
+
+    def _held(self) -> NDArray[np.float64]:
+        """Kinetic and elastic energy of the points in J/m."""
+        step = self.step
+        held = held_energy(
+            self.points,
+            self.count,
+            step.mass,
+            step.volume,
+            step.shear_modulus,
+            step.bulk_modulus,
+            self.grid.cell,
+        )
+        return np.array(held)
 
     def _conduct(self) -> None:
         conduct(

@@ -19,6 +19,7 @@ from chipglow.io.atomic import KeptErrorFile, atomic_path
 from chipglow.io.packing import PACKING
 from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene, SceneError, ToolGeometry
 from chipglow.scene.scene import (
+    ENERGY_UNITS,
     FORCE_UNITS,
     MATERIAL_COORDINATE_UNITS,
     check_frame,
@@ -40,6 +41,12 @@ _LONG_NAMES: Final[Mapping[str, str]] = {
     "material_y": "height above the cut surface before the cut",
     "cutting_force": "cutting force per width of cut",
     "thrust_force": "thrust force per width of cut",
+    "drive_work": "work of the drive since the start",
+    "contact_work": "work of the tool's normal force since the start",
+    "kinetic_energy": "change of the kinetic energy, of the scaled mass",
+    "elastic_energy": "change of the elastic energy",
+    "plastic_work": "plastic work since the start",
+    "friction_work": "friction work since the start",
 }
 _FAST: Final[Mapping[str, Any]] = dict(
     hdf5plugin.Blosc2(cname="zstd", clevel=1, filters=hdf5plugin.Blosc2.SHUFFLE)
@@ -145,8 +152,14 @@ class SceneWriter:
         self._sink.check(self.path)
         self._times.append(frame.time)
 
-    def forces(self, times: ArrayLike, cutting: ArrayLike, thrust: ArrayLike) -> None:
-        """Write the force history, once.
+    def forces(
+        self,
+        times: ArrayLike,
+        cutting: ArrayLike,
+        thrust: ArrayLike,
+        energies: Mapping[str, ArrayLike] | None = None,
+    ) -> None:
+        """Write the force history, once, and the energy account with it.
 
         Parameters
         ----------
@@ -154,17 +167,21 @@ class SceneWriter:
             Times in s, ascending, shape (n,).
         cutting, thrust : array_like
             Forces per width of cut in N/m, shape (n,).
+        energies : mapping, optional
+            Energies per width of cut in J/m by the names of `ENERGY_UNITS`, each of shape (n,).
 
         Raises
         ------
         SceneError
-            If the shapes differ, a value is not finite or the times do not ascend.
+            If an energy is missing or unknown, the shapes differ, a value is not finite or the
+            times do not ascend.
         """
         time = np.asarray(times, dtype=np.float64)
-        forces = {
-            name: np.asarray(values, dtype=np.float64)
-            for name, values in zip(FORCE_UNITS, (cutting, thrust), strict=True)
-        }
+        units = {**FORCE_UNITS, **(ENERGY_UNITS if energies else {})}
+        given = {"cutting_force": cutting, "thrust_force": thrust, **(energies or {})}
+        if set(given) != set(units):
+            raise SceneError(f"scene: energies {list(energies or {})}, expected {list(units)[2:]}")
+        forces = {name: np.asarray(given[name], dtype=np.float64) for name in units}
         if time.ndim != 1 or (np.diff(time) <= 0).any() or not np.isfinite(time).all():
             raise SceneError("scene: force_time must be one finite, ascending row of times")
         for name, values in forces.items():
@@ -173,7 +190,7 @@ class SceneWriter:
         self._file.dimensions["force_time"] = time.size
         for name, unit, values in (
             ("force_time", "s", time),
-            *((name, FORCE_UNITS[name], values) for name, values in forces.items()),
+            *((name, units[name], values) for name, values in forces.items()),
         ):
             variable = self._file.create_variable(name, ("force_time",), data=values)
             variable.attrs["units"] = unit
@@ -308,8 +325,11 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, portable: bool = 
         for frame in scene.frames():
             writer.append(frame)
         if "cutting_force" in scene.data:
-            forces = (scene.data[name].values for name in FORCE_UNITS)
-            writer.forces(scene.data["force_time"].values, *forces)
+            time, cutting, thrust = (
+                scene.data[name].values for name in ("force_time", *FORCE_UNITS)
+            )
+            known = [name for name in ENERGY_UNITS if name in scene.data]
+            writer.forces(time, cutting, thrust, {name: scene.data[name].values for name in known})
 
 
 def _first_line(error: BaseException) -> str:

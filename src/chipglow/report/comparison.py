@@ -175,6 +175,23 @@ def _period_rows(result: StudyResult) -> list[Row]:
             0,
             "Per width of cut; the paper gives no forces.",
         ),
+        _own(
+            "energy_unaccounted_percent",
+            "Work that the energy account does not find",
+            "%",
+            result.forces.unaccounted * 100,
+            1,
+            "Work of the drive less kinetic, elastic, plastic and friction energy: what the "
+            "transfer between points and grid dissipates.",
+        ),
+        _own(
+            "kinetic_share_percent",
+            "Kinetic energy of the scaled mass over the work",
+            "%",
+            result.forces.kinetic_share * 100,
+            2,
+            "Its change since the start: how much the scaling of the mass can matter.",
+        ),
     ]
 
 

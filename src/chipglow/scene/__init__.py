@@ -1,7 +1,16 @@
 """The scene: fields on a regular grid over time, and the tool in it."""
 
 from chipglow.scene.raster import Raster
-from chipglow.scene.scene import FIELD_UNITS, Frame, Material, Scene, SceneError
+from chipglow.scene.scene import ENERGY_UNITS, FIELD_UNITS, Frame, Material, Scene, SceneError
 from chipglow.scene.tool import ToolGeometry
 
-__all__ = ["FIELD_UNITS", "Frame", "Material", "Raster", "Scene", "SceneError", "ToolGeometry"]
+__all__ = [
+    "ENERGY_UNITS",
+    "FIELD_UNITS",
+    "Frame",
+    "Material",
+    "Raster",
+    "Scene",
+    "SceneError",
+    "ToolGeometry",
+]

@@ -30,6 +30,19 @@ MATERIAL_COORDINATE_UNITS: Final[Mapping[str, str]] = {"material_x": "m", "mater
 FORCE_UNITS: Final[Mapping[str, str]] = {"cutting_force": "N/m", "thrust_force": "N/m"}
 """Force history on `force_time`, per width of cut: optional, both or none."""
 
+ENERGY_UNITS: Final[Mapping[str, str]] = dict.fromkeys(
+    (
+        "drive_work",
+        "contact_work",
+        "kinetic_energy",
+        "elastic_energy",
+        "plastic_work",
+        "friction_work",
+    ),
+    "J/m",
+)
+"""Energy account on `force_time`, per width of cut and since the start: optional, all or none."""
+
 COLDEST_PLAUSIBLE: Final = 200.0
 HOTTEST_PLAUSIBLE: Final = 6000.0
 
@@ -257,12 +270,12 @@ def _check_structure(data: xr.Dataset) -> None:
         if name not in data:
             raise SceneError(f"scene: field {name!r} is missing")
         _check_unit(name, data[name], unit)
-    for pair in (MATERIAL_COORDINATE_UNITS, FORCE_UNITS):
-        present = [name for name in pair if name in data]
-        if present and len(present) < len(pair):
-            raise SceneError(f"scene: {present[0]!r} needs the other of {list(pair)}")
+    for group in (MATERIAL_COORDINATE_UNITS, FORCE_UNITS, ENERGY_UNITS):
+        present = [name for name in group if name in data]
+        if present and len(present) < len(group):
+            raise SceneError(f"scene: {present[0]!r} needs the others of {list(group)}")
         for name in present:
-            _check_unit(name, data[name], pair[name])
+            _check_unit(name, data[name], group[name])
     for name in (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS):
         if name in data and data[name].dims != ("time", "y", "x"):
             raise SceneError(

@@ -99,4 +99,4 @@ def _compute(study: Study, path: Path, progress: Progress | None) -> None:
             writer.append,
             (lambda fraction: progress(CUTTING_STEP, fraction)) if progress else None,
         )
-        writer.forces(history.time, history.cutting, history.thrust)
+        writer.forces(history.time, history.cutting, history.thrust, vars(history.energy))
