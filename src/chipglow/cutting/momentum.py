@@ -243,7 +243,7 @@ def _work_column(i, velocity, nodes, heat, tool, grid, step, sums):  # type: ign
             slip = vy * nx - vx * ny
             loss = min(limit / mass, abs(slip))
             change = -loss if slip > 0.0 else loss
-            work = mass * loss * abs(slip + change)
+            work = mass * loss * abs(slip + 0.5 * change)
             heat[i, j] += work
             vx -= change * ny
             vy += change * nx
