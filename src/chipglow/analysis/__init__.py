@@ -1,6 +1,7 @@
 """Analysis: errors of the measurement, the rake face, the shear band and the segments."""
 
 from chipglow.analysis.band_error import BandErrors, band_errors
+from chipglow.analysis.chip import ChipMetrics, ChipScan, chip_metrics
 from chipglow.analysis.error import (
     ErrorImages,
     ReferenceKind,
@@ -17,6 +18,8 @@ from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear
 __all__ = [
     "PAPER",
     "BandErrors",
+    "ChipMetrics",
+    "ChipScan",
     "ErrorImages",
     "Line",
     "NoShearBandError",
@@ -30,6 +33,7 @@ __all__ = [
     "StudyResult",
     "analyse",
     "band_errors",
+    "chip_metrics",
     "contact_length",
     "error_images",
     "find_shear_band",

@@ -1,0 +1,136 @@
+"""Chip metrics: a serrated chip in closed form gives back what it was made of."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from serrated_chip import SerratedChip
+
+from chipglow.analysis import chip_metrics
+from chipglow.scene import Raster, Scene
+
+CHIP = SerratedChip()
+# Surfaces lie between samples' centres, and lines aslant cut their squares.
+SAMPLE = CHIP.raster.spacing
+
+
+@pytest.fixture(scope="module")
+def metrics():
+    return chip_metrics(CHIP.scene())
+
+
+def test_thickness_and_segments(metrics):
+    assert metrics.segments == 2
+    # Over the frames' distance of 2.4 µs the back moves 12 µm at most and the sawtooth's steeper
+    # side 12 µm x 80 µm / 82 µm: an extreme is missed by half of that.
+    missed = 6e-6
+    assert metrics.peak == pytest.approx(CHIP.peak, abs=missed + SAMPLE)
+    assert metrics.valley == pytest.approx(CHIP.valley, abs=missed + SAMPLE)
+    assert metrics.peak_spread < missed
+    assert metrics.valley_spread < missed
+    # The sum over 61 frames is a rectangle rule; the last window's ends miss half a frame each.
+    assert metrics.thickness == pytest.approx(CHIP.thickness, abs=SAMPLE)
+    assert metrics.ratio == pytest.approx(CHIP.feed / CHIP.thickness, rel=0.01)
+    degree = (CHIP.peak - CHIP.valley) / CHIP.peak
+    # Both errors above, over the peak.
+    assert metrics.degree == pytest.approx(degree, abs=2 * (missed + SAMPLE) / CHIP.peak)
+
+
+def test_period_spacing_and_speeds(metrics):
+    # The forces are smooth, so their peaks are at most a step of 0.5 µs off.
+    assert metrics.period == pytest.approx(CHIP.period, rel=0.005)
+    assert metrics.frequency == pytest.approx(1 / CHIP.period, rel=0.005)
+    assert metrics.speed == pytest.approx(CHIP.speed, rel=1e-6)
+    assert metrics.spacing == pytest.approx(CHIP.speed * CHIP.period, rel=0.005)
+    # A mean over two periods in steps of 2.4 µs: half a step at either end of 144 µs.
+    assert metrics.chip_speed == pytest.approx(CHIP.chip_speed, rel=0.015)
+    assert metrics.chip_spacing == pytest.approx(CHIP.chip_speed * CHIP.period, rel=0.02)
+    swing = CHIP.unsteadiness * CHIP.chip_speed / np.sqrt(2)
+    assert metrics.chip_speed_spread == pytest.approx(swing, rel=0.05)
+
+
+def test_the_mean_is_over_the_chips_length_not_over_time():
+    """A chip that is fast while thin is thinner in the mean over time of a fixed line."""
+    metrics = chip_metrics(replace(CHIP, unsteadiness=0.8).scene())
+    over_time = float(metrics.scan.thickness.mean())
+    assert abs(over_time - CHIP.thickness) > 3 * SAMPLE
+    assert metrics.thickness == pytest.approx(CHIP.thickness, abs=1.5 * SAMPLE)
+
+
+def test_band(metrics):
+    # The ridge of a straight band is found to a fraction of a sample over 150 µm.
+    assert metrics.shear_angle == pytest.approx(CHIP.shear_angle, abs=np.radians(0.5))
+    assert metrics.band_width == pytest.approx(CHIP.band_width, rel=0.03)
+    assert metrics.band_rate == pytest.approx(CHIP.band_rate, rel=0.02)
+    # A frame may miss the crest by 6 µm of a Gaussian of 15 µm: 8 %.
+    assert metrics.band_strain == pytest.approx(CHIP.band_strain, rel=0.08)
+
+
+def test_contact(metrics):
+    # The next sample of the face's staircase, and the two of a bilinear foot.
+    assert metrics.contact == pytest.approx(CHIP.contact, abs=3 * SAMPLE)
+    assert metrics.contact_spread < 1e-3 * SAMPLE
+
+
+def test_feed_is_read_from_the_surface_before_the_cut(metrics):
+    assert metrics.feed == pytest.approx(CHIP.feed, abs=SAMPLE)
+    swollen = replace(CHIP, bulge=8e-6, frames=80)
+    assert chip_metrics(swollen.scene()).feed == pytest.approx(CHIP.feed + 8e-6, abs=SAMPLE)
+    swollen = replace(swollen, coordinates=True)
+    assert chip_metrics(swollen.scene()).feed == pytest.approx(CHIP.feed, abs=SAMPLE)
+
+
+def test_a_given_feed_counts():
+    assert chip_metrics(replace(CHIP, frames=80).scene(), feed=190e-6).feed == 190e-6
+    with pytest.raises(ValueError, match="feed is 0"):
+        chip_metrics(replace(CHIP, frames=2).scene(), feed=0.0)
+
+
+def test_what_the_view_cuts_is_unknown():
+    """No free surface of the chip in a view that ends 200 µm before the edge, under its peaks."""
+    narrow = Raster(left=-200e-6, top=300e-6, spacing=2e-6, rows=168, columns=142)
+    metrics = chip_metrics(replace(CHIP, raster=narrow, frames=80).scene())
+    unknown = ("thickness", "peak", "valley", "degree", "ratio", "chip_speed", "chip_spacing")
+    assert all(np.isnan(getattr(metrics, name)) for name in unknown)
+    assert np.isnan(metrics.scan.height)
+    assert metrics.segments == 0
+    assert metrics.period == pytest.approx(CHIP.period, rel=0.005)
+
+
+def test_less_than_a_period_gives_no_thickness():
+    metrics = chip_metrics(replace(CHIP, frames=40).scene())
+    assert np.isnan([metrics.thickness, metrics.peak, metrics.valley]).all()
+    assert metrics.speed == pytest.approx(CHIP.speed, rel=1e-6)
+
+
+def test_contact_beyond_the_view_is_unknown():
+    assert np.isnan(chip_metrics(replace(CHIP, contact=1e-3, frames=4).scene()).contact)
+
+
+def test_without_forces_the_scene_counts_as_one_segment():
+    scene = replace(CHIP, frames=72).scene()
+    bare = Scene(scene.data.drop_vars(["cutting_force", "thrust_force", "force_time"]))
+    metrics = chip_metrics(bare)
+    assert metrics.segments == 1
+    assert np.isnan([metrics.period, metrics.spacing, metrics.cutting_mean]).all()
+    assert metrics.thickness == pytest.approx(CHIP.thickness, abs=SAMPLE)
+
+
+def test_a_chip_that_is_not_segmented_has_degree_nought():
+    even = replace(CHIP, peak=220e-6, valley=220e-6, frames=80)
+    metrics = chip_metrics(even.scene())
+    assert metrics.degree == pytest.approx(0.0, abs=SAMPLE / even.peak)
+    assert metrics.thickness == pytest.approx(even.thickness, abs=SAMPLE)
+
+
+def test_a_scene_without_its_tool_is_refused():
+    scene = replace(CHIP, frames=2).scene()
+    for name in [name for name in scene.data.attrs if name.startswith("tool_")]:
+        del scene.data.attrs[name]
+    with pytest.raises(ValueError, match="tool"):
+        chip_metrics(scene)
+
+
+def test_every_number_is_named_in_the_docstring(metrics):
+    text = type(metrics).__doc__
+    assert all(item.name in text for item in fields(metrics))
