@@ -13,6 +13,7 @@ from analytic_chip import AnalyticChip
 from chipglow.analysis import PAPER, Plan, analyse
 from chipglow.camera import Camera
 from chipglow.report import Row, comparison_rows, write_report
+from chipglow.report.chip import chip_rows
 from chipglow.report.evidence import crossing
 from chipglow.surface import CHIP_1, CHIP_2
 
@@ -27,6 +28,7 @@ FIGURES = {
     "psf-sensitivity",
     "psf",
     "forces",
+    "chip",
 }
 
 
@@ -101,7 +103,11 @@ def test_the_page_stands_alone_and_escapes_text(folder, result):
             assert part in shown
     for number in (5, 6, 9, 10, 11):
         assert f"Figure {number}" in shown
-    assert page.seen.count("tr") == 1 + len(comparison_rows(result))
+    chip = chip_rows(result.chip)
+    for line in chip:
+        for part in (line.quantity, line.value_text, line.spread_text, line.explanation):
+            assert part in shown
+    assert page.seen.count("tr") == 2 + len(comparison_rows(result)) + len(chip)
 
 
 def test_the_summary_is_strict_json(folder, result):
@@ -116,6 +122,8 @@ def test_the_summary_is_strict_json(folder, result):
     assert summary["paper"]["rake_error_degC"] == -42.0
     assert summary["difference"]["rake_error_degC"] == result.rake.error + 42.0
     assert set(summary["explanation"]) == set(summary["results"])
+    assert summary["chip"]["feed_um"] == pytest.approx(result.chip.feed * 1e6)
+    assert set(summary["chip_spread"]) <= set(summary["chip"])
 
 
 def test_the_arrays_come_back_with_units(folder, result):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.analysis.band_error import BandErrors, band_errors
+from chipglow.analysis.chip import ChipMetrics, chip_metrics
 from chipglow.analysis.error import ErrorImages, ReferenceKind, error_images
 from chipglow.analysis.lines import nearest, sample
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
@@ -211,6 +212,8 @@ class StudyResult:
         For either order of blur and sensors.
     forces : ForceHistory or None
         If the scene has them.
+    chip : ChipMetrics
+        Shape, motion and shear band of the chip over the whole scene.
     """
 
     plan: Plan
@@ -225,6 +228,7 @@ class StudyResult:
     surfaces: Mapping[str, SurfaceResult]
     sensitivity: tuple[Sensitivity, ...]
     forces: ForceHistory | None
+    chip: ChipMetrics
 
     @property
     def band(self) -> ShearBand:
@@ -299,6 +303,7 @@ def analyse(
         surfaces=results,
         sensitivity=_sensitivities(camera, plan, moment, exposures, tell),
         forces=_forces(scene),
+        chip=_chip(scene, tell),
     )
 
 
@@ -500,6 +505,13 @@ def _sensitivities(
         results.append(sensitivity(camera, setting, plan.psf_widths, order))
     tell("width of the point spread function", 1.0)
     return tuple(results)
+
+
+def _chip(scene: Scene, tell: Progress) -> ChipMetrics:
+    tell("chip", 0.0)
+    chip = chip_metrics(scene)
+    tell("chip", 1.0)
+    return chip
 
 
 def _forces(scene: Scene) -> ForceHistory | None:

@@ -283,6 +283,47 @@ def forces(result: StudyResult) -> Figure | None:
     return figure
 
 
+def chip(result: StudyResult) -> Figure | None:
+    """Where the chip is measured, and its thickness as it passes there."""
+    found, scan = result.chip, result.chip.scan
+    if not np.isfinite(scan.height):
+        return None
+    figure = drawing.image_figure(result.raster, 3.2, rows=1)
+    left, right = figure.subplots(1, 2)
+    frame = result.frame
+    strain = np.where(frame.material == Material.WORKPIECE, frame.plastic_strain, np.nan)
+    picture = drawing.show_image(
+        left, strain, result.raster, result.tool, drawing.PLAIN, (0.0, 4.0)
+    )
+    drawing.colour_bar(figure, picture, left, "plastic strain")
+    thickness = float(np.interp(frame.time, scan.time, scan.thickness))
+    foot, normal = result.tool.rake_point(scan.height), np.array(result.tool.rake_normal)
+    across = np.stack([foot, foot + thickness * normal])
+    drawing.draw_line(left, across, VERMILLION, "thickness")
+    drawing.draw_line(left, (result.momentary_band or result.band).ridge.points, BLUE, "band")
+    figure.legend(loc="outside lower center", ncols=2)
+    left.set_title(f"a) at {frame.time * 1e6:.0f} µs")
+    right.plot(scan.time * 1e6, scan.thickness * 1e6, color=VERMILLION)
+    for value, label in (
+        (found.peak, "peak"),
+        (found.thickness, "mean"),
+        (found.valley, "valley"),
+    ):
+        if not np.isfinite(value):
+            continue
+        right.axhline(value * 1e6, color=GREY, linewidth=0.8, linestyle=":")
+        right.annotate(
+            f"{label} {value * 1e6:.0f}",
+            (1.02, value * 1e6),
+            xycoords=("axes fraction", "data"),
+            va="center",
+        )
+    right.set_xlabel("time / µs")
+    right.set_ylabel("thickness / µm")
+    right.set_title("b) the chip passing the line")
+    return figure
+
+
 def psf_sensitivity(result: StudyResult) -> Figure:
     """Headline errors and the PSF's shares against its width, for both orders."""
     figure = drawing.new_figure(5.2)
@@ -487,6 +528,15 @@ def _sensitivity_caption(result: StudyResult) -> str:
     )
 
 
+def _chip_caption(result: StudyResult) -> str:
+    return (
+        f"Distance from the rake face to the chip's free surface at right angles to the face, "
+        f"{result.chip.scan.height * 1e6:.0f} µm up from the edge's arc: the highest line on which "
+        "the surface is in the view all the time. Peak, mean and valley are those of whole "
+        "segments at the end of the scene."
+    )
+
+
 _DRAWINGS: Final = (
     _Drawing("fields", "The scene", _fields_caption, fields),
     _Drawing("measurement", "The measurement", _measurement_caption, measurement),
@@ -498,4 +548,5 @@ _DRAWINGS: Final = (
     ),
     _Drawing("psf", "The camera's point spread function", _psf_caption, point_spread),
     _Drawing("forces", "The forces", _forces_caption, forces),
+    _Drawing("chip", "The chip's thickness", _chip_caption, chip),
 )

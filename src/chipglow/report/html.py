@@ -7,6 +7,7 @@ from importlib.resources import files
 from typing import Final
 
 from chipglow import __version__
+from chipglow.report.chip import ChipRow
 from chipglow.report.comparison import Row
 from chipglow.report.figures import FigureFile
 
@@ -25,6 +26,7 @@ _PAPER: Final = (
 
 _SECTIONS: Final = (
     ("comparison", "The paper beside this study"),
+    ("chip", "The chip"),
     ("figures", "Figures"),
     ("study", "The study as run"),
     ("cite", "How to cite"),
@@ -34,6 +36,7 @@ _SECTIONS: Final = (
 def page(
     rows: Sequence[Row],
     definition: str,
+    chip: Sequence[ChipRow],
     figures: Sequence[FigureFile],
     study_text: str,
     provenance: Mapping[str, str],
@@ -46,6 +49,8 @@ def page(
         The paper's figures beside ours.
     definition : str
         What an error is, as a sentence.
+    chip : sequence of ChipRow
+        What describes the chip.
     figures : sequence of FigureFile
         Figures, whose PNG files are read.
     study_text : str
@@ -56,6 +61,7 @@ def page(
     links = "".join(f'<a href="#{name}">{escape(title)}</a>' for name, title in _SECTIONS)
     bodies = {
         "comparison": _table(rows, definition),
+        "chip": _chip_table(chip),
         "figures": "\n".join(_figure(figure) for figure in figures),
         "study": f"<pre><code>{escape(study_text)}</code></pre>",
         "cite": _citation(),
@@ -102,6 +108,21 @@ def _table(rows: Sequence[Row], definition: str) -> str:
 <div class="scroll"><table>
 <thead><tr><th>Quantity</th><th class="number">Paper</th><th class="number">Here</th>
 <th class="number">Difference</th><th>Why</th></tr></thead>
+<tbody>
+{body}
+</tbody></table></div>"""
+
+
+def _chip_table(rows: Sequence[ChipRow]) -> str:
+    body = "\n".join(
+        f'<tr><td>{escape(row.quantity)}</td><td class="number here">{escape(row.value_text)}</td>'
+        f'<td class="number">{escape(row.spread_text)}</td>'
+        f'<td class="why">{escape(row.explanation)}</td></tr>'
+        for row in rows
+    )
+    return f"""<div class="scroll"><table>
+<thead><tr><th>Quantity</th><th class="number">Here</th><th class="number">Spread</th>
+<th>How</th></tr></thead>
 <tbody>
 {body}
 </tbody></table></div>"""

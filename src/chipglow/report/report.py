@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from chipglow.analysis.paper import StudyResult
+from chipglow.report.chip import chip_rows
 from chipglow.report.comparison import comparison_rows
 from chipglow.report.evidence import error_definition
 from chipglow.report.figures import draw_figures
@@ -42,13 +43,14 @@ def write_report(
     pictures = folder / "figures"
     pictures.mkdir()
     figures = list(draw_figures(result, pictures))
-    rows = comparison_rows(result)
+    rows, chip = comparison_rows(result), chip_rows(result.chip)
     data = results_dataset(result, provenance)
     data.to_netcdf(folder / "results.nc", engine="h5netcdf", encoding=compression(data))
-    text = json.dumps(summary(rows, provenance), indent=2, ensure_ascii=False, allow_nan=False)
+    numbers = summary(rows, chip, provenance)
+    text = json.dumps(numbers, indent=2, ensure_ascii=False, allow_nan=False)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     (folder / "study.yaml").write_text(study_text, encoding="utf-8")
     report = folder / "report.html"
-    text = page(rows, error_definition(result), figures, study_text, provenance)
+    text = page(rows, error_definition(result), chip, figures, study_text, provenance)
     report.write_text(text, encoding="utf-8")
     return report

@@ -8,6 +8,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis.paper import StudyResult
+from chipglow.report.chip import ChipRow
 from chipglow.report.comparison import Row
 from chipglow.scene import FIELD_UNITS
 from chipglow.scene.scene import tool_attributes
@@ -30,7 +31,7 @@ def results_dataset(result: StudyResult, provenance: Mapping[str, str]) -> xr.Da
         ``instant`` the exposures; ``surface`` the surfaces; ``ridge_point`` along the shear band,
         NaN beyond its end; ``rake_distance`` and ``band_distance`` along the analysis lines;
         ``contact_distance`` up the rake face; ``psf_order`` and ``psf_width`` the sensitivity;
-        ``force_time`` the force history.
+        ``force_time`` the force history; ``chip_time`` the chip as it passes one rake-normal line.
     """
     variables = {
         **_scene(result),
@@ -39,6 +40,7 @@ def results_dataset(result: StudyResult, provenance: Mapping[str, str]) -> xr.Da
         **_lines(result),
         **_sensitivity(result),
         **_forces(result),
+        **_chip(result),
     }
     coordinates = {
         "surface": list(result.surfaces),
@@ -68,19 +70,25 @@ def compression(data: xr.Dataset) -> dict[str, dict[str, Any]]:
     }
 
 
-def summary(rows: Sequence[Row], provenance: Mapping[str, str]) -> dict[str, Any]:
+def summary(
+    rows: Sequence[Row], chip: Sequence[ChipRow], provenance: Mapping[str, str]
+) -> dict[str, Any]:
     """Numbers of the study for scripts; a name ends in its unit, what is unknown is None.
 
     Parameters
     ----------
     rows : sequence of Row
         The comparison.
+    chip : sequence of ChipRow
+        What describes the chip.
     provenance : mapping
         What, when, version, seed and the like.
     """
     return {
         "provenance": dict(provenance),
         "results": {row.key: row.here for row in rows},
+        "chip": {row.key: row.value for row in chip},
+        "chip_spread": {row.key: row.spread for row in chip if row.spread is not None},
         "paper": {row.key: row.paper for row in rows if row.paper is not None},
         "difference": {row.key: row.difference for row in rows if row.paper is not None},
         "explanation": {row.key: row.explanation for row in rows},
@@ -201,6 +209,14 @@ def _sensitivity(result: StudyResult) -> dict[str, Any]:
             {"units": unit},
         )
         for name, unit in units.items()
+    }
+
+
+def _chip(result: StudyResult) -> dict[str, Any]:
+    scan = result.chip.scan
+    return {
+        "chip_time": ("chip_time", scan.time, {"units": "s"}),
+        "chip_thickness": ("chip_time", scan.thickness, {"units": "m", "height": scan.height}),
     }
 
 
