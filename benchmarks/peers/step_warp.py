@@ -1,0 +1,312 @@
+"""The solver's step of transfer and stress in NVIDIA Warp on the CPU, for `solver_speed.py`.
+
+One thread a point, atomic sums on the grid, launches that are recorded once. Warp runs a kernel on
+one CPU core only, so its atomic sums are plain ones. Material points keep the order they come in.
+The mean density of a cell is taken over the points that are in it now.
+"""
+
+from time import perf_counter
+
+import numpy as np
+import warp as wp
+
+f64 = wp.float64
+ITERATIONS = wp.constant(6)
+SMALL_CHANGE = wp.constant(f64(0.02))
+SMALL_STRAIN = wp.constant(f64(0.01))
+ZERO, HALF, ONE = wp.constant(f64(0.0)), wp.constant(f64(0.5)), wp.constant(f64(1.0))
+TWO, THREE, FOUR = wp.constant(f64(2.0)), wp.constant(f64(3.0)), wp.constant(f64(4.0))
+MOST_HEAT, TINY = wp.constant(f64(0.99)), wp.constant(f64(1e-12))
+UNMEASURED = wp.constant(f64(1.5))
+COLDEST = wp.constant(f64(200.0))
+
+
+@wp.struct
+class Point:
+    x: wp.vec2d
+    v: wp.vec2d
+    c: wp.mat22d
+    d: wp.vec3d
+    strain: f64
+    increment: f64
+    damage: f64
+    temperature: f64
+    volume: f64
+
+
+@wp.struct
+class Grid:
+    left: f64
+    bottom: f64
+    cell: f64
+
+
+@wp.struct
+class Step:
+    mass: f64
+    heat_mass: f64
+    volume: f64
+    time_step: f64
+    shear_modulus: f64
+    bulk_modulus: f64
+    heat_share: f64
+
+
+@wp.struct
+class Flow:
+    yield_stress: f64
+    hardening: f64
+    hardening_exponent: f64
+    rate_sensitivity: f64
+    thermal_exponent: f64
+    melting_temperature: f64
+    reference_temperature: f64
+    reference_rate: f64
+    d1: f64
+    d2: f64
+    d3: f64
+    d4: f64
+    d5: f64
+    onset: f64
+    loss: f64
+
+
+def filled(struct, numbers):
+    """A struct with the numbers of the same name."""
+    result = struct()
+    for name in struct.vars:
+        setattr(result, name, float(getattr(numbers, name)))
+    return result
+
+
+@wp.func
+def scaled(x: wp.vec2d, grid: Grid):
+    return wp.vec2d((x[0] - grid.left) / grid.cell, (x[1] - grid.bottom) / grid.cell)
+
+
+@wp.func
+def weights(f: f64):
+    a, b, c = f64(1.5) - f, f - ONE, f - HALF
+    return wp.vec3d(HALF * a * a, f64(0.75) - b * b, HALF * c * c)
+
+
+@wp.kernel
+def gather(
+    points: wp.array(dtype=Point), velocity: wp.array2d(dtype=wp.vec2d),
+    cells: wp.array2d(dtype=wp.vec2d), grid: Grid, step: Step,
+):  # fmt: skip
+    k = wp.tid()
+    x = points[k].x
+    s = scaled(x, grid)
+    i, j = int(s[0] - HALF), int(s[1] - HALF)
+    fx, fy = s[0] - f64(i), s[1] - f64(j)
+    wx, wy = weights(fx), weights(fy)
+    dx, dy = wp.vec3d(-fx, ONE - fx, TWO - fx), wp.vec3d(-fy, ONE - fy, TWO - fy)
+    v = wp.vec2d()
+    c = wp.mat22d()
+    for a in range(3):
+        for b in range(3):
+            weighted = wx[a] * wy[b] * velocity[i + a, j + b]
+            v += weighted
+            c += wp.outer(weighted, wp.vec2d(dx[a], dy[b]))
+    c = c * (FOUR / grid.cell)
+    x += step.time_step * v
+    points[k].x = x
+    points[k].v = v
+    points[k].c = c
+    s = scaled(x, grid)
+    grown = points[k].volume * (ONE + step.time_step * wp.trace(c))
+    wp.atomic_add(cells, int(s[0]), int(s[1]), wp.vec2d(grown, ONE))
+
+
+@wp.func
+def heat_of(temperature: f64, flow: Flow):
+    span = flow.melting_temperature - flow.reference_temperature
+    return wp.clamp((temperature - flow.reference_temperature) / span, ZERO, MOST_HEAT)
+
+
+@wp.func
+def weakening(damage: f64, temperature: f64, flow: Flow):
+    heat = heat_of(temperature, flow)
+    if flow.thermal_exponent != ONE:
+        heat = wp.pow(heat, flow.thermal_exponent)
+    share = wp.clamp((damage - flow.onset) / (ONE - flow.onset), ZERO, ONE)
+    return (ONE - heat) * (ONE - flow.loss * share)
+
+
+@wp.func
+def plastic_increment(trial: f64, strain: f64, weak: f64, guess: f64, step: Step, flow: Flow):
+    if trial <= flow.yield_stress * weak:
+        return ZERO
+    n = flow.hardening_exponent
+    power = wp.exp(n * wp.log(wp.max(strain, TINY)))
+    hard = (flow.yield_stress + flow.hardening * power) * weak
+    if trial <= hard:
+        return ZERO
+    stiffness = THREE * step.shear_modulus
+    slope = f64(0.0)
+    if strain > SMALL_STRAIN:
+        slope = weak * flow.hardening * n * power / strain
+    bound = (trial - hard) / (stiffness + slope)
+    slowest = step.time_step * flow.reference_rate
+    increment = f64(bound)
+    if guess > TWO * slowest:
+        increment = wp.min(guess, bound)
+    left = int(ITERATIONS)
+    while left > 0:
+        left -= 1
+        if increment <= slowest:
+            return wp.min(slowest, bound)
+        base = hard + slope * increment
+        if strain <= SMALL_STRAIN:
+            end = strain + increment
+            power = wp.exp(n * wp.log(end))
+            base = (flow.yield_stress + flow.hardening * power) * weak
+            slope = weak * flow.hardening * n * power / end
+        fast = ONE + flow.rate_sensitivity * wp.log(increment / slowest)
+        excess = trial - stiffness * increment - base * fast
+        fall = (stiffness + slope * fast) * increment + base * flow.rate_sensitivity
+        change = excess / fall
+        if wp.abs(change) < SMALL_CHANGE:
+            return increment * (ONE + change * (ONE + HALF * change))
+        increment = wp.min(increment * wp.exp(wp.max(change, -THREE)), bound)
+    return increment
+
+
+@wp.func
+def strain_to_failure(triaxiality: f64, rate: f64, temperature: f64, flow: Flow):
+    held = wp.clamp(triaxiality, -UNMEASURED, UNMEASURED)
+    fast = ONE + flow.d4 * wp.log(wp.max(rate / flow.reference_rate, ONE))
+    warm = ONE + flow.d5 * heat_of(temperature, flow)
+    return (flow.d1 + flow.d2 * wp.exp(flow.d3 * held)) * fast * warm
+
+
+@wp.kernel
+def stress_and_scatter(
+    points: wp.array(dtype=Point), nodes: wp.array2d(dtype=wp.vec3d),
+    cells: wp.array2d(dtype=wp.vec2d), capacities: wp.array(dtype=f64),
+    grid: Grid, step: Step, flow: Flow,
+):  # fmt: skip
+    k = wp.tid()
+    p = points[k]
+    s = scaled(p.x, grid)
+    shared = cells[int(s[0]), int(s[1])]
+    volume = shared[0] / shared[1]
+    dt = step.time_step
+    two_g = TWO * step.shear_modulus * dt
+    spin = (p.c[0, 1] - p.c[1, 0]) * dt
+    third = wp.trace(p.c) / THREE
+    xy = p.d[2] + HALF * spin * (p.d[1] - p.d[0]) + HALF * two_g * (p.c[0, 1] + p.c[1, 0])
+    xx = p.d[0] + spin * p.d[2] + two_g * (p.c[0, 0] - third)
+    yy = p.d[1] - spin * p.d[2] + two_g * (p.c[1, 1] - third)
+    trial = wp.sqrt(THREE * (xx * xx + yy * yy + xx * yy + xy * xy))
+    weak = weakening(p.damage, p.temperature, flow)
+    increment = plastic_increment(trial, p.strain, weak, p.increment, step, flow)
+    tension = step.bulk_modulus * (volume / step.volume - ONE)
+    if increment > ZERO:
+        stress = trial - THREE * step.shear_modulus * increment
+        scale = stress / trial
+        xx *= scale
+        yy *= scale
+        xy *= scale
+        points[k].strain = p.strain + increment
+        points[k].damage = p.damage + increment / strain_to_failure(
+            tension / stress, increment / dt, p.temperature, flow
+        )
+        capacity = capacities[wp.clamp(int(p.temperature - COLDEST), 0, capacities.shape[0] - 1)]
+        heat = step.heat_share * stress * increment * volume
+        points[k].temperature = p.temperature + heat / (step.heat_mass * capacity)
+    points[k].increment = increment
+    points[k].volume = volume
+    points[k].d = wp.vec3d(xx, yy, xy)
+    force = FOUR / grid.cell * dt * volume
+    sigma = wp.mat22d(xx + tension, xy, xy, yy + tension)
+    affine = step.mass * grid.cell * p.c - force * sigma
+    i, j = int(s[0] - HALF), int(s[1] - HALF)
+    fx, fy = s[0] - f64(i), s[1] - f64(j)
+    wx, wy = weights(fx), weights(fy)
+    dx, dy = wp.vec3d(-fx, ONE - fx, TWO - fx), wp.vec3d(-fy, ONE - fy, TWO - fy)
+    for a in range(3):
+        for b in range(3):
+            m = step.mass * p.v + affine * wp.vec2d(dx[a], dy[b])
+            wp.atomic_add(nodes, i + a, j + b, wx[a] * wy[b] * wp.vec3d(step.mass, m[0], m[1]))
+
+
+@wp.kernel
+def update_grid(
+    nodes: wp.array2d(dtype=wp.vec3d), velocity: wp.array2d(dtype=wp.vec2d),
+    cells: wp.array2d(dtype=wp.vec2d),
+):  # fmt: skip
+    i, j = wp.tid()
+    node = nodes[i, j]
+    v = wp.vec2d()
+    if node[0] > ZERO:
+        v = wp.vec2d(node[1] / node[0], node[2] / node[0])
+    velocity[i, j] = v
+    nodes[i, j] = wp.vec3d()
+    cells[i, j] = wp.vec2d()
+
+
+class Stepper:
+    # Two passes over a record of 16 numbers; per node velocity, sums and density of the cell.
+    bytes_per_point = 4 * 16 * 8 + (2 * 16 + 4 * 24 + 4 * 16) / 4
+
+    def __init__(self, start, threads):
+        wp.config.log_level = wp.LOG_ERROR
+        wp.init()
+        wp.set_module_options({"enable_backward": False})
+        wp.set_device("cpu")
+        self.start, self.count = start, start.points.size
+        shape = (start.grid.columns, start.grid.rows)
+        self.points = wp.zeros(self.count, dtype=Point)
+        self.nodes = wp.zeros(shape, dtype=wp.vec3d)
+        self.cells = wp.zeros(shape, dtype=wp.vec2d)
+        self.velocity = wp.zeros(shape, dtype=wp.vec2d)
+        capacity = wp.array(start.capacity, dtype=f64)
+        grid, step, flow = (
+            filled(struct, numbers)
+            for struct, numbers in ((Grid, start.grid), (Step, start.step), (Flow, start.flow))
+        )
+        launches = (
+            (gather, self.count, [self.points, self.velocity, self.cells, grid, step]),
+            (
+                stress_and_scatter,
+                self.count,
+                [self.points, self.nodes, self.cells, capacity, grid, step, flow],
+            ),
+            (update_grid, shape, [self.nodes, self.velocity, self.cells]),
+        )
+        self.commands = [
+            wp.launch(kernel, size, inputs=inputs, record_cmd=True)
+            for kernel, size, inputs in launches
+        ]
+
+    def reset(self):
+        p = self.start.points
+        records = np.zeros(self.count, Point.numpy_dtype())
+        records["x"] = np.stack([p["x"], p["y"]], 1)
+        records["v"] = np.stack([p["vx"], p["vy"]], 1)
+        rates = [p[name] for name in ("cxx", "cxy", "cyx", "cyy")]
+        records["c"] = np.stack(rates, 1).reshape(-1, 2, 2)
+        records["d"] = np.stack([p[name] for name in ("dxx", "dyy", "dxy")], 1)
+        for name in ("strain", "increment", "damage", "temperature", "volume"):
+            records[name] = p[name]
+        self.points.assign(wp.array(records, dtype=Point))
+        self.velocity.assign(self.start.velocity)
+        self.nodes.zero_()
+        self.cells.zero_()
+
+    def advance(self, steps):
+        begin = perf_counter()
+        for _ in range(steps):
+            for command in self.commands:
+                command.launch()
+        wp.synchronize()
+        return perf_counter() - begin
+
+    def result(self):
+        p = self.points.numpy()
+        return {
+            "vx": p["v"][:, 0], "volume": p["volume"], "dxy": p["d"][:, 2],
+            "strain": p["strain"], "damage": p["damage"], "temperature": p["temperature"],
+        }  # fmt: skip
