@@ -7,7 +7,7 @@ from numba import get_num_threads
 
 from chipglow.cutting.energy import held_energy
 from chipglow.cutting.flow_stress import Flow
-from chipglow.cutting.material import AISI_1045
+from chipglow.cutting.library import AISI_1045
 from chipglow.cutting.momentum import Step, advance
 from chipglow.cutting.points import POINT, Grid, block_of_points, sort_by_cell
 from chipglow.scene import ToolGeometry

@@ -16,7 +16,7 @@ from chipglow.cutting.heat import (
     return_heat,
     tool_fraction,
 )
-from chipglow.cutting.material import AISI_1045, CARBIDE
+from chipglow.cutting.library import AISI_1045, CARBIDE
 from chipglow.cutting.points import Grid
 from chipglow.scene import ToolGeometry
 

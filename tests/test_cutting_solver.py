@@ -12,7 +12,7 @@ from solver import ELASTIC, Block
 
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow
 from chipglow.cutting.flow_stress import Flow, flow_stress, plastic_increment, strain_to_failure
-from chipglow.cutting.material import AISI_1045
+from chipglow.cutting.library import AISI_1045
 from chipglow.scene import Raster, ToolGeometry
 
 

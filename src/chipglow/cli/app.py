@@ -144,6 +144,31 @@ def measure(
     print(out)
 
 
+@app.command()
+def materials(
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="NAME", help="Show this one: a name, or your own file (.yaml)."),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw flow stress and heat properties, PNG, PDF or SVG."),
+    ] = None,
+) -> None:
+    """List the materials, or show the numbers of one with their sources."""
+    from chipglow.cli.materials import list_materials, plot_material, show_material
+
+    if name is None:
+        if plot is not None:
+            raise ValueError("--plot: expected the name of a material to draw")
+        list_materials()
+        return
+    show_material(name)
+    if plot is not None:
+        plot_material(name, plot)
+        print(plot)
+
+
 @cache_app.command("list")
 def list_cache() -> None:
     """Show the cached scenes, the latest first, and their size."""

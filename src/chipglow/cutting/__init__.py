@@ -2,9 +2,18 @@
 
 from chipglow.cutting.conditions import CuttingConditions, Friction, Numerics, OutputWindow
 from chipglow.cutting.energy import EnergyHistory
-from chipglow.cutting.material import (
+from chipglow.cutting.library import (
     AISI_1045,
     CARBIDE,
+    MaterialError,
+    MaterialFile,
+    is_own_file,
+    material_file,
+    material_names,
+    tool_material,
+    workpiece,
+)
+from chipglow.cutting.material import (
     DamageSoftening,
     JohnsonCook,
     TemperatureTable,
@@ -29,10 +38,17 @@ __all__ = [
     "ForceHistory",
     "Friction",
     "JohnsonCook",
+    "MaterialError",
+    "MaterialFile",
     "Numerics",
     "OutputWindow",
     "SolverError",
     "TemperatureTable",
     "ToolMaterial",
     "WorkpieceMaterial",
+    "is_own_file",
+    "material_file",
+    "material_names",
+    "tool_material",
+    "workpiece",
 ]

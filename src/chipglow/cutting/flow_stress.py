@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from chipglow.cutting.material import WorkpieceMaterial
+from chipglow.cutting.material import TRIAXIALITIES, WorkpieceMaterial
 
 _ITERATIONS = 6
 _SMALL_CHANGE = 0.02
@@ -76,8 +76,7 @@ def weakening(damage, temperature, flow):  # type: ignore[no-untyped-def]
 @njit
 def strain_to_failure(triaxiality, rate, temperature, flow):  # type: ignore[no-untyped-def]
     """Strain to failure at a triaxiality, plastic strain rate (1/s) and temperature (K)."""
-    # Beyond 1.5 the exponential was never measured.
-    held = min(max(triaxiality, -1.5), 1.5)
+    held = min(max(triaxiality, TRIAXIALITIES[0]), TRIAXIALITIES[1])
     fast = 1.0 + flow.d4 * np.log(max(rate / flow.reference_rate, 1.0))
     return (
         (flow.d1 + flow.d2 * np.exp(flow.d3 * held))

@@ -1,4 +1,4 @@
-"""Materials of the cut: flow stress, elasticity and heat, with the source of every number."""
+"""Materials of the cut: flow stress, damage, elasticity and heat."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 TABLE_COLDEST: Final = 200.0
 TABLE_HOTTEST: Final = 3000.0
+
+TRIAXIALITIES: Final = (-1.5, 1.5)
+"""Triaxialities at which the strain to failure is held: beyond, it was never measured."""
 
 
 def _check_positive(name: str, value: float) -> None:
@@ -85,10 +88,18 @@ class DamageSoftening:
     loss: float
 
     def __post_init__(self) -> None:
-        if not (0 <= self.d1 < np.inf and 0 <= self.d2 < np.inf and self.d1 + self.d2 > 0):
-            raise ValueError(f"damage: expected d1 and d2 of 0 or more, got {self.d1}, {self.d2}")
-        if not all(isfinite(d) for d in (self.d3, self.d4, self.d5)):
-            raise ValueError("damage: d3, d4 and d5 must be finite")
+        if not all(isfinite(d) for d in (self.d1, self.d2, self.d3, self.d4, self.d5)):
+            raise ValueError("damage: d1 to d5 must be finite")
+        ends = [self.d1 + self.d2 * np.exp(self.d3 * end) for end in TRIAXIALITIES]
+        if min(ends) <= 0:
+            raise ValueError(
+                f"damage: d1 + d2 exp(d3 triaxiality) falls to {min(ends):.3g}, expected over 0 "
+                f"from {TRIAXIALITIES[0]:g} to {TRIAXIALITIES[1]:g}"
+            )
+        if self.d4 < 0 or self.d5 <= -1:
+            raise ValueError(
+                f"damage: expected d4 of 0 or more and d5 over -1, got {self.d4!r}, {self.d5!r}"
+            )
         if not 0 <= self.onset < 1:
             raise ValueError(f"damage onset: expected 0 to less than 1, got {self.onset!r}")
         if not 0 <= self.loss < 1:
@@ -208,23 +219,3 @@ class ToolMaterial:
     def effusivity(self) -> float:
         """√(kρc) in W s^½/(m² K)."""
         return float(np.sqrt(self.conductivity * self.density * self.heat_capacity))
-
-
-AISI_1045: Final = WorkpieceMaterial(
-    name="AISI 1045: flow stress of Jaspers and Dautzenberg (2002), heat of Oxley (1989)",
-    density=7850.0,
-    young_modulus=205e9,
-    poisson_ratio=0.29,
-    flow_stress=JohnsonCook(553.1e6, 600.8e6, 0.234, 0.0134, 1.0, 1733.0),
-    # Published constants are 0.06, 3.31, -1.96, 0.0018 and 0.58, for rupture in a tensile test.
-    # With three tenths of that strain to failure, and 30 % of the strength left in the end, the
-    # chip is segmented; how far the strength of sheared steel really falls is not settled.
-    softening=DamageSoftening(0.018, 0.993, -1.96, 0.0018, 0.58, onset=0.15, loss=0.7),
-    # Oxley: k = 52.61 − 0.0281 T and c = 420 + 0.504 T, T in °C; held beyond 900 °C.
-    conductivity=TemperatureTable((273.15, 1173.15), (52.61, 27.32)),
-    heat_capacity=TemperatureTable((273.15, 1173.15), (420.0, 873.6)),
-)
-
-CARBIDE: Final = ToolMaterial(
-    name="uncoated WC-Co, typical values", density=14900.0, conductivity=80.0, heat_capacity=230.0
-)

@@ -14,7 +14,8 @@ from chipglow.cutting.energy import ENERGIES, EnergyHistory, held_energy
 from chipglow.cutting.flow_stress import Flow
 from chipglow.cutting.heat import ToolHeat, conduct, conduct_tool, heat_contact, return_heat
 from chipglow.cutting.heat import tool_fraction as fraction_of_tool
-from chipglow.cutting.material import AISI_1045, CARBIDE, ToolMaterial, WorkpieceMaterial
+from chipglow.cutting.library import AISI_1045, CARBIDE
+from chipglow.cutting.material import ToolMaterial, WorkpieceMaterial
 from chipglow.cutting.momentum import (
     BOUNDARY_WORK,
     CONTACT_WORK,

@@ -1,12 +1,13 @@
 """Running a study: the cut (or the scene that was cut before), the camera, the analysis."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from json import dumps
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 from chipglow.analysis.paper import StudyResult, analyse
-from chipglow.cutting import SOLVER_VERSION
+from chipglow.cutting import SOLVER_VERSION, ToolMaterial, WorkpieceMaterial
 from chipglow.io import SceneWriter, open_scene
 from chipglow.scene import SceneError
 from chipglow.study.cache import scene_path
@@ -69,11 +70,19 @@ def run(study: Study, progress: Progress | None = None) -> StudyResult:
 
 def _inputs(study: Study) -> dict[str, Any]:
     """All that a scene depends on."""
+    simulation = study.cutting.simulation()
     return {
         "cutting": study.cutting.model_dump(),
+        "workpiece": _numbers(simulation.workpiece),
+        "tool": _numbers(simulation.tool_material),
         "solver": SOLVER_VERSION,
         "format": SCENE_FORMAT,
     }
+
+
+def _numbers(material: WorkpieceMaterial | ToolMaterial) -> dict[str, Any]:
+    """All that a material's file may change but its name."""
+    return {key: value for key, value in asdict(material).items() if key != "name"}
 
 
 def _is_whole(path: Path) -> bool:

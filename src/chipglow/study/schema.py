@@ -28,15 +28,15 @@ from chipglow.camera import (
     PointSpreadFunction,
 )
 from chipglow.cutting import (
-    AISI_1045,
-    CARBIDE,
     CuttingConditions,
     CuttingSimulation,
     Friction,
     Numerics,
     OutputWindow,
-    ToolMaterial,
-    WorkpieceMaterial,
+    is_own_file,
+    material_names,
+    tool_material,
+    workpiece,
 )
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, ToolGeometry
@@ -54,10 +54,6 @@ from chipglow.study.units import (
 )
 from chipglow.surface import CHIP_1, CHIP_2, Emissivity, FeatureSurface
 
-WORKPIECES: Final[Mapping[str, WorkpieceMaterial]] = {"aisi-1045": AISI_1045}
-"""Materials of the workpiece by the names of a study."""
-TOOL_MATERIALS: Final[Mapping[str, ToolMaterial]] = {"carbide": CARBIDE}
-"""Materials of the tool by the names of a study."""
 CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2}
 """Chips of the paper's Table 1 by the names of a study."""
 
@@ -120,12 +116,13 @@ class ToolSection(Part):
     rake_angle: Angle = _field("-7 deg", "Rake angle; negative: the rake face leans over the chip.")
     clearance_angle: Angle = _field("7 deg", "Angle between the tool's flank and the cut surface.")
     edge_radius: Length = _field("20 um", "Radius of the cutting edge.")
-    material: str = _field("carbide", f"Material of the tool: {', '.join(TOOL_MATERIALS)}.")
+    material: str = _field("carbide", f"Material of the tool: {', '.join(material_names('tool'))}.")
 
     @field_validator("material")
     @classmethod
     def _known(cls, name: str) -> str:
-        return _known_name(name, TOOL_MATERIALS)
+        tool_material(name)
+        return name
 
     def build(self) -> ToolGeometry:
         """The tool's outline."""
@@ -198,7 +195,12 @@ class CuttingSection(Part):
     feed: CutLength = _field("0.3 mm", "Feed: thickness of the uncut chip.")
     length_of_cut: CutLength = _field("1.958 mm", "Length of cut, from the first contact.")
     initial_temperature: Temperature = _field("20 degC", "Temperature before the cut.")
-    workpiece: str = _field("aisi-1045", f"Material of the workpiece: {', '.join(WORKPIECES)}.")
+    workpiece: str = _field(
+        "aisi-1045",
+        f"Material of the workpiece: {', '.join(material_names('workpiece'))},\n"
+        "with one of its sets of the flow stress after a slash (aisi-1045/ozel), or a file of\n"
+        "your own (steel.yaml). The command chipglow materials shows them.",
+    )
     tool: ToolSection = _field({}, "The cutting tool.")
     friction: FrictionSection = _field({}, "Friction between chip and tool.")
     numerics: NumericsSection = _field({}, "How finely the cut is computed.")
@@ -209,8 +211,14 @@ class CuttingSection(Part):
 
     @field_validator("workpiece")
     @classmethod
-    def _known(cls, name: str) -> str:
-        return _known_name(name, WORKPIECES)
+    def _known(cls, name: str, info: ValidationInfo) -> str:
+        if is_own_file(name):
+            name = str(Path((info.context or {}).get("folder") or ".", name).resolve())
+        try:
+            workpiece(name)
+        except OSError as error:
+            raise ValueError(f"{name!r}: {error.strerror}, expected a material's file") from None
+        return name
 
     @model_validator(mode="after")
     def _window_within_cut(self) -> Self:
@@ -240,8 +248,8 @@ class CuttingSection(Part):
         return CuttingSimulation(
             conditions=self.build(),
             tool=self.tool.build(),
-            workpiece=WORKPIECES[self.workpiece],
-            tool_material=TOOL_MATERIALS[self.tool.material],
+            workpiece=workpiece(self.workpiece),
+            tool_material=tool_material(self.tool.material),
             friction=self.friction.build(),
             numerics=self.numerics.build(),
         )

@@ -1,0 +1,377 @@
+"""Materials as data files, each number with its unit and its source."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import yaml
+
+from chipglow.cutting.material import (
+    DamageSoftening,
+    JohnsonCook,
+    TemperatureTable,
+    ToolMaterial,
+    WorkpieceMaterial,
+)
+
+FOLDER: Final = Path(__file__).with_name("materials")
+_LARGEST_FILE: Final = 100_000
+
+
+class MaterialError(ValueError):
+    """A material that cannot be used: the message names file, field, value and expectation."""
+
+
+class Property(NamedTuple):
+    """A number of a material as its file gives it.
+
+    The field (``flow_stress.ozel.hardening``), its value as text with the unit, and its source.
+    """
+
+    field: str
+    text: str
+    source: str
+
+
+@dataclass(frozen=True)
+class MaterialFile:
+    """What a file of the library says.
+
+    Parameters
+    ----------
+    name, description : str
+        Of the material, for readers.
+    properties : tuple of Property
+        All numbers, in the file's order.
+    workpieces : mapping of str to WorkpieceMaterial
+        The workpiece's material by the set of its flow stress, the default first; empty for a tool.
+    tool : ToolMaterial or None
+        The tool's material.
+    """
+
+    name: str
+    description: str
+    properties: tuple[Property, ...]
+    workpieces: Mapping[str, WorkpieceMaterial]
+    tool: ToolMaterial | None
+
+
+class _Quantity(NamedTuple):
+    expectation: str
+    units: Mapping[str, tuple[str, str]]
+
+
+def _quantity(**factors: str) -> Mapping[str, tuple[str, str]]:
+    return {unit: (factor, "0") for unit, factor in factors.items()}
+
+
+_STRESS: Final = _Quantity(
+    "a stress such as 553.1 MPa or 205 GPa", _quantity(Pa="1", MPa="1e6", GPa="1e9")
+)
+_TEMPERATURE: Final = _Quantity(
+    "a temperature such as 1733 K or 20 degC", {"K": ("1", "0"), "degC": ("1", "273.15")}
+)
+_RATE: Final = _Quantity("a strain rate such as 1 1/s", {"1/s": ("1", "0")})
+_DENSITY: Final = _Quantity("a density such as 7850 kg/m3", {"kg/m3": ("1", "0")})
+_CONDUCTIVITY: Final = _Quantity(
+    "a conductivity such as 45 W/(m K)", {"W/(m K)": ("1", "0"), "W/m/K": ("1", "0")}
+)
+_HEAT_CAPACITY: Final = _Quantity(
+    "a heat capacity such as 480 J/(kg K)", {"J/(kg K)": ("1", "0"), "J/kg/K": ("1", "0")}
+)
+_NUMBER: Final = _Quantity("a number without a unit", {"": ("1", "0")})
+
+_FLOW_STRESS: Final = {
+    "yield_stress": _STRESS,
+    "hardening": _STRESS,
+    "hardening_exponent": _NUMBER,
+    "rate_sensitivity": _NUMBER,
+    "thermal_exponent": _NUMBER,
+    "melting_temperature": _TEMPERATURE,
+    "reference_temperature": _TEMPERATURE,
+    "reference_rate": _RATE,
+}
+_DAMAGE: Final = dict.fromkeys(("d1", "d2", "d3", "d4", "d5", "onset", "loss"), _NUMBER)
+_SCALARS: Final = {
+    "workpiece": {
+        "density": _DENSITY,
+        "young_modulus": _STRESS,
+        "poisson_ratio": _NUMBER,
+        "taylor_quinney": _NUMBER,
+    },
+    "tool": {
+        "density": _DENSITY,
+        "conductivity": _CONDUCTIVITY,
+        "heat_capacity": _HEAT_CAPACITY,
+    },
+}
+_TABLES: Final = {"conductivity": _CONDUCTIVITY, "heat_capacity": _HEAT_CAPACITY}
+_HEADER: Final = ("kind", "name", "description")
+_VALUE: Final = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?:\s+(\S.*))?")
+_OWN_FILE: Final = re.compile(r"(.+\.ya?ml)(?:/([^/]+))?")
+
+
+def material_names(kind: str | None = None) -> list[str]:
+    """Names of the library's materials.
+
+    Parameters
+    ----------
+    kind : {'workpiece', 'tool'}, optional
+        Only these.
+    """
+    names = sorted(path.stem for path in FOLDER.glob("*.yaml"))
+    return [n for n in names if kind is None or _is_tool(n) == (kind == "tool")]
+
+
+def is_own_file(name: str) -> bool:
+    """Whether a name is the path of a file of one's own, with or without a set."""
+    return _OWN_FILE.fullmatch(name) is not None
+
+
+def workpiece(name: str) -> WorkpieceMaterial:
+    """Material of a workpiece.
+
+    Parameters
+    ----------
+    name : str
+        A name of the library (``aisi-1045``), or the path of a file of one's own that ends in
+        .yaml; with a set of the flow stress after a slash (``aisi-1045/ozel``) or with the file's
+        first.
+
+    Raises
+    ------
+    MaterialError
+        If there is no such material, or its file is not as it should be.
+    OSError
+        If a file of one's own cannot be read.
+    """
+    own = _OWN_FILE.fullmatch(name)
+    file, chosen = (own[1], own[2]) if own else (name.split("/")[0], _after_slash(name))
+    if not own and file not in material_names("workpiece"):
+        known = ", ".join(material_names("workpiece"))
+        raise MaterialError(f"{name!r} is unknown, expected one of {known}, or a file like my.yaml")
+    sets = material_file(file).workpieces
+    if not sets:
+        raise MaterialError(f"{file}: kind: 'tool', expected workpiece")
+    if chosen is None:
+        return next(iter(sets.values()))
+    if chosen not in sets:
+        raise MaterialError(f"{file}: {chosen!r} is no set, expected one of {', '.join(sets)}")
+    return sets[chosen]
+
+
+def tool_material(name: str) -> ToolMaterial:
+    """Material of a tool by its name in the library, such as ``carbide``.
+
+    Raises
+    ------
+    MaterialError
+        If there is none of that name.
+    """
+    known = material_names("tool")
+    if name not in known:
+        raise MaterialError(f"{name!r} is unknown, expected one of {', '.join(known)}")
+    tool = material_file(name).tool
+    assert tool is not None
+    return tool
+
+
+def material_file(name: str) -> MaterialFile:
+    """Read a material's file, by its name in the library or by a path that ends in .yaml.
+
+    Raises
+    ------
+    MaterialError
+        If the name is unknown or the file is not as it should be.
+    OSError
+        If a file of one's own cannot be read.
+    """
+    if _OWN_FILE.fullmatch(name):
+        return read_material(Path(name))
+    if name not in material_names():
+        raise MaterialError(f"{name!r} is unknown, expected one of {', '.join(material_names())}")
+    return _of_library(name)
+
+
+def read_material(path: Path) -> MaterialFile:
+    """Read a material from a file.
+
+    Raises
+    ------
+    MaterialError
+        If the file is not as it should be: unknown or missing field, value without its unit.
+    OSError
+        If it cannot be read.
+    """
+    if path.stat().st_size > _LARGEST_FILE:
+        raise MaterialError(f"{path.name}: expected a material of up to {_LARGEST_FILE // 1000} kB")
+    try:
+        data = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+    except UnicodeDecodeError:
+        raise MaterialError(f"{path.name}: expected text in UTF-8") from None
+    except (yaml.YAMLError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f"line {mark.line + 1}: " if mark else ""
+        problem = getattr(error, "problem", None) or "is no YAML"
+        raise MaterialError(f"{path.name}: {place}{problem}, expected YAML") from None
+    return _Reader(path.name).material(data)
+
+
+def _after_slash(name: str) -> str | None:
+    _, slash, rest = name.partition("/")
+    return rest if slash else None
+
+
+@cache
+def _of_library(name: str) -> MaterialFile:
+    return read_material(FOLDER / f"{name}.yaml")
+
+
+def _is_tool(name: str) -> bool:
+    return _of_library(name).tool is not None
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML in which no key is twice in a mapping."""
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+        for key in keys:
+            if keys.count(key) > 1:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"key {key!r} is there twice", node.start_mark
+                )
+        return super().construct_mapping(node, deep=deep)
+
+
+class _Reader:
+    """Takes a file's data apart and keeps all its numbers as text."""
+
+    def __init__(self, file: str) -> None:
+        self._file = file
+        self._properties: list[Property] = []
+
+    def material(self, data: object) -> MaterialFile:
+        kind = data.get("kind") if isinstance(data, Mapping) else None
+        if kind not in ("workpiece", "tool"):
+            raise self._wrong("kind", kind, "workpiece or tool")
+        scalars = _SCALARS[kind]
+        parts = () if kind == "tool" else (*_TABLES, "flow_stress", "damage")
+        data = self._mapping("", data, (*_HEADER, *scalars, *parts))
+        name, description = self._text("name", data), self._text("description", data)
+        numbers = {
+            key: self._sourced(key, data[key], quantity) for key, quantity in scalars.items()
+        }
+        sets: dict[str, WorkpieceMaterial] = {}
+        tool: ToolMaterial | None = None
+        if kind == "workpiece":
+            sets = self._workpieces(name, data, numbers)
+        else:
+            tool = self._build("tool", ToolMaterial, {"name": name, **numbers})
+        return MaterialFile(name, description, tuple(self._properties), sets, tool)
+
+    def _workpieces(
+        self, name: str, data: Mapping[str, Any], numbers: Mapping[str, float]
+    ) -> dict[str, WorkpieceMaterial]:
+        tables = {key: self._table(key, data[key], quantity) for key, quantity in _TABLES.items()}
+        damage = self._group("damage", data["damage"], _DAMAGE)
+        softening = self._build("damage", DamageSoftening, damage)
+        laws = data["flow_stress"]
+        if not isinstance(laws, Mapping) or not laws:
+            raise self._wrong("flow_stress", laws, "one set or more by name")
+        sets = {}
+        for chosen, law in laws.items():
+            place = f"flow_stress.{chosen}"
+            johnson_cook = self._build(place, JohnsonCook, self._group(place, law, _FLOW_STRESS))
+            fields = {
+                "name": f"{name}, flow stress {chosen}",
+                "flow_stress": johnson_cook,
+                "softening": softening,
+                **numbers,
+                **tables,
+            }
+            sets[str(chosen)] = self._build("workpiece", WorkpieceMaterial, fields)
+        return sets
+
+    def _build(self, place: str, kind: Any, fields: Mapping[str, Any]) -> Any:
+        try:
+            return kind(**fields)
+        except ValueError as error:
+            raise MaterialError(f"{self._file}: {place}: {error}") from None
+
+    def _group(
+        self, place: str, data: object, quantities: Mapping[str, _Quantity]
+    ) -> dict[str, float]:
+        """Numbers that share one source."""
+        data = self._mapping(place, data, (*quantities, "source"))
+        source = self._text(f"{place}.source", data)
+        return {
+            key: self._number(f"{place}.{key}", data[key], quantity, source)
+            for key, quantity in quantities.items()
+        }
+
+    def _sourced(self, place: str, data: object, quantity: _Quantity) -> float:
+        data = self._mapping(place, data, ("value", "source"))
+        source = self._text(f"{place}.source", data)
+        return self._number(place, data["value"], quantity, source)
+
+    def _table(self, place: str, data: object, quantity: _Quantity) -> TemperatureTable:
+        data = self._mapping(place, data, ("value", "source"))
+        source, rows = self._text(f"{place}.source", data), data["value"]
+        if not isinstance(rows, list) or not rows:
+            raise self._wrong(place, rows, "rows of [temperature, value]")
+        pairs = []
+        for row in rows:
+            if not isinstance(row, list) or len(row) != 2:
+                raise self._wrong(place, row, "[temperature, value]")
+            temperature = self._si(place, row[0], _TEMPERATURE)
+            pairs.append((temperature, self._si(place, row[1], quantity)))
+            self._properties.append(Property(place, f"{row[1]} at {row[0]}", source))
+        temperatures, values = zip(*pairs, strict=True)
+        fields = {"temperatures": temperatures, "values": values}
+        table: TemperatureTable = self._build(place, TemperatureTable, fields)
+        return table
+
+    def _number(self, place: str, value: object, quantity: _Quantity, source: str) -> float:
+        number = self._si(place, value, quantity)
+        self._properties.append(Property(place, str(value), source))
+        return number
+
+    def _si(self, place: str, value: object, quantity: _Quantity) -> float:
+        """Value in SI units, rounded once: 553.1 MPa is 553.1e6 to the last bit."""
+        match = _VALUE.fullmatch(str(value).strip())
+        if not match or (match[2] or "") not in quantity.units:
+            raise self._wrong(place, value, quantity.expectation)
+        factor, offset = quantity.units[match[2] or ""]
+        return float(Decimal(match[1]) * Decimal(factor) + Decimal(offset))
+
+    def _mapping(self, place: str, data: object, keys: tuple[str, ...]) -> Mapping[str, Any]:
+        if not isinstance(data, Mapping):
+            raise self._wrong(place, data, f"keys {', '.join(keys)}")
+        prefix = f"{place}." if place else ""
+        for key in data:
+            if key not in keys:
+                raise MaterialError(
+                    f"{self._file}: {prefix}{key}: unknown, expected one of {', '.join(keys)}"
+                )
+        for key in keys:
+            if key not in data:
+                raise MaterialError(f"{self._file}: {prefix}{key}: is missing, expected a value")
+        return data
+
+    def _text(self, place: str, data: Mapping[str, Any]) -> str:
+        text = data[place.rpartition(".")[2]]
+        if not isinstance(text, str) or not text.strip():
+            raise self._wrong(place, text, "text")
+        return text.strip()
+
+    def _wrong(self, place: str, value: object, expectation: str) -> MaterialError:
+        return MaterialError(f"{self._file}: {place}: {value!r}, expected {expectation}")
+
+
+AISI_1045: Final = workpiece("aisi-1045")
+CARBIDE: Final = tool_material("carbide")

@@ -1,0 +1,223 @@
+import json
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from chipglow.cli.app import app
+from chipglow.cutting import (
+    AISI_1045,
+    CARBIDE,
+    DamageSoftening,
+    MaterialError,
+    TemperatureTable,
+    material_file,
+    material_names,
+    tool_material,
+    workpiece,
+)
+from chipglow.cutting.flow_stress import Flow, flow_stress, strain_to_failure
+from chipglow.cutting.library import FOLDER, read_material
+from chipglow.study import Study, load_study
+from chipglow.study.running import _inputs
+
+SETS = [
+    f"{name}/{chosen}"
+    for name in material_names("workpiece")
+    for chosen in material_file(name).workpieces
+]
+
+
+def test_default_material_is_unchanged() -> None:
+    """Exactly: these numbers decide the results of the paper's study."""
+    assert AISI_1045 == workpiece("aisi-1045") == workpiece("aisi-1045/jaspers-dautzenberg")
+    assert asdict(AISI_1045) | {"name": ""} == {
+        "name": "",
+        "density": 7850.0,
+        "young_modulus": 205e9,
+        "poisson_ratio": 0.29,
+        "flow_stress": {
+            "yield_stress": 553.1e6,
+            "hardening": 600.8e6,
+            "hardening_exponent": 0.234,
+            "rate_sensitivity": 0.0134,
+            "thermal_exponent": 1.0,
+            "melting_temperature": 1733.0,
+            "reference_temperature": 293.0,
+            "reference_rate": 1.0,
+        },
+        "softening": asdict(
+            DamageSoftening(0.018, 0.993, -1.96, 0.0018, 0.58, onset=0.15, loss=0.7)
+        ),
+        "conductivity": asdict(TemperatureTable((273.15, 1173.15), (52.61, 27.32))),
+        "heat_capacity": asdict(TemperatureTable((273.15, 1173.15), (420.0, 873.6))),
+        "taylor_quinney": 0.9,
+    }
+    assert (CARBIDE.density, CARBIDE.conductivity, CARBIDE.heat_capacity) == (14900, 80, 230)
+
+
+@pytest.mark.parametrize(
+    ("name", "strain", "rate", "temperature", "by_hand"),
+    [
+        # 1153.9 MPa × (1 + 0.0134 × 9.21034) × (1 − (1013 − 293) / 1440), half way to melting
+        ("aisi-1045/jaspers-dautzenberg", 1.0, 1e4, 1013.0, 648.156e6),
+        # 1220 MPa × (1 + 0.059 × 6.90776); ε = 1 leaves A + B, T₀ leaves the thermal factor 1
+        ("al-7075-t6/brar", 1.0, 1e3, 293.0, 1717.22e6),
+        # 1281.1 MPa × (1 + 0.028 × ln 1e9 = 20.7233) × (1 − (1085.5 − 298) / 1575)
+        ("ti-6al-4v/lee-lin", 1.0, 1e4, 1085.5, 1012.23e6),
+    ],
+)
+def test_flow_stress_by_hand(
+    name: str, strain: float, rate: float, temperature: float, by_hand: float
+) -> None:
+    flow = Flow.of(workpiece(name))
+    # Six digits of the hand calculation.
+    assert flow_stress(strain, rate, temperature, 0.0, flow) == pytest.approx(by_hand, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_workpieces_are_physical(name: str) -> None:
+    material = workpiece(name)
+    law, flow = material.flow_stress, Flow.of(material)
+    assert 2000 < material.density < 10000
+    assert 50e9 < material.young_modulus < 250e9
+    assert 0.25 < material.poisson_ratio < 0.4
+    assert 100e6 < law.yield_stress < 2e9
+    assert 850 < law.melting_temperature < 2000
+    assert 250 <= law.reference_temperature < 310
+    hot = np.linspace(300.0, law.melting_temperature, 50)
+    assert np.all((material.conductivity.at(hot) > 5) & (material.conductivity.at(hot) < 200))
+    assert np.all((material.heat_capacity.at(hot) > 400) & (material.heat_capacity.at(hot) < 1200))
+    for triaxiality in (-5.0, -1.5, 0.0, 1.5, 5.0):
+        for temperature in (293.0, law.melting_temperature):
+            assert strain_to_failure(triaxiality, 1e5, temperature, flow) > 0
+
+
+@pytest.mark.parametrize("name", material_names("tool"))
+def test_tools_are_physical(name: str) -> None:
+    tool = tool_material(name)
+    assert 3000 < tool.density < 16000
+    assert 10 < tool.conductivity < 130
+    assert 200 < tool.heat_capacity < 1000
+
+
+@pytest.mark.parametrize("name", material_names())
+def test_every_number_has_unit_and_source(name: str) -> None:
+    file = material_file(name)
+    assert file.properties and file.name and file.description
+    assert all(len(number.source) > 10 for number in file.properties)
+    assert (file.tool is None) == bool(file.workpieces)
+
+
+def test_the_rooms_data_are_files_of_the_package() -> None:
+    assert len(list(FOLDER.glob("*.yaml"))) == len(material_names()) == 8
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("cheese", "'cheese' is unknown, expected one of aisi-1045, aisi-4140"),
+        ("aisi-1045/cheese", "aisi-1045: 'cheese' is no set, expected one of jaspers-dautzenberg"),
+        ("aisi-1045/", "aisi-1045: '' is no set"),
+        ("carbide", "'carbide' is unknown, expected one of aisi-1045"),
+        ("../materials/aisi-1045", "'../materials/aisi-1045' is unknown"),
+    ],
+)
+def test_unknown_names(name: str, message: str) -> None:
+    with pytest.raises(MaterialError) as raised:
+        workpiece(name)
+    assert message in str(raised.value)
+
+
+def _write(path: Path, old: str, new: str) -> Path:
+    text = (FOLDER / "aisi-4140.yaml").read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("210 GPa", "210", "young_modulus: 210, expected a stress such as 553.1 MPa or 205 GPa"),
+        ("210 GPa", "210 kg", "young_modulus: '210 kg', expected a stress"),
+        ("210 GPa", "true GPa", "young_modulus: 'true GPa', expected a stress"),
+        ("210 GPa", ".nan GPa", "young_modulus: '.nan GPa', expected a stress"),
+        ("value: 0.3\n", "value: 0.6\n", "workpiece: poisson_ratio: expected 0 to 0.49, got 0.6"),
+        ("poisson_ratio", "poison_ratio", "poison_ratio: unknown, expected one of kind, name"),
+        ("    hardening: 580 MPa\n", "", "flow_stress.pantale.hardening: is missing"),
+        ("d3: -2.12", "d3: steep", "damage.d3: 'steep', expected a number without a unit"),
+        ("d2: 3.44", "d2: -3.44", "damage: damage: d1 + d2 exp(d3 triaxiality) falls to"),
+        ("kind: workpiece", "kind: chip", "kind: 'chip', expected workpiece or tool"),
+        ("- [200 degC", "- [50 degC", "conductivity: temperature table: temperatures must ascend"),
+        ("[200 degC, 42.3 W/(m K)]", "42.3 W/(m K)", "expected [temperature, value]"),
+        ("[200 degC, 42.3", "[200, 42.3", "conductivity: 200, expected a temperature"),
+        ("  onset: 0.15\n", "  onset: 0.15\n  onset: 0.2\n", "key 'onset' is there twice"),
+        ("kind: workpiece", "kind: [", "expected YAML"),
+        ("kind: workpiece", "kind: !!python/object:os.system x", "expected YAML"),
+    ],
+)
+def test_faults_name_file_field_value_and_expectation(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    path = _write(tmp_path / "steel.yaml", old, new)
+    with pytest.raises(MaterialError) as raised:
+        read_material(path)
+    assert str(raised.value).startswith("steel.yaml: ")
+    assert message in str(raised.value)
+
+
+def test_a_number_needs_a_source(tmp_path: Path) -> None:
+    data = yaml.safe_load((FOLDER / "ceramic.yaml").read_text(encoding="utf-8"))
+    del data["density"]["source"]
+    (tmp_path / "tool.yaml").write_text(yaml.safe_dump(data), encoding="utf-8")
+    with pytest.raises(MaterialError, match=r"density\.source: is missing, expected a value"):
+        read_material(tmp_path / "tool.yaml")
+
+
+def test_a_study_takes_a_file_beside_it(tmp_path: Path) -> None:
+    _write(tmp_path / "steel.yaml", "210 GPa", "200 GPa")
+    for name in ("steel.yaml", "steel.yaml/pantale"):
+        (tmp_path / "study.yaml").write_text(f"cutting: {{workpiece: {name}}}")
+        cutting = load_study(tmp_path / "study.yaml").cutting
+        assert cutting.simulation().workpiece.young_modulus == 200e9
+
+
+def test_the_cache_knows_a_materials_numbers(tmp_path: Path) -> None:
+    path = _write(tmp_path / "steel.yaml", "210 GPa", "200 GPa")
+    study = Study.model_validate({"cutting": {"workpiece": str(path)}})
+    before = json.dumps(_inputs(study))
+    path.write_text(path.read_text(encoding="utf-8").replace("name: AISI", "name: my"))
+    assert json.dumps(_inputs(study)) == before
+    _write(path, "210 GPa", "201 GPa")
+    assert json.dumps(_inputs(study)) != before
+
+
+def test_a_study_chooses_a_set() -> None:
+    study = Study.model_validate({"cutting": {"workpiece": "aisi-1045/ozel"}})
+    ozel = study.cutting.simulation().workpiece
+    assert ozel.flow_stress.yield_stress == 451.6e6
+    assert replace(ozel, name="", flow_stress=AISI_1045.flow_stress) == replace(AISI_1045, name="")
+
+
+def test_command_lists_and_shows() -> None:
+    listed = CliRunner().invoke(app, ["materials"])
+    assert listed.exit_code == 0
+    assert all(name in listed.output for name in material_names())
+    shown = CliRunner().invoke(app, ["materials", "aisi-1045"])
+    assert shown.exit_code == 0
+    for text in ("flow_stress.ozel.hardening", "553.1 MPa", "27.32 W/(m K) at 900 degC", "Oxley"):
+        assert text in shown.output
+
+
+def test_command_draws(tmp_path: Path) -> None:
+    path = tmp_path / "steel.png"
+    result = CliRunner().invoke(app, ["materials", "al-7075-t6", "--plot", str(path)])
+    assert result.exit_code == 0
+    assert path.read_bytes().startswith(b"\x89PNG")
+    assert CliRunner().invoke(app, ["materials", "carbide", "--plot", str(path)]).exit_code == 2
+    assert CliRunner().invoke(app, ["materials", "cheese"]).exit_code == 2
+    assert CliRunner().invoke(app, ["materials", "--plot", str(path)]).exit_code == 2
