@@ -49,7 +49,9 @@ def runs(monkeypatch, chip_scene):
     """The cutting simulation replaced by a chip in closed form."""
     calls = []
 
-    def cut_chip(simulation, window, raster, on_frame, on_progress=None):
+    def cut_chip(
+        simulation, window, raster, on_frame, on_progress=None, resume=None, on_checkpoint=None
+    ):
         calls.append(simulation)
         for frame in chip_scene.frames():
             on_frame(frame)
@@ -161,13 +163,13 @@ def test_a_second_run_finds_the_scene_and_replaces_the_results(earlier_results, 
 def test_reproduce_runs_the_papers_study(folder, monkeypatch):
     seen = []
 
-    def note(study, out):
-        seen.append((study, str(out)))
+    def note(study, out, resume):
+        seen.append((study, str(out), resume))
 
     monkeypatch.setattr("chipglow.cli.results.write_results", note)
     assert chipglow("reproduce").exit_code == 0
-    assert chipglow("reproduce", "--quick", "--out", "quick").exit_code == 0
-    assert seen == [(Study(), "chipglow-paper"), (Study.quick(), "quick")]
+    assert chipglow("reproduce", "--quick", "--out", "quick", "--resume").exit_code == 0
+    assert seen == [(Study(), "chipglow-paper", False), (Study.quick(), "quick", True)]
 
 
 def test_a_foreign_folder_is_refused_before_anything_is_computed(folder, runs):

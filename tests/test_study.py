@@ -1,6 +1,5 @@
 import os
 import threading
-import time
 from dataclasses import replace
 from math import isfinite, radians
 from pathlib import Path
@@ -22,6 +21,7 @@ from chipglow.cutting import (
     OutputWindow,
 )
 from chipglow.io import open_scene
+from chipglow.io.atomic import KeptErrorFile
 from chipglow.scene import ToolGeometry
 from chipglow.study import (
     Study,
@@ -407,7 +407,9 @@ def runs(monkeypatch):
     chip = AnalyticChip(frames=3)
     calls = []
 
-    def cut_chip(simulation, window, raster, on_frame, on_progress=None):
+    def cut_chip(
+        simulation, window, raster, on_frame, on_progress=None, resume=None, on_checkpoint=None
+    ):
         calls.append(simulation)
         for frame in chip.scene().frames():
             on_frame(frame)
@@ -490,16 +492,17 @@ def test_the_cache_is_listed_and_cleared(cache, runs):
     assert [path.name for path in cache.iterdir()] == ["notes.txt"]
 
 
-def test_what_a_killed_run_left_is_cleared_after_a_day(cache):
+def test_what_ended_runs_left_is_cleared_and_what_runs_stays(cache):
     cache.mkdir()
-    parts = {"old": 2 * 86400, "running": 600}
-    for name, age in parts.items():
-        path = cache / f".scene-{name}.0123abcd.part.nc"
+    part = cache / ".scene-ended.0123abcd.part.nc"
+    for path in (part, part.with_suffix(".npz"), cache / ".scene-other.89ab4567.part.npz"):
         path.write_bytes(b"x" * 10)
-        os.utime(path, (time.time() - age,) * 2)
-    assert [scene.path.name for scene in cached_scenes()] == [".scene-old.0123abcd.part.nc"]
+    with KeptErrorFile(cache / ".scene-running.0123abcd.part.nc") as running:
+        running.write(b"x" * 10)
+        assert [scene.path for scene in cached_scenes()] == [part]
+        assert clear_cache() == 20
+        assert [path.name for path in cache.iterdir()] == [".scene-running.0123abcd.part.nc"]
     assert clear_cache() == 10
-    assert [path.name for path in cache.iterdir()] == [".scene-running.0123abcd.part.nc"]
 
 
 def test_a_failed_cut_leaves_nothing_in_the_cache(cache, monkeypatch):

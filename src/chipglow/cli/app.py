@@ -26,6 +26,9 @@ StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="The study, a Y
 ResultFolder = Annotated[
     Path, typer.Option(metavar="DIR", help="Folder of the results; earlier results are replaced.")
 ]
+Resume = Annotated[
+    bool, typer.Option("--resume", help="Go on with the same cut where an earlier run was ended.")
+]
 
 
 def main() -> None:
@@ -63,12 +66,13 @@ def reproduce(
         bool, typer.Option("--quick", help="On a coarse cell and coarse samples, in a minute.")
     ] = False,
     out: ResultFolder = PAPER_FOLDER,
+    resume: Resume = False,
 ) -> None:
     """Do the paper's study anew and set its figures beside the paper's."""
     from chipglow.cli.results import write_results
     from chipglow.study import Study
 
-    write_results(Study.quick() if quick else Study(), out)
+    write_results(Study.quick() if quick else Study(), out, resume)
 
 
 @app.command()
@@ -90,30 +94,33 @@ def init(
 
 
 @app.command()
-def run(study: StudyFile, out: ResultFolder) -> None:
+def run(study: StudyFile, out: ResultFolder, resume: Resume = False) -> None:
     """Run a study: cut, look, analyse, report."""
     from chipglow.cli.results import write_results
     from chipglow.study import load_study
 
-    write_results(load_study(study), out)
+    write_results(load_study(study), out, resume)
 
 
 @app.command()
 def cut(
     study: StudyFile,
     out: Annotated[Path, typer.Option(metavar="FILE", help="The scene to write, NetCDF.")],
+    resume: Resume = False,
 ) -> None:
     """Do only the cutting simulation of a study."""
     from shutil import copyfile
 
-    from chipglow.cli.progress import progress_bars
+    from chipglow.cli.progress import progress_bars, say_where_it_starts
     from chipglow.io import atomic_path
     from chipglow.study import cut as cut_scene
     from chipglow.study import load_study
 
     settings = load_study(study)
-    with atomic_path(out) as temporary, progress_bars() as progress:
-        copyfile(cut_scene(settings, progress), temporary)
+    with atomic_path(out) as temporary:
+        say_where_it_starts(settings, resume)
+        with progress_bars() as progress:
+            copyfile(cut_scene(settings, progress, resume), temporary)
     print(out)
 
 

@@ -26,8 +26,9 @@ class Boundary(TyperGroup):
             raise
         except (ValueError, OSError) as error:
             raise _ended(_one_line(error), BAD_INPUT) from None
-        except KeyboardInterrupt:
-            raise _ended("interrupted, nothing was written", INTERRUPTED) from None
+        except KeyboardInterrupt as error:
+            kept = f"{error}: --resume goes on from there" if str(error) else "nothing was written"
+            raise _ended(f"interrupted, {kept}", INTERRUPTED) from None
         except RuntimeError as error:
             from chipglow.cutting import SolverError
 

@@ -1,4 +1,4 @@
-"""Progress bars on the terminal."""
+"""Where a run starts and how far it is, on the terminal."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +15,23 @@ from rich.progress import (
 )
 
 from chipglow.study import Progress as Report
+from chipglow.study import Study, is_cut, kept_progress
+
+
+def say_where_it_starts(study: Study, resume: bool) -> None:
+    """Say on stderr what earlier runs of the same cut left, and whether it is used."""
+    console = Console(stderr=True)
+    if is_cut(study):
+        console.print("The cut was computed before: its scene comes from the cache.")
+    elif kept := kept_progress(study):
+        console.print(
+            f"The cut goes on at {kept:.0%}, where an earlier run was ended."
+            if resume
+            else f"An earlier run was ended at {kept:.0%} of this cut. This one starts anew; "
+            "--resume goes on from there."
+        )
+    elif resume:
+        console.print("No earlier run left a state of this cut: it starts anew.")
 
 
 @contextmanager

@@ -9,14 +9,14 @@ from rich.console import Console
 from rich.table import Table
 
 from chipglow.analysis.paper import StudyResult
-from chipglow.cli.progress import progress_bars
+from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.cutting import SOLVER_VERSION
 from chipglow.io import atomic_folder
 from chipglow.report import comparison_rows, write_report
-from chipglow.study import Study, is_cut, run, study_text
+from chipglow.study import Study, run, study_text
 
 
-def write_results(study: Study, folder: Path) -> None:
+def write_results(study: Study, folder: Path, resume: bool) -> None:
     """Run a study, write its report and print the comparison with the paper.
 
     Parameters
@@ -26,13 +26,13 @@ def write_results(study: Study, folder: Path) -> None:
     folder : Path
         Folder of the results; appears when they are complete. One with other contents is refused
         before anything is computed.
+    resume : bool
+        Whether to go on with a cut that an earlier run left unfinished.
     """
-    console = Console(stderr=True)
     with atomic_folder(folder) as temporary:
-        if is_cut(study):
-            console.print("The cut was computed before: its scene comes from the cache.")
+        say_where_it_starts(study, resume)
         with progress_bars() as progress:
-            result = run(study, progress)
+            result = run(study, progress, resume)
             progress("report", 0.0)
             report = write_report(result, temporary, study_text(study), _provenance(study))
             progress("report", 1.0)

@@ -1,5 +1,6 @@
 """The embedded cutting simulation."""
 
+from chipglow.cutting.checkpoint import Checkpoint
 from chipglow.cutting.conditions import CuttingConditions, Friction, Numerics, OutputWindow
 from chipglow.cutting.energy import EnergyHistory
 from chipglow.cutting.library import (
@@ -31,6 +32,7 @@ __all__ = [
     "AISI_1045",
     "CARBIDE",
     "SOLVER_VERSION",
+    "Checkpoint",
     "CuttingConditions",
     "CuttingSimulation",
     "DamageSoftening",

@@ -9,6 +9,7 @@ import numpy as np
 from numba import get_num_threads
 from numpy.typing import NDArray
 
+from chipglow.cutting.checkpoint import Checkpoint, capture, restore
 from chipglow.cutting.conditions import CuttingConditions, Friction, Numerics, OutputWindow
 from chipglow.cutting.energy import ENERGIES, EnergyHistory, held_energy
 from chipglow.cutting.flow_stress import Flow
@@ -28,6 +29,7 @@ from chipglow.cutting.momentum import (
 )
 from chipglow.cutting.picture import Picture
 from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
+from chipglow.cutting.watch import Trouble, find_lost, find_off_grid, find_trouble
 from chipglow.scene import Frame, Raster, ToolGeometry
 from chipglow.scene.tool import wedge_distance
 
@@ -102,6 +104,8 @@ class CuttingSimulation:
         raster: Raster,
         on_frame: Callable[[Frame], None],
         on_progress: Callable[[float], None] | None = None,
+        resume: Checkpoint | None = None,
+        on_checkpoint: Callable[[Checkpoint], None] | None = None,
     ) -> ForceHistory:
         """Simulate the cut and hand over its frames.
 
@@ -115,6 +119,13 @@ class CuttingSimulation:
             Called with every frame of the window, in their order.
         on_progress : callable, optional
             Called with the share of the cut that is done, 0 to 1.
+        resume : Checkpoint, optional
+            Go on from here, after an earlier run of the same simulation with the same window: the
+            results are those of an unbroken run to the last bit. Only the frames that are still
+            to come are handed over.
+        on_checkpoint : callable, optional
+            Called with the state after every interval, when its frame was handed over. The arrays
+            are the simulation's own: write or copy them before you return.
 
         Returns
         -------
@@ -124,7 +135,8 @@ class CuttingSimulation:
         Raises
         ------
         ValueError
-            If the window or the raster reaches beyond what is simulated.
+            If the window or the raster reaches beyond what is simulated, or the checkpoint is of
+            another simulation.
         SolverError
             If the simulation goes wrong.
         """
@@ -140,11 +152,14 @@ class CuttingSimulation:
         )
         first, last = self.frame_range(window)
         records = np.empty((last, 2 + ENERGIES))
-        for record in range(1, last + 1):
+        done = restore(state, resume, records) if resume is not None else 0
+        for record in range(done + 1, last + 1):
             records[record - 1] = state.advance()
             if record >= first:
                 on_frame(state.frame(picture))
             state.mark()
+            if on_checkpoint is not None:
+                on_checkpoint(capture(state, records[:record], record / last))
             if on_progress is not None:
                 on_progress(record / last)
         time = window.interval * np.arange(1, last + 1, dtype=np.float64)
@@ -278,9 +293,13 @@ class _State:
         )
         if count < 0:
             self._fail("a point's position is not finite", -1 - count)
+        if count < self.count:
+            points = self.points[: self.count]
+            self._stop_at(find_lost(points, self.grid, self.step.ceiling))
         self.points, self.spare = self.spare, self.points
         self.count = count
 
+    @np.errstate(invalid="ignore", over="ignore")  # `find_trouble` finds what is not finite
     def advance(self) -> NDArray[np.float64]:
         """Advance by one interval; mean forces in N/m, then the energies of `EnergyHistory`."""
         sums = np.zeros_like(self.work)
@@ -306,9 +325,9 @@ class _State:
             )
             self.time += self.cycle
             if not good:
-                lost = ~np.isfinite(self.points["x"][: self.count])
-                self._fail("a point left the grid", int(np.argmax(lost)))
+                self._stop_at(find_off_grid(self.points[: self.count], self.grid))
             self._conduct()
+        self._stop_at(find_trouble(self.points[: self.count], self.grid.cell / self.cycle))
         self.work += sums
         forces = -sums[[FORCE_X, FORCE_Y]] / (self.cycles * self.steps)
         drive = self.work[BOUNDARY_WORK] + self.carried
@@ -380,11 +399,17 @@ class _State:
         points = self.points[: self.count]
         points["strain_before"] = points["strain"]
 
+    def _stop_at(self, trouble: Trouble | None) -> None:
+        if trouble is not None:
+            self._fail(*trouble)
+
     def _fail(self, what: str, index: int) -> None:
         point = self.points[index]
+        known = np.isfinite(point["x"]) and np.isfinite(point["y"])
+        x, y = (point[name] for name in (("x", "y") if known else ("material_x", "material_y")))
         raise SolverError(
             f"cutting simulation: {what} at {self.time * 1e6:.2f} us, "
-            f"x {point['x'] * 1e6:.1f} um, y {point['y'] * 1e6:.1f} um, "
+            f"x {x * 1e6:.1f} um, y {y * 1e6:.1f} um{'' if known else ' before the cut'}, "
             f"temperature {point['temperature']:.0f} K; try a smaller courant number"
         )
 

@@ -3,14 +3,17 @@
 from chipglow.io.atomic import atomic_folder, atomic_path
 from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
 from chipglow.io.scene_file import FORMAT_VERSION, SceneWriter, open_scene, write_scene
+from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 
 __all__ = [
     "FORMAT_VERSION",
     "SceneWriter",
+    "UnfinishedScene",
     "atomic_folder",
     "atomic_path",
     "open_scene",
     "read_measurement",
+    "unfinished_scenes",
     "write_dataset",
     "write_measurement",
     "write_scene",

@@ -4,29 +4,35 @@ import io
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
+
+from chipglow.io.unfinished import hold
 
 RESULT_MARK: Final = "summary.json"
 """The file by which a folder of results is known."""
 
 
 @contextmanager
-def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_path(
+    path: str | os.PathLike[str], keep: Callable[[Path], bool] = lambda _: False
+) -> Iterator[Path]:
     """Write a file under a temporary name; move it into place at the end.
 
     Parameters
     ----------
     path : path-like
         The file to write; one that is there is replaced.
+    keep : callable, optional
+        Told the temporary name if the block raises: whether to leave that file where it is.
 
     Yields
     ------
     pathlib.Path
         Temporary name in the same folder, with the same suffix. If the block raises, the file of
-        this name is removed and `path` stays as it was.
+        this name is removed, or kept, and `path` stays as it was.
 
     Raises
     ------
@@ -43,7 +49,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         yield temporary
         temporary.replace(path)
     finally:
-        temporary.unlink(missing_ok=True)
+        if not keep(temporary):
+            temporary.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -83,12 +90,14 @@ class KeptErrorFile(io.FileIO):
     """A file to write that keeps its first error, for the writer to raise.
 
     HDF5 loses the errors of what it writes late, and a process that closes an HDF5 file on a full
-    disk can crash. Here HDF5 sees no error; whoever writes asks for it with `check`.
+    disk can crash. Here HDF5 sees no error; whoever writes asks for it with `check`. The file is
+    held until it is closed, so that others see that it is being written.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         super().__init__(path, "w+")
         self._error: OSError | None = None
+        hold(self)
 
     def write(self, data: Any) -> int:
         """Write all the data, or keep the error; after an error write nothing more."""

@@ -17,6 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from chipglow.io.atomic import KeptErrorFile, atomic_path
 from chipglow.io.packing import PACKING
+from chipglow.io.unfinished import (
+    UnfinishedScene,
+    checkpoint_path,
+    has_checkpoint,
+    write_checkpoint,
+)
 from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene, SceneError, ToolGeometry
 from chipglow.scene.scene import (
     ENERGY_UNITS,
@@ -62,7 +68,7 @@ class SceneWriter:
     """Write a scene to a file, one frame after the other.
 
     A context manager. The file has a temporary name until the end; if the block raises, nothing
-    is left of it.
+    is left of it unless there is a checkpoint to go on from.
 
     Parameters
     ----------
@@ -79,6 +85,8 @@ class SceneWriter:
     portable : bool
         Compress with zlib, which every reader of NetCDF-4 knows; by default with Blosc2, several
         times faster, which needs the HDF5 filter of ``hdf5plugin``.
+    resume : UnfinishedScene, optional
+        Begin with the frames that an earlier writer of the same scene had at its last checkpoint.
 
     Notes
     -----
@@ -96,6 +104,7 @@ class SceneWriter:
         material_coordinates: bool = True,
         *,
         portable: bool = False,
+        resume: UnfinishedScene | None = None,
     ) -> None:
         self.path = Path(path)
         self.raster = raster
@@ -104,14 +113,20 @@ class SceneWriter:
         self._compression = _PORTABLE if portable else _FAST
         self._stack = ExitStack()
         self._times: list[float] = []
+        self._chunks: list[tuple[int, int, int]] = []
+        self._resume = resume
 
     def __enter__(self) -> "SceneWriter":
         with ExitStack() as stack:
-            temporary = stack.enter_context(atomic_path(self.path))
-            self._sink = stack.enter_context(KeptErrorFile(temporary))
+            stack.push(self._drop_checkpoint)
+            self._part = stack.enter_context(atomic_path(self.path, has_checkpoint))
+            self._sink = stack.enter_context(KeptErrorFile(self._part))
             stack.callback(self._sink.check, self.path)
-            self._file = stack.enter_context(h5netcdf.File(self._sink, "w"))
+            self._hdf = stack.enter_context(h5py.File(self._sink, "w", track_order=True))
+            self._file = stack.enter_context(h5netcdf.File(self._hdf, "w"))
             self._create_variables()
+            if self._resume is not None:
+                self._take_over(self._resume)
             self._stack = stack.pop_all()
         return self
 
@@ -151,6 +166,36 @@ class SceneWriter:
             self._file.variables[name][count] = values
         self._sink.check(self.path)
         self._times.append(frame.time)
+
+    def checkpoint(self, state: Mapping[str, NDArray[Any]], progress: float) -> Path:
+        """Keep the frames so far, with a state to go on from, even if the process is killed.
+
+        Parameters
+        ----------
+        state : mapping
+            Arrays by name.
+        progress : float
+            Share of the work that is done, 0 to 1.
+
+        Returns
+        -------
+        pathlib.Path
+            The checkpoint's file; it is removed when the scene is complete.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written; the checkpoint before it stays.
+        """
+        self._hdf.flush()
+        self._sink.check(self.path)
+        os.fsync(self._sink.fileno())
+        for frame in range(len(self._chunks) // len(self._units), len(self._times)):
+            for name in self._units:
+                at = self._dataset(name).get_chunk_info_by_coord((frame, 0, 0))
+                self._chunks.append((at.byte_offset, at.size, at.filter_mask))
+        write_checkpoint(self._part, state, progress, self._times, self._chunks)
+        return checkpoint_path(self._part)
 
     def forces(
         self,
@@ -195,6 +240,30 @@ class SceneWriter:
             variable = self._file.create_variable(name, ("force_time",), data=values)
             variable.attrs["units"] = unit
             variable.attrs["long_name"] = _LONG_NAMES.get(name, "time of the force history")
+
+    def _take_over(self, unfinished: UnfinishedScene) -> None:
+        """Copy the frames of a checkpoint, as they are compressed.
+
+        HDF5 cannot open a file whose writer was killed, but a chunk once written stays in place.
+        """
+        times, chunks = unfinished.frames()
+        self._file.resize_dimension("time", len(times))
+        with unfinished.part.open("rb") as source:
+            for index, (offset, size, filters) in enumerate(chunks.tolist()):
+                frame, field = divmod(index, len(self._units))
+                source.seek(offset)
+                dataset = self._dataset(list(self._units)[field])
+                dataset.write_direct_chunk((frame, 0, 0), source.read(size), filters)
+                self._sink.check(self.path)
+        self._file.variables["time"][...] = times
+        self._times = times.tolist()
+
+    def _dataset(self, name: str) -> Any:
+        return self._hdf[name].id
+
+    def _drop_checkpoint(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            checkpoint_path(self._part).unlink(missing_ok=True)
 
     def _create_variables(self) -> None:
         rows, columns = self.raster.shape

@@ -2,7 +2,7 @@
 
 from chipglow.study.cache import CachedScene, cache_folder, cached_scenes, clear_cache
 from chipglow.study.files import StudyError, load_study
-from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, run
+from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, kept_progress, run
 from chipglow.study.schema import Study
 from chipglow.study.template import study_text
 
@@ -17,6 +17,7 @@ __all__ = [
     "clear_cache",
     "cut",
     "is_cut",
+    "kept_progress",
     "load_study",
     "run",
     "study_text",

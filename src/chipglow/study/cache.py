@@ -2,18 +2,17 @@
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from json import dumps
 from pathlib import Path
-from time import time
 from typing import Any, Final
+
+from chipglow.io import UnfinishedScene, unfinished_scenes
 
 FOLDER_VARIABLE: Final = "CHIPGLOW_CACHE"
 """Environment variable that names another folder than the user's cache folder."""
-
-_LONGEST_RUN: Final = 86400.0
-"""Age in s from which an unfinished scene is taken for what a killed run left."""
 
 
 @dataclass(frozen=True)
@@ -58,23 +57,27 @@ def scene_path(inputs: Mapping[str, Any]) -> Path:
 
 
 def cached_scenes() -> list[CachedScene]:
-    """Scenes in the cache, the latest first; parts of scenes that killed runs left count too."""
+    """Scenes in the cache, the latest first; what ended runs left of scenes counts too."""
     scenes = []
-    for path in cache_folder().glob("*scene-*.nc"):
-        try:
+    for path in cache_folder().glob("scene-*.nc"):
+        with suppress(FileNotFoundError):  # another process cleared it meanwhile
             status = path.stat()
-        except FileNotFoundError:  # another process cleared it meanwhile
-            continue
-        if path.name.startswith(".") and time() - status.st_mtime < _LONGEST_RUN:
-            continue
-        scenes.append(CachedScene(path, status.st_size, status.st_mtime))
+            scenes.append(CachedScene(path, status.st_size, status.st_mtime))
+    for left in _unfinished():
+        with suppress(FileNotFoundError):
+            scenes.append(CachedScene(left.part, left.size, left.part.stat().st_mtime))
     return sorted(scenes, key=lambda scene: scene.modified, reverse=True)
 
 
 def clear_cache() -> int:
     """Delete the cached scenes; the bytes that this gave back."""
-    freed = 0
-    for scene in cached_scenes():
+    scenes = cached_scenes()
+    for scene in scenes:
         scene.path.unlink(missing_ok=True)
-        freed += scene.size
-    return freed
+    for left in _unfinished():
+        left.remove()
+    return sum(scene.size for scene in scenes)
+
+
+def _unfinished() -> list[UnfinishedScene]:
+    return unfinished_scenes(cache_folder() / "scene-*.nc")

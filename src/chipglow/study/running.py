@@ -4,11 +4,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from json import dumps
 from pathlib import Path
+from time import monotonic
 from typing import Any, Final, TypeAlias
 
 from chipglow.analysis.paper import StudyResult, analyse
-from chipglow.cutting import SOLVER_VERSION, ToolMaterial, WorkpieceMaterial
-from chipglow.io import SceneWriter, open_scene
+from chipglow.cutting import (
+    SOLVER_VERSION,
+    Checkpoint,
+    SolverError,
+    ToolMaterial,
+    WorkpieceMaterial,
+)
+from chipglow.io import SceneWriter, open_scene, unfinished_scenes
 from chipglow.scene import SceneError
 from chipglow.study.cache import scene_path
 from chipglow.study.schema import Study
@@ -20,8 +27,14 @@ CUTTING_STEP: Final = "cutting simulation"
 SCENE_FORMAT: Final = 1
 """Changes whenever the same frames are written as another file."""
 
+CHECKPOINT_INTERVAL: Final = 30.0
+"""Time in s between checkpoints of a simulation, if they are cheap."""
 
-def cut(study: Study, progress: Progress | None = None) -> Path:
+_CHEAP: Final = 100.0
+"""Checkpoints are this many times as far apart as one takes, or more."""
+
+
+def cut(study: Study, progress: Progress | None = None, resume: bool = False) -> Path:
     """File of the study's scene: computed now, or found in the cache.
 
     Parameters
@@ -30,16 +43,24 @@ def cut(study: Study, progress: Progress | None = None) -> Path:
         Only its section `cutting` matters.
     progress : callable, optional
         Told how far the simulation is; not called if the scene is found.
+    resume : bool
+        Go on from the last checkpoint of a run of the same cut that was interrupted or killed, if
+        there is one. The scene is the same to the last bit.
 
     Returns
     -------
     Path
         The scene's file in the cache, for `open_scene`.
+
+    Raises
+    ------
+    SolverError
+        If the simulation goes wrong; the message names the last checkpoint, which is kept.
     """
     path = scene_path(_inputs(study))
     if not _is_whole(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        _compute(study, path, progress)
+        _compute(study, path, progress, resume)
     return path
 
 
@@ -48,7 +69,12 @@ def is_cut(study: Study) -> bool:
     return _is_whole(scene_path(_inputs(study)))
 
 
-def run(study: Study, progress: Progress | None = None) -> StudyResult:
+def kept_progress(study: Study) -> float:
+    """Share of the study's cut that earlier runs left at a checkpoint, 0 to 1."""
+    return max((left.progress for left in unfinished_scenes(scene_path(_inputs(study)))), default=0)
+
+
+def run(study: Study, progress: Progress | None = None, resume: bool = False) -> StudyResult:
     """Run a study from the cut to the analysis.
 
     Parameters
@@ -57,13 +83,15 @@ def run(study: Study, progress: Progress | None = None) -> StudyResult:
         What to do; the paper's study is ``Study()``.
     progress : callable, optional
         Told which step is under way and how much of it is done.
+    resume : bool
+        As for `cut`.
 
     Returns
     -------
     StudyResult
         All that the report shows.
     """
-    scene = open_scene(cut(study, progress))
+    scene = open_scene(cut(study, progress, resume))
     surfaces = study.surface.build(study.seed)
     return analyse(scene, surfaces, study.camera.build(), study.analysis.build(), progress)
 
@@ -95,17 +123,58 @@ def _is_whole(path: Path) -> bool:
     return True
 
 
-def _compute(study: Study, path: Path, progress: Progress | None) -> None:
+def _compute(study: Study, path: Path, progress: Progress | None, resume: bool) -> None:
     if progress:
         progress(CUTTING_STEP, 0.0)
     cutting = study.cutting
     raster = cutting.field_of_view.build()
     attributes: Mapping[str, str] = {"inputs": dumps(_inputs(study), sort_keys=True)}
-    with SceneWriter(path, raster, cutting.tool.build(), attributes) as writer:
-        history = cutting.simulation().run(
-            cutting.window.build(),
-            raster,
-            writer.append,
-            (lambda fraction: progress(CUTTING_STEP, fraction)) if progress else None,
-        )
-        writer.forces(history.time, history.cutting, history.thrust, vars(history.energy))
+    left = unfinished_scenes(path) if resume else []
+    start = left[0] if left and left[0].progress > 0 else None
+    state = Checkpoint(start.state(), start.progress) if start else None
+    with SceneWriter(path, raster, cutting.tool.build(), attributes, resume=start) as writer:
+        keeper = _Keeper(writer)
+        if start and state:
+            keeper.note_kept(state, start.checkpoint)
+        try:
+            history = cutting.simulation().run(
+                cutting.window.build(),
+                raster,
+                writer.append,
+                (lambda fraction: progress(CUTTING_STEP, fraction)) if progress else None,
+                state,
+                keeper.keep,
+            )
+            writer.forces(history.time, history.cutting, history.thrust, vars(history.energy))
+        except SolverError as error:
+            raise SolverError("; ".join(filter(None, (str(error), keeper.note)))) from None
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(keeper.note) from None
+    for unfinished in unfinished_scenes(path):
+        unfinished.remove()
+
+
+class _Keeper:
+    """Makes checkpoints now and then; `note` tells of the last one."""
+
+    def __init__(self, writer: SceneWriter) -> None:
+        self._writer = writer
+        self._due = monotonic() + CHECKPOINT_INTERVAL
+        self.note = ""
+
+    def note_kept(self, checkpoint: Checkpoint, file: Path) -> None:
+        """Note which state is kept, and where."""
+        self.note = f"the state at {checkpoint.time * 1e6:.2f} us is kept in {file}"
+
+    def keep(self, checkpoint: Checkpoint) -> None:
+        """Make a checkpoint if it is time, and delete what other runs left that got no further."""
+        begin = monotonic()
+        if begin < self._due:
+            return
+        file = self._writer.checkpoint(checkpoint.arrays, checkpoint.progress)
+        self.note_kept(checkpoint, file)
+        for left in unfinished_scenes(self._writer.path):
+            if left.progress <= checkpoint.progress:
+                left.remove()
+        end = monotonic()
+        self._due = end + max(CHECKPOINT_INTERVAL, _CHEAP * (end - begin))

@@ -1,0 +1,50 @@
+"""What can go wrong with the points of a simulation: which, where."""
+
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.cutting.material import TABLE_COLDEST, TABLE_HOTTEST
+from chipglow.cutting.points import POINT, Grid, Points
+
+_COLDEST: Final = TABLE_COLDEST - 1.0  # a workpiece of 200 K may round to less
+
+Trouble: TypeAlias = tuple[str, int]
+"""What is wrong, and the number of the point."""
+
+
+def find_trouble(points: Points, fastest: float) -> Trouble | None:
+    """Look for a point that is not finite, too cold, too hot, or faster than `fastest` (m/s)."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        values = points.view(np.float64).reshape(points.size, -1)
+        total = values.sum()
+    if not np.isfinite(total) and not (finite := np.isfinite(values)).all():
+        index, field = np.argwhere(~finite)[0]
+        return f"{(POINT.names or ())[field]} is not finite", int(index)
+    temperature = points["temperature"]
+    for index in (int(temperature.argmin()), int(temperature.argmax())):
+        if not _COLDEST <= temperature[index] <= TABLE_HOTTEST:
+            return f"temperature out of {TABLE_COLDEST:g} K to {TABLE_HOTTEST:g} K", index
+    speed = np.hypot(points["vx"], points["vy"])
+    index = int(speed.argmax())
+    if speed[index] > fastest:
+        return f"speed of {speed[index]:.0f} m/s, the time step allows {fastest:.0f} m/s", index
+    return None
+
+
+def find_lost(points: Points, grid: Grid, ceiling: float) -> Trouble | None:
+    """Look for a point about to be dropped under the workpiece or, below `ceiling`, before it."""
+    left, bottom = grid.left + 2 * grid.cell, grid.bottom + 2 * grid.cell
+    # The lowest layer may begin below the region, and points enter at its left edge.
+    lost = (points["y"] < bottom) & (points["material_y"] >= bottom)
+    lost |= (points["x"] < left) & (points["vx"] <= 0) & (points["y"] < ceiling)
+    return ("a point left the workpiece's edge", int(lost.argmax())) if lost.any() else None
+
+
+def find_off_grid(points: Points, grid: Grid) -> Trouble:
+    """Find the point for which a step was given up."""
+    x, y = ((points[name] - edge) / grid.cell for name, edge in zip("xy", grid[:2], strict=True))
+    inside: NDArray[np.bool_] = (x >= 0.5) & (x < grid.columns - 1.5)
+    inside &= (y >= 0.5) & (y < grid.rows - 1.5)
+    return "a point left the grid", int(inside.argmin())

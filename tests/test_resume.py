@@ -1,0 +1,320 @@
+"""A cut that is stopped, killed or goes wrong, and one that goes on from what it left."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from copy import deepcopy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chipglow.cutting import (
+    CuttingConditions,
+    CuttingSimulation,
+    Numerics,
+    OutputWindow,
+    SolverError,
+)
+from chipglow.cutting.points import block_of_points
+from chipglow.cutting.watch import find_trouble
+from chipglow.io import SceneWriter, open_scene, unfinished_scenes
+from chipglow.scene import Frame, Raster
+from chipglow.study import cut, is_cut, kept_progress, load_study, running
+
+STUDY = """
+cutting:
+  length_of_cut: 0.1 mm
+  numerics: {cell: 20 um}
+  window: {start: 0.02 mm, end: 0.1 mm, interval: 0.5 us}
+  field_of_view: {left: -100 um, top: 200 um, spacing: 5 um, rows: 36, columns: 27}
+"""
+SIMULATION = CuttingSimulation(
+    CuttingConditions(length_of_cut=0.1e-3),
+    numerics=Numerics(cell=20e-6, upstream=0.3e-3, downstream=0.3e-3, depth=0.2e-3, height=0.5e-3),
+)
+WINDOW = OutputWindow(start=0.02e-3, end=0.1e-3, interval=1e-6)
+RASTER = Raster(left=-100e-6, top=200e-6, spacing=5e-6, rows=36, columns=27)
+
+COMMAND = """
+import sys
+from chipglow.cli import main
+from chipglow.study import running
+running.CHECKPOINT_INTERVAL = running._CHEAP = 0.0
+sys.argv = ["chipglow", "cut", "study.yaml", "--out", "scene.nc", *sys.argv[1:]]
+main()
+"""
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    """A folder for the cache beside the study; checkpoints after every interval."""
+    monkeypatch.setenv("CHIPGLOW_CACHE", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.yaml").write_text(STUDY)
+    monkeypatch.setattr(running, "CHECKPOINT_INTERVAL", 0.0)
+    monkeypatch.setattr(running, "_CHEAP", 0.0)
+    return tmp_path / "cache"
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory):
+    """The scene of a run that nothing disturbed."""
+    folder = tmp_path_factory.mktemp("unbroken")
+    (folder / "study.yaml").write_text(STUDY)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CHIPGLOW_CACHE", str(folder))
+        return open_scene(cut(load_study(folder / "study.yaml")))
+
+
+def assert_same_scene(path, expected):
+    found = open_scene(path).data.load()
+    assert found.identical(expected.data.load())
+
+
+def simulate(on_checkpoint=None, resume=None):
+    frames = []
+    history = SIMULATION.run(WINDOW, RASTER, frames.append, None, resume, on_checkpoint)
+    return frames, history
+
+
+def test_a_run_goes_on_from_any_checkpoint_with_the_same_bits():
+    checkpoints = []
+    frames, history = simulate(lambda checkpoint: checkpoints.append(deepcopy(checkpoint)))
+    for checkpoint in (checkpoints[0], checkpoints[len(checkpoints) // 2], checkpoints[-1]):
+        rest, again = simulate(resume=checkpoint)
+        assert len(rest) == sum(frame.time > checkpoint.time for frame in frames)
+        for frame, expected in zip(rest, frames[len(frames) - len(rest) :], strict=True):
+            for name, values in vars(expected).items():
+                np.testing.assert_array_equal(getattr(frame, name), values, strict=True)
+        for name in ("time", "cutting", "thrust"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(history, name))
+        for name, values in vars(history.energy).items():
+            np.testing.assert_array_equal(getattr(again.energy, name), values)
+
+
+def test_a_checkpoint_of_another_simulation_is_refused():
+    checkpoints = []
+    simulate(lambda checkpoint: checkpoints.append(deepcopy(checkpoint)))
+    finer = replace(SIMULATION, numerics=replace(SIMULATION.numerics, cell=15e-6))
+    with pytest.raises(ValueError, match=r"checkpoint: 'velocity' .* expected"):
+        finer.run(WINDOW, RASTER, lambda _: None, resume=checkpoints[3])
+    shorter = replace(WINDOW, end=0.03e-3)
+    with pytest.raises(ValueError, match=r"checkpoint: .* intervals, expected up to"):
+        SIMULATION.run(shorter, RASTER, lambda _: None, resume=checkpoints[-1])
+    unknown = replace(checkpoints[0], arrays={**checkpoints[0].arrays, "more": np.zeros(1)})
+    with pytest.raises(ValueError, match=r"checkpoint: has .*more.*, expected"):
+        simulate(resume=unknown)
+
+
+def start(*options):
+    return subprocess.Popen(
+        [sys.executable, "-c", COMMAND, *options], stderr=subprocess.PIPE, text=True
+    )
+
+
+def killed_run(study, rng, *options):
+    """Run until it has got further than before, and some random time more; then SIGKILL."""
+    before = kept_progress(study)
+    with start(*options) as process:
+        while not any(left > before for left in progress_of_all(study)):
+            assert process.poll() is None, process.stderr.read()
+            time.sleep(0.002)
+        time.sleep(rng.uniform(0.0, 0.15))
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+    assert process.returncode == -signal.SIGKILL
+
+
+def progress_of_all(study):
+    """How far the runs are, also those that go on."""
+    folder = running.scene_path(running._inputs(study)).parent
+    for path in folder.glob(".scene-*.npz"):
+        try:
+            with np.load(path) as stored:
+                yield float(stored["scene.progress"])
+        except FileNotFoundError:  # the run went on past the one before and deleted it
+            continue
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_cut_that_is_killed_again_and_again_ends_with_the_same_bits(cache, unbroken, seed):
+    study, rng = load_study("study.yaml"), np.random.default_rng(seed)
+    killed_run(study, rng)
+    reached = [kept_progress(study)]
+    assert not is_cut(study)
+    for _ in range(2):
+        killed_run(study, rng, "--resume")
+        reached.append(kept_progress(study))
+        assert len(unfinished_scenes(running.scene_path(running._inputs(study)))) <= 2
+    assert 0 < reached[0] < reached[1] < reached[2]
+    with start("--resume") as process:
+        _, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    assert f"The cut goes on at {reached[2]:.0%}" in errors
+    assert_same_scene("scene.nc", unbroken)
+    assert [path.suffix for path in cache.iterdir()] == [".nc"]
+
+
+class StopError(Exception):
+    pass
+
+
+def stop_after(intervals, error, monkeypatch):
+    """Raise an error in the hand-over of a checkpoint."""
+    whole = CuttingSimulation.run
+
+    def run(simulation, window, raster, on_frame, on_progress, resume, on_checkpoint):
+        seen = []
+
+        def count(checkpoint):
+            on_checkpoint(checkpoint)
+            seen.append(checkpoint.time)
+            if len(seen) == intervals:
+                raise error
+
+        return whole(simulation, window, raster, on_frame, on_progress, resume, count)
+
+    monkeypatch.setattr(CuttingSimulation, "run", run)
+
+
+def test_a_cut_that_is_stopped_goes_on_only_if_told_to(cache, unbroken, monkeypatch):
+    study = load_study("study.yaml")
+    with monkeypatch.context() as patch:
+        stop_after(9, StopError(), patch)
+        with pytest.raises(StopError):
+            cut(study)
+    kept = kept_progress(study)
+    assert kept == pytest.approx(9 / 48)
+    with monkeypatch.context() as patch:
+        stop_after(3, StopError(), patch)  # a new run that got less far deletes nothing
+        with pytest.raises(StopError):
+            cut(study)
+    assert kept_progress(study) == kept
+    seen = []
+    path = cut(study, lambda _, fraction: seen.append(fraction))
+    assert seen[1] < kept
+    assert_same_scene(path, unbroken)
+    assert list(cache.iterdir()) == [path]
+    path.unlink()
+    with monkeypatch.context() as patch:
+        stop_after(30, StopError(), patch)
+        with pytest.raises(StopError):
+            cut(study)
+    seen.clear()
+    assert_same_scene(cut(study, lambda _, fraction: seen.append(fraction), resume=True), unbroken)
+    assert seen[1] == pytest.approx(31 / 48)
+    assert list(cache.iterdir()) == [path]
+
+
+def test_a_broken_checkpoint_is_as_none(cache, unbroken, monkeypatch):
+    study = load_study("study.yaml")
+    with monkeypatch.context() as patch:
+        stop_after(30, StopError(), patch)
+        with pytest.raises(StopError):
+            cut(study)
+    (left,) = unfinished_scenes(running.scene_path(running._inputs(study)))
+    os.truncate(left.checkpoint, 1000)
+    assert kept_progress(study) == 0
+    path = cut(study, resume=True)
+    assert_same_scene(path, unbroken)
+    assert list(cache.iterdir()) == [path]
+
+
+def test_after_ctrl_c_the_last_state_is_named(cache, monkeypatch):
+    from typer.testing import CliRunner
+
+    from chipglow.cli import app
+
+    stop_after(5, KeyboardInterrupt(), monkeypatch)
+    result = CliRunner().invoke(app, ["cut", "study.yaml", "--out", "scene.nc"])
+    assert result.exit_code == 130
+    lines = [line for line in result.output.splitlines() if line.startswith("chipglow: ")]
+    assert len(lines) == 1
+    assert re.search(r"the state at 2\.50 us is kept in .*: --resume goes on from", lines[0])
+
+
+SPOILT = [
+    ("temperature", np.nan, "temperature is not finite"),
+    ("temperature", 3200.0, "temperature out of 200 K to 3000 K"),
+    ("temperature", 20.0, "temperature out of 200 K to 3000 K"),
+    ("dxy", np.inf, "not finite|a point left the grid"),
+    ("x", np.nan, "a point's position is not finite"),
+    ("y", -1e-3, "a point left the workpiece's edge"),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "what"), SPOILT)
+def test_a_run_that_goes_wrong_says_what_where_and_when(name, value, what):
+    def spoil(checkpoint):
+        if checkpoint.time > 9.5e-6:
+            points = checkpoint.arrays["points"]
+            points[name][np.argmin(np.hypot(points["x"] + 100e-6, points["y"] + 90e-6))] = value
+
+    with pytest.raises(SolverError, match=what) as failure:
+        simulate(spoil)
+    message = str(failure.value)
+    assert "\n" not in message
+    place = re.search(r"at (\d+\.\d+) us, x (\S+) um, y (\S+) um", message)
+    when, x, y = (float(text) for text in place.groups())
+    assert 10.0 <= when <= 11.1
+    assert -300 <= x <= 50
+    assert -1100 <= y <= 0
+
+
+def test_points_too_fast_for_the_time_step_are_found():
+    points = block_of_points(np.arange(4.0), np.arange(3.0), 1.0, 300.0, 4.0)
+    assert find_trouble(points, 40.0) is None
+    points["vy"][7] = -41.0
+    what, index = find_trouble(points, 40.0)
+    assert what == "speed of 41 m/s, the time step allows 40 m/s"
+    assert index == 7
+
+
+def test_a_run_that_goes_wrong_keeps_its_last_good_state_and_names_it(cache, monkeypatch):
+    stop_after(20, SolverError("cutting simulation: wrong"), monkeypatch)
+    with pytest.raises(SolverError, match=r"wrong; the state at 10\.00 us is kept in ") as failure:
+        cut(load_study("study.yaml"))
+    file = str(failure.value).rpartition(" is kept in ")[2]
+    with np.load(file) as stored:
+        assert stored["time"] == pytest.approx(10e-6)
+        assert np.isfinite(stored["points"]["temperature"]).all()
+    monkeypatch.setattr(running, "CHECKPOINT_INTERVAL", 3600.0)
+    with pytest.raises(SolverError, match=r"wrong; the state at 10\.00 us is kept in ") as failure:
+        cut(load_study("study.yaml"), resume=True)
+    assert str(failure.value).endswith(file)
+
+
+def test_a_checkpoint_before_the_first_frame_is_one_to_go_on_from(tmp_path):
+    path, raster = tmp_path / "scene-x.nc", replace(RASTER, rows=4, columns=5)
+
+    def write(resume, state):
+        with SceneWriter(path, raster, resume=resume) as writer:
+            writer.checkpoint(state, 0.5)
+            raise StopError
+
+    with pytest.raises(StopError):
+        write(None, {"a": np.arange(3)})
+    (left,) = unfinished_scenes(path)
+    with SceneWriter(path, raster, resume=left) as writer:
+        np.testing.assert_array_equal(left.state()["a"], np.arange(3))
+        field = np.full(raster.shape, 300.0, np.float32)
+        zero = np.zeros_like(field)
+        names = ("plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y")
+        places = {"material_x": zero, "material_y": zero}
+        material = np.zeros(raster.shape, np.uint8)
+        writer.append(
+            Frame(
+                time=1e-6,
+                temperature=field,
+                material=material,
+                **dict.fromkeys(names, zero),
+                **places,
+            )
+        )
+    left.remove()
+    assert len(open_scene(path).times) == 1
+    assert list(tmp_path.iterdir()) == [path]
