@@ -288,7 +288,7 @@ def chip(result: StudyResult) -> Figure | None:
     found, scan = result.chip, result.chip.scan
     if not np.isfinite(scan.height):
         return None
-    figure = drawing.image_figure(result.raster, 3.2, rows=1)
+    figure = drawing.new_figure(3.6)
     left, right = figure.subplots(1, 2)
     frame = result.frame
     strain = np.where(frame.material == Material.WORKPIECE, frame.plastic_strain, np.nan)
