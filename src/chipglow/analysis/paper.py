@@ -18,7 +18,6 @@ from chipglow.analysis.sensitivity import PSF_ORDERS, Sensitivity, Setting, sens
 from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear_band
 from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.camera.exposure import expose, frame_weights
-from chipglow.cutting import EnergyHistory
 from chipglow.radiometry import Band
 from chipglow.scene import ENERGY_UNITS, Frame, Material, Raster, Scene, ToolGeometry
 from chipglow.surface import EmissivityField, Surface
@@ -530,8 +529,8 @@ def _energy_shares(scene: Scene) -> tuple[float, float]:
     """What the energy account does not find again, and the kinetic energy, over the work."""
     if "drive_work" not in scene.data:
         return nan, nan
-    energy = EnergyHistory(
-        **{name: np.asarray(scene.data[name].values, dtype=np.float64) for name in ENERGY_UNITS}
-    )
-    kinetic_share = abs(energy.kinetic_energy[-1]) / energy.drive_work[-1]
-    return float(energy.closing_error[-1]), float(kinetic_share)
+    last = {name: float(scene.data[name][-1]) for name in ENERGY_UNITS}
+    given = last["drive_work"] + last["contact_work"]
+    found = sum(last[name] for name in ENERGY_UNITS if name not in ("drive_work", "contact_work"))
+    work = last["drive_work"]
+    return (given - found) / work, abs(last["kinetic_energy"]) / work

@@ -5,7 +5,6 @@ from math import isfinite
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 TABLE_COLDEST: Final = 200.0
@@ -220,9 +219,3 @@ class ToolMaterial:
     def effusivity(self) -> float:
         """√(kρc) in W s^½/(m² K)."""
         return float(np.sqrt(self.conductivity * self.density * self.heat_capacity))
-
-
-@njit
-def tabulated(table, temperature):  # type: ignore[no-untyped-def]
-    """Value of a sampled `TemperatureTable` at a temperature in K, for kernels."""
-    return table[min(max(int(temperature - TABLE_COLDEST), 0), table.size - 1)]

@@ -12,7 +12,6 @@ import numpy as np
 from numba import njit, prange
 
 from chipglow.cutting.flow_stress import flow_stress, plastic_increment, strain_to_failure
-from chipglow.cutting.material import tabulated
 from chipglow.scene.tool import wedge_distance
 
 BLOCK_COLUMNS = 6
@@ -136,7 +135,7 @@ def update_stress(p, step, flow, capacity):  # type: ignore[no-untyped-def]
             )
         work = stress * increment * p.volume
         heat = step.heat_share * work
-        p.temperature += heat / (step.heat_mass * tabulated(capacity, p.temperature))
+        p.temperature += heat / (step.heat_mass * _at(capacity, p.temperature))
     p.dxx, p.dyy, p.dxy = dxx, dyy, shear
     return stress, work
 
@@ -284,3 +283,9 @@ def advance(  # type: ignore[no-untyped-def]
             return False
     sums += of_blocks.sum(axis=0) + of_columns.sum(axis=0)
     return True
+
+
+@njit
+def _at(table, temperature):  # type: ignore[no-untyped-def]
+    """Value of a sampled `TemperatureTable`."""
+    return table[min(max(int(temperature - 200.0), 0), table.size - 1)]

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from math import degrees, isfinite, nan
 
 from chipglow.analysis.chip import ChipMetrics
-from chipglow.report.quantity import quantity_text
 
 
 @dataclass(frozen=True)
@@ -38,12 +37,18 @@ class ChipRow:
     @property
     def value_text(self) -> str:
         """The number with its unit, or a dash."""
-        return quantity_text(self.value, self.unit, self.decimals)
+        return self._text(self.value)
 
     @property
     def spread_text(self) -> str:
         """The spread with its unit, or a dash."""
-        return quantity_text(self.spread, self.unit, self.decimals)
+        return self._text(self.spread)
+
+    def _text(self, value: float | None) -> str:
+        if value is None:
+            return "–"
+        number = f"{round(value, self.decimals):,.{max(self.decimals, 0)}f}".replace(",", " ")
+        return f"{number} {self.unit}".strip()
 
 
 def chip_rows(chip: ChipMetrics) -> list[ChipRow]:
