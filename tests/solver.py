@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numba import get_num_threads
 
+from chipglow.cutting.damage import Damage
 from chipglow.cutting.energy import held_energy
-from chipglow.cutting.flow_stress import Flow
 from chipglow.cutting.library import AISI_1045
-from chipglow.cutting.momentum import Step, advance
+from chipglow.cutting.momentum import NODE_VALUES, SUMS, VELOCITY_VALUES, Step, advance_with
 from chipglow.cutting.points import POINT, Grid, block_of_points, sort_by_cell
 from chipglow.scene import ToolGeometry
 
@@ -38,6 +38,7 @@ class Block:
             heat_mass=mass,
             volume=self.spacing**2,
             time_step=courant * cell / self.sound,
+            kept=1.0,
             shear_modulus=material.shear_modulus,
             bulk_modulus=material.bulk_modulus,
             heat_share=material.taylor_quinney,
@@ -52,15 +53,16 @@ class Block:
             ceiling=-FAR,
             speed=0.0,
         )._replace(**changes)
-        self.flow = Flow.of(material)
+        self.law = material.flow_stress.numbers()
+        self.damage = Damage.of(material.damage, cell)
         self.capacity = material.heat_capacity.sampled()
         self.conductivity = material.conductivity.sampled()
         self.tool = tool or (FAR, FAR, *ToolGeometry().coefficients[2:])
         shape = (self.grid.columns, self.grid.rows)
-        self.velocity = np.zeros((*shape, 2))
-        self.nodes = np.zeros((*shape, 4))
+        self.velocity = np.zeros((*shape, VELOCITY_VALUES))
+        self.nodes = np.zeros((*shape, NODE_VALUES))
         self.heat = np.zeros(shape)
-        self.sums = np.zeros(6)
+        self.sums = np.zeros(SUMS)
         self.force = self.sums[:2]
         self.starts = np.zeros(shape[0] * shape[1] + 1, np.int64)
 
@@ -69,6 +71,9 @@ class Block:
         x = self.grid.left + self.cell * np.arange(self.grid.columns)[:, None]
         y = self.grid.bottom + self.cell * np.arange(self.grid.rows)[None, :]
         self.velocity[..., 0], self.velocity[..., 1] = vx(x, y), vy(x, y)
+        points = self.points
+        for name, of in (("vx", vx), ("vy", vy)):
+            points[name] = points[f"own_{name}"] = of(points["x"], points["y"])
 
     def advance(self, steps, cycle=20):
         """Advance, sorting the points every few steps."""
@@ -79,9 +84,10 @@ class Block:
             self.points = spare
             self.sums[:] = 0.0
             now = min(steps, cycle)
-            assert advance(
+            assert advance_with(self.law)(
                 now, self.points, self.starts, self.velocity, self.nodes, self.heat, self.tool,
-                self.grid, self.step, self.flow, self.capacity, self.sums, get_num_threads(),
+                self.grid, self.step, self.law, self.damage, self.capacity, self.sums,
+                get_num_threads(),
             )  # fmt: skip
             self.force /= now
             steps -= now
@@ -97,6 +103,6 @@ class Block:
     def momentum(self):
         """Momentum of the points, x and y, and their angular momentum (with the affine part)."""
         p, mass = self.points, self.step.mass
-        orbit = p["x"] * p["vy"] - p["y"] * p["vx"]
+        orbit = p["x"] * p["own_vy"] - p["y"] * p["own_vx"]
         spin = self.cell**2 / 4 * (p["cyx"] - p["cxy"])
-        return mass * p["vx"].sum(), mass * p["vy"].sum(), mass * (orbit + spin).sum()
+        return mass * p["own_vx"].sum(), mass * p["own_vy"].sum(), mass * (orbit + spin).sum()

@@ -1,5 +1,6 @@
 """The solver's step against mechanics: conservation, waves, shear, friction."""
 
+from dataclasses import replace
 from math import pi, sqrt
 
 import numba
@@ -10,10 +11,18 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from solver import ELASTIC, Block
 
-from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow
-from chipglow.cutting.flow_stress import Flow, flow_stress, plastic_increment, strain_to_failure
-from chipglow.cutting.library import AISI_1045
+from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow, stress
+from chipglow.cutting.damage import Damage, strain_to_failure, weakening
+from chipglow.cutting.flow_stress import flow_stress
+from chipglow.cutting.laws import HyperbolicTangent
+from chipglow.cutting.library import AISI_1045, workpiece
 from chipglow.scene import Raster, ToolGeometry
+
+TITANIUM = HyperbolicTangent(
+    862e6, 331e6, 0.34, 0.01, 0.8, 1836.0, 300.0, 1.0, hardening_limit=1.1,
+    recovery_temperature=0.4, recovery_strain=12.0, softening_temperature=1.0,
+)  # fmt: skip
+SOFTENING = replace(AISI_1045, flow_stress=TITANIUM, damage=None)
 
 
 def test_free_rotation_keeps_momentum_and_angular_momentum():
@@ -74,19 +83,34 @@ def test_period_of_a_vibrating_bar():
     damage=st.floats(0.0, 2.0),
     guess=st.sampled_from([0.0, 1e-7, 1e-5, 1e-3]),
     time_step=st.floats(1e-9, 1e-7),
+    material=st.sampled_from([AISI_1045, SOFTENING, workpiece("al-7075-t6")]),
 )
 def test_plastic_increment_solves_its_equation(
-    trial, strain, temperature, damage, guess, time_step
+    trial, strain, temperature, damage, guess, time_step, material
 ):
-    flow, shear = Flow.of(AISI_1045), AISI_1045.shear_modulus
-    increment = plastic_increment(trial, strain, temperature, damage, guess, shear, time_step, flow)
-    if trial <= flow_stress(strain, 1.0, temperature, damage, flow):
+    law, harm = material.flow_stress.numbers(), Damage.of(material.damage, 10e-6)
+    shear = material.shear_modulus
+    rows = np.zeros(stress.BUFFER)
+    given = {
+        stress.TRIAL: trial,
+        stress.STRAIN: strain,
+        stress.TEMPERATURE: temperature,
+        stress.DAMAGE: damage,
+        stress.INCREMENT: guess,
+    }
+    for row, value in given.items():
+        rows[row] = value
+    stress.plastic_increments(rows, 1, shear, time_step, law, harm)
+    increment = rows[stress.INCREMENT]
+    weak = weakening(damage, harm)
+    if trial <= weak * flow_stress(strain, stress.SLOWEST_RATE, temperature, law):
         assert increment == 0.0
         return
-    law = flow_stress(strain + increment, increment / time_step, temperature, damage, flow)
-    # Newton steps to 1e-4, and hardening made linear over the step. (At a strain
-    # of nought hardening is infinitely steep: the very first step may be off by 2 %.)
-    assert trial - 3 * shear * increment == pytest.approx(law, rel=5e-3)
+    flowing = weak * flow_stress(strain + increment, increment / time_step, temperature, law)
+    if increment <= 1.01 * stress.SLOWEST_RATE * time_step:
+        flowing = weak * flow_stress(strain, stress.SLOWEST_RATE, temperature, law)
+    # Newton steps of less than 2 % end it; what the last one leaves is of second order.
+    assert trial - 3 * shear * increment == pytest.approx(flowing, abs=1e-3 * trial)
 
 
 def test_adiabatic_shear_follows_the_flow_stress():
@@ -97,21 +121,21 @@ def test_adiabatic_shear_follows_the_flow_stress():
     block.set_velocity(lambda x, y: rate * y + 0 * x, lambda x, y: 0 * x * y)
     block.advance(1000)
     equivalent_rate = rate / sqrt(3)
-    flow = Flow.of(AISI_1045)
+    law, harm = AISI_1045.flow_stress.numbers(), Damage.of(AISI_1045.damage, block.cell)
 
     def change(strain, state):
-        temperature, damage = state
-        stress = flow_stress(strain, equivalent_rate, temperature, damage, flow)
+        temperature, _ = state
+        flowing = flow_stress(strain, equivalent_rate, temperature, law)
         capacity = AISI_1045.heat_capacity.at(temperature)
-        heating = 0.9 * stress / (AISI_1045.density * capacity)
-        return [heating, 1.0 / strain_to_failure(0.0, equivalent_rate, temperature, flow)]
+        heating = 0.9 * flowing / (AISI_1045.density * capacity)
+        return [heating, 1.0 / strain_to_failure(0.0, equivalent_rate, temperature, harm)]
 
     strain_of_all = 1.0 / sqrt(3)
     solution = solve_ivp(change, (0.0, strain_of_all), [293.0, 0.0], rtol=1e-8)
     temperature, damage = solution.y[:, -1]
     # The elastic part of the strain, σ/(3G) = 0.3 %, is not plastic.
-    stress = flow_stress(strain_of_all, equivalent_rate, temperature, damage, flow)
-    end = strain_of_all - stress / (3 * AISI_1045.shear_modulus)
+    flowing = flow_stress(strain_of_all, equivalent_rate, temperature, law)
+    end = strain_of_all - flowing / (3 * AISI_1045.shear_modulus)
     strain = block.points["strain"]
     middle = (np.abs(block.points["material_y"] - 30e-6) < 10e-6) & (
         np.abs(block.points["material_x"] - 30e-6) < 10e-6
@@ -119,6 +143,9 @@ def test_adiabatic_shear_follows_the_flow_stress():
     assert strain[middle].mean() == pytest.approx(end, rel=1e-3)
     rise = block.points["temperature"][middle].mean() - 293.0
     assert rise == pytest.approx((temperature - 293.0) * end / strain_of_all, rel=5e-3)
+    assert block.points["damage"][middle].mean() == pytest.approx(
+        damage * end / strain_of_all, rel=5e-3
+    )
 
 
 @pytest.mark.parametrize("coefficient", [0.0, 0.3])
@@ -140,8 +167,9 @@ def test_friction_of_a_block_on_the_rake_face(coefficient):
     assert 0.9 * work <= block.heat.sum() <= work
 
 
-def test_energy_of_a_vibrating_block_is_kept_but_for_what_the_transfer_dissipates():
-    block = Block((200e-6, 100e-6), courant=0.2)
+@pytest.mark.parametrize(("kept", "lost"), [(0.0, 0.007), (1.0, 0.0)])
+def test_energy_of_a_vibrating_block_is_kept_but_for_what_the_transfer_dissipates(kept, lost):
+    block = Block((200e-6, 100e-6), courant=0.2, kept=kept)
     block.set_velocity(lambda x, y: 2.0 * np.cos(pi * x / 200e-6) + 0 * y, lambda x, y: 0 * x * y)
     block.advance(1)
     start = block.energy()
@@ -151,12 +179,13 @@ def test_energy_of_a_vibrating_block_is_kept_but_for_what_the_transfer_dissipate
         block.advance(4, cycle=4)
         turned.append(block.energy())
     kinetic, elastic = np.array(turned).T
-    # Kinetic energy becomes elastic energy and comes back; the grid takes some per cent a period,
-    # and positions and velocities half a step apart make the sum swing by about a per cent.
+    # Kinetic energy becomes elastic energy and comes back. With the velocity of the grid (kept 0)
+    # the transfer takes some per cent a period; a point's own velocity keeps it. Positions and
+    # velocities half a step apart make the sum swing by about a per cent.
     assert elastic.max() > 0.6 * start[0]
     total = (kinetic + elastic) / sum(start)
     assert total.max() < 1.02
-    assert total.min() > 0.9
+    assert total[-5:].mean() == pytest.approx(1.0 - lost, abs=0.003)
 
 
 def test_energy_account_of_a_short_cut_closes():

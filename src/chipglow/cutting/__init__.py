@@ -2,7 +2,10 @@
 
 from chipglow.cutting.checkpoint import Checkpoint
 from chipglow.cutting.conditions import CuttingConditions, Friction, Numerics, OutputWindow
+from chipglow.cutting.damage import JohnsonCookDamage
 from chipglow.cutting.energy import EnergyHistory
+from chipglow.cutting.flow_stress import FlowStress, flow_stress_law
+from chipglow.cutting.laws import HyperbolicTangent, JohnsonCook
 from chipglow.cutting.library import (
     AISI_1045,
     CARBIDE,
@@ -14,13 +17,7 @@ from chipglow.cutting.library import (
     tool_material,
     workpiece,
 )
-from chipglow.cutting.material import (
-    DamageSoftening,
-    JohnsonCook,
-    TemperatureTable,
-    ToolMaterial,
-    WorkpieceMaterial,
-)
+from chipglow.cutting.material import TemperatureTable, ToolMaterial, WorkpieceMaterial
 from chipglow.cutting.simulation import (
     SOLVER_VERSION,
     CuttingSimulation,
@@ -35,11 +32,13 @@ __all__ = [
     "Checkpoint",
     "CuttingConditions",
     "CuttingSimulation",
-    "DamageSoftening",
     "EnergyHistory",
+    "FlowStress",
     "ForceHistory",
     "Friction",
+    "HyperbolicTangent",
     "JohnsonCook",
+    "JohnsonCookDamage",
     "MaterialError",
     "MaterialFile",
     "Numerics",
@@ -48,6 +47,7 @@ __all__ = [
     "TemperatureTable",
     "ToolMaterial",
     "WorkpieceMaterial",
+    "flow_stress_law",
     "is_own_file",
     "material_file",
     "material_names",

@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-ENERGIES: Final = 6
+ENERGIES: Final = 7
 """Number of an account's entries."""
 
 
@@ -28,6 +28,8 @@ class EnergyHistory:
         Plastic work, of which the Taylor-Quinney share is heat, shape (n,).
     friction_work : ndarray
         Friction work, all of it heat, shape (n,).
+    sharing_loss : ndarray
+        Elastic energy lost because the points of a cell share one density, shape (n,).
     """
 
     drive_work: NDArray[np.float64]
@@ -36,12 +38,13 @@ class EnergyHistory:
     elastic_energy: NDArray[np.float64]
     plastic_work: NDArray[np.float64]
     friction_work: NDArray[np.float64]
+    sharing_loss: NDArray[np.float64]
 
     @property
     def closing_error(self) -> NDArray[np.float64]:
         """Share of the work that the account does not find again: what the grid dissipates."""
         held = self.kinetic_energy + self.elastic_energy
-        used = self.plastic_work + self.friction_work
+        used = self.plastic_work + self.friction_work + self.sharing_loss
         return (self.drive_work + self.contact_work - held - used) / self.drive_work
 
 
@@ -52,7 +55,9 @@ def held_energy(points, count, mass, volume, shear_modulus, bulk_modulus, cell):
     for k in range(count):
         p = points[k]
         spread = p.cxx * p.cxx + p.cxy * p.cxy + p.cyx * p.cyx + p.cyy * p.cyy
-        kinetic += 0.5 * mass * (p.vx * p.vx + p.vy * p.vy + 0.25 * cell * cell * spread)
+        kinetic += (
+            0.5 * mass * (p.own_vx * p.own_vx + p.own_vy * p.own_vy + 0.25 * cell * cell * spread)
+        )
         dilation = p.volume / volume - 1.0
         square = p.dxx * p.dxx + p.dyy * p.dyy + p.dxx * p.dyy + p.dxy * p.dxy
         elastic += 0.5 * square / shear_modulus * p.volume

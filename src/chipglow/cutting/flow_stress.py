@@ -1,137 +1,133 @@
-"""Flow stress and the return to the yield surface, for kernels."""
+"""Flow-stress laws: what a law is, and the registry that the solver finds it in.
 
-from typing import NamedTuple
+A law is a frozen dataclass of numbers in SI units with a static method `stress`. Registered, it can
+be given to the solver and named in a material's file::
+
+    @flow_stress_law("hollomon")
+    @dataclass(frozen=True)
+    class Hollomon(FlowStress):
+        strength: float
+        exponent: float
+
+        @staticmethod
+        def stress(strain, rate, temperature, law):
+            return law.strength * strain**law.exponent
+"""
+
+from collections import namedtuple
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Any, ClassVar, Final, TypeVar
 
 import numpy as np
 from numba import njit
+from numba.extending import overload
+from numpy.typing import ArrayLike, NDArray
 
-from chipglow.cutting.material import TRIAXIALITIES, WorkpieceMaterial
+from chipglow.cutting.lanes import FAST
 
-_ITERATIONS = 6
-_SMALL_CHANGE = 0.02
-_SMALL_STRAIN = 0.01
-
-
-class Flow(NamedTuple):
-    """Johnson-Cook flow stress and damage: see `JohnsonCook` and `DamageSoftening`."""
-
-    yield_stress: float
-    hardening: float
-    hardening_exponent: float
-    rate_sensitivity: float
-    thermal_exponent: float
-    melting_temperature: float
-    reference_temperature: float
-    reference_rate: float
-    d1: float
-    d2: float
-    d3: float
-    d4: float
-    d5: float
-    onset: float
-    loss: float
-
-    @classmethod
-    def of(cls, material: WorkpieceMaterial) -> "Flow":
-        """Numbers of a material."""
-        law, softening = material.flow_stress, material.softening
-        return cls(
-            law.yield_stress,
-            law.hardening,
-            law.hardening_exponent,
-            law.rate_sensitivity,
-            law.thermal_exponent,
-            law.melting_temperature,
-            law.reference_temperature,
-            law.reference_rate,
-            softening.d1,
-            softening.d2,
-            softening.d3,
-            softening.d4,
-            softening.d5,
-            softening.onset,
-            softening.loss,
-        )
+_DIFFERENCE: Final = 1e-6
+_Law = TypeVar("_Law", bound="type[FlowStress]")
 
 
-@njit
-def _heat(temperature, flow):  # type: ignore[no-untyped-def]
-    """θ of Johnson and Cook."""
-    heat = (temperature - flow.reference_temperature) / (
-        flow.melting_temperature - flow.reference_temperature
-    )
-    # A liquid's strength is not nought: 1 % is left, so that points never lose all stiffness.
-    return min(max(heat, 0.0), 0.99)
+class FlowStress:
+    """Base of the flow-stress laws."""
+
+    Numbers: ClassVar[Any]
+    """Named tuple of the law's numbers: what kernels get."""
+
+    @staticmethod
+    def stress(strain: Any, rate: Any, temperature: Any, law: Any) -> Any:
+        """Flow stress in Pa; compiled by Numba.
+
+        Parameters
+        ----------
+        strain, rate, temperature : float
+            Plastic strain (over 0), its rate in 1/s (over 0), temperature in K.
+        law : named tuple
+            The law's numbers, by the names of its fields.
+        """
+        raise NotImplementedError
+
+    def numbers(self) -> Any:
+        """The law's numbers for kernels."""
+        return self.Numbers(*(float(getattr(self, name)) for name in self.Numbers._fields))
+
+    def at(self, strain: ArrayLike, rate: ArrayLike, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Flow stress in Pa at plastic strains, rates (1/s) and temperatures (K), broadcast."""
+        each = np.broadcast_arrays(strain, rate, temperature)
+        numbers = self.numbers()
+        points = np.stack([np.ravel(one) for one in each], axis=-1).astype(np.float64)
+        values = [flow_stress(*point, numbers) for point in points]
+        return np.array(values).reshape(each[0].shape)
 
 
-@njit
-def weakening(damage, temperature, flow):  # type: ignore[no-untyped-def]
-    """Factor on the flow stress from temperature and damage."""
-    heat = _heat(temperature, flow)
-    thermal = 1.0 - (heat if flow.thermal_exponent == 1.0 else heat**flow.thermal_exponent)
-    share = (damage - flow.onset) / (1.0 - flow.onset)
-    return thermal * (1.0 - flow.loss * min(max(share, 0.0), 1.0))
+LAWS: Final[dict[str, type[FlowStress]]] = {}
+"""Laws by name."""
+
+_KERNELS: Final[dict[Any, Any]] = {}
 
 
-@njit
-def strain_to_failure(triaxiality, rate, temperature, flow):  # type: ignore[no-untyped-def]
-    """Strain to failure at a triaxiality, plastic strain rate (1/s) and temperature (K)."""
-    held = min(max(triaxiality, TRIAXIALITIES[0]), TRIAXIALITIES[1])
-    fast = 1.0 + flow.d4 * np.log(max(rate / flow.reference_rate, 1.0))
-    return (
-        (flow.d1 + flow.d2 * np.exp(flow.d3 * held))
-        * fast
-        * (1.0 + flow.d5 * _heat(temperature, flow))
-    )
+def flow_stress_law(name: str, stress_and_slopes: Any = None) -> Callable[[_Law], _Law]:
+    """Class decorator that registers a law, to be put above ``@dataclass(frozen=True)``.
 
+    Parameters
+    ----------
+    name : str
+        What a material's file calls it.
+    stress_and_slopes : compiled function, optional
+        For speed: of the arguments of `FlowStress.stress`, the flow stress and its derivatives by
+        strain and by the logarithm of the rate. Taken from differences of `stress` without it.
 
-@njit
-def flow_stress(strain, rate, temperature, damage, flow):  # type: ignore[no-untyped-def]
-    """Flow stress in Pa at a plastic strain, its rate (1/s), temperature (K) and damage."""
-    hard = flow.yield_stress + flow.hardening * strain**flow.hardening_exponent
-    fast = 1.0 + flow.rate_sensitivity * np.log(max(rate / flow.reference_rate, 1.0))
-    return hard * fast * weakening(damage, temperature, flow)
-
-
-@njit
-def plastic_increment(  # type: ignore[no-untyped-def]
-    trial, strain, temperature, damage, guess, shear_modulus, time_step, flow
-):
-    """Plastic strain of a step that takes a trial equivalent stress back to the flow stress.
-
-    Solves trial − 3GΔ = flow_stress(strain + Δ, Δ/dt, temperature, damage) by Newton's method over
-    ln Δ. It starts at `guess`, the last step's Δ; without one (0), at the rate-independent Δ, which
-    is the upper bound and from which it converges because the function is concave.
+    Raises
+    ------
+    ValueError
+        If the name is taken by another law.
     """
-    weak = weakening(damage, temperature, flow)
-    if trial <= flow.yield_stress * weak:
-        return 0.0
-    stiffness = 3.0 * shear_modulus
-    power = np.exp(flow.hardening_exponent * np.log(max(strain, 1e-12)))
-    hard = (flow.yield_stress + flow.hardening * power) * weak
-    if trial <= hard:
-        return 0.0
-    slope = 0.0
-    if strain > _SMALL_STRAIN:
-        slope = weak * flow.hardening * flow.hardening_exponent * power / strain
-    bound = (trial - hard) / (stiffness + slope)
-    slowest = time_step * flow.reference_rate
-    increment = min(guess, bound) if guess > 2.0 * slowest else bound
-    for _ in range(_ITERATIONS):
-        if increment <= slowest:
-            return min(slowest, bound)
-        if strain <= _SMALL_STRAIN:
-            power = (strain + increment) ** flow.hardening_exponent
-            base = (flow.yield_stress + flow.hardening * power) * weak
-            slope = weak * flow.hardening * flow.hardening_exponent * power / (strain + increment)
-        else:
-            base = hard + slope * increment
-        fast = 1.0 + flow.rate_sensitivity * np.log(increment / slowest)
-        excess = trial - stiffness * increment - base * fast
-        fall = (stiffness + slope * fast) * increment + base * flow.rate_sensitivity
-        change = excess / fall
-        if abs(change) < _SMALL_CHANGE:
-            # The exponential to second order; the next Newton step would be under 1e-4 of this.
-            return increment * (1.0 + change * (1.0 + 0.5 * change))
-        increment = min(increment * np.exp(max(change, -3.0)), bound)
-    return increment
+
+    def register(law: _Law) -> _Law:
+        if LAWS.get(name, law).__qualname__ != law.__qualname__:
+            raise ValueError(f"flow-stress law {name!r}: the name is taken")
+        numbers: Any = namedtuple("Numbers", [f.name for f in fields(law)])  # type: ignore[arg-type,misc]
+        # Numba's cache finds the type again by these.
+        numbers.__module__ = law.__module__
+        numbers.__qualname__ = f"{law.__qualname__}.Numbers"
+        law.Numbers = numbers
+        LAWS[name] = law
+        _KERNELS[numbers] = stress_and_slopes or _by_differences(law.stress)
+        return law
+
+    return register
+
+
+def _by_differences(stress: Callable[..., Any]) -> Any:
+    law_stress = njit(**FAST)(stress)
+
+    @njit(**FAST)
+    def stress_and_slopes(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
+        held = max(strain, 1e-9)
+        here = law_stress(held, rate, temperature, law)
+        strained = law_stress(held * (1.0 + _DIFFERENCE), rate, temperature, law)
+        faster = law_stress(held, rate * (1.0 + _DIFFERENCE), temperature, law)
+        return here, (strained - here) / (held * _DIFFERENCE), (faster - here) / _DIFFERENCE
+
+    return stress_and_slopes
+
+
+def stress_and_slopes(strain: float, rate: float, temperature: float, law: Any) -> Any:
+    """Flow stress (Pa) and its derivatives by strain and by ln rate; for kernels only."""
+    raise NotImplementedError("called from compiled code only")
+
+
+@overload(stress_and_slopes, jit_options=FAST)
+def _choose(strain, rate, temperature, law):  # type: ignore[no-untyped-def]  # pragma: no cover
+    kernel = _KERNELS.get(getattr(law, "instance_class", None))
+    if kernel is None:
+        return None
+    return lambda strain, rate, temperature, law: kernel(strain, rate, temperature, law)
+
+
+@njit(**FAST)
+def flow_stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
+    """Flow stress in Pa at a plastic strain, its rate (1/s) and temperature (K)."""
+    return stress_and_slopes(strain, rate, temperature, law)[0]

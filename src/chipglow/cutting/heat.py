@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from chipglow.cutting.momentum import spline, spline_weights
+from chipglow.cutting.stress import property_at
 from chipglow.scene.tool import wedge_distance
 
 
@@ -65,7 +66,7 @@ def _gather_heat(points, count, nodes, capacity, heat_mass, grid):  # type: igno
         i, ax = spline((p.x - grid.left) / grid.cell)
         j, ay = spline((p.y - grid.bottom) / grid.cell)
         wx, wy = spline_weights(ax), spline_weights(ay)
-        heat = heat_mass * capacity[min(max(int(p.temperature - 200.0), 0), capacity.size - 1)]
+        heat = heat_mass * property_at(capacity, p.temperature)
         share = p.volume / (grid.cell * grid.cell)
         for a in range(3):
             for b in range(3):
@@ -84,7 +85,7 @@ def _exchange(nodes, increment, conductivity, i, j, k, l, duration):  # type: ig
     if nodes[k, l, 0] == 0.0:
         return
     mean = 0.5 * (nodes[i, j, 1] + nodes[k, l, 1])
-    k_mean = conductivity[min(max(int(mean - 200.0), 0), conductivity.size - 1)]
+    k_mean = property_at(conductivity, mean)
     share = min(nodes[i, j, 2], nodes[k, l, 2], 1.0)
     heat = k_mean * share * (nodes[k, l, 1] - nodes[i, j, 1]) * duration
     increment[i, j] += heat
@@ -138,7 +139,7 @@ def heat_contact(  # type: ignore[no-untyped-def]
         p = points[k]
         if p.contact_time > 0.0:
             inside = _tool_temperature(p.x, p.y, temperature, fraction, tool, grid)
-            chip = heat_mass * capacity[min(max(int(p.temperature - 200.0), 0), capacity.size - 1)]
+            chip = heat_mass * property_at(capacity, p.temperature)
             store = tool_heat.capacity * grid.cell**2
             both = chip * store / (chip + store)
             flow = tool_heat.conductance * tool_heat.area * p.contact_time

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from decimal import Decimal
 from functools import cache
 from pathlib import Path
@@ -10,13 +10,10 @@ from typing import Any, Final, NamedTuple
 
 import yaml
 
-from chipglow.cutting.material import (
-    DamageSoftening,
-    JohnsonCook,
-    TemperatureTable,
-    ToolMaterial,
-    WorkpieceMaterial,
-)
+from chipglow.cutting import laws as _laws  # noqa: F401  (registers the laws)
+from chipglow.cutting.damage import JohnsonCookDamage
+from chipglow.cutting.flow_stress import LAWS
+from chipglow.cutting.material import TemperatureTable, ToolMaterial, WorkpieceMaterial
 
 FOLDER: Final = Path(__file__).with_name("materials")
 _LARGEST_FILE: Final = 100_000
@@ -85,17 +82,29 @@ _HEAT_CAPACITY: Final = _Quantity(
 )
 _NUMBER: Final = _Quantity("a number without a unit", {"": ("1", "0")})
 
-_FLOW_STRESS: Final = {
+_FRACTURE_ENERGY: Final = _Quantity(
+    "a fracture energy such as 15 kJ/m2", _quantity(**{"J/m2": "1", "kJ/m2": "1e3"})
+)
+_LAW_FIELDS: Final = {
     "yield_stress": _STRESS,
     "hardening": _STRESS,
-    "hardening_exponent": _NUMBER,
-    "rate_sensitivity": _NUMBER,
-    "thermal_exponent": _NUMBER,
     "melting_temperature": _TEMPERATURE,
     "reference_temperature": _TEMPERATURE,
     "reference_rate": _RATE,
 }
-_DAMAGE: Final = dict.fromkeys(("d1", "d2", "d3", "d4", "d5", "onset", "loss"), _NUMBER)
+_ANY: Final = _Quantity(
+    "a number, or a stress, temperature or strain rate with its unit",
+    {**_NUMBER.units, **_STRESS.units, **_TEMPERATURE.units, **_RATE.units},
+)
+"""Fields of laws that chipglow does not know: their class says what they are."""
+_OWN_LAWS: Final = ("johnson-cook", "tanh")
+_DAMAGE: Final = {
+    **dict.fromkeys(("d1", "d2", "d3", "d4", "d5", "loss"), _NUMBER),
+    "fracture_energy": _FRACTURE_ENERGY,
+    "melting_temperature": _TEMPERATURE,
+    "reference_temperature": _TEMPERATURE,
+    "reference_rate": _RATE,
+}
 _SCALARS: Final = {
     "workpiece": {
         "density": _DENSITY,
@@ -278,28 +287,53 @@ class _Reader:
         self, name: str, data: Mapping[str, Any], numbers: Mapping[str, float]
     ) -> dict[str, WorkpieceMaterial]:
         tables = {key: self._table(key, data[key], quantity) for key, quantity in _TABLES.items()}
-        damage = self._group("damage", data["damage"], _DAMAGE)
-        softening = self._build("damage", DamageSoftening, damage)
+        damage = self._damage(data["damage"])
         laws = data["flow_stress"]
         if not isinstance(laws, Mapping) or not laws:
             raise self._wrong("flow_stress", laws, "one set or more by name")
         sets = {}
         for chosen, law in laws.items():
             place = f"flow_stress.{chosen}"
-            johnson_cook = self._build(place, JohnsonCook, self._group(place, law, _FLOW_STRESS))
-            fields = {
+            fails, flow_stress = self._flow_stress(place, law)
+            values = {
                 "name": f"{name}, flow stress {chosen}",
-                "flow_stress": johnson_cook,
-                "softening": softening,
+                "flow_stress": flow_stress,
+                "damage": damage if fails else None,
                 **numbers,
                 **tables,
             }
-            sets[str(chosen)] = self._build("workpiece", WorkpieceMaterial, fields)
+            sets[str(chosen)] = self._build("workpiece", WorkpieceMaterial, values)
         return sets
 
-    def _build(self, place: str, kind: Any, fields: Mapping[str, Any]) -> Any:
+    def _damage(self, data: object) -> JohnsonCookDamage | None:
+        if data == "none":
+            return None
+        damage: JohnsonCookDamage = self._build(
+            "damage", JohnsonCookDamage, self._group("damage", data, _DAMAGE)
+        )
+        return damage
+
+    def _flow_stress(self, place: str, data: object) -> tuple[bool, Any]:
+        """Whether the damage of the file applies, and the law."""
+        rest = dict(data) if isinstance(data, Mapping) else data
+        law, damage = "johnson-cook", None
+        if isinstance(rest, dict):
+            law, damage = rest.pop("law", law), rest.pop("damage", None)
+        if law not in LAWS:
+            raise self._wrong(f"{place}.law", law, f"one of {', '.join(sorted(LAWS))}")
+        if damage not in (None, "none"):
+            raise self._wrong(f"{place}.damage", damage, "none, or to be left out")
+        kind = LAWS[law]
+        known = law in _OWN_LAWS
+        quantities = {
+            f.name: _LAW_FIELDS.get(f.name, _NUMBER) if known else _ANY
+            for f in fields(kind)  # type: ignore[arg-type]
+        }
+        return damage is None, self._build(place, kind, self._group(place, rest, quantities))
+
+    def _build(self, place: str, kind: Any, values: Mapping[str, Any]) -> Any:
         try:
-            return kind(**fields)
+            return kind(**values)
         except ValueError as error:
             raise MaterialError(f"{self._file}: {place}: {error}") from None
 
@@ -332,8 +366,8 @@ class _Reader:
             pairs.append((temperature, self._si(place, row[1], quantity)))
             self._properties.append(Property(place, f"{row[1]} at {row[0]}", source))
         temperatures, values = zip(*pairs, strict=True)
-        fields = {"temperatures": temperatures, "values": values}
-        table: TemperatureTable = self._build(place, TemperatureTable, fields)
+        columns = {"temperatures": temperatures, "values": values}
+        table: TemperatureTable = self._build(place, TemperatureTable, columns)
         return table
 
     def _number(self, place: str, value: object, quantity: _Quantity, source: str) -> float:

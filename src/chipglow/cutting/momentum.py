@@ -1,28 +1,45 @@
 """One time step of the material points: grid to points, stress, contact, points to grid.
 
-Moving-least-squares transfer with an affine velocity (APIC) and quadratic B-splines: Jiang et al.
-(2015), Hu et al. (2018). Points are sorted by cell and the grid is cut into blocks of columns; two
-neighbouring blocks are never worked on at once, so that sums on the grid are made in the same order
-whatever the number of threads.
+Moving-least-squares transfer with an affine velocity and quadratic B-splines: Jiang et al. (2015),
+Hu et al. (2018). Points take the change of the grid's velocity rather than the velocity itself
+(AFLIP: Fei et al. 2021), so the transfer dissipates next to nothing. Points are sorted by cell and
+the grid is cut into blocks of columns; two neighbouring blocks are never worked on at once, so that
+sums on the grid are made in the same order whatever the number of threads.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, prange
 
-from chipglow.cutting.flow_stress import flow_stress, plastic_increment, strain_to_failure
+from chipglow.cutting.damage import weakening
+from chipglow.cutting.flow_stress import flow_stress
+from chipglow.cutting.lanes import FAST
+from chipglow.cutting.stress import BUFFER, LANES, STRESS, WORK, update_stresses
 from chipglow.scene.tool import wedge_distance
 
 BLOCK_COLUMNS = 6
 """Points of a block reach two columns beyond it, three if they drift by a cell before the next
 sorting: blocks two apart must not share a node."""
 
-MASS, MOMENTUM_X, MOMENTUM_Y, FRICTION_LIMIT = 0, 1, 2, 3
-"""What the points gather on a node: in kg/m, kg/s twice, and friction impulse in N s/m."""
+BATCH_CELLS = 16
+"""Cells whose points are gathered before their stress is computed."""
 
-FORCE_X, FORCE_Y, BOUNDARY_WORK, CONTACT_WORK, PLASTIC_WORK, FRICTION_WORK = range(6)
-"""What a step adds up: forces on the chip (N/m), and work per width of cut (J/m)."""
+NODE_VALUES = 6
+MASS, MOMENTUM_X, MOMENTUM_Y, IMPULSE_X, IMPULSE_Y, FRICTION_LIMIT = range(NODE_VALUES)
+"""What the points gather on a node: in kg/m; momentum and impulse of stress and contact in kg/s
+twice; limit of the friction impulse in N s/m."""
+
+VELOCITY_VALUES = 4
+VELOCITY_X, VELOCITY_Y, CHANGE_X, CHANGE_Y = range(VELOCITY_VALUES)
+"""A node's velocity after a step and its change in the step, in m/s."""
+
+SUMS = 7
+FORCE_X, FORCE_Y, BOUNDARY_WORK, CONTACT_WORK, PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS = range(
+    SUMS
+)
+"""What a step adds up: forces on the chip (N/m), and work per width of cut (J/m); the last is the
+elastic energy that goes when the points of a cell share one density."""
 
 _RATE_OF_SLIDING = 1e4
 
@@ -31,15 +48,17 @@ class Step(NamedTuple):
     """Numbers of a step.
 
     Point mass (kg/m, scaled), heat mass (kg/m, true), volume free of stress (m²), time step (s),
-    elastic constants (Pa), share of plastic work that is heat; contact: stiffness (Pa), damping
-    (N s/m²), distance at which a point touches (m), area of a point (m²/m), friction; boundary:
-    nodes under `floor`, and those left of `inflow` and under `ceiling` (m), move at `speed` (m/s).
+    share of a point's own velocity that it keeps (AFLIP 1, APIC 0), elastic constants (Pa), share
+    of plastic work that is heat; contact: stiffness (Pa), damping (N s/m²), distance at which a
+    point touches (m), area of a point (m²/m), friction; boundary: nodes under `floor`, and those
+    left of `inflow` and under `ceiling` (m), move at `speed` (m/s).
     """
 
     mass: float
     heat_mass: float
     volume: float
     time_step: float
+    kept: float
     shear_modulus: float
     bulk_modulus: float
     heat_share: float
@@ -68,8 +87,8 @@ def spline_weights(offset):  # type: ignore[no-untyped-def]
     return 0.5 * (1.5 - offset) ** 2, 0.75 - (offset - 1.0) ** 2, 0.5 * (offset - 0.5) ** 2
 
 
-@njit(error_model="numpy", fastmath={"contract", "arcp", "nsz"})
-def _gather(p, velocity, grid, time_step):  # type: ignore[no-untyped-def]
+@njit(**FAST)
+def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
     """Velocity and its gradient from the grid; the point moves. True if it is on the grid."""
     inverse = 1.0 / grid.cell
     i, ax = spline((p.x - grid.left) * inverse)
@@ -77,70 +96,39 @@ def _gather(p, velocity, grid, time_step):  # type: ignore[no-untyped-def]
     if not (0 <= i < grid.columns - 2 and 0 <= j < grid.rows - 2):
         return False
     wx, wy = spline_weights(ax), spline_weights(ay)
-    vx = vy = cxx = cxy = cyx = cyy = 0.0
+    vx = vy = dx = dy = cxx = cxy = cyx = cyy = 0.0
     for a in range(3):
-        sx = sy = tx = ty = 0.0
+        sx = sy = tx = ty = ex = ey = 0.0
         for b in range(3):
-            ux, uy = velocity[i + a, j + b, 0], velocity[i + a, j + b, 1]
+            node = velocity[i + a, j + b]
+            ux, uy = node[VELOCITY_X], node[VELOCITY_Y]
             w = wy[b]
             sx += w * ux
             sy += w * uy
+            ex += w * node[CHANGE_X]
+            ey += w * node[CHANGE_Y]
             tx += w * (b - ay) * ux
             ty += w * (b - ay) * uy
         w = wx[a]
         vx += w * sx
         vy += w * sy
+        dx += w * ex
+        dy += w * ey
         cxx += w * (a - ax) * sx
         cyx += w * (a - ax) * sy
         cxy += w * tx
         cyy += w * ty
     scale = 4.0 * inverse
     p.vx, p.vy = vx, vy
+    p.own_vx = vx + step.kept * (p.own_vx + dx - vx)
+    p.own_vy = vy + step.kept * (p.own_vy + dy - vy)
     p.cxx, p.cxy, p.cyx, p.cyy = scale * cxx, scale * cxy, scale * cyx, scale * cyy
-    p.x += time_step * vx
-    p.y += time_step * vy
+    p.x += step.time_step * vx
+    p.y += step.time_step * vy
     return True
 
 
-@njit(error_model="numpy", fastmath={"contract", "arcp", "nsz"})
-def update_stress(p, step, flow, capacity):  # type: ignore[no-untyped-def]
-    """Hypo-elastic deviator (Jaumann rate), radial return, plastic work to heat.
-
-    Returns the equivalent stress and the plastic work (J/m).
-    """
-    dt = step.time_step
-    two_g = 2.0 * step.shear_modulus * dt
-    spin = (p.cxy - p.cyx) * dt
-    third = (p.cxx + p.cyy) / 3.0
-    shear = p.dxy + 0.5 * spin * (p.dyy - p.dxx) + 0.5 * two_g * (p.cxy + p.cyx)
-    dxx = p.dxx + spin * p.dxy + two_g * (p.cxx - third)
-    dyy = p.dyy - spin * p.dxy + two_g * (p.cyy - third)
-    trial = np.sqrt(3.0 * (dxx * dxx + dyy * dyy + dxx * dyy + shear * shear))
-    increment = plastic_increment(
-        trial, p.strain, p.temperature, p.damage, p.increment, step.shear_modulus, dt, flow
-    )
-    p.increment = increment
-    stress, work = trial, 0.0
-    if increment > 0.0:
-        stress = trial - 3.0 * step.shear_modulus * increment
-        scale = stress / trial
-        dxx *= scale
-        dyy *= scale
-        shear *= scale
-        p.strain += increment
-        if flow.loss > 0.0:
-            mean_stress = step.bulk_modulus * (p.volume / step.volume - 1.0)
-            p.damage += increment / strain_to_failure(
-                mean_stress / stress, increment / dt, p.temperature, flow
-            )
-        work = stress * increment * p.volume
-        heat = step.heat_share * work
-        p.temperature += heat / (step.heat_mass * _at(capacity, p.temperature))
-    p.dxx, p.dyy, p.dxy = dxx, dyy, shear
-    return stress, work
-
-
-@njit(error_model="numpy", fastmath={"contract", "arcp", "nsz"})
+@njit(**FAST)
 def _scatter(p, fx, fy, limit, nodes, grid, step):  # type: ignore[no-untyped-def]
     """Mass, momentum, stress and contact impulse to the grid. True if the point is on it."""
     inverse = 1.0 / grid.cell
@@ -153,27 +141,28 @@ def _scatter(p, fx, fy, limit, nodes, grid, step):  # type: ignore[no-untyped-de
     force = 4.0 * inverse * step.time_step * p.volume
     spread = mass * grid.cell
     tension = step.bulk_modulus * (p.volume / step.volume - 1.0)
-    qxx = spread * p.cxx - force * (p.dxx + tension)
-    qyy = spread * p.cyy - force * (p.dyy + tension)
-    qxy, qyx = spread * p.cxy - force * p.dxy, spread * p.cyx - force * p.dxy
-    mx = mass * p.vx + step.time_step * fx
-    my = mass * p.vy + step.time_step * fy
+    qxx, qxy, qyx, qyy = spread * p.cxx, spread * p.cxy, spread * p.cyx, spread * p.cyy
+    txx, tyy, txy = force * (p.dxx + tension), force * (p.dyy + tension), force * p.dxy
+    mx, my = mass * p.own_vx, mass * p.own_vy
+    hx, hy = step.time_step * fx, step.time_step * fy
     for a in range(3):
-        ux = mx + qxx * (a - ax)
-        uy = my + qyx * (a - ax)
+        ux, uy = mx + qxx * (a - ax), my + qyx * (a - ax)
+        gx, gy = hx - txx * (a - ax), hy - txy * (a - ax)
         for b in range(3):
             w = wx[a] * wy[b]
             node = nodes[i + a, j + b]
             node[MASS] += w * mass
             node[MOMENTUM_X] += w * (ux + qxy * (b - ay))
             node[MOMENTUM_Y] += w * (uy + qyy * (b - ay))
+            node[IMPULSE_X] += w * (gx - txy * (b - ay))
+            node[IMPULSE_Y] += w * (gy - tyy * (b - ay))
             if limit > 0.0:
                 node[FRICTION_LIMIT] += w * limit
     return True
 
 
-@njit(error_model="numpy", fastmath={"contract", "arcp", "nsz"})
-def _contact(p, stress, tool, step, flow):  # type: ignore[no-untyped-def]
+@njit(**FAST)
+def _contact(p, stress, tool, step, law, damage):  # type: ignore[no-untyped-def]
     """Force of the tool's surface on a point (N/m) and the limit of its friction impulse."""
     distance, nx, ny = wedge_distance(p.x, p.y, tool)
     depth = step.reach - distance
@@ -183,45 +172,65 @@ def _contact(p, stress, tool, step, flow):  # type: ignore[no-untyped-def]
     p.contact_time += step.time_step
     if push <= 0.0:
         return 0.0, 0.0, 0.0
-    strength = max(stress, flow_stress(p.strain, _RATE_OF_SLIDING, p.temperature, p.damage, flow))
+    strength = flow_stress(p.strain, _RATE_OF_SLIDING, p.temperature, law)
+    strength = max(stress, strength * weakening(p.damage, damage))
     sticking = step.shear_fraction * strength / np.sqrt(3.0) * step.area
     limit = min(step.friction * push, sticking) * step.time_step
     return push * nx, push * ny, limit
 
 
-@njit(error_model="numpy", fastmath={"contract", "arcp", "nsz"})
-def _work_block(points, starts, block, velocity, nodes, tool, grid, step, flow, capacity, sums):  # type: ignore[no-untyped-def]
-    """One step of the points of a block; False if a point left the grid."""
-    first = block * BLOCK_COLUMNS * grid.rows
-    last = min(first + BLOCK_COLUMNS * grid.rows, starts.size - 1)
+@njit(**FAST)
+def _gather_cells(points, starts, first, last, velocity, grid, step, sums):  # type: ignore[no-untyped-def]
+    """Move the points of some cells; False if one left the grid."""
     on_grid = True
+    lost = 0.0
     for cell in range(first, last):
         begin, end = starts[cell], starts[cell + 1]
         if begin == end:
             continue
-        volume = change = 0.0
+        total = squares = 0.0
         for k in range(begin, end):
             p = points[k]
-            on_grid &= _gather(p, velocity, grid, step.time_step)
-            volume += p.volume
-            change += p.volume * (p.cxx + p.cyy)
+            on_grid &= _gather(p, velocity, grid, step)
+            volume = p.volume * (1.0 + step.time_step * (p.cxx + p.cyy))
+            total += volume
+            squares += volume * volume
         # One density for the points that share a cell: plastic flow, which keeps its volume, does
         # not lock, and pressure does not alternate from point to point.
-        volume = (volume + step.time_step * change) / (end - begin)
+        mean = total / (end - begin)
+        lost += squares - mean * total
         for k in range(begin, end):
-            p = points[k]
-            p.volume = volume
-            stress, work = update_stress(p, step, flow, capacity)
-            fx, fy, limit = _contact(p, stress, tool, step, flow)
-            sums[block, PLASTIC_WORK] += work
-            sums[block, FORCE_X] += fx
-            sums[block, FORCE_Y] += fy
-            sums[block, CONTACT_WORK] += step.time_step * (fx * p.vx + fy * p.vy)
-            on_grid &= _scatter(p, fx, fy, limit, nodes, grid, step)
+            points[k].volume = mean
+    sums[SHARING_LOSS] += 0.5 * step.bulk_modulus / step.volume * lost
     return on_grid
 
 
-@njit(error_model="numpy", fastmath={"contract", "arcp", "nsz"})
+@njit(**FAST)
+def _work_block(  # type: ignore[no-untyped-def]
+    points, starts, block, velocity, nodes, tool, grid, step, law, damage, capacity, sums, buffer
+):
+    """One step of the points of a block; False if a point left the grid."""
+    first = block * BLOCK_COLUMNS * grid.rows
+    last = min(first + BLOCK_COLUMNS * grid.rows, starts.size - 1)
+    on_grid = True
+    for cell in range(first, last, BATCH_CELLS):
+        end_cell = min(cell + BATCH_CELLS, last)
+        on_grid &= _gather_cells(points, starts, cell, end_cell, velocity, grid, step, sums[block])
+        for begin in range(starts[cell], starts[end_cell], LANES):
+            end = min(begin + LANES, starts[end_cell])
+            update_stresses(points, begin, end, step, law, damage, capacity, buffer)
+            for k in range(begin, end):
+                p = points[k]
+                fx, fy, limit = _contact(p, buffer[STRESS + k - begin], tool, step, law, damage)
+                sums[block, PLASTIC_WORK] += buffer[WORK + k - begin]
+                sums[block, FORCE_X] += fx
+                sums[block, FORCE_Y] += fy
+                sums[block, CONTACT_WORK] += step.time_step * (fx * p.vx + fy * p.vy)
+                on_grid &= _scatter(p, fx, fy, limit, nodes, grid, step)
+    return on_grid
+
+
+@njit(**FAST)
 def _work_column(i, velocity, nodes, heat, tool, grid, step, sums):  # type: ignore[no-untyped-def]
     """New velocities of a column of nodes: driven boundary and friction; sums are reset."""
     x = grid.left + i * grid.cell
@@ -229,12 +238,13 @@ def _work_column(i, velocity, nodes, heat, tool, grid, step, sums):  # type: ign
         node = nodes[i, j]
         mass = node[MASS]
         if mass == 0.0:
-            velocity[i, j, 0] = velocity[i, j, 1] = 0.0
+            velocity[i, j, :] = 0.0
             continue
         y = grid.bottom + j * grid.cell
-        vx, vy = node[MOMENTUM_X] / mass, node[MOMENTUM_Y] / mass
+        ux, uy = node[MOMENTUM_X] / mass, node[MOMENTUM_Y] / mass
+        vx, vy = ux + node[IMPULSE_X] / mass, uy + node[IMPULSE_Y] / mass
         limit = node[FRICTION_LIMIT]
-        node[MASS] = node[MOMENTUM_X] = node[MOMENTUM_Y] = node[FRICTION_LIMIT] = 0.0
+        node[:] = 0.0
         if y < step.floor or (x < step.inflow and y < step.ceiling):
             sums[i, BOUNDARY_WORK] += mass * (step.speed - vx) * step.speed
             vx, vy = step.speed, 0.0
@@ -243,38 +253,40 @@ def _work_column(i, velocity, nodes, heat, tool, grid, step, sums):  # type: ign
             slip = vy * nx - vx * ny
             loss = min(limit / mass, abs(slip))
             change = -loss if slip > 0.0 else loss
-            work = mass * loss * abs(slip + 0.5 * change)
+            work = mass * loss * abs(slip + change)
             heat[i, j] += work
             vx -= change * ny
             vy += change * nx
             sums[i, FRICTION_WORK] += work
             sums[i, FORCE_X] -= mass * change * ny / step.time_step
             sums[i, FORCE_Y] += mass * change * nx / step.time_step
-        velocity[i, j, 0], velocity[i, j, 1] = vx, vy
+        velocity[i, j, VELOCITY_X], velocity[i, j, VELOCITY_Y] = vx, vy
+        velocity[i, j, CHANGE_X], velocity[i, j, CHANGE_Y] = vx - ux, vy - uy
 
 
-@njit(cache=True, parallel=True)
-def advance(  # type: ignore[no-untyped-def]
-    steps, points, starts, velocity, nodes, heat, tool, grid, step, flow, capacity, sums, threads
-):
+def _advance(  # type: ignore[no-untyped-def]
+    steps, points, starts, velocity, nodes, heat, tool, grid, step, law, damage, capacity, sums,
+    threads,
+):  # fmt: skip
     """Advance all points by some steps, shared out among some threads.
 
-    `velocity` (columns, rows, 2) is the grid's velocity after the last step and is kept for the
-    next; `nodes` (columns, rows, 4) is zero before and after; `heat` (columns, rows) gathers
-    friction work (J/m); `sums` (6,) gathers over the steps what `FORCE_X` and so on name. Returns
-    False if a point left the grid.
+    `velocity` (columns, rows, 4) is the grid's velocity after the last step and its change in that
+    step, kept for the next; `nodes` (columns, rows, 6) is zero before and after; `heat` (columns,
+    rows) gathers friction work (J/m); `sums` gathers over the steps what `FORCE_X` and so on name.
+    Returns False if a point left the grid.
     """
     blocks = (grid.columns + BLOCK_COLUMNS - 1) // BLOCK_COLUMNS
     of_blocks = np.zeros((blocks, sums.size))
     of_columns = np.zeros((grid.columns, sums.size))
     good = np.ones(blocks, np.bool_)
+    buffers = np.empty((threads, BUFFER))
     for _ in range(steps):
         for colour in range(2):
             for thread in prange(threads):
                 for block in range(colour + 2 * thread, blocks, 2 * threads):
                     good[block] &= _work_block(
-                        points, starts, block, velocity, nodes, tool, grid, step, flow, capacity,
-                        of_blocks,
+                        points, starts, block, velocity, nodes, tool, grid, step, law, damage,
+                        capacity, of_blocks, buffers[thread],
                     )  # fmt: skip
         for thread in prange(threads):
             for i in range(thread, grid.columns, threads):
@@ -285,7 +297,16 @@ def advance(  # type: ignore[no-untyped-def]
     return True
 
 
-@njit
-def _at(table, temperature):  # type: ignore[no-untyped-def]
-    """Value of a sampled `TemperatureTable`."""
-    return table[min(max(int(temperature - 200.0), 0), table.size - 1)]
+advance = njit(cache=True, parallel=True)(_advance)
+
+
+def advance_with(law: Any) -> Any:
+    """`advance` for the numbers of a flow-stress law.
+
+    Compiled code is kept on disk for the laws that come with chipglow only: for a law of one's own
+    it would not be seen that the law has changed.
+    """
+    return advance if type(law).__module__.startswith("chipglow.") else _advance_afresh
+
+
+_advance_afresh = njit(parallel=True)(_advance)

@@ -10,7 +10,7 @@ POINT: Final = np.dtype(
     [
         (name, np.float64)
         for name in (
-            "x", "y", "vx", "vy",
+            "x", "y", "vx", "vy", "own_vx", "own_vy",
             "cxx", "cxy", "cyx", "cyy",
             "dxx", "dyy", "dxy",
             "strain", "increment", "strain_before", "damage", "temperature", "volume",
@@ -18,9 +18,10 @@ POINT: Final = np.dtype(
         )
     ]
 )  # fmt: skip
-"""Position, velocity, velocity gradient, deviator of the Cauchy stress; plastic strain, what the
-last step added to it and what it was at the last record; damage, temperature, volume per width,
-position before the cut, time in contact since the last exchange of heat; SI units."""
+"""Position, velocity of the grid there, velocity that the point carries, velocity gradient,
+deviator of the Cauchy stress; plastic strain, what the last step added to it and what it was at the
+last record; damage, temperature, volume per width, position before the cut, time in contact since
+the last exchange of heat; SI units."""
 
 Points: TypeAlias = NDArray[np.void]
 
@@ -42,7 +43,7 @@ def block_of_points(
     points = np.zeros(x.size * y.size, POINT)
     points["x"] = np.repeat(x, y.size)
     points["y"] = np.tile(y, x.size)
-    points["vx"] = speed
+    points["vx"] = points["own_vx"] = speed
     points["volume"] = spacing**2
     points["temperature"] = temperature
     points["material_x"], points["material_y"] = points["x"], points["y"]

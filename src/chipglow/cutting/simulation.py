@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from chipglow.cutting.checkpoint import Checkpoint, capture, restore
 from chipglow.cutting.conditions import CuttingConditions, Friction, Numerics, OutputWindow
+from chipglow.cutting.damage import Damage
 from chipglow.cutting.energy import ENERGIES, EnergyHistory, held_energy
-from chipglow.cutting.flow_stress import Flow
 from chipglow.cutting.heat import ToolHeat, conduct, conduct_tool, heat_contact, return_heat
 from chipglow.cutting.heat import tool_fraction as fraction_of_tool
 from chipglow.cutting.library import AISI_1045, CARBIDE
@@ -23,9 +23,14 @@ from chipglow.cutting.momentum import (
     FORCE_X,
     FORCE_Y,
     FRICTION_WORK,
+    NODE_VALUES,
     PLASTIC_WORK,
+    SHARING_LOSS,
+    SUMS,
+    VELOCITY_VALUES,
+    VELOCITY_X,
     Step,
-    advance,
+    advance_with,
 )
 from chipglow.cutting.picture import Picture
 from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
@@ -39,6 +44,7 @@ SOLVER_VERSION: Final = "2"
 _MARGIN: Final = 4
 _CONTACT_STIFFNESS: Final = 50e9
 _CONTACT_DAMPING: Final = 0.2
+_KEPT: Final = 1.0
 _LARGEST_DRIFT: Final = 0.1
 _HEAT_STABILITY: Final = 0.2
 
@@ -220,6 +226,7 @@ class _State:
             heat_mass=heat_mass,
             volume=spacing**2,
             time_step=time_step,
+            kept=_KEPT,
             shear_modulus=material.shear_modulus,
             bulk_modulus=material.bulk_modulus,
             heat_share=material.taylor_quinney,
@@ -234,15 +241,17 @@ class _State:
             ceiling=conditions.feed + 2 * cell,
             speed=conditions.speed,
         )
-        self.flow = Flow.of(material)
+        self.law = material.flow_stress.numbers()
+        self.step_points = advance_with(self.law)
+        self.damage = Damage.of(material.damage, cell)
         self.capacity = material.heat_capacity.sampled()
         self.conductivity = material.conductivity.sampled()
         self.tool_heat = _tool_heat(simulation, spacing)
         self.tool_fraction = fraction_of_tool(self.grid, self.tool)
         shape = (self.grid.columns, self.grid.rows)
-        self.velocity = np.zeros((*shape, 2))
-        self.velocity[..., 0] = conditions.speed
-        self.nodes = np.zeros((*shape, 4))
+        self.velocity = np.zeros((*shape, VELOCITY_VALUES))
+        self.velocity[..., VELOCITY_X] = conditions.speed
+        self.nodes = np.zeros((*shape, NODE_VALUES))
         self.heat_nodes = np.zeros((*shape, 3))
         self.increment = np.zeros(shape)
         self.friction_heat = np.zeros(shape)
@@ -252,7 +261,7 @@ class _State:
         self.top = numerics.height
         self._start_points(conditions, numerics)
         self.time = 0.0
-        self.work = np.zeros(FRICTION_WORK + 1)
+        self.work = np.zeros(SUMS)
         self.carried = 0.0
         self.held_at_start = self._held()
 
@@ -308,7 +317,7 @@ class _State:
             self._let_in(self.time)
             self._sort()
             self.carried += self._held().sum() - before
-            good = advance(
+            good = self.step_points(
                 self.steps,
                 self.points,
                 self.starts,
@@ -318,7 +327,8 @@ class _State:
                 self.tool,
                 self.grid,
                 self.step,
-                self.flow,
+                self.law,
+                self.damage,
                 self.capacity,
                 sums,
                 get_num_threads(),
@@ -332,7 +342,7 @@ class _State:
         forces = -sums[[FORCE_X, FORCE_Y]] / (self.cycles * self.steps)
         drive = self.work[BOUNDARY_WORK] + self.carried
         held = self._held() - self.held_at_start
-        used = self.work[[PLASTIC_WORK, FRICTION_WORK]]
+        used = self.work[[PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS]]
         return np.concatenate([forces, [drive, self.work[CONTACT_WORK]], held, used])
 
     def _held(self) -> NDArray[np.float64]:

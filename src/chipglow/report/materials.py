@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chipglow.cutting import MaterialFile, WorkpieceMaterial
-from chipglow.cutting.flow_stress import Flow, flow_stress
 from chipglow.report.drawing import BLUE, GREEN, KELVIN, VERMILLION, new_figure, style
 
 _TEMPERATURES: Final = ((20.0, BLUE), (400.0, GREEN), (800.0, VERMILLION))
@@ -44,12 +43,11 @@ def material_figure(material: MaterialFile) -> Figure:
 
 
 def _flow_stress_panel(axes: Axes, name: str, workpiece: WorkpieceMaterial) -> None:
-    flow = Flow.of(workpiece)
     for celsius, colour in _TEMPERATURES:
-        if celsius + KELVIN >= workpiece.flow_stress.melting_temperature:
+        if celsius + KELVIN >= workpiece.melting_temperature:
             continue
         for rate, line in _RATES:
-            stress = [flow_stress(s, rate, celsius + KELVIN, 0.0, flow) / 1e6 for s in _STRAINS]
+            stress = workpiece.flow_stress.at(_STRAINS, rate, celsius + KELVIN) / 1e6
             label = f"{celsius:g} °C, {rate:.0e} 1/s"
             axes.plot(_STRAINS, stress, color=colour, linestyle=line, label=label)
     axes.set_title(f"Flow stress {name}, undamaged")
@@ -61,7 +59,7 @@ def _flow_stress_panel(axes: Axes, name: str, workpiece: WorkpieceMaterial) -> N
 
 def _heat_panels(left: Axes, right: Axes, sets: Mapping[str, WorkpieceMaterial]) -> None:
     workpiece = next(iter(sets.values()))
-    celsius = np.linspace(0.0, workpiece.flow_stress.melting_temperature - KELVIN, 300)
+    celsius = np.linspace(0.0, workpiece.melting_temperature - KELVIN, 300)
     left.plot(celsius, workpiece.conductivity.at(celsius + KELVIN), color=BLUE)
     left.set_ylabel("conductivity / W/(m K)")
     right.plot(celsius, workpiece.heat_capacity.at(celsius + KELVIN), color=VERMILLION)

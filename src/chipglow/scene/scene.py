@@ -38,6 +38,7 @@ ENERGY_UNITS: Final[Mapping[str, str]] = dict.fromkeys(
         "elastic_energy",
         "plastic_work",
         "friction_work",
+        "sharing_loss",
     ),
     "J/m",
 )

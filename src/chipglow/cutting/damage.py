@@ -1,0 +1,132 @@
+"""Damage: the strain at which material begins to fail, and the energy that failing takes."""
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Final, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from chipglow.cutting.lanes import FAST, exponential, logarithm
+from chipglow.cutting.laws import check_melting, check_positive, homologous
+
+TRIAXIALITIES: Final = (-1.5, 1.5)
+"""Triaxialities at which the strain to failure is held: beyond, it was never measured."""
+
+BAND_CELLS: Final = 2.0
+"""Width in cells over which the solver spreads what fails: quadratic B-splines cannot be narrower.
+The energy of a square metre of failed surface is that of a layer so thick."""
+
+
+@dataclass(frozen=True)
+class JohnsonCookDamage:
+    """Failure as Johnson and Cook (1985) say, softening by fracture energy (Hillerborg 1976).
+
+    Damage is the sum of plastic strain over the strain to failure,
+    ε_f = (D₁ + D₂ exp(D₃ σ*))(1 + D₄ ln(ε̇/ε̇₀))(1 + D₅ θ), with the triaxiality
+    σ* = mean stress / equivalent stress and θ as in `JohnsonCook`. When it is 1, the flow stress
+    begins to fall: by the factor 1 − loss · w, where w rises from 0 to 1 while the failing layer
+    takes up the fracture energy per area, dw = σ L dε / (2 G), σ being the undamaged flow stress
+    and L the layer's thickness in the solver. The energy thus does not depend on the cell.
+
+    Parameters
+    ----------
+    d1, d2, d3, d4, d5 : float
+        Constants of the strain to failure.
+    fracture_energy : float
+        G in J/m².
+    loss : float
+        Share of the flow stress that is lost in the end, 0 to less than 1: cracks that are pressed
+        shut still rub.
+    melting_temperature, reference_temperature : float
+        Of θ, in K.
+    reference_rate : float
+        ε̇₀ in 1/s.
+    """
+
+    d1: float
+    d2: float
+    d3: float
+    d4: float
+    d5: float
+    fracture_energy: float
+    loss: float
+    melting_temperature: float
+    reference_temperature: float = 293.0
+    reference_rate: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not all(isfinite(d) for d in (self.d1, self.d2, self.d3, self.d4, self.d5)):
+            raise ValueError("damage: d1 to d5 must be finite")
+        ends = [self.d1 + self.d2 * np.exp(self.d3 * end) for end in TRIAXIALITIES]
+        if min(ends) <= 0:
+            raise ValueError(
+                f"damage: d1 + d2 exp(d3 triaxiality) falls to {min(ends):.3g}, expected over 0 "
+                f"from {TRIAXIALITIES[0]:g} to {TRIAXIALITIES[1]:g}"
+            )
+        if self.d4 < 0 or self.d5 <= -1:
+            raise ValueError(
+                f"damage: expected d4 of 0 or more and d5 over -1, got {self.d4!r}, {self.d5!r}"
+            )
+        if not 0 <= self.loss < 1:
+            raise ValueError(f"damage loss: expected 0 to less than 1, got {self.loss!r}")
+        check_positive("damage fracture_energy", self.fracture_energy)
+        check_positive("damage reference_rate", self.reference_rate)
+        check_melting("damage", self.reference_temperature, self.melting_temperature)
+
+
+class Damage(NamedTuple):
+    """Numbers of `JohnsonCookDamage` for kernels; `per_work` is L / (2 G) in 1/Pa."""
+
+    d1: float
+    d2: float
+    d3: float
+    d4: float
+    d5: float
+    per_work: float
+    loss: float
+    melting_temperature: float
+    reference_temperature: float
+    reference_rate: float
+
+    @classmethod
+    def of(cls, law: JohnsonCookDamage | None, cell: float) -> "Damage":
+        """Numbers of a law (None: nothing fails) on a grid with a cell in m."""
+        if law is None:
+            return cls(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e3, 0.0, 1.0)
+        per_work = BAND_CELLS * cell / (2 * law.fracture_energy)
+        return cls(
+            law.d1,
+            law.d2,
+            law.d3,
+            law.d4,
+            law.d5,
+            per_work,
+            law.loss,
+            law.melting_temperature,
+            law.reference_temperature,
+            law.reference_rate,
+        )
+
+
+@njit(**FAST)
+def weakening(damage, law):  # type: ignore[no-untyped-def]
+    """Factor on the flow stress; damage beyond 1 counts the softening w."""
+    return 1.0 - law.loss * min(max(damage - 1.0, 0.0), 1.0)
+
+
+@njit(**FAST)
+def strain_to_failure(triaxiality, rate, temperature, law):  # type: ignore[no-untyped-def]
+    """Strain to failure at a triaxiality, plastic strain rate (1/s) and temperature (K)."""
+    held = min(max(triaxiality, TRIAXIALITIES[0]), TRIAXIALITIES[1])
+    fast = 1.0 + law.d4 * logarithm(max(rate / law.reference_rate, 1.0))
+    cold = law.d1 + law.d2 * exponential(law.d3 * held)
+    return cold * fast * (1.0 + law.d5 * homologous(temperature, law))
+
+
+@njit(**FAST)
+def damage_growth(damage, increment, rate, mean_stress, stress, temperature, law):  # type: ignore[no-untyped-def]
+    """What a plastic strain `increment` adds to the damage; stresses in Pa, `stress` over 0."""
+    failing = increment * stress / weakening(damage, law) * law.per_work
+    limit = strain_to_failure(mean_stress / stress, rate, temperature, law)
+    return increment / limit if damage < 1.0 else failing

@@ -1,0 +1,169 @@
+"""The flow-stress laws that come with chipglow."""
+
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from numba import njit
+
+from chipglow.cutting.flow_stress import FlowStress, flow_stress_law
+from chipglow.cutting.lanes import FAST, exponential, logarithm
+
+MELTING_LIMIT = 3000.0
+"""No metal that is cut melts above, in K."""
+
+
+@njit(**FAST)
+def homologous(temperature, law):  # type: ignore[no-untyped-def]
+    """θ = (T − T₀) / (T_melt − T₀), from 0 to 0.99."""
+    share = (temperature - law.reference_temperature) / (
+        law.melting_temperature - law.reference_temperature
+    )
+    # A liquid's strength is not nought: 1 % is left, so that points never lose all stiffness.
+    return min(max(share, 0.0), 0.99)
+
+
+@njit(**FAST)
+def _thermal(temperature, law):  # type: ignore[no-untyped-def]
+    """1 − θᵐ."""
+    heat = homologous(temperature, law)
+    m = law.thermal_exponent
+    return 1.0 - (heat if m == 1.0 else exponential(m * logarithm(max(heat, 1e-30))))
+
+
+@njit(**FAST)
+def _johnson_cook(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
+    held = max(strain, 1e-12)
+    n, c = law.hardening_exponent, law.rate_sensitivity
+    hardened = law.hardening * exponential(n * logarithm(held))
+    ratio = rate / law.reference_rate
+    fast = 1.0 + c * logarithm(max(ratio, 1.0))
+    thermal = _thermal(temperature, law)
+    base = (law.yield_stress + hardened) * thermal
+    return base * fast, hardened * n / held * fast * thermal, base * c if ratio > 1.0 else 0.0
+
+
+@flow_stress_law("johnson-cook", _johnson_cook)
+@dataclass(frozen=True)
+class JohnsonCook(FlowStress):
+    """Flow stress of Johnson and Cook (1983).
+
+    σ = (A + B εⁿ)(1 + C ln(ε̇/ε̇₀))(1 − θᵐ), with θ = (T − T₀)/(T_melt − T₀), 0 below T₀, and
+    ε̇/ε̇₀ at least 1.
+
+    Parameters
+    ----------
+    yield_stress, hardening : float
+        A and B in Pa.
+    hardening_exponent, rate_sensitivity, thermal_exponent : float
+        n, C and m.
+    melting_temperature, reference_temperature : float
+        T_melt and T₀ in K.
+    reference_rate : float
+        ε̇₀ in 1/s.
+    """
+
+    yield_stress: float
+    hardening: float
+    hardening_exponent: float
+    rate_sensitivity: float
+    thermal_exponent: float
+    melting_temperature: float
+    reference_temperature: float = 293.0
+    reference_rate: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("yield_stress", "hardening_exponent", "thermal_exponent", "reference_rate"):
+            check_positive(f"Johnson-Cook {name}", getattr(self, name))
+        for name in ("hardening", "rate_sensitivity"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise ValueError(f"Johnson-Cook {name}: expected 0 or more")
+        check_melting("Johnson-Cook", self.reference_temperature, self.melting_temperature)
+
+    @staticmethod
+    def stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
+        """Flow stress in Pa."""
+        return _johnson_cook(strain, rate, temperature, law)[0]
+
+
+@flow_stress_law("tanh")
+@dataclass(frozen=True)
+class HyperbolicTangent(FlowStress):
+    """Johnson and Cook's law with strain softening: the TANH law of Calamaz et al. (2008).
+
+    σ = (A + B εⁿ / exp(εᵃ))(1 + C ln(ε̇/ε̇₀))(1 − θᵐ)(D + (1 − D) tanhˢ(1 / (ε + S)ᶜ)), with
+    D = 1 − (T/T_melt)ᵈ, S = (T/T_melt)ᵇ and T in K: the hotter the material, the more it loses
+    beyond some strain. With a = 0... s = 1 it is Calamaz et al.'s, Int. J. Mach. Tools Manuf. 48,
+    275; the exponent s is that of Sima and Özel (2010), Int. J. Mach. Tools Manuf. 50, 943.
+
+    Parameters
+    ----------
+    yield_stress, hardening : float
+        A and B in Pa.
+    hardening_exponent, rate_sensitivity, thermal_exponent : float
+        n, C and m.
+    melting_temperature, reference_temperature : float
+        T_melt and T₀ in K.
+    reference_rate : float
+        ε̇₀ in 1/s.
+    hardening_limit, recovery_temperature, recovery_strain, softening_temperature : float
+        a, b, c and d.
+    sharpness : float
+        s.
+    """
+
+    yield_stress: float
+    hardening: float
+    hardening_exponent: float
+    rate_sensitivity: float
+    thermal_exponent: float
+    melting_temperature: float
+    reference_temperature: float
+    reference_rate: float
+    hardening_limit: float
+    recovery_temperature: float
+    recovery_strain: float
+    softening_temperature: float
+    sharpness: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in (
+            "yield_stress", "hardening_exponent", "thermal_exponent", "reference_rate",
+            "recovery_strain", "sharpness",
+        ):  # fmt: skip
+            check_positive(f"TANH {name}", getattr(self, name))
+        for name in (
+            "hardening", "rate_sensitivity", "hardening_limit", "recovery_temperature",
+            "softening_temperature",
+        ):  # fmt: skip
+            if not 0 <= getattr(self, name) < np.inf:
+                raise ValueError(f"TANH {name}: expected 0 or more, got {getattr(self, name)!r}")
+        check_melting("TANH", self.reference_temperature, self.melting_temperature)
+
+    @staticmethod
+    def stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
+        """Flow stress in Pa."""
+        hardened = law.hardening * strain**law.hardening_exponent
+        hardened = hardened * np.exp(-(strain**law.hardening_limit))
+        fast = 1.0 + law.rate_sensitivity * np.log(max(rate / law.reference_rate, 1.0))
+        warm = min(max(temperature / law.melting_temperature, 0.0), 1.0)
+        residual = 1.0 - warm**law.softening_temperature
+        recovery = strain + warm**law.recovery_temperature
+        kept = np.tanh(recovery ** (-law.recovery_strain)) ** law.sharpness
+        strength = (law.yield_stress + hardened) * fast * _thermal(temperature, law)
+        return strength * (residual + (1.0 - residual) * kept)
+
+
+def check_positive(name: str, value: float) -> None:
+    """Raise ValueError unless a value is finite and over 0."""
+    if not (isfinite(value) and value > 0):
+        raise ValueError(f"{name}: expected over 0, got {value!r}")
+
+
+def check_melting(name: str, reference: float, melting: float) -> None:
+    """Raise ValueError unless a melting temperature is over the reference temperature (K)."""
+    if not reference < melting < MELTING_LIMIT:
+        raise ValueError(
+            f"{name} melting_temperature: expected {reference:g} K to {MELTING_LIMIT:g} K, "
+            f"got {melting!r} K"
+        )

@@ -1,0 +1,169 @@
+"""Stress of a batch of points: hypo-elastic, radial return to the flow stress, damage.
+
+Points are copied into rows of a buffer, one row a quantity, so that the compiler does the same
+arithmetic on several points at once.
+"""
+
+import numpy as np
+from numba import njit
+
+from chipglow.cutting.damage import damage_growth, weakening
+from chipglow.cutting.flow_stress import stress_and_slopes
+from chipglow.cutting.lanes import FAST, exponential
+
+LANES = 128
+"""Points of a batch: their rows stay in the fastest cache."""
+
+SLOWEST_RATE = 1.0
+"""Plastic flow slower than this (1/s) is taken to be as strong as at this rate."""
+
+_ROW = LANES + 8
+_ITERATIONS = 8
+_SMALL_CHANGE = 0.02
+_SMALL_STRAIN = 0.01
+(
+    DXX, DYY, DXY, STRAIN, DAMAGE, TEMPERATURE, INCREMENT, VOLUME,
+    CXX, CXY, CYX, CYY, TRIAL, WEAK, BOUND, WORK,
+) = range(0, 16 * _ROW, _ROW)  # fmt: skip
+BUFFER = 16 * _ROW
+STRESS = TRIAL
+"""Rows of the buffer; in the end the trial stress has become the equivalent stress (Pa)."""
+
+
+@njit(**FAST)
+def plastic_increments(b, count, shear_modulus, time_step, law, damage):  # type: ignore[no-untyped-def]
+    """Plastic strains of a step that take trial stresses back to the flow stress.
+
+    Solves trial − 3GΔ = weakening · σ(strain + Δ, Δ/dt, temperature) for Δ by Newton's method over
+    ln Δ; weakening and temperature are those of the step's beginning. It starts at the last step's
+    Δ or, without one, at the rate-independent Δ.
+    """
+    beyond = 0
+    for k in range(count):
+        b[WEAK + k] = weakening(b[DAMAGE + k], damage)
+    for k in range(count):
+        strain, trial = b[STRAIN + k], b[TRIAL + k]
+        still, slope, _ = stress_and_slopes(strain, SLOWEST_RATE, b[TEMPERATURE + k], law)
+        excess = trial - b[WEAK + k] * still
+        beyond += 1 if excess > 0.0 else 0
+        # Hardening is infinitely steep at no strain: no slope to rely on.
+        firm = max(slope * b[WEAK + k], 0.0) if strain > _SMALL_STRAIN else 0.0
+        bound = excess / (3.0 * shear_modulus + firm)
+        guess = b[INCREMENT + k]
+        begin = guess if guess > 2.0 * SLOWEST_RATE * time_step else bound
+        b[INCREMENT + k] = max(min(begin, bound), 0.0)
+        b[BOUND + k] = bound
+    if beyond == 0:
+        return False
+    for _ in range(_ITERATIONS):
+        if _improve(b, count, shear_modulus, time_step, law, damage) == 0:
+            break
+    return True
+
+
+@njit(**FAST)
+def _improve(b, count, shear_modulus, time_step, law, damage):  # type: ignore[no-untyped-def]
+    """One step of Newton over the logarithm of the increment; how many change much."""
+    stiffness = 3.0 * shear_modulus
+    slowest = SLOWEST_RATE * time_step
+    per_step = 1.0 / time_step
+    far = 0
+    for k in range(count):
+        increment, bound, weak = b[INCREMENT + k], b[BOUND + k], b[WEAK + k]
+        moving = increment > slowest
+        tried = increment if moving else slowest
+        flowing, by_strain, by_rate = stress_and_slopes(
+            b[STRAIN + k] + tried, tried * per_step, b[TEMPERATURE + k], law
+        )
+        excess = b[TRIAL + k] - stiffness * tried - weak * flowing
+        fall = stiffness * tried + weak * (by_strain * tried + by_rate)
+        change = excess / max(fall, 0.5 * stiffness * tried)
+        plastic = bound > 0.0
+        far += 1 if moving and plastic and abs(change) > _SMALL_CHANGE else 0
+        better = tried * exponential(min(max(change, -3.0), 3.0))
+        # What flows slower than the slowest rate flows as the trial stress says.
+        better = better if moving else min(slowest, bound)
+        largest = max(b[TRIAL + k], 0.0) / stiffness
+        b[INCREMENT + k] = min(better, largest) if plastic else 0.0
+    return far
+
+
+@njit(**FAST)
+def _try(b, count, shear_modulus, time_step):  # type: ignore[no-untyped-def]
+    """Trial deviator (Jaumann rate) and its equivalent stress."""
+    two_g = 2.0 * shear_modulus * time_step
+    for k in range(count):
+        cxx, cxy, cyx, cyy = b[CXX + k], b[CXY + k], b[CYX + k], b[CYY + k]
+        xx, yy, xy = b[DXX + k], b[DYY + k], b[DXY + k]
+        spin = (cxy - cyx) * time_step
+        third = (cxx + cyy) * (1.0 / 3.0)
+        shear = xy + 0.5 * spin * (yy - xx) + 0.5 * two_g * (cxy + cyx)
+        dxx = xx + spin * xy + two_g * (cxx - third)
+        dyy = yy - spin * xy + two_g * (cyy - third)
+        b[DXX + k], b[DYY + k], b[DXY + k] = dxx, dyy, shear
+        b[TRIAL + k] = np.sqrt(3.0 * (dxx * dxx + dyy * dyy + dxx * dyy + shear * shear))
+        b[WORK + k] = 0.0
+
+
+@njit(**FAST)
+def _return(b, count, step, law, damage):  # type: ignore[no-untyped-def]
+    """Deviator back to the flow stress; strain, damage, and plastic work (J/m)."""
+    stiffness = 3.0 * step.shear_modulus
+    per_volume = 1.0 / step.volume
+    per_step = 1.0 / step.time_step
+    fails = 1.0 if damage.loss > 0.0 else 0.0
+    for k in range(count):
+        increment, trial, volume = b[INCREMENT + k], b[TRIAL + k], b[VOLUME + k]
+        stress = trial - stiffness * increment
+        some = max(stress, 1.0)
+        scale = stress / max(trial, 1.0)
+        scale = scale if increment > 0.0 else 1.0
+        b[DXX + k] *= scale
+        b[DYY + k] *= scale
+        b[DXY + k] *= scale
+        mean_stress = step.bulk_modulus * (volume * per_volume - 1.0)
+        b[DAMAGE + k] += fails * damage_growth(
+            b[DAMAGE + k],
+            increment,
+            increment * per_step,
+            mean_stress,
+            some,
+            b[TEMPERATURE + k],
+            damage,
+        )
+        b[STRAIN + k] += increment
+        b[WORK + k] = stress * increment * volume
+        b[TRIAL + k] = stress
+
+
+@njit(**FAST)
+def update_stresses(points, begin, end, step, law, damage, capacity, b):  # type: ignore[no-untyped-def]
+    """Stress of up to `LANES` points; leaves their equivalent stress and plastic work in `b`."""
+    count = end - begin
+    for k in range(count):
+        p = points[begin + k]
+        b[CXX + k], b[CXY + k], b[CYX + k], b[CYY + k] = p.cxx, p.cxy, p.cyx, p.cyy
+        b[DXX + k], b[DYY + k], b[DXY + k] = p.dxx, p.dyy, p.dxy
+        b[STRAIN + k], b[DAMAGE + k], b[TEMPERATURE + k] = p.strain, p.damage, p.temperature
+        b[INCREMENT + k], b[VOLUME + k] = p.increment, p.volume
+    _try(b, count, step.shear_modulus, step.time_step)
+    plastic = plastic_increments(b, count, step.shear_modulus, step.time_step, law, damage)
+    if plastic:
+        _return(b, count, step, law, damage)
+    for k in range(count):
+        p = points[begin + k]
+        p.dxx, p.dyy, p.dxy = b[DXX + k], b[DYY + k], b[DXY + k]
+        p.increment = 0.0
+        if plastic:
+            p.increment = b[INCREMENT + k]
+            p.strain, p.damage = b[STRAIN + k], b[DAMAGE + k]
+            work = b[WORK + k]
+            if work > 0.0:
+                heat = step.heat_share * work
+                p.temperature += heat / (step.heat_mass * property_at(capacity, p.temperature))
+
+
+@njit
+def property_at(table, temperature):  # type: ignore[no-untyped-def]
+    """Value of a sampled `TemperatureTable`."""
+    return table[min(max(int(temperature - 200.0), 0), table.size - 1)]
