@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from solver import ELASTIC, Block
 
-from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow, stress
+from chipglow.cutting import (
+    CuttingConditions,
+    CuttingSimulation,
+    Friction,
+    Numerics,
+    OutputWindow,
+    stress,
+)
 from chipglow.cutting.damage import Damage, strain_to_failure, weakening
 from chipglow.cutting.flow_stress import flow_stress
 from chipglow.cutting.laws import HyperbolicTangent
@@ -148,16 +155,21 @@ def test_adiabatic_shear_follows_the_flow_stress():
     )
 
 
-@pytest.mark.parametrize("coefficient", [0.0, 0.3])
-def test_friction_of_a_block_on_the_rake_face(coefficient):
-    """A block pressed on the face by its own motion: tangential force is μ times normal force."""
+def pressed_on_a_face(**friction):
+    """A block that meets an upright rake face squarely, far above the edge, and slides up."""
     geometry = ToolGeometry()
-    # The rake face turned upright, where the block meets it squarely, far above the edge.
     radius = geometry.edge_radius
     clearance = geometry.coefficients[7:]
     tool = (80e-6 + radius, -1.0, radius, -1.0, 0.0, 0.0, 1.0, *clearance)
-    block = Block((80e-6, 80e-6), tool=tool, friction=coefficient, shear_fraction=1.0)
+    block = Block((80e-6, 80e-6), tool=tool, shear_fraction=1.0, **friction)
     block.set_velocity(lambda x, y: 1.0 + 0 * x * y, lambda x, y: 4.0 + 0 * x * y)
+    return block
+
+
+@pytest.mark.parametrize("coefficient", [0.0, 0.3])
+def test_friction_of_a_block_on_the_rake_face(coefficient):
+    """A block pressed on the face by its own motion: tangential force is μ times normal force."""
+    block = pressed_on_a_face(friction=coefficient)
     block.advance(10)
     normal, tangential = -block.force
     assert normal > 1e3
@@ -165,6 +177,50 @@ def test_friction_of_a_block_on_the_rake_face(coefficient):
     work = coefficient * normal * 10 * block.step.time_step * 4.0
     # The light nodes at the face slow down first: the slip is up to a tenth under 4 m/s.
     assert 0.9 * work <= block.heat.sum() <= work
+
+
+@pytest.mark.parametrize(
+    ("temperature", "by_hand"),
+    # 0.4 (1 − (700/1400)²) = 0.3; at 293 K 1 − 0.0438; nothing is left from the melting point on.
+    [(700.0, 0.3), (293.0, 0.38248), (1400.0, 0.0), (1500.0, 0.0)],
+)
+def test_friction_falls_with_the_temperature_of_the_surface(temperature, by_hand):
+    block = pressed_on_a_face(friction=0.4, friction_exponent=2.0, friction_melting=1400.0)
+    block.points["temperature"] = temperature
+    block.advance(10)
+    normal, tangential = -block.force
+    # Five digits of the hand calculation.
+    assert tangential == pytest.approx(by_hand * normal, rel=2e-5, abs=1e-9 * normal)
+
+
+def test_shear_limit_holds_whatever_the_temperature():
+    block = pressed_on_a_face(friction=2.0, friction_exponent=30.0, friction_melting=1400.0)
+    block.points["temperature"] = 900.0
+    free = pressed_on_a_face(friction=2.0)
+    free.points["temperature"] = 900.0
+    for each in (block, free):
+        each.step = each.step._replace(shear_fraction=1e-8)
+        each.advance(10)
+    # Coulomb's limit is far over the shear limit in both: it does not matter that it differs.
+    assert free.force[1] != 0.0
+    assert block.force[1] == pytest.approx(free.force[1], rel=1e-12)
+
+
+def test_thermal_exponent_reaches_the_cut():
+    """So small an exponent takes the friction away, whatever the temperature: 0.17^0.01 = 0.98."""
+    work = []
+    for exponent in (None, 0.01):
+        simulation = CuttingSimulation(
+            CuttingConditions(length_of_cut=0.03e-3),
+            friction=Friction(thermal_exponent=exponent),
+            numerics=Numerics(cell=30e-6),
+        )
+        raster = Raster(-100e-6, 100e-6, 10e-6, 20, 20)
+        window = OutputWindow(start=0.02e-3, end=0.03e-3, interval=1e-6)
+        history = simulation.run(window, raster, lambda frame: None)
+        work.append(history.energy.friction_work[-1])
+    # A fiftieth of the force at most, on a chip that slides the faster for it.
+    assert 0 < work[1] < 0.1 * work[0]
 
 
 @pytest.mark.parametrize(("kept", "lost"), [(0.0, 0.007), (1.0, 0.0)])

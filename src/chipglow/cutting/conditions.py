@@ -40,19 +40,27 @@ class CuttingConditions:
 class Friction:
     """Friction of Zorev's kind: Coulomb, limited by the shear strength of the chip.
 
+    With a `thermal_exponent` q the coefficient falls with the temperature T of the chip's surface,
+    as Moufki, Molinari and Dudzinski (1998), J. Mech. Phys. Solids 46, 2103 proposed for the mean
+    temperature of the contact: μ = μ₀ (1 − (T/T_melt)^q), 0 from T_melt on. The form is as widely
+    cited, the paper was not seen. T and T_melt, that of the flow stress, are in K here.
+
     Parameters
     ----------
     coefficient : float
-        Coulomb coefficient.
+        Coulomb coefficient; with a `thermal_exponent` that at 0 K, μ₀.
     shear_fraction : float
         Limit of the friction stress as a share of the chip's shear flow stress.
     conductance : float
         Thermal conductance of the contact in W/(m² K).
+    thermal_exponent : float, optional
+        q; without one the coefficient does not depend on the temperature.
     """
 
     coefficient: float = 0.5
     shear_fraction: float = 1.0
     conductance: float = 1e7
+    thermal_exponent: float | None = None
 
     def __post_init__(self) -> None:
         if not 0 <= self.coefficient <= 2:
@@ -62,6 +70,11 @@ class Friction:
         if not 0 <= self.conductance < 1e12:
             raise ValueError(
                 f"contact conductance: expected 0 to 1e12 W/(m2 K), got {self.conductance!r}"
+            )
+        exponent = self.thermal_exponent
+        if exponent is not None and not 0 < exponent <= 100:
+            raise ValueError(
+                f"friction thermal_exponent: expected over 0 and up to 100, got {exponent!r}"
             )
 
 

@@ -7,6 +7,7 @@ the grid is cut into blocks of columns; two neighbouring blocks are never worked
 sums on the grid are made in the same order whatever the number of threads.
 """
 
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from numba import njit, prange
 
 from chipglow.cutting.damage import weakening
 from chipglow.cutting.flow_stress import flow_stress
+from chipglow.cutting.friction import friction_coefficient
 from chipglow.cutting.lanes import FAST
 from chipglow.cutting.stress import BUFFER, LANES, STRESS, WORK, update_stresses
 from chipglow.scene.tool import wedge_distance
@@ -51,7 +53,8 @@ class Step(NamedTuple):
     share of a point's own velocity that it keeps (AFLIP 1, APIC 0), elastic constants (Pa), share
     of plastic work that is heat; contact: stiffness (Pa), damping (N s/m²), distance at which a
     point touches (m), area of a point (m²/m), friction; boundary: nodes under `floor`, and those
-    left of `inflow` and under `ceiling` (m), move at `speed` (m/s).
+    left of `inflow` and under `ceiling` (m), move at `speed` (m/s). Friction falls with the
+    temperature over `friction_melting` (K): see `friction_coefficient`.
     """
 
     mass: float
@@ -72,6 +75,8 @@ class Step(NamedTuple):
     inflow: float
     ceiling: float
     speed: float
+    friction_exponent: float = 1.0
+    friction_melting: float = inf
 
 
 @njit
@@ -175,7 +180,10 @@ def _contact(p, stress, tool, step, law, damage):  # type: ignore[no-untyped-def
     strength = flow_stress(p.strain, _RATE_OF_SLIDING, p.temperature, law)
     strength = max(stress, strength * weakening(p.damage, damage))
     sticking = step.shear_fraction * strength / np.sqrt(3.0) * step.area
-    limit = min(step.friction * push, sticking) * step.time_step
+    coefficient = friction_coefficient(
+        step.friction, step.friction_exponent, step.friction_melting, p.temperature
+    )
+    limit = min(coefficient * push, sticking) * step.time_step
     return push * nx, push * ny, limit
 
 

@@ -240,6 +240,7 @@ class _State:
             inflow=-numerics.upstream,
             ceiling=conditions.feed + 2 * cell,
             speed=conditions.speed,
+            **_thermal_friction(simulation),
         )
         self.law = material.flow_stress.numbers()
         self.step_points = advance_with(self.law)
@@ -456,6 +457,15 @@ def _time_steps(simulation: CuttingSimulation, interval: float) -> tuple[int, in
     cycles = ceil(interval / min(drift, heat))
     steps = ceil(interval / cycles / (numerics.courant * numerics.cell / sound))
     return cycles, steps, interval / cycles / steps
+
+
+def _thermal_friction(simulation: CuttingSimulation) -> dict[str, float]:
+    """What `Step` takes if friction depends on the temperature."""
+    exponent = simulation.friction.thermal_exponent
+    if exponent is None:
+        return {}
+    melting = simulation.workpiece.flow_stress.melting_temperature
+    return {"friction_exponent": exponent, "friction_melting": melting}
 
 
 def _tool_heat(simulation: CuttingSimulation, spacing: float) -> ToolHeat:

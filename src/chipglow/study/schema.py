@@ -136,10 +136,19 @@ class FrictionSection(Part):
     shear_fraction: float = _field(
         1.0, "Limit of the friction stress, as a share of the chip's shear flow stress."
     )
+    thermal_exponent: Annotated[float | None, *_NONE] = _field(
+        "none",
+        "Exponent q of a coefficient that falls with the temperature T of the chip's surface,\n"
+        "coefficient * (1 - (T / T_melt)^q) with both in K (Moufki et al. 1998); or none.",
+    )
 
     def build(self) -> Friction:
         """The law of friction."""
-        return Friction(coefficient=self.coefficient, shear_fraction=self.shear_fraction)
+        return Friction(
+            coefficient=self.coefficient,
+            shear_fraction=self.shear_fraction,
+            thermal_exponent=self.thermal_exponent,
+        )
 
 
 class NumericsSection(Part):
