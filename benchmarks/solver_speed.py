@@ -55,6 +55,7 @@ class Start(NamedTuple):
     step: Step
     flow: Flow
     capacity: np.ndarray
+    heat_shares: np.ndarray
 
 
 def sheared_block(side):
@@ -80,7 +81,15 @@ def sheared_block(side):
 def start_of(block):
     points = np.zeros_like(block.points)
     sort_by_cell(block.points, block.count, block.grid, FAR, FAR, points, block.starts)
-    return Start(points, block.velocity, block.grid, block.step, block.flow, block.capacity)
+    return Start(
+        points,
+        block.velocity,
+        block.grid,
+        block.step,
+        block.flow,
+        block.capacity,
+        block.heat_shares,
+    )
 
 
 class Chipglow:
@@ -111,7 +120,8 @@ class Chipglow:
         begin = perf_counter()
         advance(
             steps, self.points, self.starts, self.velocity, self.nodes, self.heat, self.tool,
-            start.grid, start.step, start.flow, start.capacity, self.sums, self.threads,
+            start.grid, start.step, start.flow, start.capacity, start.heat_shares,
+            self.sums, self.threads,
         )  # fmt: skip
         return perf_counter() - begin
 

@@ -9,6 +9,7 @@ from chipglow.cutting.damage import Damage
 from chipglow.cutting.energy import held_energy
 from chipglow.cutting.library import AISI_1045
 from chipglow.cutting.momentum import NODE_VALUES, SUMS, VELOCITY_VALUES, Step, advance_with
+from chipglow.cutting.plastic_heat import heat_shares
 from chipglow.cutting.points import POINT, Grid, block_of_points, sort_by_cell
 from chipglow.scene import ToolGeometry
 
@@ -41,7 +42,6 @@ class Block:
             kept=1.0,
             shear_modulus=material.shear_modulus,
             bulk_modulus=material.bulk_modulus,
-            heat_share=material.taylor_quinney,
             stiffness=50e9,
             damping=0.0,
             reach=self.spacing / 2,
@@ -56,6 +56,7 @@ class Block:
         self.law = material.flow_stress.numbers()
         self.damage = Damage.of(material.damage, cell)
         self.capacity = material.heat_capacity.sampled()
+        self.heat_shares = heat_shares(material.taylor_quinney)
         self.conductivity = material.conductivity.sampled()
         self.tool = tool or (FAR, FAR, *ToolGeometry().coefficients[2:])
         shape = (self.grid.columns, self.grid.rows)
@@ -86,7 +87,8 @@ class Block:
             now = min(steps, cycle)
             assert advance_with(self.law)(
                 now, self.points, self.starts, self.velocity, self.nodes, self.heat, self.tool,
-                self.grid, self.step, self.law, self.damage, self.capacity, self.sums,
+                self.grid, self.step, self.law, self.damage, self.capacity, self.heat_shares,
+                self.sums,
                 get_num_threads(),
             )  # fmt: skip
             self.force /= now

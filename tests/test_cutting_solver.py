@@ -17,12 +17,14 @@ from chipglow.cutting import (
     Friction,
     Numerics,
     OutputWindow,
+    RateTable,
     stress,
 )
 from chipglow.cutting.damage import Damage, strain_to_failure, weakening
 from chipglow.cutting.flow_stress import flow_stress
 from chipglow.cutting.laws import HyperbolicTangent
 from chipglow.cutting.library import AISI_1045, workpiece
+from chipglow.cutting.plastic_heat import heat_share, heat_shares
 from chipglow.scene import Raster, ToolGeometry
 
 TITANIUM = HyperbolicTangent(
@@ -120,11 +122,17 @@ def test_plastic_increment_solves_its_equation(
     assert trial - 3 * shear * increment == pytest.approx(flowing, abs=1e-3 * trial)
 
 
-def test_adiabatic_shear_follows_the_flow_stress():
+@pytest.mark.parametrize(
+    ("share", "of_it"),
+    # The rate is 1e5/√3 = 57 735 1/s: 0.3 + 0.6 (4.76144 − 2)/(5 − 2) of the work, by hand.
+    [(0.9, 0.9), (RateTable((1.0, 1e2, 1e5), (0.1, 0.3, 0.9)), 0.852288)],
+)
+def test_adiabatic_shear_follows_the_flow_stress(share, of_it):
     """Uniform simple shear at 1e5 /s against the ordinary differential equations."""
     rate = 1e5
+    material = replace(AISI_1045, taylor_quinney=share)
     # So heavy that nothing slows it: the shear stays as it was set.
-    block = Block((60e-6, 60e-6), material=AISI_1045, mass=1e9, time_step=1e-3 / rate)
+    block = Block((60e-6, 60e-6), material=material, mass=1e9, time_step=1e-3 / rate)
     block.set_velocity(lambda x, y: rate * y + 0 * x, lambda x, y: 0 * x * y)
     block.advance(1000)
     equivalent_rate = rate / sqrt(3)
@@ -134,7 +142,7 @@ def test_adiabatic_shear_follows_the_flow_stress():
         temperature, _ = state
         flowing = flow_stress(strain, equivalent_rate, temperature, law)
         capacity = AISI_1045.heat_capacity.at(temperature)
-        heating = 0.9 * flowing / (AISI_1045.density * capacity)
+        heating = of_it * flowing / (AISI_1045.density * capacity)
         return [heating, 1.0 / strain_to_failure(0.0, equivalent_rate, temperature, harm)]
 
     strain_of_all = 1.0 / sqrt(3)
@@ -164,6 +172,20 @@ def pressed_on_a_face(**friction):
     block = Block((80e-6, 80e-6), tool=tool, shear_fraction=1.0, **friction)
     block.set_velocity(lambda x, y: 1.0 + 0 * x * y, lambda x, y: 4.0 + 0 * x * y)
     return block
+
+
+@pytest.mark.parametrize(
+    ("rate", "share"),
+    [(1e-3, 0.4), (1.0, 0.4), (10.0, 0.5), (100.0, 0.6), (1e4, 0.75), (1e6, 0.9), (1e9, 0.9)],
+)
+def test_heat_share_is_linear_over_the_logarithm_of_the_rate_and_held_beyond(rate, share):
+    table = heat_shares(RateTable((1.0, 100.0, 1e6), (0.4, 0.6, 0.9)))
+    assert heat_share(rate, table) == pytest.approx(share, rel=1e-14)
+
+
+@given(share=st.floats(0.0, 1.0), rate=st.floats(0.0, 1e12))
+def test_a_constant_heat_share_is_itself(share, rate):
+    assert heat_share(rate, heat_shares(share)) == share
 
 
 @pytest.mark.parametrize("coefficient", [0.0, 0.3])

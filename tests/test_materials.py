@@ -15,6 +15,7 @@ from chipglow.cutting import (
     JohnsonCook,
     JohnsonCookDamage,
     MaterialError,
+    RateTable,
     TemperatureTable,
     material_file,
     material_names,
@@ -26,6 +27,7 @@ from chipglow.cutting.library import FOLDER, read_material
 from chipglow.study import Study, load_study
 from chipglow.study.running import _inputs
 
+RATES = "[[1 1/s, 0.6], [1000 1/s, 0.9]]"
 SETS = [
     f"{name}/{chosen}"
     for name in material_names("workpiece")
@@ -160,6 +162,11 @@ def _write(path: Path, old: str, new: str) -> Path:
         ("[200 degC, 42.3 W/(m K)]", "42.3 W/(m K)", "expected [temperature, value]"),
         ("[200 degC, 42.3", "[200, 42.3", "conductivity: 200, expected a temperature"),
         ("  loss: 0.9\n", "  loss: 0.9\n  loss: 0.8\n", "key 'loss' is there twice"),
+        ("value: 0.9\n", "value: 1.9\n", "workpiece: taylor_quinney: expected 0 to 1, got 1.9"),
+        ("value: 0.9\n", f"value: {RATES}\n".replace("1/s", "K"), "'1 K', expected a strain rate"),
+        ("value: 0.9\n", f"value: {RATES}\n".replace("0.6", "6"), "rate table: value: expected 0"),
+        ("value: 0.9\n", f"value: {RATES}\n".replace("1000", "0.1"), "rates must ascend"),
+        ("value: 0.9\n", "value: [0.9]\n", "taylor_quinney: 0.9, expected [strain rate, value]"),
         ("kind: workpiece", "kind: [", "expected YAML"),
         ("kind: workpiece", "kind: !!python/object:os.system x", "expected YAML"),
     ],
@@ -172,6 +179,18 @@ def test_faults_name_file_field_value_and_expectation(
         read_material(path)
     assert str(raised.value).startswith("steel.yaml: ")
     assert message in str(raised.value)
+
+
+def test_heat_share_over_the_strain_rate(tmp_path: Path) -> None:
+    path = _write(tmp_path / "steel.yaml", "value: 0.9\n", f"value: {RATES}\n")
+    file = read_material(path)
+    assert workpiece(str(path)).taylor_quinney == RateTable((1.0, 1000.0), (0.6, 0.9))
+    listed = [number.text for number in file.properties if number.field == "taylor_quinney"]
+    assert listed == ["0.6 at 1 1/s", "0.9 at 1000 1/s"]
+    shown = CliRunner().invoke(app, ["materials", str(path)])
+    assert "0.9 at 1000 1/s" in shown.output
+    study = Study.model_validate({"cutting": {"workpiece": str(path)}})
+    assert "0.6" in json.dumps(_inputs(study)["workpiece"]["taylor_quinney"])
 
 
 def test_a_number_needs_a_source(tmp_path: Path) -> None:

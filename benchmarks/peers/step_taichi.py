@@ -31,6 +31,7 @@ class Stepper:
             verbose=False,
         )
         self.grid, self.step, self.flow = start.grid, start.step, start.flow
+        self.heat_share = float(start.heat_shares[1, 0])
         self.start, count = start, start.points.size
         self.count = count
         point = ti.types.struct(
@@ -205,7 +206,7 @@ class Stepper:
                 )
                 index = ti.cast(p.temperature - 200.0, ti.i32)
                 capacity = self.capacity[ti.math.clamp(index, 0, self.capacity.shape[0] - 1)]
-                heat = step.heat_share * stress * increment * volume
+                heat = self.heat_share * stress * increment * volume
                 self.points[k].temperature = p.temperature + heat / (step.heat_mass * capacity)
             self.points[k].increment = increment
             self.points[k].volume = volume

@@ -6,6 +6,7 @@ The mean density of a cell is taken over the points that are in it now.
 """
 
 from time import perf_counter
+from types import SimpleNamespace
 
 import numpy as np
 import warp as wp
@@ -263,9 +264,10 @@ class Stepper:
         self.cells = wp.zeros(shape, dtype=wp.vec2d)
         self.velocity = wp.zeros(shape, dtype=wp.vec2d)
         capacity = wp.array(start.capacity, dtype=f64)
+        step = SimpleNamespace(**start.step._asdict(), heat_share=start.heat_shares[1, 0])
         grid, step, flow = (
             filled(struct, numbers)
-            for struct, numbers in ((Grid, start.grid), (Step, start.step), (Flow, start.flow))
+            for struct, numbers in ((Grid, start.grid), (Step, step), (Flow, start.flow))
         )
         launches = (
             (gather, self.count, [self.points, self.velocity, self.cells, grid, step]),

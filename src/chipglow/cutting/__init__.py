@@ -17,7 +17,12 @@ from chipglow.cutting.library import (
     tool_material,
     workpiece,
 )
-from chipglow.cutting.material import TemperatureTable, ToolMaterial, WorkpieceMaterial
+from chipglow.cutting.material import (
+    RateTable,
+    TemperatureTable,
+    ToolMaterial,
+    WorkpieceMaterial,
+)
 from chipglow.cutting.simulation import (
     SOLVER_VERSION,
     CuttingSimulation,
@@ -43,6 +48,7 @@ __all__ = [
     "MaterialFile",
     "Numerics",
     "OutputWindow",
+    "RateTable",
     "SolverError",
     "TemperatureTable",
     "ToolMaterial",

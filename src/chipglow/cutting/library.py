@@ -13,7 +13,12 @@ import yaml
 from chipglow.cutting import laws as _laws  # noqa: F401  (registers the laws)
 from chipglow.cutting.damage import JohnsonCookDamage
 from chipglow.cutting.flow_stress import LAWS
-from chipglow.cutting.material import TemperatureTable, ToolMaterial, WorkpieceMaterial
+from chipglow.cutting.material import (
+    RateTable,
+    TemperatureTable,
+    ToolMaterial,
+    WorkpieceMaterial,
+)
 
 FOLDER: Final = Path(__file__).with_name("materials")
 _LARGEST_FILE: Final = 100_000
@@ -110,7 +115,6 @@ _SCALARS: Final = {
         "density": _DENSITY,
         "young_modulus": _STRESS,
         "poisson_ratio": _NUMBER,
-        "taylor_quinney": _NUMBER,
     },
     "tool": {
         "density": _DENSITY,
@@ -269,7 +273,7 @@ class _Reader:
         if kind not in ("workpiece", "tool"):
             raise self._wrong("kind", kind, "workpiece or tool")
         scalars = _SCALARS[kind]
-        parts = () if kind == "tool" else (*_TABLES, "flow_stress", "damage")
+        parts = () if kind == "tool" else ("taylor_quinney", *_TABLES, "flow_stress", "damage")
         data = self._mapping("", data, (*_HEADER, *scalars, *parts))
         name, description = self._text("name", data), self._text("description", data)
         numbers = {
@@ -286,6 +290,7 @@ class _Reader:
     def _workpieces(
         self, name: str, data: Mapping[str, Any], numbers: Mapping[str, float]
     ) -> dict[str, WorkpieceMaterial]:
+        share = self._share("taylor_quinney", data["taylor_quinney"])
         tables = {key: self._table(key, data[key], quantity) for key, quantity in _TABLES.items()}
         damage = self._damage(data["damage"])
         laws = data["flow_stress"]
@@ -299,6 +304,7 @@ class _Reader:
                 "name": f"{name}, flow stress {chosen}",
                 "flow_stress": flow_stress,
                 "damage": damage if fails else None,
+                "taylor_quinney": share,
                 **numbers,
                 **tables,
             }
@@ -353,22 +359,36 @@ class _Reader:
         source = self._text(f"{place}.source", data)
         return self._number(place, data["value"], quantity, source)
 
+    def _share(self, place: str, data: object) -> float | RateTable:
+        """A constant share, or rows of [strain rate, share]."""
+        if not (isinstance(data, Mapping) and isinstance(data.get("value"), list)):
+            return self._sourced(place, data, _NUMBER)
+        rates, values = self._rows(place, data, ("strain rate", _RATE), _NUMBER)
+        table: RateTable = self._build(place, RateTable, {"rates": rates, "values": values})
+        return table
+
     def _table(self, place: str, data: object, quantity: _Quantity) -> TemperatureTable:
-        data = self._mapping(place, data, ("value", "source"))
-        source, rows = self._text(f"{place}.source", data), data["value"]
-        if not isinstance(rows, list) or not rows:
-            raise self._wrong(place, rows, "rows of [temperature, value]")
-        pairs = []
-        for row in rows:
-            if not isinstance(row, list) or len(row) != 2:
-                raise self._wrong(place, row, "[temperature, value]")
-            temperature = self._si(place, row[0], _TEMPERATURE)
-            pairs.append((temperature, self._si(place, row[1], quantity)))
-            self._properties.append(Property(place, f"{row[1]} at {row[0]}", source))
-        temperatures, values = zip(*pairs, strict=True)
+        temperatures, values = self._rows(place, data, ("temperature", _TEMPERATURE), quantity)
         columns = {"temperatures": temperatures, "values": values}
         table: TemperatureTable = self._build(place, TemperatureTable, columns)
         return table
+
+    def _rows(
+        self, place: str, data: object, over: tuple[str, _Quantity], quantity: _Quantity
+    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Columns of a table whose rows are [what it is over, value]."""
+        data = self._mapping(place, data, ("value", "source"))
+        source, rows = self._text(f"{place}.source", data), data["value"]
+        if not isinstance(rows, list) or not rows:
+            raise self._wrong(place, rows, f"rows of [{over[0]}, value]")
+        pairs = []
+        for row in rows:
+            if not isinstance(row, list) or len(row) != 2:
+                raise self._wrong(place, row, f"[{over[0]}, value]")
+            pairs.append((self._si(place, row[0], over[1]), self._si(place, row[1], quantity)))
+            self._properties.append(Property(place, f"{row[1]} at {row[0]}", source))
+        first, second = zip(*pairs, strict=True)
+        return first, second
 
     def _number(self, place: str, value: object, quantity: _Quantity, source: str) -> float:
         number = self._si(place, value, quantity)

@@ -50,6 +50,35 @@ class TemperatureTable:
 
 
 @dataclass(frozen=True)
+class RateTable:
+    """A share that depends on the plastic strain rate.
+
+    Linear over the logarithm of the rate between the points, constant beyond.
+
+    Parameters
+    ----------
+    rates : tuple of float
+        Plastic strain rates in 1/s, ascending, over 0.
+    values : tuple of float
+        The share at these rates, 0 to 1.
+    """
+
+    rates: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.rates) != len(self.values) or not self.values:
+            raise ValueError("rate table: expected as many values as rates")
+        for rate in self.rates:
+            _check_positive("rate table: rate", rate)
+        if any(np.diff(self.rates) <= 0):
+            raise ValueError("rate table: rates must ascend")
+        for value in self.values:
+            if not 0 <= value <= 1:
+                raise ValueError(f"rate table: value: expected 0 to 1, got {value!r}")
+
+
+@dataclass(frozen=True)
 class WorkpieceMaterial:
     """What is cut.
 
@@ -69,8 +98,8 @@ class WorkpieceMaterial:
         Failure, or None for a material that does not fail.
     conductivity, heat_capacity : TemperatureTable
         In W/(m K) and J/(kg K).
-    taylor_quinney : float
-        Share of the plastic work that becomes heat.
+    taylor_quinney : float or RateTable
+        Share of the plastic work that becomes heat: constant, or over the plastic strain rate.
     """
 
     name: str
@@ -81,15 +110,16 @@ class WorkpieceMaterial:
     damage: JohnsonCookDamage | None
     conductivity: TemperatureTable
     heat_capacity: TemperatureTable
-    taylor_quinney: float = 0.9
+    taylor_quinney: float | RateTable = 0.9
 
     def __post_init__(self) -> None:
         check_positive("workpiece density", self.density)
         check_positive("workpiece young_modulus", self.young_modulus)
         if not 0 <= self.poisson_ratio <= 0.49:
             raise ValueError(f"poisson_ratio: expected 0 to 0.49, got {self.poisson_ratio!r}")
-        if not 0 <= self.taylor_quinney <= 1:
-            raise ValueError(f"taylor_quinney: expected 0 to 1, got {self.taylor_quinney!r}")
+        share = self.taylor_quinney
+        if not isinstance(share, RateTable) and not 0 <= share <= 1:
+            raise ValueError(f"taylor_quinney: expected 0 to 1, got {share!r}")
 
     @property
     def shear_modulus(self) -> float:

@@ -50,11 +50,11 @@ class Step(NamedTuple):
     """Numbers of a step.
 
     Point mass (kg/m, scaled), heat mass (kg/m, true), volume free of stress (m²), time step (s),
-    share of a point's own velocity that it keeps (AFLIP 1, APIC 0), elastic constants (Pa), share
-    of plastic work that is heat; contact: stiffness (Pa), damping (N s/m²), distance at which a
-    point touches (m), area of a point (m²/m), friction; boundary: nodes under `floor`, and those
-    left of `inflow` and under `ceiling` (m), move at `speed` (m/s). Friction falls with the
-    temperature over `friction_melting` (K): see `friction_coefficient`.
+    share of a point's own velocity that it keeps (AFLIP 1, APIC 0), elastic constants (Pa);
+    contact: stiffness (Pa), damping (N s/m²), distance at which a point touches (m), area of a
+    point (m²/m), friction; boundary: nodes under `floor`, and those left of `inflow` and under
+    `ceiling` (m), move at `speed` (m/s). Friction falls with the temperature over
+    `friction_melting` (K): see `friction_coefficient`.
     """
 
     mass: float
@@ -64,7 +64,6 @@ class Step(NamedTuple):
     kept: float
     shear_modulus: float
     bulk_modulus: float
-    heat_share: float
     stiffness: float
     damping: float
     reach: float
@@ -215,8 +214,9 @@ def _gather_cells(points, starts, first, last, velocity, grid, step, sums):  # t
 
 @njit(**FAST)
 def _work_block(  # type: ignore[no-untyped-def]
-    points, starts, block, velocity, nodes, tool, grid, step, law, damage, capacity, sums, buffer
-):
+    points, starts, block, velocity, nodes, tool, grid, step, law, damage, capacity, heat_shares,
+    sums, buffer,
+):  # fmt: skip
     """One step of the points of a block; False if a point left the grid."""
     first = block * BLOCK_COLUMNS * grid.rows
     last = min(first + BLOCK_COLUMNS * grid.rows, starts.size - 1)
@@ -226,7 +226,9 @@ def _work_block(  # type: ignore[no-untyped-def]
         on_grid &= _gather_cells(points, starts, cell, end_cell, velocity, grid, step, sums[block])
         for begin in range(starts[cell], starts[end_cell], LANES):
             end = min(begin + LANES, starts[end_cell])
-            update_stresses(points, begin, end, step, law, damage, capacity, buffer)
+            update_stresses(
+                points, begin, end, step, law, damage, capacity, heat_shares, buffer
+            )
             for k in range(begin, end):
                 p = points[k]
                 fx, fy, limit = _contact(p, buffer[STRESS + k - begin], tool, step, law, damage)
@@ -273,15 +275,15 @@ def _work_column(i, velocity, nodes, heat, tool, grid, step, sums):  # type: ign
 
 
 def _advance(  # type: ignore[no-untyped-def]
-    steps, points, starts, velocity, nodes, heat, tool, grid, step, law, damage, capacity, sums,
-    threads,
+    steps, points, starts, velocity, nodes, heat, tool, grid, step, law, damage, capacity,
+    heat_shares, sums, threads,
 ):  # fmt: skip
     """Advance all points by some steps, shared out among some threads.
 
     `velocity` (columns, rows, 4) is the grid's velocity after the last step and its change in that
     step, kept for the next; `nodes` (columns, rows, 6) is zero before and after; `heat` (columns,
     rows) gathers friction work (J/m); `sums` gathers over the steps what `FORCE_X` and so on name.
-    Returns False if a point left the grid.
+    `heat_shares` is that of `heat_share`. Returns False if a point left the grid.
     """
     blocks = (grid.columns + BLOCK_COLUMNS - 1) // BLOCK_COLUMNS
     of_blocks = np.zeros((blocks, sums.size))
@@ -294,7 +296,7 @@ def _advance(  # type: ignore[no-untyped-def]
                 for block in range(colour + 2 * thread, blocks, 2 * threads):
                     good[block] &= _work_block(
                         points, starts, block, velocity, nodes, tool, grid, step, law, damage,
-                        capacity, of_blocks, buffers[thread],
+                        capacity, heat_shares, of_blocks, buffers[thread],
                     )  # fmt: skip
         for thread in prange(threads):
             for i in range(thread, grid.columns, threads):

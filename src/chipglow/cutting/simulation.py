@@ -33,6 +33,7 @@ from chipglow.cutting.momentum import (
     advance_with,
 )
 from chipglow.cutting.picture import Picture
+from chipglow.cutting.plastic_heat import heat_shares
 from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
 from chipglow.cutting.watch import Trouble, find_lost, find_off_grid, find_trouble
 from chipglow.scene import Frame, Raster, ToolGeometry
@@ -229,7 +230,6 @@ class _State:
             kept=_KEPT,
             shear_modulus=material.shear_modulus,
             bulk_modulus=material.bulk_modulus,
-            heat_share=material.taylor_quinney,
             stiffness=_CONTACT_STIFFNESS,
             damping=_CONTACT_DAMPING * 2 * np.sqrt(_CONTACT_STIFFNESS * mass),
             reach=spacing / 2,
@@ -246,6 +246,7 @@ class _State:
         self.step_points = advance_with(self.law)
         self.damage = Damage.of(material.damage, cell)
         self.capacity = material.heat_capacity.sampled()
+        self.heat_shares = heat_shares(material.taylor_quinney)
         self.conductivity = material.conductivity.sampled()
         self.tool_heat = _tool_heat(simulation, spacing)
         self.tool_fraction = fraction_of_tool(self.grid, self.tool)
@@ -331,6 +332,7 @@ class _State:
                 self.law,
                 self.damage,
                 self.capacity,
+                self.heat_shares,
                 sums,
                 get_num_threads(),
             )

@@ -10,6 +10,7 @@ from numba import njit
 from chipglow.cutting.damage import damage_growth, weakening
 from chipglow.cutting.flow_stress import stress_and_slopes
 from chipglow.cutting.lanes import FAST, exponential
+from chipglow.cutting.plastic_heat import heat_share
 
 LANES = 128
 """Points of a batch: their rows stay in the fastest cache."""
@@ -137,7 +138,9 @@ def _return(b, count, step, law, damage):  # type: ignore[no-untyped-def]
 
 
 @njit(**FAST)
-def update_stresses(points, begin, end, step, law, damage, capacity, b):  # type: ignore[no-untyped-def]
+def update_stresses(  # type: ignore[no-untyped-def]
+    points, begin, end, step, law, damage, capacity, heat_shares, b
+):
     """Stress of up to `LANES` points; leaves their equivalent stress and plastic work in `b`."""
     count = end - begin
     for k in range(count):
@@ -159,7 +162,7 @@ def update_stresses(points, begin, end, step, law, damage, capacity, b):  # type
             p.strain, p.damage = b[STRAIN + k], b[DAMAGE + k]
             work = b[WORK + k]
             if work > 0.0:
-                heat = step.heat_share * work
+                heat = heat_share(p.increment / step.time_step, heat_shares) * work
                 p.temperature += heat / (step.heat_mass * property_at(capacity, p.temperature))
 
 
