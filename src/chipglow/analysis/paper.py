@@ -531,6 +531,7 @@ def _energy_shares(scene: Scene) -> tuple[float, float]:
         return nan, nan
     last = {name: float(scene.data[name][-1]) for name in ENERGY_UNITS}
     given = last["drive_work"] + last["contact_work"]
-    found = sum(last[name] for name in ENERGY_UNITS if name not in ("drive_work", "contact_work"))
+    kinds = ("kinetic_energy", "elastic_energy", "plastic_work", "friction_work")
+    found = sum(last[name] for name in kinds)
     work = last["drive_work"]
     return (given - found) / work, abs(last["kinetic_energy"]) / work

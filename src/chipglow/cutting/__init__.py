@@ -1,7 +1,13 @@
 """The embedded cutting simulation."""
 
 from chipglow.cutting.checkpoint import Checkpoint
-from chipglow.cutting.conditions import CuttingConditions, Friction, Numerics, OutputWindow
+from chipglow.cutting.conditions import (
+    CuttingConditions,
+    Friction,
+    Numerics,
+    OutputWindow,
+    Surroundings,
+)
 from chipglow.cutting.damage import JohnsonCookDamage
 from chipglow.cutting.energy import EnergyHistory
 from chipglow.cutting.flow_stress import FlowStress, flow_stress_law
@@ -50,6 +56,7 @@ __all__ = [
     "OutputWindow",
     "RateTable",
     "SolverError",
+    "Surroundings",
     "TemperatureTable",
     "ToolMaterial",
     "WorkpieceMaterial",

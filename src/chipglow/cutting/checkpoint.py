@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from chipglow.cutting.simulation import _State
 
 _ARRAYS: Final = ("velocity", "tool_temperature", "friction_heat", "work", "held_at_start")
-_NUMBERS: Final = ("count", "columns", "time", "carried")
+_NUMBERS: Final = ("count", "columns", "time", "carried", "lost_heat")
 
 
 @dataclass(frozen=True)

@@ -79,6 +79,39 @@ class Friction:
 
 
 @dataclass(frozen=True)
+class Surroundings:
+    """What the free surfaces of chip, workpiece and tool lose heat to; nothing by default.
+
+    Parameters
+    ----------
+    convection : float
+        Coefficient of heat transfer in W/(m² K).
+    emissivity : float
+        Total hemispherical emissivity, of all surfaces. It only cools: what the camera sees is
+        the surface's own affair.
+    temperature : float
+        Of the air and of what the surfaces radiate to, in K.
+    """
+
+    convection: float = 0.0
+    emissivity: float = 0.0
+    temperature: float = 293.15
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.convection <= 1e6:
+            raise ValueError(
+                f"surroundings convection: expected 0 to 1e6 W/(m2 K), got {self.convection!r}"
+            )
+        if not 0 <= self.emissivity <= 1:
+            raise ValueError(f"surroundings emissivity: expected 0 to 1, got {self.emissivity!r}")
+        if not 0 < self.temperature <= 1500:
+            raise ValueError(
+                "surroundings temperature: expected over 0 K and up to 1500 K, "
+                f"got {self.temperature!r} K"
+            )
+
+
+@dataclass(frozen=True)
 class OutputWindow:
     """The part of the cut that is recorded; the paper's by default.
 

@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-ENERGIES: Final = 7
+ENERGIES: Final = 8
 """Number of an account's entries."""
 
 
@@ -30,6 +30,9 @@ class EnergyHistory:
         Friction work, all of it heat, shape (n,).
     sharing_loss : ndarray
         Elastic energy lost because the points of a cell share one density, shape (n,).
+    lost_heat : ndarray
+        Heat that free surfaces lost to the surroundings, shape (n,). It was plastic or friction
+        work before, so it is no entry of the mechanical account.
     """
 
     drive_work: NDArray[np.float64]
@@ -39,6 +42,7 @@ class EnergyHistory:
     plastic_work: NDArray[np.float64]
     friction_work: NDArray[np.float64]
     sharing_loss: NDArray[np.float64]
+    lost_heat: NDArray[np.float64]
 
     @property
     def closing_error(self) -> NDArray[np.float64]:

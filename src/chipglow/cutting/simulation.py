@@ -10,11 +10,18 @@ from numba import get_num_threads
 from numpy.typing import NDArray
 
 from chipglow.cutting.checkpoint import Checkpoint, capture, restore
-from chipglow.cutting.conditions import CuttingConditions, Friction, Numerics, OutputWindow
+from chipglow.cutting.conditions import (
+    CuttingConditions,
+    Friction,
+    Numerics,
+    OutputWindow,
+    Surroundings,
+)
 from chipglow.cutting.damage import Damage
 from chipglow.cutting.energy import ENERGIES, EnergyHistory, held_energy
 from chipglow.cutting.heat import ToolHeat, conduct, conduct_tool, heat_contact, return_heat
 from chipglow.cutting.heat import tool_fraction as fraction_of_tool
+from chipglow.cutting.heat_loss import HeatLoss, lose_heat
 from chipglow.cutting.library import AISI_1045, CARBIDE
 from chipglow.cutting.material import ToolMaterial, WorkpieceMaterial
 from chipglow.cutting.momentum import (
@@ -96,6 +103,8 @@ class CuttingSimulation:
         Friction and heat in the contact.
     numerics : Numerics
         How finely it is computed.
+    surroundings : Surroundings
+        What free surfaces lose heat to.
     """
 
     conditions: CuttingConditions = field(default_factory=CuttingConditions)
@@ -104,6 +113,7 @@ class CuttingSimulation:
     tool_material: ToolMaterial = CARBIDE
     friction: Friction = field(default_factory=Friction)
     numerics: Numerics = field(default_factory=Numerics)
+    surroundings: Surroundings = field(default_factory=Surroundings)
 
     def run(
         self,
@@ -249,6 +259,7 @@ class _State:
         self.heat_shares = heat_shares(material.taylor_quinney)
         self.conductivity = material.conductivity.sampled()
         self.tool_heat = _tool_heat(simulation, spacing)
+        self.loss = HeatLoss.of(simulation.surroundings, numerics)
         self.tool_fraction = fraction_of_tool(self.grid, self.tool)
         shape = (self.grid.columns, self.grid.rows)
         self.velocity = np.zeros((*shape, VELOCITY_VALUES))
@@ -265,6 +276,7 @@ class _State:
         self.time = 0.0
         self.work = np.zeros(SUMS)
         self.carried = 0.0
+        self.lost_heat = 0.0
         self.held_at_start = self._held()
 
     def _start_points(self, conditions: CuttingConditions, numerics: Numerics) -> None:
@@ -346,7 +358,9 @@ class _State:
         drive = self.work[BOUNDARY_WORK] + self.carried
         held = self._held() - self.held_at_start
         used = self.work[[PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS]]
-        return np.concatenate([forces, [drive, self.work[CONTACT_WORK]], held, used])
+        return np.concatenate(
+            [forces, [drive, self.work[CONTACT_WORK]], held, used, [self.lost_heat]]
+        )
 
     def _held(self) -> NDArray[np.float64]:
         """Kinetic and elastic energy of the points in J/m."""
@@ -377,6 +391,17 @@ class _State:
         conduct_tool(
             self.tool_temperature, self.tool_fraction, self.tool_heat, self.grid, self.cycle
         )
+        if self.loss.convection > 0.0 or self.loss.emissivity > 0.0:
+            self.lost_heat += lose_heat(
+                self.heat_nodes,
+                self.increment,
+                self.tool_temperature,
+                self.tool_fraction,
+                self.tool_heat,
+                self.loss,
+                self.grid,
+                self.cycle,
+            )
         heat_contact(
             self.points,
             self.count,

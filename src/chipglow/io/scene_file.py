@@ -54,6 +54,7 @@ _LONG_NAMES: Final[Mapping[str, str]] = {
     "plastic_work": "plastic work since the start",
     "friction_work": "friction work since the start",
     "sharing_loss": "elastic energy lost by sharing density since the start",
+    "lost_heat": "heat lost to the surroundings since the start",
 }
 _FAST: Final[Mapping[str, Any]] = dict(
     hdf5plugin.Blosc2(cname="zstd", clevel=1, filters=hdf5plugin.Blosc2.SHUFFLE)

@@ -39,6 +39,7 @@ ENERGY_UNITS: Final[Mapping[str, str]] = dict.fromkeys(
         "plastic_work",
         "friction_work",
         "sharing_loss",
+        "lost_heat",
     ),
     "J/m",
 )

@@ -33,6 +33,7 @@ from chipglow.cutting import (
     Friction,
     Numerics,
     OutputWindow,
+    Surroundings,
     is_own_file,
     material_names,
     tool_material,
@@ -44,6 +45,7 @@ from chipglow.study.units import (
     Angle,
     CutLength,
     Frequency,
+    HeatTransfer,
     Length,
     Position,
     Speed,
@@ -151,6 +153,24 @@ class FrictionSection(Part):
         )
 
 
+class SurroundingsSection(Part):
+    """What free surfaces lose heat to."""
+
+    convection: HeatTransfer = _field(
+        "0 W/m^2/K", "Coefficient of the heat transfer to the air, of all free surfaces."
+    )
+    emissivity: float = _field(
+        0.0, "Total hemispherical emissivity with which free surfaces cool; not the camera's."
+    )
+    temperature: Temperature = _field(
+        "20 degC", "Temperature of the air and of what the surfaces radiate to."
+    )
+
+    def build(self) -> Surroundings:
+        """The surroundings."""
+        return Surroundings(self.convection, self.emissivity, self.temperature)
+
+
 class NumericsSection(Part):
     """How finely the cut is computed."""
 
@@ -212,6 +232,9 @@ class CuttingSection(Part):
     )
     tool: ToolSection = _field({}, "The cutting tool.")
     friction: FrictionSection = _field({}, "Friction between chip and tool.")
+    surroundings: SurroundingsSection = _field(
+        {}, "What the free surfaces of chip, workpiece and tool lose heat to; nothing by default."
+    )
     numerics: NumericsSection = _field({}, "How finely the cut is computed.")
     window: WindowSection = _field({}, "The part of the cut that becomes the scene.")
     field_of_view: FieldOfViewSection = _field(
@@ -261,6 +284,7 @@ class CuttingSection(Part):
             tool_material=tool_material(self.tool.material),
             friction=self.friction.build(),
             numerics=self.numerics.build(),
+            surroundings=self.surroundings.build(),
         )
 
 

@@ -157,6 +157,10 @@ Time = Annotated[float, TIME]
 Frequency = Annotated[float, Quantity("a frequency", "Hz", "Hz", "600 Hz")]
 Speed = Annotated[float, Quantity("a speed", "m/s", "m/min", "250 m/min")]
 Angle = Annotated[float, Quantity("an angle", "rad", "deg", "-7 deg", positive=False)]
+HeatTransfer = Annotated[
+    float,
+    Quantity("a coefficient of heat transfer", "W/m^2/K", "W/m^2/K", "50 W/m^2/K", positive=False),
+]
 Temperature = Annotated[float, Quantity("a temperature", "K", "degC", "300 degC")]
 
 
