@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from chipglow.cutting.simulation import _State
 
-_ARRAYS: Final = ("velocity", "tool_temperature", "friction_heat", "work", "held_at_start")
+_ARRAYS: Final = (
+    "velocity",
+    "tool_temperature",
+    "tool_beyond",
+    "friction_heat",
+    "work",
+    "held_at_start",
+)
 _NUMBERS: Final = ("count", "columns", "time", "carried", "lost_heat")
 
 

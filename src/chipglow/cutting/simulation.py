@@ -42,11 +42,12 @@ from chipglow.cutting.momentum import (
 from chipglow.cutting.picture import Picture
 from chipglow.cutting.plastic_heat import heat_shares
 from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
+from chipglow.cutting.tool_border import CELLS, border_nodes, conduct_beyond
 from chipglow.cutting.watch import Trouble, find_lost, find_off_grid, find_trouble
 from chipglow.scene import Frame, Raster, ToolGeometry
 from chipglow.scene.tool import wedge_distance
 
-SOLVER_VERSION: Final = "2"
+SOLVER_VERSION: Final = "3"
 """Changes whenever the same input gives another result."""
 
 _MARGIN: Final = 4
@@ -269,6 +270,9 @@ class _State:
         self.increment = np.zeros(shape)
         self.friction_heat = np.zeros(shape)
         self.tool_temperature = np.full(shape, conditions.initial_temperature)
+        self.tool_border = border_nodes(self.tool_fraction)
+        far = (len(self.tool_border), CELLS)
+        self.tool_beyond = np.full(far, conditions.initial_temperature)
         self.starts = np.zeros(self.grid.columns * self.grid.rows + 1, np.int64)
         self.right = numerics.downstream
         self.top = numerics.height
@@ -390,6 +394,15 @@ class _State:
         )
         conduct_tool(
             self.tool_temperature, self.tool_fraction, self.tool_heat, self.grid, self.cycle
+        )
+        conduct_beyond(
+            self.tool_temperature,
+            self.tool_beyond,
+            self.tool_border,
+            self.tool_fraction,
+            self.tool_heat,
+            self.grid,
+            self.cycle,
         )
         if self.loss.convection > 0.0 or self.loss.emissivity > 0.0:
             self.lost_heat += lose_heat(
