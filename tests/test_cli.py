@@ -198,6 +198,23 @@ def test_cut_writes_the_scene(folder, runs):
     result = chipglow("cut", "study.yaml", "--out", "scene.nc")
     assert result.exit_code == 0, result.output
     assert len(open_scene(folder / "scene.nc").times) == AnalyticChip().frames
+    assert result.stdout == "scene.nc\n"
+    # The chip in closed form has no kinetic energy; the paper's momentum flow is 4.09 N/mm.
+    assert (
+        "Scaled mass after the build-up: kinetic energy at most 0.00% of the work" in result.stderr
+    )
+    assert "momentum flow 0.91% of the mean cutting force" in result.stderr
+    assert "Warning" not in result.stderr
+
+
+def test_cut_warns_of_too_much_inertia(folder, runs):
+    (folder / "study.yaml").write_text(
+        STUDY.replace("  field_of", "  numerics: {mass_scaling: 200}\n  field_of")
+    )
+    result = chipglow("cut", "study.yaml", "--out", "scene.nc")
+    assert result.exit_code == 0, result.output
+    assert "Warning: The scaled mass's momentum is worth 1.8% of the cutting force" in result.stderr
+    assert "lower mass_scaling, now 200." in result.stderr
 
 
 def test_measure_writes_frames_at_the_camera_rate(folder, scene):

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis import PAPER, Plan, analyse
+from chipglow.analysis import PAPER, Inertia, Plan, analyse
 from chipglow.camera import Camera
 from chipglow.report import Row, comparison_rows, write_report
 from chipglow.report.chip import chip_rows
@@ -108,6 +108,19 @@ def test_the_page_stands_alone_and_escapes_text(folder, result):
         for part in (line.quantity, line.value_text, line.spread_text, line.explanation):
             assert part in shown
     assert page.seen.count("tr") == 2 + len(comparison_rows(result)) + len(chip)
+
+
+def test_inertia_that_is_too_much_is_said(result):
+    def rows(share):
+        inert = Inertia(kinetic_share=share, force_share=0.004, mass_scaling=300.0)
+        found = comparison_rows(replace(result, forces=replace(result.forces, inertia=inert)))
+        return {row.key: row for row in found}
+
+    assert rows(0.02)["kinetic_share_percent"].here_text == "2.00 %"
+    assert "lower mass_scaling, now 300" in rows(0.02)["kinetic_share_percent"].explanation
+    assert "lower" not in rows(0.009)["kinetic_share_percent"].explanation
+    assert rows(0.009)["inertia_force_share_percent"].here_text == "0.40 %"
+    assert "1/300 of it" in rows(0.009)["inertia_force_share_percent"].explanation
 
 
 def test_the_summary_is_strict_json(folder, result):

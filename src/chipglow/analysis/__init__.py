@@ -8,6 +8,7 @@ from chipglow.analysis.error import (
     error_images,
     reference_temperature,
 )
+from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.lines import Line, sample, straight_line
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
@@ -21,6 +22,7 @@ __all__ = [
     "ChipMetrics",
     "ChipScan",
     "ErrorImages",
+    "Inertia",
     "Line",
     "NoShearBandError",
     "Plan",
@@ -37,6 +39,7 @@ __all__ = [
     "contact_length",
     "error_images",
     "find_shear_band",
+    "inertia",
     "rake_errors",
     "reference_temperature",
     "sample",

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from chipglow.analysis.band_error import BandErrors, band_errors
 from chipglow.analysis.chip import ChipMetrics, chip_metrics
 from chipglow.analysis.error import ErrorImages, ReferenceKind, error_images
+from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.lines import nearest, sample
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
 from chipglow.analysis.segmentation import Segmentation, segmentation
@@ -168,8 +169,7 @@ class ForceHistory:
     """Forces per width of cut in N/m over time in s, each of shape (n,), and their segments.
 
     `unaccounted` is the share of the drive's work that the cutting simulation's energy account does
-    not find again in the end, `kinetic_share` that of the kinetic energy (of the scaled mass); NaN
-    where the scene has no account.
+    not find again in the end; NaN where the scene has no account.
     """
 
     time: NDArray[np.float64]
@@ -177,7 +177,7 @@ class ForceHistory:
     thrust: NDArray[np.float64]
     segmentation: Segmentation
     unaccounted: float
-    kinetic_share: float
+    inertia: Inertia
 
 
 @dataclass(frozen=True)
@@ -522,16 +522,17 @@ def _forces(scene: Scene) -> ForceHistory | None:
         for name in ("force_time", "cutting_force", "thrust_force")
     )
     segments = segmentation(time, cutting, thrust)
-    return ForceHistory(time, cutting, thrust, segments, *_energy_shares(scene))
+    inert = inertia(scene)
+    assert inert is not None
+    return ForceHistory(time, cutting, thrust, segments, _unaccounted(scene), inert)
 
 
-def _energy_shares(scene: Scene) -> tuple[float, float]:
-    """What the energy account does not find again, and the kinetic energy, over the work."""
+def _unaccounted(scene: Scene) -> float:
+    """What the energy account does not find again over the work."""
     if "drive_work" not in scene.data:
-        return nan, nan
+        return nan
     last = {name: float(scene.data[name][-1]) for name in ENERGY_UNITS}
     given = last["drive_work"] + last["contact_work"]
     kinds = ("kinetic_energy", "elastic_energy", "plastic_work", "friction_work")
     found = sum(last[name] for name in kinds)
-    work = last["drive_work"]
-    return (given - found) / work, abs(last["kinetic_energy"]) / work
+    return (given - found) / last["drive_work"]

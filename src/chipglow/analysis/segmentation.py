@@ -84,8 +84,7 @@ def segmentation(
     if times.size < 16 or (steps <= 0).any() or not np.allclose(steps, steps.mean(), rtol=0.01):
         raise ValueError("force history: expected 16 or more times at even ascending steps")
     step = float(steps.mean())
-    reached = int(np.argmax(cutting >= np.median(cutting[cutting.size // 2 :])))
-    first = max(reached, cutting.size // 5)
+    first = end_of_build_up(cutting)
     times, cutting, thrust = times[first:], cutting[first:], thrust[first:]
     coarse = _correlation_period(cutting, step)
     peaks = np.zeros(0, dtype=np.int64)
@@ -108,6 +107,18 @@ def segmentation(
         cutting_swing=swings[0],
         thrust_swing=swings[1],
     )
+
+
+def end_of_build_up(cutting_force: NDArray[np.float64]) -> int:
+    """Index from which a history of the cutting force counts: see `segmentation`.
+
+    Parameters
+    ----------
+    cutting_force : ndarray
+        Per width of cut in N/m, shape (n,), at even steps, n over 0.
+    """
+    later = cutting_force[cutting_force.size // 2 :]
+    return max(int(np.argmax(cutting_force >= np.median(later))), cutting_force.size // 5)
 
 
 def _correlation_period(force: NDArray[np.float64], step: float) -> float:

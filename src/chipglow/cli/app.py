@@ -111,8 +111,10 @@ def cut(
     """Do only the cutting simulation of a study."""
     from shutil import copyfile
 
+    from chipglow.analysis import inertia
+    from chipglow.cli.inertia import say_inertia
     from chipglow.cli.progress import progress_bars, say_where_it_starts
-    from chipglow.io import atomic_path
+    from chipglow.io import atomic_path, open_scene
     from chipglow.study import cut as cut_scene
     from chipglow.study import load_study
 
@@ -121,6 +123,9 @@ def cut(
         say_where_it_starts(settings, resume)
         with progress_bars() as progress:
             copyfile(cut_scene(settings, progress, resume), temporary)
+    scene = open_scene(out)
+    say_inertia(inertia(scene))
+    scene.data.close()
     print(out)
 
 

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from chipglow.analysis.paper import StudyResult
+from chipglow.cli.inertia import say_inertia
 from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.cutting import SOLVER_VERSION
 from chipglow.io import atomic_folder
@@ -37,6 +38,7 @@ def write_results(study: Study, folder: Path, resume: bool) -> None:
             report = write_report(result, temporary, study_text(study), _provenance(study))
             progress("report", 1.0)
     _print_comparison(result)
+    say_inertia(result.forces.inertia if result.forces else None)
     print(f"Report: {folder / report.relative_to(temporary)}")
 
 

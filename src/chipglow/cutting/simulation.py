@@ -184,6 +184,15 @@ class CuttingSimulation:
         cutting, thrust, *energies = records.T.copy()
         return ForceHistory(time, cutting, thrust, EnergyHistory(*energies))
 
+    @property
+    def momentum_flow(self) -> float:
+        """Momentum of the scaled mass that arrives at the tool per time and width of cut, in N/m.
+
+        ρV² times the uncut chip thickness: inertia can matter that much beside the cutting force.
+        """
+        density = self.workpiece.density * self.numerics.mass_scaling
+        return density * self.conditions.speed**2 * self.conditions.feed
+
     def frame_range(self, window: OutputWindow) -> tuple[int, int]:
         """Numbers of the first and the last interval whose ends are recorded as frames."""
         step = self.conditions.speed * window.interval

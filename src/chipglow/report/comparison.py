@@ -131,7 +131,7 @@ def _error_rows(result: StudyResult) -> list[Row]:
 def _period_rows(result: StudyResult) -> list[Row]:
     if result.forces is None:
         return []
-    segments = result.forces.segmentation
+    segments, inert = result.forces.segmentation, result.forces.inertia
     return [
         Row(
             "segment_period_us",
@@ -186,11 +186,21 @@ def _period_rows(result: StudyResult) -> list[Row]:
         ),
         _own(
             "kinetic_share_percent",
-            "Kinetic energy of the scaled mass over the work",
+            "Kinetic energy of the scaled mass over the work, at most",
             "%",
-            result.forces.kinetic_share * 100,
+            inert.kinetic_share * 100,
             2,
-            "Its change since the start: how much the scaling of the mass can matter.",
+            "Its change since the start, after the build-up: how much the scaling of the mass can "
+            f"matter. {inert.warning}".strip(),
+        ),
+        _own(
+            "inertia_force_share_percent",
+            "Momentum flow of the scaled mass over the cutting force",
+            "%",
+            inert.force_share * 100,
+            2,
+            "Density times speed squared times uncut chip thickness: what stops it is part of the "
+            f"force. The true mass has 1/{inert.mass_scaling:g} of it.",
         ),
     ]
 

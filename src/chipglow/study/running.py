@@ -24,7 +24,7 @@ Progress: TypeAlias = Callable[[str, float], None]
 """Told which step is under way and how much of it is done, 0 to 1."""
 
 CUTTING_STEP: Final = "cutting simulation"
-SCENE_FORMAT: Final = 1
+SCENE_FORMAT: Final = 2
 """Changes whenever the same frames are written as another file."""
 
 CHECKPOINT_INTERVAL: Final = 30.0
@@ -128,7 +128,12 @@ def _compute(study: Study, path: Path, progress: Progress | None, resume: bool) 
         progress(CUTTING_STEP, 0.0)
     cutting = study.cutting
     raster = cutting.field_of_view.build()
-    attributes: Mapping[str, str] = {"inputs": dumps(_inputs(study), sort_keys=True)}
+    simulation = cutting.simulation()
+    attributes: Mapping[str, str | float] = {
+        "inputs": dumps(_inputs(study), sort_keys=True),
+        "momentum_flow": simulation.momentum_flow,
+        "mass_scaling": simulation.numerics.mass_scaling,
+    }
     left = unfinished_scenes(path) if resume else []
     start = left[0] if left and left[0].progress > 0 else None
     state = Checkpoint(start.state(), start.progress) if start else None
@@ -137,7 +142,7 @@ def _compute(study: Study, path: Path, progress: Progress | None, resume: bool) 
         if start and state:
             keeper.note_kept(state, start.checkpoint)
         try:
-            history = cutting.simulation().run(
+            history = simulation.run(
                 cutting.window.build(),
                 raster,
                 writer.append,
