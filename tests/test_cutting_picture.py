@@ -26,9 +26,9 @@ def lattice(angle=0.0, spacing=CELL / 2, top=100e-6):
     return points[inside]
 
 
-def frame_of(points, **fields):
-    fraction = tool_fraction(GRID, AWAY.coefficients)
-    picture = Picture(GRID, RASTER, AWAY, fraction, 293.0)
+def frame_of(points, tool=AWAY, **fields):
+    fraction = tool_fraction(GRID, tool.coefficients)
+    picture = Picture(GRID, RASTER, tool, fraction, 293.0)
     names = ["temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y"]
     values = {name: np.zeros(points.size) for name in [*names, "material_x", "material_y"]}
     values["temperature"] = np.full(points.size, 300.0)
@@ -86,3 +86,12 @@ def test_steps_do_not_overshoot():
     chip = frame.material == Material.WORKPIECE
     assert frame.temperature[chip].min() >= 300.0
     assert frame.temperature[chip].max() <= 1300.0
+
+
+@pytest.mark.parametrize("degrees", [-20.0, -7.0, 0.0, 6.0, 15.0])
+def test_a_bare_tool_face_shows_no_chip(degrees):
+    tool = ToolGeometry(rake_angle=np.radians(degrees))
+    frame = frame_of(lattice(top=-20e-6), tool)
+    above = RASTER.y > 20e-6
+    assert (frame.material[above] == Material.TOOL).any()
+    assert not (frame.material[above] == Material.WORKPIECE).any()

@@ -90,7 +90,8 @@ class Picture:
         area = points["volume"][seen] / self._grid.cell**2
         shape = (self._grid.columns, self._grid.rows)
         coefficients, filled, known = _fit(fx, fy, at_points, area, *shape, _CORRECTIONS)
-        filled = np.minimum(filled, 1.0) + self._filled_by_tool
+        # With no point near, the tool alone may fill half a sample on its face: a speck of chip.
+        filled = np.where(known, np.minimum(filled, 1.0) + self._filled_by_tool, 0.0)
         _fill(coefficients, known, _FILL_PASSES)
         tool = tool_temperature[..., None].copy()
         _fill(tool, self._filled_by_tool > 0.0, _FILL_PASSES)
