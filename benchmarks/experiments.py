@@ -1,0 +1,338 @@
+"""Cuts of AISI 1045 that others have published, beside the same cuts computed here.
+
+    python benchmarks/experiments.py [--cell 20] [--length 2] [--markdown] [NAME ...]
+
+The cuts, what is published of them and where it stands are in experiments.yaml. Each cut takes
+minutes at a cell of 20 um; its means are kept in build/experiments, so that an interrupted run goes
+on with the next cut. Cells in um, lengths of cut in mm.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from math import isfinite
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import yaml
+
+from chipglow.analysis import chip_metrics
+from chipglow.cutting import (
+    SOLVER_VERSION,
+    CuttingConditions,
+    CuttingSimulation,
+    ForceHistory,
+    Numerics,
+    OutputWindow,
+    tool_material,
+)
+from chipglow.io import atomic_path
+from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene, ToolGeometry
+from chipglow.study.units import Quantity
+
+DATA = Path(__file__).with_name("experiments.yaml")
+RESULTS = Path("build/experiments")
+
+LENGTH = Quantity("a length", "m", "mm", "0.3 mm")
+ANGLE = Quantity("an angle", "rad", "deg", "-7 deg", positive=False)
+CONDITIONS = {
+    "speed": Quantity("a speed", "m/s", "m/min", "250 m/min"),
+    "feed": LENGTH,
+    "rake": ANGLE,
+    "clearance": ANGLE,
+    "edge_radius": LENGTH,
+}
+FORCE = Quantity("a force per width of cut", "N/m", "N/mm", "300 N/mm")
+QUANTITIES = {
+    "cutting_force": FORCE,
+    "thrust_force": FORCE,
+    "thickness": LENGTH,
+    "contact": LENGTH,
+    "period": Quantity("a time", "s", "us", "90 us"),
+}
+KINDS = ("measured", "correlation", "computed")
+
+STEP = 10e-6  # of cut between two records of the forces
+STEPS_A_FRAME = 2
+BUILD_UP = 0.4  # share of the cut before the frames
+SAMPLE = 4e-6
+NOT_READ = "†"
+
+
+@dataclass(frozen=True)
+class Published:
+    """One number of the literature: a key of `QUANTITIES`, in SI, and where it stands."""
+
+    quantity: str
+    value: float
+    kind: str
+    source: str
+    read: bool
+    note: str = ""
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> "Published":
+        for key, allowed in (("quantity", tuple(QUANTITIES)), ("kind", KINDS)):
+            if data.get(key) not in allowed:
+                raise ValueError(f"{key} {data.get(key)!r}, expected one of {', '.join(allowed)}")
+        value = QUANTITIES[data["quantity"]].parse(data["value"])
+        return cls(**{**data, "value": value})
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A published cut: its conditions in SI, where they stand, and what is published of it."""
+
+    name: str
+    source: str
+    read: bool
+    speed: float
+    feed: float
+    rake: float
+    clearance: float
+    edge_radius: float
+    tool: str
+    tool_material: str
+    assumed: tuple[str, ...]
+    published: tuple[Published, ...]
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> "Experiment":
+        conditions = {name: unit.parse(data[name]) for name, unit in CONDITIONS.items()}
+        published = tuple(Published.of(entry) for entry in data["published"])
+        return cls(
+            **{**data, **conditions, "assumed": tuple(data["assumed"]), "published": published}
+        )
+
+    def simulation(self, cell: float, length: float) -> CuttingSimulation:
+        """The cut at these conditions, with the solver's own material, friction and numerics."""
+        return CuttingSimulation(
+            conditions=CuttingConditions(self.speed, self.feed, length),
+            tool=ToolGeometry(self.rake, self.clearance, self.edge_radius),
+            tool_material=tool_material(self.tool_material),
+            # A chip four times as thick as the feed has room; the default holds the paper's chip.
+            numerics=Numerics(cell, upstream=max(0.75e-3, 4 * self.feed)),
+        )
+
+
+@dataclass(frozen=True)
+class Means:
+    """What was computed, in SI: forces per width of cut, NaN for what the view does not show."""
+
+    cutting_force: float
+    thrust_force: float
+    thickness: float
+    contact: float
+    period: float
+    segments: int
+    drift: float
+    unaccounted: float
+    seconds: float
+
+
+def read_experiments(path: Path = DATA) -> tuple[dict[str, str], list[Experiment]]:
+    """Sources by their key, and the experiments, checked.
+
+    Raises
+    ------
+    ValueError
+        If an entry breaks the form of the file; the message names file and experiment.
+    """
+    data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    sources = {key: " ".join(text.split()) for key, text in data["sources"].items()}
+    experiments = []
+    for entry in data["experiments"]:
+        where = f"{path.name}: {entry.get('name', 'an experiment without a name')}"
+        try:
+            experiments.append(Experiment.of(entry))
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{where}: {error}") from None
+        for source in (entry["source"], *(value["source"] for value in entry["published"])):
+            if source not in sources:
+                raise ValueError(f"{where}: source {source!r}, expected one of {list(sources)}")
+    return sources, experiments
+
+
+def view(simulation: CuttingSimulation) -> Raster:
+    """Samples over the chip, from the rake face to the left border."""
+    numerics = simulation.numerics
+    left, top = -(numerics.upstream - 2 * numerics.cell), numerics.height - 4 * numerics.cell
+    return Raster(left, top, SAMPLE, int((top + 1e-4) / SAMPLE), int((1.5e-4 - left) / SAMPLE))
+
+
+def compute(simulation: CuttingSimulation) -> Means:
+    """Run a cut and take its means over what follows the first build-up of the chip."""
+    conditions = simulation.conditions
+    length = conditions.length_of_cut
+    window = OutputWindow(BUILD_UP * length, length, STEP / conditions.speed)
+    frames: list[Frame] = []
+    passed = iter(range(1_000_000))
+
+    def keep(frame: Frame) -> None:
+        if next(passed) % STEPS_A_FRAME == 0:
+            frames.append(frame)
+
+    raster, start = view(simulation), perf_counter()
+    history = simulation.run(window, raster, keep)
+    seconds = perf_counter() - start
+    chip = chip_metrics(scene_of(frames, history, raster, simulation.tool), conditions.feed)
+    return Means(
+        cutting_force=chip.cutting_mean,
+        thrust_force=chip.thrust_mean,
+        thickness=chip.thickness,
+        contact=chip.contact,
+        period=chip.period,
+        segments=chip.segments,
+        drift=drift(history),
+        unaccounted=float(history.energy.closing_error[-1]),
+        seconds=seconds,
+    )
+
+
+def scene_of(
+    frames: list[Frame], history: ForceHistory, raster: Raster, tool: ToolGeometry
+) -> Scene:
+    """The frames and the forces as a scene."""
+    fields = {name: np.stack([getattr(frame, name) for frame in frames]) for name in FIELD_UNITS}
+    scene = Scene.from_fields(raster, [frame.time for frame in frames], fields, tool)
+    forces = {"cutting_force": history.cutting, "thrust_force": history.thrust}
+    return Scene(
+        scene.data.assign_coords(force_time=("force_time", history.time, {"units": "s"})).assign(
+            {name: ("force_time", force, {"units": "N/m"}) for name, force in forces.items()}
+        )
+    )
+
+
+def drift(history: ForceHistory) -> float:
+    """Change of the mean cutting force from the first to the second half after the build-up."""
+    steady = history.time > BUILD_UP * history.time[-1] * (1 + 1e-9)
+    first, second = np.array_split(history.cutting[steady], 2)
+    return float(second.mean() / first.mean() - 1)
+
+
+def result_path(simulation: CuttingSimulation, name: str, folder: Path = RESULTS) -> Path:
+    """Where the means of a cut are kept; another solver, cell or condition is another file."""
+    state = repr((SOLVER_VERSION, STEP, STEPS_A_FRAME, BUILD_UP, SAMPLE, simulation))
+    return folder / f"{name}-{sha256(state.encode()).hexdigest()[:16]}.json"
+
+
+def means_of(simulation: CuttingSimulation, name: str, folder: Path = RESULTS) -> Means:
+    """Kept means of a cut, or those of a run now, which are then kept."""
+    path = result_path(simulation, name, folder)
+    if path.exists():
+        return Means(**json.loads(path.read_text(encoding="utf-8")))
+    means = compute(simulation)
+    folder.mkdir(parents=True, exist_ok=True)
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(asdict(means), indent=1), encoding="utf-8")
+    return means
+
+
+def comparison(computed: Iterable[tuple[Experiment, Means]]) -> list[list[str]]:
+    """Rows of the table, its head first: every published number, and what has none beside it."""
+    head = ["cut", "quantity", "published", "kind", "source", "computed", "difference"]
+    rows = [head]
+    for experiment, means in computed:
+        for quantity, unit in QUANTITIES.items():
+            here = getattr(means, quantity)
+            known = [entry for entry in experiment.published if entry.quantity == quantity]
+            label = f"{quantity.replace('_', ' ')} / {'(N/mm)' if unit is FORCE else unit.unit}"
+            for entry in known or [None]:
+                rows.append([experiment.name, label, *_sides(entry, here, unit)])
+    return rows
+
+
+def _sides(entry: Published | None, here: float, unit: Quantity) -> list[str]:
+    there = (
+        [number(entry.value, unit) + mark(entry.read), entry.kind, entry.source] if entry else []
+    )
+    difference = f"{100 * (here / entry.value - 1):+.0f} %" if entry and isfinite(here) else "–"
+    return [*(there or ["–", "–", "–"]), number(here, unit), difference.replace("-", "−")]
+
+
+def cuts(computed: Iterable[tuple[Experiment, Means]]) -> list[list[str]]:
+    """Rows of the table of conditions and of how each cut went, its head first."""
+    head = ["cut", "speed / (m/min)", "feed / mm", "rake / °", "conditions from", "assumed"]
+    rows = [[*head, "segments", "drift / %", "unaccounted work / %", "time / s"]]
+    for experiment, means in computed:
+        numbers = [
+            number(getattr(experiment, name), CONDITIONS[name]) for name in list(CONDITIONS)[:3]
+        ]
+        rows.append(
+            [
+                experiment.name,
+                *numbers,
+                experiment.source + mark(experiment.read),
+                ", ".join(experiment.assumed) or "–",
+                f"{means.segments}",
+                f"{100 * means.drift:+.0f}".replace("-", "−"),
+                f"{100 * means.unaccounted:.1f}".replace("-", "−"),
+                f"{means.seconds:.0f}",
+            ]
+        )
+    return rows
+
+
+def number(value: float, unit: Quantity) -> str:
+    """Three digits in the quantity's unit; a dash for NaN."""
+    if not isfinite(value):
+        return "–"
+    scaled = value / unit.parse(f"1 {unit.unit}")
+    digits = f"{scaled:.0f}" if abs(scaled) >= 100 else f"{scaled:.3g}"
+    return digits.replace("-", "−")
+
+
+def mark(read: bool) -> str:
+    return "" if read else f" {NOT_READ}"
+
+
+def markdown(rows: list[list[str]]) -> str:
+    lines = [f"| {' | '.join(row)} |" for row in rows]
+    return "\n".join([lines[0], "|---" * len(rows[0]) + "|", *lines[1:]])
+
+
+def aligned(rows: list[list[str]]) -> str:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    padded = ([cell.ljust(width) for cell, width in zip(row, widths, strict=True)] for row in rows)
+    return "\n".join("  ".join(row).rstrip() for row in padded)
+
+
+def arguments(names: list[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
+    parser.add_argument("--cell", type=float, default=20.0, help="side of a cell in um")
+    parser.add_argument("--length", type=float, default=2.0, help="length of cut in mm")
+    parser.add_argument("--markdown", action="store_true", help="print Markdown tables")
+    given = parser.parse_args()
+    if unknown := sorted(set(given.names) - set(names)):
+        parser.error(f"no experiment {unknown[0]!r}, expected some of {', '.join(names)}")
+    return given
+
+
+def main() -> None:
+    sources, experiments = read_experiments()
+    given = arguments([experiment.name for experiment in experiments])
+    computed = []
+    for experiment in experiments:
+        if given.names and experiment.name not in given.names:
+            continue
+        print(experiment.name, file=sys.stderr, flush=True)
+        simulation = experiment.simulation(given.cell * 1e-6, given.length * 1e-3)
+        computed.append((experiment, means_of(simulation, experiment.name)))
+    table = markdown if given.markdown else aligned
+    print(f"Cell {given.cell:g} um, length of cut {given.length:g} mm, solver {SOLVER_VERSION}.")
+    print(f"{NOT_READ}: the source was not read, look the number up before you quote it.")
+    for rows in (comparison(computed), cuts(computed)):
+        print(f"\n{table(rows)}")
+    used = {key for one, _ in computed for key in (one.source, *(p.source for p in one.published))}
+    for key in sorted(used):
+        print(f"\n- **{key}**: {sources[key]}" if given.markdown else f"\n{key}: {sources[key]}")
+
+
+if __name__ == "__main__":
+    main()
