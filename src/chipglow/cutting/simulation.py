@@ -513,7 +513,7 @@ def _thermal_friction(simulation: CuttingSimulation) -> dict[str, float]:
     exponent = simulation.friction.thermal_exponent
     if exponent is None:
         return {}
-    melting = simulation.workpiece.flow_stress.melting_temperature
+    melting = simulation.workpiece.melting_temperature
     return {"friction_exponent": exponent, "friction_melting": melting}
 
 
