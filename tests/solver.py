@@ -58,7 +58,7 @@ class Block:
         self.capacity = material.heat_capacity.sampled()
         self.heat_shares = heat_shares(material.taylor_quinney)
         self.conductivity = material.conductivity.sampled()
-        self.tool = tool or (FAR, FAR, *ToolGeometry().coefficients[2:])
+        self.tool = tool or ToolGeometry().surface._replace(x=FAR, y=FAR)
         shape = (self.grid.columns, self.grid.rows)
         self.velocity = np.zeros((*shape, VELOCITY_VALUES))
         self.nodes = np.zeros((*shape, NODE_VALUES))

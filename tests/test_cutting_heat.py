@@ -72,7 +72,7 @@ def test_conduction_keeps_heat_whatever_the_shape():
 
 def test_tool_conducts_as_a_half_space_and_keeps_its_heat():
     grid = Grid(-50e-6, -50e-6, 5e-6, 150, 120)
-    tool = (-20e-6, -1.0, 20e-6, -1.0, 0.0, 0.0, 1.0, 0.0, -1.0, 1.0, 0.0)
+    tool = ToolGeometry(rake_angle=0.0).surface._replace(x=-20e-6, y=-1.0)
     fraction = tool_fraction(grid, tool)
     # The face x = -40 um lies in the middle between two nodes.
     x = grid.left + grid.cell * np.arange(grid.columns) + 40e-6
@@ -108,7 +108,7 @@ def test_contact_shares_friction_heat_and_loses_none():
     capacity = np.full(AISI_1045.heat_capacity.sampled().size, 520.0)
     conductivity = AISI_1045.conductivity.sampled()
     shape = (block.grid.columns, block.grid.rows)
-    fraction = tool_fraction(block.grid, geometry.coefficients)
+    fraction = tool_fraction(block.grid, geometry.surface)
     temperature = np.full(shape, 293.0)
     heat = ToolHeat(CARBIDE.density * CARBIDE.heat_capacity, CARBIDE.conductivity, 0.4, 1e7, 5e-6)
     nodes, increment, friction = np.zeros((*shape, 3)), np.zeros(shape), np.zeros(shape)
@@ -128,7 +128,7 @@ def test_contact_shares_friction_heat_and_loses_none():
     before = heat_of_all()
     heat_contact(
         block.points, block.count, friction, increment, nodes, temperature, fraction,
-        geometry.coefficients, heat, capacity, block.step.heat_mass, block.grid,
+        geometry.surface, heat, capacity, block.step.heat_mass, block.grid,
     )  # fmt: skip
     return_heat(block.points, block.count, increment, block.grid)
     assert work > 0

@@ -165,10 +165,8 @@ def test_adiabatic_shear_follows_the_flow_stress(share, of_it):
 
 def pressed_on_a_face(**friction):
     """A block that meets an upright rake face squarely, far above the edge, and slides up."""
-    geometry = ToolGeometry()
-    radius = geometry.edge_radius
-    clearance = geometry.coefficients[7:]
-    tool = (80e-6 + radius, -1.0, radius, -1.0, 0.0, 0.0, 1.0, *clearance)
+    upright = ToolGeometry(rake_angle=0.0)
+    tool = upright.surface._replace(x=80e-6 + upright.edge_radius, y=-1.0)
     block = Block((80e-6, 80e-6), tool=tool, shear_fraction=1.0, **friction)
     block.set_velocity(lambda x, y: 1.0 + 0 * x * y, lambda x, y: 4.0 + 0 * x * y)
     return block

@@ -185,7 +185,7 @@ def test_inside_is_negative():
     assert tool.signed_distance(100e-6, 100e-6) < 0
     assert tool.signed_distance(-100e-6, 100e-6) > 0
     assert tool.signed_distance(100e-6, -50e-6) > 0
-    assert tool.signed_distance(*tool.edge_centre) == pytest.approx(-tool.edge_radius)
+    assert tool.signed_distance(*tool.corners[0]) == pytest.approx(-tool.edge_radius)
 
 
 @given(TOOLS, st.floats(0.0, 1e-3))

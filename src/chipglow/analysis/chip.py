@@ -11,7 +11,7 @@ from chipglow.analysis.lines import nearest, sample
 from chipglow.analysis.rake import contact_length
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear_band
-from chipglow.scene import Frame, Material, Raster, Scene, ToolGeometry
+from chipglow.scene import Frame, Material, Raster, Scene, Tool
 
 _MOST_FRAMES: Final = 64
 _FRAMES_A_BAND: Final = 2
@@ -230,7 +230,7 @@ class _Look:
     speed: float
 
     @classmethod
-    def at(cls, frame: Frame, raster: Raster, tool: ToolGeometry) -> "_Look":
+    def at(cls, frame: Frame, raster: Raster, tool: Tool) -> "_Look":
         solid = frame.material == Material.WORKPIECE
         heights = _heights(raster, tool)
         profile = _profile(frame, raster, tool, heights)
@@ -297,7 +297,7 @@ def _frame_numbers(scene: Scene) -> list[int]:
     return [int(number) for number in even.round()]
 
 
-def _heights(raster: Raster, tool: ToolGeometry) -> NDArray[np.float64]:
+def _heights(raster: Raster, tool: Tool) -> NDArray[np.float64]:
     """Heights on the rake face in the view, each two samples."""
     heights = np.arange(0.0, raster.rows * raster.spacing * 1.5, 2 * raster.spacing)
     points = tool.rake_point(heights)
@@ -313,7 +313,7 @@ def _inside(raster: Raster, points: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _profile(
-    frame: Frame, raster: Raster, tool: ToolGeometry, heights: NDArray[np.float64]
+    frame: Frame, raster: Raster, tool: Tool, heights: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Distance from the rake face to the chip's free surface; NaN where the view ends before.
 

@@ -20,7 +20,7 @@ from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear
 from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.camera.exposure import expose, frame_weights
 from chipglow.radiometry import Band
-from chipglow.scene import ENERGY_UNITS, Frame, Material, Raster, Scene, ToolGeometry
+from chipglow.scene import ENERGY_UNITS, Frame, Material, Raster, Scene, Tool
 from chipglow.surface import EmissivityField, Surface
 
 Progress = Callable[[str, float], None]
@@ -192,7 +192,7 @@ class StudyResult:
         The camera.
     raster : Raster
         The scene's samples.
-    tool : ToolGeometry
+    tool : Tool
         The tool.
     frame : Frame
         The scene in the middle of the developed instant's exposure.
@@ -219,7 +219,7 @@ class StudyResult:
     plan: Plan
     camera: Camera
     raster: Raster
-    tool: ToolGeometry
+    tool: Tool
     frame: Frame
     instants: tuple[Instant, ...]
     developed: int
@@ -372,7 +372,7 @@ class _Moment:
     """The scene at the developed instant, and where its errors are read."""
 
     frame: Frame
-    tool: ToolGeometry
+    tool: Tool
     band: ShearBand
     contact: float
     momentary_band: ShearBand | None
@@ -395,7 +395,7 @@ class _Moment:
         )
 
 
-def _momentary_band(raster: Raster, frame: Frame, tool: ToolGeometry) -> ShearBand | None:
+def _momentary_band(raster: Raster, frame: Frame, tool: Tool) -> ShearBand | None:
     workpiece = frame.material == Material.WORKPIECE
     try:
         return find_shear_band(raster, frame.plastic_strain_rate, workpiece, tool)

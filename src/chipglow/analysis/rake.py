@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.error import ErrorImages
 from chipglow.analysis.lines import Line, nearest, sample, straight_line
-from chipglow.scene import Raster, ToolGeometry
+from chipglow.scene import Raster, Tool
 
 _LONGEST_GAP: Final = 12e-6
 
@@ -86,7 +86,7 @@ def share(part: float, whole: float) -> float:
 
 
 def contact_length(
-    raster: Raster, workpiece: NDArray[np.bool_], tool: ToolGeometry, touching: float
+    raster: Raster, workpiece: NDArray[np.bool_], tool: Tool, touching: float
 ) -> float:
     """Length over which the chip touches the rake face.
 
@@ -96,7 +96,7 @@ def contact_length(
         Where the samples are.
     workpiece : ndarray of bool
         Where there is workpiece or chip, shape (y, x).
-    tool : ToolGeometry
+    tool : Tool
         The tool.
     touching : float
         Distance from the rake face in m within which chip counts as touching it.
@@ -123,7 +123,7 @@ def contact_length(
 
 
 def rake_errors(
-    errors: ErrorImages, contact: float, tool: ToolGeometry, half_length: float, step: float
+    errors: ErrorImages, contact: float, tool: Tool, half_length: float, step: float
 ) -> RakeErrors:
     """Errors across the rake face at mid-contact and along the contact.
 
@@ -133,7 +133,7 @@ def rake_errors(
         Error images.
     contact : float
         Length of contact in m.
-    tool : ToolGeometry
+    tool : Tool
         The tool.
     half_length : float
         Reach of the line to either side of the rake face in m.

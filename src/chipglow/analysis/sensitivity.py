@@ -12,7 +12,7 @@ from chipglow.analysis.error import ReferenceKind, error_images
 from chipglow.analysis.rake import RakeErrors, rake_errors
 from chipglow.analysis.shear_band import ShearBand
 from chipglow.camera import Camera, Exposure, GaussianPSF
-from chipglow.scene import ToolGeometry
+from chipglow.scene import Tool
 
 PsfOrder: TypeAlias = Literal["sensor", "optics"]
 PSF_ORDERS: Final[tuple[PsfOrder, ...]] = ("sensor", "optics")
@@ -59,7 +59,7 @@ class Setting:
         What the camera received, with the surfaces used at the rake face and at the shear band.
     contact_length : float
         Length of contact in m.
-    tool : ToolGeometry
+    tool : Tool
         The tool.
     band : ShearBand
         The shear band.
@@ -72,7 +72,7 @@ class Setting:
     rake_exposure: Exposure
     band_exposure: Exposure
     contact_length: float
-    tool: ToolGeometry
+    tool: Tool
     band: ShearBand
     half_length: float
     step: float

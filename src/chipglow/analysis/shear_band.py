@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from scipy.signal import savgol_filter
 
 from chipglow.analysis.lines import Line, sample, straight_line
-from chipglow.scene import Raster, ToolGeometry
+from chipglow.scene import Raster, Tool
 
 BAND_RATE: Final = 6000.0
 """Plastic strain rate in 1/s under which the paper sees no shear band."""
@@ -104,7 +104,7 @@ def find_shear_band(
     raster: Raster,
     strain_rate: NDArray[np.floating],
     workpiece: NDArray[np.bool_],
-    tool: ToolGeometry,
+    tool: Tool,
 ) -> ShearBand:
     """Find the shear band as the ridge of the strain rate from the edge to the free surface.
 
@@ -116,7 +116,7 @@ def find_shear_band(
         Plastic strain rate in 1/s, shape (y, x), such as the mean over an exposure.
     workpiece : ndarray of bool
         Where there is workpiece or chip.
-    tool : ToolGeometry
+    tool : Tool
         The tool; the ridge starts at its edge.
 
     Raises
@@ -134,7 +134,7 @@ def find_shear_band(
     smoothed by local parabolas, which leave a straight or evenly curved ridge where it is.
     """
     rate = np.where(workpiece, strain_rate, 0.0).astype(np.float64)
-    edge = _edge_point(tool)
+    edge = tool.edge_point
     polar = _Polar.of(raster, rate, workpiece, tool, edge)
     path, reaches_surface = polar.best_path()
     points = _even_steps(np.concatenate([edge[None], path]), 2 * raster.spacing)
@@ -158,11 +158,6 @@ def find_shear_band(
     )
 
 
-def _edge_point(tool: ToolGeometry) -> NDArray[np.float64]:
-    """The middle of the edge's arc."""
-    return np.asarray(np.array(tool.edge_centre) - tool.edge_radius / np.sqrt(2.0))
-
-
 @dataclass(frozen=True)
 class _Polar:
     """Strain rate about the edge: radii down, angles across."""
@@ -181,12 +176,13 @@ class _Polar:
         raster: Raster,
         rate: NDArray[np.float64],
         workpiece: NDArray[np.bool_],
-        tool: ToolGeometry,
+        tool: Tool,
         edge: NDArray[np.float64],
     ) -> "_Polar":
         left, right, _, top = raster.extent
         reach = float(np.hypot(max(edge[0] - left, right - edge[0]), max(top - edge[1], 1e-6)))
-        radii = np.arange(tool.edge_radius, reach + 2 * _RADIUS_STEP, _RADIUS_STEP)
+        first = max(tool.corner_radius, _RADIUS_STEP)
+        radii = np.arange(first, reach + 2 * _RADIUS_STEP, _RADIUS_STEP)
         up = np.arctan2(tool.rake_direction[1], tool.rake_direction[0])
         angles = np.linspace(up, pi + _BELOW_HORIZONTAL, _ANGLES)
         rays = np.stack([np.cos(angles), np.sin(angles)], axis=-1)

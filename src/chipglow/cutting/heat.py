@@ -7,7 +7,7 @@ from numba import njit
 
 from chipglow.cutting.momentum import spline, spline_weights
 from chipglow.cutting.stress import property_at
-from chipglow.scene.tool import wedge_distance
+from chipglow.scene.surface import surface_distance
 
 
 class ToolHeat(NamedTuple):
@@ -30,7 +30,7 @@ def tool_fraction(grid, tool):  # type: ignore[no-untyped-def]
     result = np.zeros((grid.columns, grid.rows))
     for i in range(grid.columns):
         for j in range(grid.rows):
-            distance, _, _ = wedge_distance(
+            distance, _, _ = surface_distance(
                 grid.left + i * grid.cell, grid.bottom + j * grid.cell, tool
             )
             result[i, j] = min(max(0.5 - distance / grid.cell, 0.0), 1.0)
@@ -152,7 +152,7 @@ def heat_contact(  # type: ignore[no-untyped-def]
 @njit
 def _partner(x, y, tool, grid):  # type: ignore[no-untyped-def]
     """Nodes and weights of the place half a cell under the tool's surface next to a point."""
-    distance, nx, ny = wedge_distance(x, y, tool)
+    distance, nx, ny = surface_distance(x, y, tool)
     down = distance + 0.5 * grid.cell
     fx = (x - nx * down - grid.left) / grid.cell
     fy = (y - ny * down - grid.bottom) / grid.cell

@@ -18,7 +18,7 @@ from chipglow.cutting.flow_stress import flow_stress
 from chipglow.cutting.friction import friction_coefficient
 from chipglow.cutting.lanes import FAST
 from chipglow.cutting.stress import BUFFER, LANES, STRESS, WORK, update_stresses
-from chipglow.scene.tool import wedge_distance
+from chipglow.scene.surface import surface_bound, surface_distance
 
 BLOCK_COLUMNS = 6
 """Points of a block reach two columns beyond it, three if they drift by a cell before the next
@@ -168,7 +168,9 @@ def _scatter(p, fx, fy, limit, nodes, grid, step):  # type: ignore[no-untyped-de
 @njit(**FAST)
 def _contact(p, stress, tool, step, law, damage):  # type: ignore[no-untyped-def]
     """Force of the tool's surface on a point (N/m) and the limit of its friction impulse."""
-    distance, nx, ny = wedge_distance(p.x, p.y, tool)
+    if surface_bound(p.x, p.y, tool) > step.reach:
+        return 0.0, 0.0, 0.0
+    distance, nx, ny = surface_distance(p.x, p.y, tool)
     depth = step.reach - distance
     if depth <= 0.0:
         return 0.0, 0.0, 0.0
@@ -259,7 +261,7 @@ def _work_column(i, velocity, nodes, heat, tool, grid, step, sums):  # type: ign
             sums[i, BOUNDARY_WORK] += mass * (step.speed - vx) * step.speed
             vx, vy = step.speed, 0.0
         elif limit > 0.0:
-            _, nx, ny = wedge_distance(x, y, tool)
+            _, nx, ny = surface_distance(x, y, tool)
             slip = vy * nx - vx * ny
             loss = min(limit / mass, abs(slip))
             change = -loss if slip > 0.0 else loss

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from chipglow.cutting.momentum import spline, spline_weights
 from chipglow.cutting.points import Grid, Points
-from chipglow.scene import Frame, Material, Raster, ToolGeometry
-from chipglow.scene.tool import wedge_distance
+from chipglow.scene import Frame, Material, Raster, Tool
+from chipglow.scene.surface import surface_distance
 
 _FIELDS: Final = (
     "temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y",
@@ -36,7 +36,7 @@ class Picture:
         The solver's grid.
     raster : Raster
         Samples of the frames; the grid must cover them.
-    tool : ToolGeometry
+    tool : Tool
         Outline of the tool.
     filled_by_tool : ndarray
         Share of each node's square that the tool fills, shape (columns, rows).
@@ -48,7 +48,7 @@ class Picture:
         self,
         grid: Grid,
         raster: Raster,
-        tool: ToolGeometry,
+        tool: Tool,
         filled_by_tool: NDArray[np.float64],
         ambient: float,
     ) -> None:
@@ -56,7 +56,7 @@ class Picture:
         self._filled_by_tool = filled_by_tool
         self._across = _placement((raster.x - grid.left) / grid.cell)
         self._down = _placement((raster.y - grid.bottom) / grid.cell)
-        self._in_tool = _inside(raster.x, raster.y, tool.coefficients)
+        self._in_tool = _inside(raster.x, raster.y, tool.surface)
         margin = 3 * grid.cell
         left, right, bottom, top = raster.extent
         self._view = (left - margin, right + margin, bottom - margin, top + margin)
@@ -117,7 +117,7 @@ def _inside(x, y, tool):  # type: ignore[no-untyped-def]
     result = np.empty((y.size, x.size), np.bool_)
     for row in range(y.size):
         for column in range(x.size):
-            result[row, column] = wedge_distance(x[column], y[row], tool)[0] < 0.0
+            result[row, column] = surface_distance(x[column], y[row], tool)[0] < 0.0
     return result
 
 

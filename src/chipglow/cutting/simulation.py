@@ -44,8 +44,8 @@ from chipglow.cutting.plastic_heat import heat_shares
 from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
 from chipglow.cutting.tool_border import CELLS, border_nodes, conduct_beyond
 from chipglow.cutting.watch import Trouble, find_lost, find_off_grid, find_trouble
-from chipglow.scene import Frame, Raster, ToolGeometry
-from chipglow.scene.tool import wedge_distance
+from chipglow.scene import Frame, Raster, Tool, ToolGeometry
+from chipglow.scene.surface import Surface, surface_distance
 
 SOLVER_VERSION: Final = "3"
 """Changes whenever the same input gives another result."""
@@ -94,7 +94,7 @@ class CuttingSimulation:
     ----------
     conditions : CuttingConditions
         Speed, feed, length of cut.
-    tool : ToolGeometry
+    tool : Tool
         Outline of the tool.
     workpiece : WorkpieceMaterial
         What is cut.
@@ -109,7 +109,7 @@ class CuttingSimulation:
     """
 
     conditions: CuttingConditions = field(default_factory=CuttingConditions)
-    tool: ToolGeometry = field(default_factory=ToolGeometry)
+    tool: Tool = field(default_factory=ToolGeometry)
     workpiece: WorkpieceMaterial = AISI_1045
     tool_material: ToolMaterial = CARBIDE
     friction: Friction = field(default_factory=Friction)
@@ -236,7 +236,7 @@ class _State:
         material = simulation.workpiece
         cell, spacing = numerics.cell, numerics.cell / numerics.points_per_side
         self.grid = _grid(numerics)
-        self.tool = simulation.tool.coefficients
+        self.tool = simulation.tool.surface
         self.speed, self.spacing = conditions.speed, spacing
         self.cycles, self.steps, time_step = _time_steps(simulation, interval)
         self.interval, self.cycle = interval, interval / self.cycles
@@ -534,11 +534,11 @@ def _tool_heat(simulation: CuttingSimulation, spacing: float) -> ToolHeat:
     )
 
 
-def _touching(tool: tuple[float, ...], heights: NDArray[np.float64]) -> float:
+def _touching(tool: Surface, heights: NDArray[np.float64]) -> float:
     """Place of a vertical face that touches the tool from the left."""
     low, high = -1e-2, 0.0
     for _ in range(60):
         middle = (low + high) / 2
-        clear = all(wedge_distance(middle, y, tool)[0] > 0 for y in heights)
+        clear = all(surface_distance(middle, y, tool)[0] > 0 for y in heights)
         low, high = (middle, high) if clear else (low, middle)
     return low

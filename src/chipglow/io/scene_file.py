@@ -23,15 +23,15 @@ from chipglow.io.unfinished import (
     has_checkpoint,
     write_checkpoint,
 )
-from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene, SceneError, ToolGeometry
+from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene, SceneError, Tool
 from chipglow.scene.scene import (
     ENERGY_UNITS,
     FORCE_UNITS,
     MATERIAL_COORDINATE_UNITS,
     check_frame,
     raster_coordinates,
-    tool_attributes,
 )
+from chipglow.scene.tool_attributes import tool_attributes
 
 FORMAT_VERSION: Final = 1
 """Changes when the same scene is written to a file in another way."""
@@ -78,7 +78,7 @@ class SceneWriter:
         The file to write.
     raster : Raster
         Where the samples are.
-    tool : ToolGeometry, optional
+    tool : Tool, optional
         The tool's outline.
     attributes : mapping, optional
         Attributes of the file, such as provenance: text and numbers.
@@ -101,7 +101,7 @@ class SceneWriter:
         self,
         path: str | os.PathLike[str],
         raster: Raster,
-        tool: ToolGeometry | None = None,
+        tool: Tool | None = None,
         attributes: Mapping[str, Any] | None = None,
         material_coordinates: bool = True,
         *,

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
-from chipglow.scene import Raster, ToolGeometry
+from chipglow.scene import Raster, Tool
 
 WIDTH: Final = 7.2
 """Width of a figure in inches: a page's text."""
@@ -89,7 +89,7 @@ def show_image(
     axes: Axes,
     image: NDArray[Any],
     raster: Raster,
-    tool: ToolGeometry,
+    tool: Tool,
     colours: str,
     limits: tuple[float, float],
 ) -> AxesImage:
@@ -118,7 +118,7 @@ def veil(axes: Axes, where: NDArray[np.bool_], raster: Raster) -> None:
     axes.imshow(white, extent=tuple(np.array(raster.extent) * 1e6))
 
 
-def draw_tool(axes: Axes, tool: ToolGeometry) -> None:
+def draw_tool(axes: Axes, tool: Tool) -> None:
     """The tool's outline, seen on dark and on light ground."""
     outline = tool.outline(3e-3) * 1e6
     axes.plot(*outline.T, color="white", linewidth=2.2)

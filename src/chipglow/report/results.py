@@ -11,7 +11,7 @@ from chipglow.analysis.paper import StudyResult
 from chipglow.report.chip import ChipRow
 from chipglow.report.comparison import Row
 from chipglow.scene import FIELD_UNITS
-from chipglow.scene.scene import tool_attributes
+from chipglow.scene.tool_attributes import tool_attributes
 
 
 def results_dataset(result: StudyResult, provenance: Mapping[str, str]) -> xr.Dataset:

@@ -1,7 +1,7 @@
 """The scene: what is truly there, as fields on a regular grid over time."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
 from math import isfinite
@@ -12,7 +12,8 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.scene.raster import Raster
-from chipglow.scene.tool import ToolGeometry
+from chipglow.scene.tool import Tool
+from chipglow.scene.tool_attributes import stored_tool, tool_attributes
 
 FIELD_UNITS: Final[Mapping[str, str]] = {
     "temperature": "K",
@@ -109,7 +110,7 @@ class Scene:
         raster: Raster,
         times: ArrayLike,
         fields: Mapping[str, ArrayLike],
-        tool: ToolGeometry | None = None,
+        tool: Tool | None = None,
         attributes: Mapping[str, Any] | None = None,
     ) -> "Scene":
         """Scene from arrays in SI units.
@@ -123,7 +124,7 @@ class Scene:
         fields : mapping
             Arrays of shape (time, y, x) by the names of `FIELD_UNITS`, and optionally of
             `MATERIAL_COORDINATE_UNITS`.
-        tool : ToolGeometry, optional
+        tool : Tool, optional
             The tool's outline, for the analyses that need the rake face.
         attributes : mapping, optional
             Further attributes of the dataset, such as provenance.
@@ -171,12 +172,9 @@ class Scene:
         )
 
     @property
-    def tool(self) -> ToolGeometry | None:
+    def tool(self) -> Tool | None:
         """The tool's outline, if the scene says it."""
-        names = list(asdict(ToolGeometry()))
-        if not all(f"tool_{name}" in self.data.attrs for name in names):
-            return None
-        return ToolGeometry(**{name: float(self.data.attrs[f"tool_{name}"]) for name in names})
+        return stored_tool(self.data.attrs)
 
     @property
     def has_material_coordinates(self) -> bool:
@@ -246,11 +244,6 @@ def raster_coordinates(raster: Raster, times: NDArray[np.float64]) -> dict[str, 
         "y": ("y", raster.y, {"units": "m", "long_name": "height above the cut surface"}),
         "x": ("x", raster.x, {"units": "m", "long_name": "position along the cut"}),
     }
-
-
-def tool_attributes(tool: ToolGeometry) -> dict[str, float]:
-    """The tool's outline as attributes of a dataset: angles in rad, lengths in m."""
-    return {f"tool_{name}": value for name, value in asdict(tool).items()}
 
 
 def _check_structure(data: xr.Dataset) -> None:

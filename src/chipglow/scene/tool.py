@@ -1,57 +1,58 @@
-"""Geometry of the cutting tool: a wedge with a rounded edge."""
+"""Geometry of the cutting tool: two straight faces and the edge between them."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from math import cos, isfinite, pi, radians, sin
+from functools import cached_property
+from math import ceil, cos, degrees, isfinite, pi, radians, sin, tan
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from chipglow.scene.surface import Surface, surface_distance, surface_distances, surface_of
+
+SMALLEST_WEDGE: Final = radians(5.0)
+STEEPEST_RAKE: Final = radians(60.0)
+LARGEST_CLEARANCE: Final = radians(45.0)
+
 _RIGHT_ANGLE: Final = pi / 2
+_ARC_STEP: Final = pi / 64
+_HONE_PIECES: Final = 64
+_LARGEST_FORM_FACTOR: Final = 10.0
 
 
-@dataclass(frozen=True)
-class ToolGeometry:
-    """Cross-section of the tool: rake face, clearance face and the arc between them.
+class Tool(ABC):
+    """Cross-section of a tool: a rake face, a clearance face and the edge between them.
 
-    The edge touches the lines x = 0 and y = 0: the cut surface is y = 0, the chip is to the left
-    of the rake face.
-
-    Parameters
-    ----------
-    rake_angle : float
-        Rake angle in rad; negative where the rake face leans over the chip, as the paper's −7°.
-    clearance_angle : float
-        Clearance angle in rad.
-    edge_radius : float
-        Radius of the cutting edge in m.
-
-    Raises
-    ------
-    ValueError
-        If an angle or the radius is impossible.
+    The edge's lowest point is on y = 0, the cut surface; the chip is to the left of the rake face.
+    The surface is at one distance, `corner_radius`, from the chain of `corners`.
     """
 
-    rake_angle: float = radians(-7.0)
-    clearance_angle: float = radians(7.0)
-    edge_radius: float = 20e-6
+    @property
+    @abstractmethod
+    def rake_angle(self) -> float:
+        """Rake angle of the straight rake face in rad; negative: it leans over the chip."""
 
-    def __post_init__(self) -> None:
-        if not abs(self.rake_angle) < radians(60.0):
-            raise ValueError(
-                "rake_angle: expected -60 to 60 degrees, "
-                f"got {np.degrees(self.rake_angle):g} degrees"
-            )
-        if not 0 < self.clearance_angle < radians(45.0):
-            raise ValueError(
-                "clearance_angle: expected over 0 and under 45 degrees, "
-                f"got {np.degrees(self.clearance_angle):g} degrees"
-            )
-        if self.rake_angle + self.clearance_angle > _RIGHT_ANGLE - radians(5.0):
-            raise ValueError("rake_angle and clearance_angle leave a wedge of less than 5 degrees")
-        if not (isfinite(self.edge_radius) and self.edge_radius > 0):
-            raise ValueError(f"edge_radius: expected over 0 m, got {self.edge_radius!r} m")
+    @property
+    @abstractmethod
+    def clearance_angle(self) -> float:
+        """Clearance angle of the straight clearance face in rad."""
+
+    @property
+    @abstractmethod
+    def corners(self) -> NDArray[np.float64]:
+        """Centres of the rounded corners from the rake to the clearance face, in m, (n, 2)."""
+
+    @property
+    @abstractmethod
+    def corner_radius(self) -> float:
+        """Radius of the rounded corners in m; 0 where they are sharp."""
+
+    @property
+    def rake_foot(self) -> NDArray[np.float64]:
+        """Lower end of the straight rake face in m, shape (2,)."""
+        foot = self.corners[0] + self.corner_radius * np.array(self.rake_normal)
+        return np.asarray(foot, dtype=np.float64)
 
     @property
     def rake_direction(self) -> tuple[float, float]:
@@ -69,25 +70,16 @@ class ToolGeometry:
         return cos(self.clearance_angle), sin(self.clearance_angle)
 
     @property
-    def clearance_normal(self) -> tuple[float, float]:
-        """Unit normal of the clearance face, from the tool toward the cut surface."""
-        return sin(self.clearance_angle), -cos(self.clearance_angle)
+    def edge_point(self) -> NDArray[np.float64]:
+        """The place on the surface that is nearest to the origin: the middle of a round edge."""
+        distance, *normal = surface_distance(0.0, 0.0, self.surface)
+        return np.array([-distance * part for part in normal])
 
-    @property
-    def edge_centre(self) -> tuple[float, float]:
-        """Centre of the edge's arc in m."""
-        return self.edge_radius, self.edge_radius
-
-    @property
-    def coefficients(self) -> tuple[float, ...]:
-        """Centre, radius, normals and directions as kernels take them: see `wedge_distance`."""
-        return (
-            *self.edge_centre,
-            self.edge_radius,
-            *self.rake_normal,
-            *self.rake_direction,
-            *self.clearance_normal,
-            *self.clearance_direction,
+    @cached_property
+    def surface(self) -> Surface:
+        """The surface as kernels take it."""
+        return surface_of(
+            self.corners, self.corner_radius, self.rake_direction, self.clearance_direction
         )
 
     def rake_point(self, distance: ArrayLike) -> NDArray[np.float64]:
@@ -96,16 +88,15 @@ class ToolGeometry:
         Parameters
         ----------
         distance : array_like
-            Distance in m up the rake face from where it leaves the edge's arc, shape (...).
+            Distance in m up the straight rake face from its lower end, `rake_foot`, shape (...).
 
         Returns
         -------
         ndarray
             x and y in m, shape (..., 2).
         """
-        foot = np.array(self.edge_centre) + self.edge_radius * np.array(self.rake_normal)
         along = np.asarray(distance, dtype=np.float64)[..., None]
-        return np.asarray(foot + along * np.array(self.rake_direction), dtype=np.float64)
+        return np.asarray(self.rake_foot + along * np.array(self.rake_direction), dtype=np.float64)
 
     def signed_distance(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
         """Distance to the tool's surface in m, negative inside the tool.
@@ -116,8 +107,8 @@ class ToolGeometry:
             Positions in m, broadcast against each other.
         """
         x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
-        distance = _distances(
-            np.ascontiguousarray(x).ravel(), np.ascontiguousarray(y).ravel(), self.coefficients
+        distance = surface_distances(
+            np.ascontiguousarray(x).ravel(), np.ascontiguousarray(y).ravel(), self.surface
         )
         return np.asarray(distance, dtype=np.float64).reshape(x.shape)
 
@@ -127,42 +118,227 @@ class ToolGeometry:
         Parameters
         ----------
         length : float
-            Length of either face in m.
+            Length of either face beyond the first and the last corner in m.
 
         Returns
         -------
         ndarray
             x and y in m, shape (n, 2).
         """
-        start = np.arctan2(self.rake_normal[1], self.rake_normal[0]) % (2 * pi)
-        end = np.arctan2(self.clearance_normal[1], self.clearance_normal[0]) % (2 * pi)
-        angle = np.linspace(start, end, 33)
-        centre = np.array(self.edge_centre)
-        arc = centre + self.edge_radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        top = arc[0] + length * np.array(self.rake_direction)
-        right = arc[-1] + length * np.array(self.clearance_direction)
-        return np.concatenate([top[None], arc, right[None]])
+        rake, clearance = np.array(self.rake_direction), np.array(self.clearance_direction)
+        pieces = np.concatenate([[-rake], np.diff(self.corners, axis=0), [clearance]])
+        heading = np.unwrap(np.arctan2(pieces[:, 1], pieces[:, 0]))
+        round_edge = np.concatenate(
+            [
+                corner + self.corner_radius * _right_of(start, end, self.corner_radius > 0)
+                for corner, start, end in zip(self.corners, heading[:-1], heading[1:], strict=True)
+            ]
+        )
+        top, right = round_edge[0] + length * rake, round_edge[-1] + length * clearance
+        return np.concatenate([top[None], round_edge, right[None]])
 
 
-@njit
-def wedge_distance(x, y, tool):  # type: ignore[no-untyped-def]
-    """Signed distance to a rounded wedge and its outward normal, for kernels."""
-    cx, cy, radius, n1x, n1y, t1x, t1y, n2x, n2y, t2x, t2y = tool
-    px, py = x - cx, y - cy
-    if t1x * px + t1y * py < 0.0 and t2x * px + t2y * py < 0.0:
-        length = np.sqrt(px * px + py * py)
-        if length < 1e-12:
-            return -radius, n1x, n1y
-        return length - radius, px / length, py / length
-    rake, clearance = n1x * px + n1y * py, n2x * px + n2y * py
-    if rake > clearance:
-        return rake - radius, n1x, n1y
-    return clearance - radius, n2x, n2y
+def _right_of(start: float, end: float, curved: bool) -> NDArray[np.float64]:
+    """Unit vectors to the right of headings from start to end, shape (n, 2)."""
+    steps = ceil(abs(end - start) / _ARC_STEP) if curved else 0
+    heading = np.linspace(start, end, steps + 1)
+    return np.stack([np.sin(heading), -np.cos(heading)], axis=1)
 
 
-@njit(cache=True)
-def _distances(x, y, tool):  # type: ignore[no-untyped-def]
-    result = np.empty(x.size)
-    for i in range(x.size):
-        result[i] = wedge_distance(x[i], y[i], tool)[0]
-    return result
+@dataclass(frozen=True)
+class Chamfer:
+    """A flat land between rake face and clearance face: a T-land, a negative land.
+
+    Parameters
+    ----------
+    width : float
+        Width b of the land in m, along it, between the sharp corners before they are rounded.
+    angle : float
+        Angle between land and rake face in rad: the land's own rake angle is the rake angle less
+        this angle.
+
+    Raises
+    ------
+    ValueError
+        If the width or the angle is impossible.
+    """
+
+    width: float
+    angle: float
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.width) and self.width > 0):
+            raise ValueError(f"chamfer width: expected over 0 m, got {self.width!r} m")
+        if not 0 < self.angle < _RIGHT_ANGLE:
+            raise ValueError(
+                "chamfer angle: expected over 0 and under 90 degrees, "
+                f"got {degrees(self.angle):g} degrees"
+            )
+
+
+@dataclass(frozen=True)
+class Hone:
+    """A rounded edge that need not be symmetric.
+
+    Parameters
+    ----------
+    rake, clearance : float
+        S_gamma and S_alpha: distance in m from the ideal sharp edge to where the rounding leaves
+        the rake face and the clearance face.
+
+    Raises
+    ------
+    ValueError
+        If a distance is impossible, or one is over ten times the other.
+
+    Notes
+    -----
+    Denkena et al. describe an edge by these two distances; their ratio S_gamma / S_alpha is the
+    form factor K: over 1 is a waterfall hone, 1 a symmetric one. They leave the curve between open.
+    Here it is the arc of an ellipse that touches both faces there; for K = 1 that is the arc of a
+    circle.
+    """
+
+    rake: float
+    clearance: float
+
+    def __post_init__(self) -> None:
+        for name, length in (("rake", self.rake), ("clearance", self.clearance)):
+            if not (isfinite(length) and length > 0):
+                raise ValueError(f"hone {name}: expected over 0 m, got {length!r} m")
+        factor = self.form_factor
+        if not 1 / _LARGEST_FORM_FACTOR <= factor <= _LARGEST_FORM_FACTOR:
+            raise ValueError(
+                f"hone: its form factor rake / clearance is {factor:g}, "
+                f"expected {1 / _LARGEST_FORM_FACTOR:g} to {_LARGEST_FORM_FACTOR:g}"
+            )
+
+    @property
+    def form_factor(self) -> float:
+        """K = S_gamma / S_alpha."""
+        return self.rake / self.clearance
+
+
+@dataclass(frozen=True)
+class ToolGeometry(Tool):
+    """A wedge with a prepared edge: rounded, chamfered or honed.
+
+    The circle of the rounded edge touches the lines x = 0 and y = 0; so do the circle of a
+    chamfer's lower corner and the ellipse of a hone.
+
+    Parameters
+    ----------
+    rake_angle : float
+        Rake angle in rad; negative where the rake face leans over the chip, as the paper's −7°.
+    clearance_angle : float
+        Clearance angle in rad.
+    edge_radius : float
+        Radius of the cutting edge in m, or of both corners of a chamfer. A hone takes its place.
+    chamfer : Chamfer, optional
+        The land between the faces.
+    hone : Hone, optional
+        An edge that is not round.
+
+    Raises
+    ------
+    ValueError
+        If an angle or a length is impossible, if no land is left between the rounded corners of
+        the chamfer, or if there are both a chamfer and a hone.
+    """
+
+    rake_angle: float = radians(-7.0)
+    clearance_angle: float = radians(7.0)
+    edge_radius: float = 20e-6
+    chamfer: Chamfer | None = None
+    hone: Hone | None = None
+
+    def __post_init__(self) -> None:
+        check_angles(self.rake_angle, self.clearance_angle)
+        if not (isfinite(self.edge_radius) and self.edge_radius > 0):
+            raise ValueError(f"edge_radius: expected over 0 m, got {self.edge_radius!r} m")
+        if self.chamfer and self.hone:
+            raise ValueError("chamfer and hone: expected one or the other, got both")
+        if self.chamfer:
+            self._check_chamfer(self.chamfer)
+
+    @property
+    def land(self) -> float:
+        """Length in m of the chamfer's flat between its rounded corners; 0 without a chamfer."""
+        if self.chamfer is None:
+            return 0.0
+        turn = self.chamfer.angle
+        rest = _RIGHT_ANGLE + self.rake_angle + self.clearance_angle - turn
+        return self.chamfer.width - self.edge_radius * (tan(turn / 2) + tan(rest / 2))
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """Centres of the rounded corners from the rake to the clearance face, in m, (n, 2)."""
+        if self.hone:
+            return self._honed[0]
+        lower = np.array([[self.edge_radius, self.edge_radius]])
+        if self.chamfer is None:
+            return lower
+        rake = self.rake_angle - self.chamfer.angle
+        return np.concatenate([lower + self.land * np.array([sin(rake), cos(rake)]), lower])
+
+    @property
+    def corner_radius(self) -> float:
+        """Radius of the rounded corners in m."""
+        return self._honed[1] if self.hone else self.edge_radius
+
+    @cached_property
+    def _honed(self) -> tuple[NDArray[np.float64], float]:
+        """Curve inside the hone at a distance from it, and that distance.
+
+        The hone is the image of the circle that touches both faces one unit from the sharp edge.
+        The distance is half of its smallest radius of curvature: the chain round which it runs is
+        smooth, and the surface has a normal that does not jump.
+        """
+        assert self.hone is not None
+        faces = np.array([self.rake_direction, self.clearance_direction]).T
+        image = faces @ np.diag([self.hone.rake, self.hone.clearance]) @ np.linalg.inv(faces)
+        radius = tan((_RIGHT_ANGLE - self.rake_angle - self.clearance_angle) / 2)
+        angle = np.linspace(
+            pi - self.rake_angle, 3 * _RIGHT_ANGLE + self.clearance_angle, _HONE_PIECES + 1
+        )
+        circle = np.stack([np.cos(angle), np.sin(angle)])
+        speed = np.hypot(*(image @ np.stack([-np.sin(angle), np.cos(angle)])))
+        inset = float((radius * speed**3 / np.linalg.det(image)).min()) / 2
+        normal = np.linalg.inv(image).T @ circle
+        normal /= np.hypot(*normal)
+        centre = radius * np.hypot(*image.T)
+        return centre + (radius * image @ circle - inset * normal).T, inset
+
+    def _check_chamfer(self, chamfer: Chamfer) -> None:
+        if not chamfer.angle < _RIGHT_ANGLE + self.rake_angle:
+            raise ValueError(
+                f"chamfer angle: expected under {degrees(_RIGHT_ANGLE + self.rake_angle):g} "
+                f"degrees, so that the land faces the chip, got {degrees(chamfer.angle):g} degrees"
+            )
+        if not self.land > 0:
+            raise ValueError(
+                f"chamfer width: expected over {(chamfer.width - self.land) * 1e6:.4g} um, so that "
+                f"a land is left between corners of {self.edge_radius * 1e6:g} um, "
+                f"got {chamfer.width * 1e6:g} um"
+            )
+
+
+def check_angles(rake_angle: float, clearance_angle: float) -> None:
+    """Check the angles of a tool's faces, in rad.
+
+    Raises
+    ------
+    ValueError
+        If an angle is impossible; the message names it, its value and what was expected.
+    """
+    if not abs(rake_angle) < STEEPEST_RAKE:
+        raise ValueError(
+            f"rake_angle: expected -60 to 60 degrees, got {degrees(rake_angle):g} degrees"
+        )
+    if not 0 < clearance_angle < LARGEST_CLEARANCE:
+        raise ValueError(
+            "clearance_angle: expected over 0 and under 45 degrees, "
+            f"got {degrees(clearance_angle):g} degrees"
+        )
+    if rake_angle + clearance_angle > _RIGHT_ANGLE - SMALLEST_WEDGE:
+        raise ValueError("rake_angle and clearance_angle leave a wedge of less than 5 degrees")

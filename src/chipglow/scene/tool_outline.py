@@ -1,0 +1,198 @@
+"""A tool whose outline is a row of points, such as a measured edge."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import cos
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipglow.scene.surface import FACE_LENGTH
+from chipglow.scene.tool import SMALLEST_WEDGE, Tool, check_angles
+
+MOST_POINTS: Final = 1000
+
+_LARGEST_SPAN: Final = 20e-3
+_SHORTEST_PIECE: Final = 1e-9
+_STRAIGHT: Final = 0.2e-6
+_TOUCHING: Final = 1e-10
+_LEVEL: Final = 1e-12
+_ORDER: Final = (
+    "points go from the rake face round the edge to the clearance face, the tool on their left"
+)
+
+
+class ToolOutlineError(ValueError):
+    """An outline that no tool can have.
+
+    Parameters
+    ----------
+    message : str
+        Value and expectation.
+    point : int
+        Number of the point that is to blame, from 0.
+    """
+
+    def __init__(self, message: str, point: int = 0) -> None:
+        super().__init__(message)
+        self.point = point
+
+
+@dataclass(frozen=True)
+class ToolOutline(Tool):
+    """A tool with straight lines between given points and straight faces beyond the outer ones.
+
+    Parameters
+    ----------
+    points : tuple of (float, float)
+        x and y in m, from the rake face round the edge to the clearance face, so that the tool is
+        on the left of one who walks along; the axes are those of the scene, the lowest point is on
+        y = 0. `ToolOutline.placed` moves an outline there.
+
+    Raises
+    ------
+    ToolOutlineError
+        If a value is not finite, the points are too few, too many, too far apart or the same, the
+        line crosses itself or turns back, or a face has an impossible angle.
+
+    Notes
+    -----
+    The straight rake face is the longest stretch from the first point on that stays within 0.2 um
+    of the line through its ends; the clearance face is the same from the last point back. They
+    give rake and clearance angle and go on straight beyond the outer points. What is between them
+    is the edge. Distances up the rake face count from the lower end of the straight rake face.
+    """
+
+    points: tuple[tuple[float, float], ...]
+
+    def __post_init__(self) -> None:
+        _check_points(self.corners)
+        self._check_faces()
+        lowest = float(self.corners[:, 1].min())
+        if abs(lowest) > _LEVEL:
+            raise ToolOutlineError(f"lowest point at y {lowest * 1e6:g} um, expected 0 um")
+        self._check_crossing()
+
+    @classmethod
+    def placed(cls, points: ArrayLike) -> "ToolOutline":
+        """Outline moved to where the cut is.
+
+        Its lowest point comes to y = 0; the leftmost point of the edge, between the straight faces,
+        comes to x = 0.
+
+        Parameters
+        ----------
+        points : array_like
+            x and y in m, shape (n, 2), in the order of `ToolOutline`.
+
+        Raises
+        ------
+        ToolOutlineError
+            As `ToolOutline`.
+        """
+        line = np.asarray(points, dtype=np.float64)
+        _check_points(line)
+        edge = line[_straight_end(line) : len(line) - _straight_end(line[::-1])]
+        moved = line - [edge[:, 0].min(), line[:, 1].min()]
+        return cls(tuple((float(x), float(y)) for x, y in moved))
+
+    @cached_property
+    def corners(self) -> NDArray[np.float64]:
+        """The points in m, shape (n, 2)."""
+        return np.array(self.points, dtype=np.float64)
+
+    @property
+    def corner_radius(self) -> float:
+        """0: the corners are as sharp as they are given."""
+        return 0.0
+
+    @cached_property
+    def rake_angle(self) -> float:
+        """Rake angle of the straight rake face in rad."""
+        x, y = self.corners[0] - self.rake_foot
+        return float(np.arctan2(x, y))
+
+    @cached_property
+    def clearance_angle(self) -> float:
+        """Clearance angle of the straight clearance face in rad."""
+        x, y = self.corners[-1] - self.corners[-1 - _straight_end(self.corners[::-1])]
+        return float(np.arctan2(y, x))
+
+    @cached_property
+    def rake_foot(self) -> NDArray[np.float64]:
+        """Lower end of the straight rake face in m, shape (2,)."""
+        return np.asarray(self.corners[_straight_end(self.corners)])
+
+    def _check_faces(self) -> None:
+        try:
+            check_angles(self.rake_angle, self.clearance_angle)
+        except ValueError as error:
+            raise ToolOutlineError(f"{error}; {_ORDER}") from None
+
+    def _check_crossing(self) -> None:
+        """No two pieces may cross, those of the straight faces beyond the points included."""
+        line = np.concatenate(
+            [
+                [self.corners[0] + FACE_LENGTH * np.array(self.rake_direction)],
+                self.corners,
+                [self.corners[-1] + FACE_LENGTH * np.array(self.clearance_direction)],
+            ]
+        )
+        side = _sides(line)
+        # Points on one line are on neither side of it, whatever the rounding.
+        side[np.abs(side) < _TOUCHING] = 0.0
+        apart = side[:, :-1] * side[:, 1:] < 0
+        crossing = np.argwhere(np.triu(apart & apart.T, 2))
+        if crossing.size:
+            first, second = (max(int(piece) - 1, 0) for piece in crossing[0])
+            raise ToolOutlineError(
+                f"line from point {first + 1} crosses that from point {second + 1}, "
+                "expected an outline that does not cross itself",
+                second,
+            )
+
+
+def _check_points(line: NDArray[np.float64]) -> None:
+    if line.ndim != 2 or line.shape[1] != 2 or not 3 <= len(line) <= MOST_POINTS:
+        raise ToolOutlineError(
+            f"points of shape {line.shape}, expected 3 to {MOST_POINTS} points (x, y)"
+        )
+    finite = np.isfinite(line).all(axis=1)
+    if not finite.all():
+        point = int(finite.argmin())
+        raise ToolOutlineError(f"point {line[point]} m, expected finite numbers", point)
+    span = float(np.ptp(line, axis=0).max())
+    if span > _LARGEST_SPAN:
+        raise ToolOutlineError(
+            f"outline {span * 1e3:g} mm long, expected up to {_LARGEST_SPAN * 1e3:g} mm"
+        )
+    pieces = np.diff(line, axis=0)
+    length = np.hypot(pieces[:, 0], pieces[:, 1])
+    if (length < _SHORTEST_PIECE).any():
+        point = int(length.argmin()) + 1
+        raise ToolOutlineError("the same point as the one before, expected another", point)
+    tangent = pieces / length[:, None]
+    back = (tangent[1:] * tangent[:-1]).sum(axis=1) < -cos(SMALLEST_WEDGE)
+    if back.any():
+        point = int(back.argmax()) + 1
+        raise ToolOutlineError("the line turns back, expected a corner of over 5 degrees", point)
+
+
+def _straight_end(line: NDArray[np.float64]) -> int:
+    """Number of the last point of the straight stretch that begins at the first point."""
+    for end in range(2, len(line)):
+        along = line[end] - line[0]
+        away = line[1:end] - line[0]
+        height = np.abs(away[:, 0] * along[1] - away[:, 1] * along[0])
+        if height.max() > _STRAIGHT * np.hypot(*along):
+            return end - 1
+    return len(line) - 1
+
+
+def _sides(line: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance of every point from the line through every piece, signed, shape (n - 1, n)."""
+    pieces = np.diff(line, axis=0)
+    away = line[None] - line[:-1, None]
+    cross = pieces[:, None, 0] * away[..., 1] - pieces[:, None, 1] * away[..., 0]
+    return np.asarray(cross / np.hypot(pieces[:, 0], pieces[:, 1])[:, None])
