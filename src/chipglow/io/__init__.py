@@ -3,6 +3,7 @@
 from chipglow.io.atomic import atomic_folder, atomic_path
 from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
 from chipglow.io.scene_file import FORMAT_VERSION, SceneWriter, open_scene, write_scene
+from chipglow.io.tool_file import read_tool_outline
 from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "atomic_path",
     "open_scene",
     "read_measurement",
+    "read_tool_outline",
     "unfinished_scenes",
     "write_dataset",
     "write_measurement",

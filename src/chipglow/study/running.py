@@ -16,7 +16,7 @@ from chipglow.cutting import (
     WorkpieceMaterial,
 )
 from chipglow.io import SceneWriter, open_scene, unfinished_scenes
-from chipglow.scene import SceneError
+from chipglow.scene import SceneError, ToolOutline
 from chipglow.study.cache import scene_path
 from chipglow.study.schema import Study
 
@@ -99,8 +99,10 @@ def run(study: Study, progress: Progress | None = None, resume: bool = False) ->
 def _inputs(study: Study) -> dict[str, Any]:
     """All that a scene depends on."""
     simulation = study.cutting.simulation()
+    tool = simulation.tool
     return {
-        "cutting": study.cutting.model_dump(),
+        "cutting": study.cutting.model_dump(exclude={"tool": {"outline"}}),
+        "outline": tool.points if isinstance(tool, ToolOutline) else None,
         "workpiece": _numbers(simulation.workpiece),
         "tool": _numbers(simulation.tool_material),
         "solver": SOLVER_VERSION,

@@ -39,8 +39,9 @@ from chipglow.cutting import (
     tool_material,
     workpiece,
 )
+from chipglow.io import read_tool_outline
 from chipglow.radiometry import Band
-from chipglow.scene import Raster, ToolGeometry
+from chipglow.scene import Chamfer, Hone, Raster, Tool, ToolGeometry
 from chipglow.study.units import (
     Angle,
     CutLength,
@@ -69,6 +70,11 @@ def _text_of_none(value: object, handler: SerializerFunctionWrapHandler) -> obje
 
 
 _NONE: Final = (BeforeValidator(_none_of_text), WrapSerializer(_text_of_none, when_used="json"))
+
+
+def _beside_the_study(file: str, info: ValidationInfo) -> str:
+    """Path of a file that a study names: relative to the study's folder."""
+    return str(Path((info.context or {}).get("folder") or ".", file).resolve())
 
 
 def _field(default: object, description: str) -> Any:
@@ -112,12 +118,49 @@ class Part(Section):
         return self
 
 
+class ChamferSection(Part):
+    """A chamfer of the cutting edge."""
+
+    width: Length = Field(description="Width of the land, between its sharp corners.")
+    angle: Angle = Field(description="Angle between the land and the rake face.")
+
+    def build(self) -> Chamfer:
+        """The chamfer."""
+        return Chamfer(self.width, self.angle)
+
+
+class HoneSection(Part):
+    """A hone of the cutting edge."""
+
+    rake: Length = Field(description="Where it begins on the rake face, from the sharp edge.")
+    clearance: Length = Field(description="The same on the clearance face.")
+
+    def build(self) -> Hone:
+        """The hone."""
+        return Hone(self.rake, self.clearance)
+
+
 class ToolSection(Part):
     """The cutting tool."""
 
     rake_angle: Angle = _field("-7 deg", "Rake angle; negative: the rake face leans over the chip.")
     clearance_angle: Angle = _field("7 deg", "Angle between the tool's flank and the cut surface.")
-    edge_radius: Length = _field("20 um", "Radius of the cutting edge.")
+    edge_radius: Length = _field("20 um", "Radius of the cutting edge, or of a chamfer's corners.")
+    chamfer: Annotated[ChamferSection | None, *_NONE] = _field(
+        "none",
+        "Chamfer of the edge, or none: {width: 100 um, angle: 20 deg}, the width between sharp\n"
+        "corners, the angle from the rake face.",
+    )
+    hone: Annotated[HoneSection | None, *_NONE] = _field(
+        "none",
+        "Hone in the place of the edge's radius, or none: {rake: 40 um, clearance: 20 um}, how\n"
+        "far from the sharp edge it begins on either face.",
+    )
+    outline: Annotated[str | None, *_NONE] = _field(
+        "none",
+        "File of an outline in the place of all these, or none: edge.csv, its first line\n"
+        "x_um,y_um, then a point a line, from the rake face round the edge to the clearance face.",
+    )
     material: str = _field("carbide", f"Material of the tool: {', '.join(material_names('tool'))}.")
 
     @field_validator("material")
@@ -126,9 +169,43 @@ class ToolSection(Part):
         tool_material(name)
         return name
 
-    def build(self) -> ToolGeometry:
+    @field_validator("outline")
+    @classmethod
+    def _beside_the_study(cls, outline: str | None, info: ValidationInfo) -> str | None:
+        return None if outline is None else _beside_the_study(outline, info)
+
+    @model_validator(mode="after")
+    def _nothing_unused(self) -> Self:
+        if self.outline:
+            self._refuse_beside("outline", set(type(self).model_fields) - {"outline", "material"})
+        elif self.hone:
+            self._refuse_beside("hone", {"edge_radius"})
+        return self
+
+    def _refuse_beside(self, given: str, unused: set[str]) -> None:
+        default = type(self)()
+        for name in type(self).model_fields:
+            if name in unused and getattr(self, name) != getattr(default, name):
+                raise ValueError(f"{name}: is not used beside {given}, expected one or the other")
+
+    def build(self) -> Tool:
         """The tool's outline."""
-        return ToolGeometry(self.rake_angle, self.clearance_angle, self.edge_radius)
+        if self.outline:
+            try:
+                return read_tool_outline(self.outline)
+            except OSError as error:
+                raise ValueError(
+                    f"outline: {self.outline}: {error.strerror}, expected an outline's file"
+                ) from None
+            except ValueError as error:
+                raise ValueError(f"outline: {error}") from None
+        return ToolGeometry(
+            self.rake_angle,
+            self.clearance_angle,
+            self.edge_radius,
+            self.chamfer.build() if self.chamfer else None,
+            self.hone.build() if self.hone else None,
+        )
 
 
 class FrictionSection(Part):
@@ -409,8 +486,7 @@ class MeasuredSection(Part):
     @field_validator("file")
     @classmethod
     def _beside_the_study(cls, file: str, info: ValidationInfo) -> str:
-        folder = (info.context or {}).get("folder")
-        return str(Path(folder or ".", file).resolve())
+        return _beside_the_study(file, info)
 
     def build(self) -> PointSpreadFunction:
         """The point spread function."""
