@@ -147,17 +147,18 @@ class ToolOutline(Tool):
         if crossing.size:
             first, second = (max(int(piece) - 1, 0) for piece in crossing[0])
             raise ToolOutlineError(
-                f"line from point {first + 1} crosses that from point {second + 1}, "
+                f"the piece from point {first + 1} crosses that from point {second + 1}, "
                 "expected an outline that does not cross itself",
                 second,
             )
 
 
 def _check_points(line: NDArray[np.float64]) -> None:
-    if line.ndim != 2 or line.shape[1] != 2 or not 3 <= len(line) <= MOST_POINTS:
-        raise ToolOutlineError(
-            f"points of shape {line.shape}, expected 3 to {MOST_POINTS} points (x, y)"
-        )
+    if not 3 <= len(line) <= MOST_POINTS:
+        last = min(max(len(line) - 1, 0), MOST_POINTS)
+        raise ToolOutlineError(f"{len(line)} points, expected 3 to {MOST_POINTS}", last)
+    if line.ndim != 2 or line.shape[1] != 2:
+        raise ToolOutlineError(f"points of shape {line.shape}, expected (n, 2)")
     finite = np.isfinite(line).all(axis=1)
     if not finite.all():
         point = int(finite.argmin())
