@@ -44,7 +44,7 @@ class AnalyticChip:
     @property
     def edge(self) -> NDArray[np.float64]:
         """Where the band leaves the edge's arc, in m."""
-        return np.array(self.tool.edge_centre) - self.tool.edge_radius / np.sqrt(2)
+        return self.tool.corners[-1] - self.tool.edge_radius / np.sqrt(2)
 
     @property
     def times(self) -> NDArray[np.float64]:

@@ -68,7 +68,7 @@ class SerratedChip:
 
     def _fields(self, time: float) -> dict[str, NDArray[np.generic]]:
         points = np.stack(np.meshgrid(self.raster.x, self.raster.y), axis=-1)
-        edge = np.array(self.tool.edge_centre) - self.tool.edge_radius / np.sqrt(2)
+        edge = self.tool.corners[-1] - self.tool.edge_radius / np.sqrt(2)
         offset = points - edge
         across = offset[..., 0] * sin(self.shear_angle) + offset[..., 1] * cos(self.shear_angle)
         depth = self.tool.signed_distance(points[..., 0], points[..., 1])

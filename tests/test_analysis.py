@@ -150,7 +150,7 @@ def test_errors_under_the_floor_are_given_and_flagged():
 def ridge_scene(angle, width, peak=60e3, noise=0.0, rake_layer=0.0):
     """Straight Gaussian ridge from the edge to a free surface at y = 200 µm."""
     x, y = np.meshgrid(GRID.x, GRID.y)
-    edge = np.array(TOOL.edge_centre) - TOOL.edge_radius / np.sqrt(2)
+    edge = TOOL.corners[-1] - TOOL.edge_radius / np.sqrt(2)
     across = (x - edge[0]) * sin(angle) + (y - edge[1]) * cos(angle)
     sigma = width / np.sqrt(8 * log(2))
     rate = peak * np.exp(-0.5 * (across / sigma) ** 2)

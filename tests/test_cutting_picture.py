@@ -27,7 +27,7 @@ def lattice(angle=0.0, spacing=CELL / 2, top=100e-6):
 
 
 def frame_of(points, tool=AWAY, **fields):
-    fraction = tool_fraction(GRID, tool.coefficients)
+    fraction = tool_fraction(GRID, tool.surface)
     picture = Picture(GRID, RASTER, tool, fraction, 293.0)
     names = ["temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y"]
     values = {name: np.zeros(points.size) for name in [*names, "material_x", "material_y"]}

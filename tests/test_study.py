@@ -20,9 +20,9 @@ from chipglow.cutting import (
     Numerics,
     OutputWindow,
 )
-from chipglow.io import open_scene
+from chipglow.io import open_scene, read_tool_outline
 from chipglow.io.atomic import KeptErrorFile
-from chipglow.scene import ToolGeometry
+from chipglow.scene import Chamfer, Hone, ToolGeometry
 from chipglow.study import (
     Study,
     StudyError,
@@ -311,6 +311,21 @@ def load(text, folder):
         ("analysis: {instants: 0}", "analysis", "instants is 0, expected 1 or more"),
         ("analysis: {psf_widths: [4]}", "analysis.psf_widths.0", "4 has no unit"),
         ("seed: -1", "seed", "-1 is negative, expected 0 or more"),
+        (
+            "cutting: {tool: {chamfer: {width: 10 um, angle: 20 deg}}}",
+            "cutting.tool",
+            "chamfer width: expected over 17.53 um",
+        ),
+        (
+            "cutting: {tool: {hone: {rake: 40 um, clearance: 20 um}, edge_radius: 5 um}}",
+            "cutting.tool",
+            "edge_radius: is not used beside hone, expected one or the other",
+        ),
+        (
+            "cutting: {tool: {outline: none.csv}}",
+            "cutting.tool",
+            "none.csv: No such file or directory, expected an outline's file",
+        ),
         ("- 1", "", "[1] is no section"),
         ("a: [1,", "line 1", "expected YAML"),
         ("seed: 1\nseed: 2", "line 2", "key 'seed' is there twice"),
@@ -458,11 +473,49 @@ def test_a_scene_is_computed_once_for_the_same_inputs(cache, runs):
         {"numerics": {"cell": "11 um"}},
         {"window": {"interval": "0.3 us"}},
         {"tool": {"edge_radius": "21 um"}},
+        {"tool": {"chamfer": {"width": "100 um", "angle": "20 deg"}}},
+        {"tool": {"hone": {"rake": "40 um", "clearance": "20 um"}}},
     ],
 )
 def test_another_cut_is_another_scene(cache, runs, change):
     assert cut(small_study()) != cut(small_study(**change))
     assert len(runs) == 2
+
+
+OUTLINE = "x_um,y_um\n0,500\n0,20\n20,0\n600,60\n"
+
+
+def test_a_tool_with_a_prepared_edge_is_built_and_written(tmp_path):
+    chamfered = load(
+        "cutting: {tool: {chamfer: {width: 0.1 mm, angle: 20 deg}, edge_radius: 5 um}}", tmp_path
+    )
+    assert chamfered.cutting.simulation().tool == ToolGeometry(
+        edge_radius=5e-6, chamfer=Chamfer(1e-4, radians(20))
+    )
+    honed = load("cutting: {tool: {hone: {rake: 40 um, clearance: 20 um}}}", tmp_path)
+    assert honed.cutting.simulation().tool == ToolGeometry(hone=Hone(40e-6, 20e-6))
+    (tmp_path / "edge.csv").write_text(OUTLINE)
+    measured = load("cutting: {tool: {outline: edge.csv}}", tmp_path)
+    assert measured.cutting.simulation().tool == read_tool_outline(tmp_path / "edge.csv")
+    for study in (chamfered, honed, measured):
+        assert load(study_text(study), tmp_path) == study
+    with pytest.raises(StudyError, match="rake_angle: is not used beside outline"):
+        load("cutting: {tool: {outline: edge.csv, rake_angle: 5 deg}}", tmp_path)
+
+
+def test_a_scene_is_found_by_the_points_of_the_outline_not_by_its_files_name(cache, runs, tmp_path):
+    paths = []
+    for name, text in (
+        ("a.csv", OUTLINE),
+        ("b.csv", OUTLINE),
+        ("b.csv", OUTLINE.replace("20,0", "25,0")),
+    ):
+        (tmp_path / name).write_text(text)
+        paths.append(cut(small_study(tool={"outline": str(tmp_path / name)})))
+    assert paths[0] == paths[1] != paths[2]
+    assert len(runs) == 2
+    assert open_scene(paths[2]).tool == read_tool_outline(tmp_path / "b.csv")
+    assert cut(small_study()) not in paths
 
 
 def test_another_solver_is_another_scene(cache, runs, monkeypatch):

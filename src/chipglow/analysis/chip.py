@@ -29,7 +29,7 @@ class ChipScan:
     Parameters
     ----------
     height : float
-        Where the line stands on the rake face, in m up from the end of the edge's arc; NaN if at
+        Where the line stands on the rake face, in m up from the end of the edge; NaN if at
         no height the chip's free surface is in the view all the time.
     time : ndarray
         Times of the frames that were looked at in s, shape (n,).

@@ -21,14 +21,14 @@ class RakeErrors:
     Parameters
     ----------
     contact_length : float
-        Length of contact of chip and tool in m, up the rake face from the edge's arc.
+        Length of contact of chip and tool in m, up the rake face from the edge.
     line : Line
         Across the rake face at mid-contact; the distance in m is 0 on the face, positive in the
         chip.
     case_1, psf_portion : ndarray
         On the line, with everything and the point spread function's part of it.
     contact : Line
-        Along the rake face over the contact; the distance in m counts from the edge's arc.
+        Along the rake face over the contact; the distance in m counts from the edge.
     contact_case_1, contact_psf_portion : ndarray
         The same along the contact.
     mean_case_1, mean_psf_portion : ndarray
@@ -104,7 +104,7 @@ def contact_length(
     Returns
     -------
     float
-        Length in m from the end of the edge's arc up to the first gap that is longer than two of
+        Length in m from the end of the edge up to the first gap that is longer than two of
         the paper's sensors; 0 if the chip does not touch the rake face there.
     """
     step = raster.spacing / 2

@@ -151,7 +151,7 @@ def _contact_rows(chip: ChipMetrics) -> list[ChipRow]:
             "chip_contact_um",
             "Contact length, mean over time",
             chip.contact,
-            "From the edge's arc up the rake face."
+            "From the edge up the rake face."
             if isfinite(chip.contact)
             else "Unknown: the contact reaches the border of the view.",
             chip.contact_spread,
@@ -202,7 +202,7 @@ def _band_rows(chip: ChipMetrics) -> list[ChipRow]:
 def _scan_text(chip: ChipMetrics) -> str:
     if not isfinite(chip.scan.height):
         return "The view cuts the chip at every height on the rake face."
-    return f"On the normal to the rake face {chip.scan.height * 1e6:.0f} µm up from the edge's arc."
+    return f"On the normal to the rake face {chip.scan.height * 1e6:.0f} µm up from the edge."
 
 
 def _segments_text(chip: ChipMetrics) -> str:

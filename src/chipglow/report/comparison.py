@@ -261,8 +261,8 @@ def _contact_text(result: StudyResult) -> str:
     left, _, _, top = result.raster.extent
     margin = 3 * result.raster.spacing
     if end[1] > top - margin or end[0] < left + margin:
-        return "From the edge's arc up to the border of the view: the chip touches beyond it."
-    return "From the edge's arc up to where the chip leaves the face."
+        return "From the edge up to the border of the view: the chip touches beyond it."
+    return "From the edge up to where the chip leaves the face."
 
 
 def _error(key: str, quantity: str, paper: PaperValue, here: float, explanation: str) -> Row:
