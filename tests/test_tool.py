@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from matplotlib.path import Path as Polygon
 
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow
-from chipglow.io import SceneWriter, open_scene, read_tool_outline
+from chipglow.io import SceneWriter, open_scene, read_tool_outline, write_scene
 from chipglow.scene import (
     FIELD_UNITS,
     Chamfer,
@@ -385,7 +385,10 @@ def test_a_tool_survives_in_a_scenes_file(tool, tmp_path):
         writer.append(scene.frame(0))
     stored = open_scene(tmp_path / "scene.nc")
     assert stored.tool == tool
+    write_scene(stored, tmp_path / "copy.nc", portable=True)
     stored.data.close()
+    with open_scene(tmp_path / "copy.nc").data as copy:
+        assert Scene(copy).tool == tool
 
 
 def test_a_plain_wedge_is_stored_as_before():
