@@ -107,8 +107,8 @@ def test_uneven_filling_is_no_surface():
 
 @pytest.mark.parametrize("gap", [0.0, 1e-6])
 def test_contact_with_the_tool_is_no_free_surface(gap):
-    radius = 20e-6
-    tool = (200e-6 + radius, -1.0, radius, -1.0, 0.0, 0.0, 1.0, *ToolGeometry().coefficients[7:])
+    upright = ToolGeometry(rake_angle=0.0)
+    tool = upright.surface._replace(x=200e-6 + upright.edge_radius, y=-1.0)
     warm = WarmBlock((200e-6, 200e-6), 10e-6, tool=tool)
     warm.block.points["x"] -= gap
     warm.block.points["y"] += 3e-6
@@ -128,7 +128,7 @@ def test_contact_with_the_tool_is_no_free_surface(gap):
 
 def test_faces_of_the_tool():
     geometry = ToolGeometry()
-    warm = WarmBlock((400e-6, 400e-6), 10e-6, tool=geometry.coefficients)
+    warm = WarmBlock((400e-6, 400e-6), 10e-6, tool=geometry.surface)
     warm.block.points["x"] -= 1.0
     warm.block.count = 0
     grid = warm.block.grid
@@ -170,7 +170,7 @@ def test_radiation_into_the_cold_follows_its_closed_solution():
 
 def test_what_is_lost_is_missing():
     geometry = ToolGeometry()
-    warm = WarmBlock((100e-6, 100e-6), 10e-6, tool=geometry.coefficients)
+    warm = WarmBlock((100e-6, 100e-6), 10e-6, tool=geometry.surface)
     warm.block.points["x"] -= 110e-6
     loss = EVERYWHERE._replace(convection=1e5, emissivity=0.8)
     before = warm.heat()

@@ -100,7 +100,7 @@ def test_no_heat_is_lost_at_the_border():
     geometry = ToolGeometry()
     tool = Tool(40, 50, 10e-6)
     tool.grid = tool.grid._replace(left=-100e-6, bottom=-50e-6)
-    tool.fraction = tool_fraction(tool.grid, geometry.coefficients)
+    tool.fraction = tool_fraction(tool.grid, geometry.surface)
     heated = []
 
     def once(temperature, _):

@@ -70,7 +70,7 @@ class RateTable:
         if len(self.rates) != len(self.values) or not self.values:
             raise ValueError("rate table: expected as many values as rates")
         for rate in self.rates:
-            _check_positive("rate table: rate", rate)
+            check_positive("rate table: rate", rate)
         if any(np.diff(self.rates) <= 0):
             raise ValueError("rate table: rates must ascend")
         for value in self.values:

@@ -228,9 +228,7 @@ def _work_block(  # type: ignore[no-untyped-def]
         on_grid &= _gather_cells(points, starts, cell, end_cell, velocity, grid, step, sums[block])
         for begin in range(starts[cell], starts[end_cell], LANES):
             end = min(begin + LANES, starts[end_cell])
-            update_stresses(
-                points, begin, end, step, law, damage, capacity, heat_shares, buffer
-            )
+            update_stresses(points, begin, end, step, law, damage, capacity, heat_shares, buffer)
             for k in range(begin, end):
                 p = points[k]
                 fx, fy, limit = _contact(p, buffer[STRESS + k - begin], tool, step, law, damage)
