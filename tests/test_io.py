@@ -31,6 +31,9 @@ from chipglow.scene.scene import raster_coordinates
 RASTER = Raster(left=-420e-6, top=460e-6, spacing=0.6667e-6, rows=18, columns=27)
 # Half of what the file keeps, and a rounding in float32 for what is unpacked by a product.
 RELATIVE = {
+    # A unit in the last place of a 32-bit float.
+    "material_x": 2.0**-23,
+    "material_y": 2.0**-23,
     "plastic_strain": 2.0**-14,
     "plastic_strain_rate": 2.0**-12,
     "velocity_x": 2.0**-11,
