@@ -50,11 +50,20 @@ def runs(monkeypatch, chip_scene):
     calls = []
 
     def cut_chip(
-        simulation, window, raster, on_frame, on_progress=None, resume=None, on_checkpoint=None
+        simulation,
+        window,
+        raster,
+        on_frame,
+        on_progress=None,
+        resume=None,
+        on_checkpoint=None,
+        preview=None,
     ):
         calls.append(simulation)
         for frame in chip_scene.frames():
             on_frame(frame)
+            if preview:
+                preview.on_frame(frame)
         if on_progress:
             on_progress(1.0)
         return AnalyticChip().cut_history()

@@ -423,7 +423,14 @@ def runs(monkeypatch):
     calls = []
 
     def cut_chip(
-        simulation, window, raster, on_frame, on_progress=None, resume=None, on_checkpoint=None
+        simulation,
+        window,
+        raster,
+        on_frame,
+        on_progress=None,
+        resume=None,
+        on_checkpoint=None,
+        preview=None,
     ):
         calls.append(simulation)
         for frame in chip.scene().frames():

@@ -106,27 +106,25 @@ def run(study: StudyFile, out: ResultFolder, resume: Resume = False) -> None:
 def cut(
     study: StudyFile,
     out: Annotated[Path, typer.Option(metavar="FILE", help="The scene to write, NetCDF.")],
+    preview: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="A movie to write, .mp4 or .gif: temperature, plastic strain and strain rate of "
+            "the whole cut; with --resume, of what is still to come; of a cut that was computed "
+            "before, the part that was recorded.",
+        ),
+    ] = None,
     resume: Resume = False,
 ) -> None:
     """Do only the cutting simulation of a study."""
-    from shutil import copyfile
-
-    from chipglow.analysis import inertia
-    from chipglow.cli.inertia import say_inertia
-    from chipglow.cli.progress import progress_bars, say_where_it_starts
-    from chipglow.io import atomic_path, open_scene
-    from chipglow.study import cut as cut_scene
+    from chipglow.cli.cutting import cut_study
     from chipglow.study import load_study
 
-    settings = load_study(study)
-    with atomic_path(out) as temporary:
-        say_where_it_starts(settings, resume)
-        with progress_bars() as progress:
-            copyfile(cut_scene(settings, progress, resume), temporary)
-    scene = open_scene(out)
-    say_inertia(inertia(scene))
-    scene.data.close()
+    cut_study(load_study(study), out, preview, resume)
     print(out)
+    if preview is not None:
+        print(preview)
 
 
 @app.command()

@@ -29,6 +29,7 @@ from chipglow.cutting.material import (
     ToolMaterial,
     WorkpieceMaterial,
 )
+from chipglow.cutting.preview import Preview
 from chipglow.cutting.simulation import (
     SOLVER_VERSION,
     CuttingSimulation,
@@ -54,6 +55,7 @@ __all__ = [
     "MaterialFile",
     "Numerics",
     "OutputWindow",
+    "Preview",
     "RateTable",
     "SolverError",
     "Surroundings",

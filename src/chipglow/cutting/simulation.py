@@ -42,6 +42,7 @@ from chipglow.cutting.momentum import (
 from chipglow.cutting.picture import Picture
 from chipglow.cutting.plastic_heat import heat_shares
 from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
+from chipglow.cutting.preview import Preview
 from chipglow.cutting.tool_border import CELLS, border_nodes, conduct_beyond
 from chipglow.cutting.watch import Trouble, find_lost, find_off_grid, find_trouble
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
@@ -124,6 +125,7 @@ class CuttingSimulation:
         on_progress: Callable[[float], None] | None = None,
         resume: Checkpoint | None = None,
         on_checkpoint: Callable[[Checkpoint], None] | None = None,
+        preview: Preview | None = None,
     ) -> ForceHistory:
         """Simulate the cut and hand over its frames.
 
@@ -144,6 +146,8 @@ class CuttingSimulation:
         on_checkpoint : callable, optional
             Called with the state after every interval, when its frame was handed over. The arrays
             are the simulation's own: write or copy them before you return.
+        preview : Preview, optional
+            Who looks at the whole cut while it is computed, from where it starts or is resumed.
 
         Returns
         -------
@@ -153,21 +157,15 @@ class CuttingSimulation:
         Raises
         ------
         ValueError
-            If the window or the raster reaches beyond what is simulated, or the checkpoint is of
+            If the window or a raster reaches beyond what is simulated, or the checkpoint is of
             another simulation.
         SolverError
             If the simulation goes wrong.
         """
         self._check_window(window)
         state = _State(self, window.interval)
-        self._check_raster(raster, state.grid)
-        picture = Picture(
-            state.grid,
-            raster,
-            self.tool,
-            state.tool_fraction,
-            self.conditions.initial_temperature,
-        )
+        picture = self._picture(raster, state)
+        coarse = self._picture(preview.raster, state) if preview is not None else None
         first, last = self.frame_range(window)
         records = np.empty((last, 2 + ENERGIES))
         done = restore(state, resume, records) if resume is not None else 0
@@ -175,6 +173,8 @@ class CuttingSimulation:
             records[record - 1] = state.advance()
             if record >= first:
                 on_frame(state.frame(picture))
+            if preview is not None and coarse is not None and preview.shows(record, last):
+                preview.on_frame(state.frame(coarse))
             state.mark()
             if on_checkpoint is not None:
                 on_checkpoint(capture(state, records[:record], record / last))
@@ -211,6 +211,16 @@ class CuttingSimulation:
                 f"window: no frame between {window.start * 1e3:g} mm and {window.end * 1e3:g} mm "
                 f"with an interval of {window.interval * 1e6:g} us"
             )
+
+    def _picture(self, raster: Raster, state: "_State") -> Picture:
+        self._check_raster(raster, state.grid)
+        return Picture(
+            state.grid,
+            raster,
+            self.tool,
+            state.tool_fraction,
+            self.conditions.initial_temperature,
+        )
 
     def _check_raster(self, raster: Raster, grid: Grid) -> None:
         left, right, bottom, top = raster.extent

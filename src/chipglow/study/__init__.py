@@ -2,6 +2,7 @@
 
 from chipglow.study.cache import CachedScene, cache_folder, cached_scenes, clear_cache
 from chipglow.study.files import StudyError, load_study
+from chipglow.study.preview import preview_raster
 from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, kept_progress, run
 from chipglow.study.schema import Study
 from chipglow.study.template import study_text
@@ -19,6 +20,7 @@ __all__ = [
     "is_cut",
     "kept_progress",
     "load_study",
+    "preview_raster",
     "run",
     "study_text",
 ]

@@ -16,14 +16,16 @@ from chipglow.cutting import (
     WorkpieceMaterial,
 )
 from chipglow.io import SceneWriter, open_scene, unfinished_scenes
-from chipglow.scene import SceneError, ToolOutline
+from chipglow.scene import Frame, SceneError, ToolOutline
 from chipglow.study.cache import scene_path
+from chipglow.study.preview import preview_of, show_scene
 from chipglow.study.schema import Study
 
 Progress: TypeAlias = Callable[[str, float], None]
 """Told which step is under way and how much of it is done, 0 to 1."""
 
 CUTTING_STEP: Final = "cutting simulation"
+PREVIEW_STEP: Final = "preview"
 SCENE_FORMAT: Final = 2
 """Changes whenever the same frames are written as another file."""
 
@@ -34,7 +36,12 @@ _CHEAP: Final = 100.0
 """Checkpoints are this many times as far apart as one takes, or more."""
 
 
-def cut(study: Study, progress: Progress | None = None, resume: bool = False) -> Path:
+def cut(
+    study: Study,
+    progress: Progress | None = None,
+    resume: bool = False,
+    on_preview: Callable[[Frame], None] | None = None,
+) -> Path:
     """File of the study's scene: computed now, or found in the cache.
 
     Parameters
@@ -46,6 +53,9 @@ def cut(study: Study, progress: Progress | None = None, resume: bool = False) ->
     resume : bool
         Go on from the last checkpoint of a run of the same cut that was interrupted or killed, if
         there is one. The scene is the same to the last bit.
+    on_preview : callable, optional
+        Called with coarse frames (`preview_raster`) of the whole cut while it is computed, from
+        where it starts or is resumed. If the scene is found in the cache: with frames of that.
 
     Returns
     -------
@@ -60,7 +70,9 @@ def cut(study: Study, progress: Progress | None = None, resume: bool = False) ->
     path = scene_path(_inputs(study))
     if not _is_whole(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        _compute(study, path, progress, resume)
+        _compute(study, path, progress, resume, on_preview)
+    elif on_preview:
+        _show(study, path, progress, on_preview)
     return path
 
 
@@ -125,7 +137,23 @@ def _is_whole(path: Path) -> bool:
     return True
 
 
-def _compute(study: Study, path: Path, progress: Progress | None, resume: bool) -> None:
+def _show(
+    study: Study, path: Path, progress: Progress | None, on_preview: Callable[[Frame], None]
+) -> None:
+    report = progress or (lambda step, fraction: None)
+    scene = open_scene(path)
+    preview = preview_of(study, on_preview)
+    show_scene(scene, preview, lambda fraction: report(PREVIEW_STEP, fraction))
+    scene.data.close()
+
+
+def _compute(
+    study: Study,
+    path: Path,
+    progress: Progress | None,
+    resume: bool,
+    on_preview: Callable[[Frame], None] | None,
+) -> None:
     if progress:
         progress(CUTTING_STEP, 0.0)
     cutting = study.cutting
@@ -151,6 +179,7 @@ def _compute(study: Study, path: Path, progress: Progress | None, resume: bool) 
                 (lambda fraction: progress(CUTTING_STEP, fraction)) if progress else None,
                 state,
                 keeper.keep,
+                preview_of(study, on_preview) if on_preview else None,
             )
             writer.forces(history.time, history.cutting, history.thrust, vars(history.energy))
         except SolverError as error:

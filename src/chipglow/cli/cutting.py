@@ -1,0 +1,69 @@
+"""The cut alone, with a movie of it if one is wanted."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from shutil import copyfile
+
+from rich.console import Console
+
+from chipglow.analysis import inertia
+from chipglow.cli.inertia import say_inertia
+from chipglow.cli.progress import progress_bars, say_where_it_starts
+from chipglow.io import atomic_path, open_scene
+from chipglow.scene import Frame
+from chipglow.study import Study, cut, is_cut, kept_progress, preview_raster
+
+
+def cut_study(study: Study, out: Path, preview: Path | None, resume: bool) -> None:
+    """Cut, or find what was cut before, and write the scene.
+
+    Parameters
+    ----------
+    study : Study
+        What to cut.
+    out : Path
+        The scene's file.
+    preview : Path, optional
+        File of a movie: of the whole cut, of what is still to come of a cut that goes on, or of
+        a scene that was found.
+    resume : bool
+        Whether to go on with a cut that an earlier run left unfinished.
+    """
+    with atomic_path(out) as temporary, _movie(study, preview) as on_preview:
+        say_where_it_starts(study, resume)
+        if on_preview:
+            _say_what_it_shows(study, resume)
+        with progress_bars() as progress:
+            copyfile(cut(study, progress, resume, on_preview), temporary)
+    scene = open_scene(out)
+    say_inertia(inertia(scene))
+    scene.data.close()
+
+
+@contextmanager
+def _movie(study: Study, path: Path | None) -> Iterator[Callable[[Frame], None] | None]:
+    if path is None:
+        yield None
+        return
+    from chipglow.io import check_movie_path
+
+    try:
+        check_movie_path(path)
+    except ValueError as error:
+        raise ValueError(f"--preview: {error}") from None
+    from chipglow.report.movie import cut_movie
+
+    with cut_movie(path, preview_raster(study), study.cutting.simulation()) as on_preview:
+        yield on_preview
+
+
+def _say_what_it_shows(study: Study, resume: bool) -> None:
+    console, window = Console(stderr=True), study.cutting.window
+    if is_cut(study):
+        console.print(
+            f"The preview shows that scene: {window.start * 1e3:g} mm to {window.end * 1e3:g} mm "
+            "of the cut."
+        )
+    elif resume and kept_progress(study):
+        console.print("The preview shows what is still to come.")

@@ -1,0 +1,173 @@
+"""Movies, written picture by picture: GIF through Pillow, MP4 through PyAV."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from struct import pack
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.io.atomic import atomic_path
+
+PALETTE_SIZE: Final = 255
+"""Most colours of a GIF; one more stands for what did not change."""
+
+_RATE: Final = 20
+_SAME: Final = 255
+
+
+def check_movie_path(path: str | os.PathLike[str]) -> None:
+    """Find out whether a movie of this name can be written, before anything is computed.
+
+    Raises
+    ------
+    ValueError
+        If the name does not end in .mp4 or .gif, or PyAV is missing for .mp4.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".mp4", ".gif"):
+        raise ValueError(f"{path}: expected the name of a movie, ending in .mp4 or .gif")
+    if suffix == ".mp4" and find_spec("av") is None:
+        raise ValueError(
+            f"{path}: MP4 needs PyAV, expected pip install 'chipglow[movie]' "
+            "or a name that ends in .gif"
+        )
+
+
+@contextmanager
+def movie_writer(
+    path: str | os.PathLike[str], shape: tuple[int, int], palette: NDArray[np.uint8]
+) -> Iterator[Callable[[NDArray[np.uint8]], None]]:
+    """Write a movie of 20 pictures a second; no more than the last picture is kept in memory.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to write, .mp4 (H.264) or .gif. It has a temporary name until the end; if the
+        block raises, nothing is left of it.
+    shape : tuple
+        Rows and columns of the pictures, both even.
+    palette : ndarray
+        Colours of a GIF, shape (up to `PALETTE_SIZE`, 3).
+
+    Yields
+    ------
+    callable
+        Takes the next picture: red, green and blue, shape (rows, columns, 3).
+
+    Raises
+    ------
+    ValueError
+        As `check_movie_path`, or if there was no picture.
+    OSError
+        If the file cannot be written; the message names it.
+    """
+    path = Path(path)
+    check_movie_path(path)
+    count = 0
+    with atomic_path(path) as part:
+        with _naming(path):
+            gif = path.suffix.lower() == ".gif"
+            movie = _Gif(part, shape, palette) if gif else _Mp4(part, shape)
+
+        def append(picture: NDArray[np.uint8]) -> None:
+            nonlocal count
+            with _naming(path):
+                movie.append(picture)
+            count += 1
+
+        try:
+            yield append
+            if count == 0:
+                raise ValueError(f"{path}: there was no picture to show, expected 1 or more")
+            with _naming(path):
+                movie.finish()
+        finally:
+            with _naming(path):
+                movie.close()
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise OSError(f"{path}: could not be written: {error.strerror}") from error
+
+
+class _Mp4:
+    def __init__(self, part: Path, shape: tuple[int, int]) -> None:
+        import av
+
+        self._frame = av.VideoFrame.from_ndarray
+        self._container: Any = av.open(str(part), "w", format="mp4")
+        self._stream = self._container.add_stream("h264", rate=_RATE)
+        self._stream.options = {"preset": "veryfast"}
+        self._stream.height, self._stream.width = shape
+        self._stream.pix_fmt = "yuv420p"  # the one that every player knows
+
+    def append(self, picture: NDArray[np.uint8]) -> None:
+        frame = self._frame(picture, format="rgb24")
+        self._container.mux(self._stream.encode(frame))
+
+    def finish(self) -> None:
+        self._container.mux(self._stream.encode(None))
+        self._container.close()
+
+    def close(self) -> None:
+        self._container.close()
+
+
+class _Gif:
+    """Pillow's own writer of animations keeps all pictures; this one writes each at once.
+
+    Only the rectangle that changed is written, with what stayed in it transparent.
+    """
+
+    def __init__(self, part: Path, shape: tuple[int, int], palette: NDArray[np.uint8]) -> None:
+        from PIL import Image
+
+        self._last = len(palette) - 1
+        colours = np.vstack([palette, np.repeat(palette[-1:], _SAME - self._last, axis=0)])
+        self._palette = Image.new("P", (1, 1))
+        self._palette.putpalette(colours.tobytes())
+        self._before = np.full(shape, _SAME, np.uint8)
+        self._file = part.open("wb")
+        rows, columns = shape
+        self._file.write(b"GIF89a" + pack("<HHBBB", columns, rows, 0xF7, 0, 0) + colours.tobytes())
+        self._file.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00")  # again and again
+
+    def append(self, picture: NDArray[np.uint8]) -> None:
+        from PIL import GifImagePlugin, Image
+
+        quantised = Image.fromarray(picture).quantize(
+            palette=self._palette, dither=Image.Dither.NONE
+        )
+        now = np.minimum(
+            np.asarray(quantised), self._last
+        )  # what follows in the palette are copies
+        changed = now != self._before
+        rows, columns = _extent(changed.any(axis=1)), _extent(changed.any(axis=0))
+        part = np.where(changed, now, _SAME).astype(np.uint8)[rows, columns]
+        how: dict[str, Any] = {"duration": 1000 // _RATE, "transparency": _SAME, "disposal": 1}
+        place = (columns.start, rows.start)
+        for block in GifImagePlugin.getdata(Image.fromarray(part), place, **how):
+            self._file.write(block)
+        self._before = now
+
+    def finish(self) -> None:
+        self._file.write(b";")
+        self._file.flush()
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def _extent(changed: NDArray[np.bool_]) -> slice:
+    """From the first to the last change; one sample if there is none."""
+    where = np.flatnonzero(changed)
+    return slice(int(where[0]), int(where[-1]) + 1) if where.size else slice(0, 1)

@@ -1,0 +1,206 @@
+"""The movie of a cut: temperature, plastic strain and strain rate, frame by frame."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from math import ceil, floor, log10
+from typing import Any, Final
+
+import matplotlib
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from numpy.typing import NDArray
+
+from chipglow.cutting import CuttingSimulation
+from chipglow.io.movie_file import PALETTE_SIZE, movie_writer
+from chipglow.report import drawing
+from chipglow.scene import Frame, Material, Raster
+
+RATE_COLOURS: Final = "viridis"
+
+_DPI: Final = 100
+_WIDTH: Final = 1320
+_PANEL: Final = 300
+_AROUND: Final = 130
+_HEIGHTS: Final = (240, 1080)
+_TOOL: Final = "#9ca3af"
+_FAR: Final = 3e-3
+
+_HOT: Final = 0.6
+_MELTING: Final = 1773.15
+_STRAIN: Final = 5.0
+_DECADES: Final = 3
+
+
+@dataclass(frozen=True)
+class MovieScales:
+    """Limits of the colours of a movie: known before the cut, the same from end to end.
+
+    Parameters
+    ----------
+    temperature : tuple
+        In K.
+    strain : tuple
+        Plastic strain.
+    rate : tuple
+        Plastic strain rate in 1/s, whole decades.
+    """
+
+    temperature: tuple[float, float]
+    strain: tuple[float, float]
+    rate: tuple[float, float]
+
+    @classmethod
+    def of(cls, simulation: CuttingSimulation) -> "MovieScales":
+        """Scales of a cut.
+
+        Temperature: from the initial one to where the material is soft, 0.6 of the way to melting
+        (that of steel, if the law of the flow stress knows none), to a whole 50 °C. Strain rate:
+        three decades from a tenth of speed over feed, the rate of a shear as thick as the feed.
+        """
+        conditions = simulation.conditions
+        start = conditions.initial_temperature
+        melting = getattr(simulation.workpiece.flow_stress, "melting_temperature", _MELTING)
+        hottest = start + _HOT * max(melting - start, 0.0)
+        top = 50.0 * ceil((hottest - drawing.KELVIN) / 50.0 + 1e-9) + drawing.KELVIN
+        decade = floor(log10(0.1 * conditions.speed / conditions.feed) + 1e-9)
+        return cls(
+            temperature=(start, top),
+            strain=(0.0, _STRAIN),
+            rate=(10.0**decade, 10.0 ** (decade + _DECADES)),
+        )
+
+
+class CutPicture:
+    """One figure whose images are renewed from frame to frame; all else is drawn once.
+
+    Parameters
+    ----------
+    raster : Raster
+        Samples of the frames.
+    simulation : CuttingSimulation
+        Of which the frames are.
+    """
+
+    def __init__(self, raster: Raster, simulation: CuttingSimulation) -> None:
+        self._raster, self._tool = raster, simulation.tool
+        self._speed = simulation.conditions.speed
+        with drawing.style():
+            self._build(MovieScales.of(simulation))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the pictures, both even."""
+        columns, rows = self._canvas.get_width_height()
+        return rows, columns
+
+    def draw(self, frame: Frame) -> NDArray[np.uint8]:
+        """Picture of a frame: red, green and blue, shape (rows, columns, 3)."""
+        solid = frame.material == Material.WORKPIECE
+        there = frame.material != Material.VOID
+        rate = np.maximum(frame.plastic_strain_rate, self._slowest)
+        for image, values, shown in zip(
+            self._images,
+            (frame.temperature - np.float32(drawing.KELVIN), frame.plastic_strain, rate),
+            (there, solid, solid),
+            strict=True,
+        ):
+            image.set_data(np.ma.masked_where(~shown, values))
+        cut = self._speed * frame.time * 1e3
+        self._title.set_text(f"{frame.time * 1e6:.1f} µs    length of cut {cut:.3f} mm")
+        self._canvas.restore_region(self._background)
+        for artist in self._moving:
+            self._figure.draw_artist(artist)
+        return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
+
+    def _build(self, scales: MovieScales) -> None:
+        high = _AROUND + _PANEL * self._raster.rows / self._raster.columns
+        height = 2 * round(min(max(high, _HEIGHTS[0]), _HEIGHTS[1]) / 2)
+        self._figure = Figure(figsize=(_WIDTH / _DPI, height / _DPI), dpi=_DPI, layout="compressed")
+        self._canvas = _canvas(self._figure)
+        self._slowest = scales.rate[0]
+        low, top = (limit - drawing.KELVIN for limit in scales.temperature)
+        self._figure.get_layout_engine().set(w_pad=0.09)  # type: ignore[union-attr, call-arg]
+        left, middle, right = self._figure.subplots(1, 3, sharex=True, sharey=True)
+        heat, strain, rate = Normalize(low, top), Normalize(*scales.strain), LogNorm(*scales.rate)
+        self._images = (
+            self._panel(left, "temperature", "temperature / °C", drawing.HEAT, heat),
+            self._panel(middle, "plastic strain", "plastic strain", drawing.PLAIN, strain),
+            self._panel(right, "plastic strain rate", "strain rate / (1/s)", RATE_COLOURS, rate),
+        )
+        for axes in (middle, right):
+            axes.fill(*(self._tool.outline(_FAR) * 1e6).T, color=_TOOL, zorder=1.5)
+        title = self._figure.suptitle(" ", fontsize=11)
+        self._title = title
+        self._moving: list[Artist] = [title]
+        for axes in (left, middle, right):
+            self._moving += [*axes.images, *axes.patches, *axes.lines]
+        for artist in self._moving:
+            artist.set_animated(True)
+        self._canvas.draw()
+        self._background = self._canvas.copy_from_bbox(self._figure.bbox)
+
+    def _panel(
+        self, axes: Axes, title: str, label: str, colours: str, scale: Normalize
+    ) -> AxesImage:
+        empty = np.full(self._raster.shape, np.nan, np.float32)
+        image = drawing.show_image(axes, empty, self._raster, self._tool, colours, (0.0, 1.0))
+        image.set_norm(scale)
+        extend = "both" if isinstance(scale, LogNorm) else "max"
+        self._figure.colorbar(image, ax=axes, label=label, extend=extend, aspect=25)
+        axes.set_title(title)
+        axes.label_outer()
+        return image
+
+
+def _canvas(figure: Figure) -> Any:
+    """Canvas of a figure; matplotlib does not say its types."""
+    return FigureCanvasAgg(figure)
+
+
+@contextmanager
+def cut_movie(
+    path: str | os.PathLike[str], raster: Raster, simulation: CuttingSimulation
+) -> Iterator[Callable[[Frame], None]]:
+    """Write a movie of a cut, frame by frame as they come.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to write, .mp4 or .gif. It appears when the block ends, not if that raises.
+    raster : Raster
+        Samples of the frames.
+    simulation : CuttingSimulation
+        Of which the frames are.
+
+    Yields
+    ------
+    callable
+        Takes the next frame.
+
+    Raises
+    ------
+    ValueError
+        If the name does not end in .mp4 or .gif, PyAV is missing for .mp4, or there is no frame.
+    OSError
+        If the file cannot be written.
+    """
+    picture = CutPicture(raster, simulation)
+    with movie_writer(path, picture.shape, _palette()) as append:
+        yield lambda frame: append(picture.draw(frame))
+
+
+def _palette() -> NDArray[np.uint8]:
+    """The colours of the three scales and greys, as many as a GIF may have."""
+    greys = 30
+    each = (PALETTE_SIZE - greys) // 3
+    maps: list[Any] = [drawing.HEAT, drawing.PLAIN, RATE_COLOURS]
+    colours = [matplotlib.colormaps[name](np.linspace(0.0, 1.0, each))[:, :3] for name in maps]
+    plain = np.repeat(np.linspace(0.0, 1.0, greys)[:, None], 3, axis=1)
+    return np.asarray(np.round(np.concatenate([*colours, plain]) * 255), dtype=np.uint8)

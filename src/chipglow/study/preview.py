@@ -1,0 +1,59 @@
+"""What a preview shows of a study's cut: coarse frames of the scene's view."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import ceil
+from typing import Final
+
+from chipglow.cutting import Preview
+from chipglow.scene import Frame, Raster, Scene
+from chipglow.study.schema import Study
+
+PREVIEW_FRAMES: Final = 120
+"""About how many frames a preview has."""
+
+_MOST_SAMPLES: Final = 360
+
+
+def preview_raster(study: Study) -> Raster:
+    """Samples of a preview: those of the study's scene, or several taken together."""
+    raster = study.cutting.field_of_view.build()
+    step = _step(raster)
+    return replace(
+        raster,
+        spacing=raster.spacing * step,
+        rows=raster.rows // step,
+        columns=raster.columns // step,
+    )
+
+
+def preview_of(study: Study, on_frame: Callable[[Frame], None]) -> Preview:
+    """A preview of a study's cut for who takes its frames."""
+    return Preview(preview_raster(study), PREVIEW_FRAMES, on_frame)
+
+
+def show_scene(scene: Scene, preview: Preview, on_progress: Callable[[float], None]) -> None:
+    """Hand the frames of a scene to a preview of its study, as if it were being cut."""
+    step, (rows, columns) = _step(scene.raster), preview.raster.shape
+    last = len(scene.times)
+    for number in range(1, last + 1):
+        if preview.shows(number, last):
+            frame = scene.frame(number - 1)
+            preview.on_frame(_thinned(frame, step, rows, columns))
+            on_progress(number / last)
+
+
+def _step(raster: Raster) -> int:
+    """How many samples of a scene are one of its preview, in either direction."""
+    wanted = ceil(max(raster.shape) / _MOST_SAMPLES)
+    return min(wanted, *raster.shape)
+
+
+def _thinned(frame: Frame, step: int, rows: int, columns: int) -> Frame:
+    middles = slice(step // 2, None, step)
+    fields = {
+        name: values[middles, middles][:rows, :columns]
+        for name, values in vars(frame).items()
+        if name != "time" and values is not None
+    }
+    return Frame(time=frame.time, **fields)

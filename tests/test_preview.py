@@ -1,0 +1,381 @@
+"""A cut that is looked at while it is computed, and the movie of it."""
+
+import resource
+from copy import deepcopy
+from dataclasses import replace
+from math import radians
+
+import numpy as np
+import pytest
+from matplotlib import colormaps
+from PIL import Image
+from typer.testing import CliRunner
+
+from chipglow.cli import app
+from chipglow.cutting import (
+    CuttingConditions,
+    CuttingSimulation,
+    Numerics,
+    OutputWindow,
+    Preview,
+    workpiece,
+)
+from chipglow.io import check_movie_path, movie_writer, open_scene
+from chipglow.report.drawing import HEAT, VOID
+from chipglow.report.movie import CutPicture, MovieScales, cut_movie
+from chipglow.scene import Frame, Material, Raster, ToolGeometry
+from chipglow.study import Study, cut, load_study, preview_raster
+
+SIMULATION = CuttingSimulation(
+    CuttingConditions(length_of_cut=0.05e-3),
+    numerics=Numerics(cell=25e-6, upstream=0.3e-3, downstream=0.3e-3, depth=0.2e-3, height=0.5e-3),
+)
+WINDOW = OutputWindow(start=0.03e-3, end=0.05e-3, interval=0.5e-6)
+RASTER = Raster(left=-100e-6, top=150e-6, spacing=5e-6, rows=26, columns=24)
+COARSE = replace(RASTER, spacing=10e-6, rows=13, columns=12)
+STUDY = """
+cutting:
+  length_of_cut: 0.05 mm
+  numerics: {cell: 30 um}
+  window: {start: 0.03 mm, end: 0.05 mm, interval: 1 us}
+  field_of_view: {left: -100 um, top: 150 um, spacing: 5 um, rows: 26, columns: 24}
+camera: {integration_time: 2 us}
+"""
+
+
+def simulate(preview=None, resume=None, on_checkpoint=None, window=WINDOW, raster=RASTER):
+    frames = []
+    history = SIMULATION.run(
+        window, raster, frames.append, None, resume, on_checkpoint, preview=preview
+    )
+    return frames, history
+
+
+def assert_same_frames(frames, expected):
+    for frame, other in zip(frames, expected, strict=True):
+        for name, values in vars(other).items():
+            np.testing.assert_array_equal(getattr(frame, name), values, strict=True)
+
+
+@pytest.fixture(scope="module")
+def looked_at():
+    """A run with a preview of about seven frames, and what the preview saw."""
+    seen = []
+    checkpoints = []
+    frames, history = simulate(
+        Preview(COARSE, 7, seen.append), on_checkpoint=lambda c: checkpoints.append(deepcopy(c))
+    )
+    return frames, history, seen, checkpoints
+
+
+def test_a_preview_changes_no_bit_of_the_cut(looked_at):
+    frames, history, _, _ = looked_at
+    plain_frames, plain = simulate()
+    assert_same_frames(frames, plain_frames)
+    np.testing.assert_array_equal(history.cutting, plain.cutting)
+    np.testing.assert_array_equal(history.thrust, plain.thrust)
+
+
+def test_a_preview_shows_the_whole_cut_evenly_and_as_it_is(looked_at):
+    seen = looked_at[2]
+    times = np.array([frame.time for frame in seen])
+    assert len(seen) == 8  # 24 intervals, every third
+    np.testing.assert_allclose(times, np.arange(1.5e-6, 12.1e-6, 1.5e-6))
+    assert times[0] < WINDOW.start / SIMULATION.conditions.speed
+    whole, _ = simulate(window=replace(WINDOW, start=0.0), raster=COARSE)
+    assert_same_frames(seen, whole[2::3])
+
+
+def test_a_preview_of_a_resumed_cut_shows_what_is_still_to_come(looked_at):
+    _, _, seen, checkpoints = looked_at
+    rest = []
+    simulate(Preview(COARSE, 7, rest.append), resume=checkpoints[12])
+    assert_same_frames(rest, [frame for frame in seen if frame.time > checkpoints[12].time])
+    assert 0 < len(rest) < len(seen)
+
+
+@pytest.mark.parametrize(("frames", "last"), [(7, 24), (1, 50), (100, 3), (120, 2349)])
+def test_a_preview_ends_with_the_cut_and_has_about_as_many_frames_as_asked(frames, last):
+    preview = Preview(COARSE, frames, print)
+    shown = [number for number in range(1, last + 1) if preview.shows(number, last)]
+    assert shown[-1] == last
+    assert min(frames, last) <= len(shown) <= 2 * frames
+    assert len(set(np.diff(shown))) <= 1
+
+
+def test_a_preview_that_cannot_be_is_refused():
+    with pytest.raises(ValueError, match="preview frames: expected 1 or more, got 0"):
+        Preview(COARSE, 0, print)
+    far = Preview(replace(COARSE, left=-1e-3), 7, print)
+    with pytest.raises(ValueError, match="reaches beyond the simulated region"):
+        simulate(far)
+
+
+def test_a_preview_has_samples_where_the_scene_has_but_fewer():
+    view = Study().cutting.field_of_view.build()
+    coarse = preview_raster(Study())
+    assert coarse.extent == pytest.approx(view.extent)
+    assert coarse.shape == (270, 300)
+    flat = Study(cutting={"field_of_view": {"rows": 21, "columns": 700}})
+    assert preview_raster(flat).shape == (10, 350)
+
+
+def frame_of(temperature=800.0, strain=1.0, rate=1e4, time=100e-6, material=Material.WORKPIECE):
+    shape = RASTER.shape
+    values = [np.full(shape, value, np.float32) for value in (temperature, strain, rate, 0, 0)]
+    return Frame(time, *values, material=np.full(shape, material, np.uint8))
+
+
+def panel_colour(picture, drawn, panel):
+    """Colour in the middle of a panel's lower left quarter, where no line is."""
+    image = picture._images[panel]
+    box = image.axes.get_window_extent()
+    x, y = box.x0 + box.width / 4, box.y0 + box.height / 4
+    return drawn[drawn.shape[0] - 1 - round(y), round(x)]
+
+
+def colour(name, share):
+    return np.round(np.array(colormaps[name](share))[:3] * 255)
+
+
+@pytest.fixture(scope="module")
+def picture():
+    return CutPicture(RASTER, SIMULATION)
+
+
+def test_a_picture_shows_the_fields_in_the_colours_of_its_scales(picture):
+    drawn = picture.draw(frame_of())
+    scales = MovieScales.of(SIMULATION)
+    (low, high), (_, most) = scales.temperature, scales.strain
+    shares = ((800 - low) / (high - low), 1 / most, 1 / 3)
+    for panel, (name, share) in enumerate(zip((HEAT, "cividis", "viridis"), shares, strict=True)):
+        # One step of 256 of the colour map is up to 4 of 255.
+        np.testing.assert_allclose(panel_colour(picture, drawn, panel), colour(name, share), atol=4)
+
+
+def test_a_picture_shows_nothing_where_nothing_is_and_the_end_of_a_scale_beyond_it(picture):
+    void = [int(VOID[k : k + 2], 16) for k in (1, 3, 5)]
+    drawn = picture.draw(frame_of(material=Material.VOID))
+    assert all((panel_colour(picture, drawn, panel) == void).all() for panel in range(3))
+    drawn = picture.draw(frame_of(temperature=2000.0, strain=50.0, rate=0.0))
+    for panel, name, share in ((0, HEAT, 1.0), (1, "cividis", 1.0), (2, "viridis", 0.0)):
+        np.testing.assert_allclose(panel_colour(picture, drawn, panel), colour(name, share), atol=1)
+
+
+def test_a_picture_keeps_nothing_of_the_one_before(picture):
+    first = picture.draw(frame_of())
+    other = picture.draw(frame_of(temperature=300.0, strain=4.0, time=12.3e-6))
+    top = slice(0, 20)
+    assert (first[top] != other[top]).any()  # time and length of cut
+    np.testing.assert_array_equal(picture.draw(frame_of()), first)
+    assert first.shape == (*picture.shape, 3)
+
+
+def test_a_picture_says_time_and_length_of_cut(picture):
+    picture.draw(frame_of(time=100e-6))
+    # 100 us at 250 m/min
+    assert picture._title.get_text() == "100.0 µs    length of cut 0.417 mm"
+
+
+def test_scales_follow_from_the_material_and_the_speed():
+    scales = MovieScales.of(SIMULATION)
+    # 0.6 of the way from 20 °C to 1460 °C is 884 °C; 0.1 x 4.17 m/s / 0.3 mm is 1389 1/s
+    assert scales.temperature == pytest.approx((293.15, 900 + 273.15))
+    assert scales.rate == pytest.approx((1e3, 1e6))
+    aluminium = MovieScales.of(replace(SIMULATION, workpiece=workpiece("al-7075-t6")))
+    assert aluminium.temperature[1] < scales.temperature[1] - 300
+    slow = MovieScales.of(replace(SIMULATION, conditions=CuttingConditions(speed=0.1)))
+    assert slow.rate == pytest.approx((10.0, 1e4))
+    hot = MovieScales.of(
+        replace(SIMULATION, conditions=CuttingConditions(initial_temperature=1500.0))
+    )
+    assert hot.temperature[0] < hot.temperature[1]
+
+
+def test_the_tool_is_seen_in_every_panel():
+    tool = replace(SIMULATION, tool=ToolGeometry(rake_angle=radians(20.0)))
+    frame = frame_of(material=Material.VOID)
+    one, other = (CutPicture(RASTER, simulation).draw(frame) for simulation in (SIMULATION, tool))
+    different = (one != other).any(axis=(0, 2))
+    columns = np.array_split(different, 3)
+    assert all(third.any() for third in columns)
+
+
+PICTURES = [
+    np.tile(np.array(grey, np.uint8), (24, 32, 3)) for grey in (0, 255, 255, 80, 200)
+]  # fmt: skip
+PICTURES[3][4:10, 6:9] = (200, 80, 80)
+PALETTE = np.array([[v, v, v] for v in range(0, 256, 40)] + [[200, 80, 80], [255] * 3], np.uint8)
+
+
+def read_gif(path):
+    with Image.open(path) as image:
+        for index in range(image.n_frames):
+            image.seek(index)
+            yield np.asarray(image.convert("RGB"))
+
+
+def test_a_gif_is_read_back_as_it_was_written(tmp_path):
+    with movie_writer(tmp_path / "a.GIF", (24, 32), PALETTE) as append:
+        for picture in PICTURES:
+            append(picture)
+    for found, expected in zip(read_gif(tmp_path / "a.GIF"), PICTURES, strict=True):
+        np.testing.assert_array_equal(found, expected)
+    with Image.open(tmp_path / "a.GIF") as image:
+        assert image.info["duration"] == 50
+        assert image.info["loop"] == 0
+
+
+def test_a_gif_of_the_most_colours_is_read_back(tmp_path):
+    rng = np.random.default_rng(3)
+    palette = rng.permutation(256**3)[:255]
+    palette = np.stack([palette % 256, palette // 256 % 256, palette // 65536], 1).astype(np.uint8)
+    pictures = [palette[rng.integers(0, 255, (30, 40))] for _ in range(3)]
+    with movie_writer(tmp_path / "a.gif", (30, 40), palette) as append:
+        for picture in pictures:
+            append(picture)
+    for found, expected in zip(read_gif(tmp_path / "a.gif"), pictures, strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_an_mp4_is_read_back(tmp_path):
+    av = pytest.importorskip("av")
+    with movie_writer(tmp_path / "a.mp4", (24, 32), PALETTE) as append:
+        for picture in PICTURES:
+            append(picture)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"]
+    with av.open(str(tmp_path / "a.mp4")) as movie:
+        found = [frame.to_ndarray(format="rgb24") for frame in movie.decode(video=0)]
+    for picture, expected in zip(found, PICTURES, strict=True):
+        # H.264 is lossy: colours are seen to be those, not more.
+        assert abs(picture.mean() - expected.mean()) < 6
+
+
+@pytest.mark.parametrize("kind", ["gif", "mp4"])
+def test_a_movie_is_there_whole_or_not_at_all(tmp_path, kind):
+    if kind == "mp4":
+        pytest.importorskip("av")
+    path = tmp_path / f"a.{kind}"
+    path.write_bytes(b"an earlier one")
+    with pytest.raises(KeyboardInterrupt), movie_writer(path, (24, 32), PALETTE) as append:
+        append(PICTURES[0])
+        raise KeyboardInterrupt
+    with (
+        pytest.raises(ValueError, match="there was no picture"),
+        movie_writer(path, (24, 32), PALETTE),
+    ):
+        pass
+    assert path.read_bytes() == b"an earlier one"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("kind", ["gif", "mp4"])
+def test_a_full_disk_is_told_with_the_name_of_the_movie(tmp_path, kind):
+    if kind == "mp4":
+        pytest.importorskip("av")
+    rng = np.random.default_rng(5)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
+    path = tmp_path / f"a.{kind}"
+    try:
+        with (
+            pytest.raises(OSError, match=rf"a\.{kind}: could not be written: "),
+            movie_writer(path, (200, 300), PALETTE) as append,
+        ):
+            for _ in range(60):
+                append(rng.integers(0, 256, (200, 300, 3), np.uint8))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert not list(tmp_path.iterdir())
+
+
+def test_pictures_are_written_as_they_come(tmp_path):
+    rng = np.random.default_rng(4)
+    with movie_writer(tmp_path / "a.gif", (200, 300), PALETTE) as append:
+        sizes = []
+        for _ in range(4):
+            append(rng.integers(0, 256, (200, 300, 3), np.uint8))
+            sizes.append(sum(path.stat().st_size for path in tmp_path.iterdir()))
+    assert (np.diff(sizes) > 10_000).all()
+
+
+def test_a_movie_of_another_kind_or_without_pyav_is_refused(monkeypatch):
+    for name in ("a.avi", "a", "mp4"):
+        with pytest.raises(ValueError, match=r"expected .* ending in \.mp4 or \.gif"):
+            check_movie_path(name)
+    monkeypatch.setattr("chipglow.io.movie_file.find_spec", lambda _: None)
+    with pytest.raises(ValueError, match=r"a\.mp4: MP4 needs PyAV, .*chipglow\[movie\]"):
+        check_movie_path("a.mp4")
+    check_movie_path("a.gif")
+
+
+def test_the_movie_of_frames_is_of_their_pictures(tmp_path, picture):
+    frames = [frame_of(temperature=kelvins) for kelvins in (300, 600, 900)]
+    with cut_movie(tmp_path / "a.gif", RASTER, SIMULATION) as show:
+        for frame in frames:
+            show(frame)
+    for found, frame in zip(read_gif(tmp_path / "a.gif"), frames, strict=True):
+        # The palette has every third colour of the maps and thirty greys, for all but the
+        # smoothed edges of lines on a colour.
+        far = np.abs(found - picture.draw(frame).astype(float)).max(axis=2) > 20
+        assert far.mean() < 0.005
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("CHIPGLOW_CACHE", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.yaml").write_text(STUDY)
+    return tmp_path
+
+
+def chipglow(*arguments):
+    return CliRunner().invoke(app, arguments)
+
+
+def test_the_command_makes_a_movie_of_the_cut_and_then_of_its_scene(folder):
+    result = chipglow("cut", "study.yaml", "--out", "a.nc", "--preview", "whole.gif")
+    assert result.exit_code == 0, result.output
+    assert result.output.endswith("a.nc\nwhole.gif\n")
+    assert len(list(read_gif("whole.gif"))) == 12
+    again = chipglow("cut", "study.yaml", "--out", "a.nc", "--preview", "recorded.gif")
+    assert again.exit_code == 0, again.output
+    assert "The preview shows that scene: 0.03 mm to 0.05 mm of the cut." in again.output
+    recorded, whole = list(read_gif("recorded.gif")), list(read_gif("whole.gif"))
+    assert len(recorded) == len(open_scene("a.nc").times) == 5
+    for picture, expected in zip(recorded, whole[-5:], strict=True):
+        # The file keeps the fields to some bits: neighbours in the palette may change places.
+        assert np.mean((picture != expected).any(axis=2)) < 0.01
+    names = {"study.yaml", "a.nc", "whole.gif", "recorded.gif", "cache"}
+    assert {path.name for path in folder.iterdir()} == names
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("a.avi", "ending in .mp4 or .gif"), ("none/a.gif", "there is no folder none")],
+)
+def test_a_preview_that_cannot_be_written_is_refused_before_the_cut(
+    folder, monkeypatch, name, said
+):
+    def no_run(*_, **__):
+        raise AssertionError("the cut was started")
+
+    monkeypatch.setattr(CuttingSimulation, "run", no_run)
+    result = chipglow("cut", "study.yaml", "--out", "a.nc", "--preview", name)
+    assert result.exit_code == 2
+    assert said in " ".join(result.output.split())
+    assert not (folder / "a.nc").exists()
+
+
+def test_mp4_without_pyav_is_one_line(folder, monkeypatch):
+    monkeypatch.setattr("chipglow.io.movie_file.find_spec", lambda _: None)
+    result = chipglow("cut", "study.yaml", "--out", "a.nc", "--preview", "a.mp4")
+    assert result.exit_code == 2
+    assert result.output.startswith("chipglow: --preview: a.mp4: MP4 needs PyAV")
+    assert result.output.count("\n") == 1
+
+
+def test_a_cut_in_python_is_watched_too(folder):
+    seen = []
+    cut(load_study("study.yaml"), on_preview=seen.append)
+    assert len(seen) == 12
