@@ -3,7 +3,7 @@
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
-from chipglow.study import Study, study_text
+from chipglow.study import Study, field_tables, study_text
 
 HERE = Path(__file__).parent
 GENERATED = HERE / "generated"
@@ -21,7 +21,7 @@ extensions = [
     "sphinx.ext.napoleon",
 ]
 templates_path = ["_templates"]
-exclude_patterns = ["generated/*.yaml"]
+exclude_patterns = ["generated/*.yaml", "generated/fields.md"]
 default_role = "py:obj"
 
 myst_enable_extensions = ["amsmath", "dollarmath"]
@@ -37,8 +37,18 @@ napoleon_use_rtype = False
 html_theme = "pydata_sphinx_theme"
 html_title = "chipglow"
 html_theme_options = {"show_toc_level": 2, "navigation_with_keys": False}
-html_sidebars = {"index": [], "tutorial": [], "physics": [], "cutting": [], "files": []}
+html_sidebars = {
+    "index": [],
+    "tutorial": [],
+    "physics": [],
+    "cutting": [],
+    "study": [],
+    "files": [],
+}
 
 # The page on files shows the paper's study as the program itself writes it.
 GENERATED.mkdir(exist_ok=True)
 (GENERATED / "study.yaml").write_text(study_text(Study()), encoding="utf-8")
+
+# The page on studies shows what the schema itself says of every field of the cut.
+(GENERATED / "fields.md").write_text(field_tables(Study().cutting, "cutting"), encoding="utf-8")

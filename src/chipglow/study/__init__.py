@@ -3,6 +3,7 @@
 from chipglow.study.cache import CachedScene, cache_folder, cached_scenes, clear_cache
 from chipglow.study.files import StudyError, load_study
 from chipglow.study.preview import preview_raster
+from chipglow.study.reference import FieldEntry, field_entries, field_tables
 from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, kept_progress, run
 from chipglow.study.schema import Study
 from chipglow.study.template import study_text
@@ -10,6 +11,7 @@ from chipglow.study.template import study_text
 __all__ = [
     "CUTTING_STEP",
     "CachedScene",
+    "FieldEntry",
     "Progress",
     "Study",
     "StudyError",
@@ -17,6 +19,8 @@ __all__ = [
     "cached_scenes",
     "clear_cache",
     "cut",
+    "field_entries",
+    "field_tables",
     "is_cut",
     "kept_progress",
     "load_study",

@@ -18,6 +18,7 @@ from pydantic import (
     field_validator,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 
 from chipglow.analysis.paper import Plan
 from chipglow.camera import (
@@ -77,9 +78,16 @@ def _beside_the_study(file: str, info: ValidationInfo) -> str:
     return str(Path((info.context or {}).get("folder") or ".", file).resolve())
 
 
-def _field(default: object, description: str) -> Any:
-    """Field with its default as a YAML file would give it and the comment of the template."""
-    return Field(default, description=description, validate_default=True)
+def _field(default: object, description: str, allowed: str = "") -> Any:
+    """Field with its default as a YAML file would give it, its meaning and what is allowed."""
+    extra: dict[str, Any] = {"allowed": allowed}
+    return Field(default, description=description, json_schema_extra=extra, validate_default=True)
+
+
+def allowed(field: FieldInfo) -> str:
+    """What a field may be, in words; empty if its description says it."""
+    extra = field.json_schema_extra
+    return str(extra.get("allowed", "")) if isinstance(extra, Mapping) else ""
 
 
 class Section(BaseModel):
@@ -143,25 +151,37 @@ class HoneSection(Part):
 class ToolSection(Part):
     """The cutting tool."""
 
-    rake_angle: Angle = _field("-7 deg", "Rake angle; negative: the rake face leans over the chip.")
-    clearance_angle: Angle = _field("7 deg", "Angle between the tool's flank and the cut surface.")
-    edge_radius: Length = _field("20 um", "Radius of the cutting edge, or of a chamfer's corners.")
+    rake_angle: Angle = _field(
+        "-7 deg",
+        "Rake angle; negative: the rake face leans over the chip.",
+        "over -60 deg, under 60 deg; a wedge of 5 deg or more must be left",
+    )
+    clearance_angle: Angle = _field(
+        "7 deg",
+        "Angle between the tool's flank and the cut surface.",
+        "over 0 deg, under 45 deg",
+    )
+    edge_radius: Length = _field(
+        "20 um", "Radius of the cutting edge, or of a chamfer's corners.", "over 0 um"
+    )
     chamfer: Annotated[ChamferSection | None, *_NONE] = _field(
         "none",
-        "Chamfer of the edge, or none: {width: 100 um, angle: 20 deg}, the width between sharp\n"
-        "corners, the angle from the rake face.",
+        "Chamfer of the edge: the width between sharp corners, the angle from the rake face.",
+        "none, or {width: 100 um, angle: 20 deg}",
     )
     hone: Annotated[HoneSection | None, *_NONE] = _field(
         "none",
-        "Hone in the place of the edge's radius, or none: {rake: 40 um, clearance: 20 um}, how\n"
-        "far from the sharp edge it begins on either face.",
+        "Hone in the place of the edge's radius: how far from the sharp edge it begins on\n"
+        "either face.",
+        "none, or {rake: 40 um, clearance: 20 um}",
     )
     outline: Annotated[str | None, *_NONE] = _field(
         "none",
-        "File of an outline in the place of all these, or none: edge.csv, its first line\n"
-        "x_um,y_um, then a point a line, from the rake face round the edge to the clearance face.",
+        "File of an outline in the place of all these: its first line x_um,y_um, then a point a\n"
+        "line, from the rake face round the edge to the clearance face.",
+        "none, or a file such as edge.csv",
     )
-    material: str = _field("carbide", f"Material of the tool: {', '.join(material_names('tool'))}.")
+    material: str = _field("carbide", "Material of the tool.", ", ".join(material_names("tool")))
 
     @field_validator("material")
     @classmethod
@@ -211,9 +231,9 @@ class ToolSection(Part):
 class FrictionSection(Part):
     """Friction between chip and tool."""
 
-    coefficient: float = _field(0.5, "Coulomb's coefficient.")
+    coefficient: float = _field(0.5, "Coulomb's coefficient.", "0 to 2")
     shear_fraction: float = _field(
-        1.0, "Limit of the friction stress, as a share of the chip's shear flow stress."
+        1.0, "Limit of the friction stress, as a share of the chip's shear flow stress.", "0 to 1"
     )
     thermal_exponent: Annotated[float | None, *_NONE] = _field(
         "none",
@@ -251,12 +271,20 @@ class SurroundingsSection(Part):
 class NumericsSection(Part):
     """How finely the cut is computed."""
 
-    cell: Length = _field("10 um", "Side of a cell of the grid; half of it takes eight times long.")
-    mass_scaling: float = _field(
-        100.0, "Factor on the density in the equation of motion, for longer time steps."
+    cell: Length = _field(
+        "10 um",
+        "Side of a cell of the grid; half of it takes eight times long.",
+        "0.5 um to 43.75 um",
     )
-    courant: float = _field(0.5, "Time step as a share of the time that sound takes for a cell.")
-    points_per_side: int = _field(2, "Material points along the side of a cell.")
+    mass_scaling: float = _field(
+        100.0,
+        "Factor on the density in the equation of motion, for longer time steps.",
+        "1 to 10000",
+    )
+    courant: float = _field(
+        0.5, "Time step as a share of the time that sound takes for a cell.", "over 0, up to 0.6"
+    )
+    points_per_side: int = _field(2, "Material points along the side of a cell.", "1 to 4")
 
     def build(self) -> Numerics:
         """Settings of the solver."""
@@ -271,23 +299,34 @@ class NumericsSection(Part):
 class WindowSection(Part):
     """The part of the cut that becomes the scene."""
 
-    start: CutLength = _field("1.579 mm", "Length of cut at the first frame.")
-    end: CutLength = _field("1.958 mm", "Length of cut at the last frame.")
-    interval: Time = _field("0.2 us", "Time between frames.")
+    start: CutLength = _field(
+        "1.579 mm", "Length of cut at the first frame.", "over 0 mm; under end"
+    )
+    end: CutLength = _field(
+        "1.958 mm", "Length of cut at the last frame.", "over start; up to length_of_cut"
+    )
+    interval: Time = _field(
+        "0.2 us", "Time between frames.", "1 ns to 1 ms; up to the camera's integration_time"
+    )
 
     def build(self) -> OutputWindow:
         """When the solver hands out frames."""
         return OutputWindow(start=self.start, end=self.end, interval=self.interval)
 
 
+_IN_REGION: Final = "the whole scene within the simulated region"
+
+
 class FieldOfViewSection(Part):
     """Where the scene is sampled. The tip of the tool is near the origin, y points up."""
 
-    left: Position = _field("-560 um", "Left edge of the scene.")
-    top: Position = _field("460 um", "Upper edge of the scene.")
-    spacing: Length = _field("0.66667 um", "Side of a sample; the paper has 9 to a sensor.")
-    rows: int = _field(810, "Samples from top to bottom.")
-    columns: int = _field(900, "Samples from left to right.")
+    left: Position = _field("-560 um", "Left edge of the scene.", _IN_REGION)
+    top: Position = _field("460 um", "Upper edge of the scene.", _IN_REGION)
+    spacing: Length = _field(
+        "0.66667 um", "Side of a sample; the paper has 9 to a sensor.", "over 0 um"
+    )
+    rows: int = _field(810, "Samples from top to bottom.", "1 or more")
+    columns: int = _field(900, "Samples from left to right.", "1 or more")
 
     def build(self) -> Raster:
         """The grid of samples."""
@@ -297,15 +336,19 @@ class FieldOfViewSection(Part):
 class CuttingSection(Part):
     """The cutting simulation; the paper's Table 2."""
 
-    speed: Speed = _field("250 m/min", "Cutting speed.")
-    feed: CutLength = _field("0.3 mm", "Feed: thickness of the uncut chip.")
-    length_of_cut: CutLength = _field("1.958 mm", "Length of cut, from the first contact.")
-    initial_temperature: Temperature = _field("20 degC", "Temperature before the cut.")
+    speed: Speed = _field("250 m/min", "Cutting speed.", "over 0 m/min")
+    feed: CutLength = _field("0.3 mm", "Feed: thickness of the uncut chip.", "over 0 mm")
+    length_of_cut: CutLength = _field(
+        "1.958 mm", "Length of cut, from the first contact.", "over 0 mm"
+    )
+    initial_temperature: Temperature = _field(
+        "20 degC", "Temperature before the cut.", "200 K to 1500 K"
+    )
     workpiece: str = _field(
         "aisi-1045",
-        f"Material of the workpiece: {', '.join(material_names('workpiece'))},\n"
-        "with one of its sets of the flow stress after a slash (aisi-1045/ozel), or a file of\n"
-        "your own (steel.yaml). The command chipglow materials shows them.",
+        "Material of the workpiece. The command chipglow materials shows them.",
+        f"{', '.join(material_names('workpiece'))}; with one of its sets of the\n"
+        "flow stress after a slash (aisi-1045/ozel); or a file of your own (steel.yaml)",
     )
     tool: ToolSection = _field({}, "The cutting tool.")
     friction: FrictionSection = _field({}, "Friction between chip and tool.")

@@ -6,7 +6,7 @@ from typing import Any, Final
 import yaml
 from pydantic import BaseModel
 
-from chipglow.study.schema import Section, Study
+from chipglow.study.schema import Section, Study, allowed
 
 _HEADER: Final = """\
 # A study of chipglow. Run it with: chipglow run FILE --out FOLDER
@@ -27,6 +27,8 @@ def _section_lines(section: Section, values: Mapping[str, Any], indent: str) -> 
             yield ""
         for line in (field.description or "").splitlines():
             yield f"{indent}# {line}"
+        if may_be := allowed(field):
+            yield from (f"{indent}# {line}" for line in f"Allowed: {may_be}.".splitlines())
         yield from _entry_lines(name, value, values[name], indent)
 
 
