@@ -12,24 +12,20 @@ its own that sleeps while others run; the best of the rounds counts. Taichi and 
 """
 
 import argparse
-import sys
 from importlib import import_module
 from importlib.util import find_spec
 from multiprocessing import get_context
-from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange, set_num_threads
+from solver import FAR, Block
 
 from chipglow.cutting import AISI_1045
 from chipglow.cutting.flow_stress import Flow
 from chipglow.cutting.momentum import Step, advance
 from chipglow.cutting.points import POINT, Grid, Points, sort_by_cell
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from solver import FAR, Block
 
 STEPS = 20
 WARM_UP = 20

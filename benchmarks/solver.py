@@ -1,4 +1,4 @@
-"""The cutting solver's kernels on blocks of material, without a cut: for the tests."""
+"""The cutting solver's kernels on blocks of material, without a cut: for tests and benchmarks."""
 
 from dataclasses import replace
 
@@ -7,6 +7,7 @@ from numba import get_num_threads
 
 from chipglow.cutting.damage import Damage
 from chipglow.cutting.energy import held_energy
+from chipglow.cutting.heat import conduct, return_heat
 from chipglow.cutting.library import AISI_1045
 from chipglow.cutting.momentum import NODE_VALUES, SUMS, VELOCITY_VALUES, Step, advance_with
 from chipglow.cutting.plastic_heat import heat_shares
@@ -14,6 +15,8 @@ from chipglow.cutting.points import POINT, Grid, block_of_points, sort_by_cell
 from chipglow.scene import ToolGeometry
 
 FAR = 1.0
+UNBROKEN = replace(AISI_1045, softening=replace(AISI_1045.softening, loss=0.0))
+"""AISI 1045 that does not fail."""
 ELASTIC = replace(AISI_1045, flow_stress=replace(AISI_1045.flow_stress, yield_stress=1e15))
 
 
@@ -93,6 +96,17 @@ class Block:
             )  # fmt: skip
             self.force /= now
             steps -= now
+
+    def conduct(self, duration, steps, conductivity, capacity):
+        """Conduct heat for a time, with properties sampled as a `TemperatureTable` does."""
+        shape = (self.grid.columns, self.grid.rows)
+        nodes, increment = np.zeros((*shape, 3)), np.zeros(shape)
+        for _ in range(steps):
+            conduct(
+                self.points, self.count, nodes, increment, conductivity, capacity,
+                self.step.heat_mass, self.grid, duration / steps,
+            )  # fmt: skip
+            return_heat(self.points, self.count, increment, self.grid)
 
     def energy(self):
         """Kinetic and elastic energy in J/m."""

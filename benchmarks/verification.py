@@ -1,0 +1,79 @@
+"""The verification suite: every case against what is known, as a table and as plots.
+
+    python benchmarks/verification.py [--out docs/verification] [case ...]
+
+Prints a Markdown table and ends with 1 if a check fails. Under three minutes on one core.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+from time import perf_counter
+
+from cases import heat, motion, plasticity
+
+from chipglow.report.drawing import new_figure, style
+
+CASES = {
+    "momentum": motion.momentum,
+    "waves": motion.waves,
+    "vibration": motion.vibrations,
+    "conduction": heat.conduction,
+    "shear": plasticity.adiabatic_shear,
+    "friction": plasticity.friction,
+}
+
+
+def number(value, unit=""):
+    """A number in four digits with its unit."""
+    return f"{value:.4g} {unit}".strip()
+
+
+def row(case, check):
+    """One line of the table."""
+    unit = check.unit if check.absolute else ""
+    return " | ".join(
+        [
+            case.title,
+            check.quantity,
+            f"{check.source}: {number(check.expected, check.unit)}",
+            number(check.computed, check.unit),
+            number(check.error, unit) if check.absolute else f"{check.error * 100:.2g} %",
+            number(check.tolerance, unit) if check.absolute else f"{check.tolerance * 100:.2g} %",
+            check.reason if check.holds else f"**FAILS** {check.reason}",
+        ]
+    )
+
+
+def picture(case, folder):
+    """Write a case's figure."""
+    with style():
+        figure = new_figure(case.height)
+        case.draw(figure)
+        figure.savefig(folder / f"{case.name}.png", dpi=120)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, help="folder for the plots")
+    parser.add_argument("cases", nargs="*", choices=[[], *CASES], default=[])
+    arguments = parser.parse_args()
+    if arguments.out:
+        arguments.out.mkdir(parents=True, exist_ok=True)
+    print("| case | what | known | computed | error | tolerance | reason of the tolerance |")
+    print("|---" * 7 + "|")
+    failed = 0
+    for name in arguments.cases or CASES:
+        start = perf_counter()
+        case = CASES[name]()
+        for check in case.checks:
+            print(f"| {row(case, check)} |", flush=True)
+            failed += not check.holds
+        if arguments.out:
+            picture(case, arguments.out)
+        print(f"{name}: {perf_counter() - start:.1f} s", file=sys.stderr)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
