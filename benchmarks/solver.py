@@ -23,10 +23,11 @@ ELASTIC = replace(AISI_1045, flow_stress=replace(AISI_1045.flow_stress, yield_st
 class Block:
     """A rectangle of material on a grid; the tool, the floor and the inflow are far away."""
 
-    def __init__(self, size, cell=10e-6, material=ELASTIC, courant=0.35, tool=None, **changes):
+    def __init__(
+        self, size, cell=10e-6, material=ELASTIC, courant=0.35, tool=None, margin=12, **changes
+    ):
         self.cell, self.spacing = cell, cell / 2
         columns, rows = (round(length / self.spacing) for length in size)
-        margin = 12
         self.grid = Grid(
             -margin * cell, -margin * cell, cell, columns // 2 + 2 * margin, rows // 2 + 2 * margin
         )

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
-from cases import heat, motion, plasticity
+from cases import cylinder, heat, motion, plasticity, taylor
 
 from chipglow.report.drawing import new_figure, style
 
@@ -21,6 +21,8 @@ CASES = {
     "conduction": heat.conduction,
     "shear": plasticity.adiabatic_shear,
     "friction": plasticity.friction,
+    "cylinder": cylinder.thick_cylinder,
+    "taylor": taylor.taylor_impact,
 }
 
 

@@ -44,11 +44,7 @@ def integrated_shear():
     def heating(strain, state):
         capacity = UNBROKEN.density * UNBROKEN.heat_capacity.at(state[0])
         stress = johnson_cook(law, strain, rate, state[0])
-        return [
-            UNBROKEN.taylor_quinney
-            * stress
-            / (UNBROKEN.density * UNBROKEN.heat_capacity.at(state[0]))
-        ]
+        return [UNBROKEN.taylor_quinney * stress / capacity]
 
     plastic = np.linspace(0.0, SHEAR / sqrt(3), 2001)
     temperature = solve_ivp(heating, plastic[[0, -1]], [293.0], t_eval=plastic, rtol=1e-9).y[0]

@@ -1,0 +1,260 @@
+"""A plate that strikes a wall (Taylor's test), against finite elements.
+
+The solver is plane strain, published bars are round. So the peer in `peers/elements.py` first
+repeats a published round bar, then computes the plane one that the solver is compared with.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.ticker import FormatStrFormatter, LogLocator
+from peers.elements import Steel, struck_bar
+from solver import UNBROKEN, Block
+
+from cases import Case, Check
+from chipglow.cutting import JohnsonCook, TemperatureTable
+from chipglow.report.drawing import BLUE, GREEN, GREY, VERMILLION
+from chipglow.scene import ToolGeometry
+
+HALF, LENGTH, DURATION = 3.2e-3, 32.4e-3, 80e-6
+ROUND_SPEED, SPEED = 287.0, 180.0
+MILLI = 1e-3
+PUBLISHED = {
+    "length": 26.56e-3,
+    "diameter": 11.16e-3,
+    "strain": 1.81,
+    "temperature": 590.96 + 273.15,
+}
+"""Round bar at 287 m/s, 5 × 50 elements, foot held axially; strain and temperature of the element
+at the foot's centre. Pantalé (2020), DynELA's manual, table of the axisymmetric Taylor impact:
+Abaqus; DynELA has 26.52 mm, 11.15 mm, 1.78 and 582.34 °C."""
+STEEL = replace(
+    UNBROKEN,
+    name="42CrMo4, Pantalé (2020)",
+    density=7830.0,
+    young_modulus=206.9e9,
+    poisson_ratio=0.3,
+    flow_stress=JohnsonCook(806e6, 614e6, 0.168, 0.0089, 1.1, 1813.15, 293.15),
+    heat_capacity=TemperatureTable((293.15,), (460.0,)),
+)
+
+
+def wall(x):
+    """A tool whose rake face is the plane at x (m), far above the edge."""
+    geometry = ToolGeometry()
+    radius = geometry.edge_radius
+    return (x + radius, -1.0, radius, -1.0, 0.0, 0.0, 1.0, *geometry.coefficients[7:])
+
+
+class Shape(NamedTuple):
+    """A struck plate, in m from the foot: length, largest half width, and its side.
+
+    The side is distance from the foot and half width, shape (n, 2), from the foot on.
+    """
+
+    length: float
+    foot: float
+    side: np.ndarray
+
+
+def strike(cell):
+    """The plate after the impact."""
+    block = Block(
+        (LENGTH, 2 * HALF), cell=cell, material=STEEL, tool=wall(LENGTH), margin=round(4e-3 / cell)
+    )
+    block.points["temperature"] = STEEL.flow_stress.reference_temperature
+    block.set_velocity(lambda x, y: SPEED + 0 * x * y, lambda x, y: 0 * x * y)
+    block.advance(round(DURATION / block.step.time_step))
+    return block
+
+
+def shape_of_points(block):
+    """Shape of the solver's plate: its surface is half a spacing beyond the outermost points."""
+    p = np.sort(block.points[: block.count], order=("material_x", "material_y"))
+    p = p.reshape(-1, round(2 * HALF / block.spacing))
+    place = np.stack([p["x"], p["y"]], axis=-1)
+    beyond = lambda last, next_: 1.5 * last - 0.5 * next_  # noqa: E731
+    foot = beyond(place[-1], place[-2])[:, 0].max()
+    back = beyond(place[0], place[1])[:, 0].mean()
+    sides = [beyond(place[:, 0], place[:, 1]), beyond(place[:, -1], place[:, -2])]
+    half = 0.5 * (sides[1] - sides[0])[:, 1]
+    along = foot - 0.5 * (sides[0] + sides[1])[:, 0]
+    return Shape(foot - back, float(half.max()), np.stack([along, half], axis=1)[::-1])
+
+
+def shape_of_nodes(struck):
+    """Shape of the peer's plate."""
+    nodes = struck.nodes
+    foot = nodes[:, 0, 1].min()
+    side = np.stack([nodes[-1, :, 1] - foot, nodes[-1, :, 0]], axis=1)
+    return Shape(nodes[:, -1, 1].mean() - foot, float(side[:, 1].max()), side)
+
+
+def peer(columns, rows, speed, axisymmetric):
+    """The bar by finite elements: as published if axisymmetric, free to leave the wall if not."""
+    law = STEEL.flow_stress
+    steel = Steel(
+        STEEL.shear_modulus,
+        STEEL.bulk_modulus,
+        STEEL.density,
+        float(STEEL.heat_capacity.at(300.0)),
+        STEEL.taylor_quinney,
+        law.yield_stress,
+        law.hardening,
+        law.hardening_exponent,
+        law.rate_sensitivity,
+        law.thermal_exponent,
+        law.melting_temperature,
+        law.reference_temperature,
+    )
+    return struck_bar(
+        HALF, LENGTH, columns, rows, speed, DURATION, steel, axisymmetric, axisymmetric
+    )
+
+
+def profile_difference(shape, other):
+    """Mean difference of the half widths in m over the length."""
+    along = np.linspace(0.3e-3, 30e-3, 300)
+    widths = [np.interp(along, each.side[:, 0], each.side[:, 1]) for each in (shape, other)]
+    return float(np.abs(widths[0] - widths[1]).mean())
+
+
+def published_checks():
+    """The peer against the published round bar."""
+    bar = peer(5, 50, ROUND_SPEED, True)
+    shape = shape_of_nodes(bar)
+    source = "Abaqus, in Pantalé (2020)"
+    return (
+        Check(
+            "peer, round bar: final length",
+            source,
+            PUBLISHED["length"] / MILLI,
+            shape.length / MILLI,
+            0.005,
+            "the two published codes differ by 0.15 %",
+            unit="mm",
+        ),
+        Check(
+            "peer, round bar: diameter of the foot",
+            source,
+            PUBLISHED["diameter"] / MILLI,
+            2 * shape.foot / MILLI,
+            0.005,
+            "the two published codes differ by 0.1 %",
+            unit="mm",
+        ),
+        Check(
+            "peer, round bar: plastic strain at the foot's centre",
+            source,
+            PUBLISHED["strain"],
+            float(bar.strain[0].mean()),
+            0.02,
+            "the two published codes differ by 1.7 %",
+        ),
+        Check(
+            "peer, round bar: temperature rise at the foot's centre",
+            source,
+            PUBLISHED["temperature"] - 293.15,
+            float(bar.temperature[0].mean()) - 293.15,
+            0.02,
+            "the two published codes differ by 1.5 %",
+            unit="K",
+        ),
+    )
+
+
+def taylor_impact(cells=(0.8e-3, 0.4e-3, 0.8e-3 / 3)):
+    elements = peer(10, 100, SPEED, False)
+    known = shape_of_nodes(elements)
+    blocks = [strike(cell) for cell in cells]
+    shapes = [shape_of_points(block) for block in blocks]
+    shortening = [LENGTH - shape.length for shape in shapes]
+    errors = (
+        [abs(value / (LENGTH - known.length) - 1) * 100 for value in shortening],
+        [abs(shape.foot / known.foot - 1) * 100 for shape in shapes],
+        [profile_difference(shape, known) / HALF * 100 for shape in shapes],
+    )
+
+    def draw(figure):
+        upper, left, right = figure.subplot_mosaic(
+            [["upper"] * 2, ["left", "right"]], height_ratios=(1, 1.5)
+        ).values()
+        picture(upper, blocks[-1], known)
+        for shape, cell, colour in zip(shapes, cells, (VERMILLION, GREEN, BLUE), strict=True):
+            left.plot(*(shape.side / MILLI).T, color=colour, label=f"cell {cell / MILLI:.2f} mm")
+        left.plot(*(known.side / MILLI).T, "k--", linewidth=0.9, label="finite elements")
+        left.set_xlim(0, 12)
+        left.set_ylim(3)
+        left.set_xlabel("distance from the foot / mm")
+        left.set_ylabel("half width / mm")
+        left.legend()
+        names = ("shortening", "width of the foot", "profile, mean")
+        for line, name, colour in zip(errors, names, (BLUE, VERMILLION, GREEN), strict=True):
+            right.loglog(
+                np.array(cells) / MILLI, line, "o-", color=colour, label=name, markersize=4
+            )
+        slope = 1.2 * np.max(errors) * np.array(cells) / cells[0]
+        right.loglog(np.array(cells) / MILLI, slope, ":", color=GREY, label="first order")
+        right.set_xlabel("cell / mm")
+        right.set_ylabel("difference / %")
+        right.set_xticks(np.array(cells) / MILLI, [f"{cell / MILLI:.2f}" for cell in cells])
+        right.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        right.yaxis.set_major_formatter(FormatStrFormatter("%g"))
+        right.minorticks_off()
+        right.legend()
+
+    last = f"cell {cells[-1] / MILLI:.2f} mm"
+    checks = (
+        Check(
+            f"plate at 180 m/s: shortening, {last}",
+            "finite elements",
+            (LENGTH - known.length) / MILLI,
+            shortening[-1] / MILLI,
+            0.03,
+            "12 cells in the half width; falls with the cell",
+            unit="mm",
+        ),
+        Check(
+            f"plate at 180 m/s: half width of the foot, {last}",
+            "finite elements",
+            known.foot / MILLI,
+            shapes[-1].foot / MILLI,
+            0.05,
+            "a sharp corner, drawn by 12 cells; falls with the cell",
+            unit="mm",
+        ),
+        Check(
+            f"plate at 180 m/s: half width, mean difference over the length, {last}",
+            "finite elements",
+            0.0,
+            profile_difference(shapes[-1], known) / MILLI,
+            0.032,
+            "1 % of the half width",
+            unit="mm",
+            absolute=True,
+        ),
+    )
+    return Case("taylor", "Taylor's impact", published_checks() + checks, draw, 5.0)
+
+
+def picture(axes, block, known):
+    """The plate's points by plastic strain, and the peer's outline."""
+    p = block.points
+    foot = p["x"].max() + block.spacing / 2
+    shown = axes.scatter(
+        (foot - p["x"]) / MILLI,
+        (p["y"] - HALF) / MILLI,
+        c=p["strain"],
+        s=1.5,
+        cmap="cividis",
+        vmin=0,
+        vmax=1,
+        linewidths=0,
+    )
+    along, half = (known.side / MILLI).T
+    outline = np.concatenate([along, along[::-1]]), np.concatenate([half, -half[::-1]])
+    axes.plot(*outline, "--", color=VERMILLION, linewidth=1.0)
+    axes.set_aspect("equal")
+    axes.set_ylabel("y / mm")
+    axes.figure.colorbar(shown, ax=axes, label="plastic strain")
