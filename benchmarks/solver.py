@@ -15,7 +15,7 @@ from chipglow.cutting.points import POINT, Grid, block_of_points, sort_by_cell
 from chipglow.scene import ToolGeometry
 
 FAR = 1.0
-UNBROKEN = replace(AISI_1045, softening=replace(AISI_1045.softening, loss=0.0))
+UNBROKEN = replace(AISI_1045, damage=None)
 """AISI 1045 that does not fail."""
 ELASTIC = replace(AISI_1045, flow_stress=replace(AISI_1045.flow_stress, yield_stress=1e15))
 

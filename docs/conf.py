@@ -21,7 +21,7 @@ extensions = [
     "sphinx.ext.napoleon",
 ]
 templates_path = ["_templates"]
-exclude_patterns = ["generated/*.yaml", "generated/fields.md"]
+exclude_patterns = ["generated/*.yaml", "generated/fields.md", "verification/*"]
 default_role = "py:obj"
 
 myst_enable_extensions = ["amsmath", "dollarmath"]

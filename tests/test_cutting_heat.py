@@ -4,7 +4,7 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from scipy.special import erfc
+from cases.heat import constant_properties
 from solver import Block
 
 from chipglow.cutting.heat import (
@@ -21,42 +21,6 @@ from chipglow.cutting.points import Grid
 from chipglow.scene import ToolGeometry
 
 
-def conduct_block(block, duration, steps, conductivity, capacity):
-    shape = (block.grid.columns, block.grid.rows)
-    nodes, increment = np.zeros((*shape, 3)), np.zeros(shape)
-    for _ in range(steps):
-        conduct(
-            block.points, block.count, nodes, increment, conductivity, capacity,
-            block.step.heat_mass, block.grid, duration / steps,
-        )  # fmt: skip
-        return_heat(block.points, block.count, increment, block.grid)
-
-
-def constant_properties():
-    size = AISI_1045.conductivity.sampled().size
-    return np.full(size, 45.0), np.full(size, 520.0)
-
-
-def error_against_erf(cell):
-    """Mean error of two half-spaces at 293 K and 893 K after 60 us, in K."""
-    block = Block((600e-6, 3 * cell), cell=cell)
-    x = block.points["x"] - 300e-6
-    diffusivity, start = 45.0 / (AISI_1045.density * 520.0), 40e-6
-    block.points["temperature"] = 293.0 + 300.0 * erfc(-x / sqrt(4 * diffusivity * start))
-    duration = 60e-6
-    steps = round(duration / (0.1 * cell**2 / diffusivity))
-    conduct_block(block, duration, steps, *constant_properties())
-    exact = 293.0 + 300.0 * erfc(-x / sqrt(4 * diffusivity * (start + duration)))
-    return float(np.abs(block.points["temperature"] - exact).mean())
-
-
-def test_conduction_follows_erfc_and_converges_with_second_order():
-    coarse, fine = error_against_erf(10e-6), error_against_erf(5e-6)
-    # 600 K over 90 um: the error of a 10 um cell is of the order of (10/90)² of a few kelvin.
-    assert coarse < 1.0
-    assert np.log2(coarse / fine) > 1.8
-
-
 def test_conduction_keeps_heat_whatever_the_shape():
     generator = np.random.default_rng(1)
     block = Block((100e-6, 80e-6))
@@ -65,7 +29,7 @@ def test_conduction_keeps_heat_whatever_the_shape():
     block.points["temperature"] = generator.uniform(293.0, 1200.0, block.count)
     conductivity, capacity = constant_properties()
     before, spread = block.points["temperature"].sum(), block.points["temperature"].std()
-    conduct_block(block, 1e-4, 200, conductivity, capacity)
+    block.conduct(1e-4, 200, conductivity, capacity)
     assert block.points["temperature"].sum() == pytest.approx(before, rel=1e-12)
     assert block.points["temperature"].std() < 0.9 * spread
 

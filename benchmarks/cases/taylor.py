@@ -201,6 +201,7 @@ def taylor_impact(cells=(0.8e-3, 0.4e-3, 0.8e-3 / 3)):
         right.set_xticks(np.array(cells) / MILLI, [f"{cell / MILLI:.2f}" for cell in cells])
         right.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         right.yaxis.set_major_formatter(FormatStrFormatter("%g"))
+        right.set_ylim(bottom=0.02)
         right.minorticks_off()
         right.legend()
 
@@ -246,7 +247,7 @@ def picture(axes, block, known):
         (foot - p["x"]) / MILLI,
         (p["y"] - HALF) / MILLI,
         c=p["strain"],
-        s=1.5,
+        s=2.5,
         cmap="cividis",
         vmin=0,
         vmax=1,
