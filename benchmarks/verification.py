@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
-from cases import cylinder, heat, motion, plasticity, taylor
+from cases import cylinder, heat, motion, plasticity, taylor, upsetting
 
 from chipglow.report.drawing import new_figure, style
 
@@ -23,6 +23,7 @@ CASES = {
     "shear": plasticity.adiabatic_shear,
     "friction": plasticity.friction,
     "cylinder": cylinder.thick_cylinder,
+    "upsetting": upsetting.rough_plates,
     "taylor": taylor.taylor_impact,
 }
 
