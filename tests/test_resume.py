@@ -167,7 +167,7 @@ def stop_after(intervals, error, monkeypatch):
     """Raise an error in the hand-over of a checkpoint."""
     whole = CuttingSimulation.run
 
-    def run(simulation, window, raster, on_frame, on_progress, resume, on_checkpoint):
+    def run(simulation, window, raster, on_frame, on_progress, resume, on_checkpoint, preview):
         seen = []
 
         def count(checkpoint):
@@ -176,7 +176,7 @@ def stop_after(intervals, error, monkeypatch):
             if len(seen) == intervals:
                 raise error
 
-        return whole(simulation, window, raster, on_frame, on_progress, resume, count)
+        return whole(simulation, window, raster, on_frame, on_progress, resume, count, preview)
 
     monkeypatch.setattr(CuttingSimulation, "run", run)
 
@@ -235,6 +235,25 @@ def test_after_ctrl_c_the_last_state_is_named(cache, monkeypatch):
     lines = [line for line in result.output.splitlines() if line.startswith("chipglow: ")]
     assert len(lines) == 1
     assert re.search(r"the state at 2\.50 us is kept in .*: --resume goes on from", lines[0])
+
+
+def test_the_movie_of_a_cut_that_goes_on_shows_what_is_still_to_come(cache, unbroken, monkeypatch):
+    from PIL import Image
+    from typer.testing import CliRunner
+
+    from chipglow.cli import app
+
+    command = ["cut", "study.yaml", "--out", "scene.nc", "--preview", "rest.gif"]
+    with monkeypatch.context() as patch:
+        stop_after(30, KeyboardInterrupt(), patch)
+        assert CliRunner().invoke(app, command).exit_code == 130
+    assert {path.name for path in cache.parent.iterdir()} == {"study.yaml", "cache"}
+    result = CliRunner().invoke(app, [*command, "--resume"])
+    assert result.exit_code == 0, result.output
+    assert "The preview shows what is still to come." in result.output
+    with Image.open("rest.gif") as movie:
+        assert movie.n_frames == 48 - 30
+    assert_same_scene("scene.nc", unbroken)
 
 
 SPOILT = [
