@@ -54,7 +54,7 @@ def test_default_material_is_unchanged() -> None:
             "reference_rate": 1.0,
         },
         "damage": asdict(
-            JohnsonCookDamage(0.06, 3.31, -1.96, 0.0018, 0.58, 15e3, 0.9, 1733.0, 293.0, 1.0)
+            JohnsonCookDamage(0.006, 0.331, -1.96, 0.0018, 0.58, 15e3, 0.5, 1733.0, 293.0, 1.0)
         ),
         "conductivity": asdict(TemperatureTable((273.15, 1173.15), (52.61, 27.32))),
         "heat_capacity": asdict(TemperatureTable((273.15, 1173.15), (420.0, 873.6))),
@@ -161,7 +161,7 @@ def _write(path: Path, old: str, new: str) -> Path:
         ("- [200 degC", "- [50 degC", "conductivity: temperature table: temperatures must ascend"),
         ("[200 degC, 42.3 W/(m K)]", "42.3 W/(m K)", "expected [temperature, value]"),
         ("[200 degC, 42.3", "[200, 42.3", "conductivity: 200, expected a temperature"),
-        ("  loss: 0.9\n", "  loss: 0.9\n  loss: 0.8\n", "key 'loss' is there twice"),
+        ("  loss: 0.5\n", "  loss: 0.5\n  loss: 0.8\n", "key 'loss' is there twice"),
         ("value: 0.9\n", "value: 1.9\n", "workpiece: taylor_quinney: expected 0 to 1, got 1.9"),
         ("value: 0.9\n", f"value: {RATES}\n".replace("1/s", "K"), "'1 K', expected a strain rate"),
         ("value: 0.9\n", f"value: {RATES}\n".replace("0.6", "6"), "rate table: value: expected 0"),
