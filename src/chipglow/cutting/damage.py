@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numba import njit
 
-from chipglow.cutting.lanes import FAST, exponential, logarithm
+from chipglow.cutting.lanes import INLINE, exponential, logarithm
 from chipglow.cutting.laws import check_melting, check_positive, homologous
 
 TRIAXIALITIES: Final = (-1.5, 1.5)
@@ -109,13 +109,13 @@ class Damage(NamedTuple):
         )
 
 
-@njit(**FAST)
+@njit(**INLINE)
 def weakening(damage, law):  # type: ignore[no-untyped-def]
     """Factor on the flow stress; damage beyond 1 counts the softening w."""
     return 1.0 - law.loss * min(max(damage - 1.0, 0.0), 1.0)
 
 
-@njit(**FAST)
+@njit(**INLINE)
 def strain_to_failure(triaxiality, rate, temperature, law):  # type: ignore[no-untyped-def]
     """Strain to failure at a triaxiality, plastic strain rate (1/s) and temperature (K)."""
     held = min(max(triaxiality, TRIAXIALITIES[0]), TRIAXIALITIES[1])
@@ -124,7 +124,7 @@ def strain_to_failure(triaxiality, rate, temperature, law):  # type: ignore[no-u
     return cold * fast * (1.0 + law.d5 * homologous(temperature, law))
 
 
-@njit(**FAST)
+@njit(**INLINE)
 def damage_growth(damage, increment, rate, mean_stress, stress, temperature, law):  # type: ignore[no-untyped-def]
     """What a plastic strain `increment` adds to the damage; stresses in Pa, `stress` over 0."""
     failing = increment * stress / weakening(damage, law) * law.per_work

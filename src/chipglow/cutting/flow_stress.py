@@ -24,7 +24,7 @@ from numba import njit
 from numba.extending import overload
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.cutting.lanes import FAST
+from chipglow.cutting.lanes import INLINE
 
 _DIFFERENCE: Final = 1e-6
 _Law = TypeVar("_Law", bound="type[FlowStress]")
@@ -101,9 +101,9 @@ def flow_stress_law(name: str, stress_and_slopes: Any = None) -> Callable[[_Law]
 
 
 def _by_differences(stress: Callable[..., Any]) -> Any:
-    law_stress = njit(**FAST)(stress)
+    law_stress = njit(**INLINE)(stress)
 
-    @njit(**FAST)
+    @njit(**INLINE)
     def stress_and_slopes(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
         held = max(strain, 1e-9)
         here = law_stress(held, rate, temperature, law)
@@ -119,7 +119,7 @@ def stress_and_slopes(strain: float, rate: float, temperature: float, law: Any) 
     raise NotImplementedError("called from compiled code only")
 
 
-@overload(stress_and_slopes, jit_options=FAST)
+@overload(stress_and_slopes, jit_options=INLINE)
 def _choose(strain, rate, temperature, law):  # type: ignore[no-untyped-def]  # pragma: no cover
     kernel = _KERNELS.get(getattr(law, "instance_class", None))
     if kernel is None:
@@ -127,7 +127,7 @@ def _choose(strain, rate, temperature, law):  # type: ignore[no-untyped-def]  # 
     return lambda strain, rate, temperature, law: kernel(strain, rate, temperature, law)
 
 
-@njit(**FAST)
+@njit(**INLINE)
 def flow_stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
     """Flow stress in Pa at a plastic strain, its rate (1/s) and temperature (K)."""
     return stress_and_slopes(strain, rate, temperature, law)[0]

@@ -7,13 +7,13 @@ import numpy as np
 from numba import njit
 
 from chipglow.cutting.flow_stress import FlowStress, flow_stress_law
-from chipglow.cutting.lanes import FAST, exponential, logarithm
+from chipglow.cutting.lanes import INLINE, exponential, logarithm
 
 MELTING_LIMIT = 3000.0
 """No metal that is cut melts above, in K."""
 
 
-@njit(**FAST)
+@njit(**INLINE)
 def homologous(temperature, law):  # type: ignore[no-untyped-def]
     """θ = (T − T₀) / (T_melt − T₀), from 0 to 0.99."""
     share = (temperature - law.reference_temperature) / (
@@ -23,7 +23,7 @@ def homologous(temperature, law):  # type: ignore[no-untyped-def]
     return min(max(share, 0.0), 0.99)
 
 
-@njit(**FAST)
+@njit(**INLINE)
 def _thermal(temperature, law):  # type: ignore[no-untyped-def]
     """1 − θᵐ."""
     heat = homologous(temperature, law)
@@ -31,7 +31,7 @@ def _thermal(temperature, law):  # type: ignore[no-untyped-def]
     return 1.0 - (heat if m == 1.0 else exponential(m * logarithm(max(heat, 1e-30))))
 
 
-@njit(**FAST)
+@njit(**INLINE)
 def _johnson_cook(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
     held = max(strain, 1e-12)
     n, c = law.hardening_exponent, law.rate_sensitivity

@@ -16,7 +16,7 @@ from numba import njit, prange
 from chipglow.cutting.damage import weakening
 from chipglow.cutting.flow_stress import flow_stress
 from chipglow.cutting.friction import friction_coefficient
-from chipglow.cutting.lanes import FAST
+from chipglow.cutting.lanes import FAST, INLINE
 from chipglow.cutting.stress import BUFFER, LANES, STRESS, WORK, update_stresses
 from chipglow.scene.surface import surface_bound, surface_distance
 
@@ -28,7 +28,7 @@ BATCH_CELLS = 16
 """Cells whose points are gathered before their stress is computed."""
 
 NODE_VALUES = 6
-MASS, MOMENTUM_X, MOMENTUM_Y, IMPULSE_X, IMPULSE_Y, FRICTION_LIMIT = range(NODE_VALUES)
+MASS, MOMENTUM_X, MOMENTUM_Y, IMPULSE_X, IMPULSE_Y, FRICTION_LIMIT = range(6)
 """What the points gather on a node: in kg/m; momentum and impulse of stress and contact in kg/s
 twice; limit of the friction impulse in N s/m."""
 
@@ -78,20 +78,20 @@ class Step(NamedTuple):
     friction_melting: float = inf
 
 
-@njit
+@njit(**INLINE)
 def spline(position):  # type: ignore[no-untyped-def]
     """First of three nodes and the offset from it to a position in cells: quadratic B-spline."""
     first = int(position - 0.5)
     return first, position - first
 
 
-@njit
+@njit(**INLINE)
 def spline_weights(offset):  # type: ignore[no-untyped-def]
     """Weights of the three nodes."""
     return 0.5 * (1.5 - offset) ** 2, 0.75 - (offset - 1.0) ** 2, 0.5 * (offset - 0.5) ** 2
 
 
-@njit(**FAST)
+@njit(**INLINE)
 def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
     """Velocity and its gradient from the grid; the point moves. True if it is on the grid."""
     inverse = 1.0 / grid.cell
@@ -104,13 +104,12 @@ def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
     for a in range(3):
         sx = sy = tx = ty = ex = ey = 0.0
         for b in range(3):
-            node = velocity[i + a, j + b]
-            ux, uy = node[VELOCITY_X], node[VELOCITY_Y]
+            ux, uy = velocity[i + a, j + b, VELOCITY_X], velocity[i + a, j + b, VELOCITY_Y]
             w = wy[b]
             sx += w * ux
             sy += w * uy
-            ex += w * node[CHANGE_X]
-            ey += w * node[CHANGE_Y]
+            ex += w * velocity[i + a, j + b, CHANGE_X]
+            ey += w * velocity[i + a, j + b, CHANGE_Y]
             tx += w * (b - ay) * ux
             ty += w * (b - ay) * uy
         w = wx[a]
@@ -132,7 +131,7 @@ def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(**FAST)
+@njit(**INLINE)
 def _scatter(p, fx, fy, limit, nodes, grid, step):  # type: ignore[no-untyped-def]
     """Mass, momentum, stress and contact impulse to the grid. True if the point is on it."""
     inverse = 1.0 / grid.cell
@@ -154,22 +153,18 @@ def _scatter(p, fx, fy, limit, nodes, grid, step):  # type: ignore[no-untyped-de
         gx, gy = hx - txx * (a - ax), hy - txy * (a - ax)
         for b in range(3):
             w = wx[a] * wy[b]
-            node = nodes[i + a, j + b]
-            node[MASS] += w * mass
-            node[MOMENTUM_X] += w * (ux + qxy * (b - ay))
-            node[MOMENTUM_Y] += w * (uy + qyy * (b - ay))
-            node[IMPULSE_X] += w * (gx - txy * (b - ay))
-            node[IMPULSE_Y] += w * (gy - tyy * (b - ay))
-            if limit > 0.0:
-                node[FRICTION_LIMIT] += w * limit
+            nodes[i + a, j + b, MASS] += w * mass
+            nodes[i + a, j + b, MOMENTUM_X] += w * (ux + qxy * (b - ay))
+            nodes[i + a, j + b, MOMENTUM_Y] += w * (uy + qyy * (b - ay))
+            nodes[i + a, j + b, IMPULSE_X] += w * (gx - txy * (b - ay))
+            nodes[i + a, j + b, IMPULSE_Y] += w * (gy - tyy * (b - ay))
+            nodes[i + a, j + b, FRICTION_LIMIT] += w * limit
     return True
 
 
 @njit(**FAST)
 def _contact(p, stress, tool, step, law, damage):  # type: ignore[no-untyped-def]
     """Force of the tool's surface on a point (N/m) and the limit of its friction impulse."""
-    if surface_bound(p.x, p.y, tool) > step.reach:
-        return 0.0, 0.0, 0.0
     distance, nx, ny = surface_distance(p.x, p.y, tool)
     depth = step.reach - distance
     if depth <= 0.0:
@@ -231,11 +226,13 @@ def _work_block(  # type: ignore[no-untyped-def]
             update_stresses(points, begin, end, step, law, damage, capacity, heat_shares, buffer)
             for k in range(begin, end):
                 p = points[k]
-                fx, fy, limit = _contact(p, buffer[STRESS + k - begin], tool, step, law, damage)
                 sums[block, PLASTIC_WORK] += buffer[WORK + k - begin]
-                sums[block, FORCE_X] += fx
-                sums[block, FORCE_Y] += fy
-                sums[block, CONTACT_WORK] += step.time_step * (fx * p.vx + fy * p.vy)
+                fx = fy = limit = 0.0
+                if surface_bound(p.x, p.y, tool) < step.reach:
+                    fx, fy, limit = _contact(p, buffer[STRESS + k - begin], tool, step, law, damage)
+                    sums[block, FORCE_X] += fx
+                    sums[block, FORCE_Y] += fy
+                    sums[block, CONTACT_WORK] += step.time_step * (fx * p.vx + fy * p.vy)
                 on_grid &= _scatter(p, fx, fy, limit, nodes, grid, step)
     return on_grid
 

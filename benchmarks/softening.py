@@ -1,0 +1,109 @@
+"""What softening does to the chip: the paper's cut with different laws of flow stress and damage.
+
+    python benchmarks/softening.py [--cell 14] [NAME ...]
+
+Cell in um. Prints a Markdown table: forces, segments, degree of segmentation, shear band. The TANH
+law has the constants of Ti-6Al-4V (Ducobu et al. 2017, a 1.1, b 0.4, c 12, d 1) on the Johnson-Cook
+law of AISI 1045, for want of published ones for steel.
+"""
+
+import argparse
+from dataclasses import asdict, replace
+from math import nan
+from time import perf_counter
+
+from experiments import scene_of
+
+from chipglow.analysis import chip_metrics
+from chipglow.cutting import (
+    AISI_1045,
+    CuttingSimulation,
+    HyperbolicTangent,
+    JohnsonCookDamage,
+    Numerics,
+    OutputWindow,
+)
+from chipglow.scene import Frame, Raster
+
+WINDOW = OutputWindow(start=0.9e-3, interval=1e-6)
+RASTER = Raster(-560e-6, 460e-6, 2e-6, 270, 300)
+FRAMES_APART = 2
+
+
+def damaged(**changes: float) -> JohnsonCookDamage:
+    """The damage of AISI 1045 with other constants."""
+    assert AISI_1045.damage is not None
+    return replace(AISI_1045.damage, **changes)
+
+
+CASES = {
+    "johnson-cook": replace(AISI_1045, damage=None),
+    "circulating-damage": replace(AISI_1045, damage=damaged(d1=0.06, d2=3.31)),
+    "three-tenths": replace(AISI_1045, damage=damaged(d1=0.018, d2=0.993)),
+    "default": AISI_1045,
+    "half-energy": replace(AISI_1045, damage=damaged(fracture_energy=7.5e3)),
+    "double-energy": replace(AISI_1045, damage=damaged(fracture_energy=30e3)),
+    "loss-0.7": replace(AISI_1045, damage=damaged(loss=0.7)),
+    "tanh": replace(
+        AISI_1045,
+        damage=None,
+        flow_stress=HyperbolicTangent(
+            **asdict(AISI_1045.flow_stress),
+            hardening_limit=1.1,
+            recovery_temperature=0.4,
+            recovery_strain=12.0,
+            softening_temperature=1.0,
+        ),
+    ),
+}
+
+
+def row(name: str, cell: float) -> list[str]:
+    """Run one cut and return its row of the table."""
+    simulation = CuttingSimulation(workpiece=CASES[name], numerics=Numerics(cell=cell))
+    frames: list[Frame] = []
+    passed = iter(range(1_000_000))
+
+    def keep(frame: Frame) -> None:
+        if next(passed) % FRAMES_APART == 0:
+            frames.append(frame)
+
+    start = perf_counter()
+    history = simulation.run(WINDOW, RASTER, keep)
+    seconds = perf_counter() - start
+    chip = chip_metrics(
+        scene_of(frames, history, RASTER, simulation.tool), simulation.conditions.feed
+    )
+    values = (
+        (chip.cutting_mean / 1e3, "{:.0f}"),
+        (chip.cutting_swing / 1e3, "{:.0f}"),
+        (chip.thrust_mean / 1e3, "{:.0f}"),
+        (chip.period * 1e6, f"{{:.0f}} ± {chip.period_uncertainty * 1e6:.0f}"),
+        (chip.frequency / 1e3, "{:.1f}"),
+        (chip.spacing * 1e6, "{:.0f}"),
+        (chip.degree * 100 if chip.segments > 1 else nan, "{:.0f}"),
+        (chip.band_width * 1e6, "{:.0f}"),
+        (chip.band_strain, "{:.1f}"),
+        (history.energy.closing_error[-1] * 100, "{:.2f}"),
+        (seconds, "{:.0f}"),
+    )
+    return [name, *(text.format(value) if value == value else "–" for value, text in values)]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--cell", type=float, default=14.0)
+    parser.add_argument("names", nargs="*", choices=list(CASES), metavar="NAME")
+    given = parser.parse_args()
+    print(
+        "| law | cutting force / (N/mm) | swing / (N/mm) | thrust / (N/mm) | period / us "
+        "| frequency / kHz | spacing / um | degree / % | band / um | band's strain "
+        "| unaccounted work / % | time / s |"
+    )
+    print("|---" * 12 + "|")
+    for name in given.names or CASES:
+        print("| " + " | ".join(row(name, given.cell * 1e-6)) + " |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
