@@ -25,9 +25,10 @@ class JohnsonCookDamage:
     Damage is the sum of plastic strain over the strain to failure,
     ε_f = (D₁ + D₂ exp(D₃ σ*))(1 + D₄ ln(ε̇/ε̇₀))(1 + D₅ θ), with the triaxiality
     σ* = mean stress / equivalent stress and θ as in `JohnsonCook`. When it is 1, the flow stress
-    begins to fall: by the factor 1 − loss · w, where w rises from 0 to 1 while the failing layer
-    takes up the fracture energy per area, dw = σ L dε / (2 G), σ being the undamaged flow stress
-    and L the layer's thickness in the solver. The energy thus does not depend on the cell.
+    begins to fall: by the factor 1 − loss · w, where w rises from 0 to 1 with the work of the
+    failing layer, dw = σ L dε / (2 G), σ being the undamaged flow stress and L the layer's
+    thickness in the solver. The energy thus does not depend on the cell: the layer takes up
+    (2 − loss) G, of which loss · G is above the strength that remains.
 
     Parameters
     ----------

@@ -86,9 +86,12 @@ def flow_stress_law(name: str, stress_and_slopes: Any = None) -> Callable[[_Law]
     """
 
     def register(law: _Law) -> _Law:
-        if LAWS.get(name, law).__qualname__ != law.__qualname__:
+        taken = LAWS.get(name, law)
+        if (taken.__module__, taken.__qualname__) != (law.__module__, law.__qualname__):
             raise ValueError(f"flow-stress law {name!r}: the name is taken")
-        numbers: Any = namedtuple("Numbers", [f.name for f in fields(law)])  # type: ignore[arg-type,misc]
+        # Numba tells compiled functions apart by the names of their arguments' types.
+        typename = f"Law{len(_KERNELS)}"
+        numbers: Any = namedtuple(typename, [f.name for f in fields(law)])  # type: ignore[arg-type,misc]
         # Numba's cache finds the type again by these.
         numbers.__module__ = law.__module__
         numbers.__qualname__ = f"{law.__qualname__}.Numbers"
