@@ -167,6 +167,23 @@ def _write(path: Path, old: str, new: str) -> Path:
         ("value: 0.9\n", f"value: {RATES}\n".replace("0.6", "6"), "rate table: value: expected 0"),
         ("value: 0.9\n", f"value: {RATES}\n".replace("1000", "0.1"), "rates must ascend"),
         ("value: 0.9\n", "value: [0.9]\n", "taylor_quinney: 0.9, expected [strain rate, value]"),
+        (
+            "  pantale:\n",
+            "  pantale:\n    law: cheese\n",
+            "law: 'cheese', expected one of johnson-cook",
+        ),
+        (
+            "  pantale:\n",
+            "  pantale:\n    law: [tanh]\n",
+            "flow_stress.pantale.law: ['tanh'], expected",
+        ),
+        ("  pantale:\n", "  pantale:\n    law: tanh\n", "pantale.hardening_limit: is missing"),
+        ("  pantale:\n", "  pantale:\n    damage: mine\n", "pantale.damage: 'mine', expected none"),
+        (
+            "15 kJ/m2",
+            "15 kJ",
+            "fracture_energy: '15 kJ', expected a fracture energy such as 15 kJ/m2",
+        ),
         ("kind: workpiece", "kind: [", "expected YAML"),
         ("kind: workpiece", "kind: !!python/object:os.system x", "expected YAML"),
     ],
@@ -179,6 +196,52 @@ def test_faults_name_file_field_value_and_expectation(
         read_material(path)
     assert str(raised.value).startswith("steel.yaml: ")
     assert message in str(raised.value)
+
+
+def test_a_set_names_its_law_and_whether_it_fails(tmp_path: Path) -> None:
+    data = yaml.safe_load((FOLDER / "aisi-4140.yaml").read_text(encoding="utf-8"))
+    softening = {
+        "law": "tanh", "damage": "none", "hardening_limit": 1.1, "recovery_temperature": 0.4,
+        "recovery_strain": 12, "softening_temperature": 1, "sharpness": 0.05,
+    }  # fmt: skip
+    data["flow_stress"]["mine"] = data["flow_stress"]["pantale"] | softening
+    (tmp_path / "steel.yaml").write_text(yaml.safe_dump(data), encoding="utf-8")
+    sets = read_material(tmp_path / "steel.yaml").workpieces
+    published, mine = sets["pantale"].flow_stress, sets["mine"].flow_stress
+    assert isinstance(published, JohnsonCook) and sets["pantale"].damage is not None
+    assert sets["mine"].damage is None
+    assert mine == HyperbolicTangent(
+        **asdict(published), hardening_limit=1.1, recovery_temperature=0.4, recovery_strain=12.0,
+        softening_temperature=1.0, sharpness=0.05,
+    )  # fmt: skip
+
+
+def test_a_material_that_does_not_fail(tmp_path: Path) -> None:
+    data = yaml.safe_load((FOLDER / "aisi-4140.yaml").read_text(encoding="utf-8"))
+    data["damage"] = "none"
+    (tmp_path / "steel.yaml").write_text(yaml.safe_dump(data), encoding="utf-8")
+    file = read_material(tmp_path / "steel.yaml")
+    assert file.workpieces["pantale"].damage is None
+    assert not [number for number in file.properties if number.field.startswith("damage")]
+
+
+def test_material_of_the_documentation(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[1] / "docs" / "materials.md").read_text(encoding="utf-8")
+    blocks = [text.partition("```")[0] for text in page.split("```yaml\n")[1:]]
+    whole, law, shares = (
+        next(text for text in blocks if text.startswith(key))
+        for key in ("kind: workpiece", "flow_stress:", "taylor_quinney:")
+    )
+    path = tmp_path / "steel.yaml"
+    path.write_text(whole, encoding="utf-8")
+    (mine,) = read_material(path).workpieces.values()
+    assert mine.damage is not None and mine.damage.fracture_energy == 15e3
+    data = yaml.safe_load(whole) | yaml.safe_load(shares)
+    data["flow_stress"]["softening"] = yaml.safe_load(law)["flow_stress"]["softening"]
+    path.write_text(yaml.safe_dump(data), encoding="utf-8")
+    soft = read_material(path).workpieces["softening"]
+    assert isinstance(soft.flow_stress, HyperbolicTangent) and soft.damage is None
+    assert isinstance(soft.taylor_quinney, RateTable)
 
 
 def test_heat_share_over_the_strain_rate(tmp_path: Path) -> None:
@@ -217,6 +280,19 @@ def test_the_cache_knows_a_materials_numbers(tmp_path: Path) -> None:
     assert json.dumps(_inputs(study)) == before
     _write(path, "210 GPa", "201 GPa")
     assert json.dumps(_inputs(study)) != before
+
+
+def test_the_cache_tells_laws_of_the_same_numbers_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Mine(JohnsonCook):
+        """Another law with the fields of Johnson and Cook's."""
+
+    study = Study()
+    simulation = study.cutting.simulation()
+    before = _inputs(study)
+    mine = Mine(**asdict(simulation.workpiece.flow_stress))
+    simulation = replace(simulation, workpiece=replace(simulation.workpiece, flow_stress=mine))
+    monkeypatch.setattr(type(study.cutting), "simulation", lambda self: simulation)
+    assert json.dumps(_inputs(study)) != json.dumps(before)
 
 
 def test_a_study_chooses_a_set() -> None:

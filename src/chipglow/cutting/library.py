@@ -325,7 +325,7 @@ class _Reader:
         law, damage = "johnson-cook", None
         if isinstance(rest, dict):
             law, damage = rest.pop("law", law), rest.pop("damage", None)
-        if law not in LAWS:
+        if not isinstance(law, str) or law not in LAWS:
             raise self._wrong(f"{place}.law", law, f"one of {', '.join(sorted(LAWS))}")
         if damage not in (None, "none"):
             raise self._wrong(f"{place}.damage", damage, "none, or to be left out")

@@ -116,6 +116,7 @@ def _inputs(study: Study) -> dict[str, Any]:
         "cutting": study.cutting.model_dump(exclude={"tool": {"outline"}}),
         "outline": tool.points if isinstance(tool, ToolOutline) else None,
         "workpiece": _numbers(simulation.workpiece),
+        "law": type(simulation.workpiece.flow_stress).__qualname__,
         "tool": _numbers(simulation.tool_material),
         "solver": SOLVER_VERSION,
         "format": SCENE_FORMAT,
