@@ -7,8 +7,15 @@ import pytest
 from analytic_chip import AnalyticChip
 
 from chipglow.analysis import Inertia, inertia
+from chipglow.analysis.paper import _unaccounted
 from chipglow.cli.inertia import say_inertia
-from chipglow.cutting import AISI_1045, CuttingConditions, CuttingSimulation, Numerics
+from chipglow.cutting import (
+    AISI_1045,
+    CuttingConditions,
+    CuttingSimulation,
+    EnergyHistory,
+    Numerics,
+)
 from chipglow.scene import ENERGY_UNITS, Scene
 
 CHIP = AnalyticChip(frames=3)
@@ -90,3 +97,10 @@ def test_a_warning_over_one_per_cent(kinetic, force, words, capsys):
     assert f"momentum flow {force:.2%} of the mean cutting force" in said
     assert ("Warning" in said) == bool(words)
     assert all(word in share.warning and word in said for word in words)
+
+
+def test_the_analysis_and_the_solver_close_the_account_alike():
+    size = CHIP.forces()[0].size
+    # Powers of two: no entry, nor a sum of some, can stand in for another.
+    account = {name: np.full(size, 2.0**-k) for k, name in enumerate(ENERGY_UNITS)}
+    assert _unaccounted(scene_with(**account)) == EnergyHistory(**account).closing_error[-1]

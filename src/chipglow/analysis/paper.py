@@ -533,6 +533,6 @@ def _unaccounted(scene: Scene) -> float:
         return nan
     last = {name: float(scene.data[name][-1]) for name in ENERGY_UNITS}
     given = last["drive_work"] + last["contact_work"]
-    kinds = ("kinetic_energy", "elastic_energy", "plastic_work", "friction_work")
+    kinds = ("kinetic_energy", "elastic_energy", "plastic_work", "friction_work", "sharing_loss")
     found = sum(last[name] for name in kinds)
     return (given - found) / last["drive_work"]
