@@ -2,7 +2,8 @@
 
 One thread a point, atomic sums on the grid, launches that are recorded once. Warp runs a kernel on
 one CPU core only, so its atomic sums are plain ones. Material points keep the order they come in.
-The mean density of a cell is taken over the points that are in it now.
+The mean density of a cell is taken over the points that are in it now. A point stores the velocity
+that it carries, not that of the grid, which only contact asks for.
 """
 
 from time import perf_counter
@@ -12,7 +13,9 @@ import numpy as np
 import warp as wp
 
 f64 = wp.float64
-ITERATIONS = wp.constant(6)
+Sums = wp.types.vector(length=5, dtype=f64)
+SLOWEST_RATE = wp.constant(f64(1.0))
+ITERATIONS = wp.constant(8)
 SMALL_CHANGE = wp.constant(f64(0.02))
 SMALL_STRAIN = wp.constant(f64(0.01))
 ZERO, HALF, ONE = wp.constant(f64(0.0)), wp.constant(f64(0.5)), wp.constant(f64(1.0))
@@ -48,13 +51,14 @@ class Step:
     heat_mass: f64
     volume: f64
     time_step: f64
+    kept: f64
     shear_modulus: f64
     bulk_modulus: f64
     heat_share: f64
 
 
 @wp.struct
-class Flow:
+class Law:
     yield_stress: f64
     hardening: f64
     hardening_exponent: f64
@@ -63,13 +67,20 @@ class Flow:
     melting_temperature: f64
     reference_temperature: f64
     reference_rate: f64
+
+
+@wp.struct
+class Damage:
     d1: f64
     d2: f64
     d3: f64
     d4: f64
     d5: f64
-    onset: f64
+    per_work: f64
     loss: f64
+    melting_temperature: f64
+    reference_temperature: f64
+    reference_rate: f64
 
 
 def filled(struct, numbers):
@@ -93,7 +104,7 @@ def weights(f: f64):
 
 @wp.kernel
 def gather(
-    points: wp.array(dtype=Point), velocity: wp.array2d(dtype=wp.vec2d),
+    points: wp.array(dtype=Point), velocity: wp.array2d(dtype=wp.vec4d),
     cells: wp.array2d(dtype=wp.vec2d), grid: Grid, step: Step,
 ):  # fmt: skip
     k = wp.tid()
@@ -103,17 +114,18 @@ def gather(
     fx, fy = s[0] - f64(i), s[1] - f64(j)
     wx, wy = weights(fx), weights(fy)
     dx, dy = wp.vec3d(-fx, ONE - fx, TWO - fx), wp.vec3d(-fy, ONE - fy, TWO - fy)
-    v = wp.vec2d()
+    sums = wp.vec4d()
     c = wp.mat22d()
     for a in range(3):
         for b in range(3):
             weighted = wx[a] * wy[b] * velocity[i + a, j + b]
-            v += weighted
-            c += wp.outer(weighted, wp.vec2d(dx[a], dy[b]))
+            sums += weighted
+            c += wp.outer(wp.vec2d(weighted[0], weighted[1]), wp.vec2d(dx[a], dy[b]))
     c = c * (FOUR / grid.cell)
+    v = wp.vec2d(sums[0], sums[1])
     x += step.time_step * v
     points[k].x = x
-    points[k].v = v
+    points[k].v = v + step.kept * (points[k].v + wp.vec2d(sums[2], sums[3]) - v)
     points[k].c = c
     s = scaled(x, grid)
     grown = points[k].volume * (ONE + step.time_step * wp.trace(c))
@@ -121,35 +133,43 @@ def gather(
 
 
 @wp.func
-def heat_of(temperature: f64, flow: Flow):
-    span = flow.melting_temperature - flow.reference_temperature
-    return wp.clamp((temperature - flow.reference_temperature) / span, ZERO, MOST_HEAT)
+def heat_of(temperature: f64, reference: f64, melting: f64):
+    return wp.clamp((temperature - reference) / (melting - reference), ZERO, MOST_HEAT)
 
 
 @wp.func
-def weakening(damage: f64, temperature: f64, flow: Flow):
-    heat = heat_of(temperature, flow)
-    if flow.thermal_exponent != ONE:
-        heat = wp.pow(heat, flow.thermal_exponent)
-    share = wp.clamp((damage - flow.onset) / (ONE - flow.onset), ZERO, ONE)
-    return (ONE - heat) * (ONE - flow.loss * share)
+def thermal(temperature: f64, law: Law):
+    heat = heat_of(temperature, law.reference_temperature, law.melting_temperature)
+    if law.thermal_exponent != ONE:
+        heat = wp.pow(heat, law.thermal_exponent)
+    return ONE - heat
 
 
 @wp.func
-def plastic_increment(trial: f64, strain: f64, weak: f64, guess: f64, step: Step, flow: Flow):
-    if trial <= flow.yield_stress * weak:
-        return ZERO
-    n = flow.hardening_exponent
-    power = wp.exp(n * wp.log(wp.max(strain, TINY)))
-    hard = (flow.yield_stress + flow.hardening * power) * weak
-    if trial <= hard:
-        return ZERO
+def weakening(damage: f64, numbers: Damage):
+    return ONE - numbers.loss * wp.clamp(damage - ONE, ZERO, ONE)
+
+
+@wp.func
+def hardened(strain: f64, law: Law):
+    held = wp.max(strain, TINY)
+    power = law.hardening * wp.exp(law.hardening_exponent * wp.log(held))
+    return law.yield_stress + power, law.hardening_exponent * power / held
+
+
+@wp.func
+def plastic_increment(trial: f64, strain: f64, weak: f64, guess: f64, step: Step, law: Law):
     stiffness = THREE * step.shear_modulus
-    slope = f64(0.0)
+    slowest = SLOWEST_RATE * step.time_step
+    base, slope = hardened(strain, law)
+    fast = ONE + law.rate_sensitivity * wp.log(wp.max(SLOWEST_RATE / law.reference_rate, ONE))
+    excess = trial - weak * base * fast
+    if excess <= ZERO:
+        return ZERO
+    firm = f64(0.0)
     if strain > SMALL_STRAIN:
-        slope = weak * flow.hardening * n * power / strain
-    bound = (trial - hard) / (stiffness + slope)
-    slowest = step.time_step * flow.reference_rate
+        firm = weak * slope * fast
+    bound = excess / (stiffness + firm)
     increment = f64(bound)
     if guess > TWO * slowest:
         increment = wp.min(guess, bound)
@@ -158,35 +178,35 @@ def plastic_increment(trial: f64, strain: f64, weak: f64, guess: f64, step: Step
         left -= 1
         if increment <= slowest:
             return wp.min(slowest, bound)
-        base = hard + slope * increment
-        if strain <= SMALL_STRAIN:
-            end = strain + increment
-            power = wp.exp(n * wp.log(end))
-            base = (flow.yield_stress + flow.hardening * power) * weak
-            slope = weak * flow.hardening * n * power / end
-        fast = ONE + flow.rate_sensitivity * wp.log(increment / slowest)
-        excess = trial - stiffness * increment - base * fast
-        fall = (stiffness + slope * fast) * increment + base * flow.rate_sensitivity
-        change = excess / fall
-        if wp.abs(change) < SMALL_CHANGE:
-            return increment * (ONE + change * (ONE + HALF * change))
-        increment = wp.min(increment * wp.exp(wp.max(change, -THREE)), bound)
+        base, slope = hardened(strain + increment, law)
+        ratio = increment / step.time_step / law.reference_rate
+        fast = ONE + law.rate_sensitivity * wp.log(wp.max(ratio, ONE))
+        by_rate = f64(0.0)
+        if ratio > ONE:
+            by_rate = base * law.rate_sensitivity
+        excess = trial - stiffness * increment - weak * base * fast
+        fall = stiffness * increment + weak * (slope * fast * increment + by_rate)
+        change = excess / wp.max(fall, HALF * stiffness * increment)
+        increment *= wp.exp(wp.clamp(change, -THREE, THREE))
+        increment = wp.min(increment, trial / stiffness)
+        if wp.abs(change) <= SMALL_CHANGE:
+            return increment
     return increment
 
 
 @wp.func
-def strain_to_failure(triaxiality: f64, rate: f64, temperature: f64, flow: Flow):
+def strain_to_failure(triaxiality: f64, rate: f64, temperature: f64, law: Damage):
     held = wp.clamp(triaxiality, -UNMEASURED, UNMEASURED)
-    fast = ONE + flow.d4 * wp.log(wp.max(rate / flow.reference_rate, ONE))
-    warm = ONE + flow.d5 * heat_of(temperature, flow)
-    return (flow.d1 + flow.d2 * wp.exp(flow.d3 * held)) * fast * warm
+    fast = ONE + law.d4 * wp.log(wp.max(rate / law.reference_rate, ONE))
+    heat = heat_of(temperature, law.reference_temperature, law.melting_temperature)
+    return (law.d1 + law.d2 * wp.exp(law.d3 * held)) * fast * (ONE + law.d5 * heat)
 
 
 @wp.kernel
 def stress_and_scatter(
-    points: wp.array(dtype=Point), nodes: wp.array2d(dtype=wp.vec3d),
+    points: wp.array(dtype=Point), nodes: wp.array2d(dtype=Sums),
     cells: wp.array2d(dtype=wp.vec2d), capacities: wp.array(dtype=f64),
-    grid: Grid, step: Step, flow: Flow,
+    grid: Grid, step: Step, law: Law, damage: Damage,
 ):  # fmt: skip
     k = wp.tid()
     p = points[k]
@@ -201,8 +221,9 @@ def stress_and_scatter(
     xx = p.d[0] + spin * p.d[2] + two_g * (p.c[0, 0] - third)
     yy = p.d[1] - spin * p.d[2] + two_g * (p.c[1, 1] - third)
     trial = wp.sqrt(THREE * (xx * xx + yy * yy + xx * yy + xy * xy))
-    weak = weakening(p.damage, p.temperature, flow)
-    increment = plastic_increment(trial, p.strain, weak, p.increment, step, flow)
+    kept = weakening(p.damage, damage)
+    weak = kept * thermal(p.temperature, law)
+    increment = plastic_increment(trial, p.strain, weak, p.increment, step, law)
     tension = step.bulk_modulus * (volume / step.volume - ONE)
     if increment > ZERO:
         stress = trial - THREE * step.shear_modulus * increment
@@ -211,9 +232,12 @@ def stress_and_scatter(
         yy *= scale
         xy *= scale
         points[k].strain = p.strain + increment
-        points[k].damage = p.damage + increment / strain_to_failure(
-            tension / stress, increment / dt, p.temperature, flow
-        )
+        growth = increment * stress / kept * damage.per_work
+        if p.damage < ONE:
+            growth = increment / strain_to_failure(
+                tension / stress, increment / dt, p.temperature, damage
+            )
+        points[k].damage = p.damage + growth
         capacity = capacities[wp.clamp(int(p.temperature - COLDEST), 0, capacities.shape[0] - 1)]
         heat = step.heat_share * stress * increment * volume
         points[k].temperature = p.temperature + heat / (step.heat_mass * capacity)
@@ -222,35 +246,39 @@ def stress_and_scatter(
     points[k].d = wp.vec3d(xx, yy, xy)
     force = FOUR / grid.cell * dt * volume
     sigma = wp.mat22d(xx + tension, xy, xy, yy + tension)
-    affine = step.mass * grid.cell * p.c - force * sigma
+    spread = step.mass * grid.cell * p.c
     i, j = int(s[0] - HALF), int(s[1] - HALF)
     fx, fy = s[0] - f64(i), s[1] - f64(j)
     wx, wy = weights(fx), weights(fy)
     dx, dy = wp.vec3d(-fx, ONE - fx, TWO - fx), wp.vec3d(-fy, ONE - fy, TWO - fy)
     for a in range(3):
         for b in range(3):
-            m = step.mass * p.v + affine * wp.vec2d(dx[a], dy[b])
-            wp.atomic_add(nodes, i + a, j + b, wx[a] * wy[b] * wp.vec3d(step.mass, m[0], m[1]))
+            offset = wp.vec2d(dx[a], dy[b])
+            m = step.mass * p.v + spread * offset
+            h = -force * (sigma * offset)
+            sums = Sums(step.mass, m[0], m[1], h[0], h[1])
+            wp.atomic_add(nodes, i + a, j + b, wx[a] * wy[b] * sums)
 
 
 @wp.kernel
 def update_grid(
-    nodes: wp.array2d(dtype=wp.vec3d), velocity: wp.array2d(dtype=wp.vec2d),
+    nodes: wp.array2d(dtype=Sums), velocity: wp.array2d(dtype=wp.vec4d),
     cells: wp.array2d(dtype=wp.vec2d),
 ):  # fmt: skip
     i, j = wp.tid()
     node = nodes[i, j]
-    v = wp.vec2d()
+    v = wp.vec4d()
     if node[0] > ZERO:
-        v = wp.vec2d(node[1] / node[0], node[2] / node[0])
+        dx, dy = node[3] / node[0], node[4] / node[0]
+        v = wp.vec4d(node[1] / node[0] + dx, node[2] / node[0] + dy, dx, dy)
     velocity[i, j] = v
-    nodes[i, j] = wp.vec3d()
+    nodes[i, j] = Sums()
     cells[i, j] = wp.vec2d()
 
 
 class Stepper:
     # Two passes over a record of 16 numbers; per node velocity, sums and density of the cell.
-    bytes_per_point = 4 * 16 * 8 + (2 * 16 + 4 * 24 + 4 * 16) / 4
+    bytes_per_point = 8 * (4 * 16 + (2 * 4 + 4 * 5 + 4 * 2) / 4)
 
     def __init__(self, start, threads):
         wp.config.log_level = wp.LOG_ERROR
@@ -260,21 +288,19 @@ class Stepper:
         self.start, self.count = start, start.points.size
         shape = (start.grid.columns, start.grid.rows)
         self.points = wp.zeros(self.count, dtype=Point)
-        self.nodes = wp.zeros(shape, dtype=wp.vec3d)
+        self.nodes = wp.zeros(shape, dtype=Sums)
         self.cells = wp.zeros(shape, dtype=wp.vec2d)
-        self.velocity = wp.zeros(shape, dtype=wp.vec2d)
+        self.velocity = wp.zeros(shape, dtype=wp.vec4d)
         capacity = wp.array(start.capacity, dtype=f64)
         step = SimpleNamespace(**start.step._asdict(), heat_share=start.heat_shares[1, 0])
-        grid, step, flow = (
-            filled(struct, numbers)
-            for struct, numbers in ((Grid, start.grid), (Step, step), (Flow, start.flow))
-        )
+        numbers = (start.grid, step, start.law, start.damage)
+        grid, step, law, damage = map(filled, (Grid, Step, Law, Damage), numbers)
         launches = (
             (gather, self.count, [self.points, self.velocity, self.cells, grid, step]),
             (
                 stress_and_scatter,
                 self.count,
-                [self.points, self.nodes, self.cells, capacity, grid, step, flow],
+                [self.points, self.nodes, self.cells, capacity, grid, step, law, damage],
             ),
             (update_grid, shape, [self.nodes, self.velocity, self.cells]),
         )
@@ -287,7 +313,7 @@ class Stepper:
         p = self.start.points
         records = np.zeros(self.count, Point.numpy_dtype())
         records["x"] = np.stack([p["x"], p["y"]], 1)
-        records["v"] = np.stack([p["vx"], p["vy"]], 1)
+        records["v"] = np.stack([p["own_vx"], p["own_vy"]], 1)
         rates = [p[name] for name in ("cxx", "cxy", "cyx", "cyy")]
         records["c"] = np.stack(rates, 1).reshape(-1, 2, 2)
         records["d"] = np.stack([p[name] for name in ("dxx", "dyy", "dxy")], 1)
@@ -309,6 +335,6 @@ class Stepper:
     def result(self):
         p = self.points.numpy()
         return {
-            "vx": p["v"][:, 0], "volume": p["volume"], "dxy": p["d"][:, 2],
+            "own_vx": p["v"][:, 0], "volume": p["volume"], "dxy": p["d"][:, 2],
             "strain": p["strain"], "damage": p["damage"], "temperature": p["temperature"],
         }  # fmt: skip
