@@ -56,6 +56,7 @@ _CONTACT_STIFFNESS: Final = 50e9
 _CONTACT_DAMPING: Final = 0.2
 _KEPT: Final = 1.0
 _LARGEST_DRIFT: Final = 0.1
+_FASTEST_DRIFT: Final = 0.4
 _HEAT_STABILITY: Final = 0.2
 
 
@@ -248,15 +249,14 @@ class _State:
         self.grid = _grid(numerics)
         self.tool = simulation.tool.surface
         self.speed, self.spacing = conditions.speed, spacing
-        self.cycles, self.steps, time_step = _time_steps(simulation, interval)
-        self.interval, self.cycle = interval, interval / self.cycles
+        self.simulation, self.interval = simulation, interval
         heat_mass = material.density * spacing**2
         mass = heat_mass * numerics.mass_scaling
         self.step = Step(
             mass=mass,
             heat_mass=heat_mass,
             volume=spacing**2,
-            time_step=time_step,
+            time_step=0.0,
             kept=_KEPT,
             shear_modulus=material.shear_modulus,
             bulk_modulus=material.bulk_modulus,
@@ -297,6 +297,7 @@ class _State:
         self.top = numerics.height
         self._start_points(conditions, numerics)
         self.time = 0.0
+        self._choose_steps()
         self.work = np.zeros(SUMS)
         self.carried = 0.0
         self.lost_heat = 0.0
@@ -348,6 +349,7 @@ class _State:
     @np.errstate(invalid="ignore", over="ignore")  # `find_trouble` finds what is not finite
     def advance(self) -> NDArray[np.float64]:
         """Advance by one interval; mean forces in N/m, then the energies of `EnergyHistory`."""
+        self._choose_steps()
         sums = np.zeros_like(self.work)
         for _ in range(self.cycles):
             before = self._held().sum()
@@ -384,6 +386,18 @@ class _State:
         return np.concatenate(
             [forces, [drive, self.work[CONTACT_WORK]], held, used, [self.lost_heat]]
         )
+
+    def _choose_steps(self) -> None:
+        """Time step and cycles of the next interval, by the fastest point."""
+        points = self.points[: self.count]
+        speed = np.hypot(points["vx"], points["vy"])
+        fastest, sound = float(speed.max()), _sound(self.simulation)
+        if fastest > sound:
+            what = f"speed of {fastest:.0f} m/s, over the {sound:.0f} m/s of sound, scaled mass"
+            self._fail(what, int(speed.argmax()))
+        self.cycles, self.steps, time_step = _time_steps(self.simulation, self.interval, fastest)
+        self.cycle = self.interval / self.cycles
+        self.step = self.step._replace(time_step=time_step)
 
     def _held(self) -> NDArray[np.float64]:
         """Kinetic and elastic energy of the points in J/m."""
@@ -497,16 +511,27 @@ def _grid(numerics: Numerics) -> Grid:
     )
 
 
-def _time_steps(simulation: CuttingSimulation, interval: float) -> tuple[int, int, float]:
+def _sound(simulation: CuttingSimulation) -> float:
+    """Speed of sound in the workpiece with its scaled mass in m/s."""
+    material = simulation.workpiece
+    modulus = material.bulk_modulus + 4 / 3 * material.shear_modulus
+    return float(np.sqrt(modulus / (material.density * simulation.numerics.mass_scaling)))
+
+
+def _time_steps(
+    simulation: CuttingSimulation, interval: float, fastest: float
+) -> tuple[int, int, float]:
     """Cycles in an interval, steps in a cycle, and the time step in s.
 
-    Within a cycle no point may drift far from the cell it was sorted into and explicit conduction
-    must be stable; within a step sound may not cross a cell.
+    Within a cycle no point may drift far from the cell it was sorted into, the `fastest` (m/s) as
+    little as the others, and explicit conduction must be stable; within a step sound may not cross
+    a cell of the moving material.
     """
     material, numerics = simulation.workpiece, simulation.numerics
-    modulus = material.bulk_modulus + 4 / 3 * material.shear_modulus
-    sound = np.sqrt(modulus / (material.density * numerics.mass_scaling))
-    drift = _LARGEST_DRIFT * numerics.cell / simulation.conditions.speed
+    drift = min(
+        _LARGEST_DRIFT * numerics.cell / simulation.conditions.speed,
+        _FASTEST_DRIFT * numerics.cell / max(fastest, 1e-9),
+    )
     tool = simulation.tool_material
     diffusivity = max(
         tool.conductivity / (tool.density * tool.heat_capacity),
@@ -514,7 +539,8 @@ def _time_steps(simulation: CuttingSimulation, interval: float) -> tuple[int, in
     )
     heat = _HEAT_STABILITY * numerics.cell**2 / diffusivity
     cycles = ceil(interval / min(drift, heat))
-    steps = ceil(interval / cycles / (numerics.courant * numerics.cell / sound))
+    crossing = numerics.cell / (_sound(simulation) + fastest)
+    steps = ceil(interval / cycles / (numerics.courant * crossing))
     return cycles, steps, interval / cycles / steps
 
 
