@@ -26,7 +26,7 @@ class Inertia:
     force_share : float
         Momentum that the scaled mass brings to the tool per time, ρV² times uncut chip thickness,
         over the mean cutting force; NaN where the scene does not tell it. By the balance of
-        momentum a chip that leaves at v makes a share of |V − v|/V of it a force.
+        momentum a chip that leaves at v makes a share abs(V − v)/V of it a force.
     mass_scaling : float
         Factor on the density: the true mass has this much less of both.
     """
