@@ -48,7 +48,7 @@ from chipglow.cutting.watch import Trouble, find_lost, find_off_grid, find_troub
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.surface import Surface, surface_distance
 
-SOLVER_VERSION: Final = "4"
+SOLVER_VERSION: Final = "5"
 """Changes whenever the same input gives another result."""
 
 _MARGIN: Final = 4
