@@ -17,6 +17,7 @@ from chipglow.cutting import (
     FlowStress,
     HyperbolicTangent,
     JohnsonCook,
+    MarusichOrtiz,
     flow_stress_law,
 )
 from chipglow.cutting.damage import BAND_CELLS, Damage, damage_growth, weakening
@@ -164,6 +165,19 @@ def test_slopes_are_those_of_the_stress(strain, rate, temperature, law):
     assert by_strain * strain == pytest.approx(central, **near)
     central = np.diff(law.at(strain, rates, temperature))[0] / (2 * step)
     assert by_rate == pytest.approx(central, **near)
+
+
+def test_marusich_ortiz_by_hand():
+    law = MarusichOrtiz(400e6, 0.01, 1e3, 300.0, 5.0, 20.0, 1e-3)
+    # 400 MPa × (1 − 0.001 × 400) × (1 + 0.31/0.01)^(1/5) × (1 + 1e6/1e3)^(1/20)
+    # = 240 MPa × 2 × 1.412608
+    assert law.at(0.31, 1e6, 700.0) == pytest.approx(678.052e6, rel=1e-5)
+    # 1 % is left from 1290 K on; the line itself would end at 1300 K.
+    assert law.at(0.31, 1e6, 1500.0) == pytest.approx(678.052e6 / 60, rel=1e-5)
+    assert law.melting_temperature == 1300.0
+    assert replace(law, thermal_softening=0.0).melting_temperature == 3000.0
+    with pytest.raises(ValueError, match="rate_exponent: expected over 0, got -1"):
+        replace(law, rate_exponent=-1)
 
 
 def test_the_rate_does_not_matter_below_the_reference():

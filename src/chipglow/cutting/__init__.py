@@ -11,7 +11,7 @@ from chipglow.cutting.conditions import (
 from chipglow.cutting.damage import JohnsonCookDamage
 from chipglow.cutting.energy import EnergyHistory
 from chipglow.cutting.flow_stress import FlowStress, flow_stress_law
-from chipglow.cutting.laws import HyperbolicTangent, JohnsonCook
+from chipglow.cutting.laws import HyperbolicTangent, JohnsonCook, MarusichOrtiz
 from chipglow.cutting.library import (
     AISI_1045,
     CARBIDE,
@@ -51,6 +51,7 @@ __all__ = [
     "HyperbolicTangent",
     "JohnsonCook",
     "JohnsonCookDamage",
+    "MarusichOrtiz",
     "MaterialError",
     "MaterialFile",
     "Numerics",

@@ -154,6 +154,63 @@ class HyperbolicTangent(FlowStress):
         return strength * (residual + (1.0 - residual) * kept)
 
 
+@flow_stress_law("marusich-ortiz")
+@dataclass(frozen=True)
+class MarusichOrtiz(FlowStress):
+    """Power law of Marusich and Ortiz (1995), Int. J. Numer. Methods Eng. 38, 3675.
+
+    σ = σ₀ (1 − α (T − T₀)) (1 + ε/ε₀)^(1/n) (1 + ε̇/ε̇₀)^(1/m): it hardens by powers and loses
+    strength linearly with temperature, down to 1 % of it. (Equation as widely cited; the paper was
+    not seen.)
+
+    Parameters
+    ----------
+    yield_stress : float
+        σ₀ in Pa.
+    reference_strain, reference_rate, reference_temperature : float
+        ε₀, ε̇₀ in 1/s and T₀ in K.
+    hardening_exponent, rate_exponent : float
+        n and m.
+    thermal_softening : float
+        α in 1/K.
+    """
+
+    yield_stress: float
+    reference_strain: float
+    reference_rate: float
+    reference_temperature: float
+    hardening_exponent: float
+    rate_exponent: float
+    thermal_softening: float
+
+    def __post_init__(self) -> None:
+        for name in (
+            "yield_stress", "reference_strain", "reference_rate", "reference_temperature",
+            "hardening_exponent", "rate_exponent",
+        ):  # fmt: skip
+            check_positive(f"Marusich-Ortiz {name}", getattr(self, name))
+        if not 0 <= self.thermal_softening < np.inf:
+            raise ValueError(
+                f"Marusich-Ortiz thermal_softening: expected 0 or more 1/K, "
+                f"got {self.thermal_softening!r} 1/K"
+            )
+
+    @property
+    def melting_temperature(self) -> float:
+        """Temperature in K at which the line meets nought."""
+        if self.thermal_softening == 0:
+            return MELTING_LIMIT
+        return min(self.reference_temperature + 1.0 / self.thermal_softening, MELTING_LIMIT)
+
+    @staticmethod
+    def stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
+        """Flow stress in Pa."""
+        heat = law.thermal_softening * (temperature - law.reference_temperature)
+        hard = (1.0 + strain / law.reference_strain) ** (1.0 / law.hardening_exponent)
+        fast = (1.0 + rate / law.reference_rate) ** (1.0 / law.rate_exponent)
+        return law.yield_stress * max(1.0 - heat, 0.01) * hard * fast
+
+
 def check_positive(name: str, value: float) -> None:
     """Raise ValueError unless a value is finite and over 0."""
     if not (isfinite(value) and value > 0):

@@ -87,6 +87,7 @@ _HEAT_CAPACITY: Final = _Quantity(
 )
 _NUMBER: Final = _Quantity("a number without a unit", {"": ("1", "0")})
 
+_PER_KELVIN: Final = _Quantity("a softening such as 7e-4 1/K", _quantity(**{"1/K": "1"}))
 _FRACTURE_ENERGY: Final = _Quantity(
     "a fracture energy such as 15 kJ/m2", _quantity(**{"J/m2": "1", "kJ/m2": "1e3"})
 )
@@ -96,13 +97,14 @@ _LAW_FIELDS: Final = {
     "melting_temperature": _TEMPERATURE,
     "reference_temperature": _TEMPERATURE,
     "reference_rate": _RATE,
+    "thermal_softening": _PER_KELVIN,
 }
 _ANY: Final = _Quantity(
     "a number, or a stress, temperature or strain rate with its unit",
     {**_NUMBER.units, **_STRESS.units, **_TEMPERATURE.units, **_RATE.units},
 )
 """Fields of laws that chipglow does not know: their class says what they are."""
-_OWN_LAWS: Final = ("johnson-cook", "tanh")
+_OWN_LAWS: Final = ("johnson-cook", "tanh", "marusich-ortiz")
 _DAMAGE: Final = {
     **dict.fromkeys(("d1", "d2", "d3", "d4", "d5", "loss"), _NUMBER),
     "fracture_energy": _FRACTURE_ENERGY,
