@@ -10,6 +10,7 @@ import yaml
 from experiments import Experiment, Means, Published
 
 from chipglow.cutting import EnergyHistory, ForceHistory
+from chipglow.cutting.energy import ENERGIES
 
 MEANS = Means(
     cutting_force=330e3,
@@ -149,7 +150,7 @@ def test_drift_is_the_change_of_the_mean_from_half_to_half():
     time = 1e-6 * np.arange(1, 101)
     # Forty records do not count; the halves of what is left have means of 340 and 374 kN/m.
     cutting = np.repeat([100e3, 340e3, 374e3], [40, 30, 30])
-    none = EnergyHistory(*np.zeros((6, 100)))
+    none = EnergyHistory(*np.zeros((ENERGIES, 100)))
     history = ForceHistory(time, cutting, np.full(100, 1e5), none)
     assert experiments.drift(history) == pytest.approx(0.1, rel=1e-12)
 

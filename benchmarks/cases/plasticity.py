@@ -126,10 +126,9 @@ def adiabatic_shear(steps=(4e-3, 2e-3, 1e-3)):
 
 def pressed_block(coefficient, material=ELASTIC):
     """Normal and tangential force in N/m of a block that slides up an upright face."""
-    geometry = ToolGeometry()
-    radius = geometry.edge_radius
     # The rake face turned upright, where the block meets it squarely, far above the edge.
-    tool = (SIDE + radius, -1.0, radius, -1.0, 0.0, 0.0, 1.0, *geometry.coefficients[7:])
+    upright = ToolGeometry(rake_angle=0.0)
+    tool = upright.surface._replace(x=SIDE + upright.edge_radius, y=-1.0)
     block = Block((SIDE, SIDE), material=material, tool=tool, friction=coefficient)
     block.set_velocity(lambda x, y: 1.0 + 0 * x * y, lambda x, y: 4.0 + 0 * x * y)
     block.advance(9)

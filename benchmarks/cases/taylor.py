@@ -42,9 +42,8 @@ STEEL = replace(
 
 def wall(x):
     """A tool whose rake face is the plane at x (m), far above the edge."""
-    geometry = ToolGeometry()
-    radius = geometry.edge_radius
-    return (x + radius, -1.0, radius, -1.0, 0.0, 0.0, 1.0, *geometry.coefficients[7:])
+    upright = ToolGeometry(rake_angle=0.0)
+    return upright.surface._replace(x=x + upright.edge_radius, y=-1.0)
 
 
 class Shape(NamedTuple):

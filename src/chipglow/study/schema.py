@@ -238,7 +238,8 @@ class FrictionSection(Part):
     thermal_exponent: Annotated[float | None, *_NONE] = _field(
         "none",
         "Exponent q of a coefficient that falls with the temperature T of the chip's surface,\n"
-        "coefficient * (1 - (T / T_melt)^q) with both in K (Moufki et al. 1998); or none.",
+        "coefficient * (1 - (T / T_melt)^q) with both in K (Moufki et al. 1998).",
+        "over 0, up to 100, or none",
     )
 
     def build(self) -> Friction:
@@ -254,13 +255,19 @@ class SurroundingsSection(Part):
     """What free surfaces lose heat to."""
 
     convection: HeatTransfer = _field(
-        "0 W/m^2/K", "Coefficient of the heat transfer to the air, of all free surfaces."
+        "0 W/m^2/K",
+        "Coefficient of the heat transfer to the air, of all free surfaces.",
+        "0 W/m^2/K to 1000000 W/m^2/K",
     )
     emissivity: float = _field(
-        0.0, "Total hemispherical emissivity with which free surfaces cool; not the camera's."
+        0.0,
+        "Total hemispherical emissivity with which free surfaces cool; not the camera's.",
+        "0 to 1",
     )
     temperature: Temperature = _field(
-        "20 degC", "Temperature of the air and of what the surfaces radiate to."
+        "20 degC",
+        "Temperature of the air and of what the surfaces radiate to.",
+        "over -273.15 degC, up to 1226.85 degC",
     )
 
     def build(self) -> Surroundings:
@@ -653,9 +660,8 @@ class Study(Section):
             {
                 "title": "Quick look at the study of Heigel and Whitenton (2010)",
                 "cutting": {
-                    "length_of_cut": "1.4 mm",
-                    "numerics": {"cell": "15 um"},
-                    "window": {"start": "1.021 mm", "end": "1.4 mm", "interval": "0.5 us"},
+                    "numerics": {"cell": "20 um"},
+                    "window": {"interval": "0.5 us"},
                     "field_of_view": {"spacing": "1.33334 um", "rows": 405, "columns": 450},
                 },
                 "analysis": {"instants": 5, "psf_widths": ["4 um", "8 um", "12 um", "20 um"]},
