@@ -253,8 +253,8 @@ def vibrations(cells=(20e-6, 40e-6 / 3, 10e-6, 40e-6 / 6)):
 
 
 def convergence(axes, cells, errors, names, colours):
-    """Errors over the cell on logarithmic axes, and the slope of second order."""
-    cells = np.array(cells) / MICRO
+    """Size of errors over the cell on logarithmic axes, and the slope of second order."""
+    cells, errors = np.array(cells) / MICRO, np.abs(errors)
     for line, name, colour in zip(errors, names, colours, strict=True):
         axes.loglog(cells, line, "o-", color=colour, label=name, markersize=4)
     slope = np.max(errors) * (cells / cells.max()) ** 2
