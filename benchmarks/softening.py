@@ -93,8 +93,10 @@ def row(name: str, cell: float) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--cell", type=float, default=14.0)
-    parser.add_argument("names", nargs="*", choices=list(CASES), metavar="NAME")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(CASES))
     given = parser.parse_args()
+    if unknown := set(given.names) - set(CASES):
+        parser.error(f"{sorted(unknown)[0]!r}, expected some of {', '.join(CASES)}")
     print(
         "| law | cutting force / (N/mm) | swing / (N/mm) | thrust / (N/mm) | period / us "
         "| frequency / kHz | spacing / um | degree / % | band / um | band's strain "
