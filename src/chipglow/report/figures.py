@@ -214,6 +214,8 @@ def error_lines(result: StudyResult) -> Figure:
         linewidth=1.0,
         label="the paper's error beside the band",
     )
+    # The line is no axis: it needs room below.
+    right.set_ylim(bottom=min(right.get_ylim()[0], 1.1 * PAPER.band_worst.value))
     right.set_title(f"b) across the shear band, {result.plan.band_surface}")
     right.set_xlabel("distance from the ridge / µm\n← workpiece      chip →")
     for axes in (left, right):
