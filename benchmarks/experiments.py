@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from chipglow.analysis import chip_metrics
+from chipglow.analysis import ChipMetrics, chip_metrics
 from chipglow.cutting import (
     SOLVER_VERSION,
     CuttingConditions,
@@ -167,20 +167,9 @@ def view(simulation: CuttingSimulation) -> Raster:
 
 def compute(simulation: CuttingSimulation) -> Means:
     """Run a cut and take its means over what follows the first build-up of the chip."""
-    conditions = simulation.conditions
-    length = conditions.length_of_cut
-    window = OutputWindow(BUILD_UP * length, length, STEP / conditions.speed)
-    frames: list[Frame] = []
-    passed = iter(range(1_000_000))
-
-    def keep(frame: Frame) -> None:
-        if next(passed) % STEPS_A_FRAME == 0:
-            frames.append(frame)
-
-    raster, start = view(simulation), perf_counter()
-    history = simulation.run(window, raster, keep)
-    seconds = perf_counter() - start
-    chip = chip_metrics(scene_of(frames, history, raster, simulation.tool), conditions.feed)
+    length = simulation.conditions.length_of_cut
+    window = OutputWindow(BUILD_UP * length, length, STEP / simulation.conditions.speed)
+    chip, history, seconds = cut(simulation, window)
     return Means(
         cutting_force=chip.cutting_mean,
         thrust_force=chip.thrust_mean,
@@ -192,6 +181,24 @@ def compute(simulation: CuttingSimulation) -> Means:
         unaccounted=float(history.energy.closing_error[-1]),
         seconds=seconds,
     )
+
+
+def cut(
+    simulation: CuttingSimulation, window: OutputWindow
+) -> tuple[ChipMetrics, ForceHistory, float]:
+    """Run a cut: its chip, its forces, and the seconds it took."""
+    frames: list[Frame] = []
+    passed = iter(range(1_000_000))
+
+    def keep(frame: Frame) -> None:
+        if next(passed) % STEPS_A_FRAME == 0:
+            frames.append(frame)
+
+    raster, start = view(simulation), perf_counter()
+    history = simulation.run(window, raster, keep)
+    seconds = perf_counter() - start
+    scene = scene_of(frames, history, raster, simulation.tool)
+    return chip_metrics(scene, simulation.conditions.feed), history, seconds
 
 
 def scene_of(

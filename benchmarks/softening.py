@@ -10,11 +10,9 @@ law of AISI 1045, for want of published ones for steel.
 import argparse
 from dataclasses import asdict, replace
 from math import nan
-from time import perf_counter
 
-from experiments import scene_of, view
+from experiments import cut
 
-from chipglow.analysis import chip_metrics
 from chipglow.cutting import (
     AISI_1045,
     CuttingSimulation,
@@ -23,10 +21,8 @@ from chipglow.cutting import (
     Numerics,
     OutputWindow,
 )
-from chipglow.scene import Frame
 
 WINDOW = OutputWindow(start=0.9e-3, interval=1e-6)
-FRAMES_APART = 2
 
 
 def damaged(**changes: float) -> JohnsonCookDamage:
@@ -60,19 +56,7 @@ CASES = {
 def row(name: str, cell: float) -> list[str]:
     """Run one cut and return its row of the table."""
     simulation = CuttingSimulation(workpiece=CASES[name], numerics=Numerics(cell=cell))
-    frames: list[Frame] = []
-    passed = iter(range(1_000_000))
-
-    def keep(frame: Frame) -> None:
-        if next(passed) % FRAMES_APART == 0:
-            frames.append(frame)
-
-    raster, start = view(simulation), perf_counter()
-    history = simulation.run(WINDOW, raster, keep)
-    seconds = perf_counter() - start
-    chip = chip_metrics(
-        scene_of(frames, history, raster, simulation.tool), simulation.conditions.feed
-    )
+    chip, history, seconds = cut(simulation, WINDOW)
     values = (
         (chip.cutting_mean / 1e3, "{:.0f}"),
         (chip.cutting_swing / 1e3, "{:.0f}"),

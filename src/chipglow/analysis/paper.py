@@ -19,6 +19,7 @@ from chipglow.analysis.sensitivity import PSF_ORDERS, Sensitivity, Setting, sens
 from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear_band
 from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.camera.exposure import expose, frame_weights
+from chipglow.cutting import EnergyHistory
 from chipglow.radiometry import Band
 from chipglow.scene import ENERGY_UNITS, Frame, Material, Raster, Scene, Tool
 from chipglow.surface import EmissivityField, Surface
@@ -528,11 +529,8 @@ def _forces(scene: Scene) -> ForceHistory | None:
 
 
 def _unaccounted(scene: Scene) -> float:
-    """What the energy account does not find again over the work."""
+    """Share of the drive's work that the energy account does not find again, at the end."""
     if "drive_work" not in scene.data:
         return nan
-    last = {name: float(scene.data[name][-1]) for name in ENERGY_UNITS}
-    given = last["drive_work"] + last["contact_work"]
-    kinds = ("kinetic_energy", "elastic_energy", "plastic_work", "friction_work", "sharing_loss")
-    found = sum(last[name] for name in kinds)
-    return (given - found) / last["drive_work"]
+    account = {name: np.asarray(scene.data[name].values, dtype=np.float64) for name in ENERGY_UNITS}
+    return float(EnergyHistory(**account).closing_error[-1])

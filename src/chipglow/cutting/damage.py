@@ -95,19 +95,8 @@ class Damage(NamedTuple):
         """Numbers of a law (None: nothing fails) on a grid with a cell in m."""
         if law is None:
             return cls(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e3, 0.0, 1.0)
-        per_work = BAND_CELLS * cell / (2 * law.fracture_energy)
-        return cls(
-            law.d1,
-            law.d2,
-            law.d3,
-            law.d4,
-            law.d5,
-            per_work,
-            law.loss,
-            law.melting_temperature,
-            law.reference_temperature,
-            law.reference_rate,
-        )
+        same = {name: getattr(law, name) for name in cls._fields if name != "per_work"}
+        return cls(per_work=BAND_CELLS * cell / (2 * law.fracture_energy), **same)
 
 
 @njit(**INLINE)

@@ -1,14 +1,11 @@
 """The energy account of a cut: where the work of the drive went."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Final
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-
-ENERGIES: Final = 8
-"""Number of an account's entries."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +47,10 @@ class EnergyHistory:
         held = self.kinetic_energy + self.elastic_energy
         used = self.plastic_work + self.friction_work + self.sharing_loss
         return (self.drive_work + self.contact_work - held - used) / self.drive_work
+
+
+ENERGIES: Final = len(fields(EnergyHistory))
+"""Number of an account's entries."""
 
 
 @njit(cache=True)

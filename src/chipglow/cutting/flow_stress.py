@@ -103,6 +103,11 @@ def flow_stress_law(name: str, stress_and_slopes: Any = None) -> Callable[[_Law]
     return register
 
 
+def comes_with_chipglow(kind: type) -> bool:
+    """Whether a law, or the named tuple of its numbers, is not a user's own."""
+    return kind.__module__.startswith("chipglow.")
+
+
 def _by_differences(stress: Callable[..., Any]) -> Any:
     law_stress = njit(**INLINE)(stress)
 

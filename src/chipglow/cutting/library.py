@@ -12,7 +12,7 @@ import yaml
 
 from chipglow.cutting import laws as _laws  # noqa: F401  (registers the laws)
 from chipglow.cutting.damage import JohnsonCookDamage
-from chipglow.cutting.flow_stress import LAWS
+from chipglow.cutting.flow_stress import LAWS, comes_with_chipglow
 from chipglow.cutting.material import (
     RateTable,
     TemperatureTable,
@@ -104,7 +104,6 @@ _ANY: Final = _Quantity(
     {**_NUMBER.units, **_STRESS.units, **_TEMPERATURE.units, **_RATE.units},
 )
 """Fields of laws that chipglow does not know: their class says what they are."""
-_OWN_LAWS: Final = ("johnson-cook", "tanh", "marusich-ortiz")
 _DAMAGE: Final = {
     **dict.fromkeys(("d1", "d2", "d3", "d4", "d5", "loss"), _NUMBER),
     "fracture_energy": _FRACTURE_ENERGY,
@@ -332,7 +331,7 @@ class _Reader:
         if damage not in (None, "none"):
             raise self._wrong(f"{place}.damage", damage, "none, or to be left out")
         kind = LAWS[law]
-        known = law in _OWN_LAWS
+        known = comes_with_chipglow(kind)
         quantities = {
             f.name: _LAW_FIELDS.get(f.name, _NUMBER) if known else _ANY
             for f in fields(kind)  # type: ignore[arg-type]

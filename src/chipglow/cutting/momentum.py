@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit, prange
 
 from chipglow.cutting.damage import weakening
-from chipglow.cutting.flow_stress import flow_stress
+from chipglow.cutting.flow_stress import comes_with_chipglow, flow_stress
 from chipglow.cutting.friction import friction_coefficient
 from chipglow.cutting.lanes import FAST, INLINE
 from chipglow.cutting.stress import BUFFER, LANES, STRESS, WORK, update_stresses
@@ -313,7 +313,7 @@ def advance_with(law: Any) -> Any:
     Compiled code is kept on disk for the laws that come with chipglow only: for a law of one's own
     it would not be seen that the law has changed.
     """
-    return advance if type(law).__module__.startswith("chipglow.") else _advance_afresh
+    return advance if comes_with_chipglow(type(law)) else _advance_afresh
 
 
 _advance_afresh = njit(parallel=True)(_advance)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import degrees, isfinite, nan
 
 from chipglow.analysis.chip import ChipMetrics
+from chipglow.report.quantity import quantity_text
 
 
 @dataclass(frozen=True)
@@ -37,18 +38,12 @@ class ChipRow:
     @property
     def value_text(self) -> str:
         """The number with its unit, or a dash."""
-        return self._text(self.value)
+        return quantity_text(self.value, self.unit, self.decimals)
 
     @property
     def spread_text(self) -> str:
         """The spread with its unit, or a dash."""
-        return self._text(self.spread)
-
-    def _text(self, value: float | None) -> str:
-        if value is None:
-            return "–"
-        number = f"{round(value, self.decimals):,.{max(self.decimals, 0)}f}".replace(",", " ")
-        return f"{number} {self.unit}".strip()
+        return quantity_text(self.spread, self.unit, self.decimals)
 
 
 def chip_rows(chip: ChipMetrics) -> list[ChipRow]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from chipglow.analysis.paper import PAPER, PaperValue, StudyResult
 from chipglow.report import evidence
+from chipglow.report.quantity import quantity_text
 
 
 @dataclass(frozen=True)
@@ -50,24 +51,18 @@ class Row:
     @property
     def paper_text(self) -> str:
         """The paper's figure with its unit, or a dash."""
-        return self._text(self.paper)
+        return quantity_text(self.paper, self.unit, self.decimals)
 
     @property
     def here_text(self) -> str:
         """Our figure with its unit, or a dash."""
-        return self._text(self.here)
+        return quantity_text(self.here, self.unit, self.decimals)
 
     @property
     def difference_text(self) -> str:
         """The difference with its sign and unit, or a dash; of shares in percentage points."""
-        text = self._text(self.difference, sign="+")
+        text = quantity_text(self.difference, self.unit, self.decimals, sign="+")
         return text.replace("%", "points")
-
-    def _text(self, value: float | None, sign: str = "") -> str:
-        if value is None:
-            return "–"
-        number = f"{round(value, self.decimals):{sign},.{max(self.decimals, 0)}f}"
-        return f"{number.replace(',', ' ').replace('-', '−')} {self.unit}".strip()
 
 
 def comparison_rows(result: StudyResult) -> list[Row]:
