@@ -455,3 +455,21 @@ def test_scene_in_memory_goes_to_a_file(tmp_path):
     write_scene(Scene.from_fields(RASTER, [0.0, 1e-6], fields), tmp_path / "scene.nc")
     for found, expected in zip(open_scene(tmp_path / "scene.nc").frames(), frames, strict=True):
         assert_as_kept(found, expected)
+
+
+def test_quality_flags_come_back_and_survive_a_copy(tmp_path):
+    flags = np.random.default_rng(5).integers(0, 256, RASTER.shape).astype(np.uint8)
+    with SceneWriter(tmp_path / "one.nc", RASTER, quality=True) as writer:
+        writer.append(a_frame(quality=flags))
+    write_scene(open_scene(tmp_path / "one.nc"), tmp_path / "two.nc")
+    assert np.array_equal(open_scene(tmp_path / "two.nc").frame(0).quality, flags)
+
+
+def test_quality_flags_are_bytes(tmp_path):
+    wrong = np.zeros(RASTER.shape, np.float32)
+    with (
+        pytest.raises(SceneError, match="quality has type float32"),
+        SceneWriter(tmp_path / "one.nc", RASTER, quality=True) as writer,
+    ):
+        writer.append(a_frame(quality=wrong))
+    assert not list(tmp_path.iterdir())

@@ -7,7 +7,7 @@ the surface.
 """
 
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numba import njit, prange
@@ -102,7 +102,8 @@ class Picture:
         empty = np.zeros(len(_FIELDS))
         empty[0] = self._ambient
         _sample(nodes, self._across, self._down, self._in_tool, limits, empty, samples, material)
-        return Frame(time=time, material=material, **dict(zip(_FIELDS, samples, strict=True)))
+        fields: dict[str, Any] = dict(zip(_FIELDS, samples, strict=True))
+        return Frame(time=time, material=material, **fields)
 
 
 def _placement(position: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

@@ -110,5 +110,6 @@ PACKING: Final[Mapping[str, Packing]] = {
     "material": Whole(),
     "material_x": Steps(np.int32, 20e-9),
     "material_y": Steps(np.int32, 20e-9),
+    "quality": Whole(),
 }
 """Resolution of each field of a scene."""

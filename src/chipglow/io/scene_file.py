@@ -23,14 +23,17 @@ from chipglow.io.unfinished import (
     has_checkpoint,
     write_checkpoint,
 )
-from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene, SceneError, Tool
-from chipglow.scene.scene import (
-    ENERGY_UNITS,
-    FORCE_UNITS,
+from chipglow.scene import (
+    FIELD_UNITS,
     MATERIAL_COORDINATE_UNITS,
-    check_frame,
-    raster_coordinates,
+    QUALITY,
+    Frame,
+    Raster,
+    Scene,
+    SceneError,
+    Tool,
 )
+from chipglow.scene.scene import ENERGY_UNITS, FORCE_UNITS, check_frame, raster_coordinates
 from chipglow.scene.tool_attributes import tool_attributes
 
 FORMAT_VERSION: Final = 1
@@ -45,6 +48,7 @@ _LONG_NAMES: Final[Mapping[str, str]] = {
     "material": "material: 0 void, 1 workpiece, 2 tool",
     "material_x": "position along the cut before the cut",
     "material_y": "height above the cut surface before the cut",
+    "quality": "0 to 254: distance from the colour scale in CIE L*a*b*; 255: filled",
     "cutting_force": "cutting force per width of cut",
     "thrust_force": "thrust force per width of cut",
     "drive_work": "work of the drive since the start",
@@ -84,6 +88,8 @@ class SceneWriter:
         Attributes of the file, such as provenance: text and numbers.
     material_coordinates : bool
         Whether the frames have material coordinates.
+    quality : bool
+        Whether the frames have flags of their quality.
     portable : bool
         Compress with zlib, which every reader of NetCDF-4 knows; by default with Blosc2, several
         times faster, which needs the HDF5 filter of ``hdf5plugin``.
@@ -105,13 +111,18 @@ class SceneWriter:
         attributes: Mapping[str, Any] | None = None,
         material_coordinates: bool = True,
         *,
+        quality: bool = False,
         portable: bool = False,
         resume: UnfinishedScene | None = None,
     ) -> None:
         self.path = Path(path)
         self.raster = raster
         self._attributes = {**(attributes or {}), **(tool_attributes(tool) if tool else {})}
-        self._units = {**FIELD_UNITS, **(MATERIAL_COORDINATE_UNITS if material_coordinates else {})}
+        self._units = {
+            **FIELD_UNITS,
+            **(MATERIAL_COORDINATE_UNITS if material_coordinates else {}),
+            **({QUALITY: "1"} if quality else {}),
+        }
         self._compression = _PORTABLE if portable else _FAST
         self._stack = ExitStack()
         self._times: list[float] = []
@@ -391,6 +402,7 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, portable: bool = 
         scene.raster,
         attributes=scene.data.attrs,
         material_coordinates=scene.has_material_coordinates,
+        quality=QUALITY in scene.data,
         portable=portable,
     ) as writer:
         for frame in scene.frames():

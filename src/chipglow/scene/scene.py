@@ -28,6 +28,15 @@ FIELD_UNITS: Final[Mapping[str, str]] = {
 MATERIAL_COORDINATE_UNITS: Final[Mapping[str, str]] = {"material_x": "m", "material_y": "m"}
 """Where each point was before the cut: optional, both or none."""
 
+QUALITY: Final = "quality"
+"""Name of an optional field that says how far each sample of an imported scene can be trusted.
+
+0 to 254: distance of the colour in a movie from the colour scale, in units of CIE L*a*b* (0 where
+the source gives numbers); `FILLED`: the source shows nothing there, the value is its neighbours'.
+"""
+
+FILLED: Final = 255
+
 FORCE_UNITS: Final[Mapping[str, str]] = {"cutting_force": "N/m", "thrust_force": "N/m"}
 """Force history on `force_time`, per width of cut: optional, both or none."""
 
@@ -71,6 +80,7 @@ class Frame:
     material: NDArray[np.uint8]
     material_x: NDArray[np.float32] | None = None
     material_y: NDArray[np.float32] | None = None
+    quality: NDArray[np.uint8] | None = None
 
 
 class Scene:
@@ -82,7 +92,8 @@ class Scene:
         Fields of `FIELD_UNITS` with dimensions (time, y, x) and a ``units`` attribute each;
         coordinates ``time`` in s, ascending; ``x`` in m, ascending; ``y`` in m, descending.
         Optional: ``material_x`` and ``material_y`` in m, where each point was before the cut;
-        ``cutting_force`` and ``thrust_force`` in N/m over ``force_time`` in s.
+        ``quality``, see `QUALITY`; ``cutting_force`` and ``thrust_force`` in N/m over
+        ``force_time`` in s.
 
     Raises
     ------
@@ -123,13 +134,13 @@ class Scene:
             Times of the frames in s, shape (time,).
         fields : mapping
             Arrays of shape (time, y, x) by the names of `FIELD_UNITS`, and optionally of
-            `MATERIAL_COORDINATE_UNITS`.
+            `MATERIAL_COORDINATE_UNITS` and `QUALITY`.
         tool : Tool, optional
             The tool's outline, for the analyses that need the rake face.
         attributes : mapping, optional
             Further attributes of the dataset, such as provenance.
         """
-        units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS}
+        units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS, QUALITY: "1"}
         unknown = sorted(set(fields) - set(units))
         if unknown:
             raise SceneError(f"scene: unknown field {unknown[0]!r}, expected one of {list(units)}")
@@ -137,7 +148,7 @@ class Scene:
             {
                 name: (
                     ("time", "y", "x"),
-                    np.asarray(values, dtype=np.uint8 if name == "material" else np.float32),
+                    np.asarray(values, dtype=np.uint8 if name in _BYTES else np.float32),
                     {"units": units[name]},
                 )
                 for name, values in fields.items()
@@ -196,7 +207,7 @@ class Scene:
         """
         fields = {name: self._read(name, index) for name in self._fields}
         for name, values in fields.items():
-            if name != "material":
+            if name not in _BYTES:
                 fields[name] = np.asarray(values, dtype=np.float32)
         frame = Frame(time=float(self.times[index]), **fields)
         check_frame(frame)
@@ -213,8 +224,11 @@ class Scene:
 
     @property
     def _fields(self) -> list[str]:
-        optional = MATERIAL_COORDINATE_UNITS if self.has_material_coordinates else {}
-        return [*FIELD_UNITS, *optional]
+        optional = (*MATERIAL_COORDINATE_UNITS, QUALITY)
+        return [*FIELD_UNITS, *(name for name in optional if name in self.data)]
+
+
+_BYTES: Final = ("material", QUALITY)
 
 
 class SceneError(ValueError):
@@ -235,6 +249,10 @@ def check_frame(frame: Frame) -> None:
             _check_material(values, frame.time)
         elif values is not None:
             _check_field(name, values, frame.time)
+    if frame.quality is not None and frame.quality.dtype != np.uint8:
+        raise SceneError(
+            f"scene: quality has type {frame.quality.dtype} at {frame.time:.9g} s, expected uint8"
+        )
 
 
 def raster_coordinates(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:
@@ -271,7 +289,7 @@ def _check_structure(data: xr.Dataset) -> None:
             raise SceneError(f"scene: {present[0]!r} needs the others of {list(group)}")
         for name in present:
             _check_unit(name, data[name], group[name])
-    for name in (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS):
+    for name in (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS, QUALITY):
         if name in data and data[name].dims != ("time", "y", "x"):
             raise SceneError(
                 f"scene: {name!r} has dimensions {data[name].dims}, expected ('time', 'y', 'x')"

@@ -1,0 +1,27 @@
+"""Readers of other people's fields: meshes, grids, point clouds and movies."""
+
+from chipglow.io.sources.conventions import (
+    CELSIUS,
+    COMMON_NAMES,
+    SI,
+    Placement,
+    Unit,
+    Units,
+    match_names,
+)
+from chipglow.io.sources.source import READABLE, SampledFrame, Source, SourceError, Survey
+
+__all__ = [
+    "CELSIUS",
+    "COMMON_NAMES",
+    "READABLE",
+    "SI",
+    "Placement",
+    "SampledFrame",
+    "Source",
+    "SourceError",
+    "Survey",
+    "Unit",
+    "Units",
+    "match_names",
+]

@@ -1,0 +1,199 @@
+"""What a source's names, units and axes mean."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import isfinite
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipglow.io.sources.source import READABLE, SourceError
+
+COMMON_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
+    "temperature": (
+        "temperature", "temp", "nt11", "nt", "ndtemp", "node_temperature", "nodal_temperature",
+        "t", "temperatur", "theta",
+    ),
+    "plastic_strain": (
+        "plastic_strain", "peeq", "effective_plastic_strain", "equivalent_plastic_strain",
+        "eff_plastic_strain", "element_shell_effective_plastic_strain",
+        "element_solid_effective_plastic_strain", "epeq", "eqplas", "eqps", "strain_effective",
+        "effective_strain", "strain",
+    ),
+    "plastic_strain_rate": (
+        "plastic_strain_rate", "erpeq", "peeqr", "effective_plastic_strain_rate",
+        "equivalent_plastic_strain_rate", "strain_rate_effective", "effective_strain_rate",
+        "strain_rate",
+    ),
+    "velocity": ("velocity", "node_velocity", "vel", "v", "u_dot"),
+    "velocity_x": ("velocity_x", "velocityx", "v1", "vx", "vel_x"),
+    "velocity_y": ("velocity_y", "velocityy", "v2", "vy", "vel_y"),
+    "material_x": ("material_x",),
+    "material_y": ("material_y",),
+}  # fmt: skip
+"""Names that the major codes give to fields, simplified by `simple`, the surest first."""
+
+
+def simple(name: str) -> str:
+    """A name in lower case, with one underscore in the place of all that is no letter or digit.
+
+    A unit in brackets at the end is left out.
+    """
+    text = name.split("(")[0].split("[")[0].strip().lower()
+    words = "".join(letter if letter.isalnum() else " " for letter in text).split()
+    return "_".join(words)
+
+
+def match_names(
+    available: Iterable[str], given: Mapping[str, str], known: Iterable[str] = READABLE
+) -> dict[str, str]:
+    """Which fields of a source are which of a scene.
+
+    Parameters
+    ----------
+    available : iterable of str
+        Names of the source's fields.
+    given : mapping
+        Names that the user gave, by the names of a scene; they come before what is guessed.
+    known : iterable of str
+        Names of a scene that are looked for; ``velocity`` is a vector.
+
+    Raises
+    ------
+    SourceError
+        If a given name is not there, or is given to something a scene does not have.
+    """
+    names = sorted(available)
+    for ours, theirs in given.items():
+        if ours not in COMMON_NAMES:
+            raise SourceError(
+                f"fields: unknown {ours!r}, expected one of {', '.join(COMMON_NAMES)}"
+            )
+        if theirs not in names:
+            listed = ", ".join(names) or "none"
+            raise SourceError(f"fields: {ours}: there is no field {theirs!r}, it has {listed}")
+    simplified = {simple(name): name for name in reversed(names)}
+    result = dict(given)
+    for ours in known:
+        if ours not in result:
+            match = [simplified[name] for name in COMMON_NAMES[ours] if name in simplified]
+            if match and match[0] not in result.values():
+                result[ours] = match[0]
+    return result
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: a value in SI is ``scale * value + offset``."""
+
+    scale: float
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.scale) and self.scale > 0 and isfinite(self.offset)):
+            raise ValueError(f"unit: scale {self.scale!r} must be finite and over 0")
+
+    def to_si(self, values: ArrayLike) -> NDArray[np.float32]:
+        """Values in SI."""
+        return np.asarray(np.asarray(values, np.float64) * self.scale + self.offset, np.float32)
+
+
+SI: Final = Unit(1.0)
+CELSIUS: Final = Unit(1.0, 273.15)
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units of a source.
+
+    Parameters
+    ----------
+    length, time, temperature : Unit
+        Base units; SI if nothing is said.
+    velocity, strain_rate : Unit, optional
+        If they differ from those that length and time make.
+    """
+
+    length: Unit = SI
+    time: Unit = SI
+    temperature: Unit = SI
+    velocity: Unit | None = None
+    strain_rate: Unit | None = None
+
+    def of(self, name: str) -> Unit:
+        """Unit of a field of a scene."""
+        if name == "temperature":
+            return self.temperature
+        if name.startswith("velocity"):
+            return self.velocity or Unit(self.length.scale / self.time.scale)
+        if name == "plastic_strain_rate":
+            return self.strain_rate or Unit(1.0 / self.time.scale)
+        return self.length if name.startswith("material_") else SI
+
+
+_AXES: Final = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Placement:
+    """How a source's axes lie in the scene, whose x runs along the cut and whose y goes up.
+
+    Parameters
+    ----------
+    horizontal, vertical : str
+        The source's axis along the scene's x and y: ``x``, ``y`` or ``z``, with ``-`` before it if
+        it points the other way.
+    origin : tuple of float
+        Where the scene's origin is, in m along the source's horizontal and vertical axis, before
+        a sign is changed.
+
+    Raises
+    ------
+    ValueError
+        If an axis is unknown or used twice, or the origin is not finite.
+    """
+
+    horizontal: str = "x"
+    vertical: str = "y"
+    origin: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name in ("horizontal", "vertical"):
+            if getattr(self, name).removeprefix("-") not in _AXES:
+                raise ValueError(f"{name}: {getattr(self, name)!r}, expected x, y, z, -x, -y or -z")
+        if self.axes[0] == self.axes[1]:
+            raise ValueError(f"vertical: {self.vertical!r} is the horizontal axis too")
+        if not all(isfinite(value) for value in self.origin):
+            raise ValueError(f"origin: expected finite lengths, got {self.origin!r}")
+
+    @property
+    def axes(self) -> tuple[int, int]:
+        """Numbers of the horizontal and the vertical axis."""
+        first, second = (_AXES.index(name.removeprefix("-")) for name in self._names)
+        return first, second
+
+    @property
+    def signs(self) -> tuple[float, float]:
+        """1 or -1 for the horizontal and the vertical axis."""
+        first, second = (-1.0 if name.startswith("-") else 1.0 for name in self._names)
+        return first, second
+
+    @property
+    def depth(self) -> int:
+        """Number of the axis that is neither."""
+        return 3 - sum(self.axes)
+
+    def place(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Positions in the scene in m, shape (n, 2), of points of shape (n, 3) in m."""
+        placed: NDArray[np.float64] = (points[:, self.axes] - self.origin) * self.signs
+        return placed
+
+    def turn(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Components along the scene's x and y, shape (n, 2), of vectors of shape (n, 3)."""
+        turned: NDArray[np.float64] = vectors[:, self.axes] * self.signs
+        return turned
+
+    @property
+    def _names(self) -> tuple[str, str]:
+        return self.horizontal, self.vertical

@@ -1,0 +1,111 @@
+"""What every reader of other people's fields offers: a survey, and frames sampled on a raster."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.scene import FIELD_UNITS, MATERIAL_COORDINATE_UNITS, Raster
+
+READABLE: Final = tuple(
+    name for name in (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS) if name != "material"
+)
+"""Fields that a source may have, by the names of a scene."""
+
+
+class SourceError(ValueError):
+    """A source that cannot be read: the message names the file, the field and what was expected."""
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What is in a source, before its frames are read.
+
+    Parameters
+    ----------
+    kind : str
+        What it is, for people: ``mesh, 12 files of VTK XML``.
+    times : ndarray
+        Times of the frames in s, ascending, shape (frames,).
+    extent : tuple of float
+        Left, right, bottom and top of what is there in m, in the scene's frame of reference: of
+        the first and the last frame together.
+    found : mapping
+        Which of `READABLE` come from which field of the source.
+    unused : tuple of str
+        Fields of the source that nothing is taken from.
+    spacing : float, optional
+        Side of the source's own samples in m, if they are regular.
+    assumed : tuple of str
+        What had to be assumed, a sentence each.
+    """
+
+    kind: str
+    times: NDArray[np.float64]
+    extent: tuple[float, float, float, float]
+    found: Mapping[str, str]
+    unused: tuple[str, ...] = ()
+    spacing: float | None = None
+    assumed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class SampledFrame:
+    """Fields of a source at one time, sampled on a raster.
+
+    Parameters
+    ----------
+    time : float
+        Time in s.
+    fields : mapping
+        Fields by the names of `READABLE` in SI units, shape (y, x); NaN where there is no material.
+    material : ndarray
+        `chipglow.scene.Material` of each sample, shape (y, x), uint8.
+    quality : ndarray, optional
+        How far each sample can be trusted, shape (y, x), uint8: see `chipglow.scene.QUALITY`.
+    """
+
+    time: float
+    fields: Mapping[str, NDArray[np.float32]]
+    material: NDArray[np.uint8]
+    quality: NDArray[np.uint8] | None = field(default=None)
+
+
+class Source(ABC):
+    """Someone else's fields.
+
+    A source is a frozen dataclass that says where the fields are and what they mean; it opens files
+    only in its methods, so that it can be handed to another process.
+    """
+
+    @abstractmethod
+    def survey(self) -> Survey:
+        """Look at what is there.
+
+        Raises
+        ------
+        SourceError
+            If it cannot be read.
+        OSError
+            If a file is missing or not accessible.
+        """
+
+    @abstractmethod
+    def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
+        """Sample the frames one after the other; no more than a few are in memory.
+
+        Parameters
+        ----------
+        raster : Raster
+            Where the samples shall be.
+        start : int
+            Number of the first frame to sample; those before it are skipped.
+
+        Raises
+        ------
+        SourceError
+            If a frame cannot be read.
+        """
