@@ -12,6 +12,7 @@ from chipglow.cutting.heat import (
     ToolHeat,
     conduct,
     conduct_tool,
+    even_out,
     heat_contact,
     return_heat,
     tool_fraction,
@@ -32,6 +33,62 @@ def test_conduction_keeps_heat_whatever_the_shape():
     block.conduct(1e-4, 200, conductivity, capacity)
     assert block.points["temperature"].sum() == pytest.approx(before, rel=1e-12)
     assert block.points["temperature"].std() < 0.9 * spread
+
+
+def evened(block, share):
+    shape = (block.grid.columns, block.grid.rows)
+    nodes, increment = np.zeros((*shape, 3)), np.zeros(shape)
+    conductivity, capacity = constant_properties()
+    heat_mass = block.step.heat_mass
+    conduct(
+        block.points, block.count, nodes, increment, conductivity, capacity, heat_mass,
+        block.grid, 0.0,
+    )  # fmt: skip
+    even_out(
+        block.points, block.count, nodes, increment, capacity, heat_mass, block.grid, share
+    )  # fmt: skip
+    return block.points["temperature"]
+
+
+def test_evening_out_keeps_heat_whatever_the_shape():
+    generator = np.random.default_rng(2)
+    block = Block((100e-6, 80e-6))
+    keep = generator.random(block.count) < 0.6
+    block.points, block.count = block.points[keep], int(keep.sum())
+    block.points["temperature"] = generator.uniform(293.0, 1200.0, block.count)
+    before = block.points["temperature"].copy()
+    after = evened(block, 0.5)
+    assert after.sum() == pytest.approx(before.sum(), rel=1e-12)
+    assert after.std() < 0.8 * before.std()
+
+
+def test_evening_out_takes_the_noise_and_leaves_a_smooth_field():
+    block = Block((200e-6, 200e-6))
+    x, y = block.points["x"], block.points["y"]
+    inside = (np.abs(x - 100e-6) < 50e-6) & (np.abs(y - 100e-6) < 50e-6)
+    smooth = 600.0 + 2e6 * x + 1e6 * y + 2e10 * (x - 100e-6) * (y - 50e-6) + 1e10 * x**2
+    noise = np.where((np.rint(x / block.spacing - 0.5) % 2) == 0, 40.0, -40.0)
+    block.points["temperature"] = smooth
+    # No rounding is left of a quadratic, nor is anything taken: the residue is a fourth derivative.
+    assert np.abs(evened(block, 0.25) - smooth)[inside].max() < 1e-9
+    block.points["temperature"] = smooth + noise
+    # The grid sees nothing of what alternates from point to point: all of the share is taken.
+    left = (evened(block, 0.25) - smooth)[inside]
+    assert left == pytest.approx(0.75 * noise[inside], abs=1e-9)
+
+
+def test_a_cold_point_is_not_cooled_with_the_hot_ones_around_it():
+    block = Block((100e-6, 100e-6))
+    middle = np.argmin(np.hypot(block.points["x"] - 50e-6, block.points["y"] - 50e-6))
+    block.points["temperature"] = 1293.0 - 18e6 * np.abs(block.points["y"] - 50e-6)
+    block.points["temperature"][middle] = 350.0
+    conductivity, capacity = constant_properties()
+    coldest = []
+    for _ in range(10):
+        block.conduct(4e-6, 20, conductivity, capacity)
+        coldest.append(block.points["temperature"][middle])
+    # Its own heat cannot flow away: everything around it is hotter.
+    assert min(coldest) > 350.0
 
 
 def test_tool_conducts_as_a_half_space_and_keeps_its_heat():

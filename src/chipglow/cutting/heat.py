@@ -80,6 +80,48 @@ def _gather_heat(points, count, nodes, capacity, heat_mass, grid):  # type: igno
                 nodes[i, j, 1] /= nodes[i, j, 0]
 
 
+@njit(cache=True)
+def even_out(points, count, nodes, deviation, capacity, heat_mass, grid, share):  # type: ignore[no-untyped-def]
+    """Take a share of what the grid cannot see off the points' temperatures; heat is kept.
+
+    Increments from the grid leave differences between the points of a cell as they are, so a point
+    much colder than the others would be cooled with them. The share is taken off T - S T - S(T -
+    S T), with S the way from the points to the grid and back: all of the noise that the grid does
+    not see, and of a smooth field only a fourth derivative (XPIC of order 2 for the temperature,
+    Hammerquist and Nairn 2017). `nodes` is that of `conduct`; `deviation` (columns, rows) is
+    overwritten.
+    """
+    deviation[:] = 0.0
+    for k in range(count):
+        p = points[k]
+        i, ax = spline((p.x - grid.left) / grid.cell)
+        j, ay = spline((p.y - grid.bottom) / grid.cell)
+        wx, wy = spline_weights(ax), spline_weights(ay)
+        heat = heat_mass * property_at(capacity, p.temperature)
+        beyond = p.temperature
+        for a in range(3):
+            for b in range(3):
+                beyond -= wx[a] * wy[b] * nodes[i + a, j + b, 1]
+        for a in range(3):
+            for b in range(3):
+                deviation[i + a, j + b] += wx[a] * wy[b] * heat * beyond
+    for i in range(grid.columns):
+        for j in range(grid.rows):
+            if nodes[i, j, 0] > 0.0:
+                deviation[i, j] /= nodes[i, j, 0]
+    for k in range(count):
+        p = points[k]
+        i, ax = spline((p.x - grid.left) / grid.cell)
+        j, ay = spline((p.y - grid.bottom) / grid.cell)
+        wx, wy = spline_weights(ax), spline_weights(ay)
+        noise = p.temperature
+        for a in range(3):
+            for b in range(3):
+                node = nodes[i + a, j + b, 1] + deviation[i + a, j + b]
+                noise -= wx[a] * wy[b] * node
+        p.temperature -= share * noise
+
+
 @njit
 def _exchange(nodes, increment, conductivity, i, j, k, l, duration):  # type: ignore[no-untyped-def]  # noqa: E741
     if nodes[k, l, 0] == 0.0:

@@ -19,7 +19,14 @@ from chipglow.cutting.conditions import (
 )
 from chipglow.cutting.damage import Damage
 from chipglow.cutting.energy import ENERGIES, EnergyHistory, held_energy
-from chipglow.cutting.heat import ToolHeat, conduct, conduct_tool, heat_contact, return_heat
+from chipglow.cutting.heat import (
+    ToolHeat,
+    conduct,
+    conduct_tool,
+    even_out,
+    heat_contact,
+    return_heat,
+)
 from chipglow.cutting.heat import tool_fraction as fraction_of_tool
 from chipglow.cutting.heat_loss import HeatLoss, lose_heat
 from chipglow.cutting.library import AISI_1045, CARBIDE
@@ -48,7 +55,7 @@ from chipglow.cutting.watch import Trouble, find_lost, find_off_grid, find_troub
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.surface import Surface, surface_distance
 
-SOLVER_VERSION: Final = "5"
+SOLVER_VERSION: Final = "6"
 """Changes whenever the same input gives another result."""
 
 _MARGIN: Final = 4
@@ -278,6 +285,7 @@ class _State:
         self.capacity = material.heat_capacity.sampled()
         self.heat_shares = heat_shares(material.taylor_quinney)
         self.conductivity = material.conductivity.sampled()
+        self.diffusivity = _diffusivity(material, conditions.initial_temperature)
         self.tool_heat = _tool_heat(simulation, spacing)
         self.loss = HeatLoss.of(simulation.surroundings, numerics)
         self.tool_fraction = fraction_of_tool(self.grid, self.tool)
@@ -287,6 +295,7 @@ class _State:
         self.nodes = np.zeros((*shape, NODE_VALUES))
         self.heat_nodes = np.zeros((*shape, 3))
         self.increment = np.zeros(shape)
+        self.deviation = np.zeros(shape)
         self.friction_heat = np.zeros(shape)
         self.tool_temperature = np.full(shape, conditions.initial_temperature)
         self.tool_border = border_nodes(self.tool_fraction)
@@ -425,6 +434,16 @@ class _State:
             self.grid,
             self.cycle,
         )
+        even_out(
+            self.points,
+            self.count,
+            self.heat_nodes,
+            self.deviation,
+            self.capacity,
+            self.step.heat_mass,
+            self.grid,
+            min(self.diffusivity * self.cycle / self.grid.cell**2, 1.0),
+        )
         conduct_tool(
             self.tool_temperature, self.tool_fraction, self.tool_heat, self.grid, self.cycle
         )
@@ -542,6 +561,11 @@ def _time_steps(
     crossing = numerics.cell / (_sound(simulation) + fastest)
     steps = ceil(interval / cycles / (numerics.courant * crossing))
     return cycles, steps, interval / cycles / steps
+
+
+def _diffusivity(material: WorkpieceMaterial, temperature: float) -> float:
+    capacity = material.density * material.heat_capacity.at(temperature)
+    return float(material.conductivity.at(temperature) / capacity)
 
 
 def _thermal_friction(simulation: CuttingSimulation) -> dict[str, float]:
