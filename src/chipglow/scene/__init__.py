@@ -1,6 +1,7 @@
 """The scene: fields on a regular grid over time, and the tool in it."""
 
 from chipglow.scene.raster import Raster
+from chipglow.scene.sampled import READABLE, SampledFrame
 from chipglow.scene.scene import (
     ENERGY_UNITS,
     FIELD_UNITS,
@@ -21,11 +22,13 @@ __all__ = [
     "FILLED",
     "MATERIAL_COORDINATE_UNITS",
     "QUALITY",
+    "READABLE",
     "Chamfer",
     "Frame",
     "Hone",
     "Material",
     "Raster",
+    "SampledFrame",
     "Scene",
     "SceneError",
     "Tool",

@@ -2,18 +2,14 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Final
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.scene import FIELD_UNITS, MATERIAL_COORDINATE_UNITS, Raster
+from chipglow.scene import READABLE, Raster, SampledFrame
 
-READABLE: Final = tuple(
-    name for name in (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS) if name != "material"
-)
-"""Fields that a source may have, by the names of a scene."""
+__all__ = ["READABLE", "SampledFrame", "Source", "SourceError", "Survey"]
 
 
 class SourceError(ValueError):
@@ -50,28 +46,6 @@ class Survey:
     unused: tuple[str, ...] = ()
     spacing: float | None = None
     assumed: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class SampledFrame:
-    """Fields of a source at one time, sampled on a raster.
-
-    Parameters
-    ----------
-    time : float
-        Time in s.
-    fields : mapping
-        Fields by the names of `READABLE` in SI units, shape (y, x); NaN where there is no material.
-    material : ndarray
-        `chipglow.scene.Material` of each sample, shape (y, x), uint8.
-    quality : ndarray, optional
-        How far each sample can be trusted, shape (y, x), uint8: see `chipglow.scene.QUALITY`.
-    """
-
-    time: float
-    fields: Mapping[str, NDArray[np.float32]]
-    material: NDArray[np.uint8]
-    quality: NDArray[np.uint8] | None = field(default=None)
 
 
 class Source(ABC):

@@ -1,0 +1,235 @@
+"""From a source of fields to a scene's file, frame by frame."""
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from itertools import islice
+from math import ceil, isfinite
+from pathlib import Path
+from time import monotonic
+from typing import Any, Final
+
+import numpy as np
+
+from chipglow.io.scene_file import SceneWriter
+from chipglow.io.sources import Source, SourceError, Survey
+from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
+from chipglow.scene import Frame, Raster, Scene
+from chipglow.scene.completion import Completion, complete
+
+SAMPLES_ACROSS: Final = 900
+"""Samples along the longer side of a scene, if nothing is said: those of the paper's scene."""
+
+MOST_SAMPLES: Final = 100_000_000
+"""Most samples of a frame."""
+
+_CHECKPOINT_INTERVAL: Final = 30.0
+_KEY: Final = "import"
+
+
+@dataclass(frozen=True)
+class Import:
+    """What to read, and what to make of it.
+
+    Parameters
+    ----------
+    source : Source
+        Where the fields are.
+    raster : Raster, optional
+        Where the scene's samples shall be; by default all that is there, with the source's own
+        samples, or 900 along the longer side.
+    completion : Completion
+        What stands in for what the source does not have.
+    description : mapping
+        How the source was described, kept with the scene: text and numbers.
+    """
+
+    source: Source
+    raster: Raster | None = None
+    completion: Completion = field(default_factory=Completion)
+    description: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Prospect:
+    """What an import will make: what is in the source, where it is sampled, what is assumed.
+
+    Parameters
+    ----------
+    survey : Survey
+        What is in the source.
+    raster : Raster
+        Where the scene's samples will be.
+    assumed : tuple of str
+        All that has to be assumed, a sentence each.
+    """
+
+    survey: Survey
+    raster: Raster
+    assumed: tuple[str, ...]
+
+
+def prospect(wanted: Import) -> Prospect:
+    """Look at a source and find out what a scene of it would be.
+
+    Raises
+    ------
+    SourceError
+        If the source cannot be read, or no scene can be made of it.
+    OSError
+        If a file is missing.
+    """
+    survey = wanted.source.survey()
+    _check_times(survey)
+    if "temperature" not in survey.found:
+        listed = ", ".join(survey.unused) or "none"
+        raise SourceError(
+            f"{survey.kind}: no field is known as temperature, expected fields: "
+            f"temperature: NAME with one of {listed}"
+        )
+    raster = wanted.raster or _raster_of(survey)
+    if raster.rows * raster.columns > MOST_SAMPLES:
+        raise SourceError(
+            f"{survey.kind}: {raster.rows} x {raster.columns} samples, expected up to "
+            f"{MOST_SAMPLES:.0e}; a larger spacing makes fewer"
+        )
+    assumed = wanted.completion.assumptions(survey.found, len(survey.times))
+    if any("optical flow" in sentence for sentence in assumed) and find_spec("skimage") is None:
+        raise SourceError(
+            "velocity: the source has none and the optical flow needs scikit-image, expected "
+            "pip install 'chipglow[flow]'"
+        )
+    return Prospect(survey, raster, (*survey.assumed, *assumed))
+
+
+def import_scene(
+    wanted: Import,
+    path: str | os.PathLike[str],
+    progress: Callable[[float], None] | None = None,
+    *,
+    looked: Prospect | None = None,
+    resume: bool = False,
+) -> Prospect:
+    """Read a source into a scene's file; no more than a few frames are in memory.
+
+    Parameters
+    ----------
+    wanted : Import
+        What to read.
+    path : path-like
+        The file to write; it appears when it is whole.
+    progress : callable, optional
+        Told the share that is done, 0 to 1.
+    looked : Prospect, optional
+        What `prospect` said, if it was asked before.
+    resume : bool
+        Go on where an earlier import of the same was ended.
+
+    Raises
+    ------
+    SourceError
+        If the source cannot be read.
+    SceneError
+        If what is read breaks the contract of a scene.
+    OSError
+        If a file is missing or cannot be written.
+    """
+    looked = looked or prospect(wanted)
+    survey, raster, completion = looked.survey, looked.raster, wanted.completion
+    key = _key(wanted, looked)
+    left = next((left for left in unfinished_scenes(Path(path)) if _is_of(left, key)), None)
+    start = left if resume else None
+    done = len(start.frames()[0]) if start else 0
+    attributes = {"import": key, "assumed": "; ".join(looked.assumed)}
+    coordinates = {"material_x", "material_y"} <= set(survey.found)
+    with SceneWriter(
+        path, raster, completion.tool, attributes, coordinates, quality=True, resume=start
+    ) as writer:
+        due = monotonic() + _CHECKPOINT_INTERVAL
+        for number, frame in enumerate(_frames(wanted, raster, done), start=done + 1):
+            writer.append(frame)
+            share = number / len(survey.times)
+            if progress:
+                progress(min(share, 1.0))
+            if monotonic() > due:
+                writer.checkpoint({_KEY: np.frombuffer(key.encode(), np.uint8)}, share)
+                due = monotonic() + _CHECKPOINT_INTERVAL
+    for unfinished in unfinished_scenes(Path(path)):
+        unfinished.remove()
+    return looked
+
+
+def read_scene(wanted: Import) -> Scene:
+    """Read a source into memory.
+
+    Parameters
+    ----------
+    wanted : Import
+        What to read; all frames have to fit into memory.
+
+    Raises
+    ------
+    SourceError, SceneError, OSError
+        As `import_scene`.
+    """
+    looked = prospect(wanted)
+    frames = list(_frames(wanted, looked.raster, 0))
+    names = [
+        name for name, value in vars(frames[0]).items() if name != "time" and value is not None
+    ]
+    return Scene.from_fields(
+        looked.raster,
+        [frame.time for frame in frames],
+        {name: np.stack([getattr(frame, name) for frame in frames]) for name in names},
+        wanted.completion.tool,
+        {"import": _key(wanted, looked), "assumed": "; ".join(looked.assumed)},
+    )
+
+
+def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
+    """Whole frames after the first that are done; those depend on some before them."""
+    first = max(done - wanted.completion.memory, 0)
+    frames = complete(wanted.source.frames(raster, first), raster, wanted.completion)
+    yield from islice(frames, done - first, None)
+
+
+def _raster_of(survey: Survey) -> Raster:
+    left, right, bottom, top = survey.extent
+    width, height = right - left, top - bottom
+    if not (isfinite(width) and isfinite(height) and width > 0 and height > 0):
+        raise SourceError(
+            f"{survey.kind}: extends over {width:g} m x {height:g} m, expected an area"
+        )
+    spacing = survey.spacing or max(width, height) / SAMPLES_ACROSS
+    rows, columns = (max(ceil(side / spacing - 1e-6), 2) for side in (height, width))
+    return Raster(left, top, spacing, rows, columns)
+
+
+def _check_times(survey: Survey) -> None:
+    times = survey.times
+    if times.size == 0:
+        raise SourceError(f"{survey.kind}: has no frame, expected 1 or more")
+    if not np.isfinite(times).all():
+        raise SourceError(f"{survey.kind}: its times are not finite")
+    later = np.diff(times) <= 0
+    if later.any():
+        at = int(np.argmax(later)) + 1
+        raise SourceError(
+            f"{survey.kind}: frame {at} is at {times[at]:.9g} s, expected later than "
+            f"{times[at - 1]:.9g} s"
+        )
+
+
+def _key(wanted: Import, looked: Prospect) -> str:
+    """What makes two imports the same."""
+    raster = vars(looked.raster)
+    return json.dumps({**wanted.description, "raster": raster}, sort_keys=True, default=str)
+
+
+def _is_of(left: UnfinishedScene, key: str) -> bool:
+    if left.progress == 0:
+        return False
+    stored = left.state().get(_KEY)
+    return stored is not None and stored.tobytes() == key.encode()

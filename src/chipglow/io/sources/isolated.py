@@ -1,0 +1,142 @@
+"""A source read in a process of its own: whatever a damaged file does there ends in one error."""
+
+import pickle
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from io import BufferedReader
+from tempfile import TemporaryFile
+from typing import Any, Final, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.io.sources.source import READABLE, SampledFrame, Source, SourceError, Survey
+from chipglow.io.sources.worker import Message, read_message
+from chipglow.scene import Raster
+
+MEMORY: Final = 2 * 1024**3
+"""What a reader may take for itself, in bytes."""
+
+PATIENCE: Final = 300.0
+"""How long a reader may take for one answer, in s."""
+
+
+@dataclass(frozen=True)
+class Isolated(Source):
+    """Another source, read in a process of its own.
+
+    Readers of other people's formats are large libraries, some in C and C++: a damaged file can
+    make them crash, hang or ask for all of the memory. There it takes only their process with it.
+
+    Parameters
+    ----------
+    source : Source
+        What to read.
+    name : str
+        What errors call it.
+    memory : int
+        Most memory in bytes that the process may take for data; where the system can limit it.
+    patience : float
+        Longest time in s for the survey, and for a frame.
+    """
+
+    source: Source
+    name: str
+    memory: int = MEMORY
+    patience: float = PATIENCE
+
+    def survey(self) -> Survey:
+        """Look at what is there; see `Source.survey`."""
+        with self._reader("survey", None, 0) as answers:
+            header = next(answers).header
+        return Survey(
+            **{
+                **header,
+                "times": np.asarray(header["times"], np.float64),
+                "extent": tuple(header["extent"]),
+                "unused": tuple(header["unused"]),
+                "assumed": tuple(header["assumed"]),
+            }
+        )
+
+    def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
+        """Sample the frames one after the other; see `Source.frames`."""
+        with self._reader("frames", raster, start) as answers:
+            for message in answers:
+                yield _frame(message)
+
+    @contextmanager
+    def _reader(self, wish: str, raster: Raster | None, start: int) -> Iterator[Iterator[Message]]:
+        request = pickle.dumps((self.source, wish, raster, start, self.memory))
+        with (
+            TemporaryFile() as said,
+            subprocess.Popen(
+                # -P: nothing beside the data is taken for a module.
+                [sys.executable, "-P", "-m", "chipglow.io.sources.worker"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=said,
+            ) as process,
+        ):
+            assert process.stdin is not None
+            try:
+                process.stdin.write(request)
+                process.stdin.close()
+                yield self._answers(process, cast(BufferedReader, process.stdout), raster)
+            finally:
+                process.kill()
+
+    def _answers(
+        self, process: "subprocess.Popen[bytes]", answers: BufferedReader, raster: Raster | None
+    ) -> Iterator[Message]:
+        while True:
+            message = self._in_time(process, answers, raster)
+            answer = message.header.pop("answer")
+            if answer == "end":
+                return
+            if answer == "error":
+                raise SourceError(message.header["text"])
+            if answer == "missing":
+                raise FileNotFoundError(message.header["text"])
+            if answer == "unreadable":
+                raise SourceError(f"{self.name}: {message.header['text']}")
+            yield message
+
+    def _in_time(
+        self, process: "subprocess.Popen[bytes]", answers: BufferedReader, raster: Raster | None
+    ) -> Message:
+        late = threading.Event()
+
+        def give_up() -> None:
+            late.set()
+            process.kill()
+
+        timer = threading.Timer(self.patience, give_up)
+        timer.start()
+        try:
+            message = read_message(answers, raster)
+        finally:
+            timer.cancel()
+        if message is not None:
+            return message
+        if late.is_set():
+            raise SourceError(f"{self.name}: its reader had no answer in {self.patience:g} s")
+        process.wait()
+        raise SourceError(
+            f"{self.name}: its reader ended with code {process.returncode}, "
+            "the file is damaged or too large to be read"
+        )
+
+
+def _frame(message: Message) -> SampledFrame:
+    arrays: Mapping[str, NDArray[Any]] = message.arrays
+    return SampledFrame(
+        time=float(message.header["time"]),
+        fields={name: arrays[name] for name in READABLE if name in arrays},
+        material=arrays["material"],
+        quality=arrays.get("quality"),
+    )

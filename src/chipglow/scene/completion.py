@@ -1,0 +1,267 @@
+"""From what a source says to a whole scene: what is missing, and what stands in for it."""
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.scene.motion import nearest_filled, optical_flow, strain_rate_along
+from chipglow.scene.raster import Raster
+from chipglow.scene.sampled import SampledFrame
+from chipglow.scene.scene import (
+    FILLED,
+    MATERIAL_COORDINATE_UNITS,
+    Frame,
+    Material,
+    SceneError,
+)
+from chipglow.scene.tool import Tool
+
+STRAIN_OF_CHIP: Final = 1.0
+"""Plastic strain of the region that is said to be chip, where a source has no strain."""
+
+_CHIP_STARTS, _CHIP_ENDS = 0.3, 0.5
+_MOST_FILLED: Final = 0.5
+_MOST_FRAMES: Final = 20
+_FLOW_FRAMES: Final = 5
+"""The optical flow is that over so many frames: from one to the next little moves."""
+
+
+@dataclass(frozen=True)
+class Completion:
+    """What stands in for the fields that a source does not have.
+
+    Parameters
+    ----------
+    surroundings : float
+        Temperature in K where there is no material.
+    tool : Tool, optional
+        Its outline: samples in it are tool, whatever the source says.
+    cutting_speed : float, optional
+        Speed of the workpiece along x in m/s, for a source without velocity.
+    chip : tuple of points, optional
+        Outline of the chip in m, ((x, y), ...): for a source without plastic strain.
+    rate_frames : int
+        Number of frames over which the strain rate is taken, for a source without it: more of them
+        make less noise and more blur.
+
+    Raises
+    ------
+    ValueError
+        If a number is not possible or the chip has under three corners.
+    """
+
+    surroundings: float = 293.15
+    tool: Tool | None = None
+    cutting_speed: float | None = None
+    chip: tuple[tuple[float, float], ...] | None = None
+    rate_frames: int = 1
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.surroundings) and self.surroundings > 0):
+            raise ValueError(f"surroundings: {self.surroundings!r} K, expected over 0 K")
+        if self.cutting_speed is not None and not isfinite(self.cutting_speed):
+            raise ValueError(f"cutting_speed: {self.cutting_speed!r} m/s, expected a finite speed")
+        if self.chip is not None and len(self.chip) < 3:
+            raise ValueError(f"chip: {len(self.chip)} corners, expected 3 or more")
+        if not 1 <= self.rate_frames <= _MOST_FRAMES:
+            raise ValueError(f"rate_frames: {self.rate_frames}, expected 1 to {_MOST_FRAMES}")
+
+    @property
+    def memory(self) -> int:
+        """How many frames before one it depends on."""
+        return max(self.rate_frames, _FLOW_FRAMES)
+
+    def assumptions(self, found: Iterable[str], frames: int) -> tuple[str, ...]:
+        """What stands in for what is not among the fields that were found, a sentence each."""
+        known = set(found)
+        return tuple(
+            sentence
+            for missing, sentence in (
+                (not known & {"velocity_x", "velocity_y"}, self._of_velocity(frames)),
+                ("plastic_strain" not in known, self._of_strain()),
+                ("plastic_strain_rate" not in known, self._of_rate(known, frames)),
+            )
+            if missing
+        )
+
+    def _of_velocity(self, frames: int) -> str:
+        if self.cutting_speed is None and frames == 1:
+            return "velocity: 0 everywhere, as there is one frame and no cutting speed"
+        if self.cutting_speed is None:
+            return "velocity: from the optical flow, which cannot see where nothing has a pattern"
+        chip = "0" if frames == 1 else "that of the optical flow"
+        return f"velocity: the cutting speed where the strain is small, in the chip {chip}"
+
+    def _of_strain(self) -> str:
+        if self.chip is None:
+            return "plastic strain: 0 everywhere, so the workpiece's emissivity is used for all"
+        return f"plastic strain: {STRAIN_OF_CHIP:g} in the chip's outline, 0 elsewhere"
+
+    def _of_rate(self, known: set[str], frames: int) -> str:
+        if frames == 1 or "plastic_strain" not in known:
+            return (
+                "plastic strain rate: 0 everywhere, so no shear band has an emissivity of its own"
+            )
+        return "plastic strain rate: from the change of the strain along the motion"
+
+
+def complete(
+    frames: Iterable[SampledFrame], raster: Raster, completion: Completion
+) -> Iterator[Frame]:
+    """Whole frames of a scene, one after the other; a few are in memory.
+
+    Parameters
+    ----------
+    frames : iterable of SampledFrame
+        Frames in order of time. The first one's strain rate and optical flow are taken from the
+        second.
+    raster : Raster
+        Where their samples are.
+    completion : Completion
+        What stands in for what is missing.
+
+    Raises
+    ------
+    SceneError
+        If there is no temperature, or over half of the material's samples have none.
+    """
+    chip, in_tool = _inside(completion.chip, raster), _in_tool(completion.tool, raster)
+    history: deque[SampledFrame] = deque(maxlen=completion.memory)
+    for number, sampled in enumerate(frames):
+        now = _prepared(sampled, completion, chip, in_tool)
+        if number == 1:
+            yield _finished(history[0], [now], raster, completion)
+        if number > 0:
+            yield _finished(now, history, raster, completion)
+        history.append(now)
+    if history and number == 0:
+        yield _finished(history[0], [], raster, completion)
+
+
+def _prepared(
+    sampled: SampledFrame,
+    completion: Completion,
+    chip: NDArray[np.bool_],
+    in_tool: NDArray[np.bool_],
+) -> SampledFrame:
+    """The frame with its tool and its strain, and with no hole in the material."""
+    if "temperature" not in sampled.fields:
+        raise SceneError("scene: no temperature is known, expected one")
+    material = np.where(in_tool, np.uint8(Material.TOOL), sampled.material)
+    solid = material != Material.VOID
+    known = np.isfinite(sampled.fields["temperature"])
+    holes = solid & ~known
+    if (holes & ~in_tool).sum() > _MOST_FILLED * max(solid.sum(), 1):
+        raise SceneError(
+            f"scene: temperature is not known in {(holes & ~in_tool).sum()} of {solid.sum()} "
+            f"samples of the material at {sampled.time:.9g} s, expected under half"
+        )
+    fields = {name: _without_holes(values, solid) for name, values in sampled.fields.items()}
+    fields["temperature"][holes & in_tool] = completion.surroundings
+    if "plastic_strain" not in fields:
+        strain = np.where(chip, np.float32(STRAIN_OF_CHIP), np.float32(0.0))
+        fields["plastic_strain"] = np.where(solid, strain, np.float32(np.nan))
+        fields.setdefault("plastic_strain_rate", np.zeros(material.shape, np.float32))
+    quality = np.zeros(material.shape, np.uint8) if sampled.quality is None else sampled.quality
+    quality = np.where(holes, np.uint8(FILLED), quality)
+    return SampledFrame(sampled.time, fields, material, quality)
+
+
+def _without_holes(values: NDArray[np.float32], solid: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """A field that is known everywhere in the material, and NaN elsewhere."""
+    known = solid & np.isfinite(values)
+    whole = values if known.sum() == solid.sum() else nearest_filled(values, known)
+    return np.where(solid, whole, np.float32(np.nan))
+
+
+def _finished(
+    now: SampledFrame,
+    others: Sequence[SampledFrame],
+    raster: Raster,
+    completion: Completion,
+) -> Frame:
+    """The whole frame; `others` are those before it, or the one after it."""
+    fields = now.fields
+    velocity = _velocity(now, others, raster, completion)
+    rate = fields.get("plastic_strain_rate")
+    if rate is None and others:
+        other = others[max(len(others) - completion.rate_frames, 0)]
+        before = other.fields["plastic_strain"]
+        interval = now.time - other.time
+        rate = strain_rate_along(
+            fields["plastic_strain"], before, velocity, interval, raster.spacing
+        )
+    zero = np.zeros(raster.shape, np.float32)
+    coordinates = {name: fields[name] for name in MATERIAL_COORDINATE_UNITS if name in fields}
+    return Frame(
+        time=now.time,
+        temperature=_elsewhere(fields["temperature"], completion.surroundings),
+        plastic_strain=np.maximum(_elsewhere(fields["plastic_strain"]), 0.0),
+        plastic_strain_rate=zero if rate is None else np.maximum(_elsewhere(rate), 0.0),
+        velocity_x=_elsewhere(velocity[0]),
+        velocity_y=_elsewhere(velocity[1]),
+        material=now.material,
+        quality=now.quality,
+        **{name: _elsewhere(values) for name, values in coordinates.items()},
+    )
+
+
+def _velocity(
+    now: SampledFrame, others: Sequence[SampledFrame], raster: Raster, completion: Completion
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    zero = np.zeros(raster.shape, np.float32)
+    known = [now.fields.get(name) for name in ("velocity_x", "velocity_y")]
+    if any(values is not None for values in known):
+        across, up = (zero if values is None else values for values in known)
+        return _elsewhere(across), _elsewhere(up)
+    across, up = zero, zero
+    moves = (now.material == Material.WORKPIECE).astype(np.float32)
+    if others:
+        other = others[0]
+        flow = optical_flow(_pattern(now), _pattern(other), other.time - now.time, raster.spacing)
+        across, up = flow[0] * moves, flow[1] * moves
+    if completion.cutting_speed is not None:
+        strain = _elsewhere(now.fields["plastic_strain"])
+        chip = np.clip((strain - _CHIP_STARTS) / (_CHIP_ENDS - _CHIP_STARTS), 0.0, 1.0)
+        across = chip * across + (1.0 - chip) * np.float32(completion.cutting_speed) * moves
+        up = chip * up
+    return across, up
+
+
+def _pattern(frame: SampledFrame) -> NDArray[np.float32]:
+    """What the optical flow follows: the logarithm of the strain, or the temperature."""
+    strain = _elsewhere(frame.fields["plastic_strain"])
+    if strain.max() > strain.min():
+        return np.log1p(np.maximum(strain, 0.0))
+    temperature = frame.fields["temperature"]
+    return _elsewhere(temperature - np.nanmin(temperature))
+
+
+def _elsewhere(values: NDArray[np.float32], value: float = 0.0) -> NDArray[np.float32]:
+    """Values with one value where there is no material."""
+    return np.where(np.isfinite(values), values, np.float32(value))
+
+
+def _in_tool(tool: Tool | None, raster: Raster) -> NDArray[np.bool_]:
+    if tool is None:
+        return np.zeros(raster.shape, np.bool_)
+    x, y = np.meshgrid(raster.x, raster.y)
+    return np.asarray(tool.signed_distance(x, y) < 0.0)
+
+
+def _inside(corners: Sequence[tuple[float, float]] | None, raster: Raster) -> NDArray[np.bool_]:
+    """Which samples lie in a polygon."""
+    if corners is None:
+        return np.zeros(raster.shape, np.bool_)
+    x, y = np.meshgrid(raster.x, raster.y)
+    inside = np.zeros(raster.shape, np.bool_)
+    for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        if y1 != y2:
+            crossed = (y1 > y) != (y2 > y)
+            inside ^= crossed & (x < x1 + (y - y1) * (x2 - x1) / (y2 - y1))
+    return inside

@@ -1,0 +1,96 @@
+"""Motion of the material in a scene: what can be told of it from fields alone."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, map_coordinates, zoom
+
+_FLOW_SAMPLES: Final = 320
+"""Most samples across a picture of which the optical flow is computed: it takes seconds else."""
+
+
+def strain_rate_along(
+    strain: NDArray[np.float32],
+    before: NDArray[np.float32],
+    velocity: tuple[NDArray[np.float32], NDArray[np.float32]],
+    interval: float,
+    spacing: float,
+) -> NDArray[np.float32]:
+    """Rate of the plastic strain of the material, from two instants.
+
+    Parameters
+    ----------
+    strain, before : ndarray
+        Plastic strain now and `interval` earlier (later if it is negative), shape (y, x); NaN where
+        there is no material.
+    velocity : tuple of ndarray
+        Velocity along x and up now in m/s, shape (y, x) each.
+    interval : float
+        Time between both in s.
+    spacing : float
+        Side of a sample in m.
+
+    Returns
+    -------
+    ndarray
+        ``(strain(x) - before(x - v interval)) / interval`` in 1/s, shape (y, x), 0 or more as
+        plastic strain cannot fall; 0 where there was no material, NaN where there is none. Between
+        samples `before` is a cubic spline.
+    """
+    rows, columns = np.indices(strain.shape, dtype=np.float32)
+    shift = np.float32(interval / spacing)
+    origin = rows + velocity[1] * shift, columns - velocity[0] * shift
+    there = np.isfinite(before)
+    earlier = map_coordinates(nearest_filled(before, there), origin, order=3, mode="nearest")
+    known = map_coordinates(there.astype(np.float32), origin, order=1, mode="constant") > 0.5
+    rate = np.maximum((strain - earlier) / np.float32(interval), 0.0)
+    rate[~known & np.isfinite(strain)] = 0.0
+    return np.asarray(rate, np.float32)
+
+
+def optical_flow(
+    before: NDArray[np.float32], after: NDArray[np.float32], interval: float, spacing: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Velocity along x and up in m/s by which a pattern moved, shape (y, x) each.
+
+    Total variation with the L1 norm (Zach, Pock and Bischof 2007) by scikit-image, on a picture of
+    a few hundred samples. It sees only what has a pattern: a region without one takes on the
+    motion of its surroundings.
+
+    Parameters
+    ----------
+    before, after : ndarray
+        The pattern at two instants, shape (y, x), finite.
+    interval : float
+        Time between both in s.
+    spacing : float
+        Side of a sample in m.
+
+    Raises
+    ------
+    ImportError
+        If scikit-image is missing.
+    """
+    from skimage import registration
+
+    factor = min(_FLOW_SAMPLES / max(before.shape), 1.0)
+    scale = np.float32(max(float(before.max()), float(after.max()), 1e-30))
+    small = [zoom(pattern / scale, factor, order=1) for pattern in (before, after)]
+    down, right = registration.optical_flow_tvl1(*small, dtype=np.float32)
+    back = [_resized(flow, before.shape) for flow in (right, -down)]
+    speed = np.float32(spacing * before.shape[1] / small[0].shape[1] / interval)
+    return back[0] * speed, back[1] * speed
+
+
+def nearest_filled(values: NDArray[np.float32], known: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Values with those that are not known taken from the nearest that is, shape (y, x)."""
+    if known.all() or not known.any():
+        return np.where(known, values, np.float32(0.0))
+    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    return np.asarray(values[tuple(nearest)])
+
+
+def _resized(values: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    factors = [new / old for new, old in zip(shape, values.shape, strict=True)]
+    return np.asarray(zoom(values, factors, order=1, grid_mode=True, mode="nearest"), np.float32)

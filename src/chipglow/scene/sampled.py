@@ -1,0 +1,37 @@
+"""A frame of which some fields are known: what is read before it is completed to a scene's."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.scene.scene import FIELD_UNITS, MATERIAL_COORDINATE_UNITS
+
+READABLE: Final = tuple(
+    name for name in (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS) if name != "material"
+)
+"""Fields that a source may have, by the names of a scene."""
+
+
+@dataclass(frozen=True)
+class SampledFrame:
+    """Fields of a source at one time, sampled on a raster.
+
+    Parameters
+    ----------
+    time : float
+        Time in s.
+    fields : mapping
+        Fields by the names of `READABLE` in SI units, shape (y, x); NaN where there is no material.
+    material : ndarray
+        `chipglow.scene.Material` of each sample, shape (y, x), uint8.
+    quality : ndarray, optional
+        How far each sample can be trusted, shape (y, x), uint8: see `chipglow.scene.QUALITY`.
+    """
+
+    time: float
+    fields: Mapping[str, NDArray[np.float32]]
+    material: NDArray[np.uint8]
+    quality: NDArray[np.uint8] | None = None

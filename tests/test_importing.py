@@ -1,0 +1,259 @@
+"""From a source to a scene: what is missing is made up as said, what goes wrong is one error."""
+
+import os
+from dataclasses import replace
+from io import BufferedReader, BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from moving_block import RATE, SPEED, UP, Broken, MovingBlock, strain_at
+
+from chipglow.io import open_scene, unfinished_scenes
+from chipglow.io.importing import Import, import_scene, prospect, read_scene
+from chipglow.io.sources import SourceError
+from chipglow.io.sources.isolated import Isolated
+from chipglow.io.sources.worker import read_message
+from chipglow.scene import FILLED, Material, Raster, SampledFrame, SceneError, ToolGeometry
+from chipglow.scene.completion import Completion, complete
+from chipglow.scene.motion import optical_flow, strain_rate_along
+
+RASTER = Raster(0.0, 100e-6, 2e-6, 50, 60)
+WHOLE = ("temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y")
+
+
+@pytest.fixture
+def worker_finds_tests(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent), prepend=os.pathsep)
+
+
+def inner(frame):
+    """Samples whose material was there a frame ago too, and is no neighbour of an edge."""
+    x, y = np.meshgrid(RASTER.x, RASTER.y)
+    return (x > 25e-6) & (y > 25e-6) & (x < 95e-6) & (y < 75e-6)
+
+
+def test_a_whole_source_comes_through_as_it_is(tmp_path):
+    looked = import_scene(Import(MovingBlock(WHOLE)), tmp_path / "scene.nc")
+    scene = open_scene(tmp_path / "scene.nc")
+    assert looked.assumed == ()
+    assert scene.raster == RASTER
+    frame = scene.frame(5)
+    solid = frame.material == Material.WORKPIECE
+    x, y = np.meshgrid(RASTER.x, RASTER.y)
+    # Half of the file's step of 25 mK; 2^-14 of the strain.
+    assert np.abs(frame.temperature - (400 + 1e6 * x + 5e5 * y))[solid].max() < 0.0126
+    assert frame.plastic_strain[solid] == pytest.approx(strain_at(x, y, 5e-6)[solid], rel=1e-4)
+    assert (frame.temperature[~solid] == 293.15).all()
+    assert (frame.plastic_strain[~solid] == 0).all()
+    assert (frame.quality == 0).all()
+
+
+def test_missing_strain_rate_is_the_change_of_strain_along_the_motion():
+    scene = read_scene(Import(MovingBlock()))
+    for frame in scene.frames():
+        rate = frame.plastic_strain_rate[inner(frame)]
+        # The strain's pattern is far wider than a sample: the cubic spline is right to 1e-5 of it.
+        assert np.abs(rate - RATE).max() < 0.02 * RATE
+    assert "plastic strain rate: from the change" in scene.data.attrs["assumed"]
+
+
+def test_strain_rate_does_not_take_motion_for_straining():
+    x, y = np.meshgrid(RASTER.x, RASTER.y)
+    velocity = (np.full(x.shape, SPEED, np.float32), np.full(x.shape, UP, np.float32))
+    now, before = ((strain_at(x, y, at) - RATE * at).astype(np.float32) for at in (3e-6, 2e-6))
+    still = np.zeros_like(velocity[0]), np.zeros_like(velocity[0])
+    along = strain_rate_along(now, before, velocity, 1e-6, RASTER.spacing)[10:-10, 10:-10]
+    fixed = strain_rate_along(now, before, still, 1e-6, RASTER.spacing)[10:-10, 10:-10]
+    assert along.max() < 0.02 * fixed.max()
+
+
+def test_strain_rate_of_material_that_was_not_there_is_nought():
+    strain = np.full(RASTER.shape, 2.0, np.float32)
+    before = strain.copy()
+    before[:, :10] = np.nan
+    velocity = (np.full(RASTER.shape, SPEED, np.float32), np.zeros(RASTER.shape, np.float32))
+    strain[:, :5] = 3.0
+    rate = strain_rate_along(strain, before, velocity, 1e-6, RASTER.spacing)
+    assert (rate[:, :5] == 0).all()
+
+
+def test_optical_flow_finds_the_motion_of_a_pattern():
+    pytest.importorskip("skimage")
+    x, y = np.meshgrid(RASTER.x, RASTER.y)
+
+    def pattern(at):
+        x0, y0 = x - SPEED * at, y - UP * at
+        return (2 + np.sin(x0 / 6e-6) * np.cos(y0 / 5e-6)).astype(np.float32)
+
+    across, up = optical_flow(pattern(0.0), pattern(0.5e-6), 0.5e-6, RASTER.spacing)
+    # The method prefers flows without change: its own bias is a few per cent.
+    assert np.median(across[10:-10, 10:-10]) == pytest.approx(SPEED, rel=0.1)
+    assert np.median(up[10:-10, 10:-10]) == pytest.approx(UP, abs=0.1 * SPEED)
+
+
+def test_velocity_is_the_flow_in_the_chip_and_the_cutting_speed_before_it():
+    pytest.importorskip("skimage")
+    # So short that the pattern moves more than it changes.
+    source = MovingBlock(("temperature", "plastic_strain"), count=6, interval=0.2e-6)
+    scene = read_scene(Import(source, completion=Completion(cutting_speed=4.0)))
+    frame = scene.frame(5)
+    # A pattern that is as wide as the picture: the method then makes the motion too small.
+    assert np.median(frame.velocity_x[inner(frame)]) == pytest.approx(SPEED, rel=0.3)
+    unstrained = replace(frame_of(source), fields={
+        "temperature": frame_of(source).fields["temperature"],
+        "plastic_strain": np.zeros(RASTER.shape, np.float32),
+    })  # fmt: skip
+    given = next(iter(complete([unstrained], RASTER, Completion(cutting_speed=4.0))))
+    solid = given.material == Material.WORKPIECE
+    assert (given.velocity_x[solid] == 4.0).all()
+    assert (given.velocity_x[~solid] == 0.0).all()
+
+
+def frame_of(source, number=0):
+    return list(source.frames(RASTER))[number]
+
+
+def test_without_strain_the_chip_is_the_outline_that_was_given():
+    box = ((40e-6, 30e-6), (80e-6, 30e-6), (80e-6, 60e-6), (40e-6, 60e-6))
+    source = MovingBlock(("temperature", "velocity_x", "velocity_y"), count=2)
+    scene = read_scene(Import(source, completion=Completion(chip=box)))
+    frame = scene.frame(1)
+    x, y = np.meshgrid(RASTER.x, RASTER.y)
+    inside = (x > 40e-6) & (x < 80e-6) & (y > 30e-6) & (y < 60e-6)
+    assert np.array_equal(frame.plastic_strain, inside.astype(np.float32))
+    assert (frame.plastic_strain_rate == 0).all()
+    assert "chip's outline" in scene.data.attrs["assumed"]
+
+
+def test_the_tool_of_the_description_is_tool():
+    tool = ToolGeometry(rake_angle=0.0)
+    raster = Raster(-60e-6, 60e-6, 2e-6, 60, 60)
+    fields = {"temperature": np.full(raster.shape, 700.0, np.float32)}
+    x, y = np.meshgrid(raster.x, raster.y)
+    in_tool = tool.signed_distance(x, y) < 0
+    fields["temperature"][in_tool] = np.nan
+    material = np.where(in_tool, Material.VOID, Material.WORKPIECE).astype(np.uint8)
+    sampled = SampledFrame(0.0, fields, material)
+    frame = next(iter(complete([sampled], raster, Completion(tool=tool, surroundings=300.0))))
+    assert np.array_equal(frame.material == Material.TOOL, in_tool)
+    assert (frame.temperature[in_tool] == 300.0).all()
+    assert (frame.quality[in_tool] == FILLED).all()
+    assert (frame.temperature[~in_tool] == 700.0).all()
+
+
+def test_holes_are_filled_from_the_nearest_and_flagged():
+    sampled = frame_of(MovingBlock(WHOLE))
+    fields = {name: values.copy() for name, values in sampled.fields.items()}
+    fields["temperature"][20, 30] = np.nan
+    frame = next(iter(complete([replace(sampled, fields=fields)], RASTER, Completion())))
+    assert frame.quality[20, 30] == FILLED
+    assert (frame.quality == FILLED).sum() == 1
+    near = sampled.fields["temperature"][19:22, 29:32]
+    assert near.min() <= frame.temperature[20, 30] <= near.max()
+
+
+def test_a_material_without_temperature_is_refused():
+    sampled = frame_of(MovingBlock(WHOLE))
+    nothing = {**sampled.fields, "temperature": np.full(RASTER.shape, np.nan, np.float32)}
+    with pytest.raises(SceneError, match="temperature is not known in"):
+        list(complete([replace(sampled, fields=nothing)], RASTER, Completion()))
+
+
+@pytest.mark.parametrize(
+    ("source", "wrong"),
+    [
+        (MovingBlock(("plastic_strain",)), "no field is known as temperature"),
+        (MovingBlock(WHOLE, count=0), "has no frame"),
+        (MovingBlock(WHOLE, interval=-1e-6), "frame 1 is at -1e-06 s, expected later than"),
+        (MovingBlock(WHOLE, interval=float("nan")), "times are not finite"),
+    ],
+)
+def test_sources_of_which_no_scene_can_be_made(source, wrong):
+    with pytest.raises(SourceError, match=wrong):
+        prospect(Import(source))
+
+
+def test_read_elsewhere_is_read_the_same(worker_finds_tests):
+    source = MovingBlock(WHOLE)
+    here, there = source.survey(), Isolated(source, "block").survey()
+    assert (there.kind, there.extent, there.found) == (here.kind, here.extent, here.found)
+    assert np.array_equal(there.times, here.times)
+    pairs = zip(source.frames(RASTER, 3), Isolated(source, "block").frames(RASTER, 3), strict=True)
+    for one, other in pairs:
+        assert one.time == other.time
+        assert np.array_equal(one.material, other.material)
+        for name in WHOLE:
+            assert np.array_equal(one.fields[name], other.fields[name], equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("how", "wrong"),
+    [
+        ("crash", "block: its reader ended with code -6"),
+        ("hang", "block: its reader had no answer in 6 s"),
+        ("devour", "block: needs more memory than a reader may take"),
+        ("refuse", "^block.vtu: frame 2 has no temperature"),
+        ("stumble", r"block: cannot be read, .* \(KeyError: 'offset"),
+    ],
+)
+def test_a_reader_that_goes_wrong_leaves_one_error_and_no_file(
+    how, wrong, tmp_path, worker_finds_tests
+):
+    source = Isolated(Broken(WHOLE, how=how), "block", memory=10**9, patience=6.0)
+    with pytest.raises(SourceError, match=wrong):
+        import_scene(Import(source), tmp_path / "scene.nc")
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_a_library_prints_does_not_mix_with_the_frames(worker_finds_tests):
+    source = Broken(WHOLE, how="chatter")
+    frames = list(Isolated(source, "block").frames(RASTER))
+    assert len(frames) == source.count
+
+
+def test_an_import_that_was_ended_goes_on_to_the_same_file(tmp_path, monkeypatch):
+    monkeypatch.setattr("chipglow.io.importing._CHECKPOINT_INTERVAL", 0.0)
+    wanted = Import(MovingBlock(), description={"source": "block"})
+
+    def stop(share):
+        if share > 0.6:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        import_scene(wanted, tmp_path / "scene.nc", stop)
+    assert not (tmp_path / "scene.nc").exists()
+    kept = len(unfinished_scenes(tmp_path / "scene.nc")[0].frames()[0])
+    assert 0 < kept < 8
+    shares = []
+    import_scene(wanted, tmp_path / "scene.nc", shares.append, resume=True)
+    assert len(shares) == 8 - kept
+    import_scene(wanted, tmp_path / "whole.nc")
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["scene.nc", "whole.nc"]
+    one, other = open_scene(tmp_path / "scene.nc"), open_scene(tmp_path / "whole.nc")
+    for a, b in zip(one.frames(), other.frames(), strict=True):
+        for name in WHOLE:
+            assert np.array_equal(getattr(a, name), getattr(b, name))
+
+
+def test_another_import_does_not_go_on_with_what_is_left(tmp_path, monkeypatch):
+    monkeypatch.setattr("chipglow.io.importing._CHECKPOINT_INTERVAL", 0.0)
+
+    def stop(share):
+        if share > 0.6:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        import_scene(Import(MovingBlock()), tmp_path / "scene.nc", stop)
+    shares = []
+    other = Import(MovingBlock(), description={"units": "mm"})
+    import_scene(other, tmp_path / "scene.nc", shares.append, resume=True)
+    assert len(shares) == 8
+
+
+def test_an_answer_that_is_none_is_neither_unpickled_nor_given_room():
+    assert read_message(BufferedReader(BytesIO(b"")), RASTER) is None
+    assert (
+        read_message(BufferedReader(BytesIO((10**15).to_bytes(8, "little") + b"{}")), RASTER)
+        is None
+    )
