@@ -34,7 +34,7 @@ from chipglow.study import (
     study_text,
     units,
 )
-from chipglow.study.schema import Section
+from chipglow.study.section import Section
 from chipglow.surface import CHIP_1, CHIP_2
 
 

@@ -7,7 +7,7 @@ from pydantic import ValidationError
 
 from chipglow.cutting import material_names
 from chipglow.study import Study, field_entries, field_tables, study_text
-from chipglow.study.schema import Section, allowed
+from chipglow.study.section import Section, allowed
 
 _VALUE = r"(-?[\d.]+)(?: ([A-Za-z/^2]+))?"
 _RANGE = re.compile(rf"{_VALUE} to {_VALUE}")

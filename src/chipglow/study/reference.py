@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass
 
-from chipglow.study.schema import Section, allowed
+from chipglow.study.section import Section, allowed
 from chipglow.study.units import Quantity
 
 

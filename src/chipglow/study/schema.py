@@ -1,24 +1,16 @@
 """What a study says: its sections and fields, the paper's study as defaults, what they mean."""
 
-from abc import abstractmethod
 from collections.abc import Mapping
-from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
     Field,
-    SerializerFunctionWrapHandler,
     Strict,
     ValidationInfo,
-    WrapSerializer,
     field_validator,
     model_validator,
 )
-from pydantic.fields import FieldInfo
 
 from chipglow.analysis.paper import Plan
 from chipglow.camera import (
@@ -43,6 +35,7 @@ from chipglow.cutting import (
 from chipglow.io import read_tool_outline
 from chipglow.radiometry import Band
 from chipglow.scene import Chamfer, Hone, Raster, Tool, ToolGeometry
+from chipglow.study.section import OR_NONE, Part, Section, beside_the_study, described
 from chipglow.study.units import (
     Angle,
     CutLength,
@@ -60,70 +53,6 @@ from chipglow.surface import CHIP_1, CHIP_2, Emissivity, FeatureSurface
 
 CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2}
 """Chips of the paper's Table 1 by the names of a study."""
-
-
-def _none_of_text(value: object) -> object:
-    return None if value == "none" else value
-
-
-def _text_of_none(value: object, handler: SerializerFunctionWrapHandler) -> object:
-    return "none" if value is None else handler(value)
-
-
-_NONE: Final = (BeforeValidator(_none_of_text), WrapSerializer(_text_of_none, when_used="json"))
-
-
-def _beside_the_study(file: str, info: ValidationInfo) -> str:
-    """Path of a file that a study names: relative to the study's folder."""
-    return str(Path((info.context or {}).get("folder") or ".", file).resolve())
-
-
-def _field(default: object, description: str, allowed: str = "") -> Any:
-    """Field with its default as a YAML file would give it, its meaning and what is allowed."""
-    extra: dict[str, Any] = {"allowed": allowed}
-    return Field(default, description=description, json_schema_extra=extra, validate_default=True)
-
-
-def allowed(field: FieldInfo) -> str:
-    """What a field may be, in words; empty if its description says it."""
-    extra = field.json_schema_extra
-    return str(extra.get("allowed", "")) if isinstance(extra, Mapping) else ""
-
-
-class Section(BaseModel):
-    """A section of a study. Unknown keys are refused, an empty section means the defaults."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _known_keys(cls, data: object) -> object:
-        if data is None:
-            return {}
-        if isinstance(data, Section):
-            return data
-        known = ", ".join(cls.model_fields)
-        if not isinstance(data, Mapping):
-            raise ValueError(f"{data!r} is no section, expected keys of {known}")
-        for key in data:
-            if key not in cls.model_fields:
-                close = get_close_matches(str(key), list(cls.model_fields), n=1)
-                hint = f"did you mean {close[0]!r}?" if close else f"expected one of {known}"
-                raise ValueError(f"unknown key {key!r}, {hint}")
-        return data
-
-
-class Part(Section):
-    """A section that describes one object of the library, which says what is possible."""
-
-    @abstractmethod
-    def build(self) -> Any:
-        """The object that this section describes."""
-
-    @model_validator(mode="after")
-    def _possible(self) -> Self:
-        self.build()
-        return self
 
 
 class ChamferSection(Part):
@@ -151,37 +80,37 @@ class HoneSection(Part):
 class ToolSection(Part):
     """The cutting tool."""
 
-    rake_angle: Angle = _field(
+    rake_angle: Angle = described(
         "-7 deg",
         "Rake angle; negative: the rake face leans over the chip.",
         "over -60 deg, under 60 deg; a wedge of 5 deg or more must be left",
     )
-    clearance_angle: Angle = _field(
+    clearance_angle: Angle = described(
         "7 deg",
         "Angle between the tool's flank and the cut surface.",
         "over 0 deg, under 45 deg",
     )
-    edge_radius: Length = _field(
+    edge_radius: Length = described(
         "20 um", "Radius of the cutting edge, or of a chamfer's corners.", "over 0 um"
     )
-    chamfer: Annotated[ChamferSection | None, *_NONE] = _field(
+    chamfer: Annotated[ChamferSection | None, *OR_NONE] = described(
         "none",
         "Chamfer of the edge: the width between sharp corners, the angle from the rake face.",
         "none, or {width: 100 um, angle: 20 deg}",
     )
-    hone: Annotated[HoneSection | None, *_NONE] = _field(
+    hone: Annotated[HoneSection | None, *OR_NONE] = described(
         "none",
         "Hone in the place of the edge's radius: how far from the sharp edge it begins on\n"
         "either face.",
         "none, or {rake: 40 um, clearance: 20 um}",
     )
-    outline: Annotated[str | None, *_NONE] = _field(
+    outline: Annotated[str | None, *OR_NONE] = described(
         "none",
         "File of an outline in the place of all these: its first line x_um,y_um, then a point a\n"
         "line, from the rake face round the edge to the clearance face.",
         "none, or a file such as edge.csv",
     )
-    material: str = _field("carbide", "Material of the tool.", ", ".join(material_names("tool")))
+    material: str = described("carbide", "Material of the tool.", ", ".join(material_names("tool")))
 
     @field_validator("material")
     @classmethod
@@ -192,7 +121,7 @@ class ToolSection(Part):
     @field_validator("outline")
     @classmethod
     def _beside_the_study(cls, outline: str | None, info: ValidationInfo) -> str | None:
-        return None if outline is None else _beside_the_study(outline, info)
+        return None if outline is None else beside_the_study(outline, info)
 
     @model_validator(mode="after")
     def _nothing_unused(self) -> Self:
@@ -231,11 +160,11 @@ class ToolSection(Part):
 class FrictionSection(Part):
     """Friction between chip and tool."""
 
-    coefficient: float = _field(0.5, "Coulomb's coefficient.", "0 to 2")
-    shear_fraction: float = _field(
+    coefficient: float = described(0.5, "Coulomb's coefficient.", "0 to 2")
+    shear_fraction: float = described(
         1.0, "Limit of the friction stress, as a share of the chip's shear flow stress.", "0 to 1"
     )
-    thermal_exponent: Annotated[float | None, *_NONE] = _field(
+    thermal_exponent: Annotated[float | None, *OR_NONE] = described(
         "none",
         "Exponent q of a coefficient that falls with the temperature T of the chip's surface,\n"
         "coefficient * (1 - (T / T_melt)^q) with both in K (Moufki et al. 1998).",
@@ -254,17 +183,17 @@ class FrictionSection(Part):
 class SurroundingsSection(Part):
     """What free surfaces lose heat to."""
 
-    convection: HeatTransfer = _field(
+    convection: HeatTransfer = described(
         "0 W/m^2/K",
         "Coefficient of the heat transfer to the air, of all free surfaces.",
         "0 W/m^2/K to 1000000 W/m^2/K",
     )
-    emissivity: float = _field(
+    emissivity: float = described(
         0.0,
         "Total hemispherical emissivity with which free surfaces cool; not the camera's.",
         "0 to 1",
     )
-    temperature: Temperature = _field(
+    temperature: Temperature = described(
         "20 degC",
         "Temperature of the air and of what the surfaces radiate to.",
         "over -273.15 degC, up to 1226.85 degC",
@@ -278,20 +207,20 @@ class SurroundingsSection(Part):
 class NumericsSection(Part):
     """How finely the cut is computed."""
 
-    cell: Length = _field(
+    cell: Length = described(
         "10 um",
         "Side of a cell of the grid; half of it takes eight times long.",
         "0.5 um to 43.75 um",
     )
-    mass_scaling: float = _field(
+    mass_scaling: float = described(
         100.0,
         "Factor on the density in the equation of motion, for longer time steps.",
         "1 to 10000",
     )
-    courant: float = _field(
+    courant: float = described(
         0.5, "Time step as a share of the time that sound takes for a cell.", "over 0, up to 0.6"
     )
-    points_per_side: int = _field(2, "Material points along the side of a cell.", "1 to 4")
+    points_per_side: int = described(2, "Material points along the side of a cell.", "1 to 4")
 
     def build(self) -> Numerics:
         """Settings of the solver."""
@@ -306,13 +235,13 @@ class NumericsSection(Part):
 class WindowSection(Part):
     """The part of the cut that becomes the scene."""
 
-    start: CutLength = _field(
+    start: CutLength = described(
         "1.579 mm", "Length of cut at the first frame.", "over 0 mm; under end"
     )
-    end: CutLength = _field(
+    end: CutLength = described(
         "1.958 mm", "Length of cut at the last frame.", "over start; up to length_of_cut"
     )
-    interval: Time = _field(
+    interval: Time = described(
         "0.2 us", "Time between frames.", "1 ns to 1 ms; up to the camera's integration_time"
     )
 
@@ -327,13 +256,13 @@ _IN_REGION: Final = "the whole scene within the simulated region"
 class FieldOfViewSection(Part):
     """Where the scene is sampled. The tip of the tool is near the origin, y points up."""
 
-    left: Position = _field("-560 um", "Left edge of the scene.", _IN_REGION)
-    top: Position = _field("460 um", "Upper edge of the scene.", _IN_REGION)
-    spacing: Length = _field(
+    left: Position = described("-560 um", "Left edge of the scene.", _IN_REGION)
+    top: Position = described("460 um", "Upper edge of the scene.", _IN_REGION)
+    spacing: Length = described(
         "0.66667 um", "Side of a sample; the paper has 9 to a sensor.", "over 0 um"
     )
-    rows: int = _field(810, "Samples from top to bottom.", "1 or more")
-    columns: int = _field(900, "Samples from left to right.", "1 or more")
+    rows: int = described(810, "Samples from top to bottom.", "1 or more")
+    columns: int = described(900, "Samples from left to right.", "1 or more")
 
     def build(self) -> Raster:
         """The grid of samples."""
@@ -343,28 +272,28 @@ class FieldOfViewSection(Part):
 class CuttingSection(Part):
     """The cutting simulation; the paper's Table 2."""
 
-    speed: Speed = _field("250 m/min", "Cutting speed.", "over 0 m/min")
-    feed: CutLength = _field("0.3 mm", "Feed: thickness of the uncut chip.", "over 0 mm")
-    length_of_cut: CutLength = _field(
+    speed: Speed = described("250 m/min", "Cutting speed.", "over 0 m/min")
+    feed: CutLength = described("0.3 mm", "Feed: thickness of the uncut chip.", "over 0 mm")
+    length_of_cut: CutLength = described(
         "1.958 mm", "Length of cut, from the first contact.", "over 0 mm"
     )
-    initial_temperature: Temperature = _field(
+    initial_temperature: Temperature = described(
         "20 degC", "Temperature before the cut.", "200 K to 1500 K"
     )
-    workpiece: str = _field(
+    workpiece: str = described(
         "aisi-1045",
         "Material of the workpiece. The command chipglow materials shows them.",
         f"{', '.join(material_names('workpiece'))}; with one of its sets of the\n"
         "flow stress after a slash (aisi-1045/ozel); or a file of your own (steel.yaml)",
     )
-    tool: ToolSection = _field({}, "The cutting tool.")
-    friction: FrictionSection = _field({}, "Friction between chip and tool.")
-    surroundings: SurroundingsSection = _field(
+    tool: ToolSection = described({}, "The cutting tool.")
+    friction: FrictionSection = described({}, "Friction between chip and tool.")
+    surroundings: SurroundingsSection = described(
         {}, "What the free surfaces of chip, workpiece and tool lose heat to; nothing by default."
     )
-    numerics: NumericsSection = _field({}, "How finely the cut is computed.")
-    window: WindowSection = _field({}, "The part of the cut that becomes the scene.")
-    field_of_view: FieldOfViewSection = _field(
+    numerics: NumericsSection = described({}, "How finely the cut is computed.")
+    window: WindowSection = described({}, "The part of the cut that becomes the scene.")
+    field_of_view: FieldOfViewSection = described(
         {}, "Where the scene is sampled: the tool's tip is near the origin, y points up."
     )
 
@@ -448,22 +377,22 @@ class ChipSection(Section):
 class SurfaceSection(Section):
     """Emissivity maps."""
 
-    chips: dict[str, ChipSection] = _field(
+    chips: dict[str, ChipSection] = described(
         {"chip 1": "chip-1", "chip 2": "chip-2"},
         "Chips by name, each laid on the same scene. A chip is chip-1 or chip-2 (the paper's\n"
         "Table 1), or the numbers of its body and shear bands.",
     )
-    workpiece: EmissivitySection = _field(
+    workpiece: EmissivitySection = described(
         _numbers(CHIP_1.workpiece), "The uncut workpiece; the paper assumed these numbers."
     )
-    tool: EmissivitySection = _field(_numbers(CHIP_1.tool), "The tool's side.")
-    grain: Length = _field("20 um", "Size of a grain of the emissivity's texture.")
-    follow: Literal["material", "mean"] = _field(
+    tool: EmissivitySection = described(_numbers(CHIP_1.tool), "The tool's side.")
+    grain: Length = described("20 um", "Size of a grain of the emissivity's texture.")
+    follow: Literal["material", "mean"] = described(
         "material",
         "How textures move: material (each point keeps its own) or mean (the paper's shift by\n"
         "the feature's mean velocity).",
     )
-    restore_deviation: bool = _field(
+    restore_deviation: bool = described(
         True, "Make up for the deviation that is lost when a texture is enlarged."
     )
 
@@ -500,15 +429,15 @@ class SurfaceSection(Section):
 class AnnularApertureSection(Part):
     """Diffraction of a reflecting microscope objective."""
 
-    kind: Literal["annular-aperture"] = _field(
+    kind: Literal["annular-aperture"] = described(
         "annular-aperture",
         "Diffraction of a reflecting microscope objective. Other kinds:\n"
         "  {kind: gaussian, fwhm: 12 um}  full width at half maximum\n"
         "  {kind: measured, file: psf.npy, spacing: 1 um}  .npy or .csv, side of its samples",
     )
-    wavelength: Wavelength = _field("4.5 um", "Wavelength of the diffraction.")
-    numerical_aperture: float = _field(0.28, "Numerical aperture of the objective.")
-    obscuration: float = _field(0.35, "Diameter of the central obstruction, as a share.")
+    wavelength: Wavelength = described("4.5 um", "Wavelength of the diffraction.")
+    numerical_aperture: float = described(0.28, "Numerical aperture of the objective.")
+    obscuration: float = described(0.35, "Diameter of the central obstruction, as a share.")
 
     def build(self) -> PointSpreadFunction:
         """The point spread function."""
@@ -518,7 +447,7 @@ class AnnularApertureSection(Part):
 class GaussianSection(Part):
     """A Gaussian."""
 
-    kind: Literal["gaussian"] = _field("gaussian", "A Gaussian.")
+    kind: Literal["gaussian"] = described("gaussian", "A Gaussian.")
     fwhm: Length = Field(description="Full width at half maximum.")
 
     def build(self) -> PointSpreadFunction:
@@ -529,14 +458,14 @@ class GaussianSection(Part):
 class MeasuredSection(Part):
     """A kernel from a file."""
 
-    kind: Literal["measured"] = _field("measured", "A kernel from a file.")
+    kind: Literal["measured"] = described("measured", "A kernel from a file.")
     file: str = Field(description="File of the kernel, .npy or .csv.")
     spacing: Length = Field(description="Side of the kernel's samples.")
 
     @field_validator("file")
     @classmethod
     def _beside_the_study(cls, file: str, info: ValidationInfo) -> str:
-        return _beside_the_study(file, info)
+        return beside_the_study(file, info)
 
     def build(self) -> PointSpreadFunction:
         """The point spread function."""
@@ -554,26 +483,26 @@ PSFSection = Annotated[
 class CameraSection(Part):
     """The infrared camera."""
 
-    band: WavelengthRange = _field("3.8-5.1 um", "Spectral band.")
-    pitch: Length = _field("6 um", "Distance between sensors, as seen on the scene.")
-    fill_factor: float = _field(1.0, "Share of a sensor's square that takes light.")
-    offset_right: Position = _field("0 um", "First sensor's corner from the scene's left edge.")
-    offset_down: Position = _field("0 um", "First sensor's corner from the scene's upper edge.")
-    psf: Annotated[PSFSection | None, *_NONE] = _field(
+    band: WavelengthRange = described("3.8-5.1 um", "Spectral band.")
+    pitch: Length = described("6 um", "Distance between sensors, as seen on the scene.")
+    fill_factor: float = described(1.0, "Share of a sensor's square that takes light.")
+    offset_right: Position = described("0 um", "First sensor's corner from the scene's left edge.")
+    offset_down: Position = described("0 um", "First sensor's corner from the scene's upper edge.")
+    psf: Annotated[PSFSection | None, *OR_NONE] = described(
         {"kind": "annular-aperture"},
         "Point spread function of the optics, or none.",
     )
-    psf_order: Literal["optics", "sensor"] = _field(
+    psf_order: Literal["optics", "sensor"] = described(
         "sensor",
         "sensor (the paper's: on the sensors' values) or optics (on the samples, before the\n"
         "sensors integrate).",
     )
-    integration_time: Time = _field("10 us", "Exposure.")
-    frame_rate: Frequency = _field("600 Hz", "Frames a second.")
-    floor: Annotated[Temperature | None, *_NONE] = _field(
+    integration_time: Time = described("10 us", "Exposure.")
+    frame_rate: Frequency = described("600 Hz", "Frames a second.")
+    floor: Annotated[Temperature | None, *OR_NONE] = described(
         "300 degC", "Radiance temperatures under this are flagged, not returned; or none."
     )
-    reflected: Annotated[Temperature | None, *_NONE] = _field(
+    reflected: Annotated[Temperature | None, *OR_NONE] = described(
         "none", "Temperature of the surroundings that the surface reflects, or none."
     )
 
@@ -596,20 +525,20 @@ class CameraSection(Part):
 class AnalysisSection(Part):
     """What is computed from the simulated measurement."""
 
-    instants: int = _field(9, "Exposures, spread evenly over the scene.")
-    rake_chip: str = _field(
+    instants: int = described(9, "Exposures, spread evenly over the scene.")
+    rake_chip: str = described(
         "chip 2", "Chip whose errors are read at the rake face; the paper took its chip 2."
     )
-    band_chip: str = _field(
+    band_chip: str = described(
         "chip 1", "Chip whose errors are read at the shear band; the paper took its chip 1."
     )
-    reference: Literal["maximum", "mean", "centre", "true"] = _field(
+    reference: Literal["maximum", "mean", "centre", "true"] = described(
         "maximum",
         "What a pixel's measured temperature is compared with, in its square during the exposure:\n"
         "the greatest radiance temperature (maximum, the paper's), that of the mean radiance\n"
         "(mean), that in the middle of both (centre) or the greatest true temperature (true).",
     )
-    psf_widths: Annotated[tuple[Length, ...], Strict(False)] = _field(
+    psf_widths: Annotated[tuple[Length, ...], Strict(False)] = described(
         [f"{width} um" for width in range(4, 21)],
         "Full widths at half maximum of Gaussians for which the headline errors are shown.",
     )
@@ -643,15 +572,17 @@ class Study(Section):
     5e-06
     """
 
-    title: str = _field(
+    title: str = described(
         "The effects of emissivity and camera point spread function (Heigel and Whitenton 2010)",
         "What the report is headed with.",
     )
-    seed: int = _field(2010, "Seed of all random numbers.")
-    cutting: CuttingSection = _field({}, "The cutting simulation; defaults: the paper's Table 2.")
-    surface: SurfaceSection = _field({}, "Emissivity maps; defaults: the paper's Table 1.")
-    camera: CameraSection = _field({}, "The infrared camera.")
-    analysis: AnalysisSection = _field({}, "What is computed from the simulated measurement.")
+    seed: int = described(2010, "Seed of all random numbers.")
+    cutting: CuttingSection = described(
+        {}, "The cutting simulation; defaults: the paper's Table 2."
+    )
+    surface: SurfaceSection = described({}, "Emissivity maps; defaults: the paper's Table 1.")
+    camera: CameraSection = described({}, "The infrared camera.")
+    analysis: AnalysisSection = described({}, "What is computed from the simulated measurement.")
 
     @classmethod
     def quick(cls) -> Self:

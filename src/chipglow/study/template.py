@@ -6,7 +6,8 @@ from typing import Any, Final
 import yaml
 from pydantic import BaseModel
 
-from chipglow.study.schema import Section, Study, allowed
+from chipglow.study.schema import Study
+from chipglow.study.section import Section, allowed
 
 _HEADER: Final = """\
 # A study of chipglow. Run it with: chipglow run FILE --out FOLDER

@@ -1,0 +1,84 @@
+"""What a section of a YAML file is: known keys only, each described, built into one object."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Final, Self
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationInfo,
+    WrapSerializer,
+    model_validator,
+)
+from pydantic.fields import FieldInfo
+
+
+def _none_of_text(value: object) -> object:
+    return None if value == "none" else value
+
+
+def _text_of_none(value: object, handler: SerializerFunctionWrapHandler) -> object:
+    return "none" if value is None else handler(value)
+
+
+OR_NONE: Final = (BeforeValidator(_none_of_text), WrapSerializer(_text_of_none, when_used="json"))
+"""Annotations of a field that may be none."""
+
+
+def beside_the_study(file: str, info: ValidationInfo) -> str:
+    """Path of a file that a study names: relative to the study's folder."""
+    return str(Path((info.context or {}).get("folder") or ".", file).resolve())
+
+
+def described(default: object, description: str, allowed: str = "") -> Any:
+    """Field with its default as a YAML file would give it, its meaning and what is allowed."""
+    extra: dict[str, Any] = {"allowed": allowed}
+    return Field(default, description=description, json_schema_extra=extra, validate_default=True)
+
+
+def allowed(field: FieldInfo) -> str:
+    """What a field may be, in words; empty if its description says it."""
+    extra = field.json_schema_extra
+    return str(extra.get("allowed", "")) if isinstance(extra, Mapping) else ""
+
+
+class Section(BaseModel):
+    """A section of a study. Unknown keys are refused, an empty section means the defaults."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, data: object) -> object:
+        if data is None:
+            return {}
+        if isinstance(data, Section):
+            return data
+        known = ", ".join(cls.model_fields)
+        if not isinstance(data, Mapping):
+            raise ValueError(f"{data!r} is no section, expected keys of {known}")
+        for key in data:
+            if key not in cls.model_fields:
+                close = get_close_matches(str(key), list(cls.model_fields), n=1)
+                hint = f"did you mean {close[0]!r}?" if close else f"expected one of {known}"
+                raise ValueError(f"unknown key {key!r}, {hint}")
+        return data
+
+
+class Part(Section):
+    """A section that describes one object of the library, which says what is possible."""
+
+    @abstractmethod
+    def build(self) -> Any:
+        """The object that this section describes."""
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        self.build()
+        return self
