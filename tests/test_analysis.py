@@ -284,6 +284,33 @@ def test_the_period_of_a_synthetic_force_is_found(period, shape):
     assert not found.period_uncertainty > 0.02 * period
 
 
+def test_three_unequal_segments_have_a_period():
+    # The cutting force of a cut with a cell of 7 um, in N/mm every 6 us.
+    forces = [
+        27, 278, 493, 539, 569, 587, 601, 614, 622, 625, 624, 624, 612, 583, 567, 495, 488, 469,
+        478, 484, 448, 419, 421, 432, 446, 461, 478, 493, 505, 522, 543, 564, 572, 574, 575, 582,
+        582, 591, 543, 428, 466, 462, 478, 483, 493, 503, 503, 523, 534, 542, 539, 555, 526, 429,
+        447, 459, 485, 479, 490, 504, 518, 531, 545, 528, 536, 489, 452, 406, 441, 460, 474, 485,
+        494, 506, 517, 520, 528, 524, 504,
+    ]  # fmt: skip
+    time = np.arange(0.0, 469e-6, 2e-6)
+    force = np.interp(time, 6e-6 * np.arange(len(forces)), forces) * 1e3
+    found = segmentation(time, force, force)
+    assert found.segments == 3
+    # Peaks at 222, 306 and 372 us, each known to a sample or two.
+    assert found.period == pytest.approx((372 - 222) / 2 * 1e-6, abs=6e-6)
+
+
+def test_noise_has_no_period():
+    time = np.arange(0.0, 470e-6, 2e-6)
+    found = 0
+    for seed in range(40):
+        noise = np.random.default_rng(seed).normal(0.0, 20e3, time.size)
+        found += np.isfinite(segmentation(time, 450e3 + noise, noise).period)
+    # Of white noise over so short a time some looks like a period.
+    assert found <= 4
+
+
 def test_a_force_without_period_has_none():
     time = np.arange(0.0, 400e-6, 0.5e-6)
     steady = 600e3 * (1 - np.exp(-time / 30e-6))

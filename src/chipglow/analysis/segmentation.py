@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import detrend, find_peaks
 
-_WEAKEST_CORRELATION: Final = 0.2
+_LEAST_PROMINENCE: Final = 0.3
+"""Least rise of the autocorrelation from the valley before its first peak to that peak: in a few
+unequal segments the peak is low, but the valley deep; noise has neither."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ def end_of_build_up(cutting_force: NDArray[np.float64]) -> int:
 
 
 def _correlation_period(force: NDArray[np.float64], step: float) -> float:
-    """Lag of the first high peak of the unbiased autocorrelation; NaN if there is none."""
+    """Lag of the first clear peak of the unbiased autocorrelation; NaN if there is none."""
     if force.size < 8:
         return nan
     swing = detrend(force)
@@ -137,7 +139,7 @@ def _correlation_period(force: NDArray[np.float64], step: float) -> float:
     down = np.flatnonzero(correlation < 0)
     if down.size == 0:
         return nan
-    peaks, _ = find_peaks(correlation, height=_WEAKEST_CORRELATION)
+    peaks, _ = find_peaks(correlation, prominence=_LEAST_PROMINENCE)
     peaks = peaks[peaks > down[0]]
     return float(peaks[0] * step) if peaks.size else nan
 
