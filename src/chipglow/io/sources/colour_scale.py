@@ -1,0 +1,414 @@
+"""Colour scales: from the colours of a picture back to the values that they stand for."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from math import sqrt
+from typing import Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import erfc
+
+from chipglow.io.sources.source import SourceError
+
+RAINBOW: Final = "rainbow"
+"""Blue, cyan, green, yellow, red at full saturation, as finite-element programs draw it."""
+
+_LEVELS: Final = 256
+_SAME: Final = 7.0  # a difference in Lab that a codec makes between two pixels of one colour
+_APART: Final = 15.0
+_CHORD: Final = 0.01  # half of the share of the scale over which its slope is taken
+_BAND_JUMP: Final = 3.0
+# D65, IEC 61966-2-1
+_WHITE: Final = np.array([0.95047, 1.0, 1.08883])
+_XYZ: Final = np.array(
+    [
+        [0.4124564, 0.3575761, 0.1804375],
+        [0.2126729, 0.7151522, 0.0721750],
+        [0.0193339, 0.1191920, 0.9503041],
+    ]
+)
+_TO_XYZ: Final = _XYZ / _WHITE[:, None]
+
+
+def lab(colours: ArrayLike) -> NDArray[np.float64]:
+    """CIE L*a*b* (1976, D65) of sRGB colours of 0 to 1, shape (..., 3)."""
+    srgb = np.asarray(colours, np.float64)
+    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    xyz = linear @ _TO_XYZ.T
+    small = xyz <= (6 / 29) ** 3
+    f = np.where(small, xyz * (29 / 6) ** 2 / 3 + 4 / 29, np.cbrt(xyz))
+    x, y, z = f[..., 0], f[..., 1], f[..., 2]
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class ColourScale:
+    """Colours that stand for values.
+
+    Parameters
+    ----------
+    values : ndarray
+        Values of the colours in SI units, ascending, shape (n,).
+    colours : ndarray
+        sRGB of 0 to 1, shape (n, 3).
+    banded : bool
+        Whether each colour stands for a band of values; otherwise the colours between two of the
+        scale stand for the values between theirs.
+
+    Raises
+    ------
+    SourceError
+        If values do not ascend, colours are not of 0 to 1, or a colour stands for two values.
+    """
+
+    values: NDArray[np.float64]
+    colours: NDArray[np.float64]
+    banded: bool = False
+
+    def __post_init__(self) -> None:
+        least = 1 if self.banded else 2
+        if self.values.ndim != 1 or len(self.values) < least:
+            raise SourceError(f"colours: expected {least} or more, got {self.values.shape}")
+        if not np.isfinite(self.values).all() or (np.diff(self.values) <= 0).any():
+            raise SourceError("colours: the values of the scale must be finite and ascend")
+        if self.colours.shape != (len(self.values), 3):
+            raise SourceError(
+                f"colours: have shape {self.colours.shape}, expected ({len(self.values)}, 3)"
+            )
+        if not ((self.colours >= 0) & (self.colours <= 1)).all():
+            raise SourceError("colours: expected red, green and blue of 0 to 1")
+        self._refuse_colours_that_come_back()
+
+    @classmethod
+    def named(cls, name: str, values: tuple[float, float], bands: int = 0) -> "ColourScale":
+        """Scale of a named map.
+
+        Parameters
+        ----------
+        name : str
+            `RAINBOW` or a colour map of matplotlib (``jet``, ``turbo``, ``viridis``, ``jet_r``);
+            ``matplotlib.rainbow`` is matplotlib's own.
+        values : tuple of float
+            Values at the first and the last edge of the scale, in SI units.
+        bands : int
+            Number of bands of equal width, the first and the last with the end colours of the map;
+            0 for a map that runs without steps.
+
+        Raises
+        ------
+        SourceError
+            If there is no such map, or a colour of it stands for two values.
+        """
+        count = bands or _LEVELS
+        try:
+            return cls._linear(_map_colours(name, count), values, banded=bands > 0)
+        except SourceError as error:
+            raise SourceError(f"{name}: {error}") from error
+
+    @classmethod
+    def from_legend(cls, pixels: NDArray[np.uint8], values: tuple[float, float]) -> "ColourScale":
+        """Scale of a legend's pixels.
+
+        Parameters
+        ----------
+        pixels : ndarray
+            Colours along the legend, shape (n, 3), uint8.
+        values : tuple of float
+            Values at its first and last edge, in SI units.
+
+        Notes
+        -----
+        It has bands if its colour stands still but for jumps.
+        """
+        colours = pixels / 255.0
+        steps = np.linalg.norm(np.diff(lab(colours), axis=0), axis=1)
+        jumps = np.flatnonzero(steps > _BAND_JUMP)
+        banded = 0 < len(jumps) < len(pixels) / 4 and steps[jumps].sum() > 0.8 * steps.sum()
+        first, last = values
+        if banded:
+            parts = _bands(colours, jumps)
+            edges = np.array([0, *(part.stop for part in parts)])
+            middles = (edges[1:] + edges[:-1]) / 2
+            chosen = np.array([np.median(colours[part], axis=0) for part in parts])
+        else:
+            middles, chosen = np.arange(len(pixels)) + 0.5, colours
+        return cls._sorted(first + (last - first) * middles / len(pixels), chosen, banded)
+
+    @classmethod
+    def _linear(
+        cls, colours: NDArray[np.float64], values: tuple[float, float], *, banded: bool
+    ) -> "ColourScale":
+        first, last = values
+        places = (np.arange(len(colours)) + 0.5) / len(colours)
+        return cls._sorted(first + (last - first) * places, colours, banded)
+
+    @classmethod
+    def _sorted(
+        cls, values: NDArray[np.float64], colours: NDArray[np.float64], banded: bool
+    ) -> "ColourScale":
+        order = slice(None, None, 1 if values[-1] > values[0] else -1)
+        return cls(values[order], colours[order], banded)
+
+    @cached_property
+    def knots(self) -> NDArray[np.float64]:
+        """Values of the colours that differ in 8 bits, ascending, shape (m,).
+
+        Where the colour stands still, the middle of its values.
+        """
+        first, last = self._runs
+        return np.asarray((self.values[first] + self.values[last]) / 2)
+
+    @cached_property
+    def widths(self) -> NDArray[np.float64]:
+        """Range of values for which each colour of the knots stands, shape (m,)."""
+        first, last = self._runs
+        count = len(self.values)
+        step = (self.values[-1] - self.values[0]) / max(count - 1, 1)
+        return np.asarray(self.values[last] - self.values[first] + step)
+
+    @cached_property
+    def labs(self) -> NDArray[np.float64]:
+        """Colours of the knots in CIE L*a*b*, shape (m, 3)."""
+        return lab(self.colours[self._runs[0]])
+
+    @cached_property
+    def _runs(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """First and last of the colours that are the same in 8 bits, shape (m,) each."""
+        changes = np.diff(np.round(255 * self.colours), axis=0).any(axis=1)
+        edges = np.flatnonzero(changes) + 1
+        return np.append(0, edges), np.append(edges, len(self.values)) - 1
+
+    @cached_property
+    def slope(self) -> NDArray[np.float64]:
+        """How much the value changes with the colour, per unit of CIE L*a*b*, shape (m,).
+
+        It is taken over the chord of 2 % of the scale.
+        """
+        rise, chord = self._chords
+        return np.asarray(rise / _lengths(chord))
+
+    @cached_property
+    def sensitivity(self) -> NDArray[np.float64]:
+        """Standard deviation of the value for a root mean square distance of 1, shape (m,).
+
+        For noise that is equally large in red, green and blue: it has one component along the
+        scale, which changes the value, and two across, which make the distance.
+        """
+        chord = self._chords[1]
+        tangent = chord / _lengths(chord)[:, None]
+        change = _lab_per_colour(self.colours[self._runs[0]])
+        along = (np.einsum("nij,ni->nj", change, tangent) ** 2).sum(axis=1)
+        across = (change**2).sum(axis=(1, 2)) - along
+        return np.asarray(self.slope * np.sqrt(along / across))
+
+    @cached_property
+    def _chords(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Change of value and of L*a*b* about each colour."""
+        count = len(self.knots)
+        reach = max(1, round(_CHORD * count))
+        above = np.minimum(np.arange(count) + reach, count - 1)
+        below = np.maximum(np.arange(count) - reach, 0)
+        return self.knots[above] - self.knots[below], self.labs[above] - self.labs[below]
+
+    def invert(self, picture: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Values that the colours of a picture stand for.
+
+        Parameters
+        ----------
+        picture : ndarray
+            Red, green and blue, shape (y, x, 3), uint8.
+
+        Returns
+        -------
+        values : ndarray
+            Value of the nearest place on the scale, shape (y, x), float32.
+        distance : ndarray
+            Distance from it in CIE L*a*b* (1976 difference), shape (y, x), float32.
+
+        Notes
+        -----
+        Exact: the first pixel of each of the 2^24 colours is projected onto all segments of the
+        scale; the answer is kept for the others.
+        """
+        values = np.empty(picture.shape[:2], np.float32)
+        distance = np.empty(picture.shape[:2], np.float32)
+        _invert(
+            np.ascontiguousarray(picture), self.labs, self.knots, self.banded, _linear_light(),
+            _TO_XYZ, self._known, values, distance,
+        )  # fmt: skip
+        return values, distance
+
+    @cached_property
+    def _known(self) -> NDArray[np.float32]:
+        """Value and 1 + distance of every colour; 0 where it was not asked for yet."""
+        return np.zeros((1 << 24, 2), np.float32)
+
+    def _refuse_colours_that_come_back(self) -> None:
+        """A scale may not return to a colour that it left."""
+        chosen = np.unique(np.linspace(0, len(self.knots) - 1, 192).astype(int))
+        labs = self.labs[chosen]
+        apart = np.triu(np.linalg.norm(labs[:, None] - labs[None, :], axis=2))
+        left = np.maximum.accumulate(apart, axis=1) > _APART
+        back = np.argwhere(left & (apart < _SAME) & np.triu(np.ones_like(left), 1))
+        if len(back):
+            first, second = self.knots[chosen[back[0]]]
+            raise SourceError(
+                f"colours: {first:.5g} and {second:.5g} have the same colour, expected a scale "
+                "that never returns to one"
+            )
+
+
+@dataclass(frozen=True)
+class ColourUncertainty:
+    """What the colours of a movie leave unknown of a field: standard deviations in its unit.
+
+    Parameters
+    ----------
+    colours : float
+        Because the scale has a finite number of colours.
+    noise : float
+        Because the colours are not those of the scale: compression and rounding.
+    """
+
+    colours: float
+    noise: float
+
+    @property
+    def total(self) -> float:
+        """Both together."""
+        return sqrt(self.colours**2 + self.noise**2)
+
+
+def colour_uncertainty(
+    scale: ColourScale, values: ArrayLike, distance: ArrayLike
+) -> ColourUncertainty:
+    """Uncertainty of values that were read from colours.
+
+    Parameters
+    ----------
+    scale : ColourScale
+        The scale.
+    values, distance : array_like
+        What `ColourScale.invert` gave for the pixels that show the field.
+
+    Notes
+    -----
+    Noise is taken to be as large along the scale as across it, where it is seen as a distance: see
+    `ColourScale.sensitivity`. Bands are wrong only where noise is enough for the next band.
+    """
+    values, distance = np.ravel(values), np.ravel(distance).astype(np.float64)
+    widths = np.interp(values, scale.knots, scale.widths)
+    noise = distance * np.interp(values, scale.knots, scale.sensitivity)
+    if scale.banded:
+        wrong = erfc(widths / 2 / np.maximum(noise, 1e-9 * widths) / sqrt(2))
+        noise = np.sqrt(wrong) * widths
+    return ColourUncertainty(_root_mean_square(widths) / sqrt(12), _root_mean_square(noise))
+
+
+def _root_mean_square(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt((values**2).mean())) if values.size else 0.0
+
+
+def _lengths(chords: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lengths of chords; where the colour stands still, that of a rounding of 8 bits."""
+    return np.asarray(np.maximum(np.linalg.norm(chords, axis=1), 0.1))
+
+
+def _lab_per_colour(colours: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Derivatives of L*a*b* with respect to red, green and blue, shape (n, 3, 3)."""
+    columns = []
+    for direction in np.eye(3) / 255:
+        above, below = np.minimum(colours + direction, 1), np.maximum(colours - direction, 0)
+        columns.append((lab(above) - lab(below)) / (above - below).sum(axis=1)[:, None])
+    return np.stack(columns, axis=2)
+
+
+def _map_colours(name: str, count: int) -> NDArray[np.float64]:
+    from matplotlib import colormaps
+    from matplotlib.colors import hsv_to_rgb
+
+    if name == RAINBOW:
+        hue = np.linspace(2 / 3, 0.0, count)
+        return np.asarray(hsv_to_rgb(np.stack([hue, np.ones(count), np.ones(count)], axis=1)))
+    plain = name.removeprefix("matplotlib.")
+    if plain not in colormaps:
+        raise SourceError("unknown colour map, expected rainbow or one of matplotlib's, as jet")
+    return np.asarray(colormaps[plain].resampled(count)(np.arange(count)))[:, :3]
+
+
+def _bands(colours: NDArray[np.float64], jumps: NDArray[np.intp]) -> list[slice]:
+    """Runs of one colour between jumps; a run of one or two blurred pixels goes to the next."""
+    edges = [0, *(int(jump) + 1 for jump in jumps), len(colours)]
+    longest = max(np.diff(edges))
+    kept = [0]
+    for edge in edges[1:]:
+        if edge - kept[-1] > longest / 3 or edge == len(colours):
+            kept.append(edge)
+    return [slice(first, last) for first, last in pairwise(kept)]
+
+
+def _linear_light() -> NDArray[np.float64]:
+    srgb = np.arange(256) / 255.0
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+@njit(cache=True)
+def _invert(picture, labs, scale, banded, linear, to_xyz, known, values, distance):  # type: ignore[no-untyped-def]
+    for row in range(picture.shape[0]):
+        for column in range(picture.shape[1]):
+            red, green, blue = picture[row, column]
+            key = (np.int64(red) << 16) | (np.int64(green) << 8) | np.int64(blue)
+            if known[key, 1] == 0.0:
+                place = _lab(linear[red], linear[green], linear[blue], to_xyz)
+                value, apart = _nearest(place, labs, scale, banded)
+                known[key, 0] = value
+                known[key, 1] = 1.0 + apart
+            values[row, column] = known[key, 0]
+            distance[row, column] = known[key, 1] - np.float32(1.0)
+
+
+@njit(cache=True)
+def _lab(red, green, blue, to_xyz):  # type: ignore[no-untyped-def]
+    x = _root(to_xyz[0, 0] * red + to_xyz[0, 1] * green + to_xyz[0, 2] * blue)
+    y = _root(to_xyz[1, 0] * red + to_xyz[1, 1] * green + to_xyz[1, 2] * blue)
+    z = _root(to_xyz[2, 0] * red + to_xyz[2, 1] * green + to_xyz[2, 2] * blue)
+    return 116 * y - 16, 500 * (x - y), 200 * (y - z)
+
+
+@njit(cache=True)
+def _root(value):  # type: ignore[no-untyped-def]
+    if value <= (6 / 29) ** 3:
+        return value * (29 / 6) ** 2 / 3 + 4 / 29
+    return np.cbrt(value)
+
+
+@njit(cache=True)
+def _nearest(place, labs, scale, banded):  # type: ignore[no-untyped-def]
+    """Value of the nearest place on the scale, and its distance."""
+    best = np.inf
+    value = scale[0]
+    for index in range(len(scale) if banded else len(scale) - 1):
+        u0 = place[0] - labs[index, 0]
+        u1 = place[1] - labs[index, 1]
+        u2 = place[2] - labs[index, 2]
+        share = 0.0
+        if not banded:
+            v0 = labs[index + 1, 0] - labs[index, 0]
+            v1 = labs[index + 1, 1] - labs[index, 1]
+            v2 = labs[index + 1, 2] - labs[index, 2]
+            square = v0 * v0 + v1 * v1 + v2 * v2
+            if square > 0:
+                share = min(max((u0 * v0 + u1 * v1 + u2 * v2) / square, 0.0), 1.0)
+            u0 -= share * v0
+            u1 -= share * v1
+            u2 -= share * v2
+        apart = u0 * u0 + u1 * u1 + u2 * u2
+        if apart < best:
+            best = apart
+            value = scale[index]
+            if share > 0:
+                value += share * (scale[index + 1] - scale[index])
+    return value, np.sqrt(best)

@@ -1,0 +1,458 @@
+"""Movies of fields with a colour scale: a source of scenes."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from math import hypot, isfinite
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.io.sources.colour_scale import ColourScale, ColourUncertainty, colour_uncertainty
+from chipglow.io.sources.conventions import Placement
+from chipglow.io.sources.legend import Box, find_legend, legend_pixels
+from chipglow.io.sources.moving_pictures import MovieIndex, index_movie, pictures
+from chipglow.io.sources.overlays import (
+    Colour,
+    FieldPicture,
+    FieldReader,
+    box_mask,
+    fill,
+    find_background,
+    polygon_mask,
+)
+from chipglow.io.sources.picture_sampling import PictureSampling
+from chipglow.io.sources.source import SampledFrame, Source, SourceError, Survey
+from chipglow.scene import FIELD_UNITS, FILLED, Material, Raster
+
+MOVIE_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate")
+"""Fields that a movie can show, the first of those given decides on the material."""
+
+OVERLAY_LIMIT: Final = 20.0
+
+_LEGEND_MARGIN: Final = 3
+_HALF: Final = 0.5
+
+
+@dataclass(frozen=True)
+class NamedMap:
+    """A colour map that is known by its name, see `ColourScale.named`.
+
+    Parameters
+    ----------
+    name : str
+        ``rainbow`` or a map of matplotlib.
+    bands : int
+        Number of bands; 0 for a map that runs without steps.
+    """
+
+    name: str
+    bands: int = 0
+
+    def __post_init__(self) -> None:
+        if not (self.bands == 0 or 2 <= self.bands <= 256):
+            raise ValueError(f"bands: {self.bands!r}, expected 0 or 2 to 256")
+
+
+@dataclass(frozen=True)
+class Legend:
+    """A legend in the first picture of a movie.
+
+    Parameters
+    ----------
+    box : tuple of int, optional
+        Left, top, right and bottom edge of its colours in pixels of the whole picture; it is looked
+        for if nothing is said.
+    """
+
+    box: Box | None = None
+
+
+@dataclass(frozen=True)
+class FieldMovie:
+    """A movie of one field.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    values : tuple of float
+        Values in SI units at the ends of the scale: the first and the last colour of a map; the
+        bottom and the top, or the left and the right end, of a legend.
+    colours : NamedMap or Legend
+        What the colours mean.
+
+    Raises
+    ------
+    ValueError
+        If the values are not finite or the same.
+    """
+
+    path: Path
+    values: tuple[float, float]
+    colours: NamedMap | Legend = field(default_factory=Legend)
+
+    def __post_init__(self) -> None:
+        first, last = self.values
+        if not (isfinite(first) and isfinite(last) and first != last):
+            raise ValueError(f"values: {self.values!r}, expected two different finite numbers")
+
+
+@dataclass(frozen=True)
+class MovieSource(Source):
+    """Fields shown by movies, a movie a field.
+
+    Parameters
+    ----------
+    movies : mapping
+        Movies by names of `MOVIE_FIELDS`. They have the same size and number of pictures.
+    metre_per_pixel : float
+        Side of a pixel in m; see `metre_per_pixel`.
+    origin : tuple of float
+        The scene's origin, that is the tool's tip, in pixels right of and down from the upper left
+        corner of the whole picture: 0.5, 0.5 is the middle of the first pixel.
+    crop : Box, optional
+        What part of the pictures shows the field.
+    frame_interval : float, optional
+        Time from picture to picture in s; the movie's own playing time if nothing is said.
+    every : int
+        Take one picture of so many.
+    placement : Placement
+        How the picture lies in the scene: ``x`` is to the right, ``y`` is up.
+    background : tuple of Colour, optional
+        Colours that show nothing; looked for at the border if nothing is said, none if empty.
+    covered : tuple of Box
+        Parts of the whole picture where something else is drawn, such as text.
+    overlay_limit : float
+        Distance from the scale in CIE L*a*b* beyond which a colour is a line or text.
+    tool_polygon : tuple of (float, float)
+        Corners of the tool in pixels of the whole picture; two are opposite corners of a box.
+    tool_colour : Colour, optional
+        Colour of a tool that shows no values.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of its range.
+    """
+
+    movies: Mapping[str, FieldMovie]
+    metre_per_pixel: float
+    origin: tuple[float, float]
+    crop: Box | None = None
+    frame_interval: float | None = None
+    every: int = 1
+    placement: Placement = field(default_factory=Placement)
+    background: tuple[Colour, ...] | None = None
+    covered: tuple[Box, ...] = ()
+    overlay_limit: float = OVERLAY_LIMIT
+    tool_polygon: tuple[tuple[float, float], ...] = ()
+    tool_colour: Colour | None = None
+
+    def __post_init__(self) -> None:
+        unknown = sorted(set(self.movies) - set(MOVIE_FIELDS))
+        if unknown or not self.movies:
+            raise ValueError(f"movies: {unknown}, expected one or more of {list(MOVIE_FIELDS)}")
+        for name in ("metre_per_pixel", "frame_interval", "overlay_limit"):
+            value = getattr(self, name)
+            if value is not None and not (isfinite(value) and value > 0):
+                raise ValueError(f"{name}: {value!r}, expected a finite number over 0")
+        if self.every < 1:
+            raise ValueError(f"every: {self.every!r}, expected 1 or more")
+        if not all(isfinite(value) for value in self.origin):
+            raise ValueError(f"origin: {self.origin!r}, expected finite numbers of pixels")
+        if len(self.tool_polygon) == 1:
+            raise ValueError("tool_polygon: 1 corner, expected 3 or more, or 2 of a box")
+        if self.placement.depth != 2 or self.placement.origin != (0.0, 0.0):
+            raise ValueError(
+                f"placement: {self.placement}, expected x and y of the picture; the origin is in "
+                "pixels"
+            )
+
+    def survey(self) -> Survey:
+        """Look at what is there: sizes, times, legends, the background, what colours leave open."""
+        indices = self._indices()
+        index = indices[self._names[0]]
+        readers, assumed = self._readers(indices)
+        times, clock = self._times(index)
+        return Survey(
+            kind=f"movie, {index.count} pictures of {index.columns} x {index.rows}, {index.codec}",
+            times=times,
+            extent=self._pixels(index).extent,
+            found={name: self.movies[name].path.name for name in self._names},
+            spacing=self.metre_per_pixel,
+            assumed=(*clock, *assumed, *_doubts(self._uncertainty(indices, readers))),
+        )
+
+    def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
+        """Sample the pictures: means of values, not of colours.
+
+        A tool that is known by its colour has no values.
+        """
+        indices = self._indices()
+        index = indices[self._names[0]]
+        readers, _ = self._readers(indices)
+        times, _ = self._times(index)
+        sampling = PictureSampling(self._pixels(index), raster)
+        shown = [
+            pictures(self.movies[name].path, indices[name], start * self.every, self.every)
+            for name in self._names
+        ]
+        for number, together in enumerate(zip(*shown, strict=True), start):
+            read = {
+                name: self._read(name, readers[name], picture, number * self.every)
+                for name, picture in zip(self._names, together, strict=True)
+            }
+            yield self._sampled(float(times[number]), read, sampling)
+
+    def uncertainty(self) -> dict[str, ColourUncertainty]:
+        """What the colours leave unknown of each field: in the first, middle and last picture."""
+        indices = self._indices()
+        return self._uncertainty(indices, self._readers(indices)[0])
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        return tuple(name for name in MOVIE_FIELDS if name in self.movies)
+
+    def _indices(self) -> dict[str, MovieIndex]:
+        """Indices of the movies, which must agree."""
+        indices = {name: index_movie(self.movies[name].path) for name in self._names}
+        first = indices[self._names[0]]
+        for name, other in indices.items():
+            if (other.rows, other.columns, other.count) != (first.rows, first.columns, first.count):
+                raise SourceError(
+                    f"{self.movies[name].path}: {other.count} pictures of {other.columns} x "
+                    f"{other.rows}, expected {first.count} of {first.columns} x {first.rows} as in "
+                    f"{self.movies[self._names[0]].path}"
+                )
+        return indices
+
+    def _times(self, index: MovieIndex) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+        if self.frame_interval is not None:
+            times = self.frame_interval * np.arange(index.count, dtype=np.float64)
+            return times[:: self.every], ()
+        path = self.movies[self._names[0]].path
+        if index.times is None:
+            raise SourceError(f"{path}: it has no times, expected frame_interval")
+        step = index.times[-1] / max(index.count - 1, 1)
+        said = f"the times are those of playing the movie, {step:.6g} s from picture to picture"
+        return index.times[:: self.every], (said,)
+
+    def _pixels(self, index: MovieIndex) -> Raster:
+        """Where the pixels of the cropped and turned picture are in the scene."""
+        left, top, right, bottom = self._crop(index)
+        side = self.metre_per_pixel
+        spans = (
+            (side * (left - self.origin[0]), side * (right - self.origin[0])),
+            (side * (self.origin[1] - bottom), side * (self.origin[1] - top)),
+        )
+        across, up = (
+            sorted(sign * end for end in spans[axis])
+            for axis, sign in zip(self.placement.axes, self.placement.signs, strict=True)
+        )
+        shape = (bottom - top, right - left)
+        rows, columns = shape[::-1] if self.placement.axes == (1, 0) else shape
+        return Raster(across[0], up[1], side, rows, columns)
+
+    def _crop(self, index: MovieIndex) -> Box:
+        box = self.crop or (0, 0, index.columns, index.rows)
+        left, top, right, bottom = box
+        if not (0 <= left < right <= index.columns and 0 <= top < bottom <= index.rows):
+            raise SourceError(
+                f"crop: {box} does not lie in pictures of {index.columns} x {index.rows} pixels, "
+                "expected left, top, right, bottom"
+            )
+        return box
+
+    def _cropped(self, values: NDArray[Any]) -> NDArray[Any]:
+        if self.crop is None:
+            return values
+        left, top, right, bottom = self.crop
+        return values[top:bottom, left:right]
+
+    def _readers(
+        self, indices: Mapping[str, MovieIndex]
+    ) -> tuple[dict[str, FieldReader], tuple[str, ...]]:
+        index = indices[self._names[0]]
+        self._crop(index)
+        shape = (index.rows, index.columns)
+        tool = self._cropped(polygon_mask(shape, self.tool_polygon))
+        assumed = [] if index.square else ["the pixels are square, though the movie denies it"]
+        readers = {}
+        for name in self._names:
+            movie = self.movies[name]
+            picture = next(pictures(movie.path, indices[name]))
+            with _naming(movie.path):
+                scale, legend, said = _scale(movie, picture)
+                covered = box_mask(shape, self.covered) | box_mask(shape, legend, _LEGEND_MARGIN)
+                cropped = self._cropped(picture)
+                background, also = self._background(cropped, scale)
+                readers[name] = FieldReader(
+                    scale, background, self.tool_colour, tool,
+                    self._cropped(covered), self.overlay_limit,
+                )  # fmt: skip
+            assumed += [f"{name}: {text}" for text in (*said, *also)]
+        return readers, tuple(assumed)
+
+    def _background(
+        self, picture: NDArray[np.uint8], scale: ColourScale
+    ) -> tuple[tuple[Colour, ...], tuple[str, ...]]:
+        if self.background is not None:
+            return self.background, ()
+        found, refused = find_background(picture, scale)
+        if self.tool_colour is not None:
+            tool = np.array(self.tool_colour)
+            found = tuple(colour for colour in found if np.abs(tool - colour).max() > 16)
+        named = ", ".join(str(colour) for colour in found) or "none"
+        said = [f"background colours at the border: {named}"]
+        said += [f"{colour} at the border is taken for a value" for colour in refused]
+        return found, tuple(said)
+
+    def _read(
+        self, name: str, reader: FieldReader, picture: NDArray[np.uint8], number: int
+    ) -> FieldPicture:
+        """Read a picture, which may be all void but not all lines."""
+        read = reader.read(self._cropped(picture))
+        workpiece = read.material == Material.WORKPIECE
+        if workpiece.any() and not np.isfinite(read.values[workpiece]).any():
+            raise SourceError(
+                f"{self.movies[name].path}: picture {number + 1} has no colour of the scale"
+            )
+        return read
+
+    def _sampled(
+        self, time: float, read: dict[str, FieldPicture], sampling: PictureSampling
+    ) -> SampledFrame:
+        first = read[self._names[0]]
+        material = sampling.material(self._turned(first.material))
+        worst = np.zeros(first.material.shape, np.uint8)
+        fields = {}
+        for name, picture in read.items():
+            values, quality = _completed(picture, first.material)
+            worst = np.maximum(worst, quality)
+            fields[name] = self._sampled_field(values, first.material, material, sampling)
+        return SampledFrame(
+            time, fields, material, self._sampled_quality(worst, first.material, sampling)
+        )
+
+    def _sampled_field(
+        self,
+        values: NDArray[np.float32],
+        pixels: NDArray[np.uint8],
+        material: NDArray[np.uint8],
+        sampling: PictureSampling,
+    ) -> NDArray[np.float32]:
+        """Means over the pixels of each sample's own material."""
+        result = np.full(material.shape, np.nan, np.float32)
+        turned = self._turned(values)
+        for kind in (Material.WORKPIECE, Material.TOOL):
+            chosen = material == kind
+            if chosen.any():
+                valid = self._turned((pixels == kind) & np.isfinite(values))
+                result[chosen] = sampling.mean(turned, valid)[chosen]
+        return result
+
+    def _sampled_quality(
+        self, quality: NDArray[np.uint8], material: NDArray[np.uint8], sampling: PictureSampling
+    ) -> NDArray[np.uint8]:
+        """Mean distance from the scale; FILLED where most is filled."""
+        shown = self._turned(material != Material.VOID)
+        filled = self._turned(quality == FILLED)
+        distance = sampling.mean(self._turned(quality.astype(np.float32)), shown & ~filled)
+        result = np.round(np.nan_to_num(distance)).astype(np.uint8)
+        shares = sampling.share(filled & shown), sampling.share(shown)
+        result[(shares[0] > _HALF * shares[1])] = FILLED
+        return result
+
+    def _turned(self, values: NDArray[Any]) -> NDArray[Any]:
+        """A picture as it lies in the scene."""
+        if self.placement.axes == (1, 0):
+            values = values[::-1].T[::-1]
+        across, up = (int(sign) for sign in self.placement.signs)
+        return values[::up, ::across]
+
+    def _uncertainty(
+        self, indices: Mapping[str, MovieIndex], readers: Mapping[str, FieldReader]
+    ) -> dict[str, ColourUncertainty]:
+        result = {}
+        for name, reader in readers.items():
+            index = indices[name]
+            values, distance = [], []
+            for number in sorted({0, index.count // 2, index.count - 1}):
+                picture = next(pictures(self.movies[name].path, index, number))
+                read = self._read(name, reader, picture, number)
+                values.append(read.values[read.seen])
+                distance.append(read.distance[read.seen])
+            result[name] = colour_uncertainty(
+                reader.scale, np.concatenate(values), np.concatenate(distance)
+            )
+        return result
+
+
+def metre_per_pixel(
+    first: tuple[float, float], second: tuple[float, float], length: float
+) -> float:
+    """Side of a pixel in m, from two points in pixels and the length between them in m.
+
+    Raises
+    ------
+    ValueError
+        If the points are the same, or the length is not over 0.
+    """
+    pixels = hypot(second[0] - first[0], second[1] - first[1])
+    if not (isfinite(pixels) and pixels > 0):
+        raise ValueError(f"scale: points {first!r}, {second!r}, expected two different points")
+    if not (isfinite(length) and length > 0):
+        raise ValueError(f"scale: length {length!r}, expected a finite number of m over 0")
+    return length / pixels
+
+
+def _scale(
+    movie: FieldMovie, picture: NDArray[np.uint8]
+) -> tuple[ColourScale, tuple[Box, ...], tuple[str, ...]]:
+    """Scale of a movie, where its legend is, and what was assumed."""
+    if isinstance(movie.colours, NamedMap):
+        name, bands = movie.colours.name, movie.colours.bands
+        return ColourScale.named(name, movie.values, bands), (), ()
+    box = movie.colours.box or find_legend(picture)
+    if box is None:
+        raise SourceError(
+            "no legend was found in the first picture, expected the box of one, or a named map"
+        )
+    scale = ColourScale.from_legend(legend_pixels(picture, box), movie.values)
+    kind = f"{len(scale.values)} bands" if scale.banded else "colours without steps"
+    found = "" if movie.colours.box else f"legend found at {box} (left, top, right, bottom), "
+    first, last = movie.values
+    ends = f"{first:g} at its lower or left end, {last:g} at the other"
+    return scale, (box,), (f"{found}legend of {kind}, {ends}",)
+
+
+def _completed(
+    picture: FieldPicture, material: NDArray[np.uint8]
+) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Values and quality, filled where another movie shows material and this one does not."""
+    values, quality = picture.values.copy(), picture.quality.copy()
+    lacking = (material == Material.WORKPIECE) & ~np.isfinite(values)
+    fill(values, np.isfinite(values) & (picture.material == Material.WORKPIECE), lacking)
+    quality[lacking] = FILLED
+    return values, quality
+
+
+def _doubts(uncertainty: Mapping[str, ColourUncertainty]) -> Iterator[str]:
+    for name, doubt in uncertainty.items():
+        unit = FIELD_UNITS[name].replace("1/s", "/s").removeprefix("1")
+        yield (
+            f"{name}: the colours leave a standard uncertainty of {doubt.total:.3g} {unit}".rstrip()
+            + f" ({doubt.colours:.3g} by their number, {doubt.noise:.3g} by their noise)"
+        )
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Put the file's name before what is wrong with its pictures."""
+    try:
+        yield
+    except SourceError as error:
+        raise SourceError(f"{path}: {error}") from error

@@ -1,0 +1,224 @@
+"""Pictures of a movie, one at a time, through PyAV (FFmpeg)."""
+
+from bisect import bisect_left
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.io.sources.source import SourceError
+
+_MOST_PIXELS: Final = 1 << 26
+# No playlists, scripts or numbered files: a movie may not lead to other files or to the network.
+_FORMATS: Final = (
+    "avi,mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,gif,apng,mpeg,mpegvideo,mpegts,asf,flv,ogg,nut,ivf,"
+    "yuv4mpegpipe,h264,hevc,m4v,mjpeg"
+)
+_OPTIONS: Final = {
+    "protocol_whitelist": "file",
+    "format_whitelist": _FORMATS,
+    "max_pixels": str(_MOST_PIXELS),
+}
+_WHOLE: Final = ("gif", "apng")
+"""Formats whose pictures build on all before them, though they claim to be complete."""
+
+
+@dataclass(frozen=True)
+class MovieIndex:
+    """What a movie says of itself, and how many pictures it has.
+
+    Parameters
+    ----------
+    codec : str
+        Name of the codec and of its pixels: ``mjpeg, yuvj444p``.
+    rows, columns : int
+        Size of the pictures.
+    count : int
+        Number of pictures.
+    times : ndarray or None
+        When they are shown, in s from the first; None if the movie does not say.
+    marks : tuple of int
+        Their presentation times in the movie's own unit, ascending; empty if it cannot be searched.
+    square : bool
+        Whether the pixels are said to be square.
+    """
+
+    codec: str
+    rows: int
+    columns: int
+    count: int
+    times: NDArray[np.float64] | None
+    marks: tuple[int, ...]
+    square: bool
+
+
+class _Packet(NamedTuple):
+    mark: int | None
+    discarded: bool
+    corrupt: bool
+
+
+def index_movie(path: Path) -> MovieIndex:
+    """Count the pictures of a movie without decoding them.
+
+    Raises
+    ------
+    SourceError
+        If it is no movie, has no pictures, is too large, or ends before its end.
+    OSError
+        If the file is missing or not accessible.
+    """
+    state = path.stat()
+    return _index(path, state.st_size, state.st_mtime_ns)
+
+
+def pictures(
+    path: Path, index: MovieIndex, start: int = 0, every: int = 1
+) -> Iterator[NDArray[np.uint8]]:
+    """Decode pictures one at a time.
+
+    Parameters
+    ----------
+    path : Path
+        The movie.
+    index : MovieIndex
+        What `index_movie` found.
+    start : int
+        Number of the first picture; it is searched if the movie allows.
+    every : int
+        Distance from each picture to the next.
+
+    Yields
+    ------
+    ndarray
+        Red, green and blue, shape (rows, columns, 3), uint8.
+
+    Raises
+    ------
+    SourceError
+        If a picture is damaged or missing.
+    """
+    searched = start > 0 and bool(index.marks)
+    number = start if searched and _can_search(path, index, start) else 0
+    searched = number > 0
+    with _opened(path) as (container, stream):
+        if searched:
+            container.seek(index.marks[start], stream=stream)
+        for frame in container.decode(stream):
+            if searched and _mark(index, frame) < start:
+                continue
+            if number >= index.count:
+                break
+            _check(path, index, frame, number)
+            if number >= start and (number - start) % every == 0:
+                yield frame.to_ndarray(format="rgb24")
+            number += 1
+    if number < index.count:
+        raise SourceError(
+            f"{path}: picture {number + 1} of {index.count} cannot be decoded, expected a whole "
+            "movie"
+        )
+
+
+@lru_cache(maxsize=16)
+def _index(path: Path, size: int, changed: int) -> MovieIndex:
+    """`index_movie`; size and time of change tell one state of the file from another."""
+    if size == 0:
+        raise SourceError(f"{path}: the file is empty, expected a movie")
+    with _opened(path) as (container, stream):
+        packets = [
+            _Packet(packet.pts, packet.is_discard, packet.is_corrupt)
+            for packet in container.demux(stream)
+            if packet.dts is not None or packet.size > 0
+        ]
+        shown = [packet.mark for packet in packets if not packet.discarded]
+        whole = container.format.name.split(",")[0] in _WHOLE
+        expected, rate = stream.frames, stream.average_rate
+        unit = stream.time_base
+        codec = f"{stream.codec_context.name}, {stream.codec_context.pix_fmt}"
+        shape = (stream.codec_context.height, stream.codec_context.width)
+        square = stream.sample_aspect_ratio in (None, 0, 1)
+    if not shown:
+        raise SourceError(f"{path}: there is no picture in it, expected 1 or more")
+    if len(packets) < expected or packets[-1].corrupt:
+        raise SourceError(
+            f"{path}: it ends in picture {len(packets)} of {max(expected, len(packets))}: "
+            "truncated? expected a whole movie"
+        )
+    marks = _presentation(shown)
+    times = None
+    if marks and unit:
+        times = (np.array(marks, np.float64) - marks[0]) * float(unit)
+    elif rate:
+        times = np.arange(len(shown)) / float(rate)
+    return MovieIndex(codec, *shape, len(shown), times, () if whole else marks, square)
+
+
+def _presentation(marks: list[int | None]) -> tuple[int, ...]:
+    """Presentation times, ascending; none if one is missing or two are the same."""
+    known = sorted({mark for mark in marks if mark is not None})
+    return tuple(known) if len(known) == len(marks) else ()
+
+
+def _can_search(path: Path, index: MovieIndex, start: int) -> bool:
+    """Whether a search for a picture leads to it or to one before it."""
+    with _opened(path) as (container, stream):
+        container.seek(index.marks[start], stream=stream)
+        for frame in container.decode(stream):
+            number = _mark(index, frame)
+            return number <= start and frame.pts == index.marks[number]
+    return False
+
+
+def _mark(index: MovieIndex, frame: Any) -> int:
+    """Number of a picture by its presentation time."""
+    return bisect_left(index.marks, frame.pts or 0, hi=index.count - 1)
+
+
+def _check(path: Path, index: MovieIndex, frame: Any, number: int) -> None:
+    if frame.is_corrupt:
+        raise SourceError(f"{path}: picture {number + 1} is damaged, expected a whole movie")
+    if (frame.height, frame.width) != (index.rows, index.columns):
+        raise SourceError(
+            f"{path}: picture {number + 1} has {frame.width} x {frame.height} pixels, expected "
+            f"{index.columns} x {index.rows} as the movie says"
+        )
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
+    """Open a movie; what FFmpeg says against it becomes a SourceError."""
+    try:
+        import av
+        from av.error import FFmpegError
+    except ImportError:
+        raise SourceError(f"{path}: movies need PyAV, pip install 'chipglow[movie]'") from None
+    try:
+        with av.open(f"file:{path}", options=_OPTIONS, metadata_errors="replace") as container:
+            if not container.streams.video:
+                raise SourceError(f"{path}: there are no pictures in it, expected a movie")
+            stream = container.streams.video[0]
+            _check_size(path, stream)
+            stream.codec_context.options = {"max_pixels": str(_MOST_PIXELS)}
+            yield container, stream
+    except FFmpegError as error:
+        raise SourceError(
+            f"{path}: cannot be read as a movie: {error.strerror}, expected AVI, MP4, GIF, MKV or "
+            "another format of FFmpeg"
+        ) from error
+
+
+def _check_size(path: Path, stream: Any) -> None:
+    context = stream.codec_context
+    rows, columns = context.height or 0, context.width or 0
+    if not 0 < rows * columns <= _MOST_PIXELS:
+        raise SourceError(
+            f"{path}: its pictures have {columns} x {rows} pixels, expected 1 to {_MOST_PIXELS}"
+        )
+    if context.codec is None:
+        raise SourceError(f"{path}: FFmpeg has no decoder for its codec")

@@ -1,0 +1,279 @@
+"""What a picture of a field shows: values, background, tool, and lines and text drawn over them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter, minimum_filter
+
+from chipglow.io.sources.colour_scale import ColourScale, lab
+from chipglow.io.sources.legend import Box
+from chipglow.io.sources.source import SourceError
+from chipglow.scene import FILLED, Material
+
+Colour = tuple[int, int, int]
+"""Red, green and blue of 0 to 255."""
+
+MARK_TOLERANCE: Final = 10.0
+"""How far a colour may be from that of the background or the tool, in CIE L*a*b*."""
+
+_GREY: Final = 10.0
+_BORDER_SHARE: Final = 0.1
+_COARSE: Final = 16
+
+
+@dataclass(frozen=True)
+class FieldPicture:
+    """One picture of a field, read.
+
+    Parameters
+    ----------
+    values : ndarray
+        Values in SI units, shape (y, x), float32; NaN where `known` is false.
+    material : ndarray
+        `chipglow.scene.Material` of each pixel, shape (y, x), uint8.
+    quality : ndarray
+        See `chipglow.scene.QUALITY`, shape (y, x), uint8.
+    seen : ndarray
+        Where the value was read from the pixel's own colour, shape (y, x), bool.
+    distance : ndarray
+        Distance from the scale in CIE L*a*b*, shape (y, x), float32.
+    """
+
+    values: NDArray[np.float32]
+    material: NDArray[np.uint8]
+    quality: NDArray[np.uint8]
+    seen: NDArray[np.bool_]
+    distance: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class FieldReader:
+    """Reads pictures of a field.
+
+    Parameters
+    ----------
+    scale : ColourScale
+        What the colours mean.
+    background : sequence of Colour
+        Colours that show nothing.
+    tool_colour : Colour or None
+        The colour of a tool that shows no values.
+    tool : ndarray
+        Where the tool stands, shape (y, x), bool.
+    covered : ndarray
+        Where something else is drawn, shape (y, x), bool.
+    limit : float
+        Distance from the scale in CIE L*a*b* beyond which a colour is a line or text.
+
+    Raises
+    ------
+    SourceError
+        If a colour of background or tool is one of the scale.
+    """
+
+    scale: ColourScale
+    background: Sequence[Colour]
+    tool_colour: Colour | None
+    tool: NDArray[np.bool_]
+    covered: NDArray[np.bool_]
+    limit: float
+
+    def __post_init__(self) -> None:
+        for name, colours in (("background", self.background), ("tool_colour", self._tools)):
+            for colour in colours:
+                value, apart = _place(self.scale, colour)
+                if apart < MARK_TOLERANCE:
+                    raise SourceError(
+                        f"{name}: {colour} is the colour of {value:.5g} too, expected one that is "
+                        f"{MARK_TOLERANCE:g} or more from the scale"
+                    )
+
+    def read(self, picture: NDArray[np.uint8]) -> FieldPicture:
+        """Values, material and quality of a picture of shape (y, x, 3), uint8.
+
+        What is drawn over the field takes the material and the value of the nearest pixel that
+        shows them; in the tool, of the nearest one in the tool.
+        """
+        values, distance = self.scale.invert(picture)
+        void, tool = self._marked(picture, distance)
+        drawn = _grown((distance > self.limit) & ~void & ~tool) | self.covered
+        seen = ~(drawn | void | tool)
+        material = np.full(values.shape, Material.WORKPIECE, np.uint8)
+        material[void], material[tool] = Material.VOID, Material.TOOL
+        known = (seen | void | tool) & ~self.covered & ~self.tool
+        if known.any():
+            material = material[nearest(known)]
+        material[self.tool] = Material.TOOL
+        quality = np.minimum(np.round(distance), FILLED - 1).astype(np.uint8)
+        values[~seen] = np.nan
+        for part in (material == Material.WORKPIECE, material == Material.TOOL):
+            fill(values, seen & part, part & ~seen)
+        quality[~seen & (material != Material.VOID)] = FILLED
+        quality[material == Material.VOID] = 0
+        values[material == Material.VOID] = np.nan
+        return FieldPicture(values, material, quality, seen, distance)
+
+    @property
+    def _tools(self) -> tuple[Colour, ...]:
+        return () if self.tool_colour is None else (self.tool_colour,)
+
+    @cached_property
+    def _marks(self) -> ColourScale | None:
+        """Colours of background and tool as a scale of their numbers."""
+        colours = [*self.background, *self._tools]
+        if not colours:
+            return None
+        return ColourScale(
+            np.arange(len(colours), dtype=np.float64), np.array(colours) / 255, banded=True
+        )
+
+    def _marked(
+        self, picture: NDArray[np.uint8], distance: NDArray[np.float32]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Pixels with the colour of the background, and of the tool; lines of it are neither."""
+        if self._marks is None:
+            nothing = np.zeros(distance.shape, np.bool_)
+            return nothing, nothing
+        number, apart = self._marks.invert(picture)
+        marked = (apart < MARK_TOLERANCE) & (apart < distance)
+        void = _without_lines(marked & (number < len(self.background)))
+        return void, _without_lines(marked & (number >= len(self.background)))
+
+
+def find_background(
+    picture: NDArray[np.uint8], scale: ColourScale
+) -> tuple[tuple[Colour, ...], tuple[Colour, ...]]:
+    """Colours of the background: the greys, white and black that the border of a picture has.
+
+    Parameters
+    ----------
+    picture : ndarray
+        Red, green and blue, shape (y, x, 3), uint8.
+    scale : ColourScale
+        What the colours of values are.
+
+    Returns
+    -------
+    found, refused : tuple of Colour
+        Colours that show nothing; and those that are left out because they are of the scale.
+    """
+    border = np.concatenate([picture[0], picture[-1], picture[1:-1, 0], picture[1:-1, -1]])
+    labs = lab(border / 255.0)
+    grey = border[np.hypot(labs[:, 1], labs[:, 2]) < _GREY]
+    if not len(grey):
+        return (), ()
+    _, group, counts = np.unique(grey // _COARSE, axis=0, return_inverse=True, return_counts=True)
+    found: list[Colour] = []
+    refused: list[Colour] = []
+    for index in np.flatnonzero(counts >= _BORDER_SHARE * len(border)):
+        red, green, blue = np.median(grey[group.ravel() == index], axis=0).astype(int).tolist()
+        on_scale = _place(scale, (red, green, blue))[1] < MARK_TOLERANCE
+        (refused if on_scale else found).append((red, green, blue))
+    return tuple(found), tuple(refused)
+
+
+def nearest(known: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Row and column of the nearest known pixel of each, shape (y, x) each.
+
+    By vectors handed on from pixel to pixel; in rare places it is the second nearest (Danielsson,
+    Computer Graphics and Image Processing 14 (1980) 227).
+    """
+    rows, columns = (np.full(known.shape, -1, np.int32) for _ in range(2))
+    _hand_on(known, rows, columns)
+    return rows, columns
+
+
+def fill(values: NDArray[np.float32], known: NDArray[np.bool_], wanted: NDArray[np.bool_]) -> None:
+    """Give wanted pixels the value of the nearest known one, if there is any, in place."""
+    if not (wanted.any() and known.any()):
+        return
+    rows, columns = nearest(known)
+    values[wanted] = values[rows[wanted], columns[wanted]]
+
+
+def box_mask(shape: tuple[int, int], boxes: Sequence[Box], margin: int = 0) -> NDArray[np.bool_]:
+    """Pixels within boxes, with a margin around them."""
+    mask = np.zeros(shape, np.bool_)
+    for left, top, right, bottom in boxes:
+        rows = slice(max(top - margin, 0), max(bottom + margin, 0))
+        mask[rows, max(left - margin, 0) : max(right + margin, 0)] = True
+    return mask
+
+
+def polygon_mask(
+    shape: tuple[int, int], corners: Sequence[tuple[float, float]]
+) -> NDArray[np.bool_]:
+    """Pixels whose middle is within a polygon; two corners are opposite ones of a box."""
+    from matplotlib.path import Path
+
+    if not corners:
+        return np.zeros(shape, np.bool_)
+    if len(corners) == 2:
+        (left, top), (right, bottom) = corners
+        corners = ((left, top), (right, top), (right, bottom), (left, bottom))
+    rows, columns = np.mgrid[: shape[0], : shape[1]] + 0.5
+    points = np.stack([columns.ravel(), rows.ravel()], axis=1)
+    return np.asarray(Path(corners).contains_points(points)).reshape(shape)
+
+
+def _place(scale: ColourScale, colour: Colour) -> tuple[float, float]:
+    """Value of the nearest place of a scale, and its distance."""
+    value, apart = scale.invert(np.array([[colour]], np.uint8))
+    return float(value[0, 0]), float(apart[0, 0])
+
+
+def _grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """With the pixels around: what is drawn over a field shades into it."""
+    return np.asarray(maximum_filter(mask.view(np.uint8), 3)).view(np.bool_)
+
+
+def _without_lines(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Without what is less than 3 pixels wide."""
+    wide = minimum_filter(mask.view(np.uint8), 3)
+    return np.asarray(maximum_filter(wide, 3)).view(np.bool_)
+
+
+@njit(cache=True)
+def _hand_on(known, rows, columns):  # type: ignore[no-untyped-def]
+    height, width = known.shape
+    for row in range(height):
+        for column in range(width):
+            if known[row, column]:
+                rows[row, column] = row
+                columns[row, column] = column
+    for _ in range(2):
+        for row in range(height):
+            for column in range(width):
+                _take(rows, columns, row, column, row, column - 1)
+                for step in range(-1, 2):
+                    _take(rows, columns, row, column, row - 1, column + step)
+            for column in range(width - 1, -1, -1):
+                _take(rows, columns, row, column, row, column + 1)
+        for row in range(height - 1, -1, -1):
+            for column in range(width - 1, -1, -1):
+                _take(rows, columns, row, column, row, column + 1)
+                for step in range(-1, 2):
+                    _take(rows, columns, row, column, row + 1, column + step)
+            for column in range(width):
+                _take(rows, columns, row, column, row, column - 1)
+
+
+@njit(cache=True)
+def _take(rows, columns, row, column, other_row, other_column):  # type: ignore[no-untyped-def]
+    """Take a neighbour's known pixel if it is nearer."""
+    height, width = rows.shape
+    if not (0 <= other_row < height and 0 <= other_column < width):
+        return
+    found_row, found_column = rows[other_row, other_column], columns[other_row, other_column]
+    if found_row < 0:
+        return
+    here = np.int64(rows[row, column] - row) ** 2 + np.int64(columns[row, column] - column) ** 2
+    there = np.int64(found_row - row) ** 2 + np.int64(found_column - column) ** 2
+    if rows[row, column] < 0 or there < here:
+        rows[row, column] = found_row
+        columns[row, column] = found_column
