@@ -1,0 +1,616 @@
+"""Arrays in files of many formats behind one face: they are described first and read in parts."""
+
+import re
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from functools import partial
+from glob import glob, has_magic
+from math import prod
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.io.sources.source import SourceError
+
+MOST_SAMPLES: Final = 100_000_000
+"""Most samples that are read at once."""
+
+MOST_ON_A_SIDE: Final = 1_000_000
+"""Most samples along an axis other than time."""
+
+_MOST_ARRAYS: Final = 10_000
+_LARGEST_TABLE: Final = 1_000_000_000
+_LONGEST_LINE: Final = 4_000_000
+_MOST_COMMENTS: Final = 1000
+_KINDS: Final = "fiub"
+_CODECS: Final = (
+    "blosc", "bz2", "bytes", "crc32c", "delta", "fixedscaleoffset", "gzip", "lz4", "lzma",
+    "packbits", "quantize", "sharding_indexed", "shuffle", "transpose", "zlib", "zstd",
+)  # fmt: skip
+
+Key = tuple[slice, ...]
+
+
+@dataclass(frozen=True)
+class StoredArray:
+    """A numeric array in a file.
+
+    Parameters
+    ----------
+    name : str
+        Its name; empty where the format has none.
+    shape : tuple of int
+        Its lengths.
+    read : callable
+        Gives the part that a slice for every axis says.
+    dims : tuple of str
+        Names of its axes, if the file says them.
+    attributes : mapping
+        What else the file says of it: ``units``, ``scale_factor``, ``_FillValue``...
+    chunks : tuple of int, optional
+        Shape of the parts that the file keeps together.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    read: Callable[[Key], NDArray[Any]]
+    dims: tuple[str, ...] = ()
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    chunks: tuple[int, ...] | None = None
+
+
+@contextmanager
+def reading(name: object) -> Iterator[None]:
+    """Turn whatever a library raises over a damaged file into one `SourceError`.
+
+    Parameters
+    ----------
+    name : object
+        The file, as the error calls it.
+    """
+    try:
+        yield
+    except (SourceError, FileNotFoundError, PermissionError, MemoryError):
+        raise
+    except Exception as error:  # readers of damaged files raise anything
+        said = " ".join(f"{type(error).__name__}: {error}".split())[:160]
+        raise SourceError(
+            f"{name}: cannot be read, it is damaged or of another kind ({said})"
+        ) from error
+
+
+def check_samples(name: str, count: int) -> None:
+    """Refuse to read more at once than `MOST_SAMPLES`.
+
+    Raises
+    ------
+    SourceError
+        If there are more.
+    """
+    if count > MOST_SAMPLES:
+        raise SourceError(f"{name}: {count:.3g} samples at once, expected up to {MOST_SAMPLES:.3g}")
+
+
+def matching_files(pattern: str) -> list[Path]:
+    """Files that a pattern such as ``T_*.csv`` means, numbers in their names in order.
+
+    Raises
+    ------
+    SourceError
+        If there is none.
+    """
+    if Path(pattern).exists() or not has_magic(pattern):
+        return [Path(pattern)]
+    paths = sorted(glob(pattern), key=_natural)  # noqa: PTH207  also absolute
+    if not paths:
+        raise SourceError(f"{pattern}: no file has such a name")
+    return [Path(path) for path in paths]
+
+
+def open_arrays(pattern: str, stack: ExitStack) -> dict[str, StoredArray]:
+    """Arrays of a file by their names, or of several files, one a frame.
+
+    Parameters
+    ----------
+    pattern : str
+        Path of a file, or a pattern with ``*``: each file is then a frame, and the arrays get a
+        first axis ``time``.
+    stack : ExitStack
+        Closes the files.
+
+    Raises
+    ------
+    SourceError
+        If a file cannot be read, or none has arrays of numbers.
+    OSError
+        If it is missing or not accessible.
+    """
+    paths = matching_files(pattern)
+    several = len(paths) > 1 or paths[0] != Path(pattern)
+    first = _open_file(paths[0], stack)
+    if not first:
+        raise SourceError(f"{paths[0]}: there is no array of numbers in it")
+    if len(first) > _MOST_ARRAYS:
+        raise SourceError(f"{paths[0]}: {len(first)} arrays, expected up to {_MOST_ARRAYS}")
+    if several:
+        return {name: _series(paths, name, array) for name, array in first.items()}
+    return first
+
+
+def _natural(path: str) -> list[tuple[int, int, str]]:
+    parts = re.split(r"(\d+)", path)
+    return [(1, int(p), "") if p.isdecimal() and len(p) < 20 else (0, 0, p) for p in parts]
+
+
+def _open_file(path: Path, stack: ExitStack) -> dict[str, StoredArray]:
+    suffix = path.suffix.lower()
+    if suffix not in _READERS:
+        raise SourceError(
+            f"{path}: unknown ending {suffix!r}, expected one of {', '.join(sorted(_READERS))}"
+        )
+    if path.is_file() and path.stat().st_size == 0:
+        raise SourceError(f"{path}: is empty")
+    with reading(path):
+        return {array.name: array for array in _READERS[suffix](path, stack)}
+
+
+def _series(paths: Sequence[Path], name: str, first: StoredArray) -> StoredArray:
+    def read(key: Key) -> NDArray[Any]:
+        chosen = paths[key[0]]
+        check_samples(str(chosen[0]), len(chosen) * prod(first.shape))
+        return np.stack([_read_whole(path, name, first.shape)[key[1:]] for path in chosen])
+
+    dims = ("time", *first.dims) if first.dims else ()
+    return replace(
+        first, shape=(len(paths), *first.shape), read=read, dims=dims, chunks=(1, *first.shape)
+    )
+
+
+def _read_whole(path: Path, name: str, shape: tuple[int, ...]) -> NDArray[Any]:
+    with ExitStack() as stack:
+        array = _open_file(path, stack).get(name)
+        if array is None or array.shape != shape:
+            found = "none" if array is None else f"one of shape {array.shape}"
+            raise SourceError(
+                f"{path}: expected an array {name!r} of shape {shape}, it has {found}"
+            )
+        with reading(path):
+            return array.read((slice(None),) * len(shape))
+
+
+# NumPy
+
+
+def _npy(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
+    values = np.lib.format.open_memmap(path, mode="r")
+    yield from _numpy_arrays("", values.dtype, values.shape, lambda key: np.asarray(values[key]))
+
+
+def _npz(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
+    import zipfile
+
+    archive = stack.enter_context(zipfile.ZipFile(path))
+    for info in archive.infolist():
+        if not info.filename.endswith(".npy"):
+            continue
+        with archive.open(info) as stream:
+            shape, fortran, dtype = _npy_header(stream)
+            start = stream.tell()
+        if prod(shape) * dtype.itemsize + start != info.file_size:
+            raise SourceError(
+                f"{path}: {info.filename} says shape {shape}, but has {info.file_size} bytes"
+            )
+        member = _Member(archive, info.filename, start, shape, fortran, dtype, stack)
+        yield from _numpy_arrays(info.filename[:-4], dtype, shape, member.read)
+
+
+def _npy_header(stream: Any) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    version = np.lib.format.read_magic(stream)
+    reader = {
+        (1, 0): np.lib.format.read_array_header_1_0,
+        (2, 0): np.lib.format.read_array_header_2_0,
+    }
+    if version not in reader:
+        raise ValueError(f"version {version} of the format is not known")
+    shape, fortran, dtype = reader[version](stream)
+    if dtype.hasobject:
+        raise ValueError("it holds Python objects, expected numbers")
+    return shape, fortran, dtype
+
+
+class _Member:
+    """An array in a ZIP archive, unpacked as it is read: forward costs nothing twice."""
+
+    def __init__(
+        self,
+        archive: Any,
+        name: str,
+        start: int,
+        shape: tuple[int, ...],
+        fortran: bool,
+        dtype: np.dtype[Any],
+        stack: ExitStack,
+    ) -> None:
+        self._open = partial(archive.open, name)
+        self._start, self._dtype, self._stack = start, dtype, stack
+        self._name, self._fortran = f"{archive.filename}: {name}", fortran
+        self._shape = shape
+        self._stream: Any = None
+
+    def read(self, key: Key) -> NDArray[Any]:
+        if not self._shape:
+            return self._items(0, 1).reshape(())
+        # The axis that lies outermost in the file can be read in parts.
+        stored = self._shape[::-1] if self._fortran else self._shape
+        part = key[::-1] if self._fortran else key
+        first, last, _ = part[0].indices(stored[0])
+        row = prod(stored[1:])
+        check_samples(self._name, (last - first) * row)
+        values = self._items(first * row, (last - first) * row).reshape(last - first, *stored[1:])
+        values = values[(slice(None), *part[1:])]
+        return values.T if self._fortran else values
+
+    def _items(self, first: int, count: int) -> NDArray[Any]:
+        if self._stream is None:
+            self._stream = self._stack.enter_context(self._open())
+        size = self._dtype.itemsize
+        self._stream.seek(self._start + first * size)
+        return np.frombuffer(self._stream.read(count * size), self._dtype, count)
+
+
+def _numpy_arrays(
+    name: str, dtype: np.dtype[Any], shape: tuple[int, ...], read: Callable[[Key], NDArray[Any]]
+) -> Iterator[StoredArray]:
+    """One array, or one for every field of a structured one."""
+    if dtype.names is None:
+        if dtype.kind in _KINDS:
+            yield StoredArray(name, shape, read)
+        return
+    for part in dtype.names:
+        if dtype[part].kind in _KINDS and not dtype[part].shape:
+            label = f"{name}/{part}" if name else part
+            yield StoredArray(label, shape, partial(_part, read, part))
+
+
+def _part(read: Callable[[Key], NDArray[Any]], name: str, key: Key) -> NDArray[Any]:
+    return np.asarray(read(key)[name])
+
+
+# HDF5, NetCDF-4, MATLAB 7.3
+
+
+def _hdf5(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
+    import h5py
+    import hdf5plugin  # noqa: F401  registers the filters
+
+    file = stack.enter_context(h5py.File(path, "r"))
+    found: list[StoredArray] = []
+
+    def visit(name: str, item: Any) -> bool | None:
+        # A set of data whose values lie in other files could show any file of this computer.
+        if isinstance(item, h5py.Dataset) and not (item.external or item.is_virtual):
+            array = _hdf5_array(name, item)
+            if array is not None:
+                found.append(array)
+        return True if len(found) > _MOST_ARRAYS else None
+
+    file.visititems(visit)
+    yield from found
+
+
+def _hdf5_array(name: str, item: Any) -> StoredArray | None:
+    kind = item.attrs.get("MATLAB_class")
+    if item.dtype.kind not in _KINDS or item.shape is None or "#" in name:
+        return None
+    attributes = {
+        key: _plain(item.attrs[key])
+        for key in ("units", "scale_factor", "add_offset", "_FillValue", "missing_value")
+        if key in item.attrs
+    }
+    dims = tuple(_dimension(dimension) for dimension in item.dims)
+    array = StoredArray(
+        name,
+        item.shape,
+        lambda key: np.asarray(item[key]),
+        dims if all(dims) else (),
+        attributes,
+        item.chunks,
+    )
+    if kind is None:
+        return array
+    if "MATLAB_empty" in item.attrs or bytes(kind) in (b"cell", b"char", b"struct"):
+        return None
+    return replace(  # MATLAB's axes run the other way in its files
+        array,
+        shape=item.shape[::-1],
+        read=lambda key: np.asarray(item[key[::-1]]).T,
+        chunks=None if item.chunks is None else item.chunks[::-1],
+    )
+
+
+def _dimension(dimension: Any) -> str:
+    if len(dimension):
+        return str(dimension[0].name).rsplit("/", 1)[-1]
+    return str(dimension.label)
+
+
+def _plain(value: Any) -> Any:
+    """An attribute as text or a number."""
+    value = np.asarray(value).reshape(-1)[0] if np.size(value) else ""
+    return value.decode(errors="replace") if isinstance(value, bytes) else value
+
+
+def _netcdf(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
+    with path.open("rb") as stream:
+        classic = stream.read(3) == b"CDF"
+    yield from (_netcdf3 if classic else _hdf5)(path, stack)
+
+
+def _netcdf3(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
+    from scipy.io import netcdf_file
+
+    file = netcdf_file(path, mmap=True)
+    stack.callback(_close_quietly, file)
+    for name, variable in file.variables.items():
+        if variable.data.dtype.kind in _KINDS:
+            attributes = {key: _plain(value) for key, value in variable._attributes.items()}
+            read = partial(_copy, variable.data)
+            yield StoredArray(name, variable.data.shape, read, variable.dimensions, attributes)
+
+
+def _copy(values: NDArray[Any], key: Key) -> NDArray[Any]:
+    return np.array(values[key])
+
+
+def _close_quietly(file: Any) -> None:
+    with warnings.catch_warnings():
+        # It warns that arrays still refer to the file; none of them is used again.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        file.close()
+
+
+# MATLAB
+
+
+def _matlab(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
+    import h5py
+
+    if h5py.is_hdf5(path):
+        yield from _hdf5(path, stack)
+        return
+    from scipy.io import whosmat
+
+    for name, shape, kind in whosmat(path):
+        if kind.startswith(("double", "single", "int", "uint", "logical")):
+            whole = _MatlabArray(path, name)
+            yield StoredArray(name, tuple(int(n) for n in shape), whole.read)
+
+
+class _MatlabArray:
+    """An array of MATLAB's formats up to 7.2, which cannot be read in parts."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        self._path, self._name = path, name
+        self._values: NDArray[Any] | None = None
+
+    def read(self, key: Key) -> NDArray[Any]:
+        if self._values is None:
+            from scipy.io import loadmat, whosmat
+
+            shape = next(shape for name, shape, _ in whosmat(self._path) if name == self._name)
+            check_samples(f"{self._path}: {self._name}", prod(int(n) for n in shape))
+            values = loadmat(self._path, variable_names=[self._name])[self._name]
+            if values.dtype.kind not in _KINDS:
+                raise SourceError(f"{self._path}: {self._name} is {values.dtype}, expected numbers")
+            self._values = values
+        return np.asarray(self._values[key])
+
+
+# TIFF
+
+
+def _tiff(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
+    tifffile = _extra("tifffile", path)
+    file = stack.enter_context(tifffile.TiffFile(path))
+    for number, series in enumerate(file.series):
+        if series.dtype.kind not in _KINDS:
+            continue
+        if "S" in series.axes:
+            raise SourceError(f"{path}: has colours, expected one number a sample")
+        name = "" if number == 0 else f"series_{number + 1}"
+        read = _tiff_reader(path, series)
+        dims = tuple({"Y": "y", "X": "x"}.get(axis, "time") for axis in series.axes)
+        yield StoredArray(name, tuple(series.shape), read, dims)
+
+
+def _tiff_reader(path: Path, series: Any) -> Callable[[Key], NDArray[Any]]:
+    if series.dataoffset is not None:
+        dtype = np.dtype(series.parent.byteorder + series.dtype.char)
+        end = series.dataoffset + prod(series.shape) * dtype.itemsize
+        if end > path.stat().st_size:
+            raise SourceError(
+                f"{path}: is cut short, it should have {end} bytes and has {path.stat().st_size}"
+            )
+        values = np.memmap(path, dtype, "r", series.dataoffset, tuple(series.shape))
+        return lambda key: np.asarray(values[key])
+    for page in series.pages:
+        _check_page(path, page)
+    return partial(_tiff_pages, path, series)
+
+
+def _check_page(path: Path, page: Any) -> None:
+    if page is None:
+        raise SourceError(f"{path}: a picture is missing in it")
+    ends = [a + n for a, n in zip(page.dataoffsets, page.databytecounts, strict=True)]
+    if max(ends, default=0) > path.stat().st_size:
+        raise SourceError(f"{path}: is cut short, a picture ends at byte {max(ends)}")
+
+
+def _tiff_pages(path: Path, series: Any, key: Key) -> NDArray[Any]:
+    pages = list(series.pages)[key[0]] if len(series.shape) > 2 else list(series.pages)
+    check_samples(str(path), len(pages) * prod(series.shape[-2:]))
+    stacked = np.stack([page.asarray(maxworkers=1) for page in pages])
+    part = stacked[(slice(None), *key[-2:])]
+    return np.asarray(part[0] if len(series.shape) == 2 else part)
+
+
+def _extra(module: str, path: Path) -> Any:
+    from importlib import import_module
+
+    try:
+        return import_module(module)
+    except ImportError:
+        raise SourceError(f"{path}: needs {module}, pip install 'chipglow[grid]'") from None
+
+
+# Zarr
+
+
+def _zarr(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
+    zarr = _extra("zarr", path)
+    if path.is_dir():
+        store = zarr.storage.LocalStore(path, read_only=True)
+    else:
+        store = stack.enter_context(zarr.storage.ZipStore(path, mode="r"))
+    root = zarr.open(store, mode="r")
+    if isinstance(root, zarr.Array):
+        yield from _zarr_array("", root, path)
+        return
+    for name, item in root.members(max_depth=None):
+        if isinstance(item, zarr.Array):
+            yield from _zarr_array(name, item, path)
+
+
+def _zarr_array(name: str, array: Any, path: Path) -> Iterator[StoredArray]:
+    unknown = sorted(set(_codecs(array.metadata.to_dict())) - set(_CODECS))
+    if unknown:  # one of Zarr's codecs unpickles, and so would run what is in the file
+        raise SourceError(f"{path}: {name} is packed by {unknown[0]!r}, which is not allowed")
+    if array.dtype.kind not in _KINDS:
+        return
+    attributes = dict(array.attrs)
+    dims = getattr(array.metadata, "dimension_names", None) or attributes.get("_ARRAY_DIMENSIONS")
+    yield StoredArray(
+        name,
+        tuple(array.shape),
+        lambda key: np.asarray(array[key]),
+        tuple(str(dim) for dim in dims or ()),
+        attributes,
+        array.chunks,
+    )
+
+
+def _codecs(metadata: Mapping[str, Any]) -> Iterator[str]:
+    """Names of all codecs in an array's metadata, those within others too."""
+    lists = ("filters", "codecs", "index_codecs", "storage_transformers")
+    codecs = [codec for name in lists for codec in metadata.get(name) or ()]
+    for codec in (*codecs, metadata.get("compressor")):
+        if codec is not None:
+            yield str(codec.get("id") or codec.get("name"))
+            yield from _codecs(codec.get("configuration") or {})
+
+
+# CSV
+
+
+def _csv(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
+    values = _csv_matrix(path)
+    yield StoredArray("", values.shape, lambda key: values[key])
+
+
+def _csv_matrix(path: Path) -> NDArray[np.float32]:
+    import pandas as pd
+
+    table = Table.look_at(path)
+    with path.open(encoding="utf-8-sig") as stream:
+        values = pd.read_csv(stream, header=None, **table.options)
+    for column, kind in enumerate(values.dtypes):
+        if kind.kind not in _KINDS:
+            raise SourceError(f"{path}, column {column + 1}: has text in it, expected numbers")
+    return np.asarray(values.to_numpy(np.float32))
+
+
+@dataclass(frozen=True)
+class Table:
+    """How a table in text is written.
+
+    Parameters
+    ----------
+    first : str
+        Its first line that is no comment.
+    options : mapping
+        What `pandas.read_csv` must know: how numbers are separated and written.
+    """
+
+    first: str
+    options: Mapping[str, Any]
+
+    @property
+    def cells(self) -> list[str]:
+        """Cells of the first line, without quotes."""
+        separator = self.options["sep"]
+        cells = self.first.split() if separator == r"\s+" else self.first.split(separator)
+        return [cell.strip().strip("\"'") for cell in cells]
+
+    @classmethod
+    def look_at(cls, path: Path) -> "Table":
+        """Find out how a table is written, from its first lines.
+
+        Raises
+        ------
+        SourceError
+            If it is empty, no text, too large or has a line that is too long.
+        """
+        if path.stat().st_size > _LARGEST_TABLE:
+            raise SourceError(
+                f"{path}: has {path.stat().st_size} bytes, expected up to {_LARGEST_TABLE}"
+            )
+        first, second = _two_lines(path)
+        separator = next((mark for mark in ";\t," if mark in first), r"\s+")
+        text = second or first
+        decimal = "," if separator != "," and "," in text and "." not in text else "."
+        options = {"sep": separator, "decimal": decimal, "comment": "#", "skipinitialspace": True}
+        return cls(first, options)
+
+
+def _two_lines(path: Path) -> tuple[str, str]:
+    """The first two lines that are no comments."""
+    lines: list[str] = []
+    with path.open(encoding="utf-8-sig") as stream:
+        for _ in range(_MOST_COMMENTS):
+            line = stream.readline(_LONGEST_LINE)
+            if len(line) == _LONGEST_LINE:
+                raise SourceError(f"{path}: a line has over {_LONGEST_LINE} letters")
+            if line.split("#")[0].strip():
+                lines.append(line.split("#")[0].strip())
+            if not line or len(lines) == 2:
+                break
+    if not lines:
+        raise SourceError(f"{path}: there is no number in it")
+    if "\0" in lines[0]:
+        raise SourceError(f"{path}: is no text, expected a table of numbers")
+    return lines[0], lines[1] if len(lines) > 1 else ""
+
+
+_READERS: Final[Mapping[str, Callable[[Path, ExitStack], Iterator[StoredArray]]]] = {
+    ".npy": _npy,
+    ".npz": _npz,
+    ".h5": _hdf5,
+    ".hdf5": _hdf5,
+    ".hdf": _hdf5,
+    ".he5": _hdf5,
+    ".nc": _netcdf,
+    ".nc4": _netcdf,
+    ".cdf": _netcdf,
+    ".mat": _matlab,
+    ".tif": _tiff,
+    ".tiff": _tiff,
+    ".zarr": _zarr,
+    ".zip": _zarr,
+    ".csv": _csv,
+    ".txt": _csv,
+    ".dat": _csv,
+}

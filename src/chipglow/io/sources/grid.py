@@ -1,0 +1,442 @@
+"""Fields on regular grids over time: Zarr, NetCDF, HDF5, NumPy, MATLAB, TIFF and CSV."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from functools import partial
+from math import isfinite, prod
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.io.sources.arrays import (
+    MOST_ON_A_SIDE,
+    StoredArray,
+    check_samples,
+    open_arrays,
+    reading,
+)
+from chipglow.io.sources.conventions import SI, Placement, Unit, Units
+from chipglow.io.sources.layout import (
+    AXES,
+    COORDINATES,
+    Chosen,
+    axes_of,
+    check_even,
+    check_times,
+    coordinate,
+    find_fields,
+    read_list,
+    unit_of,
+    unused_names,
+)
+from chipglow.io.sources.source import READABLE, SampledFrame, Source, SourceError, Survey
+from chipglow.scene import Material, Raster
+from chipglow.scene.regrid import regrid, taps
+
+Arrays = Mapping[str, StoredArray]
+
+_KNOWN: Final = (*READABLE, "material")
+_BLOCK: Final = 64_000_000
+"""Most samples of several frames that are read together, if the file keeps them together."""
+
+
+@dataclass(frozen=True)
+class GridSource(Source):
+    """Fields on a regular grid over time.
+
+    Parameters
+    ----------
+    files : str or mapping
+        Path of the file that has all fields, or paths by the fields' names in a scene (and
+        ``material``). A path with ``*`` means several files, one a frame, numbers in their names in
+        order.
+    names : mapping
+        Name that a field has in its file, by its name in a scene; also of ``material`` (0 void,
+        1 workpiece, 2 tool), ``time``, ``x`` and ``y``. Those not named are guessed.
+    axes : tuple of str, optional
+        What the axes of the arrays are: ``time``, ``y`` and ``x`` in their order, without ``time``
+        for a single frame. As the file says or, if it does not, in this order.
+    top_first : bool
+        Whether row 0 is the top one; where the file has no coordinate y.
+    spacing : tuple of float, optional
+        Distance of the columns and of the rows in m; comes before coordinates in the file.
+    left, top : float
+        Outer corner of the grid in m; with ``spacing``.
+    interval : float, optional
+        Time between frames in s; comes before times in the file.
+    void_value : float, optional
+        Number that stands for no material, in the file's unit; NaN always does.
+    units : Units
+        Units of what is in the files; where one is not SI, it comes before what a file says.
+    placement : Placement
+        How the grid lies in the scene.
+
+    Raises
+    ------
+    ValueError
+        If an argument is out of range.
+    """
+
+    files: str | Mapping[str, str]
+    names: Mapping[str, str] = field(default_factory=dict)
+    axes: tuple[str, ...] | None = None
+    top_first: bool = True
+    spacing: tuple[float, float] | None = None
+    left: float = 0.0
+    top: float = 0.0
+    interval: float | None = None
+    void_value: float | None = None
+    units: Units = field(default_factory=Units)
+    placement: Placement = field(default_factory=Placement)
+
+    def __post_init__(self) -> None:
+        if not self.files:
+            raise ValueError("files: there is none, expected a path or paths by field")
+        if not isinstance(self.files, str):
+            unknown = sorted(set(self.files) - {*READABLE, "material"})
+            if unknown:
+                raise ValueError(
+                    f"files: unknown field {unknown[0]!r}, expected one of "
+                    f"{', '.join((*READABLE, 'material'))}"
+                )
+        if self.axes is not None and sorted(self.axes) not in (sorted(AXES), ["x", "y"]):
+            raise ValueError(
+                f"axes: {self.axes!r}, expected time, y and x in any order, or y and x"
+            )
+        for name in ("spacing", "interval"):
+            value = getattr(self, name)
+            numbers = value if isinstance(value, tuple) else (value,)
+            if value is not None and not all(isfinite(n) and n > 0 for n in numbers):
+                raise ValueError(f"{name}: {value!r}, expected over 0")
+        if not (isfinite(self.left) and isfinite(self.top)):
+            raise ValueError(f"left, top: {self.left!r}, {self.top!r}, expected finite lengths")
+        if self.placement.depth != 2:
+            raise ValueError("placement: a grid has the axes x and y, expected no z")
+
+    def survey(self) -> Survey:
+        """Look at what is there; see `Source.survey`."""
+        with ExitStack() as stack:
+            grid = _open(self, stack)
+            grid.check_ends()
+            return Survey(
+                kind=grid.kind,
+                times=grid.times,
+                extent=grid.extent,
+                found={name: layer.chosen.label for name, layer in grid.layers.items()},
+                unused=grid.unused,
+                spacing=min(grid.steps),
+                assumed=grid.assumed,
+            )
+
+    def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
+        """Sample the frames one after the other; see `Source.frames`."""
+        with ExitStack() as stack:
+            grid = _open(self, stack)
+            across = taps(grid.x, raster.spacing, raster.x)
+            down = taps(-grid.y, raster.spacing, -raster.y)
+            for index in range(start, len(grid.times)):
+                values, material = regrid(*grid.read(index), across, down)
+                fields = dict(zip(grid.layers, values, strict=True))
+                yield SampledFrame(float(grid.times[index]), fields, material)
+
+
+class _Layer:
+    """A field of the grid: where its numbers are and what they mean."""
+
+    def __init__(self, chosen: Chosen, axes: tuple[str, ...], unit: Unit) -> None:
+        self.chosen, self.axes, self.unit = chosen, axes, unit
+        self.array = array = chosen.array
+        self.frames = self.length("time")
+        self._first, self._block = 0, np.empty((0, 0, 0), np.float32)
+        together = array.chunks[axes.index("time")] if array.chunks and "time" in axes else 1
+        self._together = max(1, min(together, _BLOCK // max(1, self.samples)))
+
+    def length(self, axis: str) -> int:
+        """Number of samples along an axis."""
+        return self.array.shape[self.axes.index(axis)] if axis in self.axes else 1
+
+    @property
+    def samples(self) -> int:
+        """Number of samples of a frame."""
+        return self.length("x") * self.length("y")
+
+    def check(self) -> None:
+        """Refuse a frame that is empty or too large to be read."""
+        for axis in ("x", "y"):
+            if not 2 <= self.length(axis) <= MOST_ON_A_SIDE:
+                raise SourceError(
+                    f"{self.chosen}: has {self.length(axis)} samples along {axis}, "
+                    f"expected 2 to {MOST_ON_A_SIDE}"
+                )
+        check_samples(f"{self.chosen}: a frame", self.samples)
+        check_samples(f"{self.chosen}: a chunk", prod(self.array.chunks or (1,)))
+        if self.frames < 1:
+            raise SourceError(f"{self.chosen}: has no frame")
+
+    def check_like(self, other: "_Layer") -> None:
+        """Refuse fields of different shape."""
+        own, expected = ([one.length(axis) for axis in AXES] for one in (self, other))
+        if own != expected:
+            raise SourceError(
+                f"{self.chosen}: has {own} samples along {', '.join(AXES)}, "
+                f"expected {expected} as {other.chosen}"
+            )
+
+    def dim(self, axis: str) -> str:
+        """Name of an axis in the file; empty if it says none."""
+        if axis not in self.axes or not self.array.dims:
+            return ""
+        return self.array.dims[self.axes.index(axis)]
+
+    def read(self, index: int) -> NDArray[np.float32]:
+        """Numbers of a frame as they are in the file, shape (y, x); NaN where there is none."""
+        if not self._first <= index < self._first + len(self._block):
+            self._first = index - index % self._together
+            self._block = self._load(self._first, min(self._first + self._together, self.frames))
+        values: NDArray[np.float32] = self._block[index - self._first]
+        return values
+
+    def _load(self, first: int, last: int) -> NDArray[np.float32]:
+        key = tuple(slice(first, last) if axis == "time" else slice(None) for axis in self.axes)
+        with reading(self.chosen):
+            raw = self.array.read(key)
+        if "time" not in self.axes:
+            raw = raw[None]
+        axes = self.axes if "time" in self.axes else ("time", *self.axes)
+        expected = (last - first, self.length("y"), self.length("x"))
+        raw = raw.transpose([axes.index(axis) for axis in AXES])
+        if raw.shape != expected:
+            raise SourceError(f"{self.chosen}: has shape {raw.shape}, expected {expected}")
+        return _decoded(raw, self.array.attributes)
+
+
+def _decoded(raw: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[np.float32]:
+    """Numbers that are packed as NetCDF's conventions say."""
+    values = np.asarray(raw, np.float32)
+    scale, offset = (attributes.get(name) for name in ("scale_factor", "add_offset"))
+    if scale is not None or offset is not None:
+        scaled = raw * float(1.0 if scale is None else scale) + float(offset or 0.0)
+        values = np.asarray(scaled, np.float32)
+    for name in ("_FillValue", "missing_value"):
+        if attributes.get(name) is not None:
+            values = np.where(raw == raw.dtype.type(attributes[name]), np.float32(np.nan), values)
+    return values
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """A source that is open."""
+
+    kind: str
+    layers: Mapping[str, _Layer]
+    material: _Layer | None
+    source: GridSource
+    times: NDArray[np.float64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    turned: tuple[bool, bool, bool]
+    unused: tuple[str, ...]
+    assumed: tuple[str, ...]
+
+    @property
+    def steps(self) -> tuple[float, float]:
+        """Distance of the columns and of the rows in m."""
+        return (
+            float((self.x[-1] - self.x[0]) / (self.x.size - 1)),
+            float((self.y[0] - self.y[-1]) / (self.y.size - 1)),
+        )
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom and top edge in m."""
+        across, down = (step / 2 for step in self.steps)
+        return (
+            float(self.x[0] - across),
+            float(self.x[-1] + across),
+            float(self.y[-1] - down),
+            float(self.y[0] + down),
+        )
+
+    def check_ends(self) -> None:
+        """Read the first and the last frame: what is wrong there is found before all are read."""
+        for index in {0, len(self.times) - 1}:
+            self.read(index)
+
+    def read(self, index: int) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        """Fields in SI, shape (fields, y, x), and material of a frame, as they lie in the scene."""
+        raw = {name: layer.read(index) for name, layer in self.layers.items()}
+        void = self._void(raw)
+        if self.material is None:
+            material = np.where(void, np.uint8(Material.VOID), np.uint8(Material.WORKPIECE))
+        else:
+            material = np.where(void, np.uint8(Material.VOID), self._material(index))
+        values = np.stack([self._in_scene(name, raw[name]) for name in raw])
+        turn = partial(_turn, turned=self.turned)
+        return np.ascontiguousarray(turn(values)), np.ascontiguousarray(turn(material))
+
+    def _void(self, raw: Mapping[str, NDArray[np.float32]]) -> NDArray[np.bool_]:
+        """Where the temperature, or else the first field, has no number."""
+        values = raw["temperature"] if "temperature" in raw else next(iter(raw.values()))
+        void: NDArray[np.bool_] = ~np.isfinite(values)
+        if self.source.void_value is not None:
+            void |= np.isclose(values, self.source.void_value, rtol=1e-6, atol=0.0)
+        return void
+
+    def _material(self, index: int) -> NDArray[np.uint8]:
+        assert self.material is not None
+        found = self.material.read(index)
+        kinds = np.nan_to_num(found, nan=float(Material.VOID))
+        wrong = ~np.isin(kinds, [float(kind) for kind in Material])
+        if wrong.any():
+            raise SourceError(
+                f"{self.material.chosen}: material is {kinds[wrong][0]:g} in frame {index}, "
+                "expected 0 (void), 1 (workpiece) or 2 (tool)"
+            )
+        return np.asarray(kinds, np.uint8)
+
+    def _in_scene(self, name: str, raw: NDArray[np.float32]) -> NDArray[np.float32]:
+        layer, placement = self.layers[name], self.source.placement
+        values = layer.unit.to_si(raw)
+        if name.endswith(("_x", "_y")):
+            number = 0 if name.endswith("_x") else 1
+            origin = placement.origin[number] if name.startswith("material") else 0.0
+            values = np.asarray((values - origin) * placement.signs[number], np.float32)
+        values[~np.isfinite(values)] = np.nan
+        return values
+
+
+def _turn(values: NDArray[Any], turned: tuple[bool, bool, bool]) -> NDArray[Any]:
+    """Rows and columns swapped, then columns and rows in the scene's order."""
+    swapped, across, down = turned
+    values = values.swapaxes(-1, -2) if swapped else values
+    values = values[..., ::-1] if across else values
+    return values[..., ::-1, :] if down else values
+
+
+def _open(source: GridSource, stack: ExitStack) -> _Grid:
+    assumed: list[str] = []
+    files, chosen = _choose(source, stack, assumed)
+    layers: dict[str, _Layer] = {}
+    for name, one in chosen.items():
+        axes = axes_of(one, source.axes, assumed)
+        unit = SI if name == "material" else unit_of(name, one, source.units.of(name), assumed)
+        layers[name] = _Layer(one, axes, unit)
+        layers[name].check()
+    first = next(iter(layers.values()))
+    for layer in layers.values():
+        layer.check_like(first)
+    material = layers.pop("material", None)
+    if not layers:
+        raise SourceError(f"{first.chosen}: is a material, expected a temperature too")
+    x, y = (_positions(source, axis, files, first, assumed) for axis in ("x", "y"))
+    x, y, turned = _placed(source.placement, x, y)
+    used = {one.label for one in chosen.values()} | set(source.names.values())
+    return _Grid(
+        kind=f"grid of {first.length('y')} x {first.length('x')} samples, {', '.join(files)}",
+        layers={_placed_name(name, source.placement): layer for name, layer in layers.items()},
+        material=material,
+        source=source,
+        times=_times(source, files, first, assumed),
+        x=x,
+        y=y,
+        turned=turned,
+        unused=unused_names((label for arrays in files.values() for label in arrays), used),
+        assumed=tuple(dict.fromkeys(assumed)),
+    )
+
+
+def _choose(
+    source: GridSource, stack: ExitStack, assumed: list[str]
+) -> tuple[dict[str, Arrays], dict[str, Chosen]]:
+    """Open the files and find every field: arrays by file, and fields by name."""
+    given = {name: label for name, label in source.names.items() if name not in COORDINATES}
+    if isinstance(source.files, str):
+        path = source.files
+        arrays = open_arrays(path, stack)
+        candidates = _candidates(path, arrays, source)
+        return {path: arrays}, find_fields(path, candidates, given, _KNOWN, assumed)
+    files: dict[str, Arrays] = {}
+    chosen: dict[str, Chosen] = {}
+    for name, path in source.files.items():
+        files[path] = files.get(path) or open_arrays(path, stack)
+        candidates = _candidates(path, files[path], source)
+        own = {name: given[name]} if name in given else {}
+        if len(candidates) == 1 and not own:
+            own = {name: next(iter(candidates))}
+        chosen.update(find_fields(path, candidates, own, (name,), assumed))
+    return files, chosen
+
+
+def _candidates(path: str, arrays: Arrays, source: GridSource) -> Arrays:
+    """Arrays that can be a field: of as many axes as there should be."""
+    flat = {label: array for label, array in arrays.items() if min(array.shape, default=0) != 1}
+    solid = {label: array for label, array in arrays.items() if len(array.shape) == 3}
+    number = len(source.axes or (AXES if solid else AXES[1:]))
+    pool = solid if number == 3 else flat
+    result = {label: array for label, array in pool.items() if len(array.shape) == number}
+    if not result:
+        shapes = ", ".join(f"{label} {array.shape}" for label, array in list(arrays.items())[:10])
+        raise SourceError(f"{path}: expected an array with {number} axes, it has {shapes}")
+    return result
+
+
+def _positions(
+    source: GridSource,
+    axis: str,
+    files: Mapping[str, Arrays],
+    layer: _Layer,
+    assumed: list[str],
+) -> NDArray[np.float64]:
+    """Centres of the columns or rows in m, as they follow in the file."""
+    count = layer.length(axis)
+    number = np.arange(count, dtype=np.float64) + 0.5
+    if source.spacing is None:
+        one = coordinate(axis, files, source.names.get(axis), layer.dim(axis), count)
+        if one is None:
+            raise SourceError(
+                f"{layer.chosen.path}: has no coordinate {axis!r}, expected spacing to be given"
+            )
+        return check_even(
+            str(one), read_list(one, unit_of(axis, one, source.units.length, assumed))
+        )
+    if axis == "x":
+        return source.left + source.spacing[0] * number
+    return source.top - source.spacing[1] * (number if source.top_first else number[::-1])
+
+
+def _times(
+    source: GridSource, files: Mapping[str, Arrays], layer: _Layer, assumed: list[str]
+) -> NDArray[np.float64]:
+    count = layer.frames
+    if source.interval is not None:
+        return source.interval * np.arange(count, dtype=np.float64)
+    one = coordinate("time", files, source.names.get("time"), layer.dim("time"), count)
+    if one is None:
+        if count > 1:
+            assumed.append("no times in the files: frames are 1 s apart")
+        return np.arange(count, dtype=np.float64)
+    return check_times(str(one), read_list(one, unit_of("time", one, source.units.time, assumed)))
+
+
+def _placed(
+    placement: Placement, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[bool, bool, bool]]:
+    """Coordinates in the scene, x ascending and y descending, and how the fields are turned."""
+    along, up = (
+        ((x, y)[axis] - origin) * sign
+        for axis, origin, sign in zip(
+            placement.axes, placement.origin, placement.signs, strict=True
+        )
+    )
+    back, rising = bool(along[0] > along[-1]), bool(up[0] < up[-1])
+    turned = (placement.axes == (1, 0), back, rising)
+    return along[::-1] if back else along, up[::-1] if rising else up, turned
+
+
+def _placed_name(name: str, placement: Placement) -> str:
+    """Name of a component in the scene, of its name in the file."""
+    if placement.axes == (0, 1) or not name.endswith(("_x", "_y")):
+        return name
+    return name[:-1] + ("y" if name.endswith("x") else "x")
