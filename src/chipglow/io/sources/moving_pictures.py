@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
+from os import SEEK_END
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -25,7 +26,12 @@ _OPTIONS: Final = {
     "max_pixels": str(_MOST_PIXELS),
 }
 _WHOLE: Final = ("gif", "apng")
-"""Formats whose pictures build on all before them, though they claim to be complete."""
+"""Formats whose pictures build on all before them, though they claim to be complete.
+
+So do those of AVI in part: its times are those of decoding, and a search leads to a wrong picture.
+"""
+
+_GIF_TAIL: Final = 64
 
 
 @dataclass(frozen=True)
@@ -59,6 +65,7 @@ class MovieIndex:
 
 class _Packet(NamedTuple):
     mark: int | None
+    key: bool
     discarded: bool
     corrupt: bool
 
@@ -107,6 +114,7 @@ def pictures(
     number = start if searched and _can_search(path, index, start) else 0
     searched = number > 0
     with _opened(path) as (container, stream):
+        interpolation = _interpolation()
         if searched:
             container.seek(index.marks[start], stream=stream)
         for frame in container.decode(stream):
@@ -116,7 +124,7 @@ def pictures(
                 break
             _check(path, index, frame, number)
             if number >= start and (number - start) % every == 0:
-                yield frame.to_ndarray(format="rgb24")
+                yield frame.to_ndarray(format="rgb24", interpolation=interpolation)
             number += 1
     if number < index.count:
         raise SourceError(
@@ -132,13 +140,14 @@ def _index(path: Path, size: int, changed: int) -> MovieIndex:
         raise SourceError(f"{path}: the file is empty, expected a movie")
     with _opened(path) as (container, stream):
         packets = [
-            _Packet(packet.pts, packet.is_discard, packet.is_corrupt)
+            _Packet(packet.pts, packet.is_keyframe, packet.is_discard, packet.is_corrupt)
             for packet in container.demux(stream)
             if packet.dts is not None or packet.size > 0
         ]
         shown = [packet.mark for packet in packets if not packet.discarded]
-        whole = container.format.name.split(",")[0] in _WHOLE
+        kind = container.format.name.split(",")[0]
         expected, rate = stream.frames, stream.average_rate
+        said = container.duration if len(container.streams) == 1 else None
         unit = stream.time_base
         codec = f"{stream.codec_context.name}, {stream.codec_context.pix_fmt}"
         shape = (stream.codec_context.height, stream.codec_context.width)
@@ -156,7 +165,24 @@ def _index(path: Path, size: int, changed: int) -> MovieIndex:
         times = (np.array(marks, np.float64) - marks[0]) * float(unit)
     elif rate:
         times = np.arange(len(shown)) / float(rate)
-    return MovieIndex(codec, *shape, len(shown), times, () if whole else marks, square)
+    _check_end(path, kind, times, said)
+    built_on_others = kind == "avi" and not all(packet.key for packet in packets)
+    if kind in _WHOLE or built_on_others:
+        marks = ()
+    return MovieIndex(codec, *shape, len(shown), times, marks, square)
+
+
+def _check_end(path: Path, kind: str, times: NDArray[np.float64] | None, said: int | None) -> None:
+    """Refuse what ends between two pictures, in the formats that do not count them."""
+    short = False
+    if kind == "matroska" and said and times is not None and len(times) > 1:
+        short = said * 1e-6 > times[-1] + 1.5 * times[-1] / (len(times) - 1)
+    if kind == "gif":
+        with path.open("rb") as file:
+            file.seek(-min(_GIF_TAIL, path.stat().st_size), SEEK_END)
+            short = not file.read().rstrip(b"\0\r\n ").endswith(b";")
+    if short:
+        raise SourceError(f"{path}: it ends before its end: truncated? expected a whole movie")
 
 
 def _presentation(marks: list[int | None]) -> tuple[int, ...]:
@@ -178,6 +204,20 @@ def _can_search(path: Path, index: MovieIndex, start: int) -> bool:
 def _mark(index: MovieIndex, frame: Any) -> int:
     """Number of a picture by its presentation time."""
     return bisect_left(index.marks, frame.pts or 0, hi=index.count - 1)
+
+
+def _interpolation() -> Any:
+    """How colours of half the resolution are enlarged.
+
+    FFmpeg's default repeats them, whatever interpolation is asked for, unless it is told to
+    compute them in full; PyAV 12 cannot tell it.
+    """
+    from av.video.reformatter import Interpolation
+
+    chosen = Interpolation.BICUBIC
+    for name in ("FULL_CHR_H_INT", "ACCURATE_RND"):
+        chosen = chosen | getattr(Interpolation, name, chosen)
+    return chosen
 
 
 def _check(path: Path, index: MovieIndex, frame: Any, number: int) -> None:
