@@ -3,7 +3,7 @@
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
-from chipglow.study import Study, field_tables, study_text
+from chipglow.study import ImportDescription, Study, field_tables, study_text
 
 HERE = Path(__file__).parent
 GENERATED = HERE / "generated"
@@ -21,7 +21,12 @@ extensions = [
     "sphinx.ext.napoleon",
 ]
 templates_path = ["_templates"]
-exclude_patterns = ["generated/*.yaml", "generated/fields.md", "verification/*"]
+exclude_patterns = [
+    "generated/*.yaml",
+    "generated/fields.md",
+    "generated/import-fields.md",
+    "verification/*",
+]
 default_role = "py:obj"
 
 myst_enable_extensions = ["amsmath", "dollarmath"]
@@ -52,3 +57,8 @@ GENERATED.mkdir(exist_ok=True)
 
 # The page on studies shows what the schema itself says of every field of the cut.
 (GENERATED / "fields.md").write_text(field_tables(Study().cutting, "cutting"), encoding="utf-8")
+
+# So does the page on imports.
+(GENERATED / "import-fields.md").write_text(
+    field_tables(ImportDescription(), "import"), encoding="utf-8"
+)

@@ -127,6 +127,40 @@ def cut(
         print(preview)
 
 
+@app.command("import")
+def import_source(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SOURCE",
+            help="A mesh, grid, point cloud or movie; or a YAML file that describes an import.",
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="The scene to write, NetCDF; without it, only say what is there."
+        ),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="FIELD=VALUE",
+            help="Set a field of the description, such as units.length=mm; may be repeated.",
+        ),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on where an earlier import was ended.")
+    ] = False,
+) -> None:
+    """Make a scene of someone else's fields."""
+    from chipglow.cli.importing import import_fields
+    from chipglow.study import load_import
+
+    import_fields(load_import(source, settings or ()), out, resume)
+
+
 @app.command()
 def measure(
     scene: Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a NetCDF file.")],

@@ -1,6 +1,7 @@
 """Readers and writers: scenes, measurements, and output that is whole or not there."""
 
 from chipglow.io.atomic import atomic_folder, atomic_path
+from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
 from chipglow.io.movie_file import check_movie_path, movie_writer
 from chipglow.io.scene_file import FORMAT_VERSION, SceneWriter, open_scene, write_scene
@@ -9,14 +10,19 @@ from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 
 __all__ = [
     "FORMAT_VERSION",
+    "Import",
     "SceneWriter",
     "UnfinishedScene",
+    "View",
     "atomic_folder",
     "atomic_path",
     "check_movie_path",
+    "import_scene",
     "movie_writer",
     "open_scene",
+    "prospect",
     "read_measurement",
+    "read_scene",
     "read_tool_outline",
     "unfinished_scenes",
     "write_dataset",

@@ -9,7 +9,7 @@ from itertools import islice
 from math import ceil, isfinite
 from pathlib import Path
 from time import monotonic
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
@@ -30,6 +30,83 @@ _KEY: Final = "import"
 
 
 @dataclass(frozen=True)
+class View:
+    """Where a scene is sampled; what is None is as in the source.
+
+    Parameters
+    ----------
+    left, right, bottom, top : float, optional
+        Edges in m.
+    spacing : float, optional
+        Side of a sample in m; by default that of the source, or a 900th of the longer side.
+
+    Raises
+    ------
+    ValueError
+        If the right edge is not right of the left one, or the upper one not over the lower one.
+    """
+
+    left: float | None = None
+    right: float | None = None
+    bottom: float | None = None
+    top: float | None = None
+    spacing: float | None = None
+
+    def __post_init__(self) -> None:
+        for low, high in (("left", "right"), ("bottom", "top")):
+            first, last = getattr(self, low), getattr(self, high)
+            if first is not None and last is not None and not first < last:
+                raise ValueError(f"{high}: {last:g} m, expected over {low}, {first:g} m")
+
+    def raster(self, survey: Survey) -> Raster:
+        """The samples for a source.
+
+        Raises
+        ------
+        SourceError
+            If nothing of the source is in view, or there are too many samples.
+        """
+        given = (self.left, self.right, self.bottom, self.top)
+        left, right, bottom, top = (
+            there if said is None else said
+            for said, there in zip(given, survey.extent, strict=True)
+        )
+        width, height = right - left, top - bottom
+        if not (isfinite(width) and isfinite(height) and width > 0 and height > 0):
+            raise SourceError(
+                f"{survey.kind}: the view is {width:g} m wide and {height:g} m high, expected an "
+                f"area; the source extends over {_metres(survey.extent)}"
+            )
+        spacing = self.spacing or survey.spacing or max(width, height) / SAMPLES_ACROSS
+        samples = (height / spacing) * (width / spacing)
+        if not samples <= MOST_SAMPLES:
+            raise SourceError(
+                f"{survey.kind}: {samples:.3g} samples of {spacing:g} m, expected up to "
+                f"{MOST_SAMPLES:.0e}; a larger spacing makes fewer"
+            )
+        rows, columns = (max(ceil(side / spacing - 1e-6), 2) for side in (height, width))
+        raster = Raster(left, top, spacing, rows, columns)
+        if not _overlap(raster.extent, survey.extent):
+            raise SourceError(
+                f"{survey.kind}: extends over {_metres(survey.extent)}, nothing of which is in "
+                f"view: {_metres(raster.extent)}"
+            )
+        return raster
+
+
+Extent: TypeAlias = tuple[float, float, float, float]
+
+
+def _overlap(one: Extent, other: Extent) -> bool:
+    return all(max(one[i], other[i]) < min(one[i + 1], other[i + 1]) for i in (0, 2))
+
+
+def _metres(extent: Extent) -> str:
+    left, right, bottom, top = extent
+    return f"x {left:.4g} to {right:.4g} m, y {bottom:.4g} to {top:.4g} m"
+
+
+@dataclass(frozen=True)
 class Import:
     """What to read, and what to make of it.
 
@@ -37,9 +114,8 @@ class Import:
     ----------
     source : Source
         Where the fields are.
-    raster : Raster, optional
-        Where the scene's samples shall be; by default all that is there, with the source's own
-        samples, or 900 along the longer side.
+    view : View
+        Where the scene's samples shall be.
     completion : Completion
         What stands in for what the source does not have.
     description : mapping
@@ -47,7 +123,7 @@ class Import:
     """
 
     source: Source
-    raster: Raster | None = None
+    view: View = field(default_factory=View)
     completion: Completion = field(default_factory=Completion)
     description: Mapping[str, Any] = field(default_factory=dict)
 
@@ -89,12 +165,7 @@ def prospect(wanted: Import) -> Prospect:
             f"{survey.kind}: no field is known as temperature, expected fields: "
             f"temperature: NAME with one of {listed}"
         )
-    raster = wanted.raster or _raster_of(survey)
-    if raster.rows * raster.columns > MOST_SAMPLES:
-        raise SourceError(
-            f"{survey.kind}: {raster.rows} x {raster.columns} samples, expected up to "
-            f"{MOST_SAMPLES:.0e}; a larger spacing makes fewer"
-        )
+    raster = wanted.view.raster(survey)
     assumed = wanted.completion.assumptions(survey.found, len(survey.times))
     if any("optical flow" in sentence for sentence in assumed) and find_spec("skimage") is None:
         raise SourceError(
@@ -193,18 +264,6 @@ def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
     first = max(done - wanted.completion.memory, 0)
     frames = complete(wanted.source.frames(raster, first), raster, wanted.completion)
     yield from islice(frames, done - first, None)
-
-
-def _raster_of(survey: Survey) -> Raster:
-    left, right, bottom, top = survey.extent
-    width, height = right - left, top - bottom
-    if not (isfinite(width) and isfinite(height) and width > 0 and height > 0):
-        raise SourceError(
-            f"{survey.kind}: extends over {width:g} m x {height:g} m, expected an area"
-        )
-    spacing = survey.spacing or max(width, height) / SAMPLES_ACROSS
-    rows, columns = (max(ceil(side / spacing - 1e-6), 2) for side in (height, width))
-    return Raster(left, top, spacing, rows, columns)
 
 
 def _check_times(survey: Survey) -> None:

@@ -1,7 +1,8 @@
 """Studies: what to cut, look at and analyse, as a YAML file or in Python."""
 
 from chipglow.study.cache import CachedScene, cache_folder, cached_scenes, clear_cache
-from chipglow.study.files import StudyError, load_study
+from chipglow.study.files import StudyError, load_import, load_study
+from chipglow.study.import_schema import ImportDescription
 from chipglow.study.preview import preview_raster
 from chipglow.study.reference import FieldEntry, field_entries, field_tables
 from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, kept_progress, run
@@ -12,6 +13,7 @@ __all__ = [
     "CUTTING_STEP",
     "CachedScene",
     "FieldEntry",
+    "ImportDescription",
     "Progress",
     "Study",
     "StudyError",
@@ -23,6 +25,7 @@ __all__ = [
     "field_tables",
     "is_cut",
     "kept_progress",
+    "load_import",
     "load_study",
     "preview_raster",
     "run",

@@ -1,13 +1,17 @@
 """Study files: YAML in, one clear line for whatever is wrong with it."""
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import yaml
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
+from chipglow.study.import_schema import ImportDescription
 from chipglow.study.schema import Study
+
+Kind = TypeVar("Kind", bound=BaseModel)
 
 _LARGEST_FILE: Final = 1_000_000
 
@@ -32,18 +36,79 @@ def load_study(path: str | Path) -> Study:
         If the file cannot be read.
     """
     path = Path(path)
+    return _validated(Study, read_yaml(path), path.name, path.parent)
+
+
+def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescription:
+    """Read the description of an import from a YAML file, or make one of a source.
+
+    Parameters
+    ----------
+    source : str or Path
+        A YAML file (.yaml, .yml) that describes an import, or the source itself.
+    settings : iterable of str
+        Fields that come before those of the file: ``units.length=mm``.
+
+    Raises
+    ------
+    StudyError
+        If the file is no YAML or the import is not possible.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(source)
+    described = path.suffix.lower() in (".yaml", ".yml")
+    data = read_yaml(path) if described else {"source": path.name}
+    for setting in settings:
+        data = _with(data, setting)
+    return _validated(ImportDescription, data, path.name, path.parent)
+
+
+def read_yaml(path: Path) -> Any:
+    """What a YAML file holds, read with the safe loader.
+
+    Raises
+    ------
+    StudyError
+        If it is too large or no YAML; the message names the file.
+    OSError
+        If it cannot be read.
+    """
     if path.stat().st_size > _LARGEST_FILE:
-        raise StudyError(f"{path.name}: expected a study of up to {_LARGEST_FILE // 1000} kB")
+        raise StudyError(f"{path.name}: expected a file of up to {_LARGEST_FILE // 1000} kB")
     try:
-        data = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+        return yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
     except UnicodeDecodeError:
         raise StudyError(f"{path.name}: expected text in UTF-8") from None
     except (yaml.YAMLError, RecursionError) as error:
         raise StudyError(f"{path.name}: {_yaml_problem(error)}") from None
+
+
+def _validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
     try:
-        return Study.model_validate(data, context={"folder": path.parent.resolve()})
+        return kind.model_validate(data, context={"folder": folder.resolve()})
     except ValidationError as error:
-        raise StudyError(f"{path.name}: {problem(error)}") from None
+        raise StudyError(f"{name}: {problem(error)}") from None
+
+
+def _with(data: Any, setting: str) -> Any:
+    """The description with one field set."""
+    place, equals, text = setting.partition("=")
+    names = place.strip().split(".")
+    if not equals or not all(names):
+        raise StudyError(f"--set {setting}: expected FIELD=VALUE such as units.length=mm")
+    try:
+        value = yaml.load(text, Loader=_Loader)
+    except (yaml.YAMLError, RecursionError) as error:
+        raise StudyError(f"--set {setting}: {_yaml_problem(error)}") from None
+    return _placed(data, names, value)
+
+
+def _placed(data: Any, names: list[str], value: Any) -> Any:
+    if not names:
+        return value
+    inside = data if isinstance(data, dict) else {}
+    return {**inside, names[0]: _placed(inside.get(names[0]), names[1:], value)}
 
 
 def problem(error: ValidationError) -> str:

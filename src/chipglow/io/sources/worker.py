@@ -64,7 +64,7 @@ def main() -> None:
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a library prints shall not mix with the answers
     source, wish, raster, start, memory = pickle.load(sys.stdin.buffer)
-    _limit(memory)
+    limit_memory(memory)
     try:
         for message in _answers(source, wish, raster, start):
             write_message(answers, message)
@@ -101,7 +101,8 @@ def _failure(error: Exception) -> Message:
     if isinstance(error, SourceError):
         return Message({"answer": "error", "text": str(error)})
     if isinstance(error, FileNotFoundError):
-        return Message({"answer": "missing", "text": str(error)})
+        name = error.filename or error
+        return Message({"answer": "missing", "text": f"{name}: there is no such file"})
     if isinstance(error, MemoryError):
         return Message({"answer": "unreadable", "text": "needs more memory than a reader may take"})
     said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
@@ -109,7 +110,7 @@ def _failure(error: Exception) -> Message:
     return Message({"answer": "unreadable", "text": text})
 
 
-def _limit(memory: int) -> None:
+def limit_memory(memory: int) -> None:
     """Limit what the process may take from now on; Windows has no such limit."""
     with suppress(ImportError):
         import resource

@@ -1,0 +1,54 @@
+"""Other people's fields to a scene's file, with what was found and what had to be assumed."""
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from chipglow.cli.progress import progress_bars
+from chipglow.io import import_scene, prospect
+from chipglow.io.importing import Prospect
+from chipglow.study import ImportDescription
+
+
+def import_fields(description: ImportDescription, out: Path | None, resume: bool) -> None:
+    """Say what a source holds and, if a file is named, write its scene.
+
+    Parameters
+    ----------
+    description : ImportDescription
+        What to read, and what it means.
+    out : Path, optional
+        The scene's file.
+    resume : bool
+        Whether to go on where an earlier import of the same was ended.
+    """
+    wanted = description.build()
+    looked = prospect(wanted)
+    _say(looked)
+    if out is None:
+        return
+    with progress_bars() as progress:
+        import_scene(
+            wanted, out, lambda share: progress("import", share), looked=looked, resume=resume
+        )
+    print(out)
+
+
+def _say(looked: Prospect) -> None:
+    console, survey, raster = Console(stderr=True), looked.survey, looked.raster
+    table = Table("field", "from")
+    for ours, theirs in survey.found.items():
+        table.add_row(ours, theirs)
+    times = survey.times * 1e6
+    console.print(f"{survey.kind}: {times.size} frames, {times[0]:g} us to {times[-1]:g} us")
+    console.print(table)
+    if survey.unused:
+        console.print(f"Not used: {', '.join(survey.unused)}")
+    left, right, bottom, top = (edge * 1e6 for edge in raster.extent)
+    console.print(
+        f"Sampled every {raster.spacing * 1e6:.4g} um: {raster.columns} x {raster.rows} samples, "
+        f"x {left:.4g} um to {right:.4g} um, y {bottom:.4g} um to {top:.4g} um"
+    )
+    for sentence in looked.assumed:
+        console.print(f"Assumed: {sentence}")

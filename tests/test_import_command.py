@@ -1,0 +1,184 @@
+"""The command import: its description, what it says, what it writes, what it refuses."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from chipglow.cli.app import app
+from chipglow.io import open_scene, prospect
+from chipglow.io.sources.grid import GridSource
+from chipglow.io.sources.movie import Legend, MovieSource, NamedMap
+from chipglow.scene import Material, ToolGeometry
+from chipglow.study import ImportDescription, StudyError, load_import
+
+RUNNER = CliRunner()
+
+
+@pytest.fixture
+def arrays(tmp_path):
+    """Temperature in °C and strain on a grid of 5 um in mm and ms, x against the cut."""
+    x, y = np.meshgrid(5e-3 * np.arange(30), 5e-3 * np.arange(20))
+    temperature = np.stack([100 + 1000 * x + 500 * y + 10 * t for t in range(4)])
+    np.savez(tmp_path / "cut.npz", NT11=temperature, PEEQ=np.full(temperature.shape, 0.8))
+    return tmp_path / "cut.npz"
+
+
+SETTINGS = [
+    "fields.temperature=NT11", "units={length: mm, temperature: degC}", "interval=2 us",
+    "grid.spacing=5 um", "grid.top_first=false", "completion.cutting_speed=250 m/min",
+]  # fmt: skip
+
+
+def options(settings):
+    return [part for setting in settings for part in ("--set", setting)]
+
+
+def test_a_grid_becomes_a_scene_and_the_command_says_what_it_assumed(arrays, tmp_path):
+    out = tmp_path / "scene.nc"
+    result = RUNNER.invoke(app, ["import", str(arrays), "--out", str(out), *options(SETTINGS)])
+    assert result.exit_code == 0, result.output
+    said = " ".join(result.output.split())
+    assert "NT11" in said
+    assert "Assumed: velocity: the cutting speed where the strain is small" in said
+    scene = open_scene(out)
+    assert list(scene.times) == pytest.approx([0.0, 2e-6, 4e-6, 6e-6])
+    frame = scene.frame(3)
+    assert (frame.material == Material.WORKPIECE).all()
+    # Row 0 of the file is the lowest: 100 + 30 °C, and 0.5 K a sample up the picture.
+    assert frame.temperature[-1, 0] == pytest.approx(403.15, abs=0.02)
+    assert frame.temperature[0, 0] == pytest.approx(403.15 + 19 * 2.5, abs=0.02)
+    assert frame.temperature[-1, 29] == pytest.approx(403.15 + 29 * 5.0, abs=0.02)
+    assert "plastic strain rate: from the change" in scene.data.attrs["assumed"]
+    assert "NT11" in scene.data.attrs["import"]
+
+
+def test_without_out_the_command_only_looks(arrays, tmp_path):
+    result = RUNNER.invoke(app, ["import", str(arrays), *options(SETTINGS)])
+    assert result.exit_code == 0, result.output
+    assert "30 x 20 samples" in result.output
+    assert [path.name for path in tmp_path.iterdir()] == ["cut.npz"]
+
+
+def test_a_description_in_a_file_means_the_same(arrays, tmp_path):
+    (tmp_path / "import.yaml").write_text(
+        "source: cut.npz\n"
+        "fields: {temperature: NT11}\n"
+        "units: {length: mm, temperature: degC}\n"
+        "interval: 2 us\n"
+        "grid: {spacing: 5 um, top_first: false}\n"
+        "completion: {cutting_speed: 250 m/min}\n"
+    )
+    assert load_import(tmp_path / "import.yaml") == load_import(arrays, SETTINGS)
+    changed = load_import(tmp_path / "import.yaml", ["interval=1 us"])
+    assert changed.interval == pytest.approx(1e-6)
+
+
+def test_the_view_and_the_placement_say_what_is_sampled(arrays):
+    view = "{left: -100 um, right: 0 um, bottom: -20 um, top: 30 um, spacing: 2.5 um}"
+    looked = prospect(
+        load_import(
+            arrays,
+            [
+                *SETTINGS, f"field_of_view={view}", "placement.horizontal=-x",
+                "placement.origin_horizontal=20 um",
+            ],
+        ).build()
+    )  # fmt: skip
+    assert looked.raster.extent == pytest.approx((-100e-6, 0.0, -20e-6, 30e-6))
+    assert looked.raster.shape == (20, 40)
+    # The grid's 0 to 150 um, turned round and with its origin at 20 um.
+    assert looked.survey.extent[:2] == pytest.approx((-130e-6, 20e-6))
+
+
+def test_a_tool_is_drawn_where_the_description_says(arrays, tmp_path):
+    out = tmp_path / "scene.nc"
+    settings = [*SETTINGS, "tool.rake_angle=0 deg", "placement.origin_horizontal=75 um"]
+    result = RUNNER.invoke(app, ["import", str(arrays), "--out", str(out), *options(settings)])
+    assert result.exit_code == 0, result.output
+    scene = open_scene(out)
+    assert isinstance(scene.tool, ToolGeometry)
+    raster = scene.raster
+    distance = scene.tool.signed_distance(*np.meshgrid(raster.x, raster.y))
+    assert np.array_equal(scene.frame(0).material == Material.TOOL, distance < 0)
+
+
+def test_movies_are_described_field_by_field(tmp_path):
+    description = load_import(
+        "t.avi",
+        [
+            "movie.temperature={first: 20 degC, last: 1127 degC, colours: jet}",
+            "movie.plastic_strain={file: e.avi, first: 0, last: 4, legend: [600, 40, 620, 400]}",
+            "movie.scale_from=[0, 0]",
+            "movie.scale_to=[300, 400]",
+            "movie.scale_length=1 mm",
+        ],
+    )
+    source = description.build().source.source
+    assert isinstance(source, MovieSource)
+    assert source.metre_per_pixel == pytest.approx(2e-6)
+    assert source.movies["temperature"].values == pytest.approx((293.15, 1400.15))
+    assert source.movies["temperature"].colours == NamedMap("jet")
+    assert source.movies["plastic_strain"].colours == Legend((600, 40, 620, 400))
+    assert source.movies["plastic_strain"].path.name == "e.avi"
+
+
+def test_the_kind_is_told_by_the_name():
+    assert ImportDescription(source="a.nc").kind_of_source() == "grid"
+    assert isinstance(ImportDescription(source="a.mat").build().source.source, GridSource)
+
+
+@pytest.mark.parametrize(
+    ("settings", "wrong"),
+    [
+        (["units.length=degC"], "units: length: unknown unit 'degC'"),
+        (["units.length=3"], "units.length"),
+        (["interval=2"], "interval: 2 has no unit"),
+        (["interval=-2 us"], "interval: -2 us is not over 0"),
+        (["fields.temperature=T"], "there is no field 'T', it has NT11, PEEQ"),
+        (["fields.colour=NT11"], "fields: unknown 'colour'"),
+        (["colour=NT11"], "unknown key 'colour'"),
+        (["placement.vertical=x"], "vertical: 'x' is the horizontal axis too"),
+        (["kind=sound"], "kind: 'sound'"),
+        (["completion.rate_frames=0"], "rate_frames: 0, expected 1 to 20"),
+        (["field_of_view.left=1 mm", "field_of_view.right=2 mm"], "nothing of which is in view"),
+        (["field_of_view={left: 1 mm, right: 0 mm}"], "right: 0 m, expected over left"),
+        (["field_of_view.spacing=1 nm"], "a larger spacing makes fewer"),
+        (["=3"], "--set =3: expected FIELD=VALUE"),
+        (["grid"], "--set grid: expected FIELD=VALUE"),
+        (["grid=[1"], "--set grid=[1: "),
+        (["grid=!!python/object:os.system {}"], "--set grid=!!python"),
+    ],
+)
+def test_what_cannot_be_is_one_line(arrays, tmp_path, settings, wrong):
+    out = tmp_path / "scene.nc"
+    both = options([*SETTINGS, *settings])
+    result = RUNNER.invoke(app, ["import", str(arrays), "--out", str(out), *both])
+    assert result.exit_code == 2
+    assert wrong in result.output
+    assert len(result.output.splitlines()) == 1
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "wrong"),
+    [
+        ("nothing.nc", None, "nothing.nc"),
+        ("notes.docx", b"text", "kind: 'notes.docx' says none"),
+        ("empty.npz", b"", "empty.npz"),
+        ("import.yaml", b"source: [", "import.yaml"),
+        ("import.yaml", b"fields: {}", "source: is missing"),
+        ("import.yaml", b"- a list", "is no section"),
+    ],
+)
+def test_what_is_no_source_is_one_line(tmp_path, name, content, wrong):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    result = RUNNER.invoke(app, ["import", str(tmp_path / name)])
+    assert result.exit_code == 2
+    assert wrong in result.output
+    assert len(result.output.splitlines()) == 1
+
+
+def test_a_setting_is_no_python(arrays):
+    with pytest.raises(StudyError, match="could not determine a constructor"):
+        load_import(arrays, ["grid=!!python/object/apply:os.getcwd []"])
