@@ -219,18 +219,16 @@ def _velocity(
     if any(values is not None for values in known):
         across, up = (zero if values is None else values for values in known)
         return _elsewhere(across), _elsewhere(up)
-    across, up = zero, zero
     moves = (now.material == Material.WORKPIECE).astype(np.float32)
-    if others:
-        other = others[0]
-        flow = optical_flow(_pattern(now), _pattern(other), other.time - now.time, raster.spacing)
-        across, up = flow[0] * moves, flow[1] * moves
+    speed, chip = completion.cutting_speed or 0.0, moves
     if completion.cutting_speed is not None:
         strain = _elsewhere(now.fields["plastic_strain"])
-        chip = np.clip((strain - _CHIP_STARTS) / (_CHIP_ENDS - _CHIP_STARTS), 0.0, 1.0)
-        across = chip * across + (1.0 - chip) * np.float32(completion.cutting_speed) * moves
-        up = chip * up
-    return across, up
+        chip = moves * np.clip((strain - _CHIP_STARTS) / (_CHIP_ENDS - _CHIP_STARTS), 0.0, 1.0)
+    across, up = zero, zero
+    if others and chip.any():
+        interval = others[0].time - now.time
+        across, up = optical_flow(_pattern(now), _pattern(others[0]), interval, raster.spacing)
+    return chip * across + (moves - chip) * np.float32(speed), chip * up
 
 
 def _pattern(frame: SampledFrame) -> NDArray[np.float32]:
