@@ -1,7 +1,7 @@
 """Arrays in files of many formats behind one face: they are described first and read in parts."""
 
+import logging
 import re
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
@@ -10,6 +10,7 @@ from glob import glob, has_magic
 from math import prod
 from pathlib import Path
 from typing import Any, Final
+from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ _LARGEST_TABLE: Final = 1_000_000_000
 _LONGEST_LINE: Final = 4_000_000
 _MOST_COMMENTS: Final = 1000
 _KINDS: Final = "fiub"
+_NO_COORDINATE: Final = b"This is a netCDF dimension but not a netCDF variable"
 _CODECS: Final = (
     "blosc", "bz2", "bytes", "crc32c", "delta", "fixedscaleoffset", "gzip", "lz4", "lzma",
     "packbits", "quantize", "sharding_indexed", "shuffle", "transpose", "zlib", "zstd",
@@ -137,8 +139,13 @@ def open_arrays(pattern: str, stack: ExitStack) -> dict[str, StoredArray]:
     if len(first) > _MOST_ARRAYS:
         raise SourceError(f"{paths[0]}: {len(first)} arrays, expected up to {_MOST_ARRAYS}")
     if several:
-        return {name: _series(paths, name, array) for name, array in first.items()}
-    return first
+        first = {name: _series(paths, name, array) for name, array in first.items()}
+    return {name or _stem(pattern): array for name, array in first.items()}
+
+
+def _stem(pattern: str) -> str:
+    """What a file is called without number: the name of its only array."""
+    return re.sub(r"[\W\d_]+$", "", Path(pattern).stem) or "values"
 
 
 def _natural(path: str) -> list[tuple[int, int, str]]:
@@ -191,9 +198,7 @@ def _npy(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
 
 
 def _npz(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
-    import zipfile
-
-    archive = stack.enter_context(zipfile.ZipFile(path))
+    archive = stack.enter_context(ZipFile(path))
     for info in archive.infolist():
         if not info.filename.endswith(".npy"):
             continue
@@ -304,6 +309,8 @@ def _hdf5(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
 
 def _hdf5_array(name: str, item: Any) -> StoredArray | None:
     kind = item.attrs.get("MATLAB_class")
+    if bytes(item.attrs.get("NAME", b"")).startswith(_NO_COORDINATE):
+        return None
     if item.dtype.kind not in _KINDS or item.shape is None or "#" in name:
         return None
     attributes = {
@@ -341,7 +348,9 @@ def _dimension(dimension: Any) -> str:
 def _plain(value: Any) -> Any:
     """An attribute as text or a number."""
     value = np.asarray(value).reshape(-1)[0] if np.size(value) else ""
-    return value.decode(errors="replace") if isinstance(value, bytes) else value
+    if isinstance(value, bytes):
+        return value.decode(errors="replace")
+    return str(value) if isinstance(value, str) else value
 
 
 def _netcdf(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
@@ -353,8 +362,9 @@ def _netcdf(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
 def _netcdf3(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
     from scipy.io import netcdf_file
 
-    file = netcdf_file(path, mmap=True)
-    stack.callback(_close_quietly, file)
+    # The mapping outlives the stream; with the stream closed, the library leaves it alone.
+    with path.open("rb") as stream:
+        file = netcdf_file(stream, mmap=True)
     for name, variable in file.variables.items():
         if variable.data.dtype.kind in _KINDS:
             attributes = {key: _plain(value) for key, value in variable._attributes.items()}
@@ -364,13 +374,6 @@ def _netcdf3(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
 
 def _copy(values: NDArray[Any], key: Key) -> NDArray[Any]:
     return np.array(values[key])
-
-
-def _close_quietly(file: Any) -> None:
-    with warnings.catch_warnings():
-        # It warns that arrays still refer to the file; none of them is used again.
-        warnings.simplefilter("ignore", RuntimeWarning)
-        file.close()
 
 
 # MATLAB
@@ -415,8 +418,12 @@ class _MatlabArray:
 
 def _tiff(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
     tifffile = _extra("tifffile", path)
-    file = stack.enter_context(tifffile.TiffFile(path))
-    for number, series in enumerate(file.series):
+    with _complaints("tifffile") as complaints:
+        file = stack.enter_context(tifffile.TiffFile(path))
+        every = list(file.series)
+    if complaints:
+        raise SourceError(f"{path}: is damaged or cut short: {complaints[0]}")
+    for number, series in enumerate(every):
         if series.dtype.kind not in _KINDS:
             continue
         if "S" in series.axes:
@@ -425,6 +432,20 @@ def _tiff(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
         read = _tiff_reader(path, series)
         dims = tuple({"Y": "y", "X": "x"}.get(axis, "time") for axis in series.axes)
         yield StoredArray(name, tuple(series.shape), read, dims)
+
+
+@contextmanager
+def _complaints(name: str) -> Iterator[list[str]]:
+    """What a library logs as an error, where it goes on with what is left of a file."""
+    said: list[str] = []
+    handler = logging.Handler(logging.ERROR)
+    handler.emit = lambda record: said.append(record.getMessage())  # type: ignore[method-assign]
+    logger = logging.getLogger(name)
+    logger.addHandler(handler)
+    try:
+        yield said
+    finally:
+        logger.removeHandler(handler)
 
 
 def _tiff_reader(path: Path, series: Any) -> Callable[[Key], NDArray[Any]]:
@@ -475,7 +496,8 @@ def _zarr(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
     if path.is_dir():
         store = zarr.storage.LocalStore(path, read_only=True)
     else:
-        store = stack.enter_context(zarr.storage.ZipStore(path, mode="r"))
+        with ZipFile(path):  # Zarr's own opening leaves a half-open store behind
+            store = stack.enter_context(zarr.storage.ZipStore(path, mode="r"))
     root = zarr.open(store, mode="r")
     if isinstance(root, zarr.Array):
         yield from _zarr_array("", root, path)
