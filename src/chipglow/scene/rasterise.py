@@ -1,0 +1,165 @@
+"""Fields of a mesh on the samples of a raster, exact for linear elements."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from chipglow.scene.raster import Raster
+
+NOTHING: Final = -1
+"""Number of the element where there is none."""
+
+FARTHEST: Final = 1e100
+"""Samples from the corner that a node may be away; beyond, products of lengths would overflow."""
+
+SMALLEST: Final = 1e-200
+"""Twice the area in samples from which on a triangle covers something; its inverse is finite."""
+
+
+@dataclass(frozen=True)
+class Rasterised:
+    """What a mesh is at the samples of a raster.
+
+    Parameters
+    ----------
+    fields : ndarray
+        Those of the nodes, then those of the elements, shape (fields, y, x), float32; NaN where
+        there is no element.
+    element : ndarray
+        Number of the triangle at each sample, shape (y, x), int32; -1 where there is none.
+    """
+
+    fields: NDArray[np.float32]
+    element: NDArray[np.int32]
+
+
+def rasterise(
+    raster: Raster,
+    points: ArrayLike,
+    triangles: ArrayLike,
+    node_values: ArrayLike | None = None,
+    element_values: ArrayLike | None = None,
+    height: ArrayLike | None = None,
+) -> Rasterised:
+    """Sample the fields of a mesh of triangles at the centres of a raster's samples.
+
+    A sample takes the value of the linear function through the triangle's three nodes, or the
+    triangle's own. A sample on an edge that two triangles share belongs to one of them: rows are
+    cut at the same crossing of the edge for both, and a triangle takes the samples from its left
+    crossing on, up to but without its right one. Orientation does not matter. A triangle without
+    area, or with a position that is not finite or absurdly far away, covers nothing. Where triangles lie over one
+    another the highest is taken, of those as high the last.
+
+    Parameters
+    ----------
+    raster : Raster
+        Where the samples are.
+    points : array_like
+        Positions of the nodes in m, shape (nodes, 2).
+    triangles : array_like
+        Numbers of the nodes of each triangle, shape (triangles, 3).
+    node_values, element_values : array_like, optional
+        Values of nodes and of triangles, shape (nodes, fields) and (triangles, fields).
+    height : array_like, optional
+        Height of the nodes toward the viewer in m, shape (nodes,); all alike if left out.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit together or a triangle has a node that does not exist.
+    """
+    points = np.ascontiguousarray(points, np.float64)
+    triangles = np.ascontiguousarray(triangles, np.int64)
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ValueError(f"points: shape {points.shape}, expected (nodes, 2)")
+    if triangles.ndim != 2 or triangles.shape[1] != 3:
+        raise ValueError(f"triangles: shape {triangles.shape}, expected (triangles, 3)")
+    if triangles.size and not (0 <= triangles.min() and triangles.max() < len(points)):
+        raise ValueError(
+            f"triangles: nodes {triangles.min()} to {triangles.max()}, expected 0 to "
+            f"{len(points) - 1}"
+        )
+    of_nodes = _values("node_values", node_values, len(points))
+    of_elements = _values("element_values", element_values, len(triangles))
+    heights = _values("height", height, len(points))[:, 0] if height is not None else np.empty(0)
+    fields = np.full(
+        (of_nodes.shape[1] + of_elements.shape[1], *raster.shape), np.nan, np.float32
+    )
+    element = np.full(raster.shape, NOTHING, np.int32)
+    highest = np.full(raster.shape if len(heights) else (0, 0), -np.inf)
+    corner = np.array((raster.left, raster.top))
+    # Samples are at whole numbers of columns and rows.
+    with np.errstate(over="ignore", invalid="ignore"):
+        places = (points - corner) * np.array((1.0, -1.0)) / raster.spacing - 0.5
+    _fill(places, triangles, of_nodes, of_elements, heights, fields, element, highest)
+    return Rasterised(fields, element)
+
+
+def _values(name: str, values: ArrayLike | None, count: int) -> NDArray[np.float64]:
+    if values is None:
+        return np.empty((count, 0))
+    array = np.ascontiguousarray(values, np.float64)
+    if array.ndim not in (1, 2) or len(array) != count:
+        raise ValueError(f"{name}: shape {array.shape}, expected ({count}, fields)")
+    return array.reshape(count, -1) if array.size else np.empty((count, 0))
+
+
+@njit(cache=True)
+def _fill(  # type: ignore[no-untyped-def]
+    places, triangles, of_nodes, of_elements, heights, fields, element, highest
+):
+    rows, columns = element.shape
+    for number in range(len(triangles)):
+        a, b, c = triangles[number]
+        # In ascending order of rows.
+        if places[b, 1] < places[a, 1]:
+            a, b = b, a
+        if places[c, 1] < places[b, 1]:
+            b, c = c, b
+        if places[b, 1] < places[a, 1]:
+            a, b = b, a
+        xa, ya = places[a]
+        xb, yb = places[b]
+        xc, yc = places[c]
+        area = (xb - xa) * (yc - ya) - (xc - xa) * (yb - ya)
+        farthest = max(abs(xa), abs(xb), abs(xc), abs(ya), abs(yc))
+        if not (abs(area) > SMALLEST and farthest < FARTHEST):
+            continue
+        scale = 1.0 / area
+        first = int(max(np.ceil(ya), 0.0))
+        last = int(min(np.ceil(yc), float(rows)))
+        for row in range(first, last):
+            long = _crossing(xa, ya, xc, yc, row)
+            short = _crossing(xa, ya, xb, yb, row) if row < yb else _crossing(xb, yb, xc, yc, row)
+            left, right = (long, short) if area > 0.0 else (short, long)
+            begin = int(min(max(np.ceil(left), 0.0), float(columns)))
+            end = int(min(max(np.ceil(right), 0.0), float(columns)))
+            for column in range(begin, end):
+                # Rounding may put a weight outside of 0 to 1, far so in a triangle like a needle.
+                u = ((column - xa) * (yc - ya) - (xc - xa) * (row - ya)) * scale
+                u = min(max(u, 0.0), 1.0)
+                v = ((xb - xa) * (row - ya) - (column - xa) * (yb - ya)) * scale
+                v = min(max(v, 0.0), 1.0 - u)
+                w = 1.0 - u - v
+                if len(heights):
+                    height = w * heights[a] + u * heights[b] + v * heights[c]
+                    if not height >= highest[row, column]:
+                        continue
+                    highest[row, column] = height
+                element[row, column] = number
+                for field in range(of_nodes.shape[1]):
+                    fields[field, row, column] = (
+                        w * of_nodes[a, field] + u * of_nodes[b, field] + v * of_nodes[c, field]
+                    )
+                for field in range(of_elements.shape[1]):
+                    fields[of_nodes.shape[1] + field, row, column] = of_elements[number, field]
+
+
+@njit(cache=True, inline="always")
+def _crossing(x0, y0, x1, y1, row):  # type: ignore[no-untyped-def]
+    """Where an edge crosses a row, the lower end first: the same for both of its triangles."""
+    x = x0 + (row - y0) / (y1 - y0) * (x1 - x0)
+    return min(max(x, min(x0, x1)), max(x0, x1))
