@@ -95,17 +95,23 @@ def encode(path: Path, pictures: Iterator[np.ndarray], codec: Codec, rate: int =
         container.mux(stream.encode(None))
 
 
-def measure(folder: Path, codec: Codec, colours: NamedMap, count: int) -> dict[str, float]:
+def measure(
+    folder: Path,
+    codec: Codec,
+    colours: NamedMap,
+    count: int,
+    shape: tuple[int, int] = (ROWS, COLUMNS),
+) -> dict[str, float]:
     """Errors and predicted uncertainty in K of one codec and map."""
     path = folder / f"movie{codec.suffix}"
-    encode(path, (drawn(known_field(n), colours) for n in range(count)), codec)
+    encode(path, (drawn(known_field(n, shape), colours) for n in range(count)), codec)
     source = MovieSource(
-        {"temperature": FieldMovie(path, (COLDEST, HOTTEST), colours)}, PIXEL, (0, ROWS)
+        {"temperature": FieldMovie(path, (COLDEST, HOTTEST), colours)}, PIXEL, (0, shape[0])
     )
-    raster = Raster(0.0, ROWS * PIXEL, PIXEL, ROWS, COLUMNS)
+    raster = Raster(0.0, shape[0] * PIXEL, PIXEL, *shape)
     errors, wrong = [], 0
     for number, frame in enumerate(source.frames(raster)):
-        truth = known_field(number)
+        truth = known_field(number, shape)
         shown = frame.material == 1
         wrong += np.count_nonzero(shown != np.isfinite(truth))
         errors.append((frame.fields["temperature"] - truth)[shown & np.isfinite(truth)])
@@ -115,7 +121,7 @@ def measure(folder: Path, codec: Codec, colours: NamedMap, count: int) -> dict[s
         "p99": float(np.percentile(np.abs(error), 99)),
         "largest": float(np.abs(error).max()),
         "predicted": source.uncertainty()["temperature"].total,
-        "border": wrong / (count * ROWS * COLUMNS),
+        "border": wrong / (count * shape[0] * shape[1]),
         "kilobytes": path.stat().st_size / 1000 / count,
     }
 

@@ -255,10 +255,10 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
 
 def _check_size(path: Path, stream: Any) -> None:
     context = stream.codec_context
+    if context is None:
+        raise SourceError(f"{path}: FFmpeg has no decoder for its codec")
     rows, columns = context.height or 0, context.width or 0
     if not 0 < rows * columns <= _MOST_PIXELS:
         raise SourceError(
             f"{path}: its pictures have {columns} x {rows} pixels, expected 1 to {_MOST_PIXELS}"
         )
-    if context.codec is None:
-        raise SourceError(f"{path}: FFmpeg has no decoder for its codec")

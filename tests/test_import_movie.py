@@ -1,0 +1,583 @@
+"""Movies of fields: known values drawn, encoded and read back, and what is refused."""
+
+import pickle
+import struct
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from matplotlib import colormaps
+from movie_codecs import CODECS, Codec, drawn, encode, known_field, measure
+
+from chipglow.io.sources import SourceError
+from chipglow.io.sources.colour_scale import ColourScale, colour_uncertainty, lab
+from chipglow.io.sources.conventions import Placement
+from chipglow.io.sources.legend import find_legend, legend_pixels
+from chipglow.io.sources.movie import (
+    FieldMovie,
+    Legend,
+    MovieSource,
+    NamedMap,
+    metre_per_pixel,
+)
+from chipglow.io.sources.moving_pictures import index_movie, pictures
+from chipglow.io.sources.overlays import find_background, nearest
+from chipglow.io.sources.picture_sampling import PictureSampling
+from chipglow.scene import FILLED, Material, Raster
+
+ENDS = (293.0, 1400.0)
+LEVEL = (ENDS[1] - ENDS[0]) / 256
+SHAPE = (90, 120)
+PIXEL = 2e-6
+RAW = CODECS[0]
+H264 = Codec("H.264", ".mp4", "libx264", "yuv420p", (("g", "5"), ("bf", "2")))
+RAINBOW = NamedMap("rainbow")
+
+
+def a_movie(path, count=3, codec=RAW, colours=RAINBOW, shape=SHAPE, change=None):
+    def one(number):
+        picture = drawn(known_field(number, shape), colours)
+        return picture if change is None else change(picture)
+
+    encode(path, (one(number) for number in range(count)), codec)
+    return path
+
+
+def a_source(path, colours=RAINBOW, **more):
+    movies = {"temperature": FieldMovie(path, ENDS, colours)}
+    given = {"metre_per_pixel": PIXEL, "origin": (0.0, float(SHAPE[0])), **more}
+    return MovieSource(movies, **given)
+
+
+def own_raster(source):
+    found = source.survey()
+    left, right, bottom, top = found.extent
+    step = found.spacing
+    return Raster(left, top, step, round((top - bottom) / step), round((right - left) / step))
+
+
+def first_frame(source):
+    return next(source.frames(own_raster(source)))
+
+
+# The colours
+
+
+def test_lab_of_published_colours():
+    # Bruce Lindbloom's calculator, D65, sRGB: to the rounding of the white point.
+    expected = {
+        (1.0, 1.0, 1.0): (100.0, 0.0, 0.0),
+        (1.0, 0.0, 0.0): (53.24, 80.09, 67.20),
+        (0.0, 1.0, 0.0): (87.73, -86.18, 83.18),
+        (0.0, 0.0, 1.0): (32.30, 79.19, -107.86),
+        (0.0, 0.0, 0.0): (0.0, 0.0, 0.0),
+    }
+    for colour, value in expected.items():
+        assert lab(colour) == pytest.approx(value, abs=0.02)
+
+
+@pytest.mark.parametrize("name", ["jet", "rainbow", "turbo", "viridis", "gray", "jet_r"])
+def test_every_colour_of_a_scale_is_read_back(name):
+    scale = ColourScale.named(name, ENDS)
+    picture = np.round(255 * scale.colours).astype(np.uint8)[None]
+    values, distance = scale.invert(picture)
+    # Colours that are the same in 8 bits stand for the middle of their values; half a level is
+    # what rounding to 8 bits moves along the scale.
+    knot = np.abs(scale.knots - values[0][:, None]).argmin(axis=1)
+    width = scale.widths[knot]
+    assert (np.abs(values[0] - scale.values) <= width / 2 + LEVEL / 2).all()
+    assert distance.max() < 1.0
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(["jet", "rainbow", "viridis"]), st.booleans())
+def test_the_nearest_place_is_found(seed, name, banded):
+    scale = ColourScale.named(name, ENDS, 16 if banded else 0)
+    picture = np.random.default_rng(seed).integers(0, 256, (2, 5, 3), np.uint8)
+    values, distance = scale.invert(picture)
+    fine = np.linspace(0, len(scale.knots) - 1, len(scale.knots) if banded else 20_001)
+    index = np.arange(len(scale.knots))
+    places = np.stack([np.interp(fine, index, part) for part in scale.labs.T], axis=1)
+    apart = np.linalg.norm(lab(picture / 255)[:, :, None] - places, axis=3)
+    # The fine sampling of the scale is never nearer, and at most its own step farther.
+    step = np.linalg.norm(np.diff(places, axis=0), axis=1).max()
+    assert (distance <= apart.min(axis=2) + 1e-3).all()
+    if not banded:
+        assert (distance >= apart.min(axis=2) - step).all()
+    assert values.min() >= ENDS[0] and values.max() <= ENDS[1]
+
+
+@pytest.mark.parametrize("name", ["hsv", "twilight", "flag", "prism"])
+def test_a_map_that_returns_to_a_colour_is_refused(name):
+    with pytest.raises(SourceError, match=f"{name}: colours: .* have the same colour"):
+        ColourScale.named(name, ENDS)
+
+
+def test_an_unknown_map_is_refused():
+    with pytest.raises(SourceError, match="jett: unknown colour map"):
+        ColourScale.named("jett", ENDS)
+
+
+def test_bands_have_the_end_colours_of_the_map():
+    scale = ColourScale.named("rainbow", ENDS, 10)
+    assert scale.colours[0] == pytest.approx([0, 0, 1], abs=1e-9)
+    assert scale.colours[-1] == pytest.approx([1, 0, 0], abs=1e-9)
+    assert scale.values[0] == pytest.approx(ENDS[0] + (ENDS[1] - ENDS[0]) / 20)
+
+
+def test_a_scale_may_descend():
+    up, down = ColourScale.named("jet", ENDS), ColourScale.named("jet_r", ENDS[::-1])
+    assert down.values == pytest.approx(up.values)
+    assert down.colours == pytest.approx(up.colours)
+
+
+@pytest.mark.parametrize("name", ["jet", "turbo", "viridis", "rainbow"])
+@pytest.mark.parametrize("amount", [0, 3, 8])
+def test_noise_of_the_colours_is_predicted(name, amount):
+    random = np.random.default_rng(2)
+    truth = random.uniform(*ENDS, (300, 300))
+    scale = ColourScale.named(name, ENDS)
+    clean = drawn(truth, NamedMap(name)).astype(int)
+    noise = random.integers(-amount, amount + 1, clean.shape)
+    values, distance = scale.invert(np.clip(clean + noise, 0, 255).astype(np.uint8))
+    error = np.sqrt(((values - truth) ** 2).mean())
+    # Colours of 0 or 255 cannot go both ways, which hides some of the noise.
+    assert 0.7 < error / colour_uncertainty(scale, values, distance).total < 1.6
+
+
+# Legends
+
+
+def with_legend(picture, colours=RAINBOW, box=(100, 10, 108, 80), outline=True):
+    """A bar with the high end on top, ticks beside it, on white."""
+    left, top, right, bottom = box
+    picture = picture.copy()
+    picture[:, left - 12 :] = 255
+    share = 1 - (np.arange(bottom - top) + 0.5) / (bottom - top)
+    bar = drawn(ENDS[0] + share * (ENDS[1] - ENDS[0]), colours)
+    if outline:
+        picture[top - 1 : bottom + 1, left - 1 : right + 1] = 0
+    picture[top:bottom, left:right] = bar[:, None]
+    for row in range(top, bottom, 10):
+        picture[row, right + 1 : right + 4] = 0
+    return picture
+
+
+@pytest.mark.parametrize("outline", [True, False])
+@pytest.mark.parametrize("colours", [RAINBOW, NamedMap("jet"), NamedMap("rainbow", 10)])
+def test_an_upright_legend_is_found(colours, outline):
+    picture = with_legend(drawn(known_field(0, SHAPE), colours), colours, outline=outline)
+    assert find_legend(picture) == (100, 10, 108, 80)
+
+
+def test_a_lying_legend_is_found():
+    picture = with_legend(drawn(known_field(0, SHAPE), RAINBOW))
+    turned = np.ascontiguousarray(picture[:, ::-1].transpose(1, 0, 2))
+    assert find_legend(turned) == (10, 12, 80, 20)
+
+
+def test_a_picture_without_a_legend_has_none():
+    assert find_legend(drawn(known_field(0, (200, 240)), RAINBOW)) is None
+    assert find_legend(np.full((50, 50, 3), 255, np.uint8)) is None
+
+
+def test_bands_of_a_legend_are_seen():
+    picture = with_legend(drawn(known_field(0, SHAPE), RAINBOW), NamedMap("rainbow", 10))
+    scale = ColourScale.from_legend(legend_pixels(picture, (100, 10, 108, 80)), ENDS)
+    assert scale.banded
+    assert scale.values == pytest.approx(ColourScale.named("rainbow", ENDS, 10).values)
+
+
+@pytest.mark.parametrize("box", [None, (200, 20, 216, 160)])
+@pytest.mark.parametrize("codec", [RAW, CODECS[2], H264], ids=lambda codec: codec.name)
+def test_values_by_the_legend(tmp_path, codec, box):
+    shape = (180, 240)
+    path = a_movie(
+        tmp_path / f"a{codec.suffix}", codec=codec, shape=shape, count=1,
+        change=lambda picture: with_legend(picture, box=(200, 20, 216, 160)),
+    )  # fmt: skip
+    source = a_source(path, Legend(box))
+    frame = first_frame(source)
+    truth = known_field(0, shape)
+    shown = np.isfinite(truth) & (frame.material == Material.WORKPIECE)
+    shown[:, 186:] = False
+    error = frame.fields["temperature"][shown] - truth[shown]
+    assert (frame.material[:, 192:] == Material.VOID).all()
+    assert np.isfinite(truth[:, :186]).sum() - shown.sum() < 200
+    # A codec blurs the ends of the bar by a pixel, which is 8 K.
+    pixel = (ENDS[1] - ENDS[0]) / 140
+    assert np.sqrt((error**2).mean()) < pixel + source.uncertainty()["temperature"].total
+
+
+def test_no_legend_and_a_wrong_box_are_told(tmp_path):
+    path = a_movie(tmp_path / "a.avi")
+    with pytest.raises(SourceError, match=r"a\.avi: no legend was found"):
+        a_source(path, Legend()).survey()
+    with pytest.raises(SourceError, match=r"a\.avi: legend: box .* does not lie in the picture"):
+        a_source(path, Legend((100, 10, 208, 80))).survey()
+
+
+# Round trips
+
+
+@pytest.mark.parametrize("colours", [NamedMap("jet"), RAINBOW, NamedMap("rainbow", 12)])
+@pytest.mark.parametrize("codec", CODECS, ids=lambda codec: codec.name)
+def test_the_error_agrees_with_the_predicted_uncertainty(tmp_path, codec, colours):
+    found = measure(tmp_path, codec, colours, 1, (200, 240))
+    # The factor of the documentation: what a codec smooths along the scale is not seen across it.
+    assert 0.5 < found["rms"] / found["predicted"] < 2
+    assert found["border"] < 0.01
+
+
+def test_lossless_values_are_those_of_the_scale(tmp_path):
+    source = a_source(a_movie(tmp_path / "a.avi"))
+    truth = known_field(0, SHAPE)
+    frame = first_frame(source)
+    seen = np.isfinite(truth) & (frame.quality != FILLED)
+    # Half a level, and the rounding of colours to 8 bits.
+    assert np.abs(frame.fields["temperature"] - truth)[seen].max() < LEVEL
+    assert np.isnan(frame.fields["temperature"][frame.material == Material.VOID]).all()
+    assert (frame.quality[seen] == 0).all()
+
+
+def test_frames_times_and_places(tmp_path):
+    source = a_source(a_movie(tmp_path / "a.avi", count=5), frame_interval=0.2e-6, every=2)
+    found = source.survey()
+    assert found.times == pytest.approx([0, 0.4e-6, 0.8e-6])
+    assert found.extent == pytest.approx((0, SHAPE[1] * PIXEL, 0, SHAPE[0] * PIXEL))
+    assert found.found == {"temperature": "a.avi"}
+    frames = list(source.frames(own_raster(source)))
+    assert [frame.time for frame in frames] == pytest.approx(found.times)
+    truth = known_field(4, SHAPE)
+    assert np.nanmax(np.abs(frames[2].fields["temperature"] - truth)) < 5 * LEVEL
+
+
+def test_the_playing_time_is_told(tmp_path):
+    found = a_source(a_movie(tmp_path / "a.avi")).survey()
+    assert found.times == pytest.approx([0, 0.05, 0.1])
+    assert any("playing the movie, 0.05 s" in text for text in found.assumed)
+    assert any("standard uncertainty of 1.25 K" in text for text in found.assumed)
+
+
+@pytest.mark.parametrize(
+    "codec",
+    [
+        RAW,
+        CODECS[1],
+        H264,
+        Codec("GIF", ".gif", "gif", "rgb8"),
+        Codec("MPEG-4 with B pictures", ".avi", "mpeg4", "yuv420p", (("bf", "2"), ("g", "5"))),
+    ],
+    ids=lambda codec: codec.name,
+)
+def test_a_start_in_the_middle_gives_the_same_pictures(tmp_path, codec):
+    path = a_movie(tmp_path / f"a{codec.suffix}", count=14, codec=codec)
+    index = index_movie(path)
+    whole = list(pictures(path, index))
+    assert index.count == len(whole) == 14
+    for start in (1, 7, 13):
+        rest = list(pictures(path, index, start))
+        assert len(rest) == 14 - start
+        assert all((one == other).all() for one, other in zip(rest, whole[start:], strict=True))
+
+
+def test_a_source_can_be_handed_to_another_process(tmp_path):
+    source = a_source(a_movie(tmp_path / "a.avi"))
+    again = pickle.loads(pickle.dumps(source))
+    assert again == source
+    assert again.survey().extent == source.survey().extent
+
+
+def test_crop_and_turn(tmp_path):
+    path = a_movie(tmp_path / "a.avi")
+    plain = a_source(path, crop=(20, 30, 60, 80), origin=(20.0, 80.0))
+    turned = a_source(
+        path, crop=(20, 30, 60, 80), origin=(20.0, 80.0), placement=Placement("-y", "x")
+    )
+    assert plain.survey().extent == pytest.approx((0, 40 * PIXEL, 0, 50 * PIXEL))
+    assert turned.survey().extent == pytest.approx((-50 * PIXEL, 0, 0, 40 * PIXEL))
+    one, other = first_frame(plain), first_frame(turned)
+    truth = known_field(0, SHAPE)[30:80, 20:60]
+    assert np.nanmax(np.abs(one.fields["temperature"] - truth)) < 5 * LEVEL
+    # What was up lies to the left, what was to the right is up.
+    expected = one.fields["temperature"].T[::-1]
+    np.testing.assert_array_equal(other.fields["temperature"], expected)
+
+
+def test_means_are_of_values_not_of_colours():
+    pixels = Raster(0.0, 4.0, 1.0, 4, 4)
+    values = np.arange(16, dtype=np.float32).reshape(4, 4)
+    valid = np.ones((4, 4), bool)
+    coarse = PictureSampling(pixels, Raster(0.0, 4.0, 2.0, 2, 2)).mean(values, valid)
+    np.testing.assert_allclose(coarse, [[2.5, 4.5], [10.5, 12.5]])
+    valid[0, 0] = False
+    coarse = PictureSampling(pixels, Raster(0.0, 4.0, 2.0, 2, 2)).mean(values, valid)
+    assert coarse[0, 0] == pytest.approx((1 + 4 + 5) / 3)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.floats(0.15, 0.99), st.floats(-0.4, 3.0), st.floats(-3.0, 0.4), st.floats(-5, 5),
+    st.floats(-5, 5),
+)  # fmt: skip
+def test_finer_samples_of_a_plane_lie_on_it(spacing, left, down, slope_x, slope_y):
+    pixels = Raster(0.0, 0.0, 1.0, 12, 12)
+    values = slope_x * pixels.x[None] + slope_y * pixels.y[:, None] + np.zeros((12, 12))
+    raster = Raster(2 + left, -4 + down, spacing, 6, 6)
+    found = PictureSampling(pixels, raster).mean(values.astype(np.float32), np.ones((12, 12), bool))
+    expected = slope_x * raster.x[None] + slope_y * raster.y[:, None]
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+def test_beyond_the_picture_there_is_void(tmp_path):
+    source = a_source(a_movie(tmp_path / "a.avi"))
+    frame = next(source.frames(Raster(-50 * PIXEL, 20 * PIXEL, PIXEL / 2, 40, 200)))
+    assert (frame.material[:, :100] == Material.VOID).all()
+    assert (frame.material[:, 100:] == Material.WORKPIECE).all()
+    assert np.isfinite(frame.fields["temperature"][:, 100:]).all()
+
+
+def test_movies_are_read_in_step(tmp_path):
+    one = a_movie(tmp_path / "a.avi")
+    other = a_movie(tmp_path / "b.mkv", codec=CODECS[1], colours=NamedMap("viridis"))
+    movies = {
+        "temperature": FieldMovie(one, ENDS, RAINBOW),
+        "plastic_strain": FieldMovie(other, (0.0, 5.0), NamedMap("viridis")),
+    }
+    source = MovieSource(movies, PIXEL, (0.0, 90.0))
+    frame = list(source.frames(own_raster(source), start=1))[1]
+    truth = known_field(2, SHAPE)
+    strain = 5 * (truth - ENDS[0]) / (ENDS[1] - ENDS[0])
+    assert np.nanmax(np.abs(frame.fields["plastic_strain"] - strain)) < 0.1
+    short = a_movie(tmp_path / "c.avi", count=2)
+    with pytest.raises(SourceError, match=r"c\.avi: 2 pictures of 120 x 90, expected 3 of"):
+        MovieSource(
+            {**movies, "plastic_strain_rate": FieldMovie(short, (0.0, 1e5), RAINBOW)},
+            PIXEL, (0.0, 90.0),
+        ).survey()  # fmt: skip
+
+
+# What is drawn over the field
+
+
+def with_mesh(picture):
+    """Black lines over everything, and a white box with black text on it."""
+    picture = picture.copy()
+    picture[::12] = 0
+    picture[:, ::12] = 0
+    picture[70:80, 40:70] = 255
+    picture[73:77, 45:65:3] = 0
+    return picture
+
+
+@pytest.mark.parametrize(("codec", "limit"), [(RAW, 3), (CODECS[2], 4), (H264, 10)])
+def test_lines_and_text_are_filled_from_their_neighbours(tmp_path, codec, limit):
+    path = a_movie(tmp_path / f"a{codec.suffix}", codec=codec, change=with_mesh)
+    source = a_source(path, covered=((40, 70, 70, 80),), background=((255, 255, 255),))
+    frame = first_frame(source)
+    truth = known_field(0, SHAPE)
+    shown = np.isfinite(truth)
+    assert (frame.material == Material.WORKPIECE)[shown].mean() > 0.98
+    assert (frame.material == Material.VOID)[~shown].mean() > 0.95
+    assert (frame.quality[36:70:12, 12:100] == FILLED).all()
+    assert (frame.quality[70:80, 40:70] == FILLED).all()
+    here = shown & (frame.material == Material.WORKPIECE)
+    here[68:82, 38:72] = False
+    error = np.abs(frame.fields["temperature"][here] - truth[here])
+    # Colours of half the resolution carry the lines two pixels into the field. The steepest part of
+    # the field changes by 40 K a pixel, and a filled pixel is the second one.
+    assert np.median(error) < limit
+    assert np.percentile(error, 99) < 120
+
+
+def test_the_background_is_found_and_told(tmp_path):
+    picture = drawn(known_field(0, SHAPE), RAINBOW)
+    scale = ColourScale.named("rainbow", ENDS)
+    assert find_background(picture, scale) == (((255, 255, 255),), ())
+    assert find_background(picture, ColourScale.named("gray", ENDS)) == ((), ((255, 255, 255),))
+    found = a_source(a_movie(tmp_path / "a.avi")).survey()
+    assert "temperature: background colours at the border: (255, 255, 255)" in found.assumed
+
+
+def test_a_background_of_the_colour_of_a_value_is_refused(tmp_path):
+    path = a_movie(tmp_path / "a.avi", colours=NamedMap("gray"))
+    with pytest.raises(SourceError, match=r"a\.avi: background: .* is the colour of 139"):
+        a_source(path, NamedMap("gray"), background=((255, 255, 255),)).survey()
+
+
+def with_grey_tool(picture):
+    picture = picture.copy()
+    picture[50:80, 90:] = 128
+    return picture
+
+
+@pytest.mark.parametrize(
+    "how", [{"tool_polygon": ((90, 50), (120, 80))}, {"tool_colour": (128, 128, 128)}]
+)
+def test_a_grey_tool_has_no_values(tmp_path, how):
+    source = a_source(a_movie(tmp_path / "a.avi", change=with_grey_tool), **how)
+    frame = first_frame(source)
+    tool = np.zeros(SHAPE, bool)
+    tool[50:80, 90:] = True
+    np.testing.assert_array_equal(frame.material == Material.TOOL, tool)
+    assert np.isnan(frame.fields["temperature"][tool]).all()
+    beside = frame.fields["temperature"][40:, 85:89] - known_field(0, SHAPE)[40:, 85:89]
+    assert np.abs(beside).max() < 15
+
+
+def test_a_coloured_tool_keeps_its_values(tmp_path):
+    corners = ((90.0, 50.0), (120.0, 50.0), (120.0, 80.0), (90.0, 80.0))
+    source = a_source(a_movie(tmp_path / "a.avi"), tool_polygon=corners)
+    frame = first_frame(source)
+    tool = frame.material == Material.TOOL
+    assert np.count_nonzero(tool) == 30 * 30
+    error = frame.fields["temperature"][tool] - known_field(0, SHAPE)[tool]
+    assert np.abs(error).max() < LEVEL
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(0.01, 0.6))
+def test_the_nearest_known_pixel_is_found(seed, share):
+    known = np.random.default_rng(seed).random((23, 31)) < share
+    known[3, 4] = True
+    rows, columns = nearest(known)
+    assert known[rows, columns].all()
+    y, x = np.mgrid[:23, :31]
+    at = np.argwhere(known)
+    best = np.sqrt(((y[..., None] - at[:, 0]) ** 2 + (x[..., None] - at[:, 1]) ** 2).min(axis=2))
+    # The known bound of vectors handed from pixel to pixel.
+    assert (np.hypot(rows - y, columns - x) <= best + 0.5).all()
+
+
+# What is refused
+
+
+def test_metre_per_pixel():
+    assert metre_per_pixel((10, 20), (40, 60), 1e-4) == pytest.approx(2e-6)
+    with pytest.raises(ValueError, match="two different points"):
+        metre_per_pixel((1, 1), (1, 1), 1e-4)
+    with pytest.raises(ValueError, match="length -1"):
+        metre_per_pixel((1, 1), (2, 1), -1)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"metre_per_pixel": 0.0}, "metre_per_pixel: 0.0, expected"),
+        ({"frame_interval": -1.0}, "frame_interval: -1.0, expected"),
+        ({"every": 0}, "every: 0, expected 1 or more"),
+        ({"tool_polygon": ((1, 2),)}, "tool_polygon: 1 corner"),
+        ({"placement": Placement("x", "z")}, "placement: .* expected x and y"),
+        ({"origin": (float("nan"), 0)}, "origin: .* expected finite"),
+    ],
+)
+def test_wrong_values_are_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        a_source(Path("a.avi"), **change)
+
+
+def test_a_crop_outside_is_refused(tmp_path):
+    with pytest.raises(SourceError, match=r"crop: .* does not lie in pictures of 120 x 90"):
+        a_source(a_movie(tmp_path / "a.avi"), crop=(0, 0, 121, 90)).survey()
+
+
+def fails(path):
+    """The message with which a movie is refused: one line, with the file's name."""
+    source = a_source(path)
+    with pytest.raises(SourceError) as caught:
+        list(source.frames(Raster(0.0, 1e-4, PIXEL, 10, 10)))
+    message = str(caught.value)
+    assert path.name in message and "\n" not in message
+    return message
+
+
+@pytest.mark.parametrize(
+    "codec",
+    [RAW, CODECS[1], CODECS[2], H264, Codec("GIF", ".gif", "gif", "rgb8")],
+    ids=lambda codec: codec.name,
+)
+@pytest.mark.parametrize("share", [0.02, 0.5, 0.9])
+def test_a_truncated_movie_is_refused(tmp_path, codec, share):
+    path = a_movie(tmp_path / f"a{codec.suffix}", count=8, codec=codec)
+    data = path.read_bytes()
+    path.write_bytes(data[: int(share * len(data))])
+    fails(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"time,temperature\n0,293\n" * 50, bytes(5000)])
+def test_what_is_no_movie_is_refused(tmp_path, content):
+    path = tmp_path / "a.avi"
+    path.write_bytes(content)
+    fails(path)
+
+
+def test_a_movie_of_another_name_is_read(tmp_path):
+    path = a_movie(tmp_path / "a.mp4", codec=H264).rename(tmp_path / "a.avi")
+    assert "h264" in a_source(path).survey().kind
+
+
+def test_a_list_of_files_is_not_followed(tmp_path):
+    target = a_movie(tmp_path / "a.avi")
+    path = tmp_path / "list.avi"
+    path.write_text(f"ffconcat version 1.0\nfile {target.name}\n")
+    assert "cannot be read as a movie" in fails(path)
+
+
+def test_a_missing_movie_is_an_os_error(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        a_source(tmp_path / "none.avi").survey()
+
+
+@pytest.mark.parametrize("size", [(40_000, 40_000), (2**31 - 1, 2**31 - 1), (0, 5), (20_000, 9)])
+def test_a_header_that_claims_a_huge_size_is_refused(tmp_path, size):
+    path = a_movie(tmp_path / "a.avi")
+    data = bytearray(path.read_bytes())
+    # 40 bytes of BITMAPINFOHEADER begin with their number; rows that run down are negative.
+    place = data.find(struct.pack("<Iii", 40, SHAPE[1], -SHAPE[0]))
+    assert place > 0
+    data[place + 4 : place + 12] = struct.pack("<ii", size[0], -size[1])
+    path.write_bytes(data)
+    fails(path)
+
+
+def test_a_picture_without_a_colour_of_the_scale_is_refused(tmp_path):
+    path = tmp_path / "a.avi"
+    encode(path, iter([np.full((90, 120, 3), 90, np.uint8)]), RAW)
+    source = a_source(path, background=())
+    with pytest.raises(SourceError, match="picture 1 has no colour of the scale"):
+        list(source.frames(Raster(0.0, 1e-4, PIXEL, 10, 10)))
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(st.sampled_from([".avi", ".mp4", ".mkv", ".gif"]), st.integers(0, 2**32 - 1))
+@example(".avi", 0)
+def test_a_damaged_movie_is_read_or_refused(tmp_path, suffix, seed):
+    codecs = {".avi": CODECS[2], ".mp4": H264, ".mkv": CODECS[1]}
+    whole = tmp_path / f"whole{suffix}"
+    if not whole.exists():
+        codec = codecs.get(suffix, Codec("GIF", ".gif", "gif", "rgb8"))
+        a_movie(whole, codec=codec, shape=(24, 32))
+    data = np.frombuffer(whole.read_bytes(), np.uint8).copy()
+    random = np.random.default_rng(seed)
+    places = random.integers(0, len(data), random.integers(1, 20))
+    data[places] = random.integers(0, 256, len(places))
+    path = tmp_path / f"damaged{seed}{suffix}"
+    data.tofile(path)
+    try:
+        for frame in a_source(path).frames(Raster(0.0, 1e-4, PIXEL, 10, 10)):
+            assert frame.material.shape == (10, 10)
+    except SourceError as error:
+        assert "\n" not in str(error)
+
+
+def test_the_maps_of_matplotlib_are_told_from_ours():
+    ours = ColourScale.named("rainbow", ENDS).colours
+    theirs = ColourScale.named("matplotlib.rainbow", ENDS).colours
+    assert theirs == pytest.approx(colormaps["rainbow"](np.arange(256))[:, :3])
+    assert np.abs(ours - theirs).max() > 0.4
+    assert all(one < other for one, other in pairwise(ColourScale.named("jet", ENDS).knots))
