@@ -1,0 +1,117 @@
+"""Whole files to damage: of every format that is read, small, some made by other programs."""
+
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+import scipy.io
+import xarray as xr
+
+from chipglow.io.sources import Source
+from chipglow.io.sources.grid import GridSource
+from chipglow.io.sources.movie import FieldMovie, MovieSource, NamedMap
+
+FOREIGN = Path(__file__).parents[2] / "tests" / "data"
+ROWS, COLUMNS, FRAMES = 24, 32, 3
+
+
+@dataclass(frozen=True)
+class Seed:
+    """A whole file, and the source that reads it or a damaged copy of it."""
+
+    name: str
+    content: bytes
+    source: Callable[[Path], Source]
+
+    @property
+    def suffix(self) -> str:
+        """How the name ends."""
+        return Path(self.name).suffix
+
+    def written(self, folder: Path) -> Path:
+        """The file, written into a folder."""
+        path = folder / self.name
+        path.write_bytes(self.content)
+        return path
+
+
+def seeds(folder: Path) -> list[Seed]:
+    """All files; those that only a library can write are written into the folder first."""
+    found = [*_grids(folder), *_movies(folder)]
+    for seed in found:
+        (folder / seed.name).unlink(missing_ok=True)
+    return found
+
+
+def _temperature():
+    y, x = np.mgrid[:ROWS, :COLUMNS].astype(np.float32)
+    return np.stack([400.0 + 10.0 * x + 5.0 * y + 20.0 * t for t in range(FRAMES)]).astype("f4")
+
+
+def _grid(path: Path) -> GridSource:
+    return GridSource(str(path), spacing=(0.03, 0.03), top=1.0, interval=1e-6)
+
+
+def _grids(folder: Path) -> list[Seed]:
+    values = _temperature()
+    with h5py.File(folder / "grid.h5", "w") as file:
+        file.create_dataset("temperature", data=values, chunks=(1, ROWS, COLUMNS), compression=4)
+    scipy.io.savemat(folder / "five.mat", {"temperature": values})
+    np.save(folder / "grid.npy", values)
+    np.savez_compressed(folder / "grid.npz", temperature=values)
+    data = xr.Dataset(
+        {"temperature": (("time", "y", "x"), values, {"units": "K"})},
+        coords={
+            "time": ("time", 1e-6 * np.arange(FRAMES), {"units": "s"}),
+            "y": ("y", 1.0 - 0.03 * np.arange(ROWS), {"units": "m"}),
+            "x": ("x", 0.03 * np.arange(COLUMNS), {"units": "m"}),
+        },
+    )
+    data.to_netcdf(folder / "four.nc", engine="h5netcdf")
+    data.to_netcdf(folder / "three.nc", engine="scipy", format="NETCDF3_64BIT")
+    np.savetxt(folder / "grid.csv", values[0], delimiter=",", fmt="%.2f")
+    written = ["grid.h5", "five.mat", "grid.npy", "grid.npz", "four.nc", "three.nc", "grid.csv"]
+    return [
+        *(Seed(name, (folder / name).read_bytes(), _grid) for name in written),
+        Seed("grid.tif", _tiff(values), _grid),
+    ]
+
+
+def _tiff(values) -> bytes:
+    import tifffile
+
+    file = io.BytesIO()
+    tifffile.imwrite(file, values, compression="zlib", photometric="minisblack")
+    return file.getvalue()
+
+
+def _movie(path: Path) -> MovieSource:
+    movie = FieldMovie(path, (293.15, 1400.0), NamedMap("jet"))
+    return MovieSource({"temperature": movie}, 1.0 / 64, (0.0, 64.0), frame_interval=1e-6)
+
+
+def _movies(folder: Path) -> list[Seed]:
+    kinds = (("mjpeg", "yuvj420p", "mjpeg.avi"), ("h264", "yuv420p", "h264.mp4"),
+             ("ffv1", "bgr0", "ffv1.mkv"), ("rawvideo", "rgb24", "raw.avi"),
+             ("gif", "rgb8", "movie.gif"))  # fmt: skip
+    return [_movie_seed(folder, *kind) for kind in kinds]
+
+
+def _movie_seed(folder: Path, codec: str, pixels: str, name: str) -> Seed:
+    import av
+    from matplotlib import colormaps
+
+    share = np.linspace(0.0, 1.0, 64)[None, :] * np.ones((64, 1))
+    picture = (colormaps["jet"](share)[..., :3] * 255).round().astype(np.uint8)
+    with av.open(str(folder / name), "w") as container:
+        stream = container.add_stream(codec, rate=10)
+        stream.width = stream.height = 64
+        stream.pix_fmt = pixels
+        for index in range(FRAMES):
+            frame = av.VideoFrame.from_ndarray(np.roll(picture, 4 * index, axis=0), format="rgb24")
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    return Seed(name, (folder / name).read_bytes(), _movie)
