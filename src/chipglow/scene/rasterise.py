@@ -85,9 +85,7 @@ def rasterise(
     of_nodes = _values("node_values", node_values, len(points))
     of_elements = _values("element_values", element_values, len(triangles))
     heights = _values("height", height, len(points))[:, 0] if height is not None else np.empty(0)
-    fields = np.full(
-        (of_nodes.shape[1] + of_elements.shape[1], *raster.shape), np.nan, np.float32
-    )
+    fields = np.full((of_nodes.shape[1] + of_elements.shape[1], *raster.shape), np.nan, np.float32)
     element = np.full(raster.shape, NOTHING, np.int32)
     highest = np.full(raster.shape if len(heights) else (0, 0), -np.inf)
     corner = np.array((raster.left, raster.top))

@@ -1,6 +1,7 @@
 """Arrays in files of many formats behind one face: they are described first and read in parts."""
 
 import logging
+import mmap
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -194,7 +195,16 @@ def _read_whole(path: Path, name: str, shape: tuple[int, ...]) -> NDArray[Any]:
 
 def _npy(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
     values = np.lib.format.open_memmap(path, mode="r")
-    yield from _numpy_arrays("", values.dtype, values.shape, lambda key: np.asarray(values[key]))
+    yield from _numpy_arrays("", values.dtype, values.shape, partial(_copy_of_mapped, values))
+
+
+def _copy_of_mapped(values: NDArray[Any], key: Key) -> NDArray[Any]:
+    """A part of a file that is mapped into memory, of which no page is kept there."""
+    part = np.array(values[key])
+    if isinstance(values, np.memmap) and hasattr(mmap, "MADV_DONTNEED"):
+        mapping: Any = values._mmap  # type: ignore[attr-defined]
+        mapping.madvise(mmap.MADV_DONTNEED)
+    return part
 
 
 def _npz(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
@@ -457,7 +467,7 @@ def _tiff_reader(path: Path, series: Any) -> Callable[[Key], NDArray[Any]]:
                 f"{path}: is cut short, it should have {end} bytes and has {path.stat().st_size}"
             )
         values = np.memmap(path, dtype, "r", series.dataoffset, tuple(series.shape))
-        return lambda key: np.asarray(values[key])
+        return partial(_copy_of_mapped, values)
     for page in series.pages:
         _check_page(path, page)
     return partial(_tiff_pages, path, series)
