@@ -9,6 +9,7 @@ from chipglow.cutting.damage import Damage
 from chipglow.cutting.energy import held_energy
 from chipglow.cutting.heat import conduct, even_out, return_heat
 from chipglow.cutting.library import AISI_1045
+from chipglow.cutting.material import ROOM_TEMPERATURE
 from chipglow.cutting.momentum import NODE_VALUES, SUMS, VELOCITY_VALUES, Step, advance_with
 from chipglow.cutting.plastic_heat import heat_shares
 from chipglow.cutting.points import POINT, Grid, block_of_points, sort_by_cell
@@ -17,7 +18,12 @@ from chipglow.scene import ToolGeometry
 FAR = 1.0
 UNBROKEN = replace(AISI_1045, damage=None)
 """AISI 1045 that does not fail."""
-ELASTIC = replace(AISI_1045, flow_stress=replace(AISI_1045.flow_stress, yield_stress=1e15))
+ELASTIC = replace(
+    AISI_1045,
+    young_modulus=205e9,
+    poisson_ratio=0.29,
+    flow_stress=replace(AISI_1045.flow_stress, yield_stress=1e15),
+)
 
 
 class Block:
@@ -34,9 +40,7 @@ class Block:
         centres = [self.spacing * (np.arange(count) + 0.5) for count in (columns, rows)]
         self.points = block_of_points(*centres, self.spacing, 293.0, 0.0)
         self.count = self.points.size
-        self.sound = np.sqrt(
-            (material.bulk_modulus + 4 / 3 * material.shear_modulus) / material.density
-        )
+        self.sound = material.sound_speed()
         mass = material.density * self.spacing**2
         self.step = Step(
             mass=mass,
@@ -44,8 +48,8 @@ class Block:
             volume=self.spacing**2,
             time_step=courant * cell / self.sound,
             kept=1.0,
-            shear_modulus=material.shear_modulus,
-            bulk_modulus=material.bulk_modulus,
+            shear_modulus=float(material.shear_modulus_at(ROOM_TEMPERATURE)),
+            bulk_modulus=float(material.bulk_modulus_at(ROOM_TEMPERATURE)),
             stiffness=50e9,
             damping=0.0,
             reach=self.spacing / 2,
@@ -59,6 +63,7 @@ class Block:
         )._replace(**changes)
         self.law = material.flow_stress.numbers()
         self.damage = Damage.of(material.damage, cell)
+        self.elastic = material.elastic_ratios()
         self.capacity = material.heat_capacity.sampled()
         self.heat_shares = heat_shares(material.taylor_quinney)
         self.conductivity = material.conductivity.sampled()
@@ -91,9 +96,8 @@ class Block:
             now = min(steps, cycle)
             assert advance_with(self.law)(
                 now, self.points, self.starts, self.velocity, self.nodes, self.heat, self.tool,
-                self.grid, self.step, self.law, self.damage, self.capacity, self.heat_shares,
-                self.sums,
-                get_num_threads(),
+                self.grid, self.step, self.law, self.damage, self.elastic, self.capacity,
+                self.heat_shares, self.sums, get_num_threads(),
             )  # fmt: skip
             self.force /= now
             steps -= now
@@ -115,13 +119,15 @@ class Block:
             )  # fmt: skip
             return_heat(self.points, self.count, increment, self.grid)
 
+    def deviator(self):
+        """Deviator of the points' Cauchy stress, xx, yy and xy, in Pa, shape (3, n)."""
+        kelvins = np.clip(self.points["temperature"] - 200.0, 0, len(self.elastic) - 1)
+        soft = self.elastic[kelvins.astype(int), 0]
+        return soft * np.array([self.points[name] for name in ("dxx", "dyy", "dxy")])
+
     def energy(self):
         """Kinetic and elastic energy in J/m."""
-        step = self.step
-        return held_energy(
-            self.points, self.count, step.mass, step.volume, step.shear_modulus,
-            step.bulk_modulus, self.cell,
-        )  # fmt: skip
+        return held_energy(self.points, self.count, self.step, self.elastic, self.cell)
 
     def momentum(self):
         """Momentum of the points, x and y, and their angular momentum (with the affine part)."""

@@ -123,10 +123,8 @@ def middle(block, component):
 
 def exact_speed(kind):
     """Speed of pressure (0) and shear (1) waves in m/s."""
-    modulus = (
-        ELASTIC.shear_modulus if kind else ELASTIC.bulk_modulus + ELASTIC.shear_modulus * 4 / 3
-    )
-    return sqrt(modulus / ELASTIC.density)
+    shear, bulk = ELASTIC.shear_modulus_at(293.0), ELASTIC.bulk_modulus_at(293.0)
+    return sqrt((shear if kind else bulk + shear * 4 / 3) / ELASTIC.density)
 
 
 def waves(cells=(20e-6, 14e-6, 10e-6, 7e-6)):

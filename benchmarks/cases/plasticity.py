@@ -49,7 +49,8 @@ def integrated_shear():
     plastic = np.linspace(0.0, SHEAR / sqrt(3), 2001)
     temperature = solve_ivp(heating, plastic[[0, -1]], [293.0], t_eval=plastic, rtol=1e-9).y[0]
     stress = johnson_cook(law, plastic, rate, temperature)
-    return plastic + stress / (3 * UNBROKEN.shear_modulus), plastic, temperature, stress / sqrt(3)
+    elastic = stress / (3 * UNBROKEN.shear_modulus_at(temperature))
+    return plastic + elastic, plastic, temperature, stress / sqrt(3)
 
 
 def sheared_block(step_strain, samples=50):
@@ -64,7 +65,8 @@ def sheared_block(step_strain, samples=50):
         p = block.points
         middle = np.abs(p["material_y"] - 30e-6) < 10e-6
         middle &= np.abs(p["material_x"] - 30e-6) < 10e-6
-        rows.append([p[name][middle].mean() for name in ("strain", "temperature", "dxy")])
+        fields = (p["strain"], p["temperature"], block.deviator()[2])
+        rows.append([each[middle].mean() for each in fields])
     return np.linspace(SHEAR / samples, SHEAR, samples), *np.array(rows).T
 
 

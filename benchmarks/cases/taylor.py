@@ -94,8 +94,8 @@ def peer(columns, rows, speed, axisymmetric):
     """The bar by finite elements: as published if axisymmetric, free to leave the wall if not."""
     law = STEEL.flow_stress
     steel = Steel(
-        STEEL.shear_modulus,
-        STEEL.bulk_modulus,
+        float(STEEL.shear_modulus_at(300.0)),
+        float(STEEL.bulk_modulus_at(300.0)),
         STEEL.density,
         float(STEEL.heat_capacity.at(300.0)),
         STEEL.taylor_quinney,

@@ -7,6 +7,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from chipglow.cutting.stress import kelvin_index
+
 
 @dataclass(frozen=True)
 class EnergyHistory:
@@ -54,17 +56,20 @@ ENERGIES: Final = len(fields(EnergyHistory))
 
 
 @njit(cache=True)
-def held_energy(points, count, mass, volume, shear_modulus, bulk_modulus, cell):  # type: ignore[no-untyped-def]
-    """Kinetic and elastic energy of the points in J/m; the affine velocity's part included."""
-    kinetic = elastic = 0.0
+def held_energy(points, count, step, elastic, cell):  # type: ignore[no-untyped-def]
+    """Kinetic and elastic energy of the points in J/m; the affine velocity's part included.
+
+    `elastic` is `WorkpieceMaterial.elastic_ratios`: elastic strain holds the less energy the warmer
+    a point is.
+    """
+    kinetic = strained = 0.0
     for k in range(count):
         p = points[k]
         spread = p.cxx * p.cxx + p.cxy * p.cxy + p.cyx * p.cyx + p.cyy * p.cyy
-        kinetic += (
-            0.5 * mass * (p.own_vx * p.own_vx + p.own_vy * p.own_vy + 0.25 * cell * cell * spread)
-        )
-        dilation = p.volume / volume - 1.0
+        kinetic += p.own_vx * p.own_vx + p.own_vy * p.own_vy + 0.25 * cell * cell * spread
+        warm = kelvin_index(p.temperature, elastic.shape[0])
+        dilation = p.volume / step.volume - 1.0
         square = p.dxx * p.dxx + p.dyy * p.dyy + p.dxx * p.dyy + p.dxy * p.dxy
-        elastic += 0.5 * square / shear_modulus * p.volume
-        elastic += 0.5 * bulk_modulus * dilation * dilation * volume
-    return kinetic, elastic
+        strained += 0.5 * elastic[warm, 0] * square / step.shear_modulus * p.volume
+        strained += 0.5 * elastic[warm, 1] * step.bulk_modulus * dilation * dilation * step.volume
+    return 0.5 * step.mass * kinetic, strained

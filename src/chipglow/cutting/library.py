@@ -114,8 +114,6 @@ _DAMAGE: Final = {
 _SCALARS: Final = {
     "workpiece": {
         "density": _DENSITY,
-        "young_modulus": _STRESS,
-        "poisson_ratio": _NUMBER,
     },
     "tool": {
         "density": _DENSITY,
@@ -124,7 +122,9 @@ _SCALARS: Final = {
     },
 }
 _TABLES: Final = {"conductivity": _CONDUCTIVITY, "heat_capacity": _HEAT_CAPACITY}
+_ELASTIC: Final = {"young_modulus": _STRESS, "poisson_ratio": _NUMBER}
 _HEADER: Final = ("kind", "name", "description")
+_WORKPIECE_PARTS: Final = (*_ELASTIC, "taylor_quinney", *_TABLES, "flow_stress", "damage")
 _VALUE: Final = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?:\s+(\S.*))?")
 _OWN_FILE: Final = re.compile(r"(.+\.ya?ml)(?:/([^/]+))?")
 
@@ -249,6 +249,10 @@ def _is_tool(name: str) -> bool:
     return _of_library(name).tool is not None
 
 
+def _has_rows(data: object) -> bool:
+    return isinstance(data, Mapping) and isinstance(data.get("value"), list)
+
+
 class _Loader(yaml.SafeLoader):
     """YAML in which no key is twice in a mapping."""
 
@@ -274,7 +278,7 @@ class _Reader:
         if kind not in ("workpiece", "tool"):
             raise self._wrong("kind", kind, "workpiece or tool")
         scalars = _SCALARS[kind]
-        parts = () if kind == "tool" else ("taylor_quinney", *_TABLES, "flow_stress", "damage")
+        parts = () if kind == "tool" else _WORKPIECE_PARTS
         data = self._mapping("", data, (*_HEADER, *scalars, *parts))
         name, description = self._text("name", data), self._text("description", data)
         numbers = {
@@ -291,6 +295,10 @@ class _Reader:
     def _workpieces(
         self, name: str, data: Mapping[str, Any], numbers: Mapping[str, float]
     ) -> dict[str, WorkpieceMaterial]:
+        elastic = {
+            key: self._constant_or_table(key, data[key], quantity)
+            for key, quantity in _ELASTIC.items()
+        }
         share = self._share("taylor_quinney", data["taylor_quinney"])
         tables = {key: self._table(key, data[key], quantity) for key, quantity in _TABLES.items()}
         damage = self._damage(data["damage"])
@@ -307,6 +315,7 @@ class _Reader:
                 "damage": damage if fails else None,
                 "taylor_quinney": share,
                 **numbers,
+                **elastic,
                 **tables,
             }
             sets[str(chosen)] = self._build("workpiece", WorkpieceMaterial, values)
@@ -362,11 +371,18 @@ class _Reader:
 
     def _share(self, place: str, data: object) -> float | RateTable:
         """A constant share, or rows of [strain rate, share]."""
-        if not (isinstance(data, Mapping) and isinstance(data.get("value"), list)):
+        if not _has_rows(data):
             return self._sourced(place, data, _NUMBER)
         rates, values = self._rows(place, data, ("strain rate", _RATE), _NUMBER)
         table: RateTable = self._build(place, RateTable, {"rates": rates, "values": values})
         return table
+
+    def _constant_or_table(
+        self, place: str, data: object, quantity: _Quantity
+    ) -> float | TemperatureTable:
+        if _has_rows(data):
+            return self._table(place, data, quantity)
+        return self._sourced(place, data, quantity)
 
     def _table(self, place: str, data: object, quantity: _Quantity) -> TemperatureTable:
         temperatures, values = self._rows(place, data, ("temperature", _TEMPERATURE), quantity)

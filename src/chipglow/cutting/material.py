@@ -12,6 +12,7 @@ from chipglow.cutting.laws import check_positive
 
 TABLE_COLDEST: Final = 200.0
 TABLE_HOTTEST: Final = 3000.0
+ROOM_TEMPERATURE: Final = 293.15
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,14 @@ class TemperatureTable:
 
     def sampled(self) -> NDArray[np.float64]:
         """Values at every kelvin from 200 K to 3000 K, for kernels."""
-        return self.at(np.arange(TABLE_COLDEST, TABLE_HOTTEST + 1.0))
+        return self.at(_KELVINS)
+
+
+_KELVINS: Final = np.arange(TABLE_COLDEST, TABLE_HOTTEST + 1.0)
+
+
+def _values(quantity: float | TemperatureTable) -> tuple[float, ...]:
+    return quantity.values if isinstance(quantity, TemperatureTable) else (quantity,)
 
 
 @dataclass(frozen=True)
@@ -88,10 +96,10 @@ class WorkpieceMaterial:
         Name with the source of the numbers.
     density : float
         In kg/m³.
-    young_modulus : float
-        In Pa.
-    poisson_ratio : float
-        0 to 0.49.
+    young_modulus : float or TemperatureTable
+        In Pa: constant, or over the temperature.
+    poisson_ratio : float or TemperatureTable
+        0 to 0.49: constant, or over the temperature.
     flow_stress : FlowStress
         Law of the flow stress.
     damage : JohnsonCookDamage or None
@@ -104,8 +112,8 @@ class WorkpieceMaterial:
 
     name: str
     density: float
-    young_modulus: float
-    poisson_ratio: float
+    young_modulus: float | TemperatureTable
+    poisson_ratio: float | TemperatureTable
     flow_stress: FlowStress
     damage: JohnsonCookDamage | None
     conductivity: TemperatureTable
@@ -114,22 +122,52 @@ class WorkpieceMaterial:
 
     def __post_init__(self) -> None:
         check_positive("workpiece density", self.density)
-        check_positive("workpiece young_modulus", self.young_modulus)
-        if not 0 <= self.poisson_ratio <= 0.49:
-            raise ValueError(f"poisson_ratio: expected 0 to 0.49, got {self.poisson_ratio!r}")
+        for value in _values(self.young_modulus):
+            check_positive("workpiece young_modulus", value)
+        for value in _values(self.poisson_ratio):
+            if not 0 <= value <= 0.49:
+                raise ValueError(f"poisson_ratio: expected 0 to 0.49, got {value!r}")
         share = self.taylor_quinney
         if not isinstance(share, RateTable) and not 0 <= share <= 1:
             raise ValueError(f"taylor_quinney: expected 0 to 1, got {share!r}")
 
-    @property
-    def shear_modulus(self) -> float:
-        """In Pa."""
-        return self.young_modulus / (2 * (1 + self.poisson_ratio))
+    def shear_modulus_at(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Shear moduli in Pa at temperatures in K, of the same shape."""
+        young, poisson = self._elastic_at(temperature)
+        return np.asarray(young / (2 * (1 + poisson)))
 
-    @property
-    def bulk_modulus(self) -> float:
-        """In Pa."""
-        return self.young_modulus / (3 * (1 - 2 * self.poisson_ratio))
+    def bulk_modulus_at(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Bulk moduli in Pa at temperatures in K, of the same shape."""
+        young, poisson = self._elastic_at(temperature)
+        return np.asarray(young / (3 * (1 - 2 * poisson)))
+
+    def elastic_ratios(self) -> NDArray[np.float64]:
+        """Moduli over those at room temperature, for kernels.
+
+        Returns
+        -------
+        ndarray
+            Shear and bulk modulus as shares of their values at `ROOM_TEMPERATURE`, at every kelvin
+            as `TemperatureTable.sampled` has it, shape (n, 2); one row if both are constant.
+        """
+        tables = (self.young_modulus, self.poisson_ratio)
+        vary = any(isinstance(each, TemperatureTable) for each in tables)
+        kelvins = _KELVINS if vary else _KELVINS[:1]
+        moduli = (self.shear_modulus_at, self.bulk_modulus_at)
+        return np.stack([each(kelvins) / each(ROOM_TEMPERATURE) for each in moduli], axis=-1)
+
+    def sound_speed(self) -> float:
+        """Speed of longitudinal waves in m/s where the material is stiffest."""
+        stiffness = self.bulk_modulus_at(_KELVINS) + 4 / 3 * self.shear_modulus_at(_KELVINS)
+        return float(np.sqrt(stiffness.max() / self.density))
+
+    def _elastic_at(self, temperature: ArrayLike) -> tuple[NDArray[np.float64], ...]:
+        return tuple(
+            each.at(temperature)
+            if isinstance(each, TemperatureTable)
+            else np.full(np.shape(temperature), each)
+            for each in (self.young_modulus, self.poisson_ratio)
+        )
 
     @property
     def melting_temperature(self) -> float:

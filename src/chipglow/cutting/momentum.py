@@ -17,7 +17,16 @@ from chipglow.cutting.damage import weakening
 from chipglow.cutting.flow_stress import comes_with_chipglow, flow_stress
 from chipglow.cutting.friction import friction_coefficient
 from chipglow.cutting.lanes import FAST, INLINE
-from chipglow.cutting.stress import BUFFER, LANES, STRESS, WORK, update_stresses
+from chipglow.cutting.stress import (
+    BUFFER,
+    LANES,
+    SOFT,
+    STRESS,
+    TENSION,
+    WORK,
+    kelvin_index,
+    update_stresses,
+)
 from chipglow.scene.surface import surface_bound, surface_distance
 
 BLOCK_COLUMNS = 6
@@ -50,9 +59,9 @@ class Step(NamedTuple):
     """Numbers of a step.
 
     Point mass (kg/m, scaled), heat mass (kg/m, true), volume free of stress (m²), time step (s),
-    share of a point's own velocity that it keeps (AFLIP 1, APIC 0), elastic constants (Pa);
-    contact: stiffness (Pa), damping (N s/m²), distance at which a point touches (m), area of a
-    point (m²/m), friction; boundary: nodes under `floor`, and those left of `inflow` and under
+    share of a point's own velocity that it keeps (AFLIP 1, APIC 0), moduli at room temperature
+    (Pa); contact: stiffness (Pa), damping (N s/m²), distance at which a point touches (m), area of
+    a point (m²/m), friction; boundary: nodes under `floor`, and those left of `inflow` and under
     `ceiling` (m), move at `speed` (m/s). Friction falls with the temperature over
     `friction_melting` (K): see `friction_coefficient`.
     """
@@ -132,7 +141,7 @@ def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
-def _scatter(p, fx, fy, limit, nodes, grid, step):  # type: ignore[no-untyped-def]
+def _scatter(p, soft, tension, fx, fy, limit, nodes, grid, step):  # type: ignore[no-untyped-def]
     """Mass, momentum, stress and contact impulse to the grid. True if the point is on it."""
     inverse = 1.0 / grid.cell
     i, ax = spline((p.x - grid.left) * inverse)
@@ -143,9 +152,9 @@ def _scatter(p, fx, fy, limit, nodes, grid, step):  # type: ignore[no-untyped-de
     mass = step.mass
     force = 4.0 * inverse * step.time_step * p.volume
     spread = mass * grid.cell
-    tension = step.bulk_modulus * (p.volume / step.volume - 1.0)
     qxx, qxy, qyx, qyy = spread * p.cxx, spread * p.cxy, spread * p.cyx, spread * p.cyy
-    txx, tyy, txy = force * (p.dxx + tension), force * (p.dyy + tension), force * p.dxy
+    txx, tyy = force * (soft * p.dxx + tension), force * (soft * p.dyy + tension)
+    txy = force * soft * p.dxy
     mx, my = mass * p.own_vx, mass * p.own_vy
     hx, hy = step.time_step * fx, step.time_step * fy
     for a in range(3):
@@ -184,7 +193,7 @@ def _contact(p, stress, tool, step, law, damage):  # type: ignore[no-untyped-def
 
 
 @njit(**FAST)
-def _gather_cells(points, starts, first, last, velocity, grid, step, sums):  # type: ignore[no-untyped-def]
+def _gather_cells(points, starts, first, last, velocity, grid, step, elastic, sums):  # type: ignore[no-untyped-def]
     """Move the points of some cells; False if one left the grid."""
     on_grid = True
     lost = 0.0
@@ -192,27 +201,30 @@ def _gather_cells(points, starts, first, last, velocity, grid, step, sums):  # t
         begin, end = starts[cell], starts[cell + 1]
         if begin == end:
             continue
-        total = squares = 0.0
+        total = stiff = squares = 0.0
         for k in range(begin, end):
             p = points[k]
             on_grid &= _gather(p, velocity, grid, step)
             volume = p.volume * (1.0 + step.time_step * (p.cxx + p.cyy))
-            total += volume
-            squares += volume * volume
+            beyond = volume - step.volume
+            bulk = elastic[kelvin_index(p.temperature, elastic.shape[0]), 1]
+            total += beyond
+            stiff += bulk
+            squares += bulk * beyond * beyond
         # One density for the points that share a cell: plastic flow, which keeps its volume, does
         # not lock, and pressure does not alternate from point to point.
         mean = total / (end - begin)
-        lost += squares - mean * total
+        lost += squares - mean * mean * stiff
         for k in range(begin, end):
-            points[k].volume = mean
+            points[k].volume = step.volume + mean
     sums[SHARING_LOSS] += 0.5 * step.bulk_modulus / step.volume * lost
     return on_grid
 
 
 @njit(**FAST)
 def _work_block(  # type: ignore[no-untyped-def]
-    points, starts, block, velocity, nodes, tool, grid, step, law, damage, capacity, heat_shares,
-    sums, buffer,
+    points, starts, block, velocity, nodes, tool, grid, step, law, damage, elastic, capacity,
+    heat_shares, sums, buffer,
 ):  # fmt: skip
     """One step of the points of a block; False if a point left the grid."""
     first = block * BLOCK_COLUMNS * grid.rows
@@ -220,10 +232,14 @@ def _work_block(  # type: ignore[no-untyped-def]
     on_grid = True
     for cell in range(first, last, BATCH_CELLS):
         end_cell = min(cell + BATCH_CELLS, last)
-        on_grid &= _gather_cells(points, starts, cell, end_cell, velocity, grid, step, sums[block])
+        on_grid &= _gather_cells(
+            points, starts, cell, end_cell, velocity, grid, step, elastic, sums[block]
+        )
         for begin in range(starts[cell], starts[end_cell], LANES):
             end = min(begin + LANES, starts[end_cell])
-            update_stresses(points, begin, end, step, law, damage, capacity, heat_shares, buffer)
+            update_stresses(
+                points, begin, end, step, law, damage, elastic, capacity, heat_shares, buffer
+            )
             for k in range(begin, end):
                 p = points[k]
                 sums[block, PLASTIC_WORK] += buffer[WORK + k - begin]
@@ -233,7 +249,8 @@ def _work_block(  # type: ignore[no-untyped-def]
                     sums[block, FORCE_X] += fx
                     sums[block, FORCE_Y] += fy
                     sums[block, CONTACT_WORK] += step.time_step * (fx * p.vx + fy * p.vy)
-                on_grid &= _scatter(p, fx, fy, limit, nodes, grid, step)
+                soft, tension = buffer[SOFT + k - begin], buffer[TENSION + k - begin]
+                on_grid &= _scatter(p, soft, tension, fx, fy, limit, nodes, grid, step)
     return on_grid
 
 
@@ -272,15 +289,16 @@ def _work_column(i, velocity, nodes, heat, tool, grid, step, sums):  # type: ign
 
 
 def _advance(  # type: ignore[no-untyped-def]
-    steps, points, starts, velocity, nodes, heat, tool, grid, step, law, damage, capacity,
-    heat_shares, sums, threads,
+    steps, points, starts, velocity, nodes, heat, tool, grid, step, law, damage, elastic,
+    capacity, heat_shares, sums, threads,
 ):  # fmt: skip
     """Advance all points by some steps, shared out among some threads.
 
     `velocity` (columns, rows, 4) is the grid's velocity after the last step and its change in that
     step, kept for the next; `nodes` (columns, rows, 6) is zero before and after; `heat` (columns,
     rows) gathers friction work (J/m); `sums` gathers over the steps what `FORCE_X` and so on name.
-    `heat_shares` is that of `heat_share`. Returns False if a point left the grid.
+    `elastic` is `WorkpieceMaterial.elastic_ratios`, `heat_shares` that of `heat_share`. Returns
+    False if a point left the grid.
     """
     blocks = (grid.columns + BLOCK_COLUMNS - 1) // BLOCK_COLUMNS
     of_blocks = np.zeros((blocks, sums.size))
@@ -293,7 +311,7 @@ def _advance(  # type: ignore[no-untyped-def]
                 for block in range(colour + 2 * thread, blocks, 2 * threads):
                     good[block] &= _work_block(
                         points, starts, block, velocity, nodes, tool, grid, step, law, damage,
-                        capacity, heat_shares, of_blocks, buffers[thread],
+                        elastic, capacity, heat_shares, of_blocks, buffers[thread],
                     )  # fmt: skip
         for thread in prange(threads):
             for i in range(thread, grid.columns, threads):

@@ -19,9 +19,9 @@ POINT: Final = np.dtype(
     ]
 )  # fmt: skip
 """Position, velocity of the grid there, velocity that the point carries, velocity gradient,
-deviator of the Cauchy stress; plastic strain, what the last step added to it and what it was at the
-last record; damage, temperature, volume per width, position before the cut, time in contact since
-the last exchange of heat; SI units."""
+deviator of the Cauchy stress that the elastic strain makes at room temperature; plastic strain,
+what the last step added to it and what it was at the last record; damage, temperature, volume per
+width, position before the cut, time in contact since the last exchange of heat; SI units."""
 
 Points: TypeAlias = NDArray[np.void]
 

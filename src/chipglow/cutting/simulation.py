@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import ceil
+from math import ceil, sqrt
 from typing import Final
 
 import numpy as np
@@ -30,7 +30,7 @@ from chipglow.cutting.heat import (
 from chipglow.cutting.heat import tool_fraction as fraction_of_tool
 from chipglow.cutting.heat_loss import HeatLoss, lose_heat
 from chipglow.cutting.library import AISI_1045, CARBIDE
-from chipglow.cutting.material import ToolMaterial, WorkpieceMaterial
+from chipglow.cutting.material import ROOM_TEMPERATURE, ToolMaterial, WorkpieceMaterial
 from chipglow.cutting.momentum import (
     BOUNDARY_WORK,
     CONTACT_WORK,
@@ -55,7 +55,7 @@ from chipglow.cutting.watch import Trouble, find_lost, find_off_grid, find_troub
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.surface import Surface, surface_distance
 
-SOLVER_VERSION: Final = "6"
+SOLVER_VERSION: Final = "7"
 """Changes whenever the same input gives another result."""
 
 _MARGIN: Final = 4
@@ -265,8 +265,8 @@ class _State:
             volume=spacing**2,
             time_step=0.0,
             kept=_KEPT,
-            shear_modulus=material.shear_modulus,
-            bulk_modulus=material.bulk_modulus,
+            shear_modulus=float(material.shear_modulus_at(ROOM_TEMPERATURE)),
+            bulk_modulus=float(material.bulk_modulus_at(ROOM_TEMPERATURE)),
             stiffness=_CONTACT_STIFFNESS,
             damping=_CONTACT_DAMPING * 2 * np.sqrt(_CONTACT_STIFFNESS * mass),
             reach=spacing / 2,
@@ -282,6 +282,7 @@ class _State:
         self.law = material.flow_stress.numbers()
         self.step_points = advance_with(self.law)
         self.damage = Damage.of(material.damage, cell)
+        self.elastic = material.elastic_ratios()
         self.capacity = material.heat_capacity.sampled()
         self.heat_shares = heat_shares(material.taylor_quinney)
         self.conductivity = material.conductivity.sampled()
@@ -377,6 +378,7 @@ class _State:
                 self.step,
                 self.law,
                 self.damage,
+                self.elastic,
                 self.capacity,
                 self.heat_shares,
                 sums,
@@ -410,17 +412,9 @@ class _State:
 
     def _held(self) -> NDArray[np.float64]:
         """Kinetic and elastic energy of the points in J/m."""
-        step = self.step
-        held = held_energy(
-            self.points,
-            self.count,
-            step.mass,
-            step.volume,
-            step.shear_modulus,
-            step.bulk_modulus,
-            self.grid.cell,
+        return np.array(
+            held_energy(self.points, self.count, self.step, self.elastic, self.grid.cell)
         )
-        return np.array(held)
 
     def _conduct(self) -> None:
         conduct(
@@ -532,9 +526,7 @@ def _grid(numerics: Numerics) -> Grid:
 
 def _sound(simulation: CuttingSimulation) -> float:
     """Speed of sound in the workpiece with its scaled mass in m/s."""
-    material = simulation.workpiece
-    modulus = material.bulk_modulus + 4 / 3 * material.shear_modulus
-    return float(np.sqrt(modulus / (material.density * simulation.numerics.mass_scaling)))
+    return simulation.workpiece.sound_speed() / sqrt(simulation.numerics.mass_scaling)
 
 
 def _time_steps(

@@ -1,5 +1,8 @@
 """Stress of a batch of points: hypo-elastic, radial return to the flow stress, damage.
 
+A point carries the deviator that its elastic strain makes at room temperature. What it makes at the
+point's own temperature is less by the ratio of the shear moduli.
+
 Points are copied into rows of a buffer, one row a quantity, so that the compiler does the same
 arithmetic on several points at once.
 """
@@ -9,7 +12,7 @@ from numba import njit
 
 from chipglow.cutting.damage import damage_growth, weakening
 from chipglow.cutting.flow_stress import stress_and_slopes
-from chipglow.cutting.lanes import FAST, exponential
+from chipglow.cutting.lanes import FAST, INLINE, exponential
 from chipglow.cutting.plastic_heat import heat_share
 
 LANES = 128
@@ -24,11 +27,12 @@ _SMALL_CHANGE = 0.02
 _SMALL_STRAIN = 0.01
 (
     DXX, DYY, DXY, STRAIN, DAMAGE, TEMPERATURE, INCREMENT, VOLUME,
-    CXX, CXY, CYX, CYY, TRIAL, WEAK, BOUND, WORK,
-) = range(0, 16 * _ROW, _ROW)  # fmt: skip
-BUFFER = 16 * _ROW
+    CXX, CXY, CYX, CYY, TRIAL, WEAK, BOUND, WORK, SOFT, TENSION,
+) = range(0, 18 * _ROW, _ROW)  # fmt: skip
+BUFFER = 18 * _ROW
 STRESS = TRIAL
-"""Rows of the buffer; in the end the trial stress has become the equivalent stress (Pa)."""
+"""Rows of the buffer; in the end the trial stress has become the equivalent stress (Pa). `SOFT` is
+the shear modulus over that at room temperature; the deviator is that at room temperature."""
 
 
 @njit(**FAST)
@@ -49,7 +53,7 @@ def plastic_increments(b, count, shear_modulus, time_step, law, damage):  # type
         beyond += 1 if excess > 0.0 else 0
         # Hardening is infinitely steep at no strain: no slope to rely on.
         firm = max(slope * b[WEAK + k], 0.0) if strain > _SMALL_STRAIN else 0.0
-        bound = excess / (3.0 * shear_modulus + firm)
+        bound = excess / (3.0 * shear_modulus * b[SOFT + k] + firm)
         guess = b[INCREMENT + k]
         begin = guess if guess > 2.0 * SLOWEST_RATE * time_step else bound
         b[INCREMENT + k] = max(min(begin, bound), 0.0)
@@ -65,12 +69,12 @@ def plastic_increments(b, count, shear_modulus, time_step, law, damage):  # type
 @njit(**FAST)
 def _improve(b, count, shear_modulus, time_step, law, damage):  # type: ignore[no-untyped-def]
     """One step of Newton over the logarithm of the increment; how many change much."""
-    stiffness = 3.0 * shear_modulus
     slowest = SLOWEST_RATE * time_step
     per_step = 1.0 / time_step
     far = 0
     for k in range(count):
         increment, bound, weak = b[INCREMENT + k], b[BOUND + k], b[WEAK + k]
+        stiffness = 3.0 * shear_modulus * b[SOFT + k]
         moving = increment > slowest
         tried = increment if moving else slowest
         flowing, by_strain, by_rate = stress_and_slopes(
@@ -90,9 +94,11 @@ def _improve(b, count, shear_modulus, time_step, law, damage):  # type: ignore[n
 
 
 @njit(**FAST)
-def _try(b, count, shear_modulus, time_step):  # type: ignore[no-untyped-def]
-    """Trial deviator (Jaumann rate) and its equivalent stress."""
-    two_g = 2.0 * shear_modulus * time_step
+def _try(b, count, step):  # type: ignore[no-untyped-def]
+    """Trial deviator (Jaumann rate), its equivalent stress, and mean stress."""
+    time_step = step.time_step
+    two_g = 2.0 * step.shear_modulus * time_step
+    per_volume = 1.0 / step.volume
     for k in range(count):
         cxx, cxy, cyx, cyy = b[CXX + k], b[CXY + k], b[CYX + k], b[CYY + k]
         xx, yy, xy = b[DXX + k], b[DYY + k], b[DXY + k]
@@ -102,32 +108,32 @@ def _try(b, count, shear_modulus, time_step):  # type: ignore[no-untyped-def]
         dxx = xx + spin * xy + two_g * (cxx - third)
         dyy = yy - spin * xy + two_g * (cyy - third)
         b[DXX + k], b[DYY + k], b[DXY + k] = dxx, dyy, shear
-        b[TRIAL + k] = np.sqrt(3.0 * (dxx * dxx + dyy * dyy + dxx * dyy + shear * shear))
+        square = dxx * dxx + dyy * dyy + dxx * dyy + shear * shear
+        b[TRIAL + k] = b[SOFT + k] * np.sqrt(3.0 * square)
+        # Till here the row holds the share of the bulk modulus at room temperature.
+        b[TENSION + k] *= step.bulk_modulus * (b[VOLUME + k] * per_volume - 1.0)
         b[WORK + k] = 0.0
 
 
 @njit(**FAST)
 def _return(b, count, step, law, damage):  # type: ignore[no-untyped-def]
     """Deviator back to the flow stress; strain, damage, and plastic work (J/m)."""
-    stiffness = 3.0 * step.shear_modulus
-    per_volume = 1.0 / step.volume
     per_step = 1.0 / step.time_step
     fails = 1.0 if damage.loss > 0.0 else 0.0
     for k in range(count):
         increment, trial, volume = b[INCREMENT + k], b[TRIAL + k], b[VOLUME + k]
-        stress = trial - stiffness * increment
+        stress = trial - 3.0 * step.shear_modulus * b[SOFT + k] * increment
         some = max(stress, 1.0)
         scale = stress / max(trial, 1.0)
         scale = scale if increment > 0.0 else 1.0
         b[DXX + k] *= scale
         b[DYY + k] *= scale
         b[DXY + k] *= scale
-        mean_stress = step.bulk_modulus * (volume * per_volume - 1.0)
         b[DAMAGE + k] += fails * damage_growth(
             b[DAMAGE + k],
             increment,
             increment * per_step,
-            mean_stress,
+            b[TENSION + k],
             some,
             b[TEMPERATURE + k],
             damage,
@@ -139,9 +145,13 @@ def _return(b, count, step, law, damage):  # type: ignore[no-untyped-def]
 
 @njit(**FAST)
 def update_stresses(  # type: ignore[no-untyped-def]
-    points, begin, end, step, law, damage, capacity, heat_shares, b
+    points, begin, end, step, law, damage, elastic, capacity, heat_shares, b
 ):
-    """Stress of up to `LANES` points; leaves their equivalent stress and plastic work in `b`."""
+    """Stress of up to `LANES` points.
+
+    Leaves their equivalent and mean stress, the soft share of the shear modulus and plastic work in
+    `b`. `elastic` is `WorkpieceMaterial.elastic_ratios`.
+    """
     count = end - begin
     for k in range(count):
         p = points[begin + k]
@@ -149,7 +159,9 @@ def update_stresses(  # type: ignore[no-untyped-def]
         b[DXX + k], b[DYY + k], b[DXY + k] = p.dxx, p.dyy, p.dxy
         b[STRAIN + k], b[DAMAGE + k], b[TEMPERATURE + k] = p.strain, p.damage, p.temperature
         b[INCREMENT + k], b[VOLUME + k] = p.increment, p.volume
-    _try(b, count, step.shear_modulus, step.time_step)
+        warm = kelvin_index(p.temperature, elastic.shape[0])
+        b[SOFT + k], b[TENSION + k] = elastic[warm, 0], elastic[warm, 1]
+    _try(b, count, step)
     plastic = plastic_increments(b, count, step.shear_modulus, step.time_step, law, damage)
     if plastic:
         _return(b, count, step, law, damage)
@@ -169,4 +181,10 @@ def update_stresses(  # type: ignore[no-untyped-def]
 @njit
 def property_at(table, temperature):  # type: ignore[no-untyped-def]
     """Value of a sampled `TemperatureTable`."""
-    return table[min(max(int(temperature - 200.0), 0), table.size - 1)]
+    return table[kelvin_index(temperature, table.size)]
+
+
+@njit(**INLINE)
+def kelvin_index(temperature, size):  # type: ignore[no-untyped-def]
+    """Row of a temperature in a table of `size` rows, one for each kelvin from 200 K."""
+    return min(max(int(temperature - 200.0), 0), size - 1)
