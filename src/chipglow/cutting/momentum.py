@@ -201,22 +201,20 @@ def _gather_cells(points, starts, first, last, velocity, grid, step, elastic, su
         begin, end = starts[cell], starts[cell + 1]
         if begin == end:
             continue
-        total = stiff = squares = 0.0
+        total = squares = 0.0
         for k in range(begin, end):
             p = points[k]
             on_grid &= _gather(p, velocity, grid, step)
             volume = p.volume * (1.0 + step.time_step * (p.cxx + p.cyy))
-            beyond = volume - step.volume
-            bulk = elastic[kelvin_index(p.temperature, elastic.shape[0]), 1]
-            total += beyond
-            stiff += bulk
-            squares += bulk * beyond * beyond
+            total += volume
+            squares += volume * volume
         # One density for the points that share a cell: plastic flow, which keeps its volume, does
         # not lock, and pressure does not alternate from point to point.
         mean = total / (end - begin)
-        lost += squares - mean * mean * stiff
+        bulk = elastic[kelvin_index(points[begin].temperature, elastic.shape[0]), 1]
+        lost += bulk * (squares - mean * total)
         for k in range(begin, end):
-            points[k].volume = step.volume + mean
+            points[k].volume = mean
     sums[SHARING_LOSS] += 0.5 * step.bulk_modulus / step.volume * lost
     return on_grid
 
