@@ -11,7 +11,12 @@ from chipglow.cutting.conditions import (
 from chipglow.cutting.damage import JohnsonCookDamage
 from chipglow.cutting.energy import EnergyHistory
 from chipglow.cutting.flow_stress import FlowStress, flow_stress_law
-from chipglow.cutting.laws import HyperbolicTangent, JohnsonCook, MarusichOrtiz
+from chipglow.cutting.laws import (
+    HyperbolicTangent,
+    JohnsonCook,
+    MarusichOrtiz,
+    ZerilliArmstrong,
+)
 from chipglow.cutting.library import (
     AISI_1045,
     CARBIDE,
@@ -63,6 +68,7 @@ __all__ = [
     "TemperatureTable",
     "ToolMaterial",
     "WorkpieceMaterial",
+    "ZerilliArmstrong",
     "flow_stress_law",
     "is_own_file",
     "material_file",

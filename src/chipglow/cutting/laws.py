@@ -211,6 +211,59 @@ class MarusichOrtiz(FlowStress):
         return law.yield_stress * max(1.0 - heat, 0.01) * hard * fast
 
 
+@njit(**INLINE)
+def _zerilli_armstrong(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
+    held = max(strain, 1e-12)
+    n, by_rate = law.hardening_exponent, law.rate_hardening * temperature
+    hardened = law.hardening * exponential(n * logarithm(held))
+    faster = by_rate * logarithm(rate / law.reference_rate)
+    thermal = law.thermal_stress * exponential(faster - law.thermal_softening * temperature)
+    return law.athermal_stress + thermal + hardened, hardened * n / held, thermal * by_rate
+
+
+@flow_stress_law("zerilli-armstrong", _zerilli_armstrong)
+@dataclass(frozen=True)
+class ZerilliArmstrong(FlowStress):
+    """Flow stress of Zerilli and Armstrong (1987), J. Appl. Phys. 61, 1816, for bcc metals.
+
+    σ = C₀ + C₁ exp(−C₃ T + C₄ T ln(ε̇/ε̇₀)) + C₅ εⁿ, T in K: strength falls exponentially with
+    temperature to what hardening and C₀ leave, and does not know a melting point. (Equation as
+    widely cited; the paper was not seen.)
+
+    Parameters
+    ----------
+    athermal_stress, thermal_stress, hardening : float
+        C₀, C₁ and C₅ in Pa.
+    thermal_softening, rate_hardening : float
+        C₃ and C₄ in 1/K.
+    hardening_exponent : float
+        n.
+    reference_rate : float
+        ε̇₀ in 1/s.
+    """
+
+    athermal_stress: float
+    thermal_stress: float
+    thermal_softening: float
+    rate_hardening: float
+    hardening: float
+    hardening_exponent: float
+    reference_rate: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("athermal_stress", "hardening_exponent", "reference_rate"):
+            check_positive(f"Zerilli-Armstrong {name}", getattr(self, name))
+        for name in ("thermal_stress", "thermal_softening", "rate_hardening", "hardening"):
+            value = getattr(self, name)
+            if not 0 <= value < np.inf:
+                raise ValueError(f"Zerilli-Armstrong {name}: expected 0 or more, got {value!r}")
+
+    @staticmethod
+    def stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
+        """Flow stress in Pa."""
+        return _zerilli_armstrong(strain, rate, temperature, law)[0]
+
+
 def check_positive(name: str, value: float) -> None:
     """Raise ValueError unless a value is finite and over 0."""
     if not (isfinite(value) and value > 0):

@@ -94,10 +94,13 @@ _FRACTURE_ENERGY: Final = _Quantity(
 _LAW_FIELDS: Final = {
     "yield_stress": _STRESS,
     "hardening": _STRESS,
+    "athermal_stress": _STRESS,
+    "thermal_stress": _STRESS,
     "melting_temperature": _TEMPERATURE,
     "reference_temperature": _TEMPERATURE,
     "reference_rate": _RATE,
     "thermal_softening": _PER_KELVIN,
+    "rate_hardening": _PER_KELVIN,
 }
 _ANY: Final = _Quantity(
     "a number, or a stress, temperature or strain rate with its unit",
