@@ -1,6 +1,6 @@
-"""Pictures of materials: flow stress over strain, heat properties over temperature."""
+"""Pictures of materials: flow stress over strain; heat and elasticity over temperature."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -16,7 +16,7 @@ _STRAINS: Final = np.linspace(0.0, 2.0, 81)
 
 
 def material_figure(material: MaterialFile) -> Figure:
-    """Flow stress of every set, and conductivity and heat capacity.
+    """Flow stress of every set; conductivity, heat capacity and elastic moduli.
 
     Parameters
     ----------
@@ -34,10 +34,11 @@ def material_figure(material: MaterialFile) -> Figure:
     rows = len(sets) + 1
     with style():
         figure = new_figure(2.6 * rows)
-        grid = figure.add_gridspec(rows, 2)
+        grid = figure.add_gridspec(rows, 3)
         for row, (name, workpiece) in enumerate(sets.items()):
             _flow_stress_panel(figure.add_subplot(grid[row, :]), name, workpiece)
-        _heat_panels(figure.add_subplot(grid[-1, 0]), figure.add_subplot(grid[-1, 1]), sets)
+        below = [figure.add_subplot(grid[-1, column]) for column in range(3)]
+        _temperature_panels(below, next(iter(sets.values())))
         figure.suptitle(f"{material.name}: {material.description}")
     return figure
 
@@ -57,13 +58,19 @@ def _flow_stress_panel(axes: Axes, name: str, workpiece: WorkpieceMaterial) -> N
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def _heat_panels(left: Axes, right: Axes, sets: Mapping[str, WorkpieceMaterial]) -> None:
-    workpiece = next(iter(sets.values()))
+def _temperature_panels(panels: Sequence[Axes], workpiece: WorkpieceMaterial) -> None:
+    """Conductivity, heat capacity and elastic moduli over the temperature."""
     celsius = np.linspace(0.0, workpiece.melting_temperature - KELVIN, 300)
-    left.plot(celsius, workpiece.conductivity.at(celsius + KELVIN), color=BLUE)
+    kelvins = celsius + KELVIN
+    left, middle, right = panels
+    left.plot(celsius, workpiece.conductivity.at(kelvins), color=BLUE)
     left.set_ylabel("conductivity / W/(m K)")
-    right.plot(celsius, workpiece.heat_capacity.at(celsius + KELVIN), color=VERMILLION)
-    right.set_ylabel("heat capacity / J/(kg K)")
-    for axes in (left, right):
+    middle.plot(celsius, workpiece.heat_capacity.at(kelvins), color=VERMILLION)
+    middle.set_ylabel("heat capacity / J/(kg K)")
+    right.plot(celsius, workpiece.bulk_modulus_at(kelvins) / 1e9, color=GREEN, label="bulk")
+    right.plot(celsius, workpiece.shear_modulus_at(kelvins) / 1e9, color=BLUE, label="shear")
+    right.set_ylabel("modulus / GPa")
+    right.legend()
+    for axes in panels:
         axes.set_xlabel("temperature / °C")
         axes.set_ylim(bottom=0.0)
