@@ -116,8 +116,9 @@ class Isolated(Source):
             process.kill()
 
         timer = threading.Timer(self.patience, give_up)
-        timer.start()
+        timer.daemon = True
         try:
+            timer.start()
             message = read_message(answers, raster)
         finally:
             timer.cancel()
