@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter, minimum_filter
+from scipy.ndimage import distance_transform_edt, maximum_filter, minimum_filter
 
 from chipglow.io.sources.colour_scale import ColourScale, lab
 from chipglow.io.sources.legend import Box
@@ -24,6 +24,7 @@ MARK_TOLERANCE: Final = 10.0
 _GREY: Final = 10.0
 _BORDER_SHARE: Final = 0.1
 _COARSE: Final = 16
+_REACH: Final = 8
 
 
 @dataclass(frozen=True)
@@ -106,8 +107,7 @@ class FieldReader:
         material = np.full(values.shape, Material.WORKPIECE, np.uint8)
         material[void], material[tool] = Material.VOID, Material.TOOL
         known = (seen | void | tool) & ~self.covered & ~self.tool
-        if known.any():
-            material = material[nearest(known)]
+        fill(material, known, ~known & ~self.tool)
         material[self.tool] = Material.TOOL
         quality = np.minimum(np.round(distance), FILLED - 1).astype(np.uint8)
         values[~seen] = np.nan
@@ -177,23 +177,30 @@ def find_background(
     return tuple(found), tuple(refused)
 
 
-def nearest(known: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Row and column of the nearest known pixel of each, shape (y, x) each.
+def nearest(known: NDArray[np.bool_], wanted: NDArray[np.bool_]) -> tuple[NDArray[np.intp], ...]:
+    """Rows and columns of the known pixels that are nearest to the wanted ones, shape (n,) each.
 
-    By vectors handed on from pixel to pixel; in rare places it is the second nearest (Danielsson,
-    Computer Graphics and Image Processing 14 (1980) 227).
+    Parameters
+    ----------
+    known : ndarray
+        Pixels to choose from, one or more, shape (y, x), bool.
+    wanted : ndarray
+        Pixels to find the nearest for, n of them, shape (y, x), bool.
     """
-    rows, columns = (np.full(known.shape, -1, np.int32) for _ in range(2))
-    _hand_on(known, rows, columns)
-    return rows, columns
+    at = np.argwhere(wanted)
+    found = np.full(at.shape, -1, np.intp)
+    _search(known, at, found)
+    far = found[:, 0] < 0
+    if far.any():
+        indices = distance_transform_edt(~known, return_distances=False, return_indices=True)
+        found[far] = indices[:, at[far, 0], at[far, 1]].T
+    return found[:, 0], found[:, 1]
 
 
-def fill(values: NDArray[np.float32], known: NDArray[np.bool_], wanted: NDArray[np.bool_]) -> None:
+def fill(values: NDArray[Any], known: NDArray[np.bool_], wanted: NDArray[np.bool_]) -> None:
     """Give wanted pixels the value of the nearest known one, if there is any, in place."""
-    if not (wanted.any() and known.any()):
-        return
-    rows, columns = nearest(known)
-    values[wanted] = values[rows[wanted], columns[wanted]]
+    if wanted.any() and known.any():
+        values[wanted] = values[nearest(known, wanted)]
 
 
 def box_mask(shape: tuple[int, int], boxes: Sequence[Box], margin: int = 0) -> NDArray[np.bool_]:
@@ -235,45 +242,27 @@ def _grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _without_lines(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Without what is less than 3 pixels wide."""
     wide = minimum_filter(mask.view(np.uint8), 3)
-    return np.asarray(maximum_filter(wide, 3)).view(np.bool_)
+    # At the border of the picture the mirrored pixels would let it grow.
+    return np.asarray(maximum_filter(wide, 3)).view(np.bool_) & mask
 
 
 @njit(cache=True)
-def _hand_on(known, rows, columns):  # type: ignore[no-untyped-def]
+def _search(known, at, found):  # type: ignore[no-untyped-def]
+    """Look for the nearest known pixel in squares that grow."""
     height, width = known.shape
-    for row in range(height):
-        for column in range(width):
-            if known[row, column]:
-                rows[row, column] = row
-                columns[row, column] = column
-    for _ in range(2):
-        for row in range(height):
-            for column in range(width):
-                _take(rows, columns, row, column, row, column - 1)
-                for step in range(-1, 2):
-                    _take(rows, columns, row, column, row - 1, column + step)
-            for column in range(width - 1, -1, -1):
-                _take(rows, columns, row, column, row, column + 1)
-        for row in range(height - 1, -1, -1):
-            for column in range(width - 1, -1, -1):
-                _take(rows, columns, row, column, row, column + 1)
-                for step in range(-1, 2):
-                    _take(rows, columns, row, column, row + 1, column + step)
-            for column in range(width):
-                _take(rows, columns, row, column, row, column - 1)
-
-
-@njit(cache=True)
-def _take(rows, columns, row, column, other_row, other_column):  # type: ignore[no-untyped-def]
-    """Take a neighbour's known pixel if it is nearer."""
-    height, width = rows.shape
-    if not (0 <= other_row < height and 0 <= other_column < width):
-        return
-    found_row, found_column = rows[other_row, other_column], columns[other_row, other_column]
-    if found_row < 0:
-        return
-    here = np.int64(rows[row, column] - row) ** 2 + np.int64(columns[row, column] - column) ** 2
-    there = np.int64(found_row - row) ** 2 + np.int64(found_column - column) ** 2
-    if rows[row, column] < 0 or there < here:
-        rows[row, column] = found_row
-        columns[row, column] = found_column
+    for index in range(len(at)):
+        row, column = at[index]
+        best = np.inf
+        side = 1
+        while side <= _REACH and side * side < best:
+            for other in range(max(row - side, 0), min(row + side, height - 1) + 1):
+                whole = abs(other - row) == side
+                step = 1 if whole else 2 * side
+                for beside in range(column - side, column + side + 1, step):
+                    apart = (other - row) ** 2 + (beside - column) ** 2
+                    if 0 <= beside < width and apart < best and known[other, beside]:
+                        best = apart
+                        found[index] = other, beside
+            side += 1
+        if best > _REACH**2:
+            found[index, 0] = -1  # one beyond the last square may be nearer
