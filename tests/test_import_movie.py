@@ -236,7 +236,10 @@ def test_lossless_values_are_those_of_the_scale(tmp_path):
     source = a_source(a_movie(tmp_path / "a.avi"))
     truth = known_field(0, SHAPE)
     frame = first_frame(source)
-    seen = np.isfinite(truth) & (frame.quality != FILLED)
+    shown = frame.material == Material.WORKPIECE
+    # The background's corner at the right border is a wedge of less than three pixels.
+    assert np.count_nonzero(shown != np.isfinite(truth)) <= 5
+    seen = shown & np.isfinite(truth) & (frame.quality != FILLED)
     # Half a level, and the rounding of colours to 8 bits.
     assert np.abs(frame.fields["temperature"] - truth)[seen].max() < LEVEL
     assert np.isnan(frame.fields["temperature"][frame.material == Material.VOID]).all()
