@@ -162,7 +162,7 @@ def find_background(
     found, refused : tuple of Colour
         Colours that show nothing; and those that are left out because they are of the scale.
     """
-    border = np.concatenate([picture[0], picture[-1], picture[1:-1, 0], picture[1:-1, -1]])
+    border = _border(picture)
     labs = lab(border / 255.0)
     grey = border[np.hypot(labs[:, 1], labs[:, 2]) < _GREY]
     if not len(grey):
@@ -172,8 +172,11 @@ def find_background(
     refused: list[Colour] = []
     for index in np.flatnonzero(counts >= _BORDER_SHARE * len(border)):
         red, green, blue = np.median(grey[group.ravel() == index], axis=0).astype(int).tolist()
-        on_scale = _place(scale, (red, green, blue))[1] < MARK_TOLERANCE
-        (refused if on_scale else found).append((red, green, blue))
+        colour = (red, green, blue)
+        if _border(_without_lines(_like(picture, colour))).mean() < _BORDER_SHARE:
+            continue
+        on_scale = _place(scale, colour)[1] < MARK_TOLERANCE
+        (refused if on_scale else found).append(colour)
     return tuple(found), tuple(refused)
 
 
@@ -226,6 +229,16 @@ def polygon_mask(
     rows, columns = np.mgrid[: shape[0], : shape[1]] + 0.5
     points = np.stack([columns.ravel(), rows.ravel()], axis=1)
     return np.asarray(Path(corners).contains_points(points)).reshape(shape)
+
+
+def _border(picture: NDArray[Any]) -> NDArray[Any]:
+    return np.concatenate([picture[0], picture[-1], picture[1:-1, 0], picture[1:-1, -1]])
+
+
+def _like(picture: NDArray[np.uint8], colour: Colour) -> NDArray[np.bool_]:
+    """Pixels of a colour."""
+    one = ColourScale(np.zeros(1), np.array([colour]) / 255, banded=True)
+    return np.asarray(one.invert(picture)[1] < MARK_TOLERANCE)
 
 
 def _place(scale: ColourScale, colour: Colour) -> tuple[float, float]:
