@@ -7,7 +7,6 @@ import shutil
 import subprocess
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from chipglow.io.sources.movie import FieldMovie, MovieSource
@@ -84,6 +83,8 @@ def truth(number: int) -> np.ndarray:
 
 def main() -> None:
     """Make the movie, read it, and draw what was read."""
+    import matplotlib.pyplot as plt
+
     draw()
     movie = source()
     survey = movie.survey()

@@ -2,6 +2,7 @@
 
 import pickle
 import struct
+from importlib.util import module_from_spec, spec_from_file_location
 from itertools import pairwise
 from pathlib import Path
 
@@ -361,6 +362,26 @@ def test_movies_are_read_in_step(tmp_path):
             {**movies, "plastic_strain_rate": FieldMovie(short, (0.0, 1e5), RAINBOW)},
             PIXEL, (0.0, 90.0),
         ).survey()  # fmt: skip
+
+
+def test_a_movie_that_ffmpeg_drew():
+    """The example of docs/import-movie.md: another program's movie, jet, legend and lines."""
+    place = Path(__file__).parents[1] / "docs" / "import_movie.py"
+    spec = spec_from_file_location("import_movie", place)
+    example = module_from_spec(spec)
+    spec.loader.exec_module(example)
+    source = example.source()
+    found = source.survey()
+    assert any("legend found at (272, 20, 288, 220)" in text for text in found.assumed)
+    frames = list(source.frames(own_raster(source)))
+    assert len(frames) == 4
+    for number, frame in enumerate(frames):
+        truth = example.truth(number)
+        workpiece = frame.material == Material.WORKPIECE
+        assert (workpiece != np.isfinite(truth)).mean() < 0.01
+        read = workpiece & np.isfinite(truth) & (frame.quality != FILLED)
+        error = frame.fields["temperature"][read] - truth[read]
+        assert np.sqrt((error**2).mean()) < 2 * source.uncertainty()["temperature"].total
 
 
 # What is drawn over the field
