@@ -163,6 +163,10 @@ class MovieSource(Source):
             raise ValueError(f"every: {self.every!r}, expected 1 or more")
         if not all(isfinite(value) for value in self.origin):
             raise ValueError(f"origin: {self.origin!r}, expected finite numbers of pixels")
+        colours = [*(self.background or ()), *([self.tool_colour] if self.tool_colour else [])]
+        for colour in colours:
+            if len(colour) != 3 or not all(0 <= part <= 255 for part in colour):
+                raise ValueError(f"colour: {colour!r}, expected red, green and blue of 0 to 255")
         if len(self.tool_polygon) == 1:
             raise ValueError("tool_polygon: 1 corner, expected 3 or more, or 2 of a box")
         if self.placement.depth != 2 or self.placement.origin != (0.0, 0.0):
@@ -195,6 +199,8 @@ class MovieSource(Source):
         index = indices[self._names[0]]
         readers, _ = self._readers(indices)
         times, _ = self._times(index)
+        if start >= len(times):
+            return
         sampling = PictureSampling(self._pixels(index), raster)
         shown = [
             pictures(self.movies[name].path, indices[name], start * self.every, self.every)
