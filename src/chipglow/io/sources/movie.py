@@ -34,6 +34,7 @@ OVERLAY_LIMIT: Final = 20.0
 
 _LEGEND_MARGIN: Final = 3
 _HALF: Final = 0.5
+_EARLY: Final = 100
 
 
 @dataclass(frozen=True)
@@ -214,7 +215,10 @@ class MovieSource(Source):
             yield self._sampled(float(times[number]), read, sampling)
 
     def uncertainty(self) -> dict[str, ColourUncertainty]:
-        """What the colours leave unknown of each field: in the first, middle and last picture."""
+        """What the colours leave unknown of each field: in the first, middle and last picture.
+
+        In a movie that cannot be searched, in three of the first 101.
+        """
         indices = self._indices()
         return self._uncertainty(indices, self._readers(indices)[0])
 
@@ -386,7 +390,7 @@ class MovieSource(Source):
         for name, reader in readers.items():
             index = indices[name]
             values, distance = [], []
-            for number in sorted({0, index.count // 2, index.count - 1}):
+            for number in _sample(index):
                 picture = next(pictures(self.movies[name].path, index, number))
                 read = self._read(name, reader, picture, number)
                 values.append(read.values[read.seen])
@@ -413,6 +417,12 @@ def metre_per_pixel(
     if not (isfinite(length) and length > 0):
         raise ValueError(f"scale: length {length!r}, expected a finite number of m over 0")
     return length / pixels
+
+
+def _sample(index: MovieIndex) -> tuple[int, ...]:
+    """The first, the middle and the last picture; where each needs all before it, early ones."""
+    last = index.count - 1 if index.marks else min(index.count - 1, _EARLY)
+    return tuple(sorted({0, last // 2, last}))
 
 
 def _scale(
