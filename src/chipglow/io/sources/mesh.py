@@ -1,0 +1,349 @@
+"""Meshes over time, from the programs that compute them."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.io.sources import mesh_meshio, mesh_vtk
+from chipglow.io.sources.conventions import Placement, Units, match_names, simple
+from chipglow.io.sources.mesh_abaqus import AbaqusReader
+from chipglow.io.sources.mesh_block import Block, FlatMesh, fields_of, flatten
+from chipglow.io.sources.mesh_dyna import DynaReader
+from chipglow.io.sources.mesh_reader import MeshReader, files_of
+from chipglow.io.sources.source import READABLE, SampledFrame, Source, SourceError, Survey
+from chipglow.scene import Material, Raster
+from chipglow.scene.rasterise import NOTHING, rasterise
+
+_PART_FIELDS: Final = (
+    "part", "part_id", "partid", "parts", "material_id", "materialid", "materialids", "material",
+    "region", "region_id", "regionid", "object_id", "objectid", "elementblockids", "block_id",
+    "gmsh_physical", "cell_tags",
+)  # fmt: skip
+_VECTOR: Final = "velocity"
+_COMPONENTS: Final = ("velocity_x", "velocity_y")
+_VECTOR_SIZES: Final = (2, 3)
+_TENSOR_SIZES: Final = (6, 9)
+
+
+@dataclass(frozen=True)
+class MeshSource(Source):
+    """Finite-element results: meshes with fields, one for each time.
+
+    Elements are sampled exactly as they are: fields of nodes by the element's own shape, fields of
+    elements constant in each. Where there is no element there is no material. Every frame may have
+    a mesh of its own. Where elements lie over one another the later one in the file is taken.
+
+    Parameters
+    ----------
+    path : Path
+        A file with one mesh or with meshes over time, an LS-DYNA d3plot, or a pattern such as
+        ``chip_*.vtu`` with a file for each time.
+    names : mapping
+        The file's names of fields, by those of a scene; guessed where nothing is given. ``velocity``
+        is a vector along the file's axes; ``velocity_x`` and ``velocity_y`` are components along
+        the placement's two axes.
+    units : Units
+        Units of the file.
+    placement : Placement
+        How the file's axes lie in the scene.
+    times : tuple of float
+        Times of the frames in s, in the place of the file's.
+    interval : float, optional
+        Time from frame to frame in s, in the place of the file's.
+    section : float, "facing" or None
+        For meshes of solid elements: where to cut along the axis of depth, in m, or the surface
+        that faces the camera, which looks at the scene's x and y from the front.
+    tool_parts : tuple of str
+        What is the tool: names of blocks, parts or sets of elements, or numbers in the field of
+        parts.
+    part_field : str, optional
+        Field of elements that numbers the parts; guessed if nothing is given.
+    displacement : str, optional
+        Field of node vectors to be added to the positions.
+
+    Raises
+    ------
+    ValueError
+        If a time is not finite, an interval is not positive, both are given, or the section is
+        neither a finite position nor ``facing``.
+    """
+
+    path: Path
+    names: Mapping[str, str] = field(default_factory=dict)
+    units: Units = field(default_factory=Units)
+    placement: Placement = field(default_factory=Placement)
+    times: tuple[float, ...] = ()
+    interval: float | None = None
+    section: float | Literal["facing"] | None = None
+    tool_parts: tuple[str, ...] = ()
+    part_field: str | None = None
+    displacement: str | None = None
+
+    def __post_init__(self) -> None:
+        if not all(isfinite(time) for time in self.times):
+            raise ValueError(f"times: expected finite times, got {self.times!r}")
+        if self.interval is not None and not (isfinite(self.interval) and self.interval > 0):
+            raise ValueError(f"interval: must be finite and over 0 s, got {self.interval!r}")
+        if self.times and self.interval is not None:
+            raise ValueError("interval: times are given too, expected one of them")
+        if isinstance(self.section, str) and self.section != "facing":
+            raise ValueError(f"section: {self.section!r}, expected a position or facing")
+        if isinstance(self.section, float) and not isfinite(self.section):
+            raise ValueError(f"section: expected a finite position, got {self.section!r}")
+
+    def survey(self) -> Survey:
+        """Look at the first and the last mesh; see `Source.survey`."""
+        reader = self._reader()
+        blocks = self._read(reader, 0)
+        found = self._found(blocks, reader.file(0))
+        first = self._flat(reader, 0, blocks, found)
+        last = first if reader.count == 1 else self._flat(reader, reader.count - 1, None, found)
+        times, assumed = self._times(reader)
+        every = fields_of(blocks)
+        return Survey(
+            reader.kind,
+            times,
+            self._extent(reader, (first, last)),
+            {ours: found[ours] for ours in READABLE if ours in found},
+            tuple(sorted(set(every) - set(found.values()))),
+            assumed=(*reader.assumed, *assumed, *self._assumed(blocks, found)),
+        )
+
+    def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
+        """Sample the meshes one after the other; see `Source.frames`."""
+        reader = self._reader()
+        times, _ = self._times(reader)
+        found = self._found(self._read(reader, 0), reader.file(0))
+        for number in range(start, reader.count):
+            mesh = self._flat(reader, number, None, found)
+            yield self._sampled(mesh, float(times[number]), raster, found)
+
+    def _reader(self) -> MeshReader:
+        timed = bool(self.times)
+        suffix = self.path.suffix.lower()
+        if suffix in mesh_vtk.KINDS:
+            return mesh_vtk.VtkReader(files_of(self.path, gaps_allowed=timed))
+        if suffix in mesh_meshio.KINDS:
+            return mesh_meshio.MeshioReader(files_of(self.path, gaps_allowed=timed))
+        if suffix == ".inp":
+            return AbaqusReader(files_of(self.path, gaps_allowed=timed))
+        if suffix in ("", ".d3plot") or "d3plot" in self.path.name.lower():
+            return DynaReader(self.path)
+        known = " ".join(sorted((*mesh_vtk.KINDS, *mesh_meshio.KINDS, ".inp")))
+        raise SourceError(f"{self.path}: {suffix} is no mesh, expected d3plot or one of {known}")
+
+    def _read(self, reader: MeshReader, number: int) -> tuple[Block, ...]:
+        return tuple(self._moved(block, reader.file(number)) for block in reader.read(number))
+
+    def _moved(self, block: Block, file: Path) -> Block:
+        if self.displacement is None:
+            return block
+        if self.displacement not in block.grid.point_data:
+            raise SourceError(f"{file}: displacement: no node has {self.displacement!r}")
+        by = np.asarray(block.grid.point_data[self.displacement], np.float64)
+        if by.ndim != 2 or by.shape[1] not in _VECTOR_SIZES:
+            raise SourceError(f"{file}: displacement: {self.displacement!r} is no vector")
+        points = np.array(block.grid.points, np.float64)
+        points[:, : by.shape[1]] += by
+        grid = block.grid.copy(deep=False)
+        grid.points = points
+        return Block(block.names, grid, block.sets)
+
+    def _found(self, blocks: Sequence[Block], file: Path) -> dict[str, str]:
+        """The file's fields by the names of a scene; a vector of velocity is both components."""
+        sizes = fields_of(blocks)
+        for ours, theirs in self.names.items():
+            _check_size(file, ours, theirs, sizes)
+        fitting = {name: size for name, size in sizes.items() if size not in _TENSOR_SIZES}
+        given = self.names
+        vectors = [name for name, size in fitting.items() if size in _VECTOR_SIZES]
+        scalars = [name for name, size in fitting.items() if size not in _VECTOR_SIZES]
+        known = [name for name in READABLE if name not in _COMPONENTS]
+        if not {_VECTOR, *_COMPONENTS} & set(given) and self.placement.axes == (0, 1):
+            known += _COMPONENTS
+        try:
+            found = match_names(sizes, given, ())
+            found |= match_names(scalars, {k: v for k, v in given.items() if v in scalars}, known)
+            if not set(_COMPONENTS) & set(given):
+                found |= match_names(
+                    vectors, {k: v for k, v in given.items() if v in vectors}, (_VECTOR,)
+                )
+        except SourceError as error:
+            raise SourceError(f"{file}: {error}") from None
+        if _VECTOR in found:
+            found |= dict.fromkeys(_COMPONENTS, found.pop(_VECTOR))
+        elif not set(_COMPONENTS) <= set(found):
+            found = {ours: theirs for ours, theirs in found.items() if ours not in _COMPONENTS}
+        return found
+
+    def _flat(
+        self,
+        reader: MeshReader,
+        number: int,
+        blocks: Sequence[Block] | None,
+        found: Mapping[str, str],
+    ) -> FlatMesh:
+        file = reader.file(number)
+        blocks = blocks or self._read(reader, number)
+        missing = set(found.values()) - set(fields_of(blocks))
+        if missing:
+            name = sorted(missing)[0]
+            raise SourceError(f"{file}: frame {number} has no field {name!r}, the first one has")
+        section = self.section
+        if isinstance(section, float | int):
+            section = section / self.units.length.scale
+        try:
+            with mesh_vtk.reading(file):
+                return flatten(blocks, found.values(), self._tool(blocks), self.placement, section)
+        except SourceError as error:
+            raise error if str(file) in str(error) else SourceError(f"{file}: {error}") from None
+
+    def _tool(self, blocks: Sequence[Block]) -> list[NDArray[np.bool_]]:
+        """Which elements of each block are of the tool."""
+        parts = [_parts(block, self.part_field) for block in blocks]
+        known = {name for block in parts for name in block}
+        for name in self.tool_parts:
+            if name not in known:
+                listed = ", ".join(sorted(known)) or "none"
+                raise SourceError(f"tool_parts: there is no part {name!r}, it has {listed}")
+        return [
+            np.any(
+                [block[name] for name in self.tool_parts if name in block]
+                or [np.zeros(grid.n_cells, np.bool_)],
+                axis=0,
+            )
+            for block, grid in zip(parts, (block.grid for block in blocks), strict=True)
+        ]
+
+    def _times(self, reader: MeshReader) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+        count = reader.count
+        if self.times:
+            if len(self.times) != count:
+                raise SourceError(
+                    f"{self.path}: times: {len(self.times)} for {count} frames, expected {count}"
+                )
+            return np.array(self.times), ()
+        if self.interval is not None:
+            return np.arange(count) * self.interval, ()
+        if reader.times is not None:
+            return np.array(reader.times) * self.units.time.scale, ()
+        assumed = ("no times in the files: frames are 1 s apart",) if count > 1 else ()
+        return np.arange(count, dtype=np.float64), assumed
+
+    def _assumed(self, blocks: Sequence[Block], found: Mapping[str, str]) -> tuple[str, ...]:
+        sentences = []
+        sizes = fields_of(blocks)
+        for ours, theirs in found.items():
+            if ours not in _COMPONENTS and sizes[theirs] > 1:
+                sentences.append(
+                    f"{ours}: {theirs} has {sizes[theirs]} values for each place, such as those "
+                    "of integration points: their mean is taken"
+                )
+        names = {simple(name): name for name in sizes}
+        moving = [names[name] for name in ("displacement", "u") if name in names]
+        if moving and self.displacement is None and not _is_exodus(self.path):
+            sentences.append(f"positions are those of the file, {moving[0]} is not added to them")
+        if any("STATUS" in block.grid.cell_data for block in blocks):
+            sentences.append("elements whose STATUS is 0 are deleted")
+        if not self.tool_parts:
+            sentences.append("no part is named as tool: all that is there is the workpiece")
+        return tuple(sentences)
+
+    def _extent(
+        self, reader: MeshReader, meshes: Sequence[FlatMesh]
+    ) -> tuple[float, float, float, float]:
+        used = [mesh.points[np.unique(mesh.triangles)] for mesh in meshes]
+        placed = self.placement.place(np.concatenate(used) * self.units.length.scale)
+        placed = placed[np.isfinite(placed).all(axis=1)]
+        if not len(placed):
+            raise SourceError(f"{reader.file(0)}: no element has finite positions")
+        (left, bottom), (right, top) = placed.min(axis=0), placed.max(axis=0)
+        return float(left), float(right), float(bottom), float(top)
+
+    def _sampled(
+        self, mesh: FlatMesh, time: float, raster: Raster, found: Mapping[str, str]
+    ) -> SampledFrame:
+        """The mesh on the raster; a field may be of nodes in some blocks, of elements in others."""
+        names = [name for name in READABLE if name in found]
+        nodes = [name for name in names if found[name] in mesh.of_nodes]
+        elements = [name for name in names if found[name] in mesh.of_elements]
+        sampled = rasterise(
+            raster,
+            self.placement.place(mesh.points * self.units.length.scale),
+            mesh.triangles,
+            _columns([self._values(name, mesh.of_nodes[found[name]]) for name in nodes]),
+            _columns([self._values(name, mesh.of_elements[found[name]]) for name in elements]),
+            self._height(mesh) if self.section == "facing" else None,
+        )
+        fields: dict[str, NDArray[np.float32]] = {}
+        for name, values in zip((*nodes, *elements), sampled.fields, strict=True):
+            fields[name] = np.fmax(fields[name], values) if name in fields else values
+        tool = np.append(mesh.tool, False)[sampled.element]
+        material = np.where(tool, Material.TOOL, Material.WORKPIECE)
+        material[sampled.element == NOTHING] = Material.VOID
+        return SampledFrame(time, fields, material.astype(np.uint8))
+
+    def _values(self, name: str, values: NDArray[np.float64]) -> NDArray[np.float32]:
+        """One value for each place, in SI."""
+        unit = self.units.of(name)
+        if name not in _COMPONENTS:
+            return unit.to_si(values.mean(axis=1))
+        along = _COMPONENTS.index(name)
+        if values.shape[1] == 1:
+            return unit.to_si(values[:, 0] * self.placement.signs[along])
+        vectors = np.zeros((len(values), 3))
+        vectors[:, : values.shape[1]] = values
+        return unit.to_si(self.placement.turn(vectors)[:, along])
+
+    def _height(self, mesh: FlatMesh) -> NDArray[np.float64]:
+        """How far the nodes are toward the camera; x, y and this are right-handed."""
+        axes = (*self.placement.axes, self.placement.depth)
+        parity = float(np.linalg.det(np.eye(3)[list(axes)]))
+        sign = np.prod(self.placement.signs) * parity
+        height: NDArray[np.float64] = sign * mesh.points[:, self.placement.depth]
+        return height
+
+
+def _check_size(file: Path, ours: str, theirs: str, sizes: Mapping[str, int]) -> None:
+    size = sizes.get(theirs, 1)
+    if ours == _VECTOR:
+        if theirs in sizes and size not in _VECTOR_SIZES:
+            raise SourceError(
+                f"{file}: fields: velocity: {theirs!r} has {size} components, expected 2 or 3"
+            )
+    elif size in (*_VECTOR_SIZES, *_TENSOR_SIZES):
+        raise SourceError(
+            f"{file}: fields: {ours}: {theirs!r} has {size} components, expected one value"
+        )
+
+
+def _columns(columns: Sequence[NDArray[np.float32]]) -> NDArray[np.float64] | None:
+    return np.stack(columns, axis=1).astype(np.float64) if columns else None
+
+
+def _parts(block: Block, part_field: str | None) -> dict[str, NDArray[np.bool_]]:
+    """Elements of a block by the names that a part may be called."""
+    grid = block.grid
+    parts = dict(block.sets)
+    for name in block.names:
+        parts[name] = np.ones(grid.n_cells, np.bool_)
+    for name in list(grid.cell_data.keys()):
+        if name == part_field or (part_field is None and simple(name) in _PART_FIELDS):
+            values = np.asarray(grid.cell_data[name])
+            if values.ndim == 1 and np.isfinite(values).all():
+                for number in np.unique(values)[:_MOST_PARTS]:
+                    parts[f"{number:g}"] = values == number
+    return parts
+
+
+_MOST_PARTS: Final = 1000
+
+
+def _is_exodus(path: Path) -> bool:
+    """Its reader adds the displacement by itself."""
+    return mesh_vtk.KINDS.get(path.suffix.lower()) == "Exodus II"

@@ -1,0 +1,159 @@
+"""Meshes of LS-DYNA: d3plot files, read by lasso-python."""
+
+import logging
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.io.sources.mesh_block import Block
+from chipglow.io.sources.mesh_reader import MeshReader
+from chipglow.io.sources.source import SourceError
+
+_FAMILIES: Final = ("shell", "solid")
+_AVERAGED: Final = ("effective_plastic_strain", "thermal_data")
+_TRIANGLE, _QUAD, _TETRA, _HEXA = 5, 9, 10, 12
+
+
+class DynaReader(MeshReader):
+    """The states of a d3plot file and of those that follow it, ``d3plot01`` and so on.
+
+    Parameters
+    ----------
+    file : Path
+        The first file.
+
+    Raises
+    ------
+    SourceError
+        If it is no d3plot, or lasso-python is missing.
+    """
+
+    def __init__(self, file: Path) -> None:
+        if not file.is_file():
+            raise FileNotFoundError(f"{file}: no such file")
+        self._file = file
+        arrays = self._arrays(state_array_filter=["timesteps"]).arrays
+        self.times = tuple(float(time) for time in arrays.get("timesteps", ()))
+        self.count = len(self.times)
+        self.kind = f"mesh, LS-DYNA d3plot with {self.count} states"
+        if not self.count:
+            raise SourceError(f"{file}: has no state, expected a d3plot with one or more")
+
+    def file(self, number: int) -> Path:
+        """The first file of the d3plot."""
+        return self._file
+
+    def read(self, number: int) -> tuple[Block, ...]:
+        """The mesh of a state; see `MeshReader.read`."""
+        plot = self._arrays(state_filter={number})
+        try:
+            blocks = tuple(_blocks(plot.arrays))
+        except (KeyError, IndexError, ValueError) as error:
+            raise self._damaged(error) from error
+        if not blocks:
+            raise SourceError(f"{self._file}: has no shells or solids, expected a mesh")
+        return blocks
+
+    def _arrays(self, **filters: Any) -> Any:
+        try:
+            from lasso.dyna import D3plot
+        except ImportError:
+            raise SourceError(
+                f"{self._file}: needs lasso-python, expected pip install 'chipglow[dyna]'"
+            ) from None
+        logging.getLogger("lasso").setLevel(logging.CRITICAL)
+        if self._file.stat().st_size == 0:
+            raise SourceError(f"{self._file}: is empty, expected an LS-DYNA d3plot")
+        try:
+            return D3plot(str(self._file), buffered_reading=True, **filters)
+        except (OSError, MemoryError):
+            raise
+        except Exception as error:  # lasso raises what it likes for what is no d3plot
+            raise self._damaged(error) from error
+
+    def _damaged(self, error: Exception) -> SourceError:
+        said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+        return SourceError(
+            f"{self._file}: cannot be read as LS-DYNA d3plot, it is damaged or of another kind "
+            f"({said})"
+        )
+
+
+def _blocks(arrays: Mapping[str, Any]) -> Iterator[Block]:
+    import pyvista
+
+    points, of_nodes = _of_nodes(arrays)
+    for family in _FAMILIES:
+        prefix = f"element_{family}_"
+        nodes = arrays.get(prefix + "node_indexes")
+        if nodes is None or not len(nodes):
+            continue
+        of_elements = _of_elements(arrays, prefix)
+        alive = of_elements.pop("is_alive", np.ones(len(nodes))) > 0
+        cells, kinds = _cells(np.asarray(nodes)[alive], family)
+        grid = pyvista.UnstructuredGrid(cells, kinds, points)
+        for name, values in of_nodes.items():
+            grid.point_data[name] = values
+        for name, values in of_elements.items():
+            grid.cell_data[name] = values[alive]
+        yield Block((family,), grid, _parts(arrays, prefix, alive))
+
+
+def _of_nodes(arrays: Mapping[str, Any]) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
+    initial = arrays["node_coordinates"]
+    # What lasso calls displacement is where the nodes are.
+    points = arrays["node_displacement"][0] if "node_displacement" in arrays else initial
+    of_nodes = {}
+    for name in ("temperature", "velocity"):
+        if f"node_{name}" in arrays:
+            values = arrays[f"node_{name}"][0]
+            layered = name == "temperature" and values.ndim > 1
+            of_nodes[name] = values.mean(axis=1) if layered else values
+    return np.asarray(points, np.float64), of_nodes
+
+
+def _of_elements(arrays: Mapping[str, Any], prefix: str) -> dict[str, NDArray[Any]]:
+    """Fields of elements: integration points and layers of an element are averaged."""
+    found: dict[str, NDArray[Any]] = {}
+    for name in _AVERAGED:
+        if prefix + name in arrays:
+            values = arrays[prefix + name][0]
+            found[name] = values.reshape(len(values), -1).mean(axis=1)
+    if prefix + "is_alive" in arrays:
+        found["is_alive"] = arrays[prefix + "is_alive"][0]
+    for name in ("history_vars", "history_variables"):
+        if prefix + name in arrays:
+            values = arrays[prefix + name][0]
+            values = values.reshape(len(values), -1, values.shape[-1]).mean(axis=1)
+            for at in range(values.shape[1]):
+                found[f"history_variable_{at + 1}"] = values[:, at]
+    return found
+
+
+def _cells(nodes: NDArray[Any], family: str) -> tuple[NDArray[Any], NDArray[np.uint8]]:
+    """Cells as VTK wants them; triangles and tetrahedra repeat their last node."""
+    full, less, least = (_QUAD, _TRIANGLE, 3) if family == "shell" else (_HEXA, _TETRA, 4)
+    repeated = (nodes[:, least:] == nodes[:, least - 1 : least]).all(axis=1)
+    counts = np.where(repeated, least, nodes.shape[1])
+    table = np.concatenate((counts[:, None], nodes), axis=1)
+    used = np.arange(table.shape[1]) <= counts[:, None]
+    return table[used], np.where(repeated, less, full).astype(np.uint8)
+
+
+def _parts(
+    arrays: Mapping[str, Any], prefix: str, alive: NDArray[np.bool_]
+) -> dict[str, NDArray[np.bool_]]:
+    """Which elements are of a part, by its number and its title."""
+    index = arrays.get(prefix + "part_indexes")
+    if index is None:
+        return {}
+    ids = arrays.get("part_titles_ids", arrays.get("part_ids", np.unique(index) + 1))
+    titles = arrays.get("part_titles", ())
+    parts = {str(int(number)): index[alive] == at for at, number in enumerate(ids)}
+    for at, title in enumerate(titles):
+        text = title.decode(errors="replace") if isinstance(title, bytes) else str(title)
+        parts.setdefault(text.strip(), index[alive] == at)
+    return parts

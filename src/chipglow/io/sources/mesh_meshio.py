@@ -1,0 +1,97 @@
+"""Meshes in the formats that meshio reads and VTK does not."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.io.sources.mesh_block import Block
+from chipglow.io.sources.mesh_reader import MeshReader
+from chipglow.io.sources.source import SourceError
+
+KINDS: Final[Mapping[str, str]] = {
+    ".msh": "Gmsh",
+    ".med": "MED",
+    ".avs": "AVS-UCD",
+    ".bdf": "Nastran",
+    ".nas": "Nastran",
+    ".fem": "Nastran",
+    ".h5m": "MOAB",
+}
+"""Formats by the ending of a file's name."""
+
+
+class MeshioReader(MeshReader):
+    """One file for each frame.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        The files.
+    """
+
+    times = None
+
+    def __init__(self, files: Sequence[Path]) -> None:
+        self._files = files
+        self.count = len(files)
+        kind = KINDS[files[0].suffix.lower()]
+        self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of {kind}"
+
+    def file(self, number: int) -> Path:
+        """The file of a frame."""
+        return self._files[number]
+
+    def read(self, number: int) -> tuple[Block, ...]:
+        """The mesh of a frame; see `MeshReader.read`."""
+        file = self._files[number]
+        if not file.is_file():
+            raise FileNotFoundError(f"{file}: no such file")
+        try:
+            import meshio
+            import pyvista
+        except ImportError:
+            raise SourceError(
+                f"{file}: needs meshio and PyVista, expected pip install 'chipglow[mesh]'"
+            ) from None
+        try:
+            mesh = meshio.read(file)
+            grid = pyvista.from_meshio(mesh)
+        except (OSError, MemoryError) as error:
+            if isinstance(error, FileNotFoundError | MemoryError):
+                raise
+            raise _damaged(file, error) from error
+        except (Exception, SystemExit) as error:  # meshio ends the program for some files
+            raise _damaged(file, error) from error
+        if not grid.n_cells:
+            raise SourceError(f"{file}: has no elements, expected a mesh")
+        return (Block((), grid, _sets(mesh, grid.n_cells)),)
+
+
+def _damaged(file: Path, error: BaseException) -> SourceError:
+    said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+    return SourceError(
+        f"{file}: cannot be read as {KINDS[file.suffix.lower()]}, it is damaged or of another "
+        f"kind ({said})"
+    )
+
+
+def _sets(mesh: Any, count: int) -> dict[str, NDArray[np.bool_]]:
+    """Named sets of elements: those of the file, Gmsh's physical groups, MED's families."""
+    first = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
+    sets: dict[str, NDArray[np.bool_]] = {}
+    for name, members in mesh.cell_sets.items():
+        sets[name] = np.zeros(count, np.bool_)
+        for at, inside in zip(first, members, strict=False):
+            if inside is not None:
+                sets[name][at + np.asarray(inside, np.int64)] = True
+    for field, names in (
+        ("gmsh:physical", {name: tag[0] for name, tag in mesh.field_data.items()}),
+        ("cell_tags", {n: tag for tag, all_ in getattr(mesh, "cell_tags", {}).items() for n in all_}),
+    ):
+        if field in mesh.cell_data:
+            tags = np.concatenate(mesh.cell_data[field])
+            sets |= {name: tags == tag for name, tag in names.items()}
+    return sets

@@ -1,0 +1,256 @@
+"""Meshes in the formats that VTK reads."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from chipglow.io.sources.mesh_block import Block, offsets_of
+from chipglow.io.sources.mesh_reader import MeshReader
+from chipglow.io.sources.source import SourceError
+
+KINDS: Final[Mapping[str, str]] = {
+    ".vtu": "VTK XML",
+    ".pvtu": "VTK XML",
+    ".vtp": "VTK XML",
+    ".vts": "VTK XML",
+    ".vtr": "VTK XML",
+    ".vti": "VTK XML",
+    ".vtm": "VTK XML multi-block",
+    ".vtmb": "VTK XML multi-block",
+    ".vtkhdf": "VTK HDF",
+    ".vtk": "VTK legacy",
+    ".pvd": "ParaView collection",
+    ".xdmf": "XDMF",
+    ".xmf": "XDMF",
+    ".e": "Exodus II",
+    ".ex2": "Exodus II",
+    ".exo": "Exodus II",
+    ".exii": "Exodus II",
+    ".case": "EnSight",
+    ".encas": "EnSight",
+    ".dat": "Tecplot ASCII",
+    ".tec": "Tecplot ASCII",
+    ".tp": "Tecplot ASCII",
+    ".cgns": "CGNS",
+    ".foam": "OpenFOAM",
+}
+"""Formats by the ending of a file's name."""
+
+_AS: Final[Mapping[str, str]] = {
+    ".xmf": ".xdmf", ".encas": ".case", ".tec": ".dat", ".tp": ".dat",
+}  # fmt: skip
+_SIZES: Final[Mapping[int, int]] = {
+    5: 3, 8: 4, 9: 4, 10: 4, 11: 8, 12: 8, 13: 6, 14: 5, 22: 6, 23: 8, 24: 10, 25: 20, 26: 15,
+    27: 13, 28: 9, 29: 27, 34: 7,
+}  # fmt: skip
+"""Nodes of VTK's types of elements."""
+
+_TECPLOT_BINARY: Final = b"#!TD"
+_HEAD: Final = 100_000
+_CLAIMS: Final = (
+    rb'NumberOf(?:Points|Cells|Verts|Lines|Polys)="(\d+)"',
+    rb"\n(?:POINTS|CELLS|POLYGONS|CELL_TYPES|POINT_DATA|CELL_DATA) +(\d+)",
+)
+_MOST_PER_BYTE: Final = 1100
+"""Deflate makes no more than 1032 bytes of one."""
+
+_TIME: Final = rb'Name="(?:TimeValue|TIME)"[^>]*RangeMin="([-+.eE\d]+)"'
+
+
+class VtkReader(MeshReader):
+    """One file for each frame, or one file with times in it.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        The files; with more than one each is a frame.
+
+    Raises
+    ------
+    SourceError
+        If a file cannot be read.
+    """
+
+    def __init__(self, files: Sequence[Path]) -> None:
+        self._files = files
+        self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of {_kind(files[0])}"
+        self._opened: Any = None
+        self.times = None
+        self.count = len(files)
+        if len(files) == 1:
+            self._opened = _opened(files[0])
+            self.times = _times_inside(self._opened, files[0])
+            self.count = len(self.times) if self.times else 1
+            if not self.times:
+                self._opened = None
+        if self.times is None:
+            times = [_time_in_head(file) for file in files]
+            found = tuple(time for time in times if time is not None)
+            self.times = found if len(found) == len(files) else None
+
+    def file(self, number: int) -> Path:
+        """The file that holds a frame."""
+        return self._files[min(number, len(self._files) - 1)]
+
+    def read(self, number: int) -> tuple[Block, ...]:
+        """The mesh of a frame; see `MeshReader.read`."""
+        file = self.file(number)
+        with reading(file):
+            reader = self._opened
+            if reader is None:
+                reader = _opened(file)
+            else:
+                assert self.times is not None
+                reader.set_active_time_point(number)
+            data = reader.read()
+        # What a reader left half done may crash what comes next.
+        with reading(file):
+            blocks = tuple(_blocks(file, data, ()))
+        for block in blocks:
+            _check_grid(file, block.grid)
+        if not any(block.grid.n_cells for block in blocks):
+            raise SourceError(f"{file}: has no elements, expected a mesh")
+        return blocks
+
+
+@contextmanager
+def reading(file: Path) -> Iterator[None]:
+    """Turn all that VTK says, to the console or by raising, into one error.
+
+    Raises
+    ------
+    SourceError
+        If VTK reports an error.
+    """
+    try:
+        from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
+    except ImportError:
+        raise SourceError(
+            f"{file}: needs PyVista, expected pip install 'chipglow[mesh]'"
+        ) from None
+    window, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
+    loud = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    vtkOutputWindow.SetInstance(window)
+    raised: Exception | None = None
+    try:
+        yield
+    except (SourceError, OSError, MemoryError):
+        raise
+    except Exception as error:  # PyVista raises what it likes
+        raised = error
+    finally:
+        vtkOutputWindow.SetInstance(before)
+        vtkLogger.SetStderrVerbosity(loud)
+    said = _error_in(window.GetOutput() or "")
+    if said or raised:
+        text = said or f"{type(raised).__name__}: {raised}"
+        raise SourceError(
+            f"{file}: cannot be read as {_kind(file)}, it is damaged or of another kind "
+            f"({' '.join(text.split())[:200]})"
+        ) from raised
+
+
+def _error_in(text: str) -> str:
+    found = re.search(r"ERROR[^\n]*\n(?:[^\n]*?\): )?(.+?)(?:\n\n|\Z)", text, re.DOTALL)
+    return found.group(1) if found else ""
+
+
+def _kind(file: Path) -> str:
+    return KINDS.get(file.suffix.lower(), "a mesh")
+
+
+def _opened(file: Path) -> Any:
+    if not file.is_file():
+        raise FileNotFoundError(f"{file}: no such file")
+    _check_head(file)
+    with reading(file):
+        import pyvista
+
+        suffix = file.suffix.lower()
+        return pyvista.get_reader(str(file), force_ext=_AS.get(suffix, suffix))
+
+
+def _check_head(file: Path) -> None:
+    with file.open("rb") as stream:
+        head = stream.read(_HEAD)
+    size = file.stat().st_size
+    if size == 0 and file.suffix.lower() != ".foam":
+        raise SourceError(f"{file}: is empty, expected {_kind(file)}")
+    if head.startswith(_TECPLOT_BINARY):
+        raise SourceError(f"{file}: is a binary Tecplot file, expected an ASCII one")
+    claims = [int(digits[:30]) for claim in _CLAIMS for digits in re.findall(claim, head)]
+    if max(claims, default=0) > _MOST_PER_BYTE * size:
+        raise SourceError(f"{file}: says it has {max(claims)} values in {size} bytes")
+
+
+def _times_inside(reader: Any, file: Path) -> tuple[float, ...] | None:
+    from pyvista import TimeReader
+
+    if not isinstance(reader, TimeReader):
+        return None
+    with reading(file):
+        times = tuple(float(time) for time in reader.time_values)
+    return times or None
+
+
+def _time_in_head(file: Path) -> float | None:
+    with file.open("rb") as stream:
+        found = re.search(_TIME, stream.read(_HEAD))
+    return float(found.group(1)) if found else None
+
+
+def _blocks(file: Path, data: Any, path: tuple[str, ...]) -> Iterator[Block]:
+    """All grids in a tree of blocks."""
+    import pyvista
+
+    if data is None:
+        return
+    if isinstance(data, pyvista.MultiBlock):
+        for number in range(data.n_blocks):
+            name = data.get_block_name(number) or f"block {number}"
+            yield from _blocks(file, data[number], (*path, name))
+    elif isinstance(data, pyvista.PartitionedDataSet):
+        for number in range(data.n_partitions):
+            yield from _blocks(file, data[number], (*path, str(number)))
+    elif isinstance(data, pyvista.DataSet):
+        names = (path[-1], "/".join(path)) if path else ()
+        if isinstance(data, pyvista.PolyData):
+            _check_polygons(file, data)
+        is_grid = isinstance(data, pyvista.UnstructuredGrid)
+        yield Block(names, data if is_grid else data.cast_to_unstructured_grid())
+
+
+def _check_polygons(file: Path, surface: Any) -> None:
+    for cells in (surface.GetVerts(), surface.GetLines(), surface.GetPolys(), surface.GetStrips()):
+        low, high = cells.GetConnectivityArray().GetRange() if cells.GetNumberOfCells() else (0, 0)
+        if not (0 <= low and high < max(surface.n_points, 1)):
+            raise SourceError(f"{file}: polygons with nodes that do not exist, it is damaged")
+
+
+def _check_grid(file: Path, grid: Any) -> None:
+    """Find what would make VTK read beyond its arrays."""
+    offset = offsets_of(grid)
+    nodes = np.asarray(grid.cell_connectivity)
+    kinds = np.asarray(grid.celltypes)
+    sizes = np.diff(offset)
+    if len(offset) != len(kinds) + 1 or (sizes < 0).any() or offset[-1] != len(nodes):
+        raise SourceError(f"{file}: its tables of elements do not fit together, it is damaged")
+    if nodes.size and not (0 <= nodes.min() and nodes.max() < grid.n_points):
+        raise SourceError(
+            f"{file}: elements with the nodes {nodes.min()} to {nodes.max()}, expected 0 to "
+            f"{grid.n_points - 1}"
+        )
+    expected = np.array([_SIZES.get(kind, 0) for kind in range(256)])[kinds]
+    if ((expected > 0) & (sizes != expected)).any():
+        raise SourceError(f"{file}: elements with a wrong number of nodes, it is damaged")
+    for data, count in ((grid.point_data, grid.n_points), (grid.cell_data, grid.n_cells)):
+        for name in list(data.keys()):
+            if len(data[name]) != count:
+                raise SourceError(
+                    f"{file}: {name!r} has {len(data[name])} values, expected {count}"
+                )
