@@ -119,7 +119,7 @@ def _combine(
         total = result if node < corners else middles
         total += weights[:, node, None] * of_nodes[elements[:, node]][:, None, :]
     result += middles
-    return result.reshape(-1, of_nodes.shape[1])
+    return result.reshape(len(elements) * len(weights), of_nodes.shape[1])
 
 
 def _lattice(three: bool) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

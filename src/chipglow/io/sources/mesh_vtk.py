@@ -155,7 +155,9 @@ def reading(file: Path) -> Iterator[None]:
         ) from raised
 
 
-def _error_in(text: str) -> str:
+def _error_in(output: str | bytes) -> str:
+    # VTK gives bytes for what is no UTF-8.
+    text = output.decode(errors="replace") if isinstance(output, bytes) else output
     found = re.search(r"ERROR[^\n]*\n(?:[^\n]*?\): )?(.+?)(?:\n\n|\Z)", text, re.DOTALL)
     return found.group(1) if found else ""
 

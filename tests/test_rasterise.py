@@ -1,0 +1,225 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import Delaunay
+
+from chipglow.scene import Raster
+from chipglow.scene.rasterise import NOTHING, rasterise
+from chipglow.scene.triangulate import NODES, triangulate
+
+RASTER = Raster(left=-2.0, top=7.0, spacing=0.25, rows=32, columns=40)
+X, Y = np.meshgrid(RASTER.x, RASTER.y)
+
+
+def linear(points):
+    return 300.0 + 7.0 * points[..., 0] - 3.0 * points[..., 1]
+
+
+def mesh_of(seed, count, on_samples):
+    """Delaunay's triangles; on_samples puts nodes and edges on the centres of samples."""
+    random = np.random.default_rng(seed)
+    points = random.uniform((-1.5, -0.5), (7.5, 6.5), (count, 2))
+    if on_samples:
+        points = np.unique(np.round(points * 4 - 0.5) / 4 + 0.125, axis=0)
+    return points, Delaunay(points).simplices
+
+
+meshes = st.builds(
+    mesh_of, st.integers(0, 10**6), st.integers(8, 60), st.booleans()
+)
+
+
+def coverings(points, triangles):
+    """How many triangles cover each sample, each drawn alone."""
+    alone = [rasterise(RASTER, points, [triangle]).element != NOTHING for triangle in triangles]
+    return np.sum(alone, axis=0)
+
+
+@settings(max_examples=40, deadline=None)
+@given(meshes, st.integers(0, 10**6))
+def test_a_linear_field_is_exact_whatever_the_triangles(mesh, seed):
+    points, triangles = mesh
+    turned = np.random.default_rng(seed).permuted(triangles, axis=1)
+    sampled = rasterise(RASTER, points, turned, linear(points))
+    inside = sampled.element != NOTHING
+    expected = linear(np.stack((X, Y), axis=-1))
+    # float32 holds 24 bits: 300 to 2e-5.
+    np.testing.assert_allclose(sampled.fields[0][inside], expected[inside], atol=4e-5)
+    assert np.isnan(sampled.fields[0][~inside]).all()
+
+
+@settings(max_examples=25, deadline=None)
+@given(meshes)
+def test_every_sample_of_the_hull_is_covered_once_and_none_outside(mesh):
+    points, triangles = mesh
+    counts = coverings(points, triangles)
+    assert counts.max() <= 1
+    hull = Delaunay(points)
+    inside = hull.find_simplex(np.stack((X - 1e-9, Y + 1e-9), axis=-1)) >= 0
+    near = np.zeros_like(inside)
+    for dx, dy in ((1e-6, 0), (-1e-6, 0), (0, 1e-6), (0, -1e-6)):
+        near |= (hull.find_simplex(np.stack((X + dx, Y + dy), axis=-1)) >= 0) != inside
+    np.testing.assert_array_equal((counts == 1)[~near], inside[~near])
+
+
+def test_samples_on_shared_edges_and_nodes_belong_to_one_triangle():
+    # A fan around a sample's centre: 8 edges run through centres, all meet in one.
+    angle = np.arange(8) * np.pi / 4
+    rim = np.round(np.stack((np.cos(angle), np.sin(angle)), axis=1)) * 2.0
+    points = np.concatenate(([(0.0, 0.0)], rim)) + (2.125, 3.125)
+    triangles = [(0, 1 + k, 1 + (k + 1) % 8) for k in range(8)]
+    counts = coverings(points, triangles)
+    assert counts.max() == 1
+    # Half-open: the square of 4 by 4 holds 16 by 16 samples, with two of its sides.
+    assert counts.sum() == 256
+
+
+def test_area_covered_is_that_of_the_mesh():
+    fine = Raster(left=0.0, top=1.0, spacing=1 / 1000, rows=1000, columns=1000)
+    points, triangles = mesh_of(3, 40, on_samples=False)
+    points = (points + (1.5, 0.5)) / 10
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    area = _area(a, b, c)
+    element = rasterise(fine, points, triangles).element
+    counted = np.bincount(element[element != NOTHING], minlength=len(triangles)) * 1e-6
+    # A row's count of samples is off by less than 1: an error of a sample for each row.
+    height = np.ptp(points[triangles][:, :, 1], axis=1)
+    assert (np.abs(counted - area) <= (height * 1000 + 2) * 1e-6).all()
+    assert abs(counted.sum() - area.sum()) < 1e-3
+
+
+def _area(a, b, c):
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    return np.abs(ux * vy - uy * vx) / 2
+
+
+def test_elements_have_their_own_value_without_blending():
+    points, triangles = mesh_of(5, 30, on_samples=False)
+    values = np.random.default_rng(1).uniform(0, 1, (len(triangles), 2)).astype(np.float32)
+    sampled = rasterise(RASTER, points, triangles, linear(points), values)
+    inside = sampled.element != NOTHING
+    assert sampled.fields.shape == (3, *RASTER.shape)
+    np.testing.assert_array_equal(sampled.fields[1:, inside].T, values[sampled.element[inside]])
+
+
+BAD = [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e120]
+
+
+@pytest.mark.parametrize("bad", BAD)
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_position_that_is_none_hides_its_triangle_only(bad, axis):
+    points = np.array([(0.0, 0.0), (2.0, 0.0), (0.0, 2.0), (5.0, 5.0)])
+    points[3, axis] = bad
+    sampled = rasterise(RASTER, points, [(0, 1, 2), (1, 3, 2), (3, 3, 3)], np.ones(4))
+    assert set(np.unique(sampled.element)) == {NOTHING, 0}
+
+
+def test_triangles_without_area_and_far_away_cover_nothing():
+    points = np.array([(0.0, 0.0), (1.0, 1.0), (3.0, 3.0), (1e9, 0.0), (1e9, 1.0), (2e9, 0.5)])
+    sampled = rasterise(RASTER, points, [(0, 1, 2), (0, 0, 1), (3, 4, 5)], np.ones(6))
+    assert (sampled.element == NOTHING).all()
+
+
+def test_a_triangle_much_larger_than_the_raster_fills_it():
+    points = np.array([(-1e7, -1e7), (1e7, -1e7), (0.0, 1e7)])
+    sampled = rasterise(RASTER, points, [(0, 1, 2)], linear(points))
+    assert (sampled.element == 0).all()
+    # Weights are rounded to 1e-16, values of the nodes are 1e8.
+    np.testing.assert_allclose(sampled.fields[0], linear(np.stack((X, Y), -1)), atol=1e-4)
+
+
+def test_values_in_a_needle_stay_between_those_of_its_nodes():
+    random = np.random.default_rng(0)
+    base = random.uniform(0, 6, (500, 1, 2))
+    points = (base + random.normal(0, 1, (500, 1, 2)) * [[[0.0], [1.0], [2.0]]]).reshape(-1, 2)
+    points += random.normal(0, 1e-15, points.shape)
+    values = random.uniform(0.0, 1.0, len(points))
+    triangles = np.arange(len(points)).reshape(-1, 3)
+    fields = rasterise(RASTER, points, triangles, values).fields
+    assert np.nanmin(np.append(fields, 0.5)) >= 0.0
+    assert np.nanmax(np.append(fields, 0.5)) <= 1.0
+
+
+def test_the_highest_triangle_is_seen():
+    points = np.array([(0.0, 0.0), (6.0, 0.0), (0.0, 6.0)] * 2)
+    heights = [0.0, 2.0, 0.0, 1.0, 0.0, 1.0]
+    sampled = rasterise(RASTER, points, [(0, 1, 2), (3, 4, 5)], height=heights)
+    inside = sampled.element != NOTHING
+    first = 2.0 * X / 6.0 > 1.0 - X / 6.0
+    np.testing.assert_array_equal(sampled.element[inside] == 0, first[inside])
+    assert first[inside].any() and not first[inside].all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (([(0, 0, 0)], [(0, 0, 0)]), "points: shape"),
+        (([(0, 0)], [(0, 0)]), "triangles: shape"),
+        (([(0, 0)], [(0, 0, 1)]), "expected 0 to 0"),
+        (([(0, 0)], [(0, -1, 0)]), "nodes -1 to 0"),
+        (([(0, 0)], [(0, 0, 0)], [1.0, 2.0]), "node_values: shape"),
+    ],
+)
+def test_shapes_that_do_not_fit_are_refused(arguments, said):
+    with pytest.raises(ValueError, match=said):
+        rasterise(RASTER, *arguments)
+
+
+REFERENCE = {
+    "triangle6": [(0, 0), (1, 0), (0, 1), (0.5, 0), (0.5, 0.5), (0, 0.5)],
+    "quad8": [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5)],
+}
+REFERENCE["quad9"] = [*REFERENCE["quad8"], (0.5, 0.5)]
+
+
+def patch(shape, count):
+    """A square of count by count elements that share their nodes, as points and elements."""
+    corners = np.stack(np.meshgrid(np.arange(count), np.arange(count)), -1).reshape(-1, 1, 2)
+    inside = np.array(REFERENCE[shape])
+    if shape == "triangle6":
+        inside = np.concatenate((inside, 1.0 - inside))
+    every = ((corners + inside) / count).reshape(-1, 2)
+    points, number = np.unique(np.round(every, 12), axis=0, return_inverse=True)
+    return points, number.reshape(-1, NODES[shape])
+
+
+@pytest.mark.parametrize("shape", REFERENCE)
+def test_quadratic_elements_converge_with_the_square_and_keep_the_stated_error(shape):
+    raster = Raster(left=0.0, top=1.0, spacing=0.01, rows=100, columns=100)
+    x = np.broadcast_to(raster.x, raster.shape)
+    errors = []
+    for count in (1, 2, 4):
+        points, elements = patch(shape, count)
+        # Bent along x only, so each element's own field is the parabola itself.
+        pieces = triangulate(shape, points, points[:, :1] ** 2, elements)
+        sampled = rasterise(raster, pieces.points, pieces.triangles, pieces.values)
+        assert (sampled.element != NOTHING).all()
+        errors.append(np.abs(sampled.fields[0] - x**2).max())
+    # f'' is 2: 2 / 128 for an edge of 1; samples miss the worst place by a little.
+    assert 0.8 * 2 / 128 < errors[0] <= 2 / 128 + 1e-6
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.2)
+
+
+@pytest.mark.parametrize("shape", REFERENCE)
+def test_curved_elements_meet_without_a_gap(shape):
+    points, elements = patch(shape, 3)
+    bent = points + 0.02 * np.sin(7.0 * points[:, ::-1])
+    edge = ((points == 0) | (points == 1)).any(axis=1)
+    bent[edge] = points[edge]
+    pieces = triangulate(shape, bent * 4.0, np.empty((len(points), 0)), elements)
+    counts = coverings(pieces.points, pieces.triangles)
+    inside = (X > 0) & (X < 4) & (Y > 0) & (Y < 4)
+    assert (counts[inside] == 1).all()
+    assert (counts[~inside] == 0).all()
+    assert np.bincount(pieces.element).min() == np.bincount(pieces.element).max()
+
+
+def test_a_quad_is_split_where_it_is_shorter():
+    # An arrow's head: the long diagonal runs outside.
+    points = np.array([(0.0, 0.0), (4.0, 2.0), (0.0, 4.0), (1.0, 2.0)])
+    pieces = triangulate("quad", points, linear(points)[:, None], np.array([(0, 1, 2, 3)]))
+    counts = coverings(pieces.points, pieces.triangles)
+    assert counts.max() == 1
+    assert counts.sum() * RASTER.spacing**2 == pytest.approx(6.0, rel=0.05)
