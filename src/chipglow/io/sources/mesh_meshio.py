@@ -12,6 +12,9 @@ from chipglow.io.sources.mesh_reader import MeshReader
 from chipglow.io.sources.source import SourceError
 
 KINDS: Final[Mapping[str, str]] = {
+    ".dat": "Tecplot ASCII",
+    ".tec": "Tecplot ASCII",
+    ".plt": "Tecplot ASCII",
     ".msh": "Gmsh",
     ".med": "MED",
     ".avs": "AVS-UCD",
@@ -21,6 +24,9 @@ KINDS: Final[Mapping[str, str]] = {
     ".h5m": "MOAB",
 }
 """Formats by the ending of a file's name."""
+
+
+_TECPLOT_BINARY: Final = b"#!TD"
 
 
 class MeshioReader(MeshReader):
@@ -56,8 +62,12 @@ class MeshioReader(MeshReader):
             raise SourceError(
                 f"{file}: needs meshio and PyVista, expected pip install 'chipglow[mesh]'"
             ) from None
+        with file.open("rb") as stream:
+            if stream.read(4) == _TECPLOT_BINARY:
+                raise SourceError(f"{file}: is a binary Tecplot file, expected an ASCII one")
+        kind = "tecplot" if KINDS[file.suffix.lower()] == "Tecplot ASCII" else None
         try:
-            mesh = meshio.read(file)
+            mesh = meshio.read(file, file_format=kind)
             grid = pyvista.from_meshio(mesh)
         except (OSError, MemoryError) as error:
             if isinstance(error, FileNotFoundError | MemoryError):

@@ -81,11 +81,9 @@ def _check_gaps(path: Path, files: Sequence[Path]) -> None:
         return
     counts = [row[counted[-1]] for row in numbers]
     steps = [after - before for before, after in zip(counts, counts[1:], strict=False)]
-    usual = min(steps)
-    if steps.count(usual) * 2 < len(steps):
-        return
+    usual = max(sorted(set(steps)), key=steps.count)
     for file, count, step in zip(files, counts, steps, strict=False):
-        # The last step is often shorter; one that is twice the usual is a file that got lost.
+        # A step that is twice the usual one is a file that got lost; the last is often shorter.
         if step > usual and step % usual == 0:
             raise SourceError(
                 f"{path}: after {file.name} number {count + usual} is missing, expected the "

@@ -32,24 +32,18 @@ KINDS: Final[Mapping[str, str]] = {
     ".exii": "Exodus II",
     ".case": "EnSight",
     ".encas": "EnSight",
-    ".dat": "Tecplot ASCII",
-    ".tec": "Tecplot ASCII",
-    ".tp": "Tecplot ASCII",
     ".cgns": "CGNS",
     ".foam": "OpenFOAM",
 }
 """Formats by the ending of a file's name."""
 
-_AS: Final[Mapping[str, str]] = {
-    ".xmf": ".xdmf", ".encas": ".case", ".tec": ".dat", ".tp": ".dat",
-}  # fmt: skip
+_AS: Final[Mapping[str, str]] = {".xmf": ".xdmf", ".encas": ".case"}
 _SIZES: Final[Mapping[int, int]] = {
     5: 3, 8: 4, 9: 4, 10: 4, 11: 8, 12: 8, 13: 6, 14: 5, 22: 6, 23: 8, 24: 10, 25: 20, 26: 15,
     27: 13, 28: 9, 29: 27, 34: 7,
 }  # fmt: skip
 """Nodes of VTK's types of elements."""
 
-_TECPLOT_BINARY: Final = b"#!TD"
 _HEAD: Final = 100_000
 _CLAIMS: Final = (
     rb'NumberOf(?:Points|Cells|Verts|Lines|Polys)="(\d+)"',
@@ -58,6 +52,7 @@ _CLAIMS: Final = (
 _MOST_PER_BYTE: Final = 1100
 """Deflate makes no more than 1032 bytes of one."""
 
+_MOST_XDMF: Final = 10_000_000
 _TIME: Final = rb'Name="(?:TimeValue|TIME)"[^>]*RangeMin="([-+.eE\d]+)"'
 
 
@@ -102,14 +97,15 @@ class VtkReader(MeshReader):
         with reading(file):
             reader = self._opened
             if reader is None:
-                reader = _opened(file)
+                data = _data(_opened(file))
             else:
                 assert self.times is not None
-                reader.set_active_time_point(number)
-            data = reader.read()
+                data = _at_time(reader, number, self.times[number])
         # What a reader left half done may crash what comes next.
         with reading(file):
             blocks = tuple(_blocks(file, data, ()))
+        if _kind(file) == "XDMF":
+            blocks = _of_time_series(file, blocks)
         for block in blocks:
             _check_grid(file, block.grid)
         if not any(block.grid.n_cells for block in blocks):
@@ -173,6 +169,8 @@ def _opened(file: Path) -> Any:
     with reading(file):
         import pyvista
 
+        if _kind(file) == "XDMF":
+            return _opened_xdmf(file)
         suffix = file.suffix.lower()
         return pyvista.get_reader(str(file), force_ext=_AS.get(suffix, suffix))
 
@@ -183,21 +181,81 @@ def _check_head(file: Path) -> None:
     size = file.stat().st_size
     if size == 0 and file.suffix.lower() != ".foam":
         raise SourceError(f"{file}: is empty, expected {_kind(file)}")
-    if head.startswith(_TECPLOT_BINARY):
-        raise SourceError(f"{file}: is a binary Tecplot file, expected an ASCII one")
+    if _kind(file) == "XDMF":
+        _check_references(file)
     claims = [int(digits[:30]) for claim in _CLAIMS for digits in re.findall(claim, head)]
     if max(claims, default=0) > _MOST_PER_BYTE * size:
         raise SourceError(f"{file}: says it has {max(claims)} values in {size} bytes")
 
 
+def _check_references(file: Path) -> None:
+    """VTK crashes where the HDF5 file of an XDMF file is not there."""
+    with file.open("rb") as stream:
+        text = stream.read(_MOST_XDMF)
+    for name in sorted(set(re.findall(rb">\s*([^<>:\"]+\.(?:h5|hdf5)):", text))):
+        heavy = file.parent / name.decode(errors="replace").strip()
+        if not heavy.is_file():
+            raise SourceError(f"{file}: its data should be in {heavy.name}, which is not there")
+
+
+def _opened_xdmf(file: Path) -> Any:
+    """PyVista's own takes no file without times."""
+    from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
+
+    reader = vtkXdmfReader()
+    reader.SetFileName(str(file))
+    reader.UpdateInformation()
+    return reader
+
+
+def _of_time_series(file: Path, blocks: tuple[Block, ...]) -> tuple[Block, ...]:
+    """Without the grid that only lends its nodes to a time series beside it.
+
+    VTK gives it the fields of some time.
+    """
+    with file.open("rb") as stream:
+        grids = re.findall(rb"<Grid\b[^>]*>", stream.read(_MOST_XDMF))
+    series = [grid for grid in grids if b'CollectionType="Temporal"' in grid]
+    names = [re.search(rb'Name="([^"]*)"', grid) for grid in series]
+    wanted = {name.group(1).decode(errors="replace") for name in names if name}
+    kept = tuple(block for block in blocks if wanted & set("/".join(block.names).split("/")))
+    return kept or blocks
+
+
 def _times_inside(reader: Any, file: Path) -> tuple[float, ...] | None:
     from pyvista import TimeReader
+    from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 
-    if not isinstance(reader, TimeReader):
-        return None
     with reading(file):
-        times = tuple(float(time) for time in reader.time_values)
-    return times or None
+        if isinstance(reader, TimeReader):
+            times = reader.time_values
+        elif hasattr(reader, "GetOutputInformation"):
+            information = reader.GetOutputInformation(0)
+            times = information.Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS())
+        else:
+            return None
+        return tuple(float(time) for time in times or ()) or None
+
+
+def _data(reader: Any) -> Any:
+    import pyvista
+
+    if hasattr(reader, "read"):
+        return reader.read()
+    reader.Update()
+    return pyvista.wrap(reader.GetOutputDataObject(0))
+
+
+def _at_time(reader: Any, number: int, time: float) -> Any:
+    import pyvista
+
+    algorithm = getattr(reader, "reader", reader)
+    if not hasattr(algorithm, "UpdateTimeStep"):
+        reader.set_active_time_point(number)
+        return reader.read()
+    # PyVista reads without saying the time again, which XDMF's reader takes for the first.
+    algorithm.UpdateTimeStep(time)
+    return pyvista.wrap(algorithm.GetOutputDataObject(0))
 
 
 def _time_in_head(file: Path) -> float | None:

@@ -1,0 +1,730 @@
+import pickle
+from contextlib import chdir
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chipglow.io.sources import CELSIUS, Placement, SourceError, Unit, Units
+from chipglow.io.sources.mesh import MeshSource
+from chipglow.scene import Material, Raster
+
+pv = pytest.importorskip("pyvista")
+meshio = pytest.importorskip("meshio")
+
+WIDTH, HEIGHT = 900e-6, 600e-6
+RASTER = Raster(left=0.0, top=HEIGHT, spacing=10e-6, rows=60, columns=90)
+X, Y = np.meshgrid(RASTER.x, RASTER.y)
+VOID, WORKPIECE, TOOL = Material.VOID, Material.WORKPIECE, Material.TOOL
+
+
+def temperature(x, y, at=0.0):
+    return 300.0 + 4e5 * x + 2e5 * y + 10.0 * at
+
+
+def grid_of(shape="quad", count=(9, 6), at=0.0, scale=1.0, depth=None, shift=0.0):
+    """A block of elements with a linear temperature, a strain of elements and a velocity."""
+    nx, ny = count
+    z = np.array([0.0]) if depth is None else np.linspace(0.0, depth, 4)
+    x, y, z = np.meshgrid(np.linspace(0, WIDTH, nx + 1), np.linspace(0, HEIGHT, ny + 1), z)
+    grid = pv.StructuredGrid(x, y, z).cast_to_unstructured_grid()
+    if shape == "triangle":
+        grid = grid.extract_surface(algorithm=None).triangulate().cast_to_unstructured_grid()
+    points = np.array(grid.points)
+    grid.points = points * scale
+    grid.points[:, 0] += shift * scale
+    grid.point_data["NT11"] = temperature(points[:, 0] + shift, points[:, 1], at) + points[:, 2] * 1e5
+    grid.point_data["V"] = np.tile((3.0, 1.0, 2.0), (len(points), 1))
+    grid.cell_data["PEEQ"] = np.arange(grid.n_cells) / grid.n_cells
+    return grid
+
+
+def only_frame(source, raster=RASTER):
+    (frame,) = source.frames(raster)
+    return frame
+
+
+def check_linear(frame, at=0.0, offset=0.0, inside=None):
+    expected = temperature(X, Y, at) + offset
+    inside = np.ones_like(X, bool) if inside is None else inside
+    found = frame.fields["temperature"]
+    # float32: 24 bits of 1000 K.
+    np.testing.assert_allclose(found[inside], expected[inside], atol=2e-4)
+    assert np.isnan(found[~inside]).all()
+    np.testing.assert_array_equal(frame.material, np.where(inside, WORKPIECE, VOID))
+
+
+@pytest.mark.parametrize("shape", ["quad", "triangle"])
+@pytest.mark.parametrize("suffix", [".vtu", ".vtk", ".vtp"])
+def test_fields_of_nodes_are_exact_and_those_of_elements_constant(tmp_path, shape, suffix):
+    path = tmp_path / f"chip{suffix}"
+    grid = grid_of(shape)
+    (grid.extract_surface(algorithm=None) if suffix == ".vtp" else grid).save(path)
+    source = MeshSource(path)
+    survey = survey_of(source)
+    assert survey.found == {
+        "temperature": "NT11", "plastic_strain": "PEEQ", "velocity_x": "V", "velocity_y": "V",
+    }  # fmt: skip
+    assert survey.extent == pytest.approx((0.0, WIDTH, 0.0, HEIGHT))
+    frame = only_frame(source)
+    check_linear(frame)
+    assert (frame.fields["velocity_x"] == 3.0).all()
+    assert (frame.fields["velocity_y"] == 1.0).all()
+    strain = frame.fields["plastic_strain"]
+    assert set(np.unique(strain)) == set(grid.cell_data["PEEQ"].astype(np.float32))
+
+
+def survey_of(source):
+    """Sources go to another process and back."""
+    return pickle.loads(pickle.dumps(source)).survey()
+
+
+@pytest.mark.parametrize("kind", [22, 23, 28])
+def test_quadratic_elements_are_not_taken_for_linear(tmp_path, kind):
+    reference = {
+        22: [(0, 0), (1, 0), (0, 1), (0.5, 0), (0.5, 0.5), (0, 0.5)],
+        23: [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5)],
+    }
+    reference[28] = [*reference[23], (0.5, 0.5)]
+    points = np.pad(np.array(reference[kind], float), ((0, 0), (0, 1))) * 1e-3
+    grid = pv.UnstructuredGrid([len(points), *range(len(points))], [kind], points)
+    grid.point_data["temperature"] = 300.0 + 1000.0 * (points[:, 0] * 1e3) ** 2
+    grid.save(tmp_path / "bent.vtu")
+    raster = Raster(0.0, 1e-3, 1e-5, 100, 100)
+    found = only_frame(MeshSource(tmp_path / "bent.vtu"), raster).fields["temperature"]
+    expected = np.broadcast_to(300.0 + 1000.0 * (raster.x * 1e3) ** 2, raster.shape)
+    inside = ~np.isnan(found)
+    assert inside.mean() == pytest.approx(0.5 if kind == 22 else 1.0, abs=0.01)
+    # The stated error: f'' h^2 / 128 with f'' h^2 = 2000 K; linear elements would be 250 K off.
+    assert np.abs(found - expected)[inside].max() <= 2000.0 / 128 + 1e-3
+
+
+def test_lagrange_elements_are_subdivided(tmp_path):
+    points = np.array([(i, j, 0.0) for j in range(4) for i in range(4)]) / 3.0
+    order = [0, 3, 15, 12, 1, 2, 7, 11, 13, 14, 4, 8, 5, 6, 9, 10]
+    grid = pv.UnstructuredGrid([16, *range(16)], [70], points[order])
+    grid.point_data["temperature"] = 300.0 + points[order][:, 0] ** 3 * 100.0
+    grid.save(tmp_path / "cubic.vtu")
+    raster = Raster(0.0, 1.0, 0.02, 50, 50)
+    found = only_frame(MeshSource(tmp_path / "cubic.vtu"), raster).fields["temperature"]
+    np.testing.assert_allclose(found, np.broadcast_to(300 + raster.x**3 * 100, found.shape), atol=3)
+
+
+@pytest.mark.parametrize("position", [0.0, 1e-4, 1.7e-4, 3e-4])
+def test_a_cut_through_a_solid_mesh_is_exact(tmp_path, position):
+    grid_of(depth=3e-4).save(tmp_path / "solid.vtu")
+    frame = only_frame(MeshSource(tmp_path / "solid.vtu", section=position))
+    check_linear(frame, offset=position * 1e5)
+    assert (frame.fields["velocity_x"] == 3.0).all()
+    assert np.unique(frame.fields["plastic_strain"]).size == 54
+
+
+@pytest.mark.parametrize(
+    ("placement", "offset"), [(Placement(), 30.0), (Placement(horizontal="-x"), 0.0)]
+)
+def test_facing_shows_the_side_toward_the_camera(tmp_path, placement, offset):
+    grid_of(depth=3e-4).save(tmp_path / "solid.vtu")
+    raster = RASTER
+    mirrored = placement.signs[0] < 0
+    if mirrored:
+        raster = Raster(-WIDTH, HEIGHT, RASTER.spacing, RASTER.rows, RASTER.columns)
+    source = MeshSource(tmp_path / "solid.vtu", section="facing", placement=placement)
+    found = only_frame(source, raster).fields["temperature"]
+    expected = temperature(X, Y) + offset
+    np.testing.assert_allclose(found, expected[:, ::-1] if mirrored else expected, atol=2e-4)
+
+
+@pytest.mark.parametrize("section", [None, -1e-4, 4e-4])
+def test_a_solid_mesh_needs_a_section_that_cuts_it(tmp_path, section):
+    grid_of(depth=3e-4).save(tmp_path / "solid.vtu")
+    with pytest.raises(SourceError, match=r"solid\.vtu: section: n.*expected"):
+        MeshSource(tmp_path / "solid.vtu", section=section).survey()
+
+
+def test_a_flat_mesh_has_no_section(tmp_path):
+    grid_of().save(tmp_path / "flat.vtu")
+    with pytest.raises(SourceError, match=r"flat\.vtu: section: .*flat"):
+        MeshSource(tmp_path / "flat.vtu", section=0.0).survey()
+
+
+def test_units_and_placement(tmp_path):
+    grid = grid_of(scale=1e3)
+    grid.point_data["NT11"] -= 273.15
+    grid.points = grid.points[:, (1, 2, 0)]
+    grid.point_data["V"] = grid.point_data["V"][:, (1, 2, 0)] * 1e3
+    grid.save(tmp_path / "mm.vtu")
+    source = MeshSource(
+        tmp_path / "mm.vtu",
+        units=Units(length=Unit(1e-3), temperature=CELSIUS),
+        placement=Placement(horizontal="-z", vertical="x", origin=(WIDTH, 0.0)),
+    )
+    assert source.survey().extent == pytest.approx((0.0, WIDTH, 0.0, HEIGHT))
+    frame = only_frame(source)
+    found = frame.fields["temperature"][:, ::-1]
+    np.testing.assert_allclose(found, temperature(X, Y), atol=3e-4)
+    np.testing.assert_allclose(frame.fields["velocity_x"], -3.0, rtol=1e-6)
+    np.testing.assert_allclose(frame.fields["velocity_y"], 1.0, rtol=1e-6)
+
+
+def test_components_of_velocity_follow_the_sign_of_their_axis(tmp_path):
+    grid = grid_of()
+    del grid.point_data["V"]
+    grid.point_data["V1"], grid.point_data["V2"] = 3.0, 1.0
+    grid.save(tmp_path / "chip.vtu")
+    source = MeshSource(tmp_path / "chip.vtu", placement=Placement("-x", "y", (WIDTH, 0.0)))
+    frame = only_frame(source)
+    assert (frame.fields["velocity_x"] == -3.0).all()
+    assert (frame.fields["velocity_y"] == 1.0).all()
+
+
+def test_the_placement_of_other_axes_does_not_guess_components(tmp_path):
+    grid = grid_of()
+    grid.rename_array("V", "other")
+    grid.point_data["V1"], grid.point_data["V2"] = 3.0, 1.0
+    grid.points = grid.points[:, (0, 2, 1)]
+    grid.save(tmp_path / "chip.vtu")
+    found = MeshSource(tmp_path / "chip.vtu", placement=Placement("x", "z")).survey().found
+    assert set(found) == {"temperature", "plastic_strain"}
+
+
+def test_a_moving_and_remeshed_series_has_void_where_nothing_is(tmp_path):
+    for number, count in enumerate([(9, 6), (4, 5), (30, 7)]):
+        grid_of(count=count, at=number, shift=number * 1e-4).save(tmp_path / f"chip_{number}.vtu")
+    source = MeshSource(tmp_path / "chip_*.vtu", interval=2e-6)
+    survey = source.survey()
+    np.testing.assert_allclose(survey.times, [0.0, 2e-6, 4e-6])
+    assert survey.extent == pytest.approx((0.0, WIDTH + 2e-4, 0.0, HEIGHT))
+    frames = list(source.frames(RASTER))
+    for number, frame in enumerate(frames):
+        assert frame.time == pytest.approx(number * 2e-6)
+        check_linear(frame, at=number, inside=number * 1e-4 < X)
+    (later,) = source.frames(RASTER, start=2)
+    np.testing.assert_array_equal(later.material, frames[2].material)
+
+
+def test_times_of_files_are_taken_and_what_is_assumed_is_said(tmp_path):
+    for number in range(3):
+        grid = grid_of()
+        grid.save(tmp_path / f"plain_{number}.vtu")
+        grid.field_data["TimeValue"] = [number * 0.25]
+        grid.save(tmp_path / f"timed_{number}.vtu")
+    plain, timed = (
+        MeshSource(tmp_path / f"{name}_*.vtu", units=Units(time=Unit(1e-3)))
+        for name in ("plain", "timed")
+    )
+    assert timed.survey().times.tolist() == pytest.approx([0.0, 2.5e-4, 5e-4])
+    assert any("1 s apart" in sentence for sentence in plain.survey().assumed)
+    assert not any("1 s apart" in sentence for sentence in timed.survey().assumed)
+
+
+def test_files_are_sorted_by_their_numbers(tmp_path):
+    for number in (9, 10, 11):
+        grid_of(at=number).save(tmp_path / f"c{number}.vtk")
+    frames = list(MeshSource(tmp_path / "c*.vtk").frames(RASTER))
+    for frame, number in zip(frames, (9, 10, 11), strict=True):
+        check_linear(frame, at=number)
+
+
+def two_blocks():
+    chip, tool = grid_of(), grid_of(shift=WIDTH)
+    tool.cell_data.remove("PEEQ")
+    return chip, tool
+
+
+WIDE = Raster(left=0.0, top=HEIGHT, spacing=20e-6, rows=30, columns=90)
+
+
+def check_two(frame):
+    right = np.broadcast_to(np.arange(90) >= 45, WIDE.shape)
+    np.testing.assert_array_equal(frame.material, np.where(right, TOOL, WORKPIECE))
+    assert not np.isnan(frame.fields["temperature"]).any()
+    np.testing.assert_array_equal(np.isnan(frame.fields["plastic_strain"]), right)
+
+
+def test_a_block_by_its_name_is_the_tool(tmp_path):
+    chip, tool = two_blocks()
+    pv.MultiBlock({"chip": chip, "insert": tool}).save(tmp_path / "both.vtm")
+    check_two(only_frame(MeshSource(tmp_path / "both.vtm", tool_parts=("insert",)), WIDE))
+
+
+@pytest.mark.parametrize(("name", "given"), [("PartId", None), ("colour", "colour")])
+def test_a_number_of_a_field_of_parts_is_the_tool(tmp_path, name, given):
+    chip, tool = two_blocks()
+    tool.cell_data["PEEQ"] = np.full(tool.n_cells, np.nan)
+    chip.cell_data[name], tool.cell_data[name] = 3, 7
+    chip.merge(tool, merge_points=False).save(tmp_path / "both.vtu")
+    source = MeshSource(tmp_path / "both.vtu", tool_parts=("7",), part_field=given)
+    check_two(only_frame(source, WIDE))
+
+
+def test_a_part_that_is_not_there_is_named_beside_those_that_are(tmp_path):
+    chip, tool = two_blocks()
+    pv.MultiBlock({"chip": chip, "insert": tool}).save(tmp_path / "both.vtm")
+    with pytest.raises(SourceError, match=r"'tip'.*chip, insert"):
+        MeshSource(tmp_path / "both.vtm", tool_parts=("tip",)).survey()
+
+
+def test_deleted_elements_are_void(tmp_path):
+    grid = grid_of()
+    grid.cell_data["STATUS"] = (np.asarray(grid.cell_centers().points[:, 0]) < 5e-4).astype(float)
+    grid.save(tmp_path / "chip.vtu")
+    check_linear(only_frame(MeshSource(tmp_path / "chip.vtu")), inside=X < 5e-4)
+
+
+def test_a_displacement_is_added_if_it_is_named(tmp_path):
+    grid = grid_of()
+    grid.point_data["U"] = np.tile((1e-4, 0.0, 0.0), (grid.n_points, 1))
+    grid.save(tmp_path / "chip.vtu")
+    still, moved = (
+        MeshSource(tmp_path / "chip.vtu", displacement=name) for name in (None, "U")
+    )
+    assert still.survey().extent[0] == 0.0
+    assert any("U is not added" in sentence for sentence in still.survey().assumed)
+    assert moved.survey().extent[:2] == pytest.approx((1e-4, WIDTH + 1e-4))
+
+
+def test_values_of_integration_points_are_averaged_and_tensors_refused(tmp_path):
+    grid = grid_of()
+    grid.cell_data["PEEQ"] = np.stack([np.full(grid.n_cells, k) for k in (1.0, 2.0, 3.0, 6.0)], 1)
+    grid.cell_data["strain"] = np.ones((grid.n_cells, 6))
+    grid.save(tmp_path / "chip.vtu")
+    source = MeshSource(tmp_path / "chip.vtu")
+    assert (only_frame(source).fields["plastic_strain"] == 3.0).all()
+    assert any("PEEQ has 4 values" in sentence for sentence in source.survey().assumed)
+    with pytest.raises(SourceError, match="'strain' has 6 components"):
+        MeshSource(tmp_path / "chip.vtu", names={"plastic_strain": "strain"}).survey()
+    with pytest.raises(SourceError, match="velocity: 'NT11' has 1 components"):
+        MeshSource(tmp_path / "chip.vtu", names={"velocity": "NT11"}).survey()
+
+
+def collection(folder, count=3):
+    lines = []
+    for number in range(count):
+        grid_of(at=number).save(folder / f"part{number}.vtu")
+        lines.append(f'<DataSet timestep="{number * 0.5}" part="0" file="part{number}.vtu"/>')
+    body = "".join(lines)
+    text = f'<VTKFile type="Collection" version="0.1"><Collection>{body}</Collection></VTKFile>'
+    (folder / "chip.pvd").write_text(text)
+    return folder / "chip.pvd"
+
+
+def exodus(folder):
+    vtk_io = pytest.importorskip("vtkmodules.vtkIOExodus")
+    writer = vtk_io.vtkExodusIIWriter()
+    writer.SetFileName(str(folder / "chip.e"))
+    writer.SetInputData(grid_of())
+    writer.Write()
+    return folder / "chip.e"
+
+
+def ensight(folder):
+    vtk_io = pytest.importorskip("vtkmodules.vtkIOParallel")
+    grid = grid_of()
+    grid.cell_data["BlockId"] = np.ones(grid.n_cells, np.int32)
+    writer = vtk_io.vtkEnSightWriter()
+    writer.SetFileName(str(folder / "chip"))
+    writer.SetInputData(grid)
+    writer.Write()
+    writer.WriteCaseFile(1)
+    return next(folder.glob("*.case"))
+
+
+def xdmf(folder):
+    grid = pv.to_meshio(grid_of())
+    # meshio writes the .h5 file to the working directory.
+    with chdir(folder), meshio.xdmf.TimeSeriesWriter(folder / "chip.xdmf") as writer:
+        writer.write_points_cells(grid.points, grid.cells)
+        for number in range(3):
+            data = {
+                "NT11": np.asarray(grid_of(at=number).point_data["NT11"]),
+                "V": grid.point_data["V"],
+            }
+            writer.write_data(number * 0.5, point_data=data, cell_data={"PEEQ": grid.cell_data["PEEQ"]})
+    return folder / "chip.xdmf"
+
+
+def by_meshio(name, shape, **options):
+    def write(folder):
+        grid = grid_of(shape)
+        mesh = pv.to_meshio(grid)
+        mesh.write(folder / name, **options)
+        return folder / name
+
+    return write
+
+
+def tecplot(folder):
+    """As Tecplot's manual of the ASCII format has it: a finite-element zone in point order."""
+    grid = grid_of()
+    lines = ["TITLE = chip", 'VARIABLES = "X", "Y", "NT11", "PEEQ"']
+    lines.append(f"ZONE T=chip, N={grid.n_points}, E={grid.n_cells}, F=FEPOINT, ET=QUADRILATERAL")
+    for point, value in zip(grid.points, grid.point_data["NT11"], strict=True):
+        lines.append(f"{point[0]:.9g} {point[1]:.9g} {value:.9g} 0.5")
+    quads = grid.cells_dict[9] + 1
+    lines += [" ".join(map(str, quad)) for quad in quads]
+    (folder / "chip.dat").write_text("\n".join(lines) + "\n")
+    return folder / "chip.dat"
+
+
+FORMATS = {
+    "pvd": collection,
+    "exodus": exodus,
+    "ensight": ensight,
+    "xdmf": xdmf,
+    "tecplot": tecplot,
+    "vts": lambda folder: written(folder, "chip.vts"),
+    "vtm": lambda folder: written(folder, "chip.vtm"),
+    "vtkhdf": lambda folder: written(folder, "chip.vtkhdf"),
+    "gmsh": by_meshio("chip.msh", "triangle", file_format="gmsh"),
+    "gmsh22": by_meshio("chip.msh", "quad", file_format="gmsh22"),
+    "med": by_meshio("chip.med", "triangle"),
+    "avs": by_meshio("chip.avs", "quad"),
+    "vtk42": by_meshio("chip.vtk", "quad", file_format="vtk42"),
+}
+
+
+def written(folder, name):
+    grid = grid_of()
+    if name.endswith("vts"):
+        x, y, z = np.meshgrid(np.linspace(0, WIDTH, 10), np.linspace(0, HEIGHT, 7), [0.0])
+        curved = pv.StructuredGrid(x, y, z)
+        curved.point_data["NT11"] = temperature(curved.points[:, 0], curved.points[:, 1])
+        grid = curved
+    (pv.MultiBlock([grid]) if name.endswith("vtm") else grid).save(folder / name)
+    return folder / name
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_formats_that_others_write_come_back(tmp_path, name):
+    # The writer of EnSight names fields after where they are.
+    names = {"temperature": "NT11_n"} if name == "ensight" else {}
+    source = MeshSource(FORMATS[name](tmp_path), names=names)
+    assert "temperature" in survey_of(source).found
+    frames = list(source.frames(RASTER))
+    for number, frame in enumerate(frames):
+        check_linear(frame, at=number)
+    if name in ("pvd", "xdmf"):
+        assert [frame.time for frame in frames] == [0.0, 0.5, 1.0]
+
+
+def d3plot(folder, count=3):
+    lasso = pytest.importorskip("lasso.dyna")
+    grid = grid_of()
+    points = np.asarray(grid.points, np.float32)
+    quads = grid.cells_dict[9]
+    plot = lasso.D3plot()
+    arrays = plot.arrays
+    arrays["node_coordinates"] = points
+    arrays["timesteps"] = np.arange(count, dtype=np.float32) * 0.5
+    shift = np.array([(k * 1e-4, 0, 0) for k in range(count)], np.float32)
+    arrays["node_displacement"] = points[None] + shift[:, None, :]
+    arrays["node_velocity"] = np.tile(np.float32((3.0, 1.0, 2.0)), (count, len(points), 1))
+    arrays["node_temperature"] = np.stack(
+        [temperature(points[:, 0] + k * 1e-4, points[:, 1]) for k in range(count)]
+    ).astype(np.float32)
+    arrays["element_shell_node_indexes"] = quads
+    right = np.asarray(grid.cell_centers().points[:, 0]) > 0.5 * WIDTH
+    arrays["element_shell_part_indexes"] = right.astype(np.int32)
+    strain = np.tile(np.float32([1.0, 2.0, 6.0]), (count, len(quads), 1))
+    arrays["element_shell_effective_plastic_strain"] = strain
+    plot.write_d3plot(str(folder / "d3plot"))
+    return folder / "d3plot"
+
+
+def test_a_d3plot_moves_and_its_layers_are_averaged(tmp_path):
+    source = MeshSource(d3plot(tmp_path))
+    survey = survey_of(source)
+    assert survey.found["plastic_strain"] == "effective_plastic_strain"
+    assert survey.times.tolist() == [0.0, 0.5, 1.0]
+    for number, frame in enumerate(source.frames(RASTER)):
+        check_linear(frame, inside=number * 1e-4 < X)
+        inside = frame.material > 0
+        assert (frame.fields["plastic_strain"][inside] == 3.0).all()
+        assert (frame.fields["velocity_x"][inside] == 3.0).all()
+    (last,) = source.frames(RASTER, start=2)
+    assert last.time == 1.0
+    assert (last.material[:, :10] == VOID).all()
+
+
+def test_a_part_of_a_d3plot_is_the_tool(tmp_path):
+    frame = next(MeshSource(d3plot(tmp_path), tool_parts=("2",)).frames(RASTER))
+    at = RASTER.x > np.ceil(0.5 * WIDTH / 1e-4 - 0.5) * 1e-4
+    assert (frame.material[:, at] == TOOL).any()
+    assert (frame.material[:, :40] == WORKPIECE).all()
+
+
+DECK = """*HEADING
+** a chip
+*NODE, NSET=ALL
+{nodes}
+*ELEMENT, TYPE=CPE4RT, ELSET=CHIP
+{chip}
+*ELEMENT, TYPE=CPE3T, ELSET=INSERT
+{tool}
+*ELSET, ELSET=HARD
+INSERT
+*MATERIAL, NAME=STEEL
+*DENSITY
+7850.,
+"""
+
+
+def abaqus(folder, tables=("",)):
+    """Labels begin at 101 and have gaps, as those of Abaqus may."""
+    grid = grid_of()
+    quads = grid.cells_dict[9]
+    right = grid.points[quads][:, :, 0].mean(axis=1) > 6e-4
+    label = lambda node: 101 + 2 * node  # noqa: E731
+    nodes = [f"{label(k)}, {p[0]:.9g}, {p[1]:.9g}" for k, p in enumerate(grid.points)]
+    chip = [f"{1 + k}, " + ", ".join(str(label(n)) for n in q) for k, q in enumerate(quads[~right])]
+    triangles = [t for q in quads[right] for t in (q[[0, 1, 2]], q[[0, 2, 3]])]
+    tool = [f"{501 + k}, " + ", ".join(str(label(n)) for n in t) for k, t in enumerate(triangles)]
+    text = DECK.format(nodes="\n".join(nodes), chip="\n".join(chip), tool="\n".join(tool))
+    (folder / "chip.inp").write_text(text)
+    for number, table in enumerate(tables):
+        values = temperature(grid.points[:, 0], grid.points[:, 1], number)
+        rows = [f"{label(k)}, {value:.9g}, 0.0" for k, value in enumerate(values)]
+        (folder / f"chip{table}_nodes.csv").write_text("\n".join(["node, NT11, U1", *rows[::-1]]))
+        rows = [f"{1 + k}, {value}" for k in range(int((~right).sum())) for value in (1, 2, 3, 6)]
+        (folder / f"chip{table}_elements.csv").write_text("\n".join(["element,PEEQ", *rows]))
+    return folder / "chip.inp"
+
+
+def test_an_abaqus_input_with_tables(tmp_path):
+    path = abaqus(tmp_path, ("_8", "_9", "_10"))
+    source = MeshSource(path, tool_parts=("HARD",))
+    assert set(survey_of(source).found) == {"temperature", "plastic_strain"}
+    frames = list(source.frames(RASTER))
+    assert len(frames) == 3
+    hard = X > 6e-4
+    for number, frame in enumerate(frames):
+        np.testing.assert_allclose(frame.fields["temperature"], temperature(X, Y, number), atol=2e-3)
+        np.testing.assert_array_equal(frame.material, np.where(hard, TOOL, WORKPIECE))
+        assert (frame.fields["plastic_strain"][~hard] == 3.0).all()
+        assert np.isnan(frame.fields["plastic_strain"][hard]).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("101, 0, 0", "101, nothing, 0", "line 4: .*no data of \\*NODE"),
+        ("CPE4RT", "B21", "B21 is not read"),
+        ("*HEADING", "*INCLUDE, INPUT=/etc/passwd", r"\*INCLUDE is not read"),
+        ("1, 101,", "1, 999999,", "999999, which is none"),
+        ("*NODE", "*NOTE", "has no .NODE"),
+    ],
+)
+def test_a_damaged_abaqus_input_says_where(tmp_path, old, new, said):
+    path = abaqus(tmp_path)
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(SourceError, match=said):
+        MeshSource(path).survey()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "expected a table"),
+        ("label,NT11\n1,2\n", "expected a table"),
+        ("node,NT11\n101,hot\n", "no table of numbers"),
+        ("node,NT11\n101,1\n103\n", "no table of numbers"),
+        ("node,NT11\n102,300\n", "label 102 is not in"),
+        ("node,NT11\n101,300,1\n", "3 columns, expected 2"),
+        ("node,NT11\n", "no table of numbers"),
+    ],
+)
+def test_a_damaged_table_says_what_is_wrong(tmp_path, text, said):
+    path = abaqus(tmp_path)
+    (tmp_path / "chip_nodes.csv").write_text(text)
+    with pytest.raises(SourceError, match=said):
+        MeshSource(path).survey()
+
+
+def foam(folder):
+    """A case of two cells of 1 mm, as blockMesh writes it, with times 0 and 0.5."""
+    mesh = folder / "constant" / "polyMesh"
+    mesh.mkdir(parents=True)
+    (folder / "system").mkdir()
+    head = "FoamFile {{ version 2.0; format ascii; class {}; object {}; }}\n"
+    points = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1, 2)]
+    corner = {point: number for number, point in enumerate(points)}
+    faces, owner = [], []
+
+    def face(*of):
+        faces.append(f"4({' '.join(str(corner[point]) for point in of)})")
+
+    face((1, 0, 0), (1, 1, 0), (1, 1, 1), (1, 0, 1))
+    owner.append(0)
+    face((0, 0, 0), (0, 0, 1), (0, 1, 1), (0, 1, 0))
+    owner.append(0)
+    face((2, 0, 0), (2, 1, 0), (2, 1, 1), (2, 0, 1))
+    owner.append(1)
+    for cell in (0, 1):
+        a, b = cell, cell + 1
+        face((a, 0, 0), (b, 0, 0), (b, 0, 1), (a, 0, 1))
+        face((a, 1, 0), (a, 1, 1), (b, 1, 1), (b, 1, 0))
+        face((a, 0, 0), (a, 1, 0), (b, 1, 0), (b, 0, 0))
+        face((a, 0, 1), (b, 0, 1), (b, 1, 1), (a, 1, 1))
+        owner += [cell] * 4
+    tables = {
+        "points": ("vectorField", [f"({x} {y} {z})" for x, y, z in points]),
+        "faces": ("faceList", faces),
+        "owner": ("labelList", owner),
+        "neighbour": ("labelList", [1]),
+    }
+    for name, (kind, rows) in tables.items():
+        body = f"{len(rows)}\n(\n" + "\n".join(map(str, rows)) + "\n)\n"
+        (mesh / name).write_text(head.format(kind, name) + body)
+    boundary = "1\n(\nsides { type patch; nFaces 10; startFace 1; }\n)\n"
+    (mesh / "boundary").write_text(head.format("polyBoundaryMesh", "boundary") + boundary)
+    control = "application none; startFrom startTime; startTime 0; stopAt endTime; endTime 1;\n"
+    control += "deltaT 0.5; writeControl runTime; writeInterval 0.5;\n"
+    (folder / "system" / "controlDict").write_text(head.format("dictionary", "controlDict") + control)
+    for time in ("0", "0.5"):
+        (folder / time).mkdir()
+        values = f"nonuniform List<scalar> 2({300 + 10 * float(time)} 400)"
+        field = f"dimensions [0 0 0 1 0 0 0];\ninternalField {values};\n"
+        field += "boundaryField { sides { type zeroGradient; } }\n"
+        (folder / time / "T").write_text(head.format("volScalarField", "T") + field)
+    (folder / "case.foam").touch()
+    return folder / "case.foam"
+
+
+def test_an_openfoam_case_is_cut_and_its_cells_are_constant(tmp_path):
+    source = MeshSource(foam(tmp_path), section=0.5)
+    survey = survey_of(source)
+    assert survey.times.tolist() == [0.0, 0.5]
+    assert survey.extent == pytest.approx((0.0, 2.0, 0.0, 1.0))
+    frames = list(source.frames(Raster(0.0, 1.0, 0.1, 10, 20)))
+    assert frames[1].fields["temperature"].shape == (10, 20)
+    assert np.unique(frames[1].fields["temperature"]).size >= 2
+
+
+def test_a_file_that_is_missing(tmp_path):
+    for name in ("chip.vtu", "chip_*.vtu", "chip.pvd", "d3plot", "chip.inp", "chip.msh"):
+        with pytest.raises(FileNotFoundError, match=name.replace("*", r"\*")):
+            MeshSource(tmp_path / name).survey()
+
+
+def test_a_gap_in_a_series_is_found_unless_times_are_given(tmp_path):
+    for number in (0, 10, 30, 40, 45):
+        grid_of().save(tmp_path / f"chip_{number:03}.vtu")
+    with pytest.raises(SourceError, match="after chip_010"):
+        MeshSource(tmp_path / "chip_*.vtu").survey()
+    times = (0.0, 1.0, 3.0, 4.0, 4.5)
+    assert MeshSource(tmp_path / "chip_*.vtu", times=times).survey().times.tolist() == list(times)
+    (tmp_path / "chip_030.vtu").rename(tmp_path / "chip_020.vtu")
+    (tmp_path / "chip_040.vtu").rename(tmp_path / "chip_030.vtu")
+    assert len(MeshSource(tmp_path / "chip_*.vtu", interval=1.0).survey().times) == 5
+
+
+def test_a_collection_whose_file_is_missing(tmp_path):
+    path = collection(tmp_path)
+    (tmp_path / "part2.vtu").unlink()
+    with pytest.raises((SourceError, FileNotFoundError), match="part2"):
+        MeshSource(path).survey()
+
+
+def test_a_field_that_a_later_frame_lacks(tmp_path):
+    grid = grid_of()
+    grid.save(tmp_path / "c0.vtu")
+    grid.point_data.remove("NT11")
+    grid.save(tmp_path / "c1.vtu")
+    frames = MeshSource(tmp_path / "c*.vtu").frames(RASTER)
+    next(frames)
+    with pytest.raises(SourceError, match=r"c1\.vtu: frame 1 has no field 'NT11'"):
+        next(frames)
+
+
+WRITERS = {**FORMATS, "vtu": lambda folder: written(folder, "chip.vtu")}
+WRITERS |= {"d3plot": d3plot, "vtk": lambda folder: written(folder, "chip.vtk")}
+
+
+@pytest.mark.parametrize("name", [name for name in WRITERS if name not in ("ensight", "vtm")])
+def test_truncated_files_end_in_one_clear_error(tmp_path, name, capfd):
+    path = WRITERS[name](tmp_path)
+    whole = path.read_bytes()
+    for size in (0, 30, len(whole) // 2):
+        path.write_bytes(whole[:size])
+        with pytest.raises(SourceError, match=path.name) as caught:
+            list(MeshSource(path).frames(RASTER))
+        assert "\n" not in str(caught.value)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".vtk", ".vtp", ".pvd", ".xdmf", ".e", ".case", ".dat",
+                                    ".cgns", ".msh", ".med", ".inp", ".d3plot", ".vtkhdf"])  # fmt: skip
+@pytest.mark.parametrize("content", [b"GIF89a" + bytes(range(256)) * 4, b"hello\nworld\n" * 50])
+def test_mislabelled_files_end_in_one_clear_error(tmp_path, suffix, content, capfd):
+    path = tmp_path / f"chip{suffix}"
+    path.write_bytes(content)
+    (tmp_path / "chip.csv").write_text("node,NT11\n1,2\n")
+    with pytest.raises(SourceError, match=path.name) as caught:
+        MeshSource(path).survey()
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr().err == ""
+
+
+def test_a_header_that_claims_more_than_the_file_can_hold(tmp_path):
+    path = written(tmp_path, "chip.vtu")
+    text = path.read_bytes().replace(b'NumberOfPoints="70"', b'NumberOfPoints="70000000000"')
+    path.write_bytes(text)
+    with pytest.raises(SourceError, match="70000000000 values in"):
+        MeshSource(path).survey()
+
+
+def test_elements_of_nodes_that_do_not_exist(tmp_path):
+    text = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 3 float\n"
+    text += "0 0 0 1 0 0 0 1 0\nCELLS 1 4\n3 0 1 9\nCELL_TYPES 1\n5\nPOINT_DATA 3\n"
+    (tmp_path / "chip.vtk").write_text(text + "SCALARS T float 1\nLOOKUP_TABLE default\n1 2 3\n")
+    with pytest.raises(SourceError, match="nodes 0 to 9, expected 0 to 2"):
+        MeshSource(tmp_path / "chip.vtk").survey()
+
+
+def test_binary_tecplot_is_refused(tmp_path):
+    (tmp_path / "chip.dat").write_bytes(b"#!TDV112" + bytes(100))
+    with pytest.raises(SourceError, match="binary Tecplot"):
+        MeshSource(tmp_path / "chip.dat").survey()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"times": (0.0, float("nan"))}, "times"),
+        ({"interval": 0.0}, "interval"),
+        ({"interval": 1.0, "times": (0.0,)}, "interval"),
+        ({"section": "front"}, "section"),
+        ({"section": float("inf")}, "section"),
+    ],
+)
+def test_what_is_impossible_is_refused(arguments, said):
+    with pytest.raises(ValueError, match=said):
+        MeshSource(Path("chip.vtu"), **arguments)
+
+
+def test_times_that_do_not_fit_and_names_that_are_not_there(tmp_path):
+    path = written(tmp_path, "chip.vtu")
+    with pytest.raises(SourceError, match="2 for 1 frames"):
+        MeshSource(path, times=(0.0, 1.0)).survey()
+    with pytest.raises(SourceError, match=r"chip\.vtu: fields: .*no field 'TEMP'"):
+        MeshSource(path, names={"temperature": "TEMP"}).survey()
+    with pytest.raises(SourceError, match="no mesh, expected"):
+        MeshSource(tmp_path / "chip.doc").survey()
+
+
+def test_files_that_came_with_pyvista():
+    """hexbeam.vtk: solid elements with node and element values, made by others."""
+    from pyvista import examples
+
+    path = Path(examples.hexbeamfile)
+    raster = Raster(0.45, 1.0, 0.1, 10, 1)
+    names = {"temperature": "sample_point_scalars", "plastic_strain": "sample_cell_scalars"}
+    frame = only_frame(MeshSource(path, section=2.5, names=names), raster)
+    mesh = pv.read(path)
+    mesh.point_data["exact"] = mesh.point_data["sample_point_scalars"].astype(float)
+    # Hexahedra are trilinear, the cut is linear: alike on the elements' faces, one is at x = 0.5.
+    points = np.stack([np.full(10, 0.5), raster.y, np.full(10, 2.5)], axis=1)
+    probed = pv.PolyData(points).sample(mesh).point_data["exact"]
+    np.testing.assert_allclose(frame.fields["temperature"][:, 0], probed, rtol=1e-6)
+    assert (frame.material == WORKPIECE).all()
+    assert set(np.unique(frame.fields["plastic_strain"])) <= set(mesh.cell_data["sample_cell_scalars"])
