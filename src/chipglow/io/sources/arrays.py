@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.text_table import TextTable
 
 MOST_SAMPLES: Final = 100_000_000
 """Most samples that are read at once."""
@@ -25,9 +26,6 @@ MOST_ON_A_SIDE: Final = 1_000_000
 """Most samples along an axis other than time."""
 
 _MOST_ARRAYS: Final = 10_000
-_LARGEST_TABLE: Final = 1_000_000_000
-_LONGEST_LINE: Final = 4_000_000
-_MOST_COMMENTS: Final = 1000
 _KINDS: Final = "fiub"
 _NO_COORDINATE: Final = b"This is a netCDF dimension but not a netCDF variable"
 _CODECS: Final = (
@@ -398,6 +396,8 @@ def _matlab(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
     from scipy.io import whosmat
 
     for name, shape, kind in whosmat(path):
+        if name.startswith("__"):
+            continue
         if kind.startswith(("double", "single", "int", "uint", "logical")):
             whole = _MatlabArray(path, name)
             yield StoredArray(name, tuple(int(n) for n in shape), whole.read)
@@ -417,8 +417,10 @@ class _MatlabArray:
             shape = next(shape for name, shape, _ in whosmat(self._path) if name == self._name)
             check_samples(f"{self._path}: {self._name}", prod(int(n) for n in shape))
             values = loadmat(self._path, variable_names=[self._name])[self._name]
-            if values.dtype.kind not in _KINDS:
-                raise SourceError(f"{self._path}: {self._name} is {values.dtype}, expected numbers")
+            if not isinstance(values, np.ndarray) or values.dtype.kind not in _KINDS:
+                raise SourceError(
+                    f"{self._path}: {self._name} is sparse or {values.dtype}, expected numbers"
+                )
             self._values = values
         return np.asarray(self._values[key])
 
@@ -556,75 +558,13 @@ def _csv(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
 def _csv_matrix(path: Path) -> NDArray[np.float32]:
     import pandas as pd
 
-    table = Table.look_at(path)
+    table = TextTable.look_at(path)
     with path.open(encoding="utf-8-sig") as stream:
         values = pd.read_csv(stream, header=None, **table.options)
     for column, kind in enumerate(values.dtypes):
         if kind.kind not in _KINDS:
             raise SourceError(f"{path}, column {column + 1}: has text in it, expected numbers")
     return np.asarray(values.to_numpy(np.float32))
-
-
-@dataclass(frozen=True)
-class Table:
-    """How a table in text is written.
-
-    Parameters
-    ----------
-    first : str
-        Its first line that is no comment.
-    options : mapping
-        What `pandas.read_csv` must know: how numbers are separated and written.
-    """
-
-    first: str
-    options: Mapping[str, Any]
-
-    @property
-    def cells(self) -> list[str]:
-        """Cells of the first line, without quotes."""
-        separator = self.options["sep"]
-        cells = self.first.split() if separator == r"\s+" else self.first.split(separator)
-        return [cell.strip().strip("\"'") for cell in cells]
-
-    @classmethod
-    def look_at(cls, path: Path) -> "Table":
-        """Find out how a table is written, from its first lines.
-
-        Raises
-        ------
-        SourceError
-            If it is empty, no text, too large or has a line that is too long.
-        """
-        if path.stat().st_size > _LARGEST_TABLE:
-            raise SourceError(
-                f"{path}: has {path.stat().st_size} bytes, expected up to {_LARGEST_TABLE}"
-            )
-        first, second = _two_lines(path)
-        separator = next((mark for mark in ";\t," if mark in first), r"\s+")
-        text = second or first
-        decimal = "," if separator != "," and "," in text and "." not in text else "."
-        options = {"sep": separator, "decimal": decimal, "comment": "#", "skipinitialspace": True}
-        return cls(first, options)
-
-
-def _two_lines(path: Path) -> tuple[str, str]:
-    """The first two lines that are no comments."""
-    lines: list[str] = []
-    with path.open(encoding="utf-8-sig") as stream:
-        for _ in range(_MOST_COMMENTS):
-            line = stream.readline(_LONGEST_LINE)
-            if len(line) == _LONGEST_LINE:
-                raise SourceError(f"{path}: a line has over {_LONGEST_LINE} letters")
-            if line.split("#")[0].strip():
-                lines.append(line.split("#")[0].strip())
-            if not line or len(lines) == 2:
-                break
-    if not lines:
-        raise SourceError(f"{path}: there is no number in it")
-    if "\0" in lines[0]:
-        raise SourceError(f"{path}: is no text, expected a table of numbers")
-    return lines[0], lines[1] if len(lines) > 1 else ""
 
 
 _READERS: Final[Mapping[str, Callable[[Path, ExitStack], Iterator[StoredArray]]]] = {

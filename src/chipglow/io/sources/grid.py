@@ -209,7 +209,8 @@ class _Layer:
         raw = raw.transpose([axes.index(axis) for axis in AXES])
         if raw.shape != expected:
             raise SourceError(f"{self.chosen}: has shape {raw.shape}, expected {expected}")
-        return _decoded(raw, self.array.attributes)
+        with reading(self.chosen):
+            return _decoded(raw, self.array.attributes)
 
 
 def _decoded(raw: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[np.float32]:

@@ -1,0 +1,91 @@
+"""How a table in text is written: what is between its numbers, and whether it is whole."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from chipglow.io.sources.source import SourceError
+
+_LARGEST_TABLE: Final = 1_000_000_000
+_LONGEST_LINE: Final = 4_000_000
+_MOST_COMMENTS: Final = 1000
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """How a table in text is written.
+
+    Parameters
+    ----------
+    first : str
+        Its first line that is no comment.
+    options : mapping
+        What `pandas.read_csv` must know: how numbers are separated and written.
+    """
+
+    first: str
+    options: Mapping[str, Any]
+
+    @property
+    def cells(self) -> list[str]:
+        """Cells of the first line, without quotes."""
+        separator = self.options["sep"]
+        return [cell.strip().strip("\"'") for cell in _split(self.first, separator)]
+
+    @classmethod
+    def look_at(cls, path: Path) -> "TextTable":
+        """Find out how a table is written, from its first lines.
+
+        Raises
+        ------
+        SourceError
+            If it is empty, no text, too large or has a line that is too long.
+        """
+        if path.stat().st_size > _LARGEST_TABLE:
+            raise SourceError(
+                f"{path}: has {path.stat().st_size} bytes, expected up to {_LARGEST_TABLE}"
+            )
+        first, second = _two_lines(path)
+        separator = next((mark for mark in ";\t," if mark in first), r"\s+")
+        text = second or first
+        decimal = "," if separator != "," and "," in text and "." not in text else "."
+        last, expected = (len(_split(one, separator)) for one in (_last_line(path), first))
+        if last != expected:
+            raise SourceError(
+                f"{path}: its last line has {last} cells, expected {expected}: it is cut short"
+            )
+        options = {"sep": separator, "decimal": decimal, "comment": "#", "skipinitialspace": True}
+        return cls(first, options)
+
+
+def _split(line: str, separator: str) -> list[str]:
+    return line.split() if separator == r"\s+" else line.split(separator)
+
+
+def _last_line(path: Path) -> str:
+    """The last line that is no comment; empty if it is too long to be looked at."""
+    with path.open("rb") as stream:
+        stream.seek(max(0, path.stat().st_size - _LONGEST_LINE))
+        lines = stream.read().decode("utf-8", "replace").split("\n")
+    known = [line.split("#")[0].strip() for line in lines[1:]]
+    return next((line for line in reversed(known) if line), "")
+
+
+def _two_lines(path: Path) -> tuple[str, str]:
+    """The first two lines that are no comments."""
+    lines: list[str] = []
+    with path.open(encoding="utf-8-sig") as stream:
+        for _ in range(_MOST_COMMENTS):
+            line = stream.readline(_LONGEST_LINE)
+            if len(line) == _LONGEST_LINE:
+                raise SourceError(f"{path}: a line has over {_LONGEST_LINE} letters")
+            if line.split("#")[0].strip():
+                lines.append(line.split("#")[0].strip())
+            if not line or len(lines) == 2:
+                break
+    if not lines:
+        raise SourceError(f"{path}: there is no number in it")
+    if "\0" in lines[0]:
+        raise SourceError(f"{path}: is no text, expected a table of numbers")
+    return lines[0], lines[1] if len(lines) > 1 else ""
