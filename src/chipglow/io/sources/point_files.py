@@ -25,7 +25,7 @@ from chipglow.io.sources.text_table import TextTable
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")
 TEXT_SUFFIXES: Final = (".csv", ".txt", ".dat", ".tsv")
-MOST_POINTS: Final = 30_000_000
+MOST_POINTS: Final = 10_000_000
 
 _PLACES: Final = ("points", "positions", "position", "coordinates", "coords", "pos", "location")
 _TIMES: Final = ("time", "times", "t_s")
