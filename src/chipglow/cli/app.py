@@ -189,6 +189,26 @@ def measure(
 
 
 @app.command()
+def show(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a NetCDF file.")],
+    at: Annotated[
+        str | None,
+        typer.Option(metavar="TIME", help="When, such as '400 us'; by default in the middle."),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw the fields at that time, PNG, PDF or SVG."),
+    ] = None,
+) -> None:
+    """Show what is in a scene: samples, times, values, where it comes from."""
+    from chipglow.cli.showing import show_scene
+
+    show_scene(scene, at, plot)
+    if plot is not None:
+        print(plot)
+
+
+@app.command()
 def materials(
     name: Annotated[
         str | None,

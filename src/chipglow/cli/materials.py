@@ -5,6 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from chipglow.cli.pictures import check_picture_path, write_picture
 from chipglow.cutting import material_file, material_names
 
 
@@ -36,11 +37,7 @@ def show_material(name: str) -> None:
 
 def plot_material(name: str, path: Path) -> None:
     """Draw a material to a picture whose kind is that of the file's name."""
-    from chipglow.io import atomic_path
     from chipglow.report.materials import material_figure
 
-    if path.suffix.lower() not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"--plot: {path}, expected a file that ends in .png, .pdf or .svg")
-    figure = material_figure(material_file(name))
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, format=path.suffix[1:].lower(), dpi=150)
+    check_picture_path(path)
+    write_picture(material_figure(material_file(name)), path)

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from chipglow.camera import Measurement
 from chipglow.cli.progress import progress_bars
+from chipglow.cli.times import parse_instant
 from chipglow.io import open_scene, write_measurement
 from chipglow.study import Study
-from chipglow.study.units import TIME
 
 
 def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: str | None) -> None:
@@ -37,7 +37,7 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
     if name not in surfaces:
         raise ValueError(f"--chip: {name!r} is unknown, expected one of {', '.join(surfaces)}")
     scene, camera = open_scene(path), study.camera.build()
-    first = float(scene.times[0]) if start is None else _start(start)
+    first = float(scene.times[0]) if start is None else parse_instant("--start", start)
     left = float(scene.times[-1]) + scene.frame_spacing - first - camera.integration_time
     count = max(floor(left * camera.frame_rate) + 1, 1)
     with progress_bars() as progress:
@@ -46,10 +46,3 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
         measured = camera.measure(scene, surfaces[name], starts).data.assign_attrs(surface=name)
         progress("measurement", 1.0)
     write_measurement(Measurement(measured), out)
-
-
-def _start(text: str) -> float:
-    try:
-        return TIME.parse(text)
-    except ValueError as error:
-        raise ValueError(f"--start: {error}") from None

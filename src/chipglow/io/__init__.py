@@ -4,7 +4,13 @@ from chipglow.io.atomic import atomic_folder, atomic_path
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
 from chipglow.io.movie_file import check_movie_path, movie_writer
-from chipglow.io.scene_file import FORMAT_VERSION, SceneWriter, open_scene, write_scene
+from chipglow.io.scene_file import (
+    FORMAT_VERSION,
+    SceneWriter,
+    StoredScene,
+    open_scene,
+    write_scene,
+)
 from chipglow.io.tool_file import read_tool_outline
 from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 
@@ -12,6 +18,7 @@ __all__ = [
     "FORMAT_VERSION",
     "Import",
     "SceneWriter",
+    "StoredScene",
     "UnfinishedScene",
     "View",
     "atomic_folder",

@@ -336,6 +336,13 @@ class StoredScene(Scene):
             xr.open_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
         )
 
+    @property
+    def compression(self) -> str:
+        """Names of the HDF5 filters of the temperature, as ``shuffle, deflate``; ``none``."""
+        settings = self._file["temperature"].id.get_create_plist()
+        filters = [settings.get_filter(i) for i in range(settings.get_nfilters())]
+        return ", ".join(name.decode() or str(code) for code, _, _, name in filters) or "none"
+
     def _is_packed(self, name: str) -> bool:
         stored, packing = self._file.get(name), PACKING[name]
         if not isinstance(stored, h5py.Dataset) or stored.dtype != packing.dtype:
@@ -356,7 +363,7 @@ class StoredScene(Scene):
             ) from error
 
 
-def open_scene(path: str | os.PathLike[str]) -> Scene:
+def open_scene(path: str | os.PathLike[str]) -> StoredScene:
     """Open a scene's file; frames are read when they are asked for.
 
     Parameters

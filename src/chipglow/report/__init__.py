@@ -3,5 +3,26 @@
 from chipglow.report.comparison import Row, comparison_rows
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
 from chipglow.report.report import write_report
+from chipglow.report.scene_figure import draw_scene
+from chipglow.report.scene_summary import (
+    FieldSummary,
+    QualitySummary,
+    SceneSummary,
+    ShownField,
+    scene_summary,
+)
 
-__all__ = ["CutPicture", "MovieScales", "Row", "comparison_rows", "cut_movie", "write_report"]
+__all__ = [
+    "CutPicture",
+    "FieldSummary",
+    "MovieScales",
+    "QualitySummary",
+    "Row",
+    "SceneSummary",
+    "ShownField",
+    "comparison_rows",
+    "cut_movie",
+    "draw_scene",
+    "scene_summary",
+    "write_report",
+]

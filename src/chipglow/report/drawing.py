@@ -1,5 +1,6 @@
 """How figures look: sizes, colours, images on micrometre axes."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -7,6 +8,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import Colormap, LogNorm, Normalize, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
@@ -24,6 +26,7 @@ VOID: Final = "#e5e7eb"
 
 HEAT: Final = "inferno"
 PLAIN: Final = "cividis"
+RATE: Final = "viridis"
 SIGNED: Final = "RdBu_r"
 
 KELVIN: Final = 273.15
@@ -89,21 +92,23 @@ def show_image(
     axes: Axes,
     image: NDArray[Any],
     raster: Raster,
-    tool: Tool,
-    colours: str,
+    tool: Tool | None,
+    colours: str | Colormap,
     limits: tuple[float, float],
+    *,
+    log: bool = False,
 ) -> AxesImage:
     """Image on micrometre axes with the tool's outline; grey where there is no value."""
     extent = np.array(raster.extent) * 1e6
-    shown = matplotlib.colormaps[colours].with_extremes(bad=VOID)
+    shown = matplotlib.colormaps.get_cmap(colours).with_extremes(bad=VOID)
     picture = axes.imshow(
         np.ma.masked_invalid(image),
         extent=tuple(extent),
         cmap=shown,
-        vmin=limits[0],
-        vmax=limits[1],
+        norm=LogNorm(*limits) if log else Normalize(*limits),
     )
-    draw_tool(axes, tool)
+    if tool is not None:
+        draw_tool(axes, tool)
     axes.set_xlim(extent[0], extent[1])
     axes.set_ylim(extent[2], extent[3])
     axes.set_xlabel("x / µm")
@@ -111,11 +116,17 @@ def show_image(
     return picture
 
 
-def veil(axes: Axes, where: NDArray[np.bool_], raster: Raster) -> None:
-    """Make part of an image paler."""
-    white = np.ones((*where.shape, 4))
-    white[..., 3] = np.where(where, 0.5, 0.0)
-    axes.imshow(white, extent=tuple(np.array(raster.extent) * 1e6))
+def veil(
+    axes: Axes,
+    where: NDArray[np.bool_],
+    raster: Raster,
+    colour: str = "white",
+    opacity: float = 0.5,
+) -> None:
+    """Make part of an image paler, or give it a colour."""
+    layer = np.broadcast_to(to_rgba(colour), (*where.shape, 4)).copy()
+    layer[..., 3] = np.where(where, opacity, 0.0)
+    axes.imshow(layer, extent=tuple(np.array(raster.extent) * 1e6))
 
 
 def draw_tool(axes: Axes, tool: Tool) -> None:
@@ -140,6 +151,41 @@ def colour_bar(figure: Figure, picture: AxesImage, axes: Any, label: str) -> Non
         (under, over), "neither"
     )
     figure.colorbar(picture, ax=axes, label=label, extend=extend, aspect=25)
+
+
+@dataclass(frozen=True)
+class ImagePanel:
+    """An image with its title and its colour bar.
+
+    Parameters
+    ----------
+    title, label : str
+        Above the image, and beside the colour bar with the unit.
+    image : ndarray
+        Values, NaN where there is none, shape (y, x).
+    limits : tuple
+        Ends of the colours.
+    colours : str
+        Name of the colour map.
+    log : bool
+        Whether the colours go by the logarithm.
+    """
+
+    title: str
+    label: str
+    image: NDArray[Any]
+    limits: tuple[float, float]
+    colours: str = PLAIN
+    log: bool = False
+
+    def draw(self, figure: Figure, axes: Axes, raster: Raster, tool: Tool | None) -> None:
+        """Draw it, with the labels of its axes only at the edges of the figure."""
+        picture = show_image(
+            axes, self.image, raster, tool, self.colours, self.limits, log=self.log
+        )
+        colour_bar(figure, picture, axes, self.label)
+        axes.set_title(self.title)
+        axes.label_outer()
 
 
 def round_limit(values: NDArray[np.float64], percentile: float, step: float) -> float:

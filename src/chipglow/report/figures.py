@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import matplotlib
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from chipglow.analysis.paper import PAPER, StudyResult, SurfaceResult
 from chipglow.camera import PointSpreadFunction
 from chipglow.report import drawing
-from chipglow.report.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.report.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, ImagePanel
 from chipglow.report.evidence import error_definition
 from chipglow.scene import Material
 
@@ -87,19 +87,16 @@ def fields(result: StudyResult) -> Figure:
     emissivity = np.where(there, surface.emissivity, np.nan)
     hottest = drawing.round_limit(temperature, 99.9, 50.0)
     name = result.plan.band_surface
-    panels: list[tuple[str, NDArray[Any], str, float, str]] = [
-        ("a) temperature", temperature, drawing.HEAT, hottest, "temperature / °C"),
-        ("b) plastic strain", strain, drawing.PLAIN, 4.0, "plastic strain"),
-        ("c) plastic strain rate", rate, drawing.PLAIN, 60.0, "strain rate / (10³ 1/s)"),
-        (f"d) emissivity, {name}", emissivity, drawing.PLAIN, 1.0, "emissivity"),
-    ]
+    panels = (
+        ImagePanel("a) temperature", "temperature / °C", temperature, (0.0, hottest), drawing.HEAT),
+        ImagePanel("b) plastic strain", "plastic strain", strain, (0.0, 4.0)),
+        ImagePanel("c) plastic strain rate", "strain rate / (10³ 1/s)", rate, (0.0, 60.0)),
+        ImagePanel(f"d) emissivity, {name}", "emissivity", emissivity, (0.0, 1.0)),
+    )
     figure = drawing.image_figure(result.raster, 2.5, rows=2)
     grid = figure.subplots(2, 2, sharex=True, sharey=True)
-    for axes, (title, image, colours, top, label) in zip(grid.flat, panels, strict=True):
-        picture = drawing.show_image(axes, image, result.raster, result.tool, colours, (0.0, top))
-        drawing.colour_bar(figure, picture, axes, label)
-        axes.set_title(title)
-        axes.label_outer()
+    for axes, panel in zip(grid.flat, panels, strict=True):
+        panel.draw(figure, axes, result.raster, result.tool)
     return figure
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
@@ -21,8 +20,6 @@ from chipglow.cutting import CuttingSimulation
 from chipglow.io.movie_file import PALETTE_SIZE, movie_writer
 from chipglow.report import drawing
 from chipglow.scene import Frame, Material, Raster
-
-RATE_COLOURS: Final = "viridis"
 
 _DPI: Final = 100
 _WIDTH: Final = 1320
@@ -128,11 +125,11 @@ class CutPicture:
         low, top = (limit - drawing.KELVIN for limit in scales.temperature)
         self._figure.get_layout_engine().set(w_pad=0.09)  # type: ignore[union-attr, call-arg]
         left, middle, right = self._figure.subplots(1, 3, sharex=True, sharey=True)
-        heat, strain, rate = Normalize(low, top), Normalize(*scales.strain), LogNorm(*scales.rate)
+        rate = "plastic strain rate", "strain rate / (1/s)", drawing.RATE
         self._images = (
-            self._panel(left, "temperature", "temperature / °C", drawing.HEAT, heat),
-            self._panel(middle, "plastic strain", "plastic strain", drawing.PLAIN, strain),
-            self._panel(right, "plastic strain rate", "strain rate / (1/s)", RATE_COLOURS, rate),
+            self._panel(left, "temperature", "temperature / °C", drawing.HEAT, (low, top)),
+            self._panel(middle, "plastic strain", "plastic strain", drawing.PLAIN, scales.strain),
+            self._panel(right, *rate, scales.rate, log=True),
         )
         for axes in (middle, right):
             axes.fill(*(self._tool.outline(_FAR) * 1e6).T, color=_TOOL, zorder=1.5)
@@ -147,12 +144,18 @@ class CutPicture:
         self._background = self._canvas.copy_from_bbox(self._figure.bbox)
 
     def _panel(
-        self, axes: Axes, title: str, label: str, colours: str, scale: Normalize
+        self,
+        axes: Axes,
+        title: str,
+        label: str,
+        colours: str,
+        limits: tuple[float, float],
+        *,
+        log: bool = False,
     ) -> AxesImage:
         empty = np.full(self._raster.shape, np.nan, np.float32)
-        image = drawing.show_image(axes, empty, self._raster, self._tool, colours, (0.0, 1.0))
-        image.set_norm(scale)
-        extend = "both" if isinstance(scale, LogNorm) else "max"
+        image = drawing.show_image(axes, empty, self._raster, self._tool, colours, limits, log=log)
+        extend = "both" if log else "max"
         self._figure.colorbar(image, ax=axes, label=label, extend=extend, aspect=25)
         axes.set_title(title)
         axes.label_outer()
@@ -200,7 +203,7 @@ def _palette() -> NDArray[np.uint8]:
     """The colours of the three scales and greys, as many as a GIF may have."""
     greys = 30
     each = (PALETTE_SIZE - greys) // 3
-    maps: list[Any] = [drawing.HEAT, drawing.PLAIN, RATE_COLOURS]
+    maps: list[Any] = [drawing.HEAT, drawing.PLAIN, drawing.RATE]
     colours = [matplotlib.colormaps[name](np.linspace(0.0, 1.0, each))[:, :3] for name in maps]
     plain = np.repeat(np.linspace(0.0, 1.0, greys)[:, None], 3, axis=1)
     return np.asarray(np.round(np.concatenate([*colours, plain]) * 255), dtype=np.uint8)

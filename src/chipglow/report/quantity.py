@@ -1,5 +1,7 @@
 """A number with its unit, as the tables print it."""
 
+from math import floor, log10
+
 
 def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "") -> str:
     """Text of a number with its unit, or a dash where there is none.
@@ -19,3 +21,13 @@ def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "")
         return "–"
     number = f"{round(value, decimals):{sign},.{max(decimals, 0)}f}"
     return f"{number.replace(',', ' ').replace('-', '−')} {unit}".strip()
+
+
+def rounded_text(value: float, unit: str = "") -> str:
+    """Text of a number to four digits that count, with its unit."""
+    if value == 0.0:
+        return quantity_text(0.0, unit, 0)
+    size = floor(log10(abs(value)))
+    if not -5 <= size <= 12:
+        return f"{value:.3e} {unit}".strip()
+    return quantity_text(value, unit, max(3 - size, 0))

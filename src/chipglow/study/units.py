@@ -154,6 +154,7 @@ WavelengthRange = Annotated[
 ]
 TIME: Final = Quantity("a time", "s", "us", "10 us")
 Time = Annotated[float, TIME]
+INSTANT: Final = Quantity("a time", "s", "us", "10 us", positive=False)
 Frequency = Annotated[float, Quantity("a frequency", "Hz", "Hz", "600 Hz")]
 Speed = Annotated[float, Quantity("a speed", "m/s", "m/min", "250 m/min")]
 Angle = Annotated[float, Quantity("an angle", "rad", "deg", "-7 deg", positive=False)]

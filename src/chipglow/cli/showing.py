@@ -1,0 +1,176 @@
+"""The command ``chipglow show``: what is in a scene, as text and as a picture."""
+
+import json
+from collections.abc import Iterator
+from math import degrees
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from chipglow.cli.pictures import check_picture_path, write_picture
+from chipglow.cli.times import parse_instant
+from chipglow.io import StoredScene, open_scene
+from chipglow.report import SceneSummary, draw_scene, scene_summary
+from chipglow.report.quantity import rounded_text
+from chipglow.report.scene_summary import frame_index
+from chipglow.scene import ENERGY_UNITS, Scene, Tool, ToolGeometry
+
+_LONGEST: Final = 800
+_MOST_NUMBERS: Final = 8
+
+_Rows: TypeAlias = Iterator[tuple[str, str]]
+
+
+def show_scene(path: Path, at: str | None, plot: Path | None) -> None:
+    """Print what is in a scene, and draw it if a picture is wanted.
+
+    Parameters
+    ----------
+    path : Path
+        The scene's file.
+    at : str, optional
+        Time of the frame to look at, with its unit; the middle one by default.
+    plot : Path, optional
+        The picture to write, .png, .pdf or .svg.
+    """
+    if plot is not None:
+        check_picture_path(plot)
+    scene = open_scene(path)
+    time = None if at is None else _time_in(scene, at)
+    summary = scene_summary(scene, time)
+    console = Console(highlight=False, markup=False)
+    console.print(_listed(_facts(scene, summary, path)))
+    console.print(f"\nAt {_microseconds(summary.times[summary.index])}:")
+    console.print(_listed(_state(summary)))
+    console.print()
+    console.print(_field_table(summary))
+    attributes = _listed(_attributes(scene))
+    if attributes.row_count:
+        console.print("\nAttributes:")
+        console.print(attributes)
+    if plot is not None:
+        write_picture(draw_scene(scene, time), plot)
+    scene.data.close()
+
+
+def _time_in(scene: Scene, at: str) -> float:
+    time = parse_instant("--at", at)
+    try:
+        frame_index(scene, time)
+    except ValueError as error:
+        raise ValueError(f"--at: {error}") from None
+    return time
+
+
+def _listed(rows: _Rows) -> Table:
+    table = Table(box=None, show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for row in rows:
+        table.add_row(*map(_printable, row))
+    return table
+
+
+def _facts(scene: StoredScene, summary: SceneSummary, path: Path) -> _Rows:
+    raster, times, data = summary.raster, summary.times, scene.data
+    left, right, bottom, top = (f"{1e6 * edge:.6g} µm" for edge in raster.extent)
+    yield "samples", f"{raster.columns} x {raster.rows} of {1e6 * raster.spacing:.6g} µm"
+    yield "x", f"{left} to {right}"
+    yield "y", f"{bottom} to {top}"
+    yield "frames", f"{len(times)}, {_microseconds(times[0])} to {_microseconds(times[-1])}"
+    if len(times) > 1:
+        yield "interval", _interval(np.diff(times))
+    yield "tool", _tool_text(scene.tool) if scene.tool else "not given"
+    yield "material coordinates", "yes" if scene.has_material_coordinates else "no"
+    if "force_time" in data:
+        span = data["force_time"].values
+        energies = ", with energies" if set(ENERGY_UNITS) <= set(data) else ""
+        yield "forces", f"{span.size} records{energies}"
+    size = path.stat().st_size
+    each = size / (len(times) * raster.rows * raster.columns)
+    yield "file", f"{size / 1e6:,.1f} MB, {each:.2g} bytes a sample ({scene.compression})"
+
+
+def _interval(steps: Any) -> str:
+    least, mean, greatest = (float(f(steps)) for f in (np.min, np.mean, np.max))
+    if greatest - least < 1e-3 * mean:
+        return _microseconds(mean)
+    return f"{_microseconds(least)} to {_microseconds(greatest)}"
+
+
+def _tool_text(tool: Tool) -> str:
+    text = f"rake {degrees(tool.rake_angle):.4g}°, clearance {degrees(tool.clearance_angle):.4g}°"
+    if not isinstance(tool, ToolGeometry):
+        return f"{text}, outline of {len(tool.corners)} points"
+    parts = [text, f"edge radius {1e6 * tool.edge_radius:.4g} µm"]
+    parts += ["chamfer"] * (tool.chamfer is not None) + ["hone"] * (tool.hone is not None)
+    return ", ".join(parts)
+
+
+def _state(summary: SceneSummary) -> _Rows:
+    shares = (f"{kind.name.lower()} {100 * share:.3g} %" for kind, share in summary.shares.items())
+    yield "samples that show", ", ".join(shares)
+    quality = summary.quality
+    if quality is not None:
+        yield "filled", f"{100 * quality.filled:.3g} % of the samples with material"
+        yield (
+            "colour distance",
+            f"median {quality.median:.3g}, 95 % within {quality.percentile_95:.3g}",
+        )
+
+
+def _field_table(summary: SceneSummary) -> Table:
+    everywhere = f"in {len(summary.sampled)} frames"
+    table = Table("over the workpiece", "unit", "least", "median", "greatest", everywhere, box=None)
+    table.columns[0].no_wrap = True
+    for column in table.columns[2:]:
+        column.justify = "right"
+    for field in summary.fields:
+        now = [rounded_text(number) for number in field.now or ()] or ["–"] * 3
+        overall = " to ".join(rounded_text(number) for number in field.overall or ()) or "–"
+        table.add_row(field.field.title, field.field.unit, *now, overall)
+    return table
+
+
+def _attributes(scene: Scene) -> _Rows:
+    """All that the file says of itself but the tool, which is shown above."""
+    for name, value in scene.data.attrs.items():
+        if not name.startswith("tool_"):
+            yield name, _shortened(_attribute_text(value))
+
+
+def _attribute_text(value: Any) -> str:
+    """An attribute as text; one that holds JSON, by its keys."""
+    if not isinstance(value, str):
+        return str(value)
+    try:
+        parsed = json.loads(value)
+    except (ValueError, RecursionError):
+        return value
+    return ", ".join(_leaves("", parsed)) if isinstance(parsed, dict) else value
+
+
+def _leaves(name: str, value: Any) -> Iterator[str]:
+    if isinstance(value, dict) and value:
+        for key, inner in value.items():
+            yield from _leaves(f"{name}.{key}" if name else str(key), inner)
+    elif isinstance(value, list) and len(value) > _MOST_NUMBERS:
+        yield f"{name} [{len(value)} values]"
+    else:
+        yield f"{name} {value}"
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} … ({len(text)} characters)"
+
+
+def _printable(text: str) -> str:
+    """Without what could steer the terminal."""
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
+def _microseconds(time: float) -> str:
+    return f"{time * 1e6:.7g} µs"

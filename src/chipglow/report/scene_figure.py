@@ -1,0 +1,174 @@
+"""A scene at one time, as a picture: its fields, and how their values are spread."""
+
+from math import ceil
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from chipglow.report import drawing
+from chipglow.report.drawing import BLUE, GREY, VERMILLION, VOID, WIDTH, ImagePanel
+from chipglow.report.scene_summary import RATE, STRAIN, TEMPERATURE, frame_index
+from chipglow.scene import FILLED, Frame, Material, Raster, Scene, Tool
+
+_COLOURS: Final = {Material.VOID: VOID, Material.WORKPIECE: BLUE, Material.TOOL: GREY}
+_ROWS: Final = 3
+_PANEL_WIDTH: Final = 2.6
+_PANEL_HEIGHTS: Final = (1.0, 3.4)
+_AROUND: Final = 0.46
+_HISTOGRAMS: Final = 3.6
+_DECADES: Final = 4
+_BINS: Final = 60
+_ARROWS: Final = 14
+
+
+def draw_scene(scene: Scene, time: float | None = None) -> Figure:
+    """Draw the fields of one frame and, below, how their values are spread over the workpiece.
+
+    Parameters
+    ----------
+    scene : Scene
+        Any scene; one frame is read.
+    time : float, optional
+        Time in s of what is drawn, the nearest frame's; the middle one by default.
+
+    Raises
+    ------
+    ValueError
+        If the time is not within the scene.
+    """
+    frame = scene.frame(frame_index(scene, time))
+    raster, tool, panels = scene.raster, scene.tool, _panels(frame)
+    with drawing.style():
+        images = _ROWS * (_panel_height(raster) + _AROUND) + _AROUND
+        figure = Figure(figsize=(WIDTH, images + _HISTOGRAMS), layout="constrained")
+        FigureCanvasAgg(figure)
+        figure.suptitle(f"{frame.time * 1e6:.6g} µs")
+        parts: Any = figure.subfigures(2, 1, height_ratios=(images, _HISTOGRAMS))
+        top, bottom = parts
+        grid = top.subplots(_ROWS, 2, sharex=True, sharey=True)
+        for axes, panel in zip(grid.flat, panels, strict=False):
+            panel.draw(top, axes, raster, tool)
+        _draw_arrows(grid[1, 1], frame, raster)
+        _draw_material(top, grid[2, 0], frame, raster, tool)
+        if frame.quality is not None and frame.quality[frame.material != Material.VOID].any():
+            _draw_quality(top, grid[2, 1], frame, frame.quality, raster, tool)
+        else:
+            _leave_out(grid[2, 1], grid[1, 1])
+        solid = frame.material == Material.WORKPIECE
+        for axes, panel in zip(bottom.subplots(2, 2).flat, panels, strict=True):
+            _draw_histogram(axes, panel, panel.image[solid])
+        bottom.supylabel("share of the workpiece's samples / %", fontsize=9.5)
+    return figure
+
+
+def _panels(frame: Frame) -> tuple[ImagePanel, ...]:
+    """Temperature, strain, strain rate and speed."""
+    there, solid = frame.material != Material.VOID, frame.material == Material.WORKPIECE
+    temperature = np.where(there, TEMPERATURE(frame.temperature), np.nan)
+    strain = np.where(solid, frame.plastic_strain, np.nan)
+    rate = np.where(solid, frame.plastic_strain_rate, np.nan)
+    speed = np.where(solid, np.hypot(frame.velocity_x, frame.velocity_y), np.nan)
+    decades = _decades(rate)
+    heat = _ends(temperature, (0.1, 99.9))
+    return (
+        ImagePanel("temperature", TEMPERATURE.label, temperature, heat, drawing.HEAT),
+        ImagePanel("plastic strain", STRAIN.label, strain, (0.0, _ends(strain, (0.0, 99.9))[1])),
+        ImagePanel(
+            "plastic strain rate",
+            RATE.label,
+            np.maximum(rate, decades[0]),
+            decades,
+            drawing.RATE,
+            log=True,
+        ),
+        ImagePanel("speed", "speed / (m/s)", speed, (0.0, _ends(speed, (0.0, 99.9))[1])),
+    )
+
+
+def _ends(image: NDArray[Any], percentiles: tuple[float, float]) -> tuple[float, float]:
+    """Two percentiles of what is known, apart from each other."""
+    known = image[np.isfinite(image)]
+    low, high = map(float, np.percentile(known, percentiles)) if known.size else (0.0, 1.0)
+    return low, high if high - low > 1e-6 * abs(high) else low + 1.0
+
+
+def _decades(rate: NDArray[Any]) -> tuple[float, float]:
+    """Whole decades, the last of which has the fastest."""
+    fastest = _ends(rate, (0.0, 99.9))[1]
+    top = float(np.ceil(np.log10(max(fastest, 1e-30)) - 1e-9))
+    return 10.0 ** (top - _DECADES), 10.0**top
+
+
+def _panel_height(raster: Raster) -> float:
+    least, most = _PANEL_HEIGHTS
+    return min(max(_PANEL_WIDTH * raster.rows / raster.columns, least), most)
+
+
+def _draw_arrows(axes: Axes, frame: Frame, raster: Raster) -> None:
+    """Directions of the motion on a coarse grid, the fastest as long as the grid is wide."""
+    step = max(ceil(max(raster.shape) / _ARROWS), 1)
+    coarse = np.s_[step // 2 :: step, step // 2 :: step]
+    solid = frame.material[coarse] == Material.WORKPIECE
+    x, y = np.meshgrid(raster.x[coarse[1]] * 1e6, raster.y[coarse[0]] * 1e6)
+    u, v = frame.velocity_x[coarse][solid], frame.velocity_y[coarse][solid]
+    fastest = float(np.hypot(u, v).max(initial=0.0))
+    if fastest > 0.0:
+        scale = fastest / (step * raster.spacing * 1e6)
+        style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": scale}
+        edge: dict[str, Any] = {"color": "white", "edgecolor": "black", "linewidth": 0.4}
+        axes.quiver(x[solid], y[solid], u, v, width=0.007, pivot="mid", **style, **edge)
+
+
+def _draw_material(
+    figure: Any, axes: Axes, frame: Frame, raster: Raster, tool: Tool | None
+) -> None:
+    colours = ListedColormap([_COLOURS[kind] for kind in Material])
+    ends = (-0.5, len(Material) - 0.5)
+    picture = drawing.show_image(axes, frame.material, raster, tool, colours, ends)
+    bar = figure.colorbar(picture, ax=axes, aspect=25, ticks=list(Material))
+    bar.ax.set_yticklabels([kind.name.lower() for kind in Material], rotation=90, va="center")
+    axes.set_title("material")
+    axes.label_outer()
+
+
+def _draw_quality(
+    figure: Any,
+    axes: Axes,
+    frame: Frame,
+    flags: NDArray[np.uint8],
+    raster: Raster,
+    tool: Tool | None,
+) -> None:
+    there = frame.material != Material.VOID
+    filled = there & (flags == FILLED)
+    distance = np.where(there & ~filled, flags, np.nan)
+    ends = (0.0, _ends(distance, (0.0, 99.0))[1])
+    title = f"quality; red: filled, {100 * filled.sum() / there.sum():.2g} %"
+    ImagePanel(title, "colour distance / ΔE", distance, ends).draw(figure, axes, raster, tool)
+    drawing.veil(axes, filled, raster, VERMILLION, 1.0)
+
+
+def _leave_out(axes: Axes, above: Axes) -> None:
+    """Remove a panel; the one above it is then the lowest of its column."""
+    axes.remove()
+    above.set_xlabel("x / µm")
+    above.tick_params(labelbottom=True)
+
+
+def _draw_histogram(axes: Axes, panel: ImagePanel, values: NDArray[Any]) -> None:
+    axes.set_xlabel(panel.label)
+    if values.size == 0:
+        axes.set_title("no workpiece")
+        return
+    low, high = _ends(values, (0.0, 100.0))
+    bins = np.geomspace(low, high, _BINS) if panel.log else np.linspace(low, high, _BINS)
+    axes.hist(values, bins.tolist(), weights=np.full(values.size, 100.0 / values.size), color=BLUE)
+    axes.set_yscale("log")
+    if panel.log:
+        axes.set_xscale("log")
+        axes.set_title("slower ones in the first bar")

@@ -1,0 +1,234 @@
+"""`chipglow show`: what is in a scene, in numbers and as a picture."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from shutil import copy
+
+import numpy as np
+import pytest
+from analytic_chip import AnalyticChip
+from PIL import Image
+from typer.testing import CliRunner
+
+from chipglow.cli import app
+from chipglow.io import StoredScene, open_scene, write_scene
+from chipglow.report import draw_scene, scene_summary
+from chipglow.report.quantity import rounded_text
+from chipglow.scene import FILLED, Material, Raster, Scene
+
+RASTER = Raster(left=-100e-6, top=50e-6, spacing=2e-6, rows=30, columns=40)
+TIMES = np.arange(101) * 1e-6
+KINDS = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
+
+
+def a_scene(times=TIMES, attributes=None, **changed):
+    """Rows of void, chip and tool; the chip's temperature rises with x and with time."""
+    shape = (len(times), *RASTER.shape)
+    material = np.full(shape, Material.WORKPIECE, np.uint8)
+    material[:, :6], material[:, 24:] = Material.VOID, Material.TOOL
+    rise = np.linspace(0.0, 100.0, RASTER.columns) + 1e6 * np.asarray(times)[:, None, None]
+    zero = np.zeros(shape)
+    fields = {
+        "temperature": np.where(material == Material.WORKPIECE, 373.15 + rise, 300.0),
+        "plastic_strain": zero + 0.5,
+        "plastic_strain_rate": zero + 2e4,
+        "velocity_x": zero + 3.0,
+        "velocity_y": zero - 4.0,
+        "material": material,
+    }
+    return Scene.from_fields(RASTER, times, {**fields, **changed}, attributes=attributes)
+
+
+def flags():
+    """Flags of 100 samples of void, and of the material: 3 of 10 filled, 7 of 10 at 4."""
+    quality = np.full((1, *RASTER.shape), 4, np.uint8)
+    quality[:, 6:, :12] = FILLED
+    quality[:, :6] = 200
+    return quality
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    path = tmp_path_factory.mktemp("written") / "scene.nc"
+    write_scene(a_scene(attributes={"assumed": "frames are 1 us apart"}), path)
+    return path
+
+
+@pytest.fixture
+def path(tmp_path, monkeypatch, written):
+    monkeypatch.chdir(tmp_path)
+    return Path(copy(written, tmp_path))
+
+
+def show(*arguments):
+    result = CliRunner().invoke(app, ["show", *map(str, arguments)], env={"COLUMNS": "120"})
+    return result.exit_code, result.output
+
+
+def test_the_summary_is_of_the_workpiece_at_that_time():
+    summary = scene_summary(a_scene(), 20.2e-6)
+    assert summary.index == 20
+    temperature = summary.fields[0]
+    assert temperature.field.unit == "°C"
+    assert temperature.now == pytest.approx((120.0, 170.0, 220.0), abs=1e-3)
+    assert temperature.overall == pytest.approx((100.0, 300.0), abs=1e-3)
+    values = {field.field.name: field.now for field in summary.fields}
+    assert values["velocity_y"] == (-4.0, -4.0, -4.0)
+    assert values["plastic_strain_rate"] == (2e4, 2e4, 2e4)
+    assert "material_x" not in values
+    assert summary.shares == pytest.approx(
+        {Material.VOID: 0.2, Material.WORKPIECE: 0.6, Material.TOOL: 0.2}
+    )
+    assert summary.quality is None
+
+
+def test_the_quality_is_that_of_the_samples_with_material():
+    quality = scene_summary(a_scene(times=[0.0], quality=flags())).quality
+    assert quality.filled == pytest.approx(0.3)
+    assert (quality.median, quality.percentile_95) == (4.0, 4.0)
+
+
+def test_a_scene_without_workpiece_has_no_values():
+    void = np.zeros((1, *RASTER.shape), np.uint8)
+    scene = a_scene(times=[0.0], material=void, quality=void + FILLED)
+    summary = scene_summary(scene)
+    assert all(field.now is None and field.overall is None for field in summary.fields)
+    assert summary.quality.filled == 0.0
+    draw_scene(scene)
+
+
+def test_few_frames_are_read(path, monkeypatch):
+    scene, read = open_scene(path), []
+    one = StoredScene.frame
+    monkeypatch.setattr(StoredScene, "frame", lambda s, index: read.append(index) or one(s, index))
+    assert scene_summary(scene, 33e-6).sampled == (0, 25, 33, 50, 75, 100)
+    draw_scene(scene, 33e-6)
+    assert len(read) <= 7
+
+
+def test_the_time_must_be_in_the_scene():
+    scene = a_scene()
+    assert scene_summary(scene).index == 50
+    assert scene_summary(scene, 0.0).index == 0
+    assert scene_summary(scene, 100.4e-6).index == 100
+    for wrong in (-1e-6, 101e-6, np.nan):
+        with pytest.raises(ValueError, match=r"us is not in the scene, expected 0 us to 100 us"):
+            scene_summary(scene, wrong)
+
+
+def test_the_command_prints_what_is_there(path):
+    code, text = show("scene.nc", "--at", "0 us")
+    assert code == 0
+    for part in (
+        "40 x 30 of 2 µm",
+        "-100 µm to -20 µm",
+        "-10 µm to 50 µm",
+        "101, 0 µs to 100 µs",
+        "not given",
+        "blosc2",
+        "At 0 µs",
+        "void 20 %, workpiece 60 %, tool 20 %",
+        "frames are 1 us apart",
+        "20 000",
+    ):
+        assert part in text
+    assert "filled" not in text
+    (row,) = (line for line in text.splitlines() if line.startswith(" temperature"))
+    assert row.split() == ["temperature", "°C", "100.0", "150.0", "200.0", "100.0", "to", "300.0"]
+
+
+def test_the_command_prints_flags_tool_forces_and_provenance(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    chip = AnalyticChip().scene()
+    one = Scene(
+        chip.data.isel(time=[3])
+        .assign(quality=(("time", "y", "x"), np.full((1, *chip.raster.shape), FILLED, np.uint8)))
+        .assign_attrs({"import": json.dumps({"movie": "a.avi", "box": {"left": 7}})})
+        .assign_attrs(title="[bold]\x1b[31mred")
+    )
+    write_scene(one, "scene.nc", portable=True)
+    code, text = show("scene.nc")
+    assert code == 0
+    for part in ("rake -7°", "edge radius", "filled", "100 %", "movie a.avi, box.left 7"):
+        assert part in text
+    assert "[bold] [31mred" in text
+    assert "940 records" in text
+    assert "shuffle, deflate" in text
+    assert "interval" not in text
+
+
+def test_uneven_times_are_said(tmp_path):
+    write_scene(a_scene(times=[0.0, 1e-6, 3e-6]), tmp_path / "scene.nc")
+    assert "1 µs to 2 µs" in show(tmp_path / "scene.nc")[1]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_command_draws(path, kind):
+    code, text = show("scene.nc", "--plot", f"scene.{kind}")
+    assert code == 0, text
+    assert text.splitlines()[-1] == f"scene.{kind}"
+    assert (path.parent / f"scene.{kind}").read_bytes().startswith(KINDS[kind])
+
+
+def test_the_picture_shows_the_flags_if_there_are_any():
+    def titles(scene):
+        images = draw_scene(scene).subfigs[0].axes
+        return [axes.get_title(loc="left") for axes in images if axes.get_title(loc="left")]
+
+    plain = ["temperature", "plastic strain", "plastic strain rate", "speed", "material"]
+    assert titles(a_scene(times=[0.0])) == plain
+    assert titles(a_scene(times=[0.0], quality=flags() * np.uint8(0))) == plain
+    assert titles(a_scene(times=[0.0], quality=flags())) == [*plain, "quality; red: filled, 30 %"]
+
+
+def test_the_histograms_are_of_the_workpiece():
+    scene = a_scene(times=[0.0], plastic_strain=np.tile(np.arange(40.0), (1, 30, 1)))
+    for axes in draw_scene(scene).subfigs[1].axes:
+        assert sum(bar.get_height() for bar in axes.patches) == pytest.approx(100.0)
+    strain = draw_scene(scene).subfigs[1].axes[1]
+    assert strain.get_xlabel() == "plastic strain"
+    heights = [bar.get_height() for bar in strain.patches if bar.get_height()]
+    assert heights == pytest.approx([2.5] * 40)
+
+
+def test_the_picture_is_of_a_scene_of_any_shape(tmp_path):
+    for shape in ((4, 400), (400, 4)):
+        raster = replace(RASTER, rows=shape[0], columns=shape[1])
+        zero = np.zeros((1, *shape))
+        names = ("plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y")
+        fields = {**dict.fromkeys(names, zero), "temperature": zero + 300, "material": zero + 1}
+        draw_scene(Scene.from_fields(raster, [0.0], fields)).savefig(tmp_path / "any.png")
+        with Image.open(tmp_path / "any.png") as picture:
+            assert max(picture.size) < 2000
+
+
+def test_what_is_wrong_is_one_line(path):
+    (path.parent / "cut.nc").write_bytes(path.read_bytes()[:20_000])
+    for arguments, parts in (
+        (["scene.nc", "--at", "2 ms"], ("--at: 2000 us is not in the scene", "0 us to 100 us")),
+        (["scene.nc", "--at", "20"], ("--at: 20 has no unit", "10 us")),
+        (["scene.nc", "--plot", "scene.jpg"], ("--plot: scene.jpg", ".png, .pdf or .svg")),
+        (["none.nc"], ("none.nc: there is no such file",)),
+        (["cut.nc"], ("cut.nc: not a scene, or cut short",)),
+    ):
+        code, text = show(*arguments)
+        assert code == 2
+        assert len(text.splitlines()) == 1
+        assert all(part in text for part in ("chipglow: ", *parts))
+    assert {file.name for file in path.parent.iterdir()} == {"scene.nc", "cut.nc"}
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [
+        (0.0, "0"),
+        (-1458.86, "−1 459"),
+        (69216.0, "69 216"),
+        (549.425, "549.4"),
+        (0.00029156, "0.0002916"),
+        (1e-9, "1.000e-09"),
+    ],
+)
+def test_numbers_have_four_digits_that_count(number, text):
+    assert rounded_text(number) == text
