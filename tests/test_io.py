@@ -21,9 +21,11 @@ from chipglow.io import (
     atomic_path,
     open_scene,
     read_measurement,
+    unfinished_scenes,
     write_measurement,
     write_scene,
 )
+from chipglow.io.packing import HOTTEST_PACKED, PACKING
 from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene, SceneError, ToolGeometry
 from chipglow.scene.scene import raster_coordinates
@@ -32,6 +34,7 @@ RASTER = Raster(left=-420e-6, top=460e-6, spacing=0.6667e-6, rows=18, columns=27
 # Half of what the file keeps, and a rounding in float32 for what is unpacked by a product.
 RELATIVE = {
     # A unit in the last place of a 32-bit float.
+    "temperature": 2.0**-23,
     "material_x": 2.0**-23,
     "material_y": 2.0**-23,
     "plastic_strain": 2.0**-14,
@@ -68,6 +71,11 @@ def a_file(folder, count=3, name="scene.nc", **options):
             writer.append(a_frame(index * 0.2e-6, seed=index))
         writer.forces([0.0, 1e-6], [4.0e5, 4.5e5], [1.5e5, 2.0e5])
     return path
+
+
+def write_frame(path, frame, **options):
+    with SceneWriter(path, RASTER, **options) as writer:
+        writer.append(frame)
 
 
 def assert_as_kept(found, expected):
@@ -454,6 +462,64 @@ def test_scene_in_memory_goes_to_a_file(tmp_path):
     fields = {name: np.stack([getattr(frame, name) for frame in frames]) for name in names}
     write_scene(Scene.from_fields(RASTER, [0.0, 1e-6], fields), tmp_path / "scene.nc")
     for found, expected in zip(open_scene(tmp_path / "scene.nc").frames(), frames, strict=True):
+        assert_as_kept(found, expected)
+
+
+def test_a_hot_scene_comes_back_and_survives_a_copy(tmp_path):
+    hot = np.linspace(200.0, 6000.0, 18 * 27, dtype=np.float32).reshape(RASTER.shape)
+    frame = a_frame(temperature=hot)
+    with SceneWriter(tmp_path / "one.nc", RASTER, hottest=6000.0) as writer:
+        writer.append(frame)
+    one = open_scene(tmp_path / "one.nc")
+    assert_as_kept(one.frame(0), frame)
+    # As read by xarray, which does not know the fast way.
+    np.testing.assert_allclose(one.data["temperature"][0], hot, atol=0.0125 + 1e-3)
+    write_scene(one, tmp_path / "two.nc")
+    two = open_scene(tmp_path / "two.nc").frame(0)
+    np.testing.assert_array_equal(two.temperature, one.frame(0).temperature)
+    with xr.open_dataset(tmp_path / "one.nc", decode_times=False) as data:
+        data.load().drop_encoding().to_netcdf(tmp_path / "foreign.nc")
+    write_scene(open_scene(tmp_path / "foreign.nc"), tmp_path / "three.nc")
+    assert_as_kept(open_scene(tmp_path / "three.nc").frame(0), frame)
+    with pytest.raises(SceneError, match=r"beyond the file's range, 200 to 1838"):
+        write_frame(tmp_path / "four.nc", frame)
+
+
+def test_only_a_hot_scene_takes_more_bits(tmp_path):
+    def kind(**options):
+        write_frame(tmp_path / "scene.nc", a_frame(), **options)
+        with h5py.File(tmp_path / "scene.nc") as file:
+            return file["temperature"].dtype
+
+    assert PACKING["temperature"].range[1] == HOTTEST_PACKED
+    assert kind() == kind(hottest=1838.375) == np.uint16
+    assert kind(hottest=1838.4) == np.int32
+    # A copy of a file that cannot be hotter stays as it is.
+    write_scene(open_scene(a_file(tmp_path)), tmp_path / "copy.nc")
+    with h5py.File(tmp_path / "copy.nc") as file:
+        assert file["temperature"].dtype == np.uint16
+
+
+@pytest.mark.parametrize("hottest", [1838.0, 6000.0])
+def test_a_scene_goes_on_from_a_checkpoint(tmp_path, hottest):
+    path = tmp_path / "scene.nc"
+    frames = [
+        a_frame(i * 1e-6, seed=i, temperature=np.full(RASTER.shape, hottest - i, np.float32))
+        for i in range(3)
+    ]
+    with (
+        pytest.raises(KeyboardInterrupt),
+        SceneWriter(path, RASTER, hottest=hottest) as writer,
+    ):
+        for frame in frames[:2]:
+            writer.append(frame)
+        writer.checkpoint({}, 0.5)
+        raise KeyboardInterrupt
+    (left,) = unfinished_scenes(path)
+    with SceneWriter(path, RASTER, hottest=hottest, resume=left) as writer:
+        writer.append(frames[2])
+    left.remove()
+    for found, expected in zip(open_scene(path).frames(), frames, strict=True):
         assert_as_kept(found, expected)
 
 

@@ -18,6 +18,7 @@ from chipglow.io.sources import Source, SourceError, Survey
 from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 from chipglow.scene import Frame, Raster, Scene
 from chipglow.scene.completion import Completion, complete
+from chipglow.scene.scene import HOTTEST_PLAUSIBLE
 
 SAMPLES_ACROSS: Final = 900
 """Samples along the longer side of a scene, if nothing is said: those of the paper's scene."""
@@ -216,7 +217,14 @@ def import_scene(
     attributes = {"import": key, "assumed": "; ".join(looked.assumed)}
     coordinates = {"material_x", "material_y"} <= set(survey.found)
     with SceneWriter(
-        path, raster, completion.tool, attributes, coordinates, quality=True, resume=start
+        path,
+        raster,
+        completion.tool,
+        attributes,
+        coordinates,
+        quality=True,
+        hottest=HOTTEST_PLAUSIBLE,
+        resume=start,
     ) as writer:
         due = monotonic() + _CHECKPOINT_INTERVAL
         for number, frame in enumerate(_frames(wanted, raster, done), start=done + 1):

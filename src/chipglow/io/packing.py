@@ -113,3 +113,14 @@ PACKING: Final[Mapping[str, Packing]] = {
     "quality": Whole(),
 }
 """Resolution of each field of a scene."""
+
+HOTTEST_PACKED: Final = 1838.375
+"""Greatest temperature in K that 16 bits of its steps reach."""
+
+HOT: Final = Steps(np.int32, 0.025, 200.0)
+"""The temperature of a scene that may be hotter."""
+
+
+def packing_for(hottest: float) -> Mapping[str, Packing]:
+    """Resolution of each field of a scene whose temperature in K may be as high as `hottest`."""
+    return PACKING if hottest <= HOTTEST_PACKED else {**PACKING, "temperature": HOT}

@@ -16,7 +16,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.io.atomic import KeptErrorFile, atomic_path
-from chipglow.io.packing import PACKING
+from chipglow.io.packing import HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
 from chipglow.io.unfinished import (
     UnfinishedScene,
     checkpoint_path,
@@ -33,7 +33,13 @@ from chipglow.scene import (
     SceneError,
     Tool,
 )
-from chipglow.scene.scene import ENERGY_UNITS, FORCE_UNITS, check_frame, raster_coordinates
+from chipglow.scene.scene import (
+    ENERGY_UNITS,
+    FORCE_UNITS,
+    HOTTEST_PLAUSIBLE,
+    check_frame,
+    raster_coordinates,
+)
 from chipglow.scene.tool_attributes import tool_attributes
 
 FORMAT_VERSION: Final = 1
@@ -90,6 +96,9 @@ class SceneWriter:
         Whether the frames have material coordinates.
     quality : bool
         Whether the frames have flags of their quality.
+    hottest : float
+        Greatest temperature in K that the frames may have. Over the default, 1838.375 K,
+        temperature takes 32 bits instead of 16 and reaches all that a scene may have.
     portable : bool
         Compress with zlib, which every reader of NetCDF-4 knows; by default with Blosc2, several
         times faster, which needs the HDF5 filter of ``hdf5plugin``.
@@ -98,9 +107,9 @@ class SceneWriter:
 
     Notes
     -----
-    One NetCDF-4 file, a chunk per field and frame. Temperature has steps of 25 mK from 200 K to
-    1838.375 K, material coordinates steps of 20 nm; plastic strain, plastic strain rate and
-    velocities are within 2⁻¹⁴, 2⁻¹² and 2⁻¹¹ of their value.
+    One NetCDF-4 file, a chunk per field and frame. Temperature has steps of 25 mK from 200 K up,
+    material coordinates steps of 20 nm; plastic strain, plastic strain rate and velocities are
+    within 2⁻¹⁴, 2⁻¹² and 2⁻¹¹ of their value.
     """
 
     def __init__(
@@ -112,6 +121,7 @@ class SceneWriter:
         material_coordinates: bool = True,
         *,
         quality: bool = False,
+        hottest: float = HOTTEST_PACKED,
         portable: bool = False,
         resume: UnfinishedScene | None = None,
     ) -> None:
@@ -123,6 +133,7 @@ class SceneWriter:
             **(MATERIAL_COORDINATE_UNITS if material_coordinates else {}),
             **({QUALITY: "1"} if quality else {}),
         }
+        self._packing = packing_for(hottest)
         self._compression = _PORTABLE if portable else _FAST
         self._stack = ExitStack()
         self._times: list[float] = []
@@ -296,7 +307,7 @@ class SceneWriter:
             self._create_field(name)
 
     def _create_field(self, name: str) -> None:
-        packing = PACKING[name]
+        packing = self._packing[name]
         variable = self._file.create_variable(
             name,
             ("time", "y", "x"),
@@ -316,7 +327,7 @@ class SceneWriter:
                 f"scene: {name!r} is {found} at {frame.time:.9g} s, expected {self.raster.shape}"
             )
         try:
-            return PACKING[name].pack(values)
+            return self._packing[name].pack(values)
         except ValueError as error:
             raise SceneError(f"scene: {name!r} at {frame.time:.9g} s: {error}") from None
 
@@ -331,10 +342,20 @@ class StoredScene(Scene):
     def __init__(self, path: Path) -> None:
         self.path = path
         self._file = h5py.File(path, "r")
-        self._direct = {name for name in PACKING if self._is_packed(name)}
+        self._direct = {
+            name: packing
+            for name, packing in (*PACKING.items(), ("temperature", HOT))
+            if self._is_packed(name, packing)
+        }
         super().__init__(
             xr.open_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
         )
+
+    @property
+    def hottest(self) -> float:
+        """Temperature in K over which the file can have none."""
+        narrow = self._direct.get("temperature") == PACKING["temperature"]
+        return HOTTEST_PACKED if narrow else HOTTEST_PLAUSIBLE
 
     @property
     def compression(self) -> str:
@@ -343,8 +364,8 @@ class StoredScene(Scene):
         filters = [settings.get_filter(i) for i in range(settings.get_nfilters())]
         return ", ".join(name.decode() or str(code) for code, _, _, name in filters) or "none"
 
-    def _is_packed(self, name: str) -> bool:
-        stored, packing = self._file.get(name), PACKING[name]
+    def _is_packed(self, name: str, packing: Packing) -> bool:
+        stored = self._file.get(name)
         if not isinstance(stored, h5py.Dataset) or stored.dtype != packing.dtype:
             return False
         names = ("scale_factor", "add_offset", "_FillValue", "missing_value", "_Unsigned")
@@ -355,7 +376,7 @@ class StoredScene(Scene):
     def _read(self, name: str, index: int) -> NDArray[Any]:
         try:
             if name in self._direct:
-                return PACKING[name].unpack(self._file[name][index])
+                return self._direct[name].unpack(self._file[name][index])
             return super()._read(name, index)
         except OSError as error:
             raise SceneError(
@@ -410,6 +431,7 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, portable: bool = 
         attributes=scene.data.attrs,
         material_coordinates=scene.has_material_coordinates,
         quality=QUALITY in scene.data,
+        hottest=scene.hottest if isinstance(scene, StoredScene) else HOTTEST_PLAUSIBLE,
         portable=portable,
     ) as writer:
         for frame in scene.frames():
