@@ -13,6 +13,7 @@ import scipy.io
 import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 
 from chipglow.io.sources import CELSIUS, Placement, SourceError, Unit, Units
 from chipglow.io.sources.arrays import open_arrays
@@ -129,6 +130,14 @@ def tiff_packed(folder, values):
     return folder / "T.tif", {}
 
 
+def tiff_of_libtiff(folder, values):
+    pytest.importorskip("tifffile")
+    pictures = [Image.fromarray(frame) for frame in values]
+    others = {"save_all": True, "append_images": pictures[1:], "compression": "tiff_lzw"}
+    pictures[0].save(folder / "T.tif", **others)
+    return folder / "T.tif", {}
+
+
 def csv(folder, values, separator=","):
     for number, frame in enumerate(values):
         np.savetxt(folder / f"T_{number * 7}.csv", frame, delimiter=separator, fmt="%.9g")
@@ -144,7 +153,7 @@ def csv_semicolons(folder, values):
 
 FORMATS = [
     npy, npz, npz_packed, npz_fortran, hdf5, netcdf3, netcdf4, zarr2, zarr3, matlab5, matlab73,
-    tiff, tiff_packed, csv, csv_semicolons,
+    tiff, tiff_packed, tiff_of_libtiff, csv, csv_semicolons,
 ]  # fmt: skip
 
 

@@ -27,6 +27,8 @@ MOST_ON_A_SIDE: Final = 1_000_000
 
 _MOST_ARRAYS: Final = 10_000
 _KINDS: Final = "fiub"
+_UNPACKED_BY_TIFFFILE: Final = (1, 8, 32946)
+"""None, and two names of deflate: the other compressions need libtiff, which Pillow has."""
 _NO_COORDINATE: Final = b"This is a netCDF dimension but not a netCDF variable"
 _CODECS: Final = (
     "blosc", "bz2", "bytes", "crc32c", "delta", "fixedscaleoffset", "gzip", "lz4", "lzma",
@@ -486,9 +488,24 @@ def _check_page(path: Path, page: Any) -> None:
 def _tiff_pages(path: Path, series: Any, key: Key) -> NDArray[Any]:
     pages = list(series.pages)[key[0]] if len(series.shape) > 2 else list(series.pages)
     check_samples(str(path), len(pages) * prod(series.shape[-2:]))
-    stacked = np.stack([page.asarray(maxworkers=1) for page in pages])
+    stacked = np.stack([_tiff_page(path, page) for page in pages])
     part = stacked[(slice(None), *key[-2:])]
     return np.asarray(part[0] if len(series.shape) == 2 else part)
+
+
+def _tiff_page(path: Path, page: Any) -> NDArray[Any]:
+    if page.compression in _UNPACKED_BY_TIFFFILE and page.keyframe.predictor == 1:
+        return np.asarray(page.asarray(maxworkers=1))
+    from PIL import Image
+
+    with Image.open(path) as picture:
+        picture.seek(page.index)
+        values = np.asarray(picture)
+    if values.shape != page.shape:
+        raise SourceError(
+            f"{path}: picture {page.index} cannot be unpacked, expected no LZW or JPEG"
+        )
+    return values
 
 
 def _extra(module: str, path: Path) -> Any:

@@ -322,7 +322,11 @@ def _open(source: GridSource, stack: ExitStack) -> _Grid:
     layers: dict[str, _Layer] = {}
     for name, one in chosen.items():
         axes = axes_of(one, source.axes, assumed)
-        unit = SI if name == "material" else unit_of(name, one, source.units.of(name), assumed)
+        unit = (
+            SI
+            if name == "material"
+            else unit_of(name, str(one), one.unit, source.units.of(name), assumed)
+        )
         layers[name] = _Layer(one, axes, unit)
         layers[name].check()
     first = next(iter(layers.values()))
@@ -400,7 +404,8 @@ def _positions(
                 f"{layer.chosen.path}: has no coordinate {axis!r}, expected spacing to be given"
             )
         return check_even(
-            str(one), read_list(one, unit_of(axis, one, source.units.length, assumed))
+            str(one),
+            read_list(one, unit_of(axis, str(one), one.unit, source.units.length, assumed)),
         )
     if axis == "x":
         return source.left + source.spacing[0] * number
@@ -418,7 +423,9 @@ def _times(
         if count > 1:
             assumed.append("no times in the files: frames are 1 s apart")
         return np.arange(count, dtype=np.float64)
-    return check_times(str(one), read_list(one, unit_of("time", one, source.units.time, assumed)))
+    return check_times(
+        str(one), read_list(one, unit_of("time", str(one), one.unit, source.units.time, assumed))
+    )
 
 
 def _placed(

@@ -33,6 +33,11 @@ class Chosen:
     label: str
     array: StoredArray
 
+    @property
+    def unit(self) -> object:
+        """Unit that the file says."""
+        return self.array.attributes.get("units")
+
     def __str__(self) -> str:
         """What errors call it."""
         return f"{self.path}: {self.label}"
@@ -143,15 +148,17 @@ def _axis(dim: str) -> str:
     return next((axis for axis, names in COORDINATES.items() if simple(dim) in names), "")
 
 
-def unit_of(name: str, chosen: Chosen, own: Unit, assumed: list[str]) -> Unit:
+def unit_of(name: str, label: str, text: object, own: Unit, assumed: list[str]) -> Unit:
     """Unit of a field or coordinate: as given if that is not SI, else as the file says.
 
     Parameters
     ----------
     name : str
         Its name in a scene, or ``time``, ``x``, ``y``, ``z``.
-    chosen : Chosen
-        The array.
+    label : str
+        File and name there.
+    text : object
+        What the file says; anything but text is nothing said.
     own : Unit
         What the user says.
     assumed : list of str
@@ -162,21 +169,21 @@ def unit_of(name: str, chosen: Chosen, own: Unit, assumed: list[str]) -> Unit:
     SourceError
         If the file says a unit that is unknown or another quantity's.
     """
-    text = chosen.array.attributes.get("units")
+    short = label.rsplit(": ", 1)[-1]
     if own != SI:
         if isinstance(text, str):
-            assumed.append(f"{chosen.label} is in the unit given, the file says {text!r}")
+            assumed.append(f"{short} is in the unit given, the file says {text!r}")
         return own
     if not isinstance(text, str):
         if SI_UNITS[name]:
-            assumed.append(f"{chosen.label} is in {SI_UNITS[name]}: the file says no unit")
+            assumed.append(f"{short} is in {SI_UNITS[name]}: the file says no unit")
         return own
     try:
         unit = parse_unit(name, text)
     except ValueError as error:
-        raise SourceError(f"{chosen}: {error}") from None
+        raise SourceError(f"{label}: {error}") from None
     if unit != SI:
-        assumed.append(f"{chosen.label} is in {text!r}, as the file says")
+        assumed.append(f"{short} is in {text!r}, as the file says")
     return unit
 
 
