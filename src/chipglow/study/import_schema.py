@@ -1,5 +1,6 @@
 """What the description of an import says: where fields are, what they mean, where to sample."""
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -9,8 +10,10 @@ from pydantic import Strict, ValidationInfo, field_validator, model_validator
 
 from chipglow.io.importing import Import, View
 from chipglow.io.sources import Placement, Source, Unit, Units
+from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.isolated import Isolated
+from chipglow.io.sources.mesh import MeshSource
 from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap, metre_per_pixel
 from chipglow.io.sources.unit_text import parse_unit
 from chipglow.scene.completion import Completion
@@ -141,6 +144,14 @@ class CompletionSection(Part):
         )
 
 
+class SourceSection(Section):
+    """What is said of one kind of source."""
+
+    @abstractmethod
+    def source(self, whole: "ImportDescription") -> Source:
+        """The source that the whole describes."""
+
+
 class FieldMovieSection(Section):
     """A movie of one field."""
 
@@ -169,7 +180,7 @@ class FieldMovieSection(Section):
         return None if file is None else beside_the_study(file, info)
 
 
-class MovieSection(Section):
+class MovieSection(SourceSection):
     """Movies of fields with a colour scale, a movie a field."""
 
     temperature: FieldMovieSection = described({}, "The movie of the temperature.")
@@ -272,7 +283,70 @@ _EXAMPLES: Final = {
 }
 
 
-class GridSection(Section):
+class MeshSection(SourceSection):
+    """Finite-element results."""
+
+    section: Annotated[Position | Literal["facing"] | None, *OR_NONE] = described(
+        "none",
+        "Of solid elements: where to cut along the axis of depth, or the surface that faces the\n"
+        "camera.",
+        "none, 0 mm, facing",
+    )
+    tool_parts: Annotated[tuple[str, ...], Strict(False)] = described(
+        [], "Names of the blocks, parts or sets that are tool, or their numbers.", "[TOOL], ['2']"
+    )
+    part_field: Annotated[str | None, *OR_NONE] = described(
+        "none", "Field of elements that numbers the parts; none: it is guessed."
+    )
+    displacement: Annotated[str | None, *OR_NONE] = described(
+        "none", "Field of node vectors to be added to the positions."
+    )
+
+    def source(self, whole: "ImportDescription") -> MeshSource:
+        """The source that this section describes."""
+        return MeshSource(
+            path=Path(whole.file),
+            names=whole.fields,
+            units=whole.units.build(),
+            placement=whole.placement.build(),
+            interval=whole.interval,
+            section=self.section,
+            tool_parts=self.tool_parts,
+            part_field=self.part_field,
+            displacement=self.displacement,
+        )
+
+
+class PointsSection(SourceSection):
+    """Points, as of smoothed particles or material points."""
+
+    spacing: Annotated[Length | None, *OR_NONE] = described(
+        "none", "Distance of neighbours before the cut; none: from volumes or the first frame."
+    )
+    tool_parts: Annotated[tuple[int, ...], Strict(False)] = described(
+        [], "Numbers of the part field that are tool.", "[], [2]"
+    )
+    depth: Position = described("0 um", "Middle of the slab that is seen of points in space.")
+    thickness: Annotated[Length | None, *OR_NONE] = described(
+        "none", "Thickness of that slab; none: all points."
+    )
+
+    def source(self, whole: "ImportDescription") -> CloudSource:
+        """The source that this section describes."""
+        return CloudSource(
+            files=whole.file,
+            names=whole.fields,
+            spacing=self.spacing,
+            tool_parts=self.tool_parts,
+            depth=self.depth,
+            thickness=self.thickness,
+            interval=whole.interval,
+            units=whole.units.build(),
+            placement=whole.placement.build(),
+        )
+
+
+class GridSection(SourceSection):
     """Arrays on a regular grid."""
 
     files: Annotated[dict[str, str] | None, *OR_NONE] = described(
@@ -345,7 +419,9 @@ class ImportDescription(Section):
         "none", "The tool's outline with its tip at the origin: what is in it is tool."
     )
     completion: CompletionSection = described({}, "What stands in for what the source lacks.")
+    mesh: MeshSection = described({}, "More of a mesh.")
     movie: MovieSection = described({}, "More of a movie.")
+    points: PointsSection = described({}, "More of points.")
     grid: GridSection = described({}, "More of a grid.")
 
     @field_validator("source")
@@ -380,8 +456,13 @@ class ImportDescription(Section):
 
     def build(self) -> Import:
         """The import that is described."""
-        kind = self.kind_of_source()
-        source: Source = (self.movie if kind == "movie" else self.grid).source(self)
+        sections: Mapping[str, SourceSection] = {
+            "mesh": self.mesh,
+            "movie": self.movie,
+            "points": self.points,
+            "grid": self.grid,
+        }
+        source = sections[self.kind_of_source()].source(self)
         completion = self.completion.build()
         tool = self.tool.build() if self.tool else None
         return Import(
