@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Strict, ValidationInfo, field_validator, model_validator
 
 from chipglow.io.importing import Import, View
-from chipglow.io.sources import Placement, Source, Unit, Units
+from chipglow.io.sources import Placement, Source, Unit, Units, mesh_meshio, mesh_vtk
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.isolated import Isolated
@@ -23,11 +23,7 @@ from chipglow.study.units import Length, Position, Speed, Temperature, Time
 
 KINDS: Final[Mapping[str, tuple[str, ...]]] = {
     "movie": (".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif"),
-    "mesh": (
-        ".vtu", ".vtk", ".vtp", ".pvtu", ".pvd", ".vtm", ".vtmb", ".xdmf", ".xmf", ".exo", ".e",
-        ".ex2", ".case", ".encas", ".plt", ".tec", ".cgns", ".foam", ".d3plot", ".inp", ".msh",
-        ".med",
-    ),
+    "mesh": (*mesh_vtk.KINDS, *mesh_meshio.KINDS, ".inp", "d3plot"),
     "grid": (
         ".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr", ".npy", ".npz", ".mat", ".tif", ".tiff",
         ".csv", ".txt",
@@ -450,8 +446,6 @@ class ImportDescription(Section):
         for kind, suffixes in KINDS.items():
             if name.endswith(suffixes):
                 return kind
-        if "d3plot" in name:
-            return "mesh"
         raise ValueError(f"kind: {name!r} says none, expected movie, mesh, points or grid")
 
     def build(self) -> Import:
