@@ -268,11 +268,13 @@ def test_time_step_follows_the_fastest_point():
     sorted_at_rest, step_at_rest = state.cycles, state.step.time_step
     # 590 m/s of sound and 4 m/s of the workpiece: 100 m/s more take a sixth off the time step.
     state.points["vx"][7] = 104.0
-    state._choose_steps()
+    state.choose_steps()
     assert state.step.time_step < 0.9 * step_at_rest
     assert state.cycles > sorted_at_rest
     # In a cycle the fastest point stays under half a cell.
     assert 104.0 * state.cycle < 0.5 * simulation.numerics.cell
+    with pytest.raises(SolverError, match=r"speed of 104 m/s, the time step allows 50 m/s at 0.00"):
+        state.choose_steps(50.0)
     state.points["vx"][7] = 700.0
     with pytest.raises(SolverError, match=r"speed of 700 m/s, over the \d+ m/s of sound.* at 0.00"):
-        state._choose_steps()
+        state.choose_steps()

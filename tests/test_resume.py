@@ -20,7 +20,7 @@ from chipglow.cutting import (
     SolverError,
 )
 from chipglow.cutting.points import block_of_points
-from chipglow.cutting.watch import find_trouble
+from chipglow.cutting.watch import fastest_point, find_trouble
 from chipglow.io import SceneWriter, open_scene, unfinished_scenes
 from chipglow.scene import Frame, Raster
 from chipglow.study import cut, is_cut, kept_progress, load_study, running
@@ -284,12 +284,12 @@ def test_a_run_that_goes_wrong_says_what_where_and_when(name, value, what):
     assert -1100 <= y <= 0
 
 
-def test_points_too_fast_for_the_time_step_are_found():
+def test_the_fastest_point_is_found():
     points = block_of_points(np.arange(4.0), np.arange(3.0), 1.0, 300.0, 4.0)
-    assert find_trouble(points, 40.0) is None
+    assert find_trouble(points) is None
     points["vy"][7] = -41.0
-    what, index = find_trouble(points, 40.0)
-    assert what == "speed of 41 m/s, the time step allows 40 m/s"
+    speed, index = fastest_point(points)
+    assert speed == pytest.approx(np.hypot(4.0, 41.0))
     assert index == 7
 
 

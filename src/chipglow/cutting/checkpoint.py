@@ -83,4 +83,5 @@ def restore(state: "_State", checkpoint: Checkpoint, records: NDArray[np.float64
         setattr(state, name, arrays[name].item())
     state.points[:count] = arrays["points"]
     records[:done] = arrays["records"]
+    state.choose_steps()
     return done

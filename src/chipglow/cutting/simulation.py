@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import ceil, sqrt
+from math import ceil, inf
 from typing import Final
 
 import numpy as np
@@ -51,7 +52,7 @@ from chipglow.cutting.plastic_heat import heat_shares
 from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
 from chipglow.cutting.preview import Preview
 from chipglow.cutting.tool_border import CELLS, border_nodes, conduct_beyond
-from chipglow.cutting.watch import Trouble, find_lost, find_off_grid, find_trouble
+from chipglow.cutting.watch import Trouble, fastest_point, find_lost, find_off_grid, find_trouble
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.surface import Surface, surface_distance
 
@@ -307,7 +308,7 @@ class _State:
         self.top = numerics.height
         self._start_points(conditions, numerics)
         self.time = 0.0
-        self._choose_steps()
+        self.choose_steps()
         self.work = np.zeros(SUMS)
         self.carried = 0.0
         self.lost_heat = 0.0
@@ -359,7 +360,6 @@ class _State:
     @np.errstate(invalid="ignore", over="ignore")  # `find_trouble` finds what is not finite
     def advance(self) -> NDArray[np.float64]:
         """Advance by one interval; mean forces in N/m, then the energies of `EnergyHistory`."""
-        self._choose_steps()
         sums = np.zeros_like(self.work)
         for _ in range(self.cycles):
             before = self._held().sum()
@@ -388,9 +388,10 @@ class _State:
             if not good:
                 self._stop_at(find_off_grid(self.points[: self.count], self.grid))
             self._conduct()
-        self._stop_at(find_trouble(self.points[: self.count], self.grid.cell / self.cycle))
+        self._stop_at(find_trouble(self.points[: self.count]))
         self.work += sums
         forces = -sums[[FORCE_X, FORCE_Y]] / (self.cycles * self.steps)
+        self.choose_steps(self.grid.cell / self.cycle)
         drive = self.work[BOUNDARY_WORK] + self.carried
         held = self._held() - self.held_at_start
         used = self.work[[PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS]]
@@ -398,14 +399,19 @@ class _State:
             [forces, [drive, self.work[CONTACT_WORK]], held, used, [self.lost_heat]]
         )
 
-    def _choose_steps(self) -> None:
-        """Time step and cycles of the next interval, by the fastest point."""
-        points = self.points[: self.count]
-        speed = np.hypot(points["vx"], points["vy"])
-        fastest, sound = float(speed.max()), _sound(self.simulation)
+    def choose_steps(self, allowed: float = inf) -> None:
+        """Time step and cycles of the next interval, by the fastest point.
+
+        It may not have been faster than `allowed` (m/s) by the steps of the interval before.
+        """
+        fastest, index = fastest_point(self.points[: self.count])
+        sound = _sound(self.simulation)
         if fastest > sound:
-            what = f"speed of {fastest:.0f} m/s, over the {sound:.0f} m/s of sound, scaled mass"
-            self._fail(what, int(speed.argmax()))
+            self._fail(
+                f"speed of {fastest:.0f} m/s, over the {sound:.0f} m/s of sound, scaled mass", index
+            )
+        if fastest > allowed:
+            self._fail(f"speed of {fastest:.0f} m/s, the time step allows {allowed:.0f} m/s", index)
         self.cycles, self.steps, time_step = _time_steps(self.simulation, self.interval, fastest)
         self.cycle = self.interval / self.cycles
         self.step = self.step._replace(time_step=time_step)

@@ -14,8 +14,8 @@ Trouble: TypeAlias = tuple[str, int]
 """What is wrong, and the number of the point."""
 
 
-def find_trouble(points: Points, fastest: float) -> Trouble | None:
-    """Look for a point that is not finite, too cold, too hot, or faster than `fastest` (m/s)."""
+def find_trouble(points: Points) -> Trouble | None:
+    """Look for a point that is not finite, too cold or too hot."""
     with np.errstate(invalid="ignore", over="ignore"):
         values = points.view(np.float64).reshape(points.size, -1)
         total = values.sum()
@@ -26,11 +26,14 @@ def find_trouble(points: Points, fastest: float) -> Trouble | None:
     for index in (int(temperature.argmin()), int(temperature.argmax())):
         if not _COLDEST <= temperature[index] <= TABLE_HOTTEST:
             return f"temperature out of {TABLE_COLDEST:g} K to {TABLE_HOTTEST:g} K", index
+    return None
+
+
+def fastest_point(points: Points) -> tuple[float, int]:
+    """Speed in m/s and number of the fastest point."""
     speed = np.hypot(points["vx"], points["vy"])
     index = int(speed.argmax())
-    if speed[index] > fastest:
-        return f"speed of {speed[index]:.0f} m/s, the time step allows {fastest:.0f} m/s", index
-    return None
+    return float(speed[index]), index
 
 
 def find_lost(points: Points, grid: Grid, ceiling: float) -> Trouble | None:
