@@ -1,7 +1,9 @@
 """The flow-stress laws that come with chipglow."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import isfinite
+from typing import Final
 
 import numpy as np
 from numba import njit
@@ -11,6 +13,9 @@ from chipglow.cutting.lanes import INLINE, exponential, logarithm
 
 MELTING_LIMIT = 3000.0
 """No metal that is cut melts above, in K."""
+
+_POSITIVE: Final = ("yield_stress", "hardening_exponent", "thermal_exponent", "reference_rate")
+_NOT_NEGATIVE: Final = ("hardening", "rate_sensitivity")
 
 
 @njit(**INLINE)
@@ -73,11 +78,7 @@ class JohnsonCook(FlowStress):
     reference_rate: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("yield_stress", "hardening_exponent", "thermal_exponent", "reference_rate"):
-            check_positive(f"Johnson-Cook {name}", getattr(self, name))
-        for name in ("hardening", "rate_sensitivity"):
-            if not 0 <= getattr(self, name) < np.inf:
-                raise ValueError(f"Johnson-Cook {name}: expected 0 or more")
+        _check_numbers("Johnson-Cook", self, _POSITIVE, _NOT_NEGATIVE)
         check_melting("Johnson-Cook", self.reference_temperature, self.melting_temperature)
 
     @staticmethod
@@ -127,17 +128,9 @@ class HyperbolicTangent(FlowStress):
     sharpness: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in (
-            "yield_stress", "hardening_exponent", "thermal_exponent", "reference_rate",
-            "recovery_strain", "sharpness",
-        ):  # fmt: skip
-            check_positive(f"TANH {name}", getattr(self, name))
-        for name in (
-            "hardening", "rate_sensitivity", "hardening_limit", "recovery_temperature",
-            "softening_temperature",
-        ):  # fmt: skip
-            if not 0 <= getattr(self, name) < np.inf:
-                raise ValueError(f"TANH {name}: expected 0 or more, got {getattr(self, name)!r}")
+        own = ("hardening_limit", "recovery_temperature", "softening_temperature")
+        positive = (*_POSITIVE, "recovery_strain", "sharpness")
+        _check_numbers("TANH", self, positive, (*_NOT_NEGATIVE, *own))
         check_melting("TANH", self.reference_temperature, self.melting_temperature)
 
     @staticmethod
@@ -184,16 +177,11 @@ class MarusichOrtiz(FlowStress):
     thermal_softening: float
 
     def __post_init__(self) -> None:
-        for name in (
+        positive = (
             "yield_stress", "reference_strain", "reference_rate", "reference_temperature",
             "hardening_exponent", "rate_exponent",
-        ):  # fmt: skip
-            check_positive(f"Marusich-Ortiz {name}", getattr(self, name))
-        if not 0 <= self.thermal_softening < np.inf:
-            raise ValueError(
-                f"Marusich-Ortiz thermal_softening: expected 0 or more 1/K, "
-                f"got {self.thermal_softening!r} 1/K"
-            )
+        )  # fmt: skip
+        _check_numbers("Marusich-Ortiz", self, positive, ("thermal_softening",))
 
     @property
     def melting_temperature(self) -> float:
@@ -262,6 +250,16 @@ class ZerilliArmstrong(FlowStress):
     def stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
         """Flow stress in Pa."""
         return _zerilli_armstrong(strain, rate, temperature, law)[0]
+def _check_numbers(
+    title: str, law: FlowStress, positive: Iterable[str], not_negative: Iterable[str]
+) -> None:
+    """Raise ValueError unless numbers of a law are finite and over 0, and others 0 or more."""
+    for name in positive:
+        check_positive(f"{title} {name}", getattr(law, name))
+    for name in not_negative:
+        value = getattr(law, name)
+        if not 0 <= value < np.inf:
+            raise ValueError(f"{title} {name}: expected 0 or more, got {value!r}")
 
 
 def check_positive(name: str, value: float) -> None:
