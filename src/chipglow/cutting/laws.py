@@ -239,17 +239,16 @@ class ZerilliArmstrong(FlowStress):
     reference_rate: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("athermal_stress", "hardening_exponent", "reference_rate"):
-            check_positive(f"Zerilli-Armstrong {name}", getattr(self, name))
-        for name in ("thermal_stress", "thermal_softening", "rate_hardening", "hardening"):
-            value = getattr(self, name)
-            if not 0 <= value < np.inf:
-                raise ValueError(f"Zerilli-Armstrong {name}: expected 0 or more, got {value!r}")
+        positive = ("athermal_stress", "hardening_exponent", "reference_rate")
+        others = ("thermal_stress", "thermal_softening", "rate_hardening", "hardening")
+        _check_numbers("Zerilli-Armstrong", self, positive, others)
 
     @staticmethod
     def stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
         """Flow stress in Pa."""
         return _zerilli_armstrong(strain, rate, temperature, law)[0]
+
+
 def _check_numbers(
     title: str, law: FlowStress, positive: Iterable[str], not_negative: Iterable[str]
 ) -> None:

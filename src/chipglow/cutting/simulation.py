@@ -2,8 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import ceil, sqrt
-from math import ceil, inf
+from math import ceil, inf, sqrt
 from typing import Final
 
 import numpy as np
