@@ -25,9 +25,7 @@ def mesh_of(seed, count, on_samples):
     return points, Delaunay(points).simplices
 
 
-meshes = st.builds(
-    mesh_of, st.integers(0, 10**6), st.integers(8, 60), st.booleans()
-)
+meshes = st.builds(mesh_of, st.integers(0, 10**6), st.integers(8, 60), st.booleans())
 
 
 def coverings(points, triangles):
@@ -67,7 +65,7 @@ def test_samples_on_shared_edges_and_nodes_belong_to_one_triangle():
     # A fan around a sample's centre: 8 edges run through centres, all meet in one.
     angle = np.arange(8) * np.pi / 4
     rim = np.round(np.stack((np.cos(angle), np.sin(angle)), axis=1)) * 2.0
-    points = np.concatenate(([(0.0, 0.0)], rim)) + (2.125, 3.125)
+    points = np.array([(0.0, 0.0), *rim]) + np.array((2.125, 3.125))
     triangles = [(0, 1 + k, 1 + (k + 1) % 8) for k in range(8)]
     counts = coverings(points, triangles)
     assert counts.max() == 1
@@ -78,7 +76,7 @@ def test_samples_on_shared_edges_and_nodes_belong_to_one_triangle():
 def test_area_covered_is_that_of_the_mesh():
     fine = Raster(left=0.0, top=1.0, spacing=1 / 1000, rows=1000, columns=1000)
     points, triangles = mesh_of(3, 40, on_samples=False)
-    points = (points + (1.5, 0.5)) / 10
+    points = (points + np.array((1.5, 0.5))) / 10
     a, b, c = (points[triangles[:, k]] for k in range(3))
     area = _area(a, b, c)
     element = rasterise(fine, points, triangles).element

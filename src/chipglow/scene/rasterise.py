@@ -50,8 +50,8 @@ def rasterise(
     triangle's own. A sample on an edge that two triangles share belongs to one of them: rows are
     cut at the same crossing of the edge for both, and a triangle takes the samples from its left
     crossing on, up to but without its right one. Orientation does not matter. A triangle without
-    area, or with a position that is not finite or absurdly far away, covers nothing. Where triangles lie over one
-    another the highest is taken, of those as high the last.
+    area, or with a position that is not finite or absurdly far away, covers nothing. Where
+    triangles lie over one another the highest is taken, of those as high the last.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def rasterise(
         raise ValueError(f"points: shape {points.shape}, expected (nodes, 2)")
     if triangles.ndim != 2 or triangles.shape[1] != 3:
         raise ValueError(f"triangles: shape {triangles.shape}, expected (triangles, 3)")
-    if triangles.size and not (0 <= triangles.min() and triangles.max() < len(points)):
+    if triangles.size and (triangles.min() < 0 or triangles.max() >= len(points)):
         raise ValueError(
             f"triangles: nodes {triangles.min()} to {triangles.max()}, expected 0 to "
             f"{len(points) - 1}"

@@ -90,9 +90,7 @@ def _subdivide(
     lattice, pieces = _lattice(three=shape == "triangle6")
     weights = _FUNCTIONS[shape](lattice[:, 0], lattice[:, 1])
     corners = 3 if shape == "triangle6" else 4
-    nodes = [
-        _combine(weights, of_nodes, elements, corners) for of_nodes in (points, values)
-    ]
+    nodes = [_combine(weights, of_nodes, elements, corners) for of_nodes in (points, values)]
     first = np.arange(len(elements))[:, None, None] * len(lattice)
     return Triangulated(
         nodes[0],

@@ -9,7 +9,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources import mesh_meshio, mesh_vtk
+from chipglow.io.sources import mesh_meshio, mesh_tecplot, mesh_vtk
 from chipglow.io.sources.conventions import Placement, Units, match_names, simple
 from chipglow.io.sources.mesh_abaqus import AbaqusReader
 from chipglow.io.sources.mesh_block import Block, FlatMesh, fields_of, flatten
@@ -44,9 +44,9 @@ class MeshSource(Source):
         A file with one mesh or with meshes over time, an LS-DYNA d3plot, or a pattern such as
         ``chip_*.vtu`` with a file for each time.
     names : mapping
-        The file's names of fields, by those of a scene; guessed where nothing is given. ``velocity``
-        is a vector along the file's axes; ``velocity_x`` and ``velocity_y`` are components along
-        the placement's two axes.
+        The file's names of fields, by those of a scene; guessed where nothing is given.
+        ``velocity`` is a vector along the file's axes; ``velocity_x`` and ``velocity_y`` are
+        components along the placement's two axes.
     units : Units
         Units of the file.
     placement : Placement
@@ -130,11 +130,15 @@ class MeshSource(Source):
             return mesh_vtk.VtkReader(files_of(self.path, gaps_allowed=timed))
         if suffix in mesh_meshio.KINDS:
             return mesh_meshio.MeshioReader(files_of(self.path, gaps_allowed=timed))
+        if suffix in mesh_tecplot.ENDINGS:
+            return mesh_tecplot.TecplotReader(files_of(self.path, gaps_allowed=timed))
         if suffix == ".inp":
             return AbaqusReader(files_of(self.path, gaps_allowed=timed))
         if suffix in ("", ".d3plot") or "d3plot" in self.path.name.lower():
             return DynaReader(self.path)
-        known = " ".join(sorted((*mesh_vtk.KINDS, *mesh_meshio.KINDS, ".inp")))
+        known = " ".join(
+            sorted((*mesh_vtk.KINDS, *mesh_meshio.KINDS, *mesh_tecplot.ENDINGS, ".inp"))
+        )
         raise SourceError(f"{self.path}: {suffix} is no mesh, expected d3plot or one of {known}")
 
     def _read(self, reader: MeshReader, number: int) -> tuple[Block, ...]:
@@ -227,11 +231,11 @@ class MeshSource(Source):
                 raise SourceError(
                     f"{self.path}: times: {len(self.times)} for {count} frames, expected {count}"
                 )
-            return np.array(self.times), ()
+            return np.array(self.times, np.float64), ()
         if self.interval is not None:
-            return np.arange(count) * self.interval, ()
+            return np.arange(count, dtype=np.float64) * self.interval, ()
         if reader.times is not None:
-            return np.array(reader.times) * self.units.time.scale, ()
+            return np.array(reader.times, np.float64) * self.units.time.scale, ()
         assumed = ("no times in the files: frames are 1 s apart",) if count > 1 else ()
         return np.arange(count, dtype=np.float64), assumed
 

@@ -220,7 +220,9 @@ def _block(
             found[name] = _by_label(file, index, labels, values)
     points = _moved(points, of_nodes)
     kinds = np.array([kind for kind, _ in deck.elements.values()], np.uint8)
-    grid = pyvista.UnstructuredGrid(np.concatenate([np.array(cell) for cell in cells]), kinds, points)
+    grid = pyvista.UnstructuredGrid(
+        np.concatenate([np.array(cell) for cell in cells]), kinds, points
+    )
     for data, fields in ((grid.point_data, of_nodes), (grid.cell_data, of_elements)):
         for name, values in fields.items():
             data[name] = values

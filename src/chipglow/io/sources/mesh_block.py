@@ -1,4 +1,4 @@
-"""A part of a mesh at one time, and how it is made flat: cut, seen from the side, or flat already."""
+"""A part of a mesh at one time, and how it is made flat: cut, or seen from the side."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -223,9 +223,15 @@ def _flat(grid: Any) -> list[FlatMesh]:
         cells = np.flatnonzero(grid.celltypes == kind)
         if cells.size:
             nodes = _nodes(grid, kind, cells)
-            flat.append(_triangles(shape, points, nodes, of_nodes, {
-                name: values[cells] for name, values in of_elements.items()
-            }))
+            flat.append(
+                _triangles(
+                    shape,
+                    points,
+                    nodes,
+                    of_nodes,
+                    {name: values[cells] for name, values in of_elements.items()},
+                )
+            )
     return flat
 
 
@@ -233,8 +239,8 @@ def _nodes(grid: Any, kind: int, cells: NDArray[np.int64]) -> NDArray[np.int64]:
     offsets = offsets_of(grid)
     count = int(offsets[cells[0] + 1] - offsets[cells[0]])
     nodes = np.asarray(grid.cell_connectivity)[offsets[cells][:, None] + np.arange(count)]
-    nodes = nodes.astype(np.int64)
-    return nodes[:, (0, 1, 3, 2)] if kind == _PIXEL else nodes
+    ordered: NDArray[np.int64] = nodes[:, (0, 1, 3, 2)] if kind == _PIXEL else nodes
+    return ordered.astype(np.int64)
 
 
 def _triangles(

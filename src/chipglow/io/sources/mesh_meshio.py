@@ -12,9 +12,6 @@ from chipglow.io.sources.mesh_reader import MeshReader
 from chipglow.io.sources.source import SourceError
 
 KINDS: Final[Mapping[str, str]] = {
-    ".dat": "Tecplot ASCII",
-    ".tec": "Tecplot ASCII",
-    ".plt": "Tecplot ASCII",
     ".msh": "Gmsh",
     ".med": "MED",
     ".avs": "AVS-UCD",
@@ -24,9 +21,6 @@ KINDS: Final[Mapping[str, str]] = {
     ".h5m": "MOAB",
 }
 """Formats by the ending of a file's name."""
-
-
-_TECPLOT_BINARY: Final = b"#!TD"
 
 
 class MeshioReader(MeshReader):
@@ -62,12 +56,8 @@ class MeshioReader(MeshReader):
             raise SourceError(
                 f"{file}: needs meshio and PyVista, expected pip install 'chipglow[mesh]'"
             ) from None
-        with file.open("rb") as stream:
-            if stream.read(4) == _TECPLOT_BINARY:
-                raise SourceError(f"{file}: is a binary Tecplot file, expected an ASCII one")
-        kind = "tecplot" if KINDS[file.suffix.lower()] == "Tecplot ASCII" else None
         try:
-            mesh = meshio.read(file, file_format=kind)
+            mesh = meshio.read(file)
             grid = pyvista.from_meshio(mesh)
         except (OSError, MemoryError) as error:
             if isinstance(error, FileNotFoundError | MemoryError):
@@ -99,7 +89,10 @@ def _sets(mesh: Any, count: int) -> dict[str, NDArray[np.bool_]]:
                 sets[name][at + np.asarray(inside, np.int64)] = True
     for field, names in (
         ("gmsh:physical", {name: tag[0] for name, tag in mesh.field_data.items()}),
-        ("cell_tags", {n: tag for tag, all_ in getattr(mesh, "cell_tags", {}).items() for n in all_}),
+        (
+            "cell_tags",
+            {n: tag for tag, all_ in getattr(mesh, "cell_tags", {}).items() for n in all_},
+        ),
     ):
         if field in mesh.cell_data:
             tags = np.concatenate(mesh.cell_data[field])

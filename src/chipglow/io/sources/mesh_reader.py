@@ -4,6 +4,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from glob import glob, has_magic
+from itertools import pairwise
 from pathlib import Path
 
 from chipglow.io.sources.mesh_block import Block
@@ -59,7 +60,8 @@ def files_of(path: Path, *, gaps_allowed: bool) -> tuple[Path, ...]:
         return (path,)
     if not has_magic(str(path)):
         raise FileNotFoundError(f"{path}: no such file")
-    files = sorted((Path(name) for name in glob(str(path))), key=natural)
+    names = glob(str(path))  # noqa: PTH207  the folder may be part of the pattern
+    files = sorted((Path(name) for name in names), key=natural)
     if not files:
         raise FileNotFoundError(f"{path}: no file matches this pattern")
     if not gaps_allowed:
@@ -80,7 +82,7 @@ def _check_gaps(path: Path, files: Sequence[Path]) -> None:
     if len(files) < 3 or not counted:
         return
     counts = [row[counted[-1]] for row in numbers]
-    steps = [after - before for before, after in zip(counts, counts[1:], strict=False)]
+    steps = [after - before for before, after in pairwise(counts)]
     usual = max(sorted(set(steps)), key=steps.count)
     for file, count, step in zip(files, counts, steps, strict=False):
         # A step that is twice the usual one is a file that got lost; the last is often shorter.

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
+from xml.parsers.expat import ExpatError, ParserCreate
 
 import numpy as np
 
@@ -125,9 +126,7 @@ def reading(file: Path) -> Iterator[None]:
     try:
         from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
     except ImportError:
-        raise SourceError(
-            f"{file}: needs PyVista, expected pip install 'chipglow[mesh]'"
-        ) from None
+        raise SourceError(f"{file}: needs PyVista, expected pip install 'chipglow[mesh]'") from None
     window, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
     loud = vtkLogger.GetCurrentVerbosityCutoff()
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
@@ -172,7 +171,8 @@ def _opened(file: Path) -> Any:
         if _kind(file) == "XDMF":
             return _opened_xdmf(file)
         suffix = file.suffix.lower()
-        return pyvista.get_reader(str(file), force_ext=_AS.get(suffix, suffix))
+        reader_for: Any = pyvista.get_reader
+        return reader_for(str(file), force_ext=_AS.get(suffix, suffix))
 
 
 def _check_head(file: Path) -> None:
@@ -189,7 +189,14 @@ def _check_head(file: Path) -> None:
 
 
 def _check_references(file: Path) -> None:
-    """VTK crashes where the HDF5 file of an XDMF file is not there."""
+    """VTK crashes where the HDF5 file is not there, and its XML library writes to the console."""
+    with file.open("rb") as stream:
+        try:
+            ParserCreate().ParseFile(stream)
+        except ExpatError as error:
+            raise SourceError(
+                f"{file}: cannot be read as XDMF, it is damaged or of another kind ({error})"
+            ) from None
     with file.open("rb") as stream:
         text = stream.read(_MOST_XDMF)
     for name in sorted(set(re.findall(rb">\s*([^<>:\"]+\.(?:h5|hdf5)):", text))):
@@ -288,7 +295,7 @@ def _blocks(file: Path, data: Any, path: tuple[str, ...]) -> Iterator[Block]:
 def _check_polygons(file: Path, surface: Any) -> None:
     for cells in (surface.GetVerts(), surface.GetLines(), surface.GetPolys(), surface.GetStrips()):
         low, high = cells.GetConnectivityArray().GetRange() if cells.GetNumberOfCells() else (0, 0)
-        if not (0 <= low and high < max(surface.n_points, 1)):
+        if low < 0 or high >= max(surface.n_points, 1):
             raise SourceError(f"{file}: polygons with nodes that do not exist, it is damaged")
 
 
@@ -300,7 +307,7 @@ def _check_grid(file: Path, grid: Any) -> None:
     sizes = np.diff(offset)
     if len(offset) != len(kinds) + 1 or (sizes < 0).any() or offset[-1] != len(nodes):
         raise SourceError(f"{file}: its tables of elements do not fit together, it is damaged")
-    if nodes.size and not (0 <= nodes.min() and nodes.max() < grid.n_points):
+    if nodes.size and (nodes.min() < 0 or nodes.max() >= grid.n_points):
         raise SourceError(
             f"{file}: elements with the nodes {nodes.min()} to {nodes.max()}, expected 0 to "
             f"{grid.n_points - 1}"
