@@ -682,7 +682,22 @@ def test_truncated_files_end_in_one_clear_error(tmp_path, name, capfd):
     assert "ERR|" not in capfd.readouterr().err  # what VTK logs
 
 
-ENDINGS = ".vtu .vtk .vtp .pvd .xdmf .e .case .dat .cgns .msh .med .inp .d3plot .vtkhdf".split()
+ENDINGS = [
+    ".vtu",
+    ".vtk",
+    ".vtp",
+    ".pvd",
+    ".xdmf",
+    ".e",
+    ".case",
+    ".dat",
+    ".cgns",
+    ".msh",
+    ".med",
+    ".inp",
+    ".d3plot",
+    ".vtkhdf",
+]
 
 
 @pytest.mark.parametrize("suffix", ENDINGS)
