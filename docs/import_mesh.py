@@ -36,6 +36,7 @@ def main() -> None:
             )
             axes.set_title(title, fontsize=8)
             axes.set_xlabel("x")
+            axes.set_ylabel("z")
             figure.colorbar(shown, ax=axes, shrink=0.8)
         figure.savefig(Path(__file__).with_name("import-mesh.png"), dpi=150)
 

@@ -370,14 +370,14 @@ def tecplot(folder):
 
 def test_tecplot_zones_of_many_times_blocks_and_cell_values(tmp_path):
     x, y = np.meshgrid(np.linspace(0, WIDTH, 4), np.linspace(0, HEIGHT, 3))
-    text = 'TITLE = "chip"\nVARIABLES = "X" "Y"\n"Temperature [K]", "Strain"\n'
+    text = 'TITLE = "chip"\n# by hand\nVARIABLES = "X" "Y"\n"Temperature [K]", "Strain"\n'
     for time in (2.0, 0.5):
         text += 'ZONE T="chip", ZONETYPE=FETRIANGLE,\n NODES=4 ELEMENTS=2, DATAPACKING=BLOCK\n'
         text += f" VARLOCATION=([4]=CELLCENTERED), SOLUTIONTIME={time} STRANDID=1\n"
         text += f"0 {WIDTH} {WIDTH} 0\n0 0 {HEIGHT} {HEIGHT}\n"
         text += " ".join(str(temperature(a, b, time)) for a, b in
                          ((0, 0), (WIDTH, 0), (WIDTH, HEIGHT), (0, HEIGHT)))  # fmt: skip
-        text += "\n1.0 2.0\n1 2 3\n1 3 4\n"
+        text += "\n# strain\n1.0 2.0\n1 2 3\n1 3 4\n"
         text += f'ZONE T="tool", I=4, J=3, F=POINT, SOLUTIONTIME={time}\n'
         rows = zip(x.ravel() + WIDTH, y.ravel(), strict=True)
         text += "".join(f"{a} {b} {temperature(a, b, time)} 0\n" for a, b in rows)

@@ -15,10 +15,6 @@ KINDS: Final[Mapping[str, str]] = {
     ".msh": "Gmsh",
     ".med": "MED",
     ".avs": "AVS-UCD",
-    ".bdf": "Nastran",
-    ".nas": "Nastran",
-    ".fem": "Nastran",
-    ".h5m": "MOAB",
 }
 """Formats by the ending of a file's name."""
 
@@ -58,6 +54,9 @@ class MeshioReader(MeshReader):
             ) from None
         try:
             mesh = meshio.read(file)
+            sets = _sets(mesh)
+            # PyVista stumbles over sets that are none of elements, such as Gmsh's.
+            mesh.cell_sets, mesh.point_sets = {}, {}
             grid = pyvista.from_meshio(mesh)
         except (OSError, MemoryError) as error:
             if isinstance(error, FileNotFoundError | MemoryError):
@@ -67,7 +66,7 @@ class MeshioReader(MeshReader):
             raise _damaged(file, error) from error
         if not grid.n_cells:
             raise SourceError(f"{file}: has no elements, expected a mesh")
-        return (Block((), grid, _sets(mesh, grid.n_cells)),)
+        return (Block((), grid, sets),)
 
 
 def _damaged(file: Path, error: BaseException) -> SourceError:
@@ -78,12 +77,14 @@ def _damaged(file: Path, error: BaseException) -> SourceError:
     )
 
 
-def _sets(mesh: Any, count: int) -> dict[str, NDArray[np.bool_]]:
+def _sets(mesh: Any) -> dict[str, NDArray[np.bool_]]:
     """Named sets of elements: those of the file, Gmsh's physical groups, MED's families."""
     first = np.cumsum([0, *(len(block.data) for block in mesh.cells)])
     sets: dict[str, NDArray[np.bool_]] = {}
     for name, members in mesh.cell_sets.items():
-        sets[name] = np.zeros(count, np.bool_)
+        if name.startswith("gmsh:"):  # numbers of entities
+            continue
+        sets[name] = np.zeros(first[-1], np.bool_)
         for at, inside in zip(first, members, strict=False):
             if inside is not None:
                 sets[name][at + np.asarray(inside, np.int64)] = True

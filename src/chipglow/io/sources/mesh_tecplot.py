@@ -81,6 +81,9 @@ def _zones(file: Path) -> tuple[_Zone, ...]:
         stream.seek(0)
         at = 0
         for line in stream:
+            if line.lstrip().startswith(b"#"):
+                at += len(line)
+                continue
             if line.lstrip()[:4].upper() == b"ZONE":
                 ends.append(at)
                 texts.append(line)
@@ -149,7 +152,8 @@ def _block(zone: _Zone) -> Block:
     kind = kind.removeprefix("FE")
     with zone.file.open("rb") as stream:
         stream.seek(zone.begin)
-        words = stream.read(zone.end - zone.begin).split()
+        text = stream.read(zone.end - zone.begin)
+        words = re.sub(rb"(?m)^\s*#.*$", b"", text).split()
     if kind in _ORDERED:
         counts = tuple(int(keys.get(axis, "1")) for axis in "IJK")
         nodes, elements = int(np.prod(counts)), int(np.prod([max(c - 1, 1) for c in counts]))
