@@ -532,6 +532,28 @@ def test_an_abaqus_input_with_tables(tmp_path):
         assert np.isnan(frame.fields["plastic_strain"][hard]).all()
 
 
+ASSEMBLY = """*ASSEMBLY, NAME=ALL
+*INSTANCE, NAME=CHIP-1, PART=CHIP
+{moved}*END INSTANCE
+*NODE
+101, 9., 9.
+*END ASSEMBLY
+"""
+
+
+def test_one_instance_of_a_part_is_read_and_no_more(tmp_path):
+    path = abaqus(tmp_path)
+    plain = path.read_text()
+    path.write_text(plain + ASSEMBLY.format(moved=""))
+    assert MeshSource(path).survey().extent == pytest.approx((0.0, WIDTH, 0.0, HEIGHT))
+    path.write_text(plain + ASSEMBLY.format(moved="1., 0., 0.\n"))
+    with pytest.raises(SourceError, match="instance is moved"):
+        MeshSource(path).survey()
+    path.write_text(plain + 2 * ASSEMBLY.format(moved=""))
+    with pytest.raises(SourceError, match="one instance at most"):
+        MeshSource(path).survey()
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -98,6 +98,7 @@ def _read_deck(file: Path) -> _Deck:
     deck = _Deck()
     keyword, options = "", dict[str, str]()
     waiting: list[int] = []
+    instances, outside = 0, False
     with file.open(encoding="utf-8", errors="replace") as stream:
         for number, line in enumerate(stream, start=1):
             text = line.strip()
@@ -106,11 +107,21 @@ def _read_deck(file: Path) -> _Deck:
             if text.startswith("*"):
                 keyword, options = _keyword(text)
                 waiting = []
-                if keyword in ("INCLUDE", "INSTANCE"):
+                instances += keyword == "INSTANCE"
+                # Nodes of the assembly itself are points of reference with labels of their own.
+                if keyword in ("ASSEMBLY", "END INSTANCE", "INSTANCE", "END ASSEMBLY"):
+                    outside = keyword in ("ASSEMBLY", "END INSTANCE")
+                if keyword == "INCLUDE" or instances > 1:
                     raise SourceError(
-                        f"{file}: line {number}: *{keyword} is not read, expected a flat input "
-                        "file with all nodes and elements in it"
+                        f"{file}: line {number}: *{keyword} is not read, expected an input file "
+                        "with all nodes and elements in it and one instance at most"
                     )
+                continue
+            if keyword == "INSTANCE":
+                raise SourceError(
+                    f"{file}: line {number}: the instance is moved, expected one that is not"
+                )
+            if outside and keyword == "NODE":
                 continue
             try:
                 waiting = _take(deck, keyword, options, waiting, text)
