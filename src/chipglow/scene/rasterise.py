@@ -127,11 +127,17 @@ def _fill(  # type: ignore[no-untyped-def]
         if not (abs(area) > SMALLEST and farthest < FARTHEST):
             continue
         scale = 1.0 / area
+        slope_ab = _slope(xa, ya, xb, yb)
+        slope_bc = _slope(xb, yb, xc, yc)
+        slope_ac = _slope(xa, ya, xc, yc)
         first = int(max(np.ceil(ya), 0.0))
         last = int(min(np.ceil(yc), float(rows)))
         for row in range(first, last):
-            long = _crossing(xa, ya, xc, yc, row)
-            short = _crossing(xa, ya, xb, yb, row) if row < yb else _crossing(xb, yb, xc, yc, row)
+            long = _crossing(xa, ya, xc, slope_ac, row)
+            if row < yb:
+                short = _crossing(xa, ya, xb, slope_ab, row)
+            else:
+                short = _crossing(xb, yb, xc, slope_bc, row)
             left, right = (long, short) if area > 0.0 else (short, long)
             begin = int(min(max(np.ceil(left), 0.0), float(columns)))
             end = int(min(max(np.ceil(right), 0.0), float(columns)))
@@ -157,7 +163,13 @@ def _fill(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, inline="always")
-def _crossing(x0, y0, x1, y1, row):  # type: ignore[no-untyped-def]
+def _slope(x0, y0, x1, y1):  # type: ignore[no-untyped-def]
+    """Columns per row; that of an edge along a row is not used, but has to be finite."""
+    return (x1 - x0) / max(y1 - y0, SMALLEST)
+
+
+@njit(cache=True, inline="always")
+def _crossing(x0, y0, x1, slope, row):  # type: ignore[no-untyped-def]
     """Where an edge crosses a row, the lower end first: the same for both of its triangles."""
-    x = x0 + (row - y0) / (y1 - y0) * (x1 - x0)
+    x = x0 + (row - y0) * slope
     return min(max(x, min(x0, x1)), max(x0, x1))
