@@ -1,4 +1,5 @@
 import pickle
+import sys
 from contextlib import chdir
 from pathlib import Path
 
@@ -650,6 +651,18 @@ def test_an_openfoam_case_is_cut_and_its_cells_are_constant(tmp_path):
     frames = list(source.frames(Raster(0.0, 1.0, 0.1, 10, 20)))
     assert frames[1].fields["temperature"].shape == (10, 20)
     assert np.unique(frames[1].fields["temperature"]).size >= 2
+
+
+def test_an_extra_that_is_missing_is_named(tmp_path, monkeypatch):
+    written(tmp_path, "chip.vtu")
+    monkeypatch.setattr("chipglow.io.sources.mesh.find_spec", lambda name: None)
+    with pytest.raises(SourceError, match=r"pip install 'chipglow\[mesh\]'"):
+        MeshSource(tmp_path / "chip.vtu").survey()
+    monkeypatch.undo()
+    monkeypatch.setitem(sys.modules, "lasso.dyna", None)
+    (tmp_path / "d3plot").write_bytes(bytes(100))
+    with pytest.raises(SourceError, match=r"pip install 'chipglow\[dyna\]'"):
+        MeshSource(tmp_path / "d3plot").survey()
 
 
 def test_a_file_that_is_missing(tmp_path):

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
 from typing import Final, Literal
@@ -124,6 +125,10 @@ class MeshSource(Source):
             yield self._sampled(mesh, float(times[number]), raster, found)
 
     def _reader(self) -> MeshReader:
+        if find_spec("pyvista") is None or find_spec("meshio") is None:
+            raise SourceError(
+                f"{self.path}: needs PyVista and meshio, expected pip install 'chipglow[mesh]'"
+            )
         timed = bool(self.times)
         suffix = self.path.suffix.lower()
         if suffix in mesh_vtk.KINDS:

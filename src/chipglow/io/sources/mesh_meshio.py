@@ -45,13 +45,9 @@ class MeshioReader(MeshReader):
         file = self._files[number]
         if not file.is_file():
             raise FileNotFoundError(f"{file}: no such file")
-        try:
-            import meshio
-            import pyvista
-        except ImportError:
-            raise SourceError(
-                f"{file}: needs meshio and PyVista, expected pip install 'chipglow[mesh]'"
-            ) from None
+        import meshio
+        import pyvista
+
         try:
             mesh = meshio.read(file)
             sets = _sets(mesh)

@@ -123,10 +123,8 @@ def reading(file: Path) -> Iterator[None]:
     SourceError
         If VTK reports an error.
     """
-    try:
-        from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
-    except ImportError:
-        raise SourceError(f"{file}: needs PyVista, expected pip install 'chipglow[mesh]'") from None
+    from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
+
     window, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
     loud = vtkLogger.GetCurrentVerbosityCutoff()
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
