@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chipglow.io.sources import mesh_meshio, mesh_tecplot, mesh_vtk
 from chipglow.io.sources.conventions import Placement, Units, match_names, simple
 from chipglow.io.sources.mesh_abaqus import AbaqusReader
-from chipglow.io.sources.mesh_block import Block, FlatMesh, fields_of, flatten
+from chipglow.io.sources.mesh_block import Block, FlatMesh, check_grid, fields_of, flatten
 from chipglow.io.sources.mesh_dyna import DynaReader
 from chipglow.io.sources.mesh_reader import MeshReader, files_of
 from chipglow.io.sources.source import READABLE, SampledFrame, Source, SourceError, Survey
@@ -147,7 +147,10 @@ class MeshSource(Source):
         raise SourceError(f"{self.path}: {suffix} is no mesh, expected d3plot or one of {known}")
 
     def _read(self, reader: MeshReader, number: int) -> tuple[Block, ...]:
-        return tuple(self._moved(block, reader.file(number)) for block in reader.read(number))
+        blocks = reader.read(number)
+        for block in blocks:
+            check_grid(reader.file(number), block.grid)
+        return tuple(self._moved(block, reader.file(number)) for block in blocks)
 
     def _moved(self, block: Block, file: Path) -> Block:
         if self.displacement is None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
@@ -21,6 +22,11 @@ _OTHER_FLAT: Final = (6, 7, 34, 35, 63, 69, 70, 76, 77)
 _PIXEL: Final = 8
 _LINES_AND_POINTS: Final = (0, 1, 2, 3, 4, 21, 36, 60, 61, 68, 75)
 _NUDGE: Final = 1e-7
+_SIZES: Final[Mapping[int, int]] = {
+    5: 3, 8: 4, 9: 4, 10: 4, 11: 8, 12: 8, 13: 6, 14: 5, 22: 6, 23: 8, 24: 10, 25: 20, 26: 15,
+    27: 13, 28: 9, 29: 27, 34: 7,
+}  # fmt: skip
+"""Nodes of VTK's types of elements."""
 _TOOL: Final = "chipglow: tool"
 _HIDDEN_GHOST: Final = 32
 
@@ -72,6 +78,36 @@ def offsets_of(grid: Any) -> NDArray[np.int64]:
     # PyVista gave it another name in 0.49.
     offsets = grid.cell_offsets if hasattr(grid, "cell_offsets") else grid.offset
     return np.asarray(offsets, np.int64)
+
+
+def check_grid(file: Path, grid: Any) -> None:
+    """Find what would make VTK read beyond its arrays.
+
+    Raises
+    ------
+    SourceError
+        If an element has nodes that do not exist, or tables do not fit together.
+    """
+    offset = offsets_of(grid)
+    nodes = np.asarray(grid.cell_connectivity)
+    kinds = np.asarray(grid.celltypes)
+    sizes = np.diff(offset)
+    if len(offset) != len(kinds) + 1 or (sizes < 0).any() or offset[-1] != len(nodes):
+        raise SourceError(f"{file}: its tables of elements do not fit together, it is damaged")
+    if nodes.size and (nodes.min() < 0 or nodes.max() >= grid.n_points):
+        raise SourceError(
+            f"{file}: elements with the nodes {nodes.min()} to {nodes.max()}, expected 0 to "
+            f"{grid.n_points - 1}"
+        )
+    expected = np.array([_SIZES.get(kind, 0) for kind in range(256)])[kinds]
+    if ((expected > 0) & (sizes != expected)).any():
+        raise SourceError(f"{file}: elements with a wrong number of nodes, it is damaged")
+    for data, count in ((grid.point_data, grid.n_points), (grid.cell_data, grid.n_cells)):
+        for name in list(data.keys()):
+            if len(data[name]) != count:
+                raise SourceError(
+                    f"{file}: {name!r} has {len(data[name])} values, expected {count}"
+                )
 
 
 def fields_of(blocks: Iterable[Block]) -> dict[str, int]:

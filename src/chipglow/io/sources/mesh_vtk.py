@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 from xml.parsers.expat import ExpatError, ParserCreate
 
-import numpy as np
-
-from chipglow.io.sources.mesh_block import Block, offsets_of
+from chipglow.io.sources.mesh_block import Block
 from chipglow.io.sources.mesh_reader import MeshReader
 from chipglow.io.sources.source import SourceError
 
@@ -39,12 +37,6 @@ KINDS: Final[Mapping[str, str]] = {
 """Formats by the ending of a file's name."""
 
 _AS: Final[Mapping[str, str]] = {".xmf": ".xdmf", ".encas": ".case"}
-_SIZES: Final[Mapping[int, int]] = {
-    5: 3, 8: 4, 9: 4, 10: 4, 11: 8, 12: 8, 13: 6, 14: 5, 22: 6, 23: 8, 24: 10, 25: 20, 26: 15,
-    27: 13, 28: 9, 29: 27, 34: 7,
-}  # fmt: skip
-"""Nodes of VTK's types of elements."""
-
 _HEAD: Final = 100_000
 _CLAIMS: Final = (
     rb'NumberOf(?:Points|Cells|Verts|Lines|Polys)="(\d+)"',
@@ -107,8 +99,6 @@ class VtkReader(MeshReader):
             blocks = tuple(_blocks(file, data, ()))
         if _kind(file) == "XDMF":
             blocks = _of_time_series(file, blocks)
-        for block in blocks:
-            _check_grid(file, block.grid)
         if not any(block.grid.n_cells for block in blocks):
             raise SourceError(f"{file}: has no elements, expected a mesh")
         return blocks
@@ -295,27 +285,3 @@ def _check_polygons(file: Path, surface: Any) -> None:
         low, high = cells.GetConnectivityArray().GetRange() if cells.GetNumberOfCells() else (0, 0)
         if low < 0 or high >= max(surface.n_points, 1):
             raise SourceError(f"{file}: polygons with nodes that do not exist, it is damaged")
-
-
-def _check_grid(file: Path, grid: Any) -> None:
-    """Find what would make VTK read beyond its arrays."""
-    offset = offsets_of(grid)
-    nodes = np.asarray(grid.cell_connectivity)
-    kinds = np.asarray(grid.celltypes)
-    sizes = np.diff(offset)
-    if len(offset) != len(kinds) + 1 or (sizes < 0).any() or offset[-1] != len(nodes):
-        raise SourceError(f"{file}: its tables of elements do not fit together, it is damaged")
-    if nodes.size and (nodes.min() < 0 or nodes.max() >= grid.n_points):
-        raise SourceError(
-            f"{file}: elements with the nodes {nodes.min()} to {nodes.max()}, expected 0 to "
-            f"{grid.n_points - 1}"
-        )
-    expected = np.array([_SIZES.get(kind, 0) for kind in range(256)])[kinds]
-    if ((expected > 0) & (sizes != expected)).any():
-        raise SourceError(f"{file}: elements with a wrong number of nodes, it is damaged")
-    for data, count in ((grid.point_data, grid.n_points), (grid.cell_data, grid.n_cells)):
-        for name in list(data.keys()):
-            if len(data[name]) != count:
-                raise SourceError(
-                    f"{file}: {name!r} has {len(data[name])} values, expected {count}"
-                )
