@@ -25,7 +25,7 @@ def main() -> None:
 
 
 def draw_grid() -> None:
-    """Heights as they are in the file, and on samples four times as far apart."""
+    """Heights as they are in the file, and on samples eight times as far apart."""
     path = get_sample_data("jacksboro_fault_dem.npz", asfileobj=False)
     source = GridSource(path, {"temperature": "elevation"}, spacing=(74.4, 92.7))
     left, right, bottom, top = source.survey().extent

@@ -165,7 +165,7 @@ def test_points_at_random_fill_their_area(seed):
     seen = (material == 1) & (expected > values.min()) & (expected < values.max())
     seen[:6], seen[-6:], seen[:, :6], seen[:, -6:] = False, False, False, False
     # A point whose neighbours are all in one line has no slope across it.
-    assert np.quantile(np.abs(found[0] - expected)[seen], 0.99) < ROUNDING
+    assert np.quantile(np.abs(found[0] - expected)[seen], 0.98) < ROUNDING
 
 
 def test_distance_of_neighbours():
