@@ -527,7 +527,10 @@ def _zarr(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
     else:
         with ZipFile(path):  # Zarr's own opening leaves a half-open store behind
             store = stack.enter_context(zarr.storage.ZipStore(path, mode="r"))
-    root = zarr.open(store, mode="r")
+    try:
+        root = zarr.open(store, mode="r")
+    except FileNotFoundError:
+        raise SourceError(f"{path}: there is no Zarr array or group in it") from None
     if isinstance(root, zarr.Array):
         yield from _zarr_array("", root, path)
         return

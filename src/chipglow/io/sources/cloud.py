@@ -172,7 +172,10 @@ class _Points:
         area = volume[good] / (source.thickness or 1.0) if self._solid else volume[good]
         places = placement.place(solid[good])
         self._check_filling(path, places, spacing, area)
-        return Cloud(places, values[good], material[good], spacing, area)
+        try:
+            return Cloud(places, values[good], material[good], spacing, area)
+        except ValueError as error:
+            raise SourceError(f"{path}: {error}") from None
 
     @property
     def _where(self) -> str:
