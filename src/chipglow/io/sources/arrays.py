@@ -563,6 +563,8 @@ def _codecs(metadata: Mapping[str, Any]) -> Iterator[str]:
     codecs = [codec for name in lists for codec in metadata.get(name) or ()]
     for codec in (*codecs, metadata.get("compressor")):
         if codec is not None:
+            # Up to Zarr 3.0 codecs of its second format are objects here.
+            codec = codec if isinstance(codec, Mapping) else codec.get_config()
             yield str(codec.get("id") or codec.get("name"))
             yield from _codecs(codec.get("configuration") or {})
 
