@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Strict, ValidationInfo, field_validator, model_validator
 
 from chipglow.io.importing import Import, View
-from chipglow.io.sources import Placement, Source, Unit, Units, mesh_meshio, mesh_vtk
+from chipglow.io.sources import Placement, Source, Unit, Units, mesh_meshio, mesh_tecplot, mesh_vtk
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.isolated import Isolated
@@ -23,10 +23,10 @@ from chipglow.study.units import Length, Position, Speed, Temperature, Time
 
 KINDS: Final[Mapping[str, tuple[str, ...]]] = {
     "movie": (".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif"),
-    "mesh": (*mesh_vtk.KINDS, *mesh_meshio.KINDS, ".inp", "d3plot"),
+    "mesh": (*mesh_vtk.KINDS, *mesh_meshio.KINDS, *mesh_tecplot.ENDINGS, ".inp", "d3plot"),
     "grid": (
         ".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr", ".npy", ".npz", ".mat", ".tif", ".tiff",
-        ".csv", ".txt",
+        ".csv", ".txt", ".hdf", ".he5", ".zip",
     ),
 }  # fmt: skip
 """Kinds of sources by how the file's name ends; a source of points has to be called so."""
