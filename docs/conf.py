@@ -49,6 +49,7 @@ html_sidebars = {
     "cutting": [],
     "study": [],
     "files": [],
+    "import": [],
 }
 
 # The page on files shows the paper's study as the program itself writes it.

@@ -9,12 +9,14 @@ import h5py
 import numpy as np
 import scipy.io
 import xarray as xr
+from mesh_seeds import WRITTEN, cloud_table, write_meshes
 
 from chipglow.io.sources import Source
+from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.grid import GridSource
+from chipglow.io.sources.mesh import MeshSource
 from chipglow.io.sources.movie import FieldMovie, MovieSource, NamedMap
 
-FOREIGN = Path(__file__).parents[2] / "tests" / "data"
 ROWS, COLUMNS, FRAMES = 24, 32, 3
 
 
@@ -40,7 +42,7 @@ class Seed:
 
 def seeds(folder: Path) -> list[Seed]:
     """All files; those that only a library can write are written into the folder first."""
-    found = [*_grids(folder), *_movies(folder)]
+    found = [*_grids(folder), *_movies(folder), *_meshes(folder), *_clouds(folder)]
     for seed in found:
         (folder / seed.name).unlink(missing_ok=True)
     return found
@@ -86,6 +88,28 @@ def _tiff(values) -> bytes:
     file = io.BytesIO()
     tifffile.imwrite(file, values, compression="zlib", photometric="minisblack")
     return file.getvalue()
+
+
+def _mesh(path: Path) -> MeshSource:
+    return MeshSource(path)
+
+
+def _meshes(folder: Path) -> list[Seed]:
+    write_meshes(folder)
+    return [Seed(name, (folder / name).read_bytes(), _mesh) for name in WRITTEN]
+
+
+def _cloud(path: Path) -> CloudSource:
+    return CloudSource(str(path), interval=1e-6)
+
+
+def _clouds(folder: Path) -> list[Seed]:
+    y, x = np.mgrid[0.02:0.98:25j, 0.02:0.98:25j].reshape(2, -1)
+    np.savez(folder / "points.npz", x=x, y=y, temperature=400.0 + 500.0 * x)
+    return [
+        Seed("points.csv", cloud_table().encode(), _cloud),
+        Seed("points.npz", (folder / "points.npz").read_bytes(), _cloud),
+    ]
 
 
 def _movie(path: Path) -> MovieSource:

@@ -208,6 +208,9 @@ class MovieSection(SourceSection):
     covered: Annotated[tuple[BoxSection, ...], Strict(False)] = described(
         [], "Boxes where something else is drawn, such as text."
     )
+    overlay_limit: float = described(
+        20.0, "Distance from the scale in CIE L*a*b* beyond which a colour is a line or text."
+    )
     tool_polygon: Annotated[tuple[Pixels, ...], Strict(False)] = described(
         [], "Corners of the tool in pixels; two are the corners of a box."
     )
@@ -232,6 +235,7 @@ class MovieSection(SourceSection):
             placement=whole.placement.build(),
             background=self.background,
             covered=self.covered,
+            overlay_limit=self.overlay_limit,
             tool_polygon=self.tool_polygon,
             tool_colour=self.tool_colour,
         )

@@ -1,0 +1,103 @@
+"""Whole meshes and clouds of points to damage."""
+
+from pathlib import Path
+
+import numpy as np
+import pyvista as pv
+from lasso.dyna import D3plot
+from vtkmodules.vtkIOExodus import vtkExodusIIWriter
+from vtkmodules.vtkIOParallel import vtkEnSightWriter
+
+WRITTEN = (
+    "chip.vtu", "chip.vtk", "chip.vtp", "chip.vtm", "chip.vtkhdf", "chip.e", "chip.case",
+    "chip.xdmf", "chip.pvd", "chip.msh", "chip.med", "chip.avs", "chip.dat", "chip.inp", "d3plot",
+)  # fmt: skip
+"""Names of the files that `write_meshes` writes, each of which is damaged."""
+
+
+def write_meshes(folder: Path) -> None:
+    """Write a mesh in every format; files that one of them names stay as they are."""
+    grid = _grid()
+    for name in ("chip.vtu", "chip.vtk", "chip.vtkhdf"):
+        grid.save(folder / name)
+    grid.extract_surface(algorithm=None).save(folder / "chip.vtp")
+    pv.MultiBlock({"chip": grid}).save(folder / "chip.vtm")
+    _exodus(grid, folder)
+    _ensight(grid, folder)
+    grid.save(folder / "part.vtu")
+    (folder / "chip.pvd").write_text(
+        '<VTKFile type="Collection" version="0.1"><Collection>'
+        '<DataSet timestep="0" part="0" file="part.vtu"/>'
+        '<DataSet timestep="1" part="0" file="part.vtu"/></Collection></VTKFile>'
+    )
+    mesh = pv.to_meshio(grid)
+    mesh.write(folder / "chip.msh", file_format="gmsh")
+    mesh.write(folder / "chip.med")
+    mesh.write(folder / "chip.avs")
+    mesh.write(folder / "chip.xdmf", data_format="XML")
+    mesh.write(folder / "chip.inp")
+    rows = [f"{number + 1}, {value:.6g}" for number, value in enumerate(grid.point_data["NT11"])]
+    (folder / "chip.csv").write_text("\n".join(["node, NT11", *rows]) + "\n")
+    (folder / "chip.dat").write_text(_tecplot(grid))
+    _d3plot(grid, folder)
+
+
+def _grid():
+    x, y, z = np.meshgrid(np.linspace(0, 1, 10), np.linspace(0, 1, 7), [0.0])
+    grid = pv.StructuredGrid(x, y, z).cast_to_unstructured_grid()
+    grid.point_data["NT11"] = 400.0 + 500.0 * grid.points[:, 0]
+    grid.point_data["V"] = np.tile((3.0, 1.0, 0.0), (grid.n_points, 1))
+    grid.cell_data["PEEQ"] = np.arange(grid.n_cells) / grid.n_cells
+    return grid
+
+
+def _exodus(grid, folder):
+    writer = vtkExodusIIWriter()
+    writer.SetFileName(str(folder / "chip.e"))
+    writer.SetInputData(grid)
+    writer.Write()
+
+
+def _ensight(grid, folder):
+    copy = grid.copy()
+    copy.cell_data["BlockId"] = np.ones(grid.n_cells, np.int32)
+    writer = vtkEnSightWriter()
+    writer.SetFileName(str(folder / "ensight"))
+    writer.SetInputData(copy)
+    writer.Write()
+    writer.WriteCaseFile(1)
+    next(folder.glob("ensight*.case")).rename(folder / "chip.case")
+
+
+def _tecplot(grid):
+    quads = grid.cells_dict[9] + 1
+    lines = [
+        "TITLE = chip",
+        'VARIABLES = "X", "Y", "NT11"',
+        f"ZONE T=chip, N={grid.n_points}, E={len(quads)}, F=FEPOINT, ET=QUADRILATERAL",
+    ]
+    values = zip(grid.points, grid.point_data["NT11"], strict=True)
+    lines += [f"{point[0]:.6g} {point[1]:.6g} {value:.6g}" for point, value in values]
+    lines += [" ".join(map(str, quad)) for quad in quads]
+    return "\n".join(lines) + "\n"
+
+
+def _d3plot(grid, folder):
+    quads = grid.cells_dict[9]
+    plot = D3plot()
+    plot.arrays["node_coordinates"] = np.asarray(grid.points, np.float32)
+    plot.arrays["timesteps"] = np.arange(2, dtype=np.float32)
+    plot.arrays["node_displacement"] = np.tile(np.asarray(grid.points, np.float32), (2, 1, 1))
+    temperature = np.asarray(grid.point_data["NT11"], np.float32)
+    plot.arrays["node_temperature"] = np.tile(temperature, (2, 1))
+    plot.arrays["element_shell_node_indexes"] = quads
+    plot.arrays["element_shell_part_indexes"] = np.zeros(len(quads), np.int32)
+    plot.write_d3plot(str(folder / "d3plot"))
+
+
+def cloud_table() -> str:
+    """Points as a table of text."""
+    x, y = np.meshgrid(np.linspace(0.02, 0.98, 25), np.linspace(0.02, 0.98, 25))
+    rows = zip(x.ravel(), y.ravel(), strict=True)
+    lines = [f"{a:.4f},{b:.4f},{400 + 500 * a:.3f}" for a, b in rows]
+    return "\n".join(["x,y,temperature", *lines]) + "\n"
