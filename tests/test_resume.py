@@ -8,6 +8,7 @@ import sys
 import time
 from copy import deepcopy
 from dataclasses import replace
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from chipglow.cutting import (
 from chipglow.cutting.points import block_of_points
 from chipglow.cutting.watch import fastest_point, find_trouble
 from chipglow.io import SceneWriter, open_scene, unfinished_scenes
+from chipglow.io.interrupts import uninterrupted
 from chipglow.scene import Frame, Raster
 from chipglow.study import cut, is_cut, kept_progress, load_study, running
 
@@ -337,3 +339,85 @@ def test_a_checkpoint_before_the_first_frame_is_one_to_go_on_from(tmp_path):
     left.remove()
     assert len(open_scene(path).times) == 1
     assert list(tmp_path.iterdir()) == [path]
+
+
+WRITES = {
+    # What calls HDF5, the how many-th call is disturbed, and what is said.
+    "__enter__": (1, "interrupted, nothing was written"),
+    "checkpoint": (20, r"the state at 10\.00 us is kept in .*: --resume goes on from there"),
+    "forces": (1, r"the state at 24\.00 us is kept in .*: --resume goes on from there"),
+}
+
+
+@pytest.mark.parametrize("method", WRITES)
+def test_ctrl_c_while_hdf5_writes_is_as_at_any_other_time(cache, unbroken, monkeypatch, method):
+    """HDF5 calls back into Python to write: an exception there could end the process."""
+    from typer.testing import CliRunner
+
+    from chipglow.cli import app
+    from chipglow.io.atomic import KeptErrorFile
+
+    which, said = WRITES[method]
+    called, write = getattr(SceneWriter, method), KeptErrorFile.write
+    calls, sent = [], []
+
+    def counted(writer, *arguments, **named):
+        calls.append(True)
+        result = called(writer, *arguments, **named)
+        calls[-1] = False
+        return result
+
+    def interrupted(file, data):
+        if len(calls) == which and calls[-1] and not sent:
+            sent.append(data)
+            signal.raise_signal(signal.SIGINT)
+        return write(file, data)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(SceneWriter, method, counted)
+        patch.setattr(KeptErrorFile, "write", interrupted)
+        result = CliRunner().invoke(app, ["cut", "study.yaml", "--out", "scene.nc"])
+    assert sent
+    assert result.exit_code == 130
+    lines = [line for line in result.output.splitlines() if line.startswith("chipglow: ")]
+    assert len(lines) == 1
+    assert re.search(said, lines[0])
+    left = [path.name for path in cache.iterdir()]
+    assert len(left) == (0 if method == "__enter__" else 2)
+    command = ["cut", "study.yaml", "--out", "scene.nc", "--resume"]
+    assert CliRunner().invoke(app, command).exit_code == 0
+    assert_same_scene("scene.nc", unbroken)
+
+
+def test_held_signals_come_when_the_block_ends():
+    seen = []
+    with pytest.raises(KeyboardInterrupt), uninterrupted():
+        with uninterrupted():
+            signal.raise_signal(signal.SIGINT)
+            seen.append("inner")
+        seen.append("outer")
+    assert seen == ["inner", "outer"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    with pytest.raises(KeyboardInterrupt, match="first"), uninterrupted():
+        signal.raise_signal(signal.SIGINT)
+        raise KeyboardInterrupt("first")
+    with pytest.raises(KeyboardInterrupt) as stop, uninterrupted():
+        signal.raise_signal(signal.SIGINT)
+        raise StopError
+    assert isinstance(stop.value.__context__, StopError)
+
+
+def test_signals_are_not_touched_beside_the_main_thread():
+    failures = []
+
+    def work():
+        try:
+            with uninterrupted():
+                pass
+        except ValueError as error:
+            failures.append(error)
+
+    thread = Thread(target=work)
+    thread.start()
+    thread.join()
+    assert not failures

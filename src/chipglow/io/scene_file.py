@@ -16,6 +16,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.io.atomic import KeptErrorFile, atomic_path
+from chipglow.io.interrupts import uninterrupted
 from chipglow.io.packing import HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
 from chipglow.io.unfinished import (
     UnfinishedScene,
@@ -142,18 +143,12 @@ class SceneWriter:
 
     def __enter__(self) -> "SceneWriter":
         with ExitStack() as stack:
-            stack.push(self._drop_checkpoint)
-            self._part = stack.enter_context(atomic_path(self.path, has_checkpoint))
-            self._sink = stack.enter_context(KeptErrorFile(self._part))
-            stack.callback(self._sink.check, self.path)
-            self._hdf = stack.enter_context(h5py.File(self._sink, "w", track_order=True))
-            self._file = stack.enter_context(h5netcdf.File(self._hdf, "w"))
-            self._create_variables()
-            if self._resume is not None:
-                self._take_over(self._resume)
+            with uninterrupted():
+                self._open(stack)
             self._stack = stack.pop_all()
         return self
 
+    @uninterrupted()
     def __exit__(
         self,
         kind: type[BaseException] | None,
@@ -166,6 +161,7 @@ class SceneWriter:
             if not self._times:
                 raise SceneError(f"{self.path}: no frame was written, expected 1 or more")
 
+    @uninterrupted()
     def append(self, frame: Frame) -> None:
         """Write the next frame.
 
@@ -191,6 +187,7 @@ class SceneWriter:
         self._sink.check(self.path)
         self._times.append(frame.time)
 
+    @uninterrupted()
     def checkpoint(self, state: Mapping[str, NDArray[Any]], progress: float) -> Path:
         """Keep the frames so far, with a state to go on from, even if the process is killed.
 
@@ -221,6 +218,7 @@ class SceneWriter:
         write_checkpoint(self._part, state, progress, self._times, self._chunks)
         return checkpoint_path(self._part)
 
+    @uninterrupted()
     def forces(
         self,
         times: ArrayLike,
@@ -264,6 +262,17 @@ class SceneWriter:
             variable = self._file.create_variable(name, ("force_time",), data=values)
             variable.attrs["units"] = unit
             variable.attrs["long_name"] = _LONG_NAMES.get(name, "time of the force history")
+
+    def _open(self, stack: ExitStack) -> None:
+        stack.push(self._drop_checkpoint)
+        self._part = stack.enter_context(atomic_path(self.path, has_checkpoint))
+        self._sink = stack.enter_context(KeptErrorFile(self._part))
+        stack.callback(self._sink.check, self.path)
+        self._hdf = stack.enter_context(h5py.File(self._sink, "w", track_order=True))
+        self._file = stack.enter_context(h5netcdf.File(self._hdf, "w"))
+        self._create_variables()
+        if self._resume is not None:
+            self._take_over(self._resume)
 
     def _take_over(self, unfinished: UnfinishedScene) -> None:
         """Copy the frames of a checkpoint, as they are compressed.

@@ -16,6 +16,7 @@ from chipglow.cutting import (
     WorkpieceMaterial,
 )
 from chipglow.io import SceneWriter, open_scene, unfinished_scenes
+from chipglow.io.interrupts import uninterrupted
 from chipglow.scene import Frame, SceneError, ToolOutline
 from chipglow.study.cache import scene_path
 from chipglow.study.preview import preview_of, show_scene
@@ -203,6 +204,7 @@ class _Keeper:
         """Note which state is kept, and where."""
         self.note = f"the state at {checkpoint.time * 1e6:.2f} us is kept in {file}"
 
+    @uninterrupted()
     def keep(self, checkpoint: Checkpoint) -> None:
         """Make a checkpoint if it is time, and delete what other runs left that got no further."""
         begin = monotonic()
