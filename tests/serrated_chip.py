@@ -1,7 +1,7 @@
 """A serrated chip in closed form, which moves up the rake face by fits and starts."""
 
 from dataclasses import dataclass, field
-from math import cos, log, radians, sin
+from math import cos, log, radians, sin, tan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,8 @@ class SerratedChip:
     """What the scene holds, in SI units.
 
     The thickness is a sawtooth between `valley` and `peak` over the chip's length, so its mean is
-    halfway; a band of strain goes through the chip at every valley, from the face to the back.
+    halfway; beyond the contact the chip leaves the face by the angle `lift`. A band of strain goes
+    through the chip at every valley, from the face to the back.
     """
 
     tool: ToolGeometry = field(default_factory=ToolGeometry)
@@ -38,6 +39,7 @@ class SerratedChip:
     band_rate: float = 80e3
     band_strain: float = 6.0
     contact: float = 150e-6
+    lift: float = 0.0
     coordinates: bool = False
 
     @property
@@ -79,7 +81,10 @@ class SerratedChip:
         phase = (along - travel) / length % 1.0
         share = np.where(phase < self.rise, phase / self.rise, (1 - phase) / (1 - self.rise))
         back = self.valley + (self.peak - self.valley) * share
-        chip = (across > 0) & (depth < back) & (depth > np.where(along > self.contact, 8e-6, 0.0))
+        free = along > self.contact
+        gap = np.where(free, 8e-6 + tan(self.lift) * (along - self.contact), 0.0)
+        back = back + np.where(free, gap - 8e-6, 0.0)
+        chip = (across > 0) & (depth < back) & (depth > gap)
         uncut = (across <= 0) & (points[..., 1] < np.where(offset[..., 0] < 0, self.feed, 0.0))
         uncut &= points[..., 1] < self.feed
         raised = (across <= 0) & (points[..., 0] < -300e-6)

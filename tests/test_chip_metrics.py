@@ -7,7 +7,7 @@ import pytest
 from serrated_chip import SerratedChip
 
 from chipglow.analysis import chip_metrics
-from chipglow.scene import Raster, Scene
+from chipglow.scene import Material, Raster, Scene
 
 CHIP = SerratedChip()
 # Surfaces lie between samples' centres, and lines aslant cut their squares.
@@ -50,8 +50,8 @@ def test_period_spacing_and_speeds(metrics):
 
 
 def test_the_mean_is_over_the_chips_length_not_over_time():
-    """A chip that is fast while thin is thinner in the mean over time of a fixed line."""
-    metrics = chip_metrics(replace(CHIP, unsteadiness=0.8).scene())
+    """A chip that is slow while thin is thinner in the mean over time of a fixed line."""
+    metrics = chip_metrics(replace(CHIP, unsteadiness=-0.8).scene())
     over_time = float(metrics.scan.thickness.mean())
     assert abs(over_time - CHIP.thickness) > 3 * SAMPLE
     assert metrics.thickness == pytest.approx(CHIP.thickness, abs=1.5 * SAMPLE)
@@ -84,6 +84,29 @@ def test_a_given_feed_counts():
     assert chip_metrics(replace(CHIP, frames=80).scene(), feed=190e-6).feed == 190e-6
     with pytest.raises(ValueError, match="feed is 0"):
         chip_metrics(replace(CHIP, frames=2).scene(), feed=0.0)
+
+
+def test_the_view_does_not_decide():
+    """A taller and wider view shows the chip where it has left the face: not to be measured."""
+    chip = replace(CHIP, contact=266e-6, lift=np.radians(25.0))
+    wide = Raster(left=-436e-6, top=600e-6, spacing=2e-6, rows=318, columns=260)
+    metrics = chip_metrics(chip.scene())
+    assert metrics.thickness == pytest.approx(CHIP.thickness, abs=SAMPLE)
+    wider = chip_metrics(replace(chip, raster=wide).scene())
+    assert wider.scan.height < chip.contact
+    # The samples are at the same places, but for rounding.
+    for name in ("height", "thickness"):
+        np.testing.assert_allclose(
+            getattr(wider.scan, name), getattr(metrics.scan, name), rtol=1e-9
+        )
+    for name in ("feed", "contact", "thickness", "peak", "valley", "chip_speed", "band_strain"):
+        assert getattr(wider, name) == pytest.approx(getattr(metrics, name), rel=1e-6)
+
+
+def test_feed_is_the_workpieces_also_under_a_curled_chip():
+    scene = replace(CHIP, frames=80).scene()
+    scene.data["material"][:, :20, :4] = Material.WORKPIECE
+    assert chip_metrics(scene).feed == pytest.approx(CHIP.feed, abs=SAMPLE)
 
 
 def test_what_the_view_cuts_is_unknown():

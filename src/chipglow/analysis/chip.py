@@ -16,7 +16,7 @@ from chipglow.scene import Frame, Material, Raster, Scene, Tool
 _MOST_FRAMES: Final = 64
 _FRAMES_A_BAND: Final = 2
 _TOUCHING: Final = 3e-6
-_CHIP_OVER_FEED: Final = 1.05
+_CHIP_OVER_FEED: Final = 1.2
 _UNDEFORMED: Final = 0.01
 _WHOLE: Final = 0.95
 _DEVELOPED: Final = 0.5
@@ -155,8 +155,10 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     Notes
     -----
     A camera's view seldom holds two whole segments at once. So the chip is measured as it passes
-    one line at right angles to the rake face, the highest on which its free surface is in the
-    view all the time: there it is formed most. The means are over whole periods, each moment
+    one line at right angles to the rake face, the lowest on which its free surface is in the view
+    and over 1.2 times the feed all the time. There it is formed and still lies on the face: on a
+    higher line, which a taller view would have, it has lifted off and curls, so that the line
+    crosses the gap and the chip aslant. The means are over whole periods, each moment
     weighted by the chip's speed, which makes them means over the chip's length. At most 64
     frames, evenly spread, are looked at.
     """
@@ -334,9 +336,9 @@ def _profile(
 
 def _feed(frame: Frame, solid: NDArray[np.bool_], raster: Raster) -> float:
     """Height of the uncut surface at the left border, before the cut where that is known."""
-    column = solid[:, 0]
-    top = int(column.argmax())
-    if not column.any() or top == 0:
+    void = np.flatnonzero(~solid[:, 0])
+    top = int(void[-1]) + 1 if void.size else 0  # of the workpiece: a curled chip may be over it
+    if not 0 < top < raster.rows:
         return nan
     if frame.material_y is not None:
         return float(frame.material_y[top, 0]) + raster.spacing / 2
@@ -351,10 +353,10 @@ def _speed(frame: Frame, solid: NDArray[np.bool_], raster: Raster) -> float:
 
 
 def _scan_row(looks: list[_Look], feed: float) -> int | None:
-    """The highest height at which every frame shows the chip's free surface, over the uncut one."""
+    """The lowest height at which every frame shows the chip's free surface, over the uncut one."""
     chip = [look.exit_height > _CHIP_OVER_FEED * feed for look in looks]
     seen = np.flatnonzero(np.all(chip, axis=0))
-    return int(seen[-1]) if seen.size else None
+    return int(seen[0]) if seen.size else None
 
 
 def _windows(time: NDArray[np.float64], period: float) -> list[NDArray[np.bool_]]:

@@ -530,9 +530,9 @@ def _sensitivity_caption(result: StudyResult) -> str:
 def _chip_caption(result: StudyResult) -> str:
     return (
         f"Distance from the rake face to the chip's free surface at right angles to the face, "
-        f"{result.chip.scan.height * 1e6:.0f} µm up from the edge: the highest line on which "
-        "the surface is in the view all the time. Peak, mean and valley are those of whole "
-        "segments at the end of the scene."
+        f"{result.chip.scan.height * 1e6:.0f} µm up from the edge: the lowest line on which "
+        "the surface is in the view and over 1.2 times the feed all the time. Peak, mean and "
+        "valley are those of whole segments at the end of the scene."
     )
 
 
