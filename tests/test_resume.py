@@ -282,7 +282,7 @@ def test_a_run_that_goes_wrong_says_what_where_and_when(name, value, what):
     place = re.search(r"at (\d+\.\d+) us, x (\S+) um, y (\S+) um", message)
     when, x, y = (float(text) for text in place.groups())
     assert 10.0 <= when <= 11.1
-    assert -300 <= x <= 50
+    assert -200 <= x <= 50
     assert -1100 <= y <= 0
 
 

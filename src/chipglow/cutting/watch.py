@@ -20,13 +20,24 @@ def find_trouble(points: Points) -> Trouble | None:
         values = points.view(np.float64).reshape(points.size, -1)
         total = values.sum()
     if not np.isfinite(total) and not (finite := np.isfinite(values)).all():
-        index, field = np.argwhere(~finite)[0]
-        return f"{(POINT.names or ())[field]} is not finite", int(index)
+        # What spread furthest was the first.
+        field = int((~finite).sum(axis=0).argmax())
+        return f"{(POINT.names or ())[field]} is not finite", _innermost(points, ~finite[:, field])
     temperature = points["temperature"]
     for index in (int(temperature.argmin()), int(temperature.argmax())):
         if not _COLDEST <= temperature[index] <= TABLE_HOTTEST:
             return f"temperature out of {TABLE_COLDEST:g} K to {TABLE_HOTTEST:g} K", index
     return None
+
+
+def _innermost(points: Points, marked: NDArray[np.bool_]) -> int:
+    """Number of the marked point nearest to the middle of them: what spreads began there."""
+    x, y = points["x"], points["y"]
+    placed = marked & np.isfinite(x) & np.isfinite(y)
+    if not placed.any():
+        return int(marked.argmax())
+    distance = np.hypot(x - x[placed].mean(), y - y[placed].mean())
+    return int(np.where(placed, distance, np.inf).argmin())
 
 
 def fastest_point(points: Points) -> tuple[float, int]:
