@@ -5,7 +5,7 @@ import pytest
 from typer.testing import CliRunner
 
 from chipglow.cli.app import app
-from chipglow.io import open_scene, prospect
+from chipglow.io import open_scene, prospect, read_measurement
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.movie import Legend, MovieSource, NamedMap
 from chipglow.scene import Material, ToolGeometry
@@ -100,6 +100,25 @@ def test_a_tool_is_drawn_where_the_description_says(arrays, tmp_path):
     raster = scene.raster
     distance = scene.tool.signed_distance(*np.meshgrid(raster.x, raster.y))
     assert np.array_equal(scene.frame(0).material == Material.TOOL, distance < 0)
+
+
+def test_an_imported_scene_can_be_looked_at(arrays, tmp_path):
+    out, study = tmp_path / "scene.nc", tmp_path / "study.yaml"
+    study.write_text(
+        "camera: {pitch: 15 um, integration_time: 4 us, floor: none}\n"
+        "cutting: {window: {interval: 1 us}}\n"
+    )
+    result = RUNNER.invoke(app, ["import", str(arrays), "--out", str(out), *options(SETTINGS)])
+    assert result.exit_code == 0, result.output
+    measured = tmp_path / "m.nc"
+    result = RUNNER.invoke(
+        app, ["measure", str(out), "--study", str(study), "--out", str(measured)]
+    )
+    assert result.exit_code == 0, result.output
+    assert "textures move with the mean velocity" in " ".join(result.output.split())
+    seen = read_measurement(measured).radiance_temperature()[0]
+    # The strain of 0.8 makes all of it chip, of an emissivity under 1: it looks colder than it is.
+    assert 300.0 < np.nanmean(seen) < open_scene(out).frame(0).temperature.mean()
 
 
 def test_movies_are_described_field_by_field(tmp_path):

@@ -7,11 +7,18 @@ if TYPE_CHECKING:
     from chipglow.analysis import StudyResult, analyse, error_images
     from chipglow.camera import AnnularAperturePSF, Camera, GaussianPSF, MeasuredPSF, Measurement
     from chipglow.cutting import CuttingSimulation
-    from chipglow.io import open_scene, read_measurement, write_measurement, write_scene
+    from chipglow.io import (
+        import_scene,
+        open_scene,
+        read_measurement,
+        read_scene,
+        write_measurement,
+        write_scene,
+    )
     from chipglow.radiometry import Band
     from chipglow.report import write_report
     from chipglow.scene import Raster, Scene, ToolGeometry
-    from chipglow.study import Study, cut, load_study, run
+    from chipglow.study import Study, cut, load_import, load_study, run
     from chipglow.surface import CHIP_1, CHIP_2, Emissivity, FeatureSurface, UniformSurface
 
 __all__ = [
@@ -35,9 +42,12 @@ __all__ = [
     "analyse",
     "cut",
     "error_images",
+    "import_scene",
+    "load_import",
     "load_study",
     "open_scene",
     "read_measurement",
+    "read_scene",
     "run",
     "write_measurement",
     "write_report",
@@ -49,11 +59,18 @@ _ROOMS: Final = {
     "analysis": ("StudyResult", "analyse", "error_images"),
     "camera": ("AnnularAperturePSF", "Camera", "GaussianPSF", "MeasuredPSF", "Measurement"),
     "cutting": ("CuttingSimulation",),
-    "io": ("open_scene", "read_measurement", "write_measurement", "write_scene"),
+    "io": (
+        "import_scene",
+        "open_scene",
+        "read_measurement",
+        "read_scene",
+        "write_measurement",
+        "write_scene",
+    ),
     "radiometry": ("Band",),
     "report": ("write_report",),
     "scene": ("Raster", "Scene", "ToolGeometry"),
-    "study": ("Study", "cut", "load_study", "run"),
+    "study": ("Study", "cut", "load_import", "load_study", "run"),
     "surface": ("CHIP_1", "CHIP_2", "Emissivity", "FeatureSurface", "UniformSurface"),
 }
 _ROOM_OF: Final = {name: room for room, names in _ROOMS.items() for name in names}

@@ -1,7 +1,10 @@
 """The camera alone, from a scene's file to a measurement's."""
 
+from dataclasses import replace
 from math import floor
 from pathlib import Path
+
+from rich.console import Console
 
 from chipglow.camera import Measurement
 from chipglow.cli.progress import progress_bars
@@ -27,6 +30,9 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
     chip : str, optional
         Name of one of the study's chips; the first by default.
 
+    A scene without material coordinates, as imports often are, is looked at with textures that move
+    by the mean velocities, as the paper's did; that is said.
+
     Raises
     ------
     ValueError
@@ -40,9 +46,16 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
     first = float(scene.times[0]) if start is None else parse_instant("--start", start)
     left = float(scene.times[-1]) + scene.frame_spacing - first - camera.integration_time
     count = max(floor(left * camera.frame_rate) + 1, 1)
+    surface = surfaces[name]
+    if surface.follow == "material" and not scene.has_material_coordinates:
+        Console(stderr=True).print(
+            "The scene does not say where each point was before the cut: textures move with the "
+            "mean velocity of their feature (surface.follow: mean)."
+        )
+        surface = replace(surface, follow="mean")
     with progress_bars() as progress:
         progress("measurement", 0.0)
         starts = camera.frame_times(first, count)
-        measured = camera.measure(scene, surfaces[name], starts).data.assign_attrs(surface=name)
+        measured = camera.measure(scene, surface, starts).data.assign_attrs(surface=name)
         progress("measurement", 1.0)
     write_measurement(Measurement(measured), out)
