@@ -1,7 +1,7 @@
 """From a source to a scene: what is missing is made up as said, what goes wrong is one error."""
 
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from io import BufferedReader, BytesIO
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import pytest
 from moving_block import RATE, SPEED, UP, Broken, MovingBlock, strain_at
 
 from chipglow.io import open_scene, unfinished_scenes
-from chipglow.io.importing import Import, import_scene, prospect, read_scene
+from chipglow.io.importing import Import, import_scene, kept_import, prospect, read_scene
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.isolated import Isolated
 from chipglow.io.sources.worker import read_message
@@ -160,6 +160,20 @@ def test_a_material_without_temperature_is_refused():
         list(complete([replace(sampled, fields=nothing)], RASTER, Completion()))
 
 
+@dataclass(frozen=True)
+class InMillimetres(MovingBlock):
+    """Millimetres that were taken for metres."""
+
+    def survey(self):
+        return replace(super().survey(), extent=(0.0, 120.0, 0.0, 100.0), spacing=2.0)
+
+
+def test_a_size_that_no_chip_has_is_said():
+    assert not any("units.length" in text for text in prospect(Import(MovingBlock(WHOLE))).assumed)
+    (said,) = prospect(Import(InMillimetres(WHOLE))).assumed
+    assert "the source is 120 m large" in said
+
+
 @pytest.mark.parametrize(
     ("source", "wrong"),
     [
@@ -220,11 +234,13 @@ def test_an_import_that_was_ended_goes_on_to_the_same_file(tmp_path, monkeypatch
         if share > 0.6:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt) as ended:
         import_scene(wanted, tmp_path / "scene.nc", stop)
     assert not (tmp_path / "scene.nc").exists()
     kept = len(unfinished_scenes(tmp_path / "scene.nc")[0].frames()[0])
     assert 0 < kept < 8
+    assert str(ended.value) == f"{kept} frames are kept"
+    assert kept_import(wanted, prospect(wanted), tmp_path / "scene.nc") == kept / 8
     shares = []
     import_scene(wanted, tmp_path / "scene.nc", shares.append, resume=True)
     assert len(shares) == 8 - kept

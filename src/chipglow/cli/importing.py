@@ -7,7 +7,7 @@ from rich.table import Table
 
 from chipglow.cli.progress import progress_bars
 from chipglow.io import import_scene, prospect
-from chipglow.io.importing import Prospect
+from chipglow.io.importing import Prospect, kept_import
 from chipglow.study import ImportDescription
 
 
@@ -28,11 +28,25 @@ def import_fields(description: ImportDescription, out: Path | None, resume: bool
     _say(looked)
     if out is None:
         return
+    _say_where_it_starts(kept_import(wanted, looked, out), resume)
     with progress_bars() as progress:
         import_scene(
             wanted, out, lambda share: progress("import", share), looked=looked, resume=resume
         )
     print(out)
+
+
+def _say_where_it_starts(kept: float, resume: bool) -> None:
+    console = Console(stderr=True)
+    if kept and resume:
+        console.print(f"The import goes on at {kept:.0%}, where an earlier one was ended.")
+    elif kept:
+        console.print(
+            f"An earlier import was ended at {kept:.0%}. This one starts anew; --resume goes on "
+            "from there."
+        )
+    elif resume:
+        console.print("No earlier run left a state of this import: it starts anew.")
 
 
 def _say(looked: Prospect) -> None:

@@ -28,6 +28,7 @@ MOST_SAMPLES: Final = 100_000_000
 
 _CHECKPOINT_INTERVAL: Final = 30.0
 _KEY: Final = "import"
+_SMALLEST, _LARGEST = 5e-6, 0.05
 
 
 @dataclass(frozen=True)
@@ -167,7 +168,10 @@ def prospect(wanted: Import) -> Prospect:
             f"temperature: NAME with one of {listed}"
         )
     raster = wanted.view.raster(survey)
-    assumed = wanted.completion.assumptions(survey.found, len(survey.times))
+    assumed = [
+        *_doubtful_size(survey),
+        *wanted.completion.assumptions(survey.found, len(survey.times)),
+    ]
     if any("optical flow" in sentence for sentence in assumed) and find_spec("skimage") is None:
         raise SourceError(
             "velocity: the source has none and the optical flow needs scikit-image, expected "
@@ -211,8 +215,7 @@ def import_scene(
     looked = looked or prospect(wanted)
     survey, raster, completion = looked.survey, looked.raster, wanted.completion
     key = _key(wanted, looked)
-    left = next((left for left in unfinished_scenes(Path(path)) if _is_of(left, key)), None)
-    start = left if resume else None
+    start = _unfinished(path, key) if resume else None
     done = len(start.frames()[0]) if start else 0
     attributes = {"import": key, "assumed": "; ".join(looked.assumed)}
     coordinates = {"material_x", "material_y"} <= set(survey.found)
@@ -226,18 +229,29 @@ def import_scene(
         hottest=HOTTEST_PLAUSIBLE,
         resume=start,
     ) as writer:
+        kept = f"{done} frames are kept" if done else ""
         due = monotonic() + _CHECKPOINT_INTERVAL
-        for number, frame in enumerate(_frames(wanted, raster, done), start=done + 1):
-            writer.append(frame)
-            share = number / len(survey.times)
-            if progress:
-                progress(min(share, 1.0))
-            if monotonic() > due:
-                writer.checkpoint({_KEY: np.frombuffer(key.encode(), np.uint8)}, share)
-                due = monotonic() + _CHECKPOINT_INTERVAL
+        try:
+            for number, frame in enumerate(_frames(wanted, raster, done), start=done + 1):
+                writer.append(frame)
+                share = number / len(survey.times)
+                if progress:
+                    progress(min(share, 1.0))
+                if monotonic() > due:
+                    writer.checkpoint({_KEY: np.frombuffer(key.encode(), np.uint8)}, share)
+                    kept = f"{number} frames are kept"
+                    due = monotonic() + _CHECKPOINT_INTERVAL
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(kept) from None
     for unfinished in unfinished_scenes(Path(path)):
         unfinished.remove()
     return looked
+
+
+def kept_import(wanted: Import, looked: Prospect, path: str | os.PathLike[str]) -> float:
+    """Share of an import to a file that an earlier run left at a checkpoint, 0 to 1."""
+    left = _unfinished(path, _key(wanted, looked))
+    return left.progress if left else 0.0
 
 
 def read_scene(wanted: Import) -> Scene:
@@ -274,6 +288,15 @@ def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
     yield from islice(frames, done - first, None)
 
 
+def _doubtful_size(survey: Survey) -> tuple[str, ...]:
+    """A sentence if the source is larger or smaller than what is cut and seen by a microscope."""
+    left, right, bottom, top = survey.extent
+    size = max(right - left, top - bottom)
+    if _SMALLEST <= size <= _LARGEST:
+        return ()
+    return (f"the source is {size:.3g} m large, as units.length says; a chip is about 1 mm",)
+
+
 def _check_times(survey: Survey) -> None:
     times = survey.times
     if times.size == 0:
@@ -293,6 +316,11 @@ def _key(wanted: Import, looked: Prospect) -> str:
     """What makes two imports the same."""
     raster = vars(looked.raster)
     return json.dumps({**wanted.description, "raster": raster}, sort_keys=True, default=str)
+
+
+def _unfinished(path: str | os.PathLike[str], key: str) -> UnfinishedScene | None:
+    """What an earlier run of the same import left, the furthest."""
+    return next((left for left in unfinished_scenes(Path(path)) if _is_of(left, key)), None)
 
 
 def _is_of(left: UnfinishedScene, key: str) -> bool:
