@@ -311,6 +311,13 @@ def test_noise_has_no_period():
     assert found <= 4
 
 
+def test_the_ripple_of_a_continuous_chip_is_no_segment():
+    time = np.arange(0.0, 470e-6, 2e-6)
+    ripple = np.sin(2 * np.pi * time / 60e-6)
+    assert np.isnan(segmentation(time, 700e3 + 25e3 * ripple, 300e3 + ripple).period)
+    assert segmentation(time, 700e3 + 60e3 * ripple, 300e3 + ripple).segments > 4
+
+
 def test_a_force_without_period_has_none():
     time = np.arange(0.0, 400e-6, 0.5e-6)
     steady = 600e3 * (1 - np.exp(-time / 30e-6))

@@ -14,6 +14,10 @@ _LEAST_PROMINENCE: Final = 0.3
 """Least rise of the autocorrelation from the valley before its first peak to that peak: in a few
 unequal segments the peak is low, but the valley deep; noise has neither."""
 
+_LEAST_SWING: Final = 0.1
+"""Least range of the force, from 5 % to 95 % of its values, over its mean: less is the ripple of a
+continuous chip."""
+
 
 @dataclass(frozen=True)
 class Segmentation:
@@ -74,7 +78,8 @@ def segmentation(
     Notes
     -----
     The history counts from where the cutting force first reaches the median of its second half,
-    and from a fifth of its duration on at the earliest.
+    and from a fifth of its duration on at the earliest. A force whose range is under a tenth of its
+    mean has no segments: a continuous chip ripples, by some per cent.
     The autocorrelation of what remains gives a first period; the force is smoothed over a
     fifteenth of it, and its peaks, at least six tenths of a period apart and a fifth of the swing
     high, give the period and its uncertainty.
@@ -88,7 +93,7 @@ def segmentation(
     step = float(steps.mean())
     first = end_of_build_up(cutting)
     times, cutting, thrust = times[first:], cutting[first:], thrust[first:]
-    coarse = _correlation_period(cutting, step)
+    coarse = _correlation_period(cutting, step) if _swings(cutting) else nan
     peaks = np.zeros(0, dtype=np.int64)
     swings = [nan, nan]
     if np.isfinite(coarse):
@@ -121,6 +126,11 @@ def end_of_build_up(cutting_force: NDArray[np.float64]) -> int:
     """
     later = cutting_force[cutting_force.size // 2 :]
     return max(int(np.argmax(cutting_force >= np.median(later))), cutting_force.size // 5)
+
+
+def _swings(force: NDArray[np.float64]) -> bool:
+    low, high = np.percentile(detrend(force), [5.0, 95.0])
+    return bool(high - low > _LEAST_SWING * abs(force.mean()))
 
 
 def _correlation_period(force: NDArray[np.float64], step: float) -> float:
