@@ -142,6 +142,24 @@ def test_the_tool_of_the_description_is_tool():
     assert (frame.temperature[~in_tool] == 700.0).all()
 
 
+def test_a_tool_that_is_only_drawn_has_the_temperature_of_the_surroundings():
+    sampled = frame_of(MovingBlock(WHOLE))
+    material = sampled.material.copy()
+    material[30:, 30:] = Material.TOOL
+    temperature = sampled.fields["temperature"].copy()
+    temperature[30:, 30:] = np.nan
+    fields = {**sampled.fields, "temperature": temperature}
+    drawn = replace(sampled, fields=fields, material=material)
+    frame = next(iter(complete([drawn], RASTER, Completion(surroundings=310.0))))
+    assert (frame.temperature[30:, 30:] == 310.0).all()
+    # One that has temperatures keeps them, and a hole in it takes its neighbours'.
+    temperature[30:, 30:] = 500.0
+    temperature[40, 40] = np.nan
+    frame = next(iter(complete([drawn], RASTER, Completion(surroundings=310.0))))
+    assert (frame.temperature[30:, 30:] == 500.0).all()
+    assert frame.quality[40, 40] == FILLED
+
+
 def test_holes_are_filled_from_the_nearest_and_flagged():
     sampled = frame_of(MovingBlock(WHOLE))
     fields = {name: values.copy() for name, values in sampled.fields.items()}

@@ -156,13 +156,17 @@ def _prepared(
     solid = material != Material.VOID
     known = np.isfinite(sampled.fields["temperature"])
     holes = solid & ~known
-    if (holes & ~in_tool).sum() > _MOST_FILLED * max(solid.sum(), 1):
+    tool = material == Material.TOOL
+    # A tool that is only drawn has no temperature anywhere; that of the chip is not its own.
+    bare = tool & holes if in_tool.any() or not (tool & known).any() else np.zeros_like(tool)
+    unknown = int((holes & ~bare).sum())
+    if unknown > _MOST_FILLED * max(solid.sum(), 1):
         raise SceneError(
-            f"scene: temperature is not known in {(holes & ~in_tool).sum()} of {solid.sum()} "
-            f"samples of the material at {sampled.time:.9g} s, expected under half"
+            f"scene: temperature is not known in {unknown} of {solid.sum()} samples of the "
+            f"material at {sampled.time:.9g} s, expected under half"
         )
     fields = {name: _without_holes(values, solid) for name, values in sampled.fields.items()}
-    fields["temperature"][holes & in_tool] = completion.surroundings
+    fields["temperature"][bare] = completion.surroundings
     if "plastic_strain" not in fields:
         strain = np.where(chip, np.float32(STRAIN_OF_CHIP), np.float32(0.0))
         fields["plastic_strain"] = np.where(solid, strain, np.float32(np.nan))
