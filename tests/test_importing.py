@@ -50,7 +50,7 @@ def test_a_whole_source_comes_through_as_it_is(tmp_path):
 
 
 def test_missing_strain_rate_is_the_change_of_strain_along_the_motion():
-    scene = read_scene(Import(MovingBlock()))
+    scene = read_scene(MovingBlock())
     for frame in scene.frames():
         rate = frame.plastic_strain_rate[inner(frame)]
         # The strain's pattern is far wider than a sample: the cubic spline is right to 1e-5 of it.

@@ -254,19 +254,21 @@ def kept_import(wanted: Import, looked: Prospect, path: str | os.PathLike[str]) 
     return left.progress if left else 0.0
 
 
-def read_scene(wanted: Import) -> Scene:
+def read_scene(source: Import | Source) -> Scene:
     """Read a source into memory.
 
     Parameters
     ----------
-    wanted : Import
-        What to read; all frames have to fit into memory.
+    source : Import or Source
+        What to read; all frames have to fit into memory. Of a bare source all is read, and what it
+        lacks is completed as `Completion` has it by default.
 
     Raises
     ------
     SourceError, SceneError, OSError
         As `import_scene`.
     """
+    wanted = source if isinstance(source, Import) else Import(source)
     looked = prospect(wanted)
     frames = list(_frames(wanted, looked.raster, 0))
     names = [
