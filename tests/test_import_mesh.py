@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fuzz.cgns_file import write_cgns
 
 from chipglow.io.sources import CELSIUS, Placement, SourceError, Unit, Units
 from chipglow.io.sources.mesh import MeshSource
@@ -391,6 +392,20 @@ def test_tecplot_zones_of_many_times_blocks_and_cell_values(tmp_path):
         np.testing.assert_allclose(frame.fields["temperature"], expected, atol=2e-4)
         np.testing.assert_array_equal(frame.material == TOOL, wide > WIDTH)
         assert set(np.unique(frame.fields["plastic_strain"])) == {0.0, 1.0, 2.0}
+
+
+def test_cgns_with_values_of_nodes_and_of_elements(tmp_path):
+    grid = grid_of()
+    speed = {f"Velocity{axis}": grid.point_data["V"][:, k] for k, axis in enumerate("XYZ")}
+    of_nodes = {"Temperature": grid.point_data["NT11"], **speed}
+    path = tmp_path / "chip.cgns"
+    of_elements = {"PEEQ": grid.cell_data["PEEQ"]}
+    write_cgns(path, grid.points, grid.cells_dict[9], of_nodes, of_elements)
+    frame = only_frame(MeshSource(path))
+    check_linear(frame)
+    np.testing.assert_allclose(frame.fields["velocity_x"], 3.0)
+    np.testing.assert_allclose(frame.fields["velocity_y"], 1.0)
+    assert len(np.unique(frame.fields["plastic_strain"])) == grid.n_cells
 
 
 FORMATS = {

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pyvista as pv
+from cgns_file import write_cgns
 from lasso.dyna import D3plot
 from vtkmodules.vtkIOExodus import vtkExodusIIWriter
 from vtkmodules.vtkIOParallel import vtkEnSightWriter
@@ -11,6 +12,7 @@ from vtkmodules.vtkIOParallel import vtkEnSightWriter
 WRITTEN = (
     "chip.vtu", "chip.vtk", "chip.vtp", "chip.vtm", "chip.vtkhdf", "chip.e", "chip.case",
     "chip.xdmf", "chip.pvd", "chip.msh", "chip.med", "chip.avs", "chip.dat", "chip.inp", "d3plot",
+    "chip.cgns",
 )  # fmt: skip
 """Names of the files that `write_meshes` writes, each of which is damaged."""
 
@@ -40,6 +42,8 @@ def write_meshes(folder: Path) -> None:
     (folder / "chip.csv").write_text("\n".join(["node, NT11", *rows]) + "\n")
     (folder / "chip.dat").write_text(_tecplot(grid))
     _d3plot(grid, folder)
+    fields = {"Temperature": grid.point_data["NT11"]}
+    write_cgns(folder / "chip.cgns", grid.points, grid.cells_dict[9], fields, {})
 
 
 def _grid():

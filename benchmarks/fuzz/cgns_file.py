@@ -1,0 +1,55 @@
+"""A CGNS file by hand, after the standard's mapping to HDF5: one zone of quadrilaterals."""
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+_TYPES = {"float32": "R4", "float64": "R8", "int32": "I4", "int8": "C1"}
+_QUAD_4 = 7
+
+
+def write_cgns(
+    path: Path, points: Any, quads: Any, of_nodes: dict[str, Any], of_elements: dict[str, Any]
+) -> None:
+    """Write points (n, 3), quadrilaterals (m, 4), and fields of nodes and of elements."""
+    with h5py.File(path, "w", track_order=True) as file:
+        _mark(file, "HDF5 MotherNode", "Root Node of HDF5 File")
+        file.create_dataset(" format", data=_text("IEEE_LITTLE_32\0"))
+        file.create_dataset(" hdf5version", data=_text("HDF5 Version 1.10.0".ljust(33, "\0")))
+        _node(file, "CGNSLibraryVersion", "CGNSLibraryVersion_t", np.float32([3.2]))
+        base = _node(file, "Base", "CGNSBase_t", np.int32([2, 3]))
+        zone = _node(base, "Chip", "Zone_t", np.int32([[len(points)], [len(quads)], [0]]))
+        _node(zone, "ZoneType", "ZoneType_t", _text("Unstructured"))
+        coordinates = _node(zone, "GridCoordinates", "GridCoordinates_t")
+        for axis, values in zip("XYZ", np.transpose(points), strict=True):
+            _node(coordinates, f"Coordinate{axis}", "DataArray_t", np.array(values, np.float64))
+        elements = _node(zone, "Quads", "Elements_t", np.int32([_QUAD_4, 0]))
+        _node(elements, "ElementRange", "IndexRange_t", np.int32([1, len(quads)]))
+        connectivity = np.int32(quads).ravel() + np.int32(1)
+        _node(elements, "ElementConnectivity", "DataArray_t", connectivity)
+        for place, fields in (("Vertex", of_nodes), ("CellCenter", of_elements)):
+            solution = _node(zone, f"At{place}", "FlowSolution_t")
+            _node(solution, "GridLocation", "GridLocation_t", _text(place))
+            for name, values in fields.items():
+                _node(solution, name, "DataArray_t", np.asarray(values, np.float64))
+
+
+def _text(text: str) -> Any:
+    return np.frombuffer(text.encode(), np.int8)
+
+
+def _node(parent: Any, name: str, label: str, data: Any = None) -> Any:
+    # Nodes are found in the order in which they were made.
+    return _mark(parent.create_group(name, track_order=True), name, label, data)
+
+
+def _mark(group: Any, name: str, label: str, data: Any = None) -> Any:
+    kind = "MT" if data is None else _TYPES[data.dtype.name]
+    for key, value, length in (("name", name, 33), ("label", label, 33), ("type", kind, 3)):
+        group.attrs.create(key, np.bytes_(value), dtype=h5py.string_dtype("ascii", length))
+    group.attrs.create("flags", np.int32([1]))
+    if data is not None:
+        group.create_dataset(" data", data=data)
+    return group
