@@ -146,6 +146,49 @@ def test_the_kind_is_told_by_the_name():
     assert isinstance(ImportDescription(source="a.mat").build().source.source, GridSource)
 
 
+def test_the_description_that_init_writes_says_every_field_and_is_read_back(arrays, tmp_path):
+    path = tmp_path / "import.yaml"
+    result = RUNNER.invoke(app, ["init", str(path), "--import"])
+    assert result.exit_code == 0, result.output
+    assert load_import(path) == ImportDescription()
+    assert "# Units of the source" in path.read_text()
+    path.write_text(path.read_text().replace("source: none", "source: cut.npz", 1))
+    assert load_import(path).file == str(arrays)
+
+
+def test_a_table_with_names_is_points_and_one_without_a_grid(tmp_path):
+    (tmp_path / "points.csv").write_text("x,y,temperature\n0,0,300\n")
+    (tmp_path / "grid.csv").write_text("300,3.1e2\n310,nan\n")
+    assert load_import(tmp_path / "points.csv").kind_of_source() == "points"
+    assert load_import(tmp_path / "grid.csv").kind_of_source() == "grid"
+
+
+def test_units_that_follow_from_others_are_said(arrays, tmp_path):
+    np.savez(tmp_path / "v.npz", T=np.full((4, 6), 300.0), vx=np.ones((4, 6)))
+    settings = ["grid.spacing=5 um", "units={length: mm, time: us}"]
+    looked = prospect(load_import(tmp_path / "v.npz", settings).build())
+    assert "velocities are in mm/us, made of units.length and time" in looked.assumed
+    given = load_import(tmp_path / "v.npz", [*settings, "units.velocity=m/s"])
+    assert not any("velocities" in said for said in prospect(given.build()).assumed)
+
+
+@pytest.mark.parametrize(
+    ("values", "wrong"),
+    [
+        (np.full((4, 6), np.nan), "no sample of any frame shows material"),
+        (np.full((4, 6), np.inf), "T: has infinite numbers"),
+        (np.full((4, 6), 25.0), "if it is in °C, expected units.temperature: degC"),
+    ],
+)
+def test_temperatures_that_are_none_are_refused(tmp_path, values, wrong):
+    np.savez(tmp_path / "t.npz", T=values)
+    arguments = ["import", str(tmp_path / "t.npz"), "--set", "grid.spacing=5 um"]
+    result = RUNNER.invoke(app, [*arguments, "--out", str(tmp_path / "s.nc")])
+    assert result.exit_code == 2
+    assert wrong in " ".join(result.output.split())
+    assert not (tmp_path / "s.nc").exists()
+
+
 @pytest.mark.parametrize(
     ("settings", "wrong"),
     [

@@ -81,15 +81,19 @@ def init(
         "study.yaml"
     ),
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    of_import: Annotated[
+        bool, typer.Option("--import", help="Write the description of an import instead.")
+    ] = False,
 ) -> None:
     """Write the paper's study as a commented YAML file."""
     from chipglow.io import atomic_path
-    from chipglow.study import Study, study_text
+    from chipglow.study import ImportDescription, Study, import_text, study_text
 
     if path.exists() and not force:
         raise FileExistsError(f"{path}: is there already, expected a new name or --force")
     with atomic_path(path) as temporary:
-        temporary.write_text(study_text(Study()), encoding="utf-8")
+        text = import_text(ImportDescription()) if of_import else study_text(Study())
+        temporary.write_text(text, encoding="utf-8")
     print(path)
 
 

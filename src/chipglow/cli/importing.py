@@ -23,6 +23,8 @@ def import_fields(description: ImportDescription, out: Path | None, resume: bool
     resume : bool
         Whether to go on where an earlier import of the same was ended.
     """
+    if out is not None and not out.parent.is_dir():
+        raise FileNotFoundError(f"{out}: there is no folder {out.parent}")
     wanted = description.build()
     looked = prospect(wanted)
     _say(looked)

@@ -18,7 +18,7 @@ from chipglow.io.sources import Source, SourceError, Survey
 from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 from chipglow.scene import Frame, Raster, Scene
 from chipglow.scene.completion import Completion, complete
-from chipglow.scene.scene import HOTTEST_PLAUSIBLE
+from chipglow.scene.scene import COLDEST_PLAUSIBLE, HOTTEST_PLAUSIBLE
 
 SAMPLES_ACROSS: Final = 900
 """Samples along the longer side of a scene, if nothing is said: those of the paper's scene."""
@@ -76,7 +76,7 @@ class View:
         width, height = right - left, top - bottom
         if not (isfinite(width) and isfinite(height) and width > 0 and height > 0):
             raise SourceError(
-                f"{survey.kind}: the view is {width:g} m wide and {height:g} m high, expected an "
+                f"{survey.kind}: the view is {_metres((left, right, bottom, top))}, expected an "
                 f"area; the source extends over {_metres(survey.extent)}"
             )
         spacing = self.spacing or survey.spacing or max(width, height) / SAMPLES_ACROSS
@@ -122,12 +122,15 @@ class Import:
         What stands in for what the source does not have.
     description : mapping
         How the source was described, kept with the scene: text and numbers.
+    notes : mapping
+        What has to be assumed of fields, by their names, if the source has them: sentences.
     """
 
     source: Source
     view: View = field(default_factory=View)
     completion: Completion = field(default_factory=Completion)
     description: Mapping[str, Any] = field(default_factory=dict)
+    notes: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -170,6 +173,7 @@ def prospect(wanted: Import) -> Prospect:
     raster = wanted.view.raster(survey)
     assumed = [
         *_doubtful_size(survey),
+        *dict.fromkeys(note for name, note in wanted.notes.items() if name in survey.found),
         *wanted.completion.assumptions(survey.found, len(survey.times)),
     ]
     if any("optical flow" in sentence for sentence in assumed) and find_spec("skimage") is None:
@@ -287,7 +291,23 @@ def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
     """Whole frames after the first that are done; those depend on some before them."""
     first = max(done - wanted.completion.memory, 0)
     frames = complete(wanted.source.frames(raster, first), raster, wanted.completion)
-    yield from islice(frames, done - first, None)
+    seen = done > 0
+    for frame in islice(frames, done - first, None):
+        _check_kelvin(frame)
+        seen = seen or bool(frame.material.any())
+        yield frame
+    if not seen:
+        raise SourceError("import: no sample of any frame shows material, expected some in view")
+
+
+def _check_kelvin(frame: Frame) -> None:
+    """Refuse temperatures that look like °C, in the words of an import."""
+    lowest = float(frame.temperature.min())
+    if -100.0 < lowest < COLDEST_PLAUSIBLE:
+        raise SourceError(
+            f"temperature: {lowest:.6g} at {frame.time:.9g} s, expected kelvin of "
+            f"{COLDEST_PLAUSIBLE:g} or more; if it is in °C, expected units.temperature: degC"
+        )
 
 
 def _doubtful_size(survey: Survey) -> tuple[str, ...]:

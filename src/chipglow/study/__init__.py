@@ -7,7 +7,7 @@ from chipglow.study.preview import preview_raster
 from chipglow.study.reference import FieldEntry, field_entries, field_tables
 from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, kept_progress, run
 from chipglow.study.schema import Study
-from chipglow.study.template import study_text
+from chipglow.study.template import import_text, study_text
 
 __all__ = [
     "CUTTING_STEP",
@@ -23,6 +23,7 @@ __all__ = [
     "cut",
     "field_entries",
     "field_tables",
+    "import_text",
     "is_cut",
     "kept_progress",
     "load_import",

@@ -1,5 +1,6 @@
 """What the description of an import says: where fields are, what they mean, where to sample."""
 
+import re
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
@@ -265,6 +266,8 @@ def _field_movie(name: str, section: FieldMovieSection, whole: "ImportDescriptio
 def _value(place: str, field: str, value: str | int | float) -> float:
     """SI number of a value of a field with its unit, such as ``1127 degC`` or ``4``."""
     text = str(value)
+    if not text.strip():
+        raise ValueError(f"{place}: is missing, expected a value such as {_EXAMPLES[field]}")
     number, _, unit = text.strip().partition(" ")
     if not unit and field != "plastic_strain":
         raise ValueError(f"{place}: {text!r} has no unit, expected one such as {_EXAMPLES[field]}")
@@ -274,6 +277,16 @@ def _value(place: str, field: str, value: str | int | float) -> float:
         raise ValueError(
             f"{place}: {text!r}, expected a value such as {_EXAMPLES[field]}"
         ) from None
+
+
+def _has_header(path: Path) -> bool:
+    """Whether a table of text begins with a line of names."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        first = file.readline(10_000).decode("utf-8", "replace").lower()
+    words = re.findall(r"[a-z_]+", first)
+    return any(word not in ("e", "nan", "inf") for word in words)
 
 
 _EXAMPLES: Final = {
@@ -292,8 +305,8 @@ class MeshSection(SourceSection):
         "camera.",
         "none, 0 mm, facing",
     )
-    tool_parts: Annotated[tuple[str, ...], Strict(False)] = described(
-        [], "Names of the blocks, parts or sets that are tool, or their numbers.", "[TOOL], ['2']"
+    tool_parts: Annotated[tuple[str | int, ...], Strict(False)] = described(
+        [], "Names of the blocks, parts or sets that are tool, or their numbers.", "[TOOL], [2]"
     )
     part_field: Annotated[str | None, *OR_NONE] = described(
         "none", "Field of elements that numbers the parts; none: it is guessed."
@@ -311,7 +324,7 @@ class MeshSection(SourceSection):
             placement=whole.placement.build(),
             interval=whole.interval,
             section=self.section,
-            tool_parts=self.tool_parts,
+            tool_parts=tuple(str(part) for part in self.tool_parts),
             part_field=self.part_field,
             displacement=self.displacement,
         )
@@ -447,6 +460,8 @@ class ImportDescription(Section):
         if self.kind is not None:
             return self.kind
         name = Path(self.file).name.lower()
+        if name.endswith((".csv", ".tsv")) and _has_header(Path(self.file)):
+            return "points"
         for kind, suffixes in KINDS.items():
             if name.endswith(suffixes):
                 return kind
@@ -468,4 +483,21 @@ class ImportDescription(Section):
             self.field_of_view.build(),
             replace(completion, tool=tool),
             self.model_dump(mode="json"),
+            self._notes(),
         )
+
+    def _notes(self) -> dict[str, str]:
+        """What has to be assumed of a field if the source has it."""
+        notes: dict[str, str] = {}
+        units = self.units
+        if units.velocity is None and (units.length, units.time) != ("m", "s"):
+            text = f"velocities are in {units.length}/{units.time}, made of units.length and time"
+            notes |= {"velocity_x": text, "velocity_y": text}
+        if units.strain_rate is None and units.time != "s":
+            notes["plastic_strain_rate"] = f"strain rates are in 1/{units.time}, as units.time says"
+        if self.tool is not None or self.movie.tool_colour is not None:
+            notes["temperature"] = (
+                "temperature of the tool, where the source has none: "
+                f"{self.completion.surroundings - 273.15:g} °C (completion.surroundings)"
+            )
+        return notes

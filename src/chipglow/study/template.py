@@ -6,6 +6,7 @@ from typing import Any, Final
 import yaml
 from pydantic import BaseModel
 
+from chipglow.study.import_schema import ImportDescription
 from chipglow.study.schema import Study
 from chipglow.study.section import Section, allowed
 
@@ -14,6 +15,19 @@ _HEADER: Final = """\
 # Quantities carry their unit, in any unit of their kind: 10 us, 0.3 mm, 250 m/min, 391 degC.
 # What is left out has the value of the paper's study: Heigel and Whitenton (2010).
 """
+
+
+_IMPORT_HEADER: Final = """\
+# An import of chipglow. Run it with: chipglow import FILE --out scene.nc
+# Quantities carry their unit, in any unit of their kind: 10 us, 0.3 mm, 250 m/min, 391 degC.
+# Of movie, mesh, points and grid only the one of the source's kind counts.
+"""
+
+
+def import_text(description: ImportDescription) -> str:
+    """A description of an import as YAML, every field with a comment."""
+    values = description.model_dump(mode="json")
+    return "\n".join([_IMPORT_HEADER, *_section_lines(description, values, "")]) + "\n"
 
 
 def study_text(study: Study) -> str:
@@ -37,7 +51,7 @@ def _entry_lines(name: str, value: object, plain: Any, indent: str) -> Iterator[
     if isinstance(value, Section):
         yield f"{indent}{_scalar(name)}:"
         yield from _section_lines(value, plain, indent + "  ")
-    elif isinstance(value, Mapping):
+    elif isinstance(value, Mapping) and value:
         yield f"{indent}{_scalar(name)}:"
         for key, item in value.items():
             yield from _entry_lines(key, item, plain[key], indent + "  ")

@@ -585,7 +585,10 @@ def _csv_matrix(path: Path) -> NDArray[np.float32]:
         values = pd.read_csv(stream, header=None, **table.options)
     for column, kind in enumerate(values.dtypes):
         if kind.kind not in _KINDS:
-            raise SourceError(f"{path}, column {column + 1}: has text in it, expected numbers")
+            raise SourceError(
+                f"{path}, column {column + 1}: has text in it, expected numbers; "
+                "a table of points needs kind: points"
+            )
     return np.asarray(values.to_numpy(np.float32))
 
 

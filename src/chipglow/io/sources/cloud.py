@@ -209,7 +209,7 @@ class _Points:
             raise SourceError(f"{path}: {error}") from None
         if not self._labels:
             listed = ", ".join(labels[:20]) or "none"
-            raise SourceError(f"{path}: no column has the name of a field, it has {listed}")
+            raise SourceError(f"{path}: no column is known as temperature, it has {listed}")
         third = {f"{vector}_z"} | {n for n in labels if simple(n) in _VELOCITY_Z}
         if source.placement.depth != 2 and third & set(labels):
             self._labels["velocity_z"] = sorted(third & set(labels))[0]

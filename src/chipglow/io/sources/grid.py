@@ -280,7 +280,10 @@ class _Grid:
     def _void(self, raw: Mapping[str, NDArray[np.float32]]) -> NDArray[np.bool_]:
         """Where the temperature, or else the first field, has no number."""
         values = raw["temperature"] if "temperature" in raw else next(iter(raw.values()))
-        void: NDArray[np.bool_] = ~np.isfinite(values)
+        if np.isinf(values).any():
+            first = next(iter(self.layers.values()))
+            raise SourceError(f"{first.chosen}: has infinite numbers, expected finite ones or NaN")
+        void: NDArray[np.bool_] = np.isnan(values)
         if self.source.void_value is not None:
             void |= np.isclose(values, self.source.void_value, rtol=1e-6, atol=0.0)
         return void
@@ -401,14 +404,17 @@ def _positions(
         one = coordinate(axis, files, source.names.get(axis), layer.dim(axis), count)
         if one is None:
             raise SourceError(
-                f"{layer.chosen.path}: has no coordinate {axis!r}, expected spacing to be given"
+                f"{layer.chosen.path}: has no coordinate {axis!r}, expected grid.spacing"
             )
         return check_even(
             str(one),
             read_list(one, unit_of(axis, str(one), one.unit, source.units.length, assumed)),
         )
+    if coordinate(axis, files, source.names.get(axis), layer.dim(axis), count) is not None:
+        assumed.append(f"the file's coordinate {axis} is not used, as the spacing is given")
     if axis == "x":
         return source.left + source.spacing[0] * number
+    assumed.append(f"row 0 is the {'upper' if source.top_first else 'lower'} edge")
     return source.top - source.spacing[1] * (number if source.top_first else number[::-1])
 
 

@@ -101,8 +101,8 @@ def _failure(error: Exception) -> Message:
     if isinstance(error, SourceError):
         return Message({"answer": "error", "text": str(error)})
     if isinstance(error, FileNotFoundError):
-        name = error.filename or error
-        return Message({"answer": "missing", "text": f"{name}: there is no such file"})
+        text = f"{error.filename}: there is no such file" if error.filename else str(error)
+        return Message({"answer": "missing", "text": text})
     if isinstance(error, MemoryError):
         return Message({"answer": "unreadable", "text": "needs more memory than a reader may take"})
     said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
