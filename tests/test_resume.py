@@ -349,6 +349,15 @@ WRITES = {
 }
 
 
+@pytest.fixture
+def ctrl_c():
+    """Ctrl-C as in a terminal: a process that was started in the background ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 @pytest.mark.parametrize("method", WRITES)
 def test_ctrl_c_while_hdf5_writes_is_as_at_any_other_time(cache, unbroken, monkeypatch, method):
     """HDF5 calls back into Python to write: an exception there could end the process."""
@@ -389,6 +398,7 @@ def test_ctrl_c_while_hdf5_writes_is_as_at_any_other_time(cache, unbroken, monke
     assert_same_scene("scene.nc", unbroken)
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_held_signals_come_when_the_block_ends():
     seen = []
     with pytest.raises(KeyboardInterrupt), uninterrupted():
