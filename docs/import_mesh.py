@@ -20,8 +20,8 @@ def main() -> None:
     path = Path(examples.hexbeamfile)
     side = Placement(horizontal="x", vertical="z")
     sources = {
-        "nodes, section: 0.6": MeshSource(path, NODES, placement=side, section=0.6),
-        "elements, section: 0.6": MeshSource(path, ELEMENTS, placement=side, section=0.6),
+        "nodes, section: 0.6 m": MeshSource(path, NODES, placement=side, section=0.6),
+        "elements, section: 0.6 m": MeshSource(path, ELEMENTS, placement=side, section=0.6),
         "nodes, section: facing": MeshSource(path, NODES, placement=side, section="facing"),
     }
     with style():
@@ -35,9 +35,9 @@ def main() -> None:
                 cmap="inferno",
             )
             axes.set_title(title, fontsize=8)
-            axes.set_xlabel("x")
-            axes.set_ylabel("z")
-            figure.colorbar(shown, ax=axes, shrink=0.8)
+            axes.set_xlabel("x / m")
+            axes.set_ylabel("z / m")
+            figure.colorbar(shown, ax=axes, shrink=0.8, label="the value in the file")
         figure.savefig(Path(__file__).with_name("import-mesh.png"), dpi=150)
 
 
