@@ -454,7 +454,7 @@ def test_a_very_long_line(tmp_path):
     ("text", "said"),
     [
         ("x,temperature\n1,300\n", "no column 'y'"),
-        ("x,y,heat\n1,2,300\n", "no column has the name of a field, it has heat"),
+        ("x,y,heat\n1,2,300\n", "no column is known as temperature, it has heat"),
         ("x,y,temperature\n1,2,hot\n", "temperature has text in it"),
         ("x,y,temperature\n1,2,300,4,5\n1,2,3,4,5,6\n", "p.csv"),
         ("x,x,temperature\n1,2,300\n", "two columns have one name"),
