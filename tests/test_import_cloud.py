@@ -1,16 +1,17 @@
 """Clouds of points: fields come back exactly, surfaces are where they are, errors are clear."""
 
 import struct
-import tracemalloc
 import zipfile
+from functools import partial
 
 import h5py
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import PNG, refused_on
 
-from chipglow.io.sources import CELSIUS, Placement, SourceError, Unit, Units
+from chipglow.io.sources import CELSIUS, Placement, Unit, Units
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.scene import Raster
 from chipglow.scene.cloud import Cloud, neighbour_distance, sample_cloud
@@ -385,22 +386,7 @@ def test_points_without_a_number_are_left_out(tmp_path):
 # Bad input
 
 
-def refused(source, *texts):
-    tracemalloc.start()
-    with pytest.raises(SourceError) as caught:
-        source.survey()
-        list(source.frames(RASTER))
-    _, most = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert most < 60e6
-    message = str(caught.value)
-    assert "\n" not in message
-    assert len(message) < 700
-    for text in texts:
-        assert text in message
-
-
-PNG = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x10\0\0\0\x10\x08\x02\0\0\0\x90\x91h6" + bytes(200)
+refused = partial(refused_on, RASTER, 60e6)
 
 
 @pytest.mark.parametrize("content", [b"", PNG, b"\0" * 3000, b"x,y,temperature\n", b"1,2,3\n4,5,6"])

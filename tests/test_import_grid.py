@@ -4,6 +4,7 @@ import pickle
 import struct
 import tracemalloc
 import zipfile
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -14,8 +15,9 @@ import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from refusals import PNG, refused_on
 
-from chipglow.io.sources import CELSIUS, Placement, SourceError, Unit, Units
+from chipglow.io.sources import CELSIUS, Placement, Unit, Units
 from chipglow.io.sources.arrays import open_arrays
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.unit_text import parse_unit
@@ -401,23 +403,7 @@ def test_only_a_block_of_frames_is_in_memory(tmp_path):
 # Bad input
 
 
-def refused(source, *texts):
-    """One line that names the file, without much memory."""
-    tracemalloc.start()
-    with pytest.raises(SourceError) as caught:
-        source.survey()
-        list(source.frames(FIT))
-    _, most = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert most < 50e6
-    message = str(caught.value)
-    assert "\n" not in message
-    assert len(message) < 700
-    for text in texts:
-        assert text in message
-
-
-PNG = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x10\0\0\0\x10\x08\x02\0\0\0\x90\x91h6" + bytes(200)
+refused = partial(refused_on, FIT, 50e6)
 
 
 @pytest.mark.parametrize("content", [b"", PNG, b"\x93NUMPY", b"PK\x03\x04" + bytes(50), b"II*\0"])

@@ -7,6 +7,7 @@ from rich.table import Table
 
 from chipglow.cli.progress import progress_bars
 from chipglow.io import import_scene, prospect
+from chipglow.io.atomic import check_folder
 from chipglow.io.importing import Prospect, kept_import
 from chipglow.study import ImportDescription
 
@@ -23,8 +24,8 @@ def import_fields(description: ImportDescription, out: Path | None, resume: bool
     resume : bool
         Whether to go on where an earlier import of the same was ended.
     """
-    if out is not None and not out.parent.is_dir():
-        raise FileNotFoundError(f"{out}: there is no folder {out.parent}")
+    if out is not None:
+        check_folder(out)
     wanted = description.build()
     looked = prospect(wanted)
     _say(looked)

@@ -59,13 +59,19 @@ def conduct(points, count, nodes, increment, conductivity, capacity, heat_mass, 
 
 
 @njit
+def _nodes_around(p, grid):  # type: ignore[no-untyped-def]
+    """First of the nodes around a point, column and row, and their weights along either."""
+    i, ax = spline((p.x - grid.left) / grid.cell)
+    j, ay = spline((p.y - grid.bottom) / grid.cell)
+    return i, j, spline_weights(ax), spline_weights(ay)
+
+
+@njit
 def _gather_heat(points, count, nodes, capacity, heat_mass, grid):  # type: ignore[no-untyped-def]
     nodes[:] = 0.0
     for k in range(count):
         p = points[k]
-        i, ax = spline((p.x - grid.left) / grid.cell)
-        j, ay = spline((p.y - grid.bottom) / grid.cell)
-        wx, wy = spline_weights(ax), spline_weights(ay)
+        i, j, wx, wy = _nodes_around(p, grid)
         heat = heat_mass * property_at(capacity, p.temperature)
         share = p.volume / (grid.cell * grid.cell)
         for a in range(3):
@@ -94,9 +100,7 @@ def even_out(points, count, nodes, deviation, capacity, heat_mass, grid, share):
     deviation[:] = 0.0
     for k in range(count):
         p = points[k]
-        i, ax = spline((p.x - grid.left) / grid.cell)
-        j, ay = spline((p.y - grid.bottom) / grid.cell)
-        wx, wy = spline_weights(ax), spline_weights(ay)
+        i, j, wx, wy = _nodes_around(p, grid)
         heat = heat_mass * property_at(capacity, p.temperature)
         beyond = p.temperature
         for a in range(3):
@@ -111,9 +115,7 @@ def even_out(points, count, nodes, deviation, capacity, heat_mass, grid, share):
                 deviation[i, j] /= nodes[i, j, 0]
     for k in range(count):
         p = points[k]
-        i, ax = spline((p.x - grid.left) / grid.cell)
-        j, ay = spline((p.y - grid.bottom) / grid.cell)
-        wx, wy = spline_weights(ax), spline_weights(ay)
+        i, j, wx, wy = _nodes_around(p, grid)
         noise = p.temperature
         for a in range(3):
             for b in range(3):
@@ -238,9 +240,7 @@ def return_heat(points, count, increment, grid):  # type: ignore[no-untyped-def]
     """Give the rise of temperature on the grid to the points: increments, so nothing diffuses."""
     for k in range(count):
         p = points[k]
-        i, ax = spline((p.x - grid.left) / grid.cell)
-        j, ay = spline((p.y - grid.bottom) / grid.cell)
-        wx, wy = spline_weights(ax), spline_weights(ay)
+        i, j, wx, wy = _nodes_around(p, grid)
         rise = 0.0
         for a in range(3):
             for b in range(3):

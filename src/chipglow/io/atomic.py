@@ -124,9 +124,14 @@ class KeptErrorFile(io.FileIO):
             raise OSError(f"{path}: could not be written: {self._error.strerror}") from self._error
 
 
-def _temporary_beside(path: Path) -> Path:
+def check_folder(path: Path) -> None:
+    """Raise FileNotFoundError unless the folder is there in which a file shall be written."""
     if not path.parent.is_dir():
         raise FileNotFoundError(f"{path}: there is no folder {path.parent}")
+
+
+def _temporary_beside(path: Path) -> Path:
+    check_folder(path)
     return path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
 
 

@@ -176,7 +176,7 @@ def prospect(wanted: Import) -> Prospect:
         *dict.fromkeys(note for name, note in wanted.notes.items() if name in survey.found),
         *wanted.completion.assumptions(survey.found, len(survey.times)),
     ]
-    if any("optical flow" in sentence for sentence in assumed) and find_spec("skimage") is None:
+    if Completion.uses_flow(survey.found, len(survey.times)) and find_spec("skimage") is None:
         raise SourceError(
             "velocity: the source has none and the optical flow needs scikit-image, expected "
             "pip install 'chipglow[flow]'"

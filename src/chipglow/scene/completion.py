@@ -89,6 +89,11 @@ class Completion:
             if missing
         )
 
+    @staticmethod
+    def uses_flow(found: Iterable[str], frames: int) -> bool:
+        """Whether the optical flow may be asked for the velocity."""
+        return frames > 1 and not set(found) & {"velocity_x", "velocity_y"}
+
     def _of_velocity(self, frames: int) -> str:
         if self.cutting_speed is None and frames == 1:
             return "velocity: 0 everywhere, as there is one frame and no cutting speed"

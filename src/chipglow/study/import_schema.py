@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import Strict, ValidationInfo, field_validator, model_validator
+from pydantic import Strict, model_validator
 
 from chipglow.io.importing import Import, View
 from chipglow.io.sources import Placement, Source, Unit, Units, mesh_meshio, mesh_tecplot, mesh_vtk
@@ -19,7 +19,7 @@ from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap,
 from chipglow.io.sources.unit_text import parse_unit
 from chipglow.scene.completion import Completion
 from chipglow.study.schema import ToolSection
-from chipglow.study.section import OR_NONE, Part, Section, beside_the_study, described
+from chipglow.study.section import OR_NONE, FileBeside, Part, Section, described
 from chipglow.study.units import Length, Position, Speed, Temperature, Time
 
 KINDS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -152,7 +152,7 @@ class SourceSection(Section):
 class FieldMovieSection(Section):
     """A movie of one field."""
 
-    file: Annotated[str | None, *OR_NONE] = described("none", "The movie.")
+    file: Annotated[FileBeside | None, *OR_NONE] = described("none", "The movie.")
     first: str | int | float = described(
         "", "Value of the first colour, or at the bottom or left of the legend."
     )
@@ -170,11 +170,6 @@ class FieldMovieSection(Section):
         "Left, top, right and bottom pixel of the legend's colours; none: it is looked for.",
         "none, or [600, 40, 620, 400]",
     )
-
-    @field_validator("file")
-    @classmethod
-    def _beside(cls, file: str | None, info: ValidationInfo) -> str | None:
-        return None if file is None else beside_the_study(file, info)
 
 
 class MovieSection(SourceSection):
@@ -362,7 +357,7 @@ class PointsSection(SourceSection):
 class GridSection(SourceSection):
     """Arrays on a regular grid."""
 
-    files: Annotated[dict[str, str] | None, *OR_NONE] = described(
+    files: Annotated[dict[str, FileBeside] | None, *OR_NONE] = described(
         "none",
         "Files by the names of fields, in the place of source.",
         "none, or {temperature: T.npy, plastic_strain: strain.npy}",
@@ -382,13 +377,6 @@ class GridSection(SourceSection):
     void_value: Annotated[float | None, *OR_NONE] = described(
         "none", "Number that stands for no material; NaN always does."
     )
-
-    @field_validator("files")
-    @classmethod
-    def _beside(cls, files: dict[str, str] | None, info: ValidationInfo) -> dict[str, str] | None:
-        if files is None:
-            return None
-        return {name: beside_the_study(file, info) for name, file in files.items()}
 
     def source(self, whole: "ImportDescription") -> GridSource:
         """The source that this section describes."""
@@ -411,7 +399,7 @@ class GridSection(SourceSection):
 class ImportDescription(Section):
     """An import: which source, what its fields mean, where they are sampled."""
 
-    source: Annotated[str | None, *OR_NONE] = described(
+    source: Annotated[FileBeside | None, *OR_NONE] = described(
         "none", "The file, or a pattern for several: chip_*.vtu."
     )
     kind: Annotated[Literal["movie", "mesh", "points", "grid"] | None, *OR_NONE] = described(
@@ -436,11 +424,6 @@ class ImportDescription(Section):
     movie: MovieSection = described({}, "More of a movie.")
     points: PointsSection = described({}, "More of points.")
     grid: GridSection = described({}, "More of a grid.")
-
-    @field_validator("source")
-    @classmethod
-    def _beside(cls, source: str | None, info: ValidationInfo) -> str | None:
-        return None if source is None else beside_the_study(source, info)
 
     @model_validator(mode="after")
     def _possible(self) -> Self:

@@ -35,7 +35,7 @@ from chipglow.cutting import (
 from chipglow.io import read_tool_outline
 from chipglow.radiometry import Band
 from chipglow.scene import Chamfer, Hone, Raster, Tool, ToolGeometry
-from chipglow.study.section import OR_NONE, Part, Section, beside_the_study, described
+from chipglow.study.section import OR_NONE, FileBeside, Part, Section, described
 from chipglow.study.units import (
     Angle,
     CutLength,
@@ -104,7 +104,7 @@ class ToolSection(Part):
         "either face.",
         "none, or {rake: 40 um, clearance: 20 um}",
     )
-    outline: Annotated[str | None, *OR_NONE] = described(
+    outline: Annotated[FileBeside | None, *OR_NONE] = described(
         "none",
         "File of an outline in the place of all these: its first line x_um,y_um, then a point a\n"
         "line, from the rake face round the edge to the clearance face.",
@@ -117,11 +117,6 @@ class ToolSection(Part):
     def _known(cls, name: str) -> str:
         tool_material(name)
         return name
-
-    @field_validator("outline")
-    @classmethod
-    def _beside_the_study(cls, outline: str | None, info: ValidationInfo) -> str | None:
-        return None if outline is None else beside_the_study(outline, info)
 
     @model_validator(mode="after")
     def _nothing_unused(self) -> Self:
@@ -459,13 +454,8 @@ class MeasuredSection(Part):
     """A kernel from a file."""
 
     kind: Literal["measured"] = described("measured", "A kernel from a file.")
-    file: str = Field(description="File of the kernel, .npy or .csv.")
+    file: FileBeside = Field(description="File of the kernel, .npy or .csv.")
     spacing: Length = Field(description="Side of the kernel's samples.")
-
-    @field_validator("file")
-    @classmethod
-    def _beside_the_study(cls, file: str, info: ValidationInfo) -> str:
-        return beside_the_study(file, info)
 
     def build(self) -> PointSpreadFunction:
         """The point spread function."""

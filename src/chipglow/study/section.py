@@ -4,9 +4,10 @@ from abc import abstractmethod
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Annotated, Any, Final, Self
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -34,6 +35,10 @@ OR_NONE: Final = (BeforeValidator(_none_of_text), WrapSerializer(_text_of_none, 
 def beside_the_study(file: str, info: ValidationInfo) -> str:
     """Path of a file that a study names: relative to the study's folder."""
     return str(Path((info.context or {}).get("folder") or ".", file).resolve())
+
+
+FileBeside = Annotated[str, AfterValidator(beside_the_study)]
+"""A file that a study names."""
 
 
 def described(default: object, description: str, allowed: str = "") -> Any:

@@ -16,6 +16,7 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.io.sources.file_order import natural
 from chipglow.io.sources.source import SourceError
 from chipglow.io.sources.text_table import TextTable
 
@@ -108,7 +109,7 @@ def matching_files(pattern: str) -> list[Path]:
     """
     if Path(pattern).exists() or not has_magic(pattern):
         return [Path(pattern)]
-    paths = sorted(glob(pattern), key=_natural)  # noqa: PTH207  also absolute
+    paths = sorted(glob(pattern), key=natural)  # noqa: PTH207  also absolute
     if not paths:
         raise SourceError(f"{pattern}: no file has such a name")
     return [Path(path) for path in paths]
@@ -147,11 +148,6 @@ def open_arrays(pattern: str, stack: ExitStack) -> dict[str, StoredArray]:
 def _stem(pattern: str) -> str:
     """What a file is called without number: the name of its only array."""
     return re.sub(r"[\W\d_]+$", "", Path(pattern).stem) or "values"
-
-
-def _natural(path: str) -> list[tuple[int, int, str]]:
-    parts = re.split(r"(\d+)", path)
-    return [(1, int(p), "") if p.isdecimal() and len(p) < 20 else (0, 0, p) for p in parts]
 
 
 def _open_file(path: Path, stack: ExitStack) -> dict[str, StoredArray]:

@@ -10,8 +10,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.io.sources.file_order import natural
 from chipglow.io.sources.mesh_block import Block
-from chipglow.io.sources.mesh_reader import MeshReader, natural
+from chipglow.io.sources.mesh_reader import MeshReader
 from chipglow.io.sources.source import SourceError
 
 _FLAT: Final = ("CPE", "CPS", "CAX", "CGAX", "DC2D", "DCAX", "SAX", "S", "STRI", "R2D", "M3D")
@@ -81,7 +82,7 @@ def _tables(file: Path) -> list[tuple[Path, ...]]:
     """Tables beside an input file, those of a frame together."""
     frames: defaultdict[str, list[Path]] = defaultdict(list)
     beside = [path for path in file.parent.iterdir() if path.suffix.lower() == ".csv"]
-    for path in sorted(beside, key=natural):
+    for path in sorted(beside, key=lambda path: natural(str(path))):
         name = path.stem.removesuffix("_nodes").removesuffix("_elements")
         rest = name.removeprefix(file.stem)
         if name.startswith(file.stem) and rest.strip("_-.").isdigit() | (rest == ""):

@@ -7,6 +7,7 @@ from glob import glob, has_magic
 from itertools import pairwise
 from pathlib import Path
 
+from chipglow.io.sources.file_order import natural
 from chipglow.io.sources.mesh_block import Block
 from chipglow.io.sources.source import SourceError
 
@@ -61,18 +62,12 @@ def files_of(path: Path, *, gaps_allowed: bool) -> tuple[Path, ...]:
     if not has_magic(str(path)):
         raise FileNotFoundError(f"{path}: no such file")
     names = glob(str(path))  # noqa: PTH207  the folder may be part of the pattern
-    files = sorted((Path(name) for name in names), key=natural)
+    files = [Path(name) for name in sorted(names, key=natural)]
     if not files:
         raise FileNotFoundError(f"{path}: no file matches this pattern")
     if not gaps_allowed:
         _check_gaps(path, files)
     return tuple(files)
-
-
-def natural(path: Path) -> tuple[tuple[int, str], ...]:
-    """Sorts 9 before 10."""
-    words = re.split(r"(\d+)", str(path))
-    return tuple((int(word), "") if word.isdecimal() else (-1, word) for word in words)
 
 
 def _check_gaps(path: Path, files: Sequence[Path]) -> None:
