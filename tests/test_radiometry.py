@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chipglow import Band
+from chipglow.radiometry import ObjectParameters
 from chipglow.radiometry.planck import FIRST_RADIATION_CONSTANT, SECOND_RADIATION_CONSTANT
 
 REFERENCE = Path(__file__).parent / "reference" / "inband_radiance.csv"
@@ -87,3 +88,31 @@ def test_wide_band_obeys_stefan_boltzmann():
 def test_impossible_bands_are_refused(lower, upper):
     with pytest.raises(ValueError, match="band"):
         Band(lower, upper)
+
+
+@given(
+    st.floats(400.0, 2000.0),
+    st.floats(0.05, 1.0),
+    st.floats(200.0, 400.0),
+    st.floats(0.3, 1.0),
+    st.floats(250.0, 330.0),
+)
+def test_object_parameters_are_taken_back(temperature, emissivity, reflected, transmission, air):
+    told = ObjectParameters(emissivity, reflected, transmission, air)
+    received = told.apparent_radiance(temperature, MID_WAVE)
+    # The band's table and its inverse are each within 1e-6 of the integral.
+    assert told.temperature(received, MID_WAVE) == pytest.approx(temperature, rel=1e-5)
+
+
+def test_a_gray_object_without_surroundings_sends_its_share_of_a_black_body():
+    told = ObjectParameters(emissivity=0.4, reflected=1.0, transmission=0.5, atmosphere=1.0)
+    assert told.apparent_radiance(800.0, MID_WAVE) == pytest.approx(0.2 * MID_WAVE.radiance(800.0))
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("emissivity", 0.0), ("emissivity", 1.1), ("transmission", -0.1), ("reflected", 0.0)],
+)
+def test_impossible_object_parameters_are_refused(field, value):
+    with pytest.raises(ValueError, match=f"object parameters: {field} is {value}"):
+        ObjectParameters(**{field: value})

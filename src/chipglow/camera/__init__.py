@@ -2,10 +2,12 @@
 
 from chipglow.camera.camera import Camera
 from chipglow.camera.exposure import Exposure
-from chipglow.camera.measurement import Flag, Measurement
+from chipglow.camera.measurement import UNUSABLE, Flag, Measurement
 from chipglow.camera.psf import AnnularAperturePSF, GaussianPSF, MeasuredPSF, PointSpreadFunction
+from chipglow.camera.recording import PlanckConversion, Recording
 
 __all__ = [
+    "UNUSABLE",
     "AnnularAperturePSF",
     "Camera",
     "Exposure",
@@ -13,5 +15,7 @@ __all__ = [
     "GaussianPSF",
     "MeasuredPSF",
     "Measurement",
+    "PlanckConversion",
     "PointSpreadFunction",
+    "Recording",
 ]

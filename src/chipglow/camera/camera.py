@@ -6,18 +6,16 @@ from math import isfinite
 from typing import Final, Literal
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.camera.convolution import blur
 from chipglow.camera.exposure import Exposure, expose
-from chipglow.camera.measurement import MEASUREMENT_UNITS, Flag, Measurement
+from chipglow.camera.measurement import Measurement
 from chipglow.camera.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.sampling import integrate, sensor_raster
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Raster, Scene
-from chipglow.scene.scene import raster_coordinates
 from chipglow.surface import Surface
 
 PSF_ORDERS: Final = ("optics", "sensor")
@@ -252,28 +250,13 @@ class Camera:
     def _measurement(
         self, starts: NDArray[np.float64], radiance: NDArray[np.float64], sensors: Raster
     ) -> Measurement:
-        temperature = self.band.temperature(radiance)
-        below = ~(temperature >= (self.floor or 0.0))
-        values = {
-            "radiance_temperature": np.where(below, np.nan, temperature),
-            "radiance": radiance,
-            "flags": np.where(below, Flag.BELOW_FLOOR, 0).astype(np.uint8),
-        }
-        return Measurement(
-            xr.Dataset(
-                {
-                    name: (("time", "y", "x"), values[name], {"units": unit})
-                    for name, unit in MEASUREMENT_UNITS.items()
-                },
-                coords=raster_coordinates(sensors, starts),
-                attrs=self._attributes(),
-            )
+        return Measurement.from_radiance(
+            radiance, self.band, starts, sensors, self.floor, attributes=self._attributes()
         )
 
     def _attributes(self) -> dict[str, float | str]:
-        """The camera, as attributes of a dataset: SI units; what is None is left out."""
+        """What a measurement does not tell of the camera by itself; SI, without what is None."""
         attributes: dict[str, float | str | None] = {
-            "pitch": self.pitch,
             "offset_right": self.offset[0],
             "offset_down": self.offset[1],
             "fill_factor": self.fill_factor,
@@ -281,11 +264,8 @@ class Camera:
             "psf_order": self.psf_order,
             "integration_time": self.integration_time,
             "frame_rate": self.frame_rate,
-            "floor": self.floor,
             "reflected": self.reflected,
         }
-        if self.band.response is None:
-            attributes |= {"band_lower": self.band.lower, "band_upper": self.band.upper}
         return {name: value for name, value in attributes.items() if value is not None}
 
 

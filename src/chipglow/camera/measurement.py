@@ -1,5 +1,6 @@
 """What a camera saw: frames of radiance temperature, simulated or real."""
 
+from collections.abc import Mapping
 from enum import IntFlag
 from functools import cached_property
 from typing import Final
@@ -10,16 +11,27 @@ from numpy.typing import NDArray
 
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
+from chipglow.scene.scene import raster_coordinates
 
 MEASUREMENT_UNITS: Final = {"radiance_temperature": "K", "radiance": "W m-2 sr-1", "flags": "1"}
 """The variables that every measurement has, and their units."""
 
 
 class Flag(IntFlag):
-    """Why a pixel has no radiance temperature."""
+    """What is wrong with a pixel; it has a radiance temperature only if it was `REPLACED`."""
 
     BELOW_FLOOR = 1
     """Colder than the camera measures at its integration time, or without any radiance."""
+    SATURATED = 2
+    """At the upper end of the camera's counts, or hotter than its calibration reaches."""
+    DEAD = 4
+    """The sensor does not answer to light."""
+    REPLACED = 8
+    """The sensor does not answer to light; the value is that of its neighbours."""
+
+
+UNUSABLE: Final = Flag.BELOW_FLOOR | Flag.SATURATED | Flag.DEAD
+"""The flags of pixels without a radiance temperature."""
 
 
 class Measurement:
@@ -32,7 +44,10 @@ class Measurement:
         each: ``radiance_temperature``, NaN where flagged; ``radiance``; ``flags``, a sum of
         `Flag`, uint8. Coordinates as a scene's: ``time`` in s, when each integration began;
         ``x`` ascending and ``y`` descending in m, the middles of the sensors. Attributes tell the
-        camera; ``pitch`` is the distance between sensors in m.
+        camera; ``pitch`` is the distance between sensors in m, ``band_lower`` and ``band_upper``
+        in m limit a band that is shaped like a box. ``calibration_uncertainty``, of the shape and
+        unit of ``radiance``, may be there: its standard uncertainty from the calibration, which
+        is common to all pixels and frames.
 
     Raises
     ------
@@ -50,6 +65,88 @@ class Measurement:
         if "pitch" not in data.attrs:
             raise ValueError("measurement: attribute 'pitch' is missing")
         self.data = data
+
+    @classmethod
+    def from_radiance(
+        cls,
+        radiance: NDArray[np.floating],
+        band: Band,
+        times: NDArray[np.float64],
+        raster: Raster,
+        floor: float | None = None,
+        flags: NDArray[np.uint8] | None = None,
+        calibration_uncertainty: NDArray[np.floating] | None = None,
+        attributes: Mapping[str, float | str] | None = None,
+    ) -> "Measurement":
+        """Frames from their radiance.
+
+        Parameters
+        ----------
+        radiance : ndarray
+            In-band radiance in W/(m² sr), shape (time, y, x).
+        band : Band
+            The camera's band.
+        times : ndarray
+            When each integration began in s, shape (time,).
+        raster : Raster
+            The grid of the sensors.
+        floor : float, optional
+            Lowest radiance temperature in K that the camera measures; what is under it, or has no
+            radiance, is flagged.
+        flags : ndarray, optional
+            Sums of `Flag` that are known already, uint8, shape (time, y, x).
+        calibration_uncertainty : ndarray, optional
+            Standard uncertainty of the radiance from the calibration in W/(m² sr), shape
+            (time, y, x).
+        attributes : mapping, optional
+            What else is known of the camera.
+        """
+        temperature = band.temperature(radiance)
+        below = ~(temperature >= (floor or 0.0))
+        flags = np.zeros(radiance.shape, np.uint8) if flags is None else flags
+        flags = flags | np.where(below & (flags & UNUSABLE == 0), Flag.BELOW_FLOOR, 0).astype(
+            np.uint8
+        )
+        values = {
+            "radiance_temperature": np.where(flags & UNUSABLE, np.nan, temperature),
+            "radiance": radiance,
+            "flags": flags,
+        }
+        units = dict(MEASUREMENT_UNITS)
+        if calibration_uncertainty is not None:
+            values["calibration_uncertainty"] = calibration_uncertainty
+            units["calibration_uncertainty"] = units["radiance"]
+        known: dict[str, float | str] = {**(attributes or {}), "pitch": raster.spacing}
+        if floor is not None:
+            known["floor"] = floor
+        if band.response is None:
+            known |= {"band_lower": band.lower, "band_upper": band.upper}
+        return cls(
+            xr.Dataset(
+                {
+                    name: (("time", "y", "x"), values[name], {"units": unit})
+                    for name, unit in units.items()
+                },
+                coords=raster_coordinates(raster, times),
+                attrs=known,
+            )
+        )
+
+    @cached_property
+    def band(self) -> Band:
+        """The camera's band.
+
+        Raises
+        ------
+        ValueError
+            If the attributes do not tell it: its response is not a box.
+        """
+        if "band_lower" not in self.data.attrs:
+            raise ValueError(
+                "measurement: the limits of a box-shaped band are needed, and the attribute "
+                "'band_lower' is missing"
+            )
+        return Band(float(self.data.attrs["band_lower"]), float(self.data.attrs["band_upper"]))
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -93,10 +190,15 @@ class Measurement:
         stored = np.asarray(self.data["radiance_temperature"].values, dtype=np.float64)
         if not flagged:
             return stored
-        if "band_lower" not in self.data.attrs:
-            raise ValueError(
-                "measurement: flagged pixels need the limits of a box-shaped band, and the "
-                "attribute 'band_lower' is missing"
-            )
-        band = Band(float(self.data.attrs["band_lower"]), float(self.data.attrs["band_upper"]))
-        return np.where(self.flags == 0, stored, band.temperature(self.radiance))
+        usable = self.flags & UNUSABLE == 0
+        return np.where(usable, stored, self.band.temperature(self.radiance))
+
+    @property
+    def calibration_uncertainty(self) -> NDArray[np.float64] | None:
+        """Standard uncertainty of the radiance from the calibration in W/(m² sr), if known.
+
+        Of shape (time, y, x), and common to all pixels and frames: it does not fall in a mean.
+        """
+        if "calibration_uncertainty" not in self.data:
+            return None
+        return np.asarray(self.data["calibration_uncertainty"].values, dtype=np.float64)

@@ -1,6 +1,7 @@
 """Radiometry: Planck's law, spectral bands, in-band radiance and radiance temperature."""
 
 from chipglow.radiometry.band import Band
+from chipglow.radiometry.object_parameters import ObjectParameters
 from chipglow.radiometry.planck import spectral_radiance
 
-__all__ = ["Band", "spectral_radiance"]
+__all__ = ["Band", "ObjectParameters", "spectral_radiance"]
