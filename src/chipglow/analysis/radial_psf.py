@@ -1,0 +1,206 @@
+"""A round point spread function without a model, from the edge-spread functions of any edges.
+
+The light is shared among rings about the point. Each ring has a known edge-spread function, so
+that the shares follow from the measured one by least squares: the inversion of Abel's integral.
+Alone that would blow up the noise. No share is negative, and the shares change as smoothly from
+ring to ring as the data let them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+from scipy.special import j1
+
+from chipglow.analysis.edge_spread import EdgeSpread
+from chipglow.analysis.psf_fit import ApertureSignals, EdgePixels, ModelFit
+from chipglow.analysis.psf_models import edge_response, sampled_psf
+from chipglow.camera import MeasuredPSF
+
+_RINGS: Final = 32
+_FIRST_RING: Final = 0.12
+_SMOOTHNESS: Final = np.geomspace(1e4, 1e-4, 17)
+_REPEATS: Final = 24
+
+
+@dataclass(frozen=True, eq=False)
+class RadialPSF:
+    """A round point spread function of the optics, ring by ring.
+
+    Parameters
+    ----------
+    edges : ndarray
+        Radii in m that limit the rings, from 0, shape (n + 1,).
+    shares : ndarray
+        Share of the light in each ring, of sum 1, shape (n,).
+    uncertainty : ndarray
+        Standard uncertainty of the shares by the noise; what smoothness hides is not in it.
+    smoothness : float
+        Weight of the smoothness.
+    """
+
+    edges: NDArray[np.float64]
+    shares: NDArray[np.float64]
+    uncertainty: NDArray[np.float64]
+    smoothness: float
+
+    @property
+    def radius(self) -> NDArray[np.float64]:
+        """Middles of the rings in m."""
+        return np.asarray((self.edges[1:] + self.edges[:-1]) / 2)
+
+    @property
+    def density(self) -> NDArray[np.float64]:
+        """Light per area in 1/m²."""
+        return np.asarray(self.shares / (np.pi * np.diff(self.edges**2)))
+
+    @property
+    def encircled(self) -> NDArray[np.float64]:
+        """Share of the light within each of the radii `edges`."""
+        return np.concatenate([[0.0], np.cumsum(self.shares)])
+
+    def psf(self) -> MeasuredPSF:
+        """The kernel, straight lines between the rings' middles."""
+        radius, density = self.radius, self.density
+
+        def at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.interp(np.hypot(x, y), radius, density, right=0.0)
+
+        return sampled_psf(at, float(self.edges[-1]), float(self.edges[3]) / 2)
+
+
+def radial_psf(
+    fit: ModelFit,
+    edges: Sequence[EdgePixels],
+    spreads: Sequence[EdgeSpread],
+    apertures: ApertureSignals | None,
+    generator: np.random.Generator,
+) -> RadialPSF:
+    """Invert edge-spread functions and signals of apertures.
+
+    Parameters
+    ----------
+    fit : ModelFit
+        Where the edges are; of it come the edges' and the apertures' backgrounds and steps.
+    edges : sequence of EdgePixels
+        The edges' pixels.
+    spreads : sequence of EdgeSpread
+        Their edge-spread functions.
+    apertures : ApertureSignals, optional
+        Signals of apertures.
+    generator : numpy.random.Generator
+        For the repeats with other noise that give the uncertainty.
+
+    Notes
+    -----
+    The weight of the smoothness is the greatest with which the sum of squared residuals stays
+    within one standard deviation (√2n) of its least.
+    """
+    radii = _radii(fit, edges)
+    design, data = _rows(fit, edges, spreads, apertures, radii)
+    penalty = _penalty(radii, fit.fwhm)
+    least = _misfit(design, data, _solved(design, data, penalty, float(_SMOOTHNESS[-1])))
+    allowed = max(least, float(data.size)) + (2.0 * data.size) ** 0.5
+    smoothness = float(_SMOOTHNESS[-1])
+    for weight in _SMOOTHNESS:
+        if _misfit(design, data, _solved(design, data, penalty, float(weight))) <= allowed:
+            smoothness = float(weight)
+            break
+    shares = _solved(design, data, penalty, smoothness)
+    repeats = np.array(
+        [
+            _solved(design, data + generator.standard_normal(data.size), penalty, smoothness)
+            for _ in range(_REPEATS)
+        ]
+    )
+    total = shares.sum()
+    return RadialPSF(radii, shares / total, repeats.std(axis=0, ddof=1) / total, smoothness)
+
+
+def _radii(fit: ModelFit, edges: Sequence[EdgePixels]) -> NDArray[np.float64]:
+    first = _FIRST_RING * max(fit.fwhm, 0.5 * min(edge.pitch for edge in edges))
+    last = max(0.8 * min(edge.reach for edge in edges), 8 * first)
+    return np.concatenate([[0.0], np.geomspace(first, last, _RINGS)])
+
+
+def _rows(
+    fit: ModelFit,
+    edges: Sequence[EdgePixels],
+    spreads: Sequence[EdgeSpread],
+    apertures: ApertureSignals | None,
+    radii: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Design and data over their noise, of all bins and apertures."""
+    rows, data = [], []
+    for found, pixels, spread in zip(fit.edges, edges, spreads, strict=True):
+        columns = [
+            edge_response(
+                partial(_ring_transfer, radii, k),
+                found.line.normal,
+                pixels.footprint,
+                pixels.reach,
+            )(spread.distance)
+            for k in range(radii.size - 1)
+        ]
+        rows.append(np.array(columns).T / spread.uncertainty[:, None])
+        data.append(spread.value / spread.uncertainty)
+    if apertures is not None:
+        transfers = [_ring_transfer(radii, k, apertures.frequency) for k in range(radii.size - 1)]
+        sigma = apertures.sigma / fit.source
+        rows.append((apertures.weights @ np.array(transfers).T) / sigma[:, None])
+        data.append((apertures.radiance - fit.aperture_background) / fit.source / sigma)
+    return np.concatenate(rows), np.concatenate(data)
+
+
+def _ring_transfer(
+    radii: NDArray[np.float64], k: int, frequency: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Transfer function of an even ring."""
+    inner, outer = radii[k], radii[k + 1]
+    whole = outer**2 * _jinc(frequency * outer) - inner**2 * _jinc(frequency * inner)
+    return np.asarray(whole / (outer**2 - inner**2))
+
+
+def _jinc(cycles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Transfer function of an even disc over frequency times radius."""
+    argument = 2 * np.pi * cycles
+    safe = np.where(argument == 0.0, 1.0, argument)
+    return np.asarray(np.where(argument == 0.0, 1.0, 2 * j1(safe) / safe))
+
+
+def _penalty(radii: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+    """Second differences from ring to ring; beyond the last one there is nothing.
+
+    They are those of the density in the core, which is flat there, and of the density times the
+    square of the radius in the tails, in which the density alone would be too small to be smoothed.
+    """
+    middles = (radii[1:] + radii[:-1]) / 2
+    weighted = np.diag((middles**2 + width**2) / np.diff(radii**2))
+    padded = np.concatenate([weighted[:1], weighted, np.zeros((1, middles.size))])
+    return np.asarray(np.diff(padded, n=2, axis=0) * 1e3)
+
+
+def _solved(
+    design: NDArray[np.float64],
+    data: NDArray[np.float64],
+    penalty: NDArray[np.float64],
+    weight: float,
+) -> NDArray[np.float64]:
+    matrix = np.concatenate([design, weight * penalty])
+    wanted = np.concatenate([data, np.zeros(len(penalty))])
+    # The normal equations are small, whatever the number of bins.
+    normal = matrix.T @ matrix
+    factor = np.linalg.cholesky(normal + 1e-12 * np.trace(normal) * np.eye(len(normal)))
+    solution, _ = nnls(factor.T, np.linalg.solve(factor, matrix.T @ wanted))
+    return np.asarray(solution)
+
+
+def _misfit(
+    design: NDArray[np.float64], data: NDArray[np.float64], shares: NDArray[np.float64]
+) -> float:
+    left = data - design @ shares
+    return float(left @ left)
