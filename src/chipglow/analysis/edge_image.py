@@ -134,13 +134,14 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
         # Where an edge is can be seen on clipped pixels too.
         line, straightness = find_edge(np.where(image.dead, np.nan, image.radiance), x, y)
         pixels = _pixels_of(image, x, y, line)
-        quick = _quick_fit(pixels)
+        hidden = image.saturated.any() or image.below.any()
+        quick = _quick_fit(pixels, 0.0 if hidden else 1.0)
         doubts = _bent(straightness, image)
         limits, clipped = _limits(image, x, y, quick.edges[0].line)
         doubts += clipped
         if clipped:
             pixels = _within_limits(pixels, quick.edges[0].line, limits)
-            quick = _quick_fit(pixels)
+            quick = _quick_fit(pixels, 0.0)
         pixels, outliers = _without_outliers(pixels, quick)
         doubts += outliers
         _check_single(pixels, quick)
@@ -164,8 +165,8 @@ def _pixels_of(
     )
 
 
-def _quick_fit(pixels: EdgePixels) -> ModelFit:
-    """A Gaussian fitted to the pixels, if it shows an edge."""
+def _quick_fit(pixels: EdgePixels, least: float) -> ModelFit:
+    """A Gaussian fitted to the pixels, if it shows `least` times its width of both sides."""
     fit = fit_model(GaussianModel(), [pixels])
     edge = fit.edges[0]
     distance = edge.line.distance(pixels.x, pixels.y)
@@ -175,7 +176,7 @@ def _quick_fit(pixels: EdgePixels) -> ModelFit:
             f"the step is {edge.step:.3g} W/m^2/sr with a standard uncertainty of "
             f"{edge.step_uncertainty:.2g}, expected {_LEAST_STEP:g} times as much or more"
         )
-    if min(dark, bright) < fit.fwhm or min(dark, bright) < 2 * pixels.pitch:
+    if min(dark, bright) <= least * max(fit.fwhm, 2 * pixels.pitch):
         raise NoEdgeError(
             f"the image reaches {dark * 1e6:.3g} um to the dark and {bright * 1e6:.3g} um to the "
             f"bright side of the edge, which is {fit.fwhm * 1e6:.3g} um wide, expected more of both"

@@ -311,7 +311,7 @@ def edge_response(
     """
     step = footprint / _SAMPLES_PER_FOOTPRINT
     count = fft.next_fast_len(ceil(_PERIODS * reach / step), real=True)
-    frequency = np.fft.rfftfreq(count, step)
+    frequency = np.arange(count // 2 + 1, dtype=np.float64) / (count * step)
     response = transfer(frequency) * footprint_transfer(frequency, angle, footprint)
     line = fft.irfft(response, count) / step
     integral = np.zeros(frequency.size, dtype=np.complex128)
@@ -359,7 +359,9 @@ def disc_response(
     """
     radius = diameter / 2
     angles = ((np.arange(12) + 0.5) * pi / 24).tolist()
-    square = np.mean([footprint_transfer(frequency, angle, footprint) for angle in angles], axis=0)
+    square = np.zeros_like(frequency)
+    for angle in angles:
+        square += footprint_transfer(frequency, angle, footprint) / len(angles)
     middle = np.mean([j0(2 * pi * frequency * rho) for rho in radii.tolist()], axis=0)
     weight = 2 * pi * radius * j1(2 * pi * frequency * radius) * middle * square
     return np.asarray(weight * frequency[1])
@@ -384,7 +386,7 @@ def sampled_psf(
     spacing = max(spacing, 2 * reach / (_MOST_SIDE - 1))
     half = ceil(reach / spacing)
     node, weight = np.polynomial.legendre.leggauss(_KERNEL_NODES)
-    line = spacing * (np.arange(-half, half + 1)[:, None] + node / 2)
+    line = spacing * (np.arange(-half, half + 1, dtype=np.float64)[:, None] + node / 2)
     kernel = np.zeros((2 * half + 1, 2 * half + 1))
     for i in range(_KERNEL_NODES):
         for j in range(_KERNEL_NODES):

@@ -23,7 +23,8 @@ from chipglow.camera import MeasuredPSF
 
 _RINGS: Final = 32
 _FIRST_RING: Final = 0.12
-_SMOOTHNESS: Final = np.geomspace(1e4, 1e-4, 17)
+_SMOOTHNESS: Final[list[float]] = np.geomspace(1e2, 1e-4, 13).tolist()
+_MORE_MISFIT: Final = 4.0
 _REPEATS: Final = 24
 
 
@@ -38,7 +39,10 @@ class RadialPSF:
     shares : ndarray
         Share of the light in each ring, of sum 1, shape (n,).
     uncertainty : ndarray
-        Standard uncertainty of the shares by the noise; what smoothness hides is not in it.
+        Standard uncertainty of the shares: by the noise, and by how much they change when they are
+        let be rougher.
+    encircled_uncertainty : ndarray
+        The same of `encircled`, shape (n + 1,).
     smoothness : float
         Weight of the smoothness.
     """
@@ -46,6 +50,7 @@ class RadialPSF:
     edges: NDArray[np.float64]
     shares: NDArray[np.float64]
     uncertainty: NDArray[np.float64]
+    encircled_uncertainty: NDArray[np.float64]
     smoothness: float
 
     @property
@@ -98,27 +103,35 @@ def radial_psf(
     Notes
     -----
     The weight of the smoothness is the greatest with which the sum of squared residuals stays
-    within one standard deviation (√2n) of its least.
+    within 4 of its least: a solution that is two standard uncertainties away from the data's own.
+    What it hides is estimated by the change with a tenth of that weight.
     """
     radii = _radii(fit, edges)
     design, data = _rows(fit, edges, spreads, apertures, radii)
     penalty = _penalty(radii, fit.fwhm)
-    least = _misfit(design, data, _solved(design, data, penalty, float(_SMOOTHNESS[-1])))
-    allowed = max(least, float(data.size)) + (2.0 * data.size) ** 0.5
-    smoothness = float(_SMOOTHNESS[-1])
-    for weight in _SMOOTHNESS:
-        if _misfit(design, data, _solved(design, data, penalty, float(weight))) <= allowed:
-            smoothness = float(weight)
-            break
-    shares = _solved(design, data, penalty, smoothness)
-    repeats = np.array(
-        [
-            _solved(design, data + generator.standard_normal(data.size), penalty, smoothness)
-            for _ in range(_REPEATS)
-        ]
+    solutions = [_solved(design, data, penalty, weight) for weight in _SMOOTHNESS]
+    allowed = _misfit(design, data, solutions[-1]) + _MORE_MISFIT
+    chosen = next(k for k, s in enumerate(solutions) if _misfit(design, data, s) <= allowed)
+    weight = _SMOOTHNESS[chosen]
+    repeats = [
+        _solved(design, data + generator.standard_normal(data.size), penalty, weight)
+        for _ in range(_REPEATS)
+    ]
+    rougher = solutions[min(chosen + 2, len(solutions) - 1)]
+    all_shares = np.array([solutions[chosen], rougher, *repeats])
+    all_shares /= all_shares.sum(axis=1, keepdims=True)
+    return RadialPSF(
+        radii,
+        all_shares[0],
+        _spread(all_shares),
+        np.concatenate([[0.0], _spread(np.cumsum(all_shares, axis=1))]),
+        weight,
     )
-    total = shares.sum()
-    return RadialPSF(radii, shares / total, repeats.std(axis=0, ddof=1) / total, smoothness)
+
+
+def _spread(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard uncertainty by the repeats (from row 2 on) and the rougher solution (row 1)."""
+    return np.hypot(np.std(values[2:], axis=0, ddof=1), values[0] - values[1])
 
 
 def _radii(fit: ModelFit, edges: Sequence[EdgePixels]) -> NDArray[np.float64]:
