@@ -134,14 +134,15 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
         # Where an edge is can be seen on clipped pixels too.
         line, straightness = find_edge(np.where(image.dead, np.nan, image.radiance), x, y)
         pixels = _pixels_of(image, x, y, line)
-        hidden = image.saturated.any() or image.below.any()
-        quick = _quick_fit(pixels, 0.0 if hidden else 1.0)
+        quick = _quick_fit(pixels)
         doubts = _bent(straightness, image)
         limits, clipped = _limits(image, x, y, quick.edges[0].line)
         doubts += clipped
         if clipped:
             pixels = _within_limits(pixels, quick.edges[0].line, limits)
-            quick = _quick_fit(pixels, 0.0)
+            quick = _quick_fit(pixels)
+        else:
+            _check_edge(pixels, quick)
         pixels, outliers = _without_outliers(pixels, quick)
         doubts += outliers
         _check_single(pixels, quick)
@@ -165,10 +166,14 @@ def _pixels_of(
     )
 
 
-def _quick_fit(pixels: EdgePixels, least: float) -> ModelFit:
-    """A Gaussian fitted to the pixels, if it shows `least` times its width of both sides."""
-    fit = fit_model(GaussianModel(), [pixels])
-    edge = fit.edges[0]
+def _quick_fit(pixels: EdgePixels) -> ModelFit:
+    """A Gaussian fitted to the pixels."""
+    return fit_model(GaussianModel(), [pixels])
+
+
+def _check_edge(pixels: EdgePixels, quick: ModelFit) -> None:
+    """Raise unless the step is significant and enough of both sides is seen."""
+    edge = quick.edges[0]
     distance = edge.line.distance(pixels.x, pixels.y)
     dark, bright = -float(distance.min()), float(distance.max())
     if edge.step < _LEAST_STEP * edge.step_uncertainty:
@@ -176,12 +181,12 @@ def _quick_fit(pixels: EdgePixels, least: float) -> ModelFit:
             f"the step is {edge.step:.3g} W/m^2/sr with a standard uncertainty of "
             f"{edge.step_uncertainty:.2g}, expected {_LEAST_STEP:g} times as much or more"
         )
-    if min(dark, bright) <= least * max(fit.fwhm, 2 * pixels.pitch):
+    if min(dark, bright) < max(quick.fwhm, 2 * pixels.pitch):
         raise NoEdgeError(
             f"the image reaches {dark * 1e6:.3g} um to the dark and {bright * 1e6:.3g} um to the "
-            f"bright side of the edge, which is {fit.fwhm * 1e6:.3g} um wide, expected more of both"
+            f"bright side of the edge, which is {quick.fwhm * 1e6:.3g} um wide, "
+            "expected more of both"
         )
-    return fit
 
 
 def _piled_up(image: EdgeImage) -> NDArray[np.bool_]:
@@ -218,7 +223,7 @@ def _first_clipped(
     count = np.bincount(index)
     share = np.bincount(index, clipped.ravel()) / np.maximum(count, 1)
     found = np.flatnonzero((share > _CLIPPED_SHARE) & (share * count >= 2))
-    return first + (float(found[0]) - 2) * pitch / 2 if found.size else np.inf
+    return first + float(found[0]) * pitch / 2 if found.size else np.inf
 
 
 def _clipped_text(clipped: NDArray[np.bool_], how: str, side: str, limit: float) -> str:

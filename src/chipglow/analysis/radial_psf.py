@@ -1,9 +1,10 @@
-"""A round point spread function without a model, from the edge-spread functions of any edges.
+"""A round point spread function from edges, which departs from a model as far as data ask.
 
 The light is shared among rings about the point. Each ring has a known edge-spread function, so
 that the shares follow from the measured one by least squares: the inversion of Abel's integral.
-Alone that would blow up the noise. No share is negative, and the shares change as smoothly from
-ring to ring as the data let them.
+Alone that would blow up the noise. No share is negative, and the difference to the best model
+changes as smoothly from ring to ring as the data let it: what the data do not tell, as the finest
+of the core and the farthest of the tails, is the model's.
 """
 
 from collections.abc import Sequence
@@ -18,13 +19,13 @@ from scipy.special import j1
 
 from chipglow.analysis.edge_spread import EdgeSpread
 from chipglow.analysis.psf_fit import ApertureSignals, EdgePixels, ModelFit
-from chipglow.analysis.psf_models import edge_response, sampled_psf
+from chipglow.analysis.psf_models import disc_response, edge_response, sampled_psf
 from chipglow.camera import MeasuredPSF
 
 _RINGS: Final = 32
-_FIRST_RING: Final = 0.12
 _SMOOTHNESS: Final[list[float]] = np.geomspace(1e2, 1e-4, 13).tolist()
 _MORE_MISFIT: Final = 4.0
+_ROUGHER: Final = 4
 _REPEATS: Final = 24
 
 
@@ -37,7 +38,7 @@ class RadialPSF:
     edges : ndarray
         Radii in m that limit the rings, from 0, shape (n + 1,).
     shares : ndarray
-        Share of the light in each ring, of sum 1, shape (n,).
+        Share of the light in each ring, shape (n,); what is missing to 1 lies beyond.
     uncertainty : ndarray
         Standard uncertainty of the shares: by the noise, and by how much they change when they are
         let be rougher.
@@ -75,7 +76,7 @@ class RadialPSF:
         def at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
             return np.interp(np.hypot(x, y), radius, density, right=0.0)
 
-        return sampled_psf(at, float(self.edges[-1]), float(self.edges[3]) / 2)
+        return sampled_psf(at, float(self.edges[-1]), float(self.edges[1]))
 
 
 def radial_psf(
@@ -104,22 +105,25 @@ def radial_psf(
     -----
     The weight of the smoothness is the greatest with which the sum of squared residuals stays
     within 4 of its least: a solution that is two standard uncertainties away from the data's own.
-    What it hides is estimated by the change with a tenth of that weight.
+    What it hides is estimated by the change with a hundredth of that weight.
     """
     radii = _radii(fit, edges)
-    design, data = _rows(fit, edges, spreads, apertures, radii)
-    penalty = _penalty(radii, fit.fwhm)
-    solutions = [_solved(design, data, penalty, weight) for weight in _SMOOTHNESS]
+    design, left = _rows(fit, edges, spreads, apertures, radii)
+    penalty = _penalty(radii, _core(fit, edges))
+    model = _model_shares(fit, radii)
+    # Light of the model beyond the last ring stays in it.
+    data, beyond = left + design @ model, 1.0 - float(model.sum())
+    solutions = [_solved(design, data, weight * penalty, model) for weight in _SMOOTHNESS]
     allowed = _misfit(design, data, solutions[-1]) + _MORE_MISFIT
     chosen = next(k for k, s in enumerate(solutions) if _misfit(design, data, s) <= allowed)
     weight = _SMOOTHNESS[chosen]
     repeats = [
-        _solved(design, data + generator.standard_normal(data.size), penalty, weight)
+        _solved(design, data + generator.standard_normal(data.size), weight * penalty, model)
         for _ in range(_REPEATS)
     ]
-    rougher = solutions[min(chosen + 2, len(solutions) - 1)]
+    rougher = solutions[min(chosen + _ROUGHER, len(solutions) - 1)]
     all_shares = np.array([solutions[chosen], rougher, *repeats])
-    all_shares /= all_shares.sum(axis=1, keepdims=True)
+    all_shares /= all_shares.sum(axis=1, keepdims=True) + beyond
     return RadialPSF(
         radii,
         all_shares[0],
@@ -131,13 +135,18 @@ def radial_psf(
 
 def _spread(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Standard uncertainty by the repeats (from row 2 on) and the rougher solution (row 1)."""
-    return np.hypot(np.std(values[2:], axis=0, ddof=1), values[0] - values[1])
+    return np.asarray(np.hypot(np.std(values[2:], axis=0, ddof=1), values[0] - values[1]))
 
 
 def _radii(fit: ModelFit, edges: Sequence[EdgePixels]) -> NDArray[np.float64]:
-    first = _FIRST_RING * max(fit.fwhm, 0.5 * min(edge.pitch for edge in edges))
-    last = max(0.8 * min(edge.reach for edge in edges), 8 * first)
-    return np.concatenate([[0.0], np.geomspace(first, last, _RINGS)])
+    """Limits of the rings: even in the core, in proportion to the radius beyond."""
+    core = _core(fit, edges)
+    last = 0.8 * min(edge.reach for edge in edges)
+    return np.asarray(core * np.sinh(np.linspace(0.0, np.arcsinh(last / core), _RINGS + 1)))
+
+
+def _core(fit: ModelFit, edges: Sequence[EdgePixels]) -> float:
+    return max(fit.fwhm, 0.5 * min(edge.pitch for edge in edges)) / 2
 
 
 def _rows(
@@ -147,7 +156,7 @@ def _rows(
     apertures: ApertureSignals | None,
     radii: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Design and data over their noise, of all bins and apertures."""
+    """Design, and what the model leaves of the data, over the noise, of bins and apertures."""
     rows, data = [], []
     for found, pixels, spread in zip(fit.edges, edges, spreads, strict=True):
         columns = [
@@ -160,12 +169,14 @@ def _rows(
             for k in range(radii.size - 1)
         ]
         rows.append(np.array(columns).T / spread.uncertainty[:, None])
-        data.append(spread.value / spread.uncertainty)
+        data.append(spread.residual / spread.uncertainty)
     if apertures is not None:
         transfers = [_ring_transfer(radii, k, apertures.frequency) for k in range(radii.size - 1)]
         sigma = apertures.sigma / fit.source
         rows.append((apertures.weights @ np.array(transfers).T) / sigma[:, None])
-        data.append((apertures.radiance - fit.aperture_background) / fit.source / sigma)
+        shares = apertures.weights @ fit.model.mean_transfer(fit.values, apertures.frequency)
+        left = (apertures.radiance - fit.aperture_background) / fit.source - shares
+        data.append(left / sigma)
     return np.concatenate(rows), np.concatenate(data)
 
 
@@ -197,14 +208,26 @@ def _penalty(radii: NDArray[np.float64], width: float) -> NDArray[np.float64]:
     return np.asarray(np.diff(padded, n=2, axis=0) * 1e3)
 
 
+def _model_shares(fit: ModelFit, radii: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Share of a model's light in each ring."""
+    frequency = np.arange(0.0, 6 / fit.fwhm, 1 / (32 * float(radii[-1])))
+    transfer = fit.model.mean_transfer(fit.values, frequency)
+    middle = np.zeros(1)
+    encircled = [
+        float(disc_response(frequency, 2 * radius, middle, 0.0) @ transfer)
+        for radius in radii.tolist()
+    ]
+    return np.maximum(np.diff(encircled), 0.0)
+
+
 def _solved(
     design: NDArray[np.float64],
     data: NDArray[np.float64],
     penalty: NDArray[np.float64],
-    weight: float,
+    model: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    matrix = np.concatenate([design, weight * penalty])
-    wanted = np.concatenate([data, np.zeros(len(penalty))])
+    matrix = np.concatenate([design, penalty])
+    wanted = np.concatenate([data, penalty @ model])
     # The normal equations are small, whatever the number of bins.
     normal = matrix.T @ matrix
     factor = np.linalg.cholesky(normal + 1e-12 * np.trace(normal) * np.eye(len(normal)))
