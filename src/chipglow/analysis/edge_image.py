@@ -39,6 +39,8 @@ class EdgeImage:
         Middle of the camera's band in m.
     name : str
         What it is called in messages.
+    notes : tuple of str
+        What is assumed of it, a sentence each.
     """
 
     radiance: NDArray[np.float64]
@@ -50,6 +52,7 @@ class EdgeImage:
     footprint: float
     wavelength: float | None
     name: str
+    notes: tuple[str, ...] = ()
 
     @property
     def pitch(self) -> float:
@@ -89,9 +92,8 @@ def edge_image(
             f"{name}: the region has {radiance.shape[0]} x {radiance.shape[1]} pixels, expected "
             f"8 x 8 or more of the image's {raster.rows} x {raster.columns}"
         )
-    fill = float(measurement.data.attrs.get("fill_factor", 1.0))
-    known = "band_lower" in measurement.data.attrs
-    band = measurement.band if known else None
+    attributes = measurement.data.attrs
+    band = measurement.band if "band_lower" in attributes else None
     return EdgeImage(
         radiance,
         raster.x[part[1]],
@@ -99,10 +101,23 @@ def edge_image(
         ((flags & (Flag.DEAD | Flag.REPLACED)) != 0) | ~np.isfinite(radiance),
         (flags & Flag.SATURATED) != 0,
         (flags & Flag.BELOW_FLOOR) != 0,
-        raster.spacing * sqrt(fill),
+        raster.spacing * sqrt(float(attributes.get("fill_factor", 1.0))),
         (band.lower + band.upper) / 2 if band else None,
         name,
+        _notes(measurement),
     )
+
+
+def _notes(measurement: Measurement) -> tuple[str, ...]:
+    notes = []
+    if "fill_factor" not in measurement.data.attrs:
+        notes.append("the whole square of a sensor takes light (fill factor 1).")
+    if measurement.data.attrs.get("psf_order") == "sensor":
+        notes.append(
+            "each sensor's square acts once; this camera was simulated with psf_order sensor, "
+            "where it acts twice, and the second time is counted as optics."
+        )
+    return tuple(notes)
 
 
 def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:

@@ -221,6 +221,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     doubts = [doubt for _, said in read for doubt in said]
     signals = aperture_signals(apertures, images[0].footprint) if apertures else None
     models, assumptions = _models(images, edges)
+    assumptions += dict.fromkeys(note for image in images for note in image.notes)
     first = [fit_model(model, edges, signals) for model in models]
     found = min(first, key=lambda fit: fit.bic)
     edges = [with_noise(edge, found.predicted(k, edge)) for k, edge in enumerate(edges)]

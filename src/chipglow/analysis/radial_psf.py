@@ -24,7 +24,6 @@ from chipglow.camera import MeasuredPSF
 
 _RINGS: Final = 32
 _SMOOTHNESS: Final[list[float]] = np.geomspace(1e2, 1e-4, 13).tolist()
-_MORE_MISFIT: Final = 4.0
 _ROUGHER: Final = 4
 _REPEATS: Final = 24
 
@@ -103,9 +102,9 @@ def radial_psf(
 
     Notes
     -----
-    The weight of the smoothness is the greatest with which the sum of squared residuals stays
-    within 4 of its least: a solution that is two standard uncertainties away from the data's own.
-    What it hides is estimated by the change with a hundredth of that weight.
+    The weight of the smoothness is the one with the least sum of squared residuals and twice the
+    number of free shares that it leaves (Mallows, 1973). What it hides is
+    estimated by the change with a hundredth of that weight.
     """
     radii = _radii(fit, edges)
     design, left = _rows(fit, edges, spreads, apertures, radii)
@@ -114,8 +113,11 @@ def radial_psf(
     # Light of the model beyond the last ring stays in it.
     data, beyond = left + design @ model, 1.0 - float(model.sum())
     solutions = [_solved(design, data, weight * penalty, model) for weight in _SMOOTHNESS]
-    allowed = _misfit(design, data, solutions[-1]) + _MORE_MISFIT
-    chosen = next(k for k, s in enumerate(solutions) if _misfit(design, data, s) <= allowed)
+    criteria = [
+        _criterion(design, data, weight * penalty, solution)
+        for weight, solution in zip(_SMOOTHNESS, solutions, strict=True)
+    ]
+    chosen = int(np.argmin(criteria))
     weight = _SMOOTHNESS[chosen]
     repeats = [
         _solved(design, data + generator.standard_normal(data.size), weight * penalty, model)
@@ -235,8 +237,15 @@ def _solved(
     return np.asarray(solution)
 
 
-def _misfit(
-    design: NDArray[np.float64], data: NDArray[np.float64], shares: NDArray[np.float64]
+def _criterion(
+    design: NDArray[np.float64],
+    data: NDArray[np.float64],
+    penalty: NDArray[np.float64],
+    shares: NDArray[np.float64],
 ) -> float:
+    """Squared residuals, and twice the trace of what makes fitted data of data."""
     left = data - design @ shares
-    return float(left @ left)
+    free = shares > 0
+    normal = design[:, free].T @ design[:, free]
+    smooth = penalty[:, free].T @ penalty[:, free]
+    return float(left @ left + 2 * np.trace(np.linalg.solve(normal + smooth, normal)))

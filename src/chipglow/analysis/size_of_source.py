@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.analysis.psf_fit import ApertureSignals
+from chipglow.camera import UNUSABLE, Flag, Measurement
 
 _LEAST_APERTURES: Final = 3
 _FEWEST_OUTSIDE: Final = 20
@@ -43,6 +44,29 @@ class ApertureImage:
     def __post_init__(self) -> None:
         if not 0 < self.diameter < np.inf:
             raise ValueError(f"{self.name}: diameter is {self.diameter!r} m, expected over 0")
+
+
+def aperture_image(measurement: Measurement, diameter: float, name: str) -> ApertureImage:
+    """The mean of a measurement's frames as an image of an aperture.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        One frame or several of the same aperture.
+    diameter : float
+        Its diameter in m.
+    name : str
+        What it is called in messages.
+
+    Raises
+    ------
+    ValueError
+        If the diameter is not positive.
+    """
+    usable = (np.bitwise_or.reduce(measurement.flags, axis=0) & (UNUSABLE | Flag.REPLACED)) == 0
+    radiance = np.where(usable, measurement.radiance.mean(axis=0), np.nan)
+    raster = measurement.raster
+    return ApertureImage(diameter, radiance, raster.x, raster.y, name)
 
 
 def aperture_signals(images: Sequence[ApertureImage], footprint: float) -> ApertureSignals:
@@ -99,7 +123,6 @@ def _middle(image: ApertureImage) -> tuple[float, float, NDArray[np.float64]]:
         middle[1] - image.y[-1],
         image.y[0] - middle[1],
     )
-    # A disc as large as the aperture: the median of what is bright lies at its radius over √2.
     if away[bright].max() > radius + 12 * pitch or room < radius:
         raise ValueError(
             f"{image.name}: no aperture of {image.diameter * 1e6:.4g} um within the image; what is "

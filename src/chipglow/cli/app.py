@@ -9,6 +9,7 @@ from typing import Annotated, Final
 import typer
 
 from chipglow.cli.boundary import Boundary
+from chipglow.cli.psf import psf
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 
@@ -258,6 +259,9 @@ def clear() -> None:
     from chipglow.study.cache import cache_folder, clear_cache
 
     print(f"{_megabytes(clear_cache())} freed in {cache_folder()}")
+
+
+app.command("psf")(psf)
 
 
 def _megabytes(size: int) -> str:

@@ -4,6 +4,7 @@ from chipglow.io.atomic import atomic_folder, atomic_path
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
 from chipglow.io.movie_file import check_movie_path, movie_writer
+from chipglow.io.psf_file import write_psf
 from chipglow.io.scene_file import (
     FORMAT_VERSION,
     SceneWriter,
@@ -34,5 +35,6 @@ __all__ = [
     "unfinished_scenes",
     "write_dataset",
     "write_measurement",
+    "write_psf",
     "write_scene",
 ]

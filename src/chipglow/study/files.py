@@ -8,6 +8,7 @@ from typing import Any, Final, TypeVar
 import yaml
 from pydantic import BaseModel, ValidationError
 
+from chipglow.study.apertures import ApertureList
 from chipglow.study.import_schema import ImportDescription
 from chipglow.study.schema import Study
 
@@ -62,6 +63,32 @@ def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescr
     for setting in settings:
         data = _with(data, setting)
     return _validated(ImportDescription, data, path.name, path.parent)
+
+
+def load_apertures(path: str | Path) -> list[tuple[Path, float]]:
+    """Read a list of images of apertures from a YAML file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file: ``apertures: [{file: small.nc, diameter: 50 um}, ...]``. Images are looked up
+        beside it.
+
+    Returns
+    -------
+    list of tuple
+        Each image's file and the aperture's diameter in m.
+
+    Raises
+    ------
+    StudyError
+        If the file is no YAML or no such list.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    found = _validated(ApertureList, read_yaml(path), path.name, path.parent)
+    return [(Path(aperture.file), aperture.diameter) for aperture in found.apertures]
 
 
 def read_yaml(path: Path) -> Any:
