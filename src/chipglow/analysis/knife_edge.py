@@ -298,8 +298,9 @@ def _result(
 def _line_fwhm(best: ModelFit, k: int, pixels: EdgePixels) -> float:
     """Width of the fitted line-spread function in m."""
     response = best.response(k, pixels)
-    half = float(response(0.0, 1)) / 2
-    return 2 * float(brentq(lambda u: float(response(u, 1)) - half, 0.0, pixels.reach))
+    half = float(response.slope(np.array(0.0))) / 2
+    found = brentq(lambda u: float(response.slope(np.array(u))) - half, 0.0, pixels.reach)
+    return 2 * float(found)
 
 
 def _edge_doubts(best: ModelFit, k: int, result: EdgeResult) -> list[str]:

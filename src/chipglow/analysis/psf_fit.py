@@ -13,15 +13,14 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import least_squares
 
 from chipglow.analysis.edge_line import EdgeLine
-from chipglow.analysis.psf_models import PSFModel, disc_response, edge_response
+from chipglow.analysis.psf_models import EdgeResponse, PSFModel, disc_response, edge_response
 from chipglow.camera import PointSpreadFunction
 
 _START_WIDTHS: Final = (0.5, 1.0, 1.7, 3.0, 5.0, 9.0)
-_DIFFERENCE: Final = 1e-4
+_DIFFERENCE: Final = 1e-5
 _EDGE_PARAMETERS: Final = 4
 _SOURCE_PARAMETERS: Final = 2
 
@@ -182,14 +181,14 @@ class ModelFit:
         """The optics' point spread function."""
         return self.model.psf(self.values)
 
-    def response(self, edge: int, pixels: EdgePixels) -> CubicHermiteSpline:
+    def response(self, edge: int, pixels: EdgePixels) -> EdgeResponse:
         """Edge-spread function of optics and sensor for one of the edges, from 0 to 1."""
         return _response(self.model, self.values, self.edges[edge].line, pixels)
 
     def predicted(self, edge: int, pixels: EdgePixels) -> NDArray[np.float64]:
         """Radiance of an edge's pixels in W/(m² sr)."""
         found = self.edges[edge]
-        distance = _within(found.line.distance(pixels.x, pixels.y), pixels)
+        distance = found.line.distance(pixels.x, pixels.y)
         return np.asarray(found.background + found.step * self.response(edge, pixels)(distance))
 
 
@@ -228,8 +227,8 @@ def fit_model(
         jac=lambda v: problem.jacobian(v * scales) * scales,
         bounds=(low / scales, high / scales),
         x_scale="jac",
-        xtol=1e-9,
-        ftol=1e-10,
+        xtol=1e-8,
+        ftol=1e-9,
         max_nfev=60,
     )
     if not np.isfinite(result.cost):
@@ -280,7 +279,7 @@ class _Problem:
         parts = []
         for edge, (background, step, line) in zip(self.edges, self._places(vector), strict=True):
             response = _response(self.model, values, line, edge)
-            modelled = background + step * response(_within(line.distance(edge.x, edge.y), edge))
+            modelled = background + step * response(line.distance(edge.x, edge.y))
             parts.append((edge.radiance - modelled) / edge.sigma)
         if self.apertures is not None:
             background, source = vector[-_SOURCE_PARAMETERS:]
@@ -296,24 +295,24 @@ class _Problem:
         row, column = 0, self.shapes
         for edge, (_, step, line) in zip(self.edges, self._places(vector), strict=True):
             part = np.s_[row : row + edge.x.size]
-            distance = _within(line.distance(edge.x, edge.y), edge)
+            distance = line.distance(edge.x, edge.y)
             response = _response(self.model, vector[: self.shapes], line, edge)
-            slope = step * response(distance, 1)
+            slope = step * response.slope(distance)
             turned = edge.y * cos(line.normal) - edge.x * sin(line.normal)
-            for k, value in enumerate((np.ones_like(slope), response(distance), -slope)):
+            for k, value in enumerate(
+                (np.ones_like(slope), response(distance), -slope, slope * turned)
+            ):
                 result[part, column + k] = -value / edge.sigma
-            result[part, column + 3] = -slope * turned / edge.sigma
             row, column = row + edge.x.size, column + _EDGE_PARAMETERS
         if self.apertures is not None:
             result[row:, column] = -1 / self.apertures.sigma
             result[row:, column + 1] = -self._shares(vector[: self.shapes]) / self.apertures.sigma
-        low, high = self.bounds()
+        here, high = self.residual(vector), self.bounds()[1]
         for k in range(self.shapes):
-            shift = _DIFFERENCE * self.scales[k]
-            above, below = vector.copy(), vector.copy()
-            above[k], below[k] = min(vector[k] + shift, high[k]), max(vector[k] - shift, low[k])
-            change = self.residual(above) - self.residual(below)
-            result[:, k] = change / (above[k] - below[k])
+            shift = _DIFFERENCE * self.scales[k] * (1 if vector[k] < high[k] / 2 else -1)
+            moved = vector.copy()
+            moved[k] += shift
+            result[:, k] = (self.residual(moved) - here) / shift
         return result
 
     def fitted(self, vector: NDArray[np.float64]) -> ModelFit:
@@ -463,17 +462,13 @@ def with_noise(edge: EdgePixels, predicted: NDArray[np.float64]) -> EdgePixels:
 
 def _response(
     model: PSFModel, values: NDArray[np.float64], line: EdgeLine, edge: EdgePixels
-) -> CubicHermiteSpline:
+) -> EdgeResponse:
     return edge_response(
         lambda frequency: model.transfer(values, frequency, line.normal),
         line.normal,
         edge.footprint,
         edge.reach,
     )
-
-
-def _within(distance: NDArray[np.float64], edge: EdgePixels) -> NDArray[np.float64]:
-    return np.clip(distance, -edge.reach, edge.reach)
 
 
 def _step_guess(edge: EdgePixels) -> tuple[float, float]:

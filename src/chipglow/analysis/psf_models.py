@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 from scipy.special import j0, j1
 
@@ -284,13 +283,53 @@ class EllipticalModel(PSFModel):
         return np.array([[values[0] ** 2, both], [both, values[1] ** 2]])
 
 
+@dataclass(frozen=True, eq=False)
+class EdgeResponse:
+    """Edge-spread function of optics and sensor, a curve through even samples.
+
+    Parameters
+    ----------
+    spacing : float
+        Distance of the samples in m; the one in the middle is on the edge.
+    edge, line : ndarray
+        Edge-spread function, from 0 on the dark side to 1 on the bright one, and its derivative,
+        the line-spread function in 1/m, shape (n,), n odd.
+    """
+
+    spacing: float
+    edge: NDArray[np.float64]
+    line: NDArray[np.float64]
+
+    def __call__(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Edge-spread function at distances in m (Hermite's cubic); beyond the samples the last."""
+        k, t = self._place(distance)
+        rise = self.edge[k + 1] - self.edge[k]
+        first, last = self.spacing * self.line[k], self.spacing * self.line[k + 1]
+        bend, twist = 3 * rise - 2 * first - last, first + last - 2 * rise
+        return np.asarray(self.edge[k] + t * (first + t * (bend + t * twist)))
+
+    def slope(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Line-spread function at distances in m, in 1/m, by straight lines."""
+        k, t = self._place(distance)
+        return np.asarray(self.line[k] + t * (self.line[k + 1] - self.line[k]))
+
+    def _place(
+        self, distance: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Sample before each distance, and how far on the way to the next one it is."""
+        last = self.edge.size - 1
+        place = np.clip(np.asarray(distance) / self.spacing + last // 2, 0.0, last)
+        before = np.minimum(place.astype(np.int64), last - 1)
+        return before, place - before
+
+
 def edge_response(
     transfer: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     angle: float,
     footprint: float,
     reach: float,
-) -> CubicHermiteSpline:
-    """Edge-spread function of optics and sensor, as a curve whose derivative is the line's.
+) -> EdgeResponse:
+    """Edge-spread function of optics and sensor.
 
     Parameters
     ----------
@@ -303,25 +342,18 @@ def edge_response(
         Side of the sensitive square in m.
     reach : float
         Largest distance from the edge in m that is asked for.
-
-    Returns
-    -------
-    CubicHermiteSpline
-        From 0 on the dark side to 1 on the bright one, over the distance in m.
     """
     step = footprint / _SAMPLES_PER_FOOTPRINT
     count = fft.next_fast_len(ceil(_PERIODS * reach / step), real=True)
     frequency = np.arange(count // 2 + 1, dtype=np.float64) / (count * step)
     response = transfer(frequency) * footprint_transfer(frequency, angle, footprint)
-    line = fft.irfft(response, count) / step
     integral = np.zeros(frequency.size, dtype=np.complex128)
     integral[1:] = response[1:] / (2j * pi * frequency[1:])
-    edge = fft.irfft(integral, count) / step
-    half = min(ceil(1.01 * reach / step) + 2, count // 2 - 1)
+    line, edge = fft.irfft(np.stack([response, integral]), count) / step
+    half = min(ceil(reach / step) + 2, count // 2 - 1)
     index = np.arange(-half, half + 1)
     # The series is that of an edge less a ramp over the whole period.
-    ramp = index / count
-    return CubicHermiteSpline(index * step, 0.5 + edge[index] + ramp, line[index])
+    return EdgeResponse(step, 0.5 + edge[index] + index / count, line[index])
 
 
 def footprint_transfer(

@@ -13,6 +13,7 @@ from chipglow.analysis.psf_fit import FittedEdge
 from chipglow.report import drawing
 from chipglow.report.drawing import BLUE, GREY, VERMILLION, WIDTH
 from chipglow.report.knife_edge_summary import with_uncertainty
+from chipglow.scene import Raster
 
 _HEIGHT: Final = 5.6
 _APERTURES: Final = 2.6
@@ -50,21 +51,20 @@ def _draw_edge(figure: Any, found: KnifeEdge, k: int, edge: EdgeResult) -> None:
     shown = min(_SHOWN_WIDTHS * edge.line_fwhm, edge.pixels.reach)
     fine = np.linspace(-shown, shown, 801)
     _draw_spread(spread, residual, edge, fine, response(fine))
-    _draw_line(figure.add_subplot(grid[2, 0]), edge, fine, response(fine, 1))
+    _draw_line(figure.add_subplot(grid[2, 0]), edge, fine, response.slope(fine))
     _draw_transfer(figure.add_subplot(grid[2, 1]), edge)
 
 
 def _draw_image(figure: Any, axes: Axes, edge: EdgeResult, fitted: FittedEdge) -> None:
-    image = edge.image
-    half = image.pitch / 2
-    left, right = float(image.x[0] - half) * 1e6, float(image.x[-1] + half) * 1e6
-    bottom, top = float(image.y[-1] - half) * 1e6, float(image.y[0] + half) * 1e6
-    extent = (left, right, bottom, top)
-    usable = np.where(image.usable, image.radiance, np.nan)
-    picture = axes.imshow(
-        np.ma.masked_invalid(usable), extent=extent, cmap=drawing.HEAT, aspect="equal"
+    image, pitch = edge.image, edge.image.pitch
+    raster = Raster(
+        float(image.x[0]) - pitch / 2, float(image.y[0]) + pitch / 2, pitch, *image.radiance.shape
     )
-    figure.colorbar(picture, ax=axes, label="radiance / (W/(m² sr))", aspect=25)
+    left, right, bottom, top = (end * 1e6 for end in raster.extent)
+    usable = np.where(image.usable, image.radiance, np.nan)
+    limits = float(np.nanmin(usable)), float(np.nanmax(usable))
+    picture = drawing.show_image(axes, usable, raster, None, drawing.HEAT, limits)
+    drawing.colour_bar(figure, picture, axes, "radiance / (W/(m² sr))")
     c, s = cos(fitted.line.normal), sin(fitted.line.normal)
     middle = float(image.x.mean()) * 1e6, float(image.y.mean()) * 1e6
     along = np.array([-1.0, 1.0]) * hypot(right - left, top - bottom)
@@ -74,8 +74,6 @@ def _draw_image(figure: Any, axes: Axes, edge: EdgeResult, fitted: FittedEdge) -
     axes.plot(x, y, color=BLUE, linewidth=1.2)
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
-    axes.set_xlabel("x / µm")
-    axes.set_ylabel("y / µm")
     axes.set_title(image.name)
 
 
@@ -117,9 +115,10 @@ def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
     axes.plot(frequency, transfer.value, color=GREY, label="measured, 2 u")
     axes.plot(frequency, transfer.model, color=VERMILLION, label="fit: optics and sensor")
     axes.plot(frequency, transfer.optics, color=BLUE, linestyle="--", label="fit: optics alone")
-    axes.axvline(0.5e-3 / edge.image.pitch, color="black", linewidth=0.8, linestyle=":")
+    nyquist = 0.5e-3 / edge.image.pitch
+    axes.axvline(nyquist, color="black", linewidth=0.8, linestyle=":", label="Nyquist")
     axes.set_ylim(-0.05, 1.05)
-    axes.set_title("MTF; dotted: the sensors' Nyquist frequency")
+    axes.set_title("modulation transfer function")
     axes.set_xlabel("frequency / (1/mm)")
     axes.legend(loc="upper right")
 

@@ -12,24 +12,23 @@ from chipglow.camera import AnnularAperturePSF, GaussianPSF
 
 def model_table(found: KnifeEdge) -> Table:
     """The models, the best first."""
-    table = Table("model", "FWHM / um", "parameters", "AICc", "BIC", "weight", box=None)
+    table = Table("model", "FWHM / um", "AICc", "BIC", "weight", "misfit", box=None)
     for fit, weight in zip(found.fits, found.weights, strict=True):
         table.add_row(
             fit.model.name,
             with_uncertainty(fit.fwhm * 1e6, fit.fwhm_uncertainty * 1e6),
-            _parameters(fit),
             f"{fit.aicc - found.best.aicc:+.1f}",
             f"{fit.bic - found.best.bic:+.1f}",
-            f"{weight:.2g}",
+            f"{weight:.3f}",
+            f"{fit.misfit:.3g}",
         )
     return table
 
 
 def edge_table(found: KnifeEdge) -> Table:
-    """The images: where the edge is and what each says alone."""
+    """The images: the edge's normal, the optics' width by it alone, the line spread's width."""
     table = Table(
-        "image", "normal / deg", "tilt / deg", "FWHM alone / um", "with sensor / um",
-        "step / noise", "MTF at Nyquist", box=None,
+        "image", "normal / deg", "FWHM / um", "LSF / um", "step/noise", "MTF(Nyquist)", box=None
     )  # fmt: skip
     for edge, fitted in zip(found.edges, found.best.edges, strict=True):
         transfer = edge.transfer
@@ -37,7 +36,6 @@ def edge_table(found: KnifeEdge) -> Table:
         table.add_row(
             edge.image.name,
             with_uncertainty(degrees(fitted.line.normal), degrees(fitted.normal_uncertainty)),
-            f"{degrees(fitted.line.tilt):.2f}",
             with_uncertainty(edge.fwhm * 1e6, edge.fwhm_uncertainty * 1e6),
             f"{edge.line_fwhm * 1e6:.4g}",
             f"{fitted.step / edge.noise:.3g}",
@@ -51,7 +49,7 @@ def sentences(found: KnifeEdge) -> list[str]:
     width = with_uncertainty(found.fwhm * 1e6, found.fwhm_uncertainty * 1e6)
     lines = [
         f"The optics' point spread function is {width} um wide (full width at half maximum, with "
-        f"its standard uncertainty; {found.best.model.name})."
+        f"its standard uncertainty; {found.best.model.name}: {_parameters(found.best)})."
     ]
     lines += _directions(found)
     if (text := study_text(found)) is not None:
