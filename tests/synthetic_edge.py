@@ -8,7 +8,7 @@ from functools import cache
 from math import cos, log, pi, radians, sin, sqrt
 
 import numpy as np
-from scipy.integrate import cumulative_simpson, quad, trapezoid
+from scipy.integrate import cumulative_simpson, trapezoid
 from scipy.interpolate import CubicSpline
 from scipy.special import j1, k1, ndtr
 
@@ -46,18 +46,32 @@ def annular_edge(wavelength, aperture, obscuration):
     """Of an annular pupil, by Abel's integral of the closed form of its point spread function."""
     far = np.concatenate([np.arange(0, 100, 0.15), np.geomspace(100, 4000, 400)])
     along = np.concatenate([np.arange(0, 200, 0.2), np.geomspace(200, 40000, 1500)])
-    line = np.array([2 * trapezoid(_annular(np.hypot(x, along), obscuration), along) for x in far])
+    line = np.array(
+        [2 * trapezoid(annular_density(np.hypot(x, along), obscuration), along) for x in far]
+    )
     energy = 4 * pi / (1 - obscuration**2)
     unit = wavelength / (2 * pi * aperture)
     half = CubicSpline(far * unit, cumulative_simpson(line, x=far, initial=0.0) / energy)
     return lambda u: 0.5 + np.sign(u) * half(np.abs(u))
 
 
-def _annular(v, o):
+def annular_density(v, o):
+    """Irradiance over that in the middle, at v = 2π NA r / λ, of a pupil with an obscuration o."""
+
     def jinc(t):
         return 2 * j1(np.maximum(t, 1e-9)) / np.maximum(t, 1e-9)
 
     return ((jinc(v) - o**2 * jinc(o * v)) / (1 - o**2)) ** 2
+
+
+def disc_edge(radius):
+    """Of an even disc, as a lens out of focus makes it."""
+
+    def edge(u):
+        t = np.clip(u / radius, -1.0, 1.0)
+        return 0.5 + (np.arcsin(t) + t * np.sqrt(1 - t**2)) / pi
+
+    return edge
 
 
 def edge_radiance(edge, normal, side=40, position=1e-6, background=2.0, step=5.0, fill=1.0):
@@ -122,8 +136,3 @@ def gaussian_transfer(frequency, fwhm, normal):
     angle = radians(normal)
     sensor = np.sinc(frequency * PITCH * cos(angle)) * np.sinc(frequency * PITCH * sin(angle))
     return optics * np.abs(sensor)
-
-
-def encircled(density, radius):
-    """Light within a radius of a density over the plane."""
-    return quad(lambda r: 2 * pi * r * density(r), 0.0, radius, limit=200)[0]

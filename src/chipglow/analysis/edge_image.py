@@ -17,6 +17,7 @@ _LEAST_STEP: Final = 7.0
 _OUTLIER: Final = 7.0
 _SECOND_EDGE: Final = 0.12
 _BLOCK: Final = 5
+_ROUGHLY: Final = 1e-5
 _LEAST_PILE: Final = 10
 _CLIPPED_SHARE: Final = 0.02
 
@@ -183,7 +184,7 @@ def _pixels_of(
 
 def _quick_fit(pixels: EdgePixels) -> ModelFit:
     """A Gaussian fitted to the pixels."""
-    return fit_model(GaussianModel(), [pixels])
+    return fit_model(GaussianModel(), [pixels], tolerance=_ROUGHLY)
 
 
 def _check_edge(pixels: EdgePixels, quick: ModelFit) -> None:
@@ -293,7 +294,8 @@ def _check_single(pixels: EdgePixels, quick: ModelFit) -> None:
     weight = uniform_filter(count, _BLOCK, mode="constant")
     mean = uniform_filter(total, _BLOCK, mode="constant") / np.maximum(weight, 1e-9)
     share = np.abs(np.where(weight > 0.5, mean, 0.0)) / quick.edges[0].step
-    noise = 1.4826 * float(np.median(np.abs(left))) / (_BLOCK * quick.edges[0].step)
+    change = np.diff(total, axis=1)[(count[:, 1:] * count[:, :-1]) > 0]
+    noise = float(np.median(np.abs(change))) / (_BLOCK * quick.edges[0].step)
     if share.max() > max(_SECOND_EDGE, 7 * noise):
         where = np.unravel_index(int(np.argmax(share)), share.shape)
         raise NoEdgeError(

@@ -46,6 +46,7 @@ from chipglow.camera import MeasuredPSF, PointSpreadFunction
 RADIAL: Final = "radial"
 """Name of the point spread function without a model."""
 
+_ROUGHLY: Final = 1e-4
 _MISFIT: Final = 1.6
 _PLATEAU: Final = 3.0
 _UNRESOLVED: Final = 0.3
@@ -222,7 +223,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     signals = aperture_signals(apertures, images[0].footprint) if apertures else None
     models, assumptions = _models(images, edges)
     assumptions += dict.fromkeys(note for image in images for note in image.notes)
-    first = [fit_model(model, edges, signals) for model in models]
+    first = [fit_model(model, edges, signals, tolerance=_ROUGHLY) for model in models]
     found = min(first, key=lambda fit: fit.bic)
     edges = [with_noise(edge, found.predicted(k, edge)) for k, edge in enumerate(edges)]
     fits = sorted(

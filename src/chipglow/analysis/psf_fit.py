@@ -197,6 +197,7 @@ def fit_model(
     edges: Sequence[EdgePixels],
     apertures: ApertureSignals | None = None,
     start: ModelFit | None = None,
+    tolerance: float = 1e-8,
 ) -> ModelFit:
     """Weighted least squares with the edges' places, backgrounds and steps free.
 
@@ -210,6 +211,8 @@ def fit_model(
         Signals of apertures, which tell of the tails.
     start : ModelFit, optional
         An earlier fit of the same model to begin with.
+    tolerance : float
+        Relative change of the parameters at which the fit ends.
 
     Raises
     ------
@@ -227,8 +230,8 @@ def fit_model(
         jac=lambda v: problem.jacobian(v * scales) * scales,
         bounds=(low / scales, high / scales),
         x_scale="jac",
-        xtol=1e-8,
-        ftol=1e-9,
+        xtol=tolerance,
+        ftol=tolerance,
         max_nfev=60,
     )
     if not np.isfinite(result.cost):

@@ -396,7 +396,11 @@ def disc_response(
         square += footprint_transfer(frequency, angle, footprint) / len(angles)
     middle = np.mean([j0(2 * pi * frequency * rho) for rho in radii.tolist()], axis=0)
     weight = 2 * pi * radius * j1(2 * pi * frequency * radius) * middle * square
-    return np.asarray(weight * frequency[1])
+    step = float(frequency[1])
+    weight *= step
+    # The rule of rectangles misses the slope with which the integrand begins (Euler, Maclaurin).
+    weight[0] += 2 * (pi * radius * step) ** 2 / 12
+    return np.asarray(weight)
 
 
 def sampled_psf(

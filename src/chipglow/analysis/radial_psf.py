@@ -8,7 +8,7 @@ of the core and the farthest of the tails, is the model's.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
 
@@ -104,7 +104,7 @@ def radial_psf(
     -----
     The weight of the smoothness is the one with the least sum of squared residuals and twice the
     number of free shares that it leaves (Mallows, 1973). What it hides is
-    estimated by the change with a hundredth of that weight.
+    estimated by the change with a hundredth of that weight. The repeats draw the model too.
     """
     radii = _radii(fit, edges)
     design, left = _rows(fit, edges, spreads, apertures, radii)
@@ -119,10 +119,11 @@ def radial_psf(
     ]
     chosen = int(np.argmin(criteria))
     weight = _SMOOTHNESS[chosen]
-    repeats = [
-        _solved(design, data + generator.standard_normal(data.size), weight * penalty, model)
-        for _ in range(_REPEATS)
-    ]
+    repeats = []
+    for other in _drawn(fit, generator):
+        shares = _model_shares(replace(fit, values=other), radii)
+        noisy = left + generator.standard_normal(left.size) + design @ shares
+        repeats.append(_solved(design, noisy, weight * penalty, shares))
     rougher = solutions[min(chosen + _ROUGHER, len(solutions) - 1)]
     all_shares = np.array([solutions[chosen], rougher, *repeats])
     all_shares /= all_shares.sum(axis=1, keepdims=True) + beyond
@@ -133,6 +134,15 @@ def radial_psf(
         np.concatenate([[0.0], _spread(np.cumsum(all_shares, axis=1))]),
         weight,
     )
+
+
+def _drawn(fit: ModelFit, generator: np.random.Generator) -> NDArray[np.float64]:
+    """Parameters of the model as other noise would have given them, shape (repeat, parameter)."""
+    values, vectors = np.linalg.eigh(fit.covariance)
+    spread = vectors * np.sqrt(np.maximum(values, 0.0))
+    drawn = fit.values + generator.standard_normal((_REPEATS, values.size)) @ spread.T
+    low, high = fit.model.bounds(0.0, np.inf)
+    return np.clip(drawn, low, high)
 
 
 def _spread(values: NDArray[np.float64]) -> NDArray[np.float64]:

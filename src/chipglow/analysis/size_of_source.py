@@ -123,11 +123,11 @@ def _middle(image: ApertureImage) -> tuple[float, float, NDArray[np.float64]]:
         middle[1] - image.y[-1],
         image.y[0] - middle[1],
     )
-    if away[bright].max() > radius + 12 * pitch or room < radius:
+    seen = pitch * (np.count_nonzero(bright) / np.pi) ** 0.5
+    if not 0.6 * radius - pitch < seen < 1.5 * radius + 3 * pitch or room < radius:
         raise ValueError(
             f"{image.name}: no aperture of {image.diameter * 1e6:.4g} um within the image; what is "
-            f"bright reaches {away[bright].max() * 1e6:.4g} um from its middle, expected about "
-            f"{radius * 1e6:.4g} um"
+            f"bright is {2 * seen * 1e6:.4g} um wide, and {room * 1e6:.4g} um from the image's edge"
         )
     inner = known & (away <= pitch)
     if not inner.any():
