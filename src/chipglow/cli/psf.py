@@ -82,7 +82,7 @@ def psf(
         write_psf(found, out, chosen)
         print(out)
     if plot is not None:
-        from chipglow.report.knife_edge_figure import draw_knife_edge
+        from chipglow.report import draw_knife_edge
 
         write_picture(draw_knife_edge(found), plot)
         print(plot)
