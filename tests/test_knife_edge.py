@@ -368,6 +368,23 @@ def test_a_clean_edge_is_not_doubtful(clean):
     assert clean.doubts == ()
 
 
+def test_without_noise_the_truth_is_returned_and_nothing_is_doubtful():
+    found = knife_edge([an_image(noise=0.0)])
+    assert found.fwhm == pytest.approx(FWHM, rel=1e-4)
+    assert found.doubts == ()
+
+
+def test_noise_that_grows_with_the_light_is_weighed():
+    """Of a dark side with a tenth of the noise, the width is known better than from the other."""
+    radiance = edge_radiance(GAUSSIAN, 5.0)
+    share = (radiance - 2.0) / 5.0
+    found = knife_edge([image_of(radiance, 0.02 + 0.18 * share, 3)])
+    assert found.edges[0].noise < 0.06
+    assert abs(found.fwhm - FWHM) < 3 * found.fwhm_uncertainty
+    even = knife_edge([image_of(radiance, 0.2, 3)])
+    assert found.fwhm_uncertainty < 0.8 * even.fwhm_uncertainty
+
+
 def test_bent_and_short_and_unresolved_edges_are_doubtful():
     rows = np.arange(60.0)
     angle = radians(5.0)
