@@ -281,6 +281,16 @@ def test_apertures_tell_of_tails_that_an_edge_does_not():
     assert share.uncertainties[1] < 0.3 * unsure
 
 
+def test_apertures_that_contradict_the_edge_are_doubtful():
+    sizes = (60e-6, 120e-6, 240e-6, 300e-6)
+    holes = [gaussian_aperture(FWHM, size, noise=0.01, seed=5) for size in sizes]
+    assert knife_edge([an_image()], holes).doubts == ()
+    # A tail that the edge does not have, in the apertures alone.
+    holes = [gaussian_aperture(FWHM, size, 0.2, 40e-6, noise=0.01, seed=5) for size in sizes]
+    doubts = knife_edge([an_image(noise=0.01, side=64)], holes).doubts
+    assert any("contradict each other" in doubt for doubt in doubts)
+
+
 def test_the_system_holds_the_sensor_once(clean):
     system, optics = clean.psf("system").kernel(1e-6), clean.psf().kernel(1e-6)
 

@@ -165,6 +165,8 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
     except NoEdgeError as error:
         raise NoEdgeError(f"{image.name}: {error}") from None
     said = [f"{image.name}: {doubt}" for doubt in doubts]
+    noise = float(np.std(pixels.radiance - quick.predicted(0, pixels)))
+    pixels = replace(pixels, sigma=np.full(pixels.x.size, max(noise, 1e-300)))
     # A Gaussian with a free step can put the edge of a clipped image far away.
     return (pixels if clipped else replace(pixels, line=quick.edges[0].line)), said
 

@@ -49,6 +49,7 @@ RADIAL: Final = "radial"
 _ROUGHLY: Final = 1e-6
 _MISFIT: Final = 1.6
 _TRIES: Final = 6
+_APERTURE_MISFIT: Final = 4.0
 _NOTHING: Final = 5e-4
 _PLATEAU: Final = 3.0
 _UNRESOLVED: Final = 0.3
@@ -243,6 +244,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     for k, result in enumerate(results):
         doubts += _edge_doubts(best, k, result)
     doubts += _fit_doubts(best, results)
+    doubts += _aperture_doubts(best, signals) if signals is not None else []
     return KnifeEdge(results, tuple(fits), signals, tuple(doubts), tuple(assumptions))
 
 
@@ -349,6 +351,21 @@ def _fit_doubts(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
             "(radial) may be nearer."
         )
     return doubts
+
+
+def _aperture_doubts(best: ModelFit, signals: ApertureSignals) -> list[str]:
+    """Whether apertures say something else than the edges."""
+    shares = signals.weights @ best.model.mean_transfer(best.values, signals.frequency)
+    left = (signals.radiance - best.aperture_background) / best.source - shares
+    square = float(np.sum((left * best.source / signals.sigma) ** 2))
+    greatest = int(np.argmax(np.abs(left)))
+    if square < _APERTURE_MISFIT * left.size or abs(left[greatest]) < _NOTHING:
+        return []
+    return [
+        f"the apertures and the edges contradict each other: the signal of "
+        f"{signals.diameters[greatest] * 1e6:.4g} um is {100 * abs(left[greatest]):.2g} % of the "
+        "source away from the fit; check the diameters and that the source is even."
+    ]
 
 
 def _left(edge: EdgeResult) -> float:
