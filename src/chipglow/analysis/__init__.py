@@ -12,9 +12,10 @@ from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.lines import Line, sample, straight_line
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
+from chipglow.analysis.ridge import NoShearBandError
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
-from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear_band
+from chipglow.analysis.shear_band import ShearBand, find_shear_band
 
 __all__ = [
     "PAPER",
