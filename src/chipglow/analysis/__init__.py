@@ -12,6 +12,7 @@ from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.lines import Line, sample, straight_line
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
+from chipglow.analysis.rake_grid import RakeGrid, rake_grid
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
 from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear_band
@@ -27,6 +28,7 @@ __all__ = [
     "NoShearBandError",
     "Plan",
     "RakeErrors",
+    "RakeGrid",
     "ReferenceKind",
     "Segmentation",
     "Sensitivity",
@@ -41,6 +43,7 @@ __all__ = [
     "find_shear_band",
     "inertia",
     "rake_errors",
+    "rake_grid",
     "reference_temperature",
     "sample",
     "segmentation",
