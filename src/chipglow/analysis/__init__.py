@@ -12,6 +12,7 @@ from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.lines import Line, sample, straight_line
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
+from chipglow.analysis.rake_grid import RakeGrid, rake_grid
 from chipglow.analysis.ridge import NoShearBandError
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
@@ -28,6 +29,7 @@ __all__ = [
     "NoShearBandError",
     "Plan",
     "RakeErrors",
+    "RakeGrid",
     "ReferenceKind",
     "Segmentation",
     "Sensitivity",
@@ -42,6 +44,7 @@ __all__ = [
     "find_shear_band",
     "inertia",
     "rake_errors",
+    "rake_grid",
     "reference_temperature",
     "sample",
     "segmentation",
