@@ -1,6 +1,8 @@
 """Analysis: errors of the measurement, the rake face, the shear band and the segments."""
 
 from chipglow.analysis.band_error import BandErrors, band_errors
+from chipglow.analysis.band_profile import BandProfile, Stage, band_profile
+from chipglow.analysis.band_ridge import ThermalImage, find_band
 from chipglow.analysis.chip import ChipMetrics, ChipScan, chip_metrics
 from chipglow.analysis.error import (
     ErrorImages,
@@ -21,6 +23,7 @@ from chipglow.analysis.shear_band import ShearBand, find_shear_band
 __all__ = [
     "PAPER",
     "BandErrors",
+    "BandProfile",
     "ChipMetrics",
     "ChipScan",
     "ErrorImages",
@@ -35,12 +38,16 @@ __all__ = [
     "Sensitivity",
     "Setting",
     "ShearBand",
+    "Stage",
     "StudyResult",
+    "ThermalImage",
     "analyse",
     "band_errors",
+    "band_profile",
     "chip_metrics",
     "contact_length",
     "error_images",
+    "find_band",
     "find_shear_band",
     "inertia",
     "rake_errors",

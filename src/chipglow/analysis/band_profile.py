@@ -12,7 +12,7 @@ from scipy.ndimage import map_coordinates
 
 from chipglow.analysis.band_ridge import ThermalImage, find_band
 from chipglow.analysis.lines import Line, sample
-from chipglow.analysis.ridge import NoShearBandError, normals_of
+from chipglow.analysis.ridge import NoShearBandError, arc_length, normals_of
 from chipglow.camera import Measurement
 from chipglow.scene import Tool
 
@@ -47,10 +47,10 @@ class BandProfile:
     Parameters
     ----------
     reference : Line
-        The curve of the fully developed band; the distance in m counts from the cutting edge, or
-        from the first point of a given curve.
+        The curve of the fully developed band, with distances as below.
     distance : ndarray
-        Distances in m, common to all frames, shape (n,).
+        Distances in m, common to all frames, shape (n,): from the cutting edge straight to the
+        curve's first point, then along the curve.
     points : ndarray
         Where they are in each frame, x and y in m, shape (frames, n, 2); NaN where the frame's
         band does not reach.
@@ -122,7 +122,7 @@ def band_profile(
     measurement: Measurement,
     tool: Tool,
     frames: Sequence[int] | None = None,
-    curve: Line | None = None,
+    curve: NDArray[np.float64] | None = None,
     reference: int | None = None,
     width: float | None = None,
     position: float | None = None,
@@ -137,9 +137,9 @@ def band_profile(
         The tool, in the measurement's coordinates.
     frames : sequence of int, optional
         Numbers of the frames; all by default.
-    curve : Line, optional
-        Where to read, in all frames, from the cutting edge outward. By default the ridge that
-        `find_band` finds in each frame.
+    curve : ndarray, optional
+        Corners of a polyline along which to read all frames, from the cutting edge outward, x and
+        y in m, shape (k, 2). By default the ridge that `find_band` finds in each frame.
     reference : int, optional
         Number of the frame whose band is fully developed. By default the given curve is its place;
         without a curve, the frame with the hottest band of those that begin at the edge.
@@ -174,13 +174,14 @@ def band_profile(
             raise ValueError(f"band profile: {name} is {value!r} m, expected 0 m or more")
     numbers = _numbers(measurement, frames)
     images = _Images(measurement)
+    given = None if curve is None else _given(curve, tool, pitch)
     found, reason = _found(images, tool, numbers)
     notes: list[str] = []
-    if curve is None and not any(found):
+    if given is None and not any(found):
         raise NoShearBandError(reason if numbers.size == 1 else _none(numbers.size, reason))
-    base = _reference(measurement, images, tool, found, numbers, curve, reference, notes)
-    lines = found if curve is None else [curve] * numbers.size
-    distance = _common(lines, pitch)
+    base = _reference(measurement, images, tool, found, numbers, given, reference, notes)
+    lines = found if given is None else [given] * numbers.size
+    distance = _common(lines, pitch) if given is None else given.distance
     points = np.stack([_laid(line, distance) for line in lines])
     reader = _Reader(measurement, images, width, position)
     read = [reader(int(k), p) for k, p in zip(numbers, points, strict=True)]
@@ -234,6 +235,27 @@ def _numbers(measurement: Measurement, frames: Sequence[int] | None) -> NDArray[
     return numbers
 
 
+def _given(curve: NDArray[np.float64], tool: Tool, pitch: float) -> Line:
+    """A given polyline at steps of half a pixel."""
+    if curve.ndim != 2 or curve.shape[1] != 2 or len(curve) < 2 or not np.isfinite(curve).all():
+        raise ValueError(
+            f"curve: points of shape {curve.shape}, expected 2 or more of x and y, all finite"
+        )
+    first, last = np.hypot(*(curve[[0, -1]] - tool.edge_point).T).tolist()
+    if first > last:
+        raise ValueError(
+            f"curve: it begins {first * 1e6:.4g} µm from the cutting edge and ends "
+            f"{last * 1e6:.4g} µm from it, expected from the edge outward"
+        )
+    corners = first + arc_length(curve)
+    if (np.diff(corners) <= 0).any():
+        raise ValueError("curve: two points are the same, expected each apart from the one before")
+    steps = max(round((corners[-1] - first) / (_STEP * pitch)), 2)
+    distance = np.linspace(first, corners[-1], steps + 1)
+    columns = [np.interp(distance, corners, curve[:, axis]) for axis in (0, 1)]
+    return Line(distance, np.stack(columns, axis=1))
+
+
 def _found(
     images: _Images, tool: Tool, numbers: NDArray[np.int64]
 ) -> tuple[list[Line | None], str]:
@@ -259,7 +281,7 @@ def _reference(
     tool: Tool,
     found: list[Line | None],
     numbers: NDArray[np.int64],
-    curve: Line | None,
+    given: Line | None,
     reference: int | None,
     notes: list[str],
 ) -> Line:
@@ -267,9 +289,9 @@ def _reference(
     if reference is not None:
         _numbers(measurement, [reference])
         return find_band(images[reference], tool)
-    if curve is not None:
+    if given is not None:
         notes.append("Assumed: the given curve is the place of the fully developed band.")
-        return curve
+        return given
     pitch = measurement.raster.spacing
     bands = [(line, k) for line, k in zip(found, numbers.tolist(), strict=True) if line]
     near = [(line, k) for line, k in bands if line.distance[0] < NEAR_THE_EDGE * pitch]
@@ -296,7 +318,7 @@ def _mean(measurement: Measurement, line: Line, number: int) -> float:
 
 
 def _common(lines: Sequence[Line | None], pitch: float) -> NDArray[np.float64]:
-    """Distances that cover all lines, at steps of half a pixel, or those of the one given line."""
+    """Distances that cover all lines, at steps of half a pixel."""
     first = min(float(line.distance[0]) for line in lines if line)
     last = max(float(line.distance[-1]) for line in lines if line)
     step = _STEP * pitch
@@ -363,8 +385,11 @@ class _Reader:
 
     def _position(self, number: int, curve: NDArray[np.float64]) -> NDArray[np.float64]:
         image = self.images[number]
-        down, across = np.gradient(image.temperature, self.pitch)
-        squared = map_coordinates(down**2 + across**2, image.index(curve), order=1, mode="nearest")
+        slopes = (
+            map_coordinates(slope, image.index(curve), order=1, mode="nearest")
+            for slope in np.gradient(image.temperature, self.pitch)
+        )
+        squared = sum(slope**2 for slope in slopes)
         ahead, here, behind = (
             map_coordinates(image.temperature, image.index(place), order=1, mode="nearest")
             for place in (curve + self.pitch * k * normals_of(curve) for k in (-1, 0, 1))

@@ -1,6 +1,7 @@
 """Readers and writers: scenes, measurements, and output that is whole or not there."""
 
 from chipglow.io.atomic import atomic_folder, atomic_path
+from chipglow.io.band_file import check_band_profile_path, read_curve, write_band_profile
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
 from chipglow.io.movie_file import check_movie_path, movie_writer
@@ -23,15 +24,18 @@ __all__ = [
     "View",
     "atomic_folder",
     "atomic_path",
+    "check_band_profile_path",
     "check_movie_path",
     "import_scene",
     "movie_writer",
     "open_scene",
     "prospect",
+    "read_curve",
     "read_measurement",
     "read_scene",
     "read_tool_outline",
     "unfinished_scenes",
+    "write_band_profile",
     "write_dataset",
     "write_measurement",
     "write_scene",

@@ -1,5 +1,6 @@
 """The report: the paper's figures beside ours, as a page, pictures, numbers and arrays; movies."""
 
+from chipglow.report.band_figure import draw_band_profile
 from chipglow.report.comparison import Row, comparison_rows
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
 from chipglow.report.report import write_report
@@ -22,6 +23,7 @@ __all__ = [
     "ShownField",
     "comparison_rows",
     "cut_movie",
+    "draw_band_profile",
     "draw_scene",
     "scene_summary",
     "write_report",
