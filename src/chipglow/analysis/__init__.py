@@ -10,6 +10,7 @@ from chipglow.analysis.error import (
     error_images,
     reference_temperature,
 )
+from chipglow.analysis.find_tool import FoundTool, find_tool
 from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.lines import Line, sample, straight_line
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
@@ -27,6 +28,7 @@ __all__ = [
     "ChipMetrics",
     "ChipScan",
     "ErrorImages",
+    "FoundTool",
     "Inertia",
     "Line",
     "NoShearBandError",
@@ -49,6 +51,7 @@ __all__ = [
     "error_images",
     "find_band",
     "find_shear_band",
+    "find_tool",
     "inertia",
     "rake_errors",
     "rake_grid",

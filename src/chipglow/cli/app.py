@@ -9,6 +9,7 @@ from typing import Annotated, Final
 import typer
 
 from chipglow.cli.boundary import Boundary
+from chipglow.cli.rake import rake
 from chipglow.cli.shearband import shearband
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
@@ -239,6 +240,7 @@ def materials(
 
 
 app.command("shearband")(shearband)
+app.command("rake")(rake)
 
 
 @cache_app.command("list")

@@ -5,6 +5,7 @@ from chipglow.io.band_file import check_band_profile_path, read_curve, write_ban
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
 from chipglow.io.movie_file import check_movie_path, movie_writer
+from chipglow.io.rake_grid_file import check_rake_grid_path, write_rake_grid
 from chipglow.io.scene_file import (
     FORMAT_VERSION,
     SceneWriter,
@@ -26,6 +27,7 @@ __all__ = [
     "atomic_path",
     "check_band_profile_path",
     "check_movie_path",
+    "check_rake_grid_path",
     "import_scene",
     "movie_writer",
     "open_scene",
@@ -38,5 +40,6 @@ __all__ = [
     "write_band_profile",
     "write_dataset",
     "write_measurement",
+    "write_rake_grid",
     "write_scene",
 ]
