@@ -4,6 +4,17 @@ from chipglow.analysis.band_error import BandErrors, band_errors
 from chipglow.analysis.band_profile import BandProfile, Stage, band_profile
 from chipglow.analysis.band_ridge import ThermalImage, find_band
 from chipglow.analysis.chip import ChipMetrics, ChipScan, chip_metrics
+from chipglow.analysis.comparison import (
+    BandComparison,
+    Comparison,
+    Doubts,
+    Fit,
+    GridComparison,
+    PlaceResult,
+    Reading,
+    compare,
+    normalised_error,
+)
 from chipglow.analysis.error import (
     ErrorImages,
     ReferenceKind,
@@ -23,18 +34,25 @@ from chipglow.analysis.shear_band import ShearBand, find_shear_band
 
 __all__ = [
     "PAPER",
+    "BandComparison",
     "BandErrors",
     "BandProfile",
     "ChipMetrics",
     "ChipScan",
+    "Comparison",
+    "Doubts",
     "ErrorImages",
+    "Fit",
     "FoundTool",
+    "GridComparison",
     "Inertia",
     "Line",
     "NoShearBandError",
+    "PlaceResult",
     "Plan",
     "RakeErrors",
     "RakeGrid",
+    "Reading",
     "ReferenceKind",
     "Segmentation",
     "Sensitivity",
@@ -47,12 +65,14 @@ __all__ = [
     "band_errors",
     "band_profile",
     "chip_metrics",
+    "compare",
     "contact_length",
     "error_images",
     "find_band",
     "find_shear_band",
     "find_tool",
     "inertia",
+    "normalised_error",
     "rake_errors",
     "rake_grid",
     "reference_temperature",

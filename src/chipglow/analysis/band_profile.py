@@ -58,7 +58,8 @@ class BandProfile:
         Mean radiance temperature in K over the width, shape (frames, n); NaN where a pixel in it
         is not usable.
     calibration : ndarray
-        Its standard uncertainty in K from the calibration, common to all, of the same shape.
+        Its standard uncertainty in K from the calibration, common to all, of the same shape; 0
+        where the measurement tells none.
     position : ndarray
         Its standard uncertainty in K from the position of the curve, of the same shape.
     offset : ndarray
@@ -190,11 +191,6 @@ def band_profile(
         raise ValueError(
             "shear band: no point of the curve is on usable pixels in any frame, expected a curve "
             "in the image where the chip is hotter than the camera's floor"
-        )
-    if measurement.calibration_uncertainty is None:
-        notes.append(
-            "Doubtful: the measurement does not tell the uncertainty of its calibration; the "
-            "uncertainty is that of the position only."
         )
     offset = np.array([_offset(line, base) for line in found])
     return BandProfile(

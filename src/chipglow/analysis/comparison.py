@@ -140,6 +140,11 @@ class PlaceResult:
     confidence: float
 
     @property
+    def is_sure(self) -> bool:
+        """Whether the best one is best in `SURE` of the draws."""
+        return self.confidence >= SURE
+
+    @property
     def sentence(self) -> str:
         """Which simulation fits here, in one sentence from the numbers."""
         best = self.fits[self.best]
@@ -152,7 +157,7 @@ class PlaceResult:
             for fit in others
         )
         how = f"{100 * self.confidence:.3g} % of the draws of the uncertainties"
-        if self.confidence >= SURE:
+        if self.is_sure:
             return f"{_upper(self.place)} {best.label} fits best (in {how}): it is {what}; {rest}."
         return (
             f"{_upper(self.place)} the sets cannot be told apart ({best.label} is nearest, in "
@@ -235,6 +240,23 @@ class Comparison:
     band: BandComparison | None
     places: tuple[PlaceResult, ...]
     notes: tuple[str, ...]
+
+    @property
+    def statement(self) -> str:
+        """Which simulation fits where, as the paper's conclusion says it."""
+        if len(self.labels) == 1:
+            agreeing = sum(result.fits[0].agreeing for result in self.places)
+            count = sum(result.fits[0].count for result in self.places)
+            return f"{self.labels[0]}: {agreeing} of {count} values agree (E_n up to 1)."
+        parts = []
+        for i, label in enumerate(self.labels):
+            where = [r.place.rstrip(",") for r in self.places if r.is_sure and r.best == i]
+            if where:
+                parts.append(f"{label} fits best {'; '.join(where)}.")
+        unsure = [r.place.rstrip(",") for r in self.places if not r.is_sure]
+        if unsure:
+            parts.append(f"The sets cannot be told apart {'; '.join(unsure)}.")
+        return " ".join(parts)
 
 
 @dataclass(frozen=True)
@@ -458,15 +480,19 @@ def _compare_band(
 def _along(
     name: str, profile: BandProfile, distance: NDArray[np.float64], notes: list[str]
 ) -> tuple[NDArray[np.float64], ...]:
-    """Means over the frames: temperature, calibration, position; and that of the mean itself."""
+    """Means over the frames: temperature, calibration, position; and that of the mean itself.
+
+    Where a single frame reaches, the variance between frames is the mean of it where several do.
+    """
     used = profile.in_place
+    notes.extend(f"{note} ({name})" for note in profile.notes)
     if not used.any():
         notes.append(
             f"Doubtful: {name}: no frame has a band that is in place; all frames are used."
         )
         used = np.ones(used.size, np.bool_)
     elif used.sum() < _FEW:
-        notes.append(_few_frames(f"{name}, shear band", int(used.sum())))
+        notes.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
     fields = (profile.temperature, profile.calibration, profile.position)
     read = [
         np.stack([_at(distance, profile.distance, row) for row in field[used]]) for field in fields
@@ -475,7 +501,10 @@ def _along(
     count = known.sum(axis=0)
     mean, calibration, position = (_mean(field, known) for field in read)
     squares = np.where(known, (read[0] - mean) ** 2, 0.0).sum(axis=0)
-    variance = np.divide(squares, count - 1, out=np.zeros_like(squares), where=count > 1)
+    several = count > 1
+    variance = np.divide(squares, count - 1, out=np.zeros_like(squares), where=several)
+    if several.any():
+        variance[count == 1] = variance[several].mean()
     return mean, calibration, position, np.sqrt(variance / np.maximum(count, 1))
 
 

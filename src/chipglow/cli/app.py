@@ -9,6 +9,7 @@ from typing import Annotated, Final
 import typer
 
 from chipglow.cli.boundary import Boundary
+from chipglow.cli.compare import compare
 from chipglow.cli.rake import rake
 from chipglow.cli.shearband import shearband
 
@@ -241,6 +242,7 @@ def materials(
 
 app.command("shearband")(shearband)
 app.command("rake")(rake)
+app.command("compare")(compare)
 
 
 @cache_app.command("list")

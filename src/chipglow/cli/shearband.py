@@ -112,6 +112,11 @@ def shearband(
     console.print(_table(profile))
     for note in profile.notes:
         console.print(note)
+    if measured.calibration_uncertainty is None:
+        console.print(
+            "Doubtful: the measurement does not tell the uncertainty of its calibration; the "
+            "uncertainty is that of the position only."
+        )
     if out is not None:
         write_band_profile(profile, out)
         print(out)

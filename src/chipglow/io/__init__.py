@@ -2,6 +2,7 @@
 
 from chipglow.io.atomic import atomic_folder, atomic_path
 from chipglow.io.band_file import check_band_profile_path, read_curve, write_band_profile
+from chipglow.io.comparison_file import write_comparison
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
 from chipglow.io.movie_file import check_movie_path, movie_writer
@@ -38,6 +39,7 @@ __all__ = [
     "read_tool_outline",
     "unfinished_scenes",
     "write_band_profile",
+    "write_comparison",
     "write_dataset",
     "write_measurement",
     "write_rake_grid",

@@ -1,6 +1,7 @@
 """The report: the paper's figures beside ours, as a page, pictures, numbers and arrays; movies."""
 
 from chipglow.report.band_figure import draw_band_profile
+from chipglow.report.compare_figure import draw_comparison
 from chipglow.report.comparison import Row, comparison_rows
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
 from chipglow.report.rake_figure import draw_rake_grid
@@ -25,6 +26,7 @@ __all__ = [
     "comparison_rows",
     "cut_movie",
     "draw_band_profile",
+    "draw_comparison",
     "draw_rake_grid",
     "draw_scene",
     "scene_summary",
