@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from chipglow.analysis import find_tool, rake_grid
 from chipglow.camera import Camera, GaussianPSF, Measurement
 from chipglow.cli import app
-from chipglow.io import write_measurement
+from chipglow.io import read_measurement, write_measurement
 from chipglow.radiometry import Band
 from chipglow.scene import PlacedTool, Raster, ToolGeometry
 from chipglow.surface import CHIP_1, CHIP_2
@@ -161,7 +161,9 @@ def test_a_given_and_a_found_tool(folder):
     assert code == 0 and "over a square's pixels" in given
     code, found, _ = command("real.nc", "--tool", "found", "--frame", "0")
     assert code == 0
-    assert "Found: rake angle -7" in found and "Assumed: clearance angle 7 deg" in found
+    angle = degrees(find_tool(read_measurement(folder / "real.nc")).tool.rake_angle)
+    assert f"Found: rake angle {angle:.1f} ± " in found
+    assert "Assumed: clearance angle 7 deg, edge radius 20 um." in found
 
 
 @pytest.mark.parametrize(

@@ -103,7 +103,7 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
     if rows.size < _FEWEST_ROWS:
         raise _not_found(f"only {rows.size} rows of the image show one")
     fit = _fit(image, rows, _best_start(image, rows, start))
-    rows = rows[_good_rows(_residuals(fit, image, rows))]
+    rows = rows[_good_rows(_Strip.along(fit, image, rows).residuals(fit))]
     fit = _fit(image, rows, fit)
     angle_error, place_error = _jackknife(image, rows, fit)
     angle = atan(fit[1])
@@ -223,14 +223,47 @@ def _remainder(windows: NDArray[np.float64], basis: NDArray[np.float64]) -> NDAr
     return np.asarray(windows - np.einsum("...sk,...k->...s", frame, parts))
 
 
-def _windows(
-    line: NDArray[np.float64], image: NDArray[np.float64], rows: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Pixels of rows beside a line, and where in them the line is; nothing is resampled."""
-    place = line[0] + line[1] * _up(image, rows)
-    nearest = np.clip(np.rint(place).astype(np.int64), _REACH, image.shape[1] - 1 - _REACH)
-    columns = nearest[:, None] + np.arange(-_REACH, _REACH + 1)
-    return image[rows[:, None], columns], place - nearest
+@dataclass(frozen=True)
+class _Strip:
+    """Pixels of rows beside a line; nothing is resampled.
+
+    Parameters
+    ----------
+    windows : ndarray
+        Radiance, shape (rows, pixels).
+    middle : ndarray
+        Column of each window's middle pixel, shape (rows,).
+    up : ndarray
+        Rows counted up from the image's middle one, shape (rows,).
+    level : ndarray
+        Level of each window's radiance, shape (rows,).
+    """
+
+    windows: NDArray[np.float64]
+    middle: NDArray[np.float64]
+    up: NDArray[np.float64]
+    level: NDArray[np.float64]
+
+    @classmethod
+    def along(
+        cls, line: NDArray[np.float64], image: NDArray[np.float64], rows: NDArray[np.int64]
+    ) -> "_Strip":
+        up = _up(image, rows)
+        nearest = np.rint(line[0] + line[1] * up).astype(np.int64)
+        middle = np.clip(nearest, _REACH, image.shape[1] - 1 - _REACH)
+        windows = image[rows[:, None], middle[:, None] + np.arange(-_REACH, _REACH + 1)]
+        level = windows.mean(axis=-1) + _DARK * np.percentile(image, 99.0)
+        return cls(windows, middle.astype(np.float64), up, level)
+
+    def place(self, line: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where a line is in each window, from its middle pixel."""
+        return np.asarray(line[0] + line[1] * self.up - self.middle, dtype=np.float64)
+
+    def residuals(self, line: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What the model leaves of each row, as a share of its level, shape (rows, pixels)."""
+        steps = np.arange(-_REACH, _REACH + 1.0) - self.place(line)[:, None]
+        left = _remainder(self.windows, _decays(steps, float(line[2])))
+        return np.asarray(left / self.level[:, None])
 
 
 def _rows_with_face(image: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -238,21 +271,10 @@ def _rows_with_face(image: NDArray[np.float64], line: NDArray[np.float64]) -> ND
     every = np.arange(image.shape[0], dtype=np.int64)
     place = line[0] + line[1] * _up(image, every)
     rows = every[(place > _REACH) & (place < image.shape[1] - 1 - _REACH)]
-    windows, offset = _windows(line, image, rows)
-    gain = _gain(windows, offset, line[2], image)
+    strip = _Strip.along(line, image, rows)
+    gain = _gain(strip.windows, strip.place(line), line[2], image)
     typical = np.median(np.sort(gain)[-rows.size // 2 :])
     return np.asarray(rows[gain > _HAS_FACE * typical], dtype=np.int64)
-
-
-def _residuals(
-    line: NDArray[np.float64], image: NDArray[np.float64], rows: NDArray[np.int64]
-) -> NDArray[np.float64]:
-    """What the model leaves of each row, as a share of the row's level, shape (rows, pixels)."""
-    windows, place = _windows(line, image, rows)
-    steps = np.arange(-_REACH, _REACH + 1.0)
-    left = _remainder(windows, _decays(steps - place[:, None], float(line[2])))
-    level = windows.mean(axis=-1) + _DARK * np.percentile(image, 99.0)
-    return np.asarray(left / level[:, None])
 
 
 def _best_start(
@@ -264,7 +286,7 @@ def _best_start(
         for place in np.linspace(-4.0, 4.0, 17)
         for slope in np.linspace(-_ROOM, _ROOM, 9)
     ]
-    left = [float(np.abs(_residuals(line, image, rows)).sum()) for line in lines]
+    left = [np.abs(_Strip.along(line, image, rows).residuals(line)).sum() for line in lines]
     return np.asarray(lines[int(np.argmin(left))], dtype=np.float64)
 
 
@@ -272,11 +294,13 @@ def _fit(
     image: NDArray[np.float64], rows: NDArray[np.int64], start: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Column in the middle row, slope and width of the blur in pixels."""
+    # Windows that moved with the line would make the sum of squares jump.
+    strip = _Strip.along(start, image, rows)
     room = np.array([3.0, _ROOM])
     lower, upper = start[:2] - room, start[:2] + room
     middle = float(np.clip(start[2], 0.5, 2.9))
     found = least_squares(
-        lambda line: _residuals(line, image, rows).ravel(),
+        lambda line: strip.residuals(line).ravel(),
         [start[0], start[1], middle],
         bounds=([*lower, 0.4], [*upper, 3.0]),
         x_scale=[1.0, 0.05, 1.0],
@@ -315,7 +339,7 @@ def _tip_row(
 ) -> tuple[float, bool]:
     """Row in which the radiance on the face has fallen to half, and whether it is seen to."""
     every = np.arange(image.shape[0])
-    windows, _ = _windows(line, image, every)
+    windows = _Strip.along(line, image, every).windows
     level = windows[:, _REACH - 1 : _REACH + 2].mean(axis=-1)
     hottest = int(rows[level[rows].argmax()])
     below = np.flatnonzero(level[hottest:] < level[hottest] / 2)

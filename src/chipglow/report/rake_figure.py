@@ -28,14 +28,17 @@ def draw_rake_grid(measurement: Measurement, grid: RakeGrid) -> Figure:
         What the grid was read from.
     grid : RakeGrid
         The grid. Of several frames their mean is drawn, with bars of one standard deviation
-        between frames; of one frame, with bars of one standard deviation over a square's pixels.
+        between frames, and hollow where a square is usable in some of the frames only; of one
+        frame, with bars of one standard deviation over a square's pixels.
     """
     with drawing.style():
         figure = drawing.new_figure(_HEIGHT)
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
         _draw_image(figure, left, measurement, grid)
         _draw_profiles(right, grid)
-        figure.legend(loc="outside lower right", ncols=grid.depth.size, title="depth into the chip")
+        partly = ((grid.frame_count > 0) & (grid.frame_count < grid.times.size)).any()
+        title = "depth into the chip" + "; hollow: usable in some frames only" * bool(partly)
+        figure.legend(loc="outside lower right", ncols=grid.depth.size, title=title)
     return figure
 
 
@@ -76,18 +79,23 @@ def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
         if not grid.usable[:, m].any():
             continue
         aside = _ASIDE * (m - (grid.depth.size - 1) / 2) * grid.size
+        along = 1e6 * (grid.along + aside)
+        marker = _MARKERS[m % len(_MARKERS)]
         axes.errorbar(
-            1e6 * (grid.along + aside),
+            along,
             mean[m],
             np.nan_to_num(bars[m]),
             color=colours[m],
-            marker=_MARKERS[m % len(_MARKERS)],
+            marker=marker,
             markersize=4,
             linewidth=1.2,
             elinewidth=0.8,
             capsize=2,
             label=f"{1e6 * depth:.3g} µm",
         )
+        partly = grid.frame_count[m] < grid.times.size
+        hollow = {"color": colours[m], "markerfacecolor": "white", "linestyle": "none"}
+        axes.plot(along[partly], mean[m, partly], marker=marker, markersize=4, zorder=3, **hollow)
     axes.set_xlabel("distance along the rake face / µm")
     axes.set_ylabel("radiance temperature / °C")
     over = f"between {grid.times.size} frames" if several else "in a square"
