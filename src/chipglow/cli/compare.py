@@ -23,11 +23,12 @@ def compare(
         ),
     ],
     tool: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
-            metavar="FILE",
-            help="The tool in the measurement, a YAML file with the keys of a study's cutting.tool "
-            "and tip; by default what the measurement tells.",
+            metavar="FILE|found",
+            help="The tool, a YAML file with the keys of a study's cutting.tool and tip; or "
+            "'found', to look for the rake face in the image; by default what the measurement "
+            "tells, as a simulated one does.",
         ),
     ] = None,
     curve: Annotated[
@@ -86,9 +87,9 @@ def compare(
 
     from chipglow.analysis import compare as compare_all
     from chipglow.cli.pictures import check_picture_path, write_picture
+    from chipglow.cli.tools import chosen_tool
     from chipglow.io import read_curve
     from chipglow.report import draw_comparison
-    from chipglow.study import tool_of
     from chipglow.study.measured import load_measurement
 
     if plot is not None:
@@ -100,16 +101,17 @@ def compare(
             f"--uncertainty: {uncertainty} beside the uncertainty that {measured} tells, "
             "expected one or the other"
         )
+    placed, remarks = chosen_tool(whole, tool)
     result = compare_all(
         whole,
         _labelled(simulated),
-        tool_of(whole, tool),
+        placed,
         None if curve is None else read_curve(curve),
         doubts,
     )
     console = Console(highlight=False, markup=False)
     console.print(_table(result))
-    for text in (*result.notes, "", *(place.sentence for place in result.places)):
+    for text in (*remarks, *result.notes, "", *(place.sentence for place in result.places)):
         console.print(text)
     console.print(f"\n{result.statement}")
     if out is not None:

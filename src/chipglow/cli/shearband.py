@@ -32,11 +32,12 @@ def shearband(
         ),
     ] = None,
     tool: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
-            metavar="FILE",
-            help="The tool, a YAML file with the keys of a study's cutting.tool and tip; by "
-            "default what the measurement tells, as a simulated one does.",
+            metavar="FILE|found",
+            help="The tool, a YAML file with the keys of a study's cutting.tool and tip; or "
+            "'found', to look for the rake face in the image; by default what the measurement "
+            "tells, as a simulated one does.",
         ),
     ] = None,
     reference: Annotated[
@@ -87,9 +88,9 @@ def shearband(
     from chipglow.cli.lengths import parse_length
     from chipglow.cli.pictures import check_picture_path, write_picture
     from chipglow.cli.times import frame_at
+    from chipglow.cli.tools import chosen_tool
     from chipglow.io import check_band_profile_path, read_curve, write_band_profile
     from chipglow.report import draw_band_profile
-    from chipglow.study import tool_of
     from chipglow.study.measured import load_measurement
 
     if plot is not None:
@@ -98,7 +99,7 @@ def shearband(
         check_band_profile_path(out)
     measured = load_measurement(measurement, settings or ())
     times = measured.times
-    placed = tool_of(measured, tool)
+    placed, remarks = chosen_tool(measured, tool)
     profile = band_profile(
         measured,
         placed,
@@ -110,7 +111,7 @@ def shearband(
     )
     console = Console(highlight=False, markup=False)
     console.print(_table(profile))
-    for note in profile.notes:
+    for note in (*remarks, *profile.notes):
         console.print(note)
     if measured.calibration_uncertainty is None:
         console.print(
