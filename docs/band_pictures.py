@@ -17,7 +17,7 @@ from chipglow.scene import Scene
 HERE = Path(__file__).parent
 FRAMES = 9
 EXPERIMENT = chipglow.FeatureSurface(
-    chip=chipglow.Emissivity(0.66, 0.05), shear_band=chipglow.Emissivity(0.60, 0.05), seed=77
+    chip=chipglow.Emissivity(0.68, 0.04), shear_band=chipglow.Emissivity(0.56, 0.04), seed=77
 )
 
 

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import trapezoid
 from scipy.ndimage import map_coordinates
 
 from chipglow.analysis.band_ridge import ThermalImage, find_band
@@ -16,7 +17,7 @@ from chipglow.analysis.ridge import NoShearBandError, arc_length, normals_of
 from chipglow.camera import Measurement
 from chipglow.scene import Tool
 
-NEAR_THE_EDGE: Final = 10.0
+NEAR_THE_EDGE: Final = 15.0
 """Distance from the edge in pixels within which a band has not left it."""
 
 MOVED: Final = 1.0
@@ -143,7 +144,8 @@ def band_profile(
         y in m, shape (k, 2). By default the ridge that `find_band` finds in each frame.
     reference : int, optional
         Number of the frame whose band is fully developed. By default the given curve is its place;
-        without a curve, the frame with the hottest band of those that begin at the edge.
+        without a curve, the frame in which the band that begins near the edge has the greatest
+        integral of its temperature over the camera's floor.
     width : float, optional
         Width across the curve in m over which to average; a pixel by default.
     position : float, optional
@@ -293,24 +295,24 @@ def _reference(
     near = [(line, k) for line, k in bands if line.distance[0] < NEAR_THE_EDGE * pitch]
     if not near:
         notes.append(
-            "Doubtful: no band begins at the cutting edge, so that all may have moved; the stages "
-            "are judged against the hottest one."
+            "Doubtful: no band begins near the cutting edge, so that all may have moved; the "
+            "stages are judged against the hottest and longest one."
         )
-    line, number = max(near or bands, key=lambda band: _mean(measurement, *band))
+    line, number = max(near or bands, key=lambda band: _heat(measurement, *band))
     if near:
         notes.append(
             f"Assumed: the band at {measurement.times[number] * 1e6:.6g} µs is fully developed: "
-            "it is the hottest of those that begin at the cutting edge."
+            "it is the hottest and longest of those that begin near the cutting edge."
         )
     return line
 
 
-def _mean(measurement: Measurement, line: Line, number: int) -> float:
-    """Mean radiance temperature along a line of a frame in K."""
+def _heat(measurement: Measurement, line: Line, number: int) -> float:
+    """Integral along a line of a frame of the temperature over the camera's floor in K m."""
     frame = measurement.data["radiance_temperature"][number].values
-    values = sample(frame, measurement.raster, line.points)
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if known.size else -np.inf
+    floor = float(measurement.data.attrs.get("floor", np.nanmin(frame)))
+    values = np.nan_to_num(sample(frame, measurement.raster, line.points) - floor)
+    return float(trapezoid(values, line.distance))
 
 
 def _common(lines: Sequence[Line | None], pitch: float) -> NDArray[np.float64]:

@@ -190,14 +190,19 @@ def _path(image: ThermalImage, response: NDArray[np.float64], tool: Tool) -> NDA
 def _unbroken(
     points: NDArray[np.float64], score: NDArray[np.float64], longest: float
 ) -> NDArray[np.float64]:
-    """The strongest part of a path between stretches without a ridge that are too long."""
+    """The strongest part of a path between stretches without a ridge that are too long.
+
+    It begins where the ridge does: near the edge the heat of the rake face may hide it.
+    """
     weak = score < _WEAK * np.median(score)
     ends = np.flatnonzero(np.diff(np.concatenate([[False], weak, [False]]).astype(np.int8)))
     along = arc_length(points)
     gaps = [(a, b) for a, b in ends.reshape(-1, 2) if along[b - 1] - along[a] > longest]
     bounds = [0, *(int(end) for gap in gaps for end in gap), score.size]
     parts = [slice(a, b) for a, b in zip(bounds[::2], bounds[1::2], strict=True)]
-    return points[max(parts, key=lambda part: float(score[part].sum()))]
+    best = max(parts, key=lambda part: float(score[part].sum()))
+    strong = np.flatnonzero(~weak[best])
+    return points[best][strong[0] : strong[-1] + 1]
 
 
 def _climbed(
