@@ -24,6 +24,8 @@ from chipglow.analysis import (
 from chipglow.camera import Flag, Measurement
 from chipglow.cli import app
 from chipglow.io import read_curve, write_measurement
+from chipglow.report import draw_band_profile
+from chipglow.scene import PlacedTool
 
 PITCH = RASTER.spacing
 X, Y = np.meshgrid(RASTER.x, RASTER.y)
@@ -244,6 +246,38 @@ def test_a_given_curve_is_the_place_of_the_reference():
     np.testing.assert_array_equal(profile.points[0], profile.points[1])
 
 
+def test_a_single_band_has_a_doubtful_stage():
+    profile = band_profile(measured([BandImage().temperature(), NO_BANDS["uniform"]]), TOOL)
+    assert profile.notes == (
+        "Doubtful: one frame has a band; without another its stage says nothing.",
+    )
+
+
+def test_without_a_band_near_the_edge_the_stages_are_doubtful():
+    image = BandImage()
+    along, _ = image.place(np.stack([X, Y], axis=-1))
+    temperature = np.where(along > 150e-6, image.temperature(), 600.0)
+    profile = band_profile(measured([temperature, temperature + 5.0]), TOOL)
+    assert profile.stage == (Stage.DEVELOPED, Stage.DEVELOPED)
+    assert any(note.startswith("Doubtful: no band begins near") for note in profile.notes)
+
+
+def test_a_tool_far_outside_the_image_is_one_error():
+    with pytest.raises(ValueError, match=r"^tool: its edge at x 1e\+06 µm, .* outside the image"):
+        band_profile(measured([BandImage().temperature()]), PlacedTool(TOOL, (1.0, 0.0)))
+
+
+def test_a_coarse_image_of_a_wide_band_is_searched_as_well():
+    raster = replace(RASTER, spacing=30e-6, left=-2.1e-3, top=1.8e-3)
+    x, y = np.meshgrid(raster.x, raster.y)
+    across = ((x - TOOL.edge_point[0]) + (y - TOOL.edge_point[1])) / np.sqrt(2)
+    image = np.where(y > 0, 600.0 + 150.0 * np.exp(-0.5 * (across / 60e-6) ** 2), 500.0)
+    line = find_band(ThermalImage.of(measured([image], raster=raster), 0), TOOL)
+    off = np.abs((line.points - TOOL.edge_point).sum(axis=1)) / np.sqrt(2)
+    middle = (line.distance > 300e-6) & (line.distance < 1.5e-3)
+    assert off[middle].max() < 0.1 * 30e-6
+
+
 # Bad input
 
 
@@ -333,6 +367,13 @@ def test_the_netcdf_file_holds_si_units(file, tmp_path):
     assert 600 < float(data["temperature"].mean()) < 800
     both = np.hypot(data["uncertainty_calibration"], data["uncertainty_position"])
     np.testing.assert_allclose(data["uncertainty"], both)
+
+
+@pytest.mark.parametrize(("count", "names"), [(2, 2), (13, 1)])
+def test_many_frames_are_named_by_their_stage_only(count, names):
+    frames = measured([BandImage(bend=1e-3).temperature()] * count)
+    figure = draw_band_profile(frames, TOOL, band_profile(frames, TOOL, reference=0))
+    assert len(figure.legends[0].get_texts()) == names
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from chipglow.analysis import Doubts, Reading, compare, normalised_error
-from chipglow.camera import Measurement
+from chipglow.camera import Flag, Measurement
 from chipglow.cli import app
 from chipglow.io import write_measurement
 from chipglow.scene import PlacedTool, ToolGeometry
@@ -154,6 +154,21 @@ def test_frames_that_differ_make_the_mean_uncertain():
         assert part is not None
         known = np.isfinite(part.measured.temperature)
         np.testing.assert_allclose(part.measured.random[known], 9.0 / sqrt(3.0), rtol=1e-3)
+
+
+def test_a_pixel_without_light_does_not_take_the_uncertainty_away():
+    clean = frames(field(X, Y), relative_uncertainty=0.02)
+    radiance, flags = clean.radiance.copy(), clean.flags.copy()
+    radiance[0, 20:30, 40:60], flags[0, 20:30, 40:60] = 0.0, Flag.DEAD
+    damaged = Measurement.from_radiance(
+        radiance, BAND, clean.times, RASTER, 573.15, flags, 0.02 * radiance
+    )
+    result = compare(damaged, {"same": frames(field(X, Y))}, TOOL, CURVE)
+    for part in (result.grid, result.band):
+        assert part is not None
+        known = np.isfinite(part.measured.temperature)
+        assert np.isfinite(part.measured.uncertainty[known]).all()
+        assert known.sum() > 30
 
 
 def test_few_frames_and_an_unknown_calibration_are_doubtful():

@@ -299,7 +299,9 @@ def _reference(
             "stages are judged against the hottest and longest one."
         )
     line, number = max(near or bands, key=lambda band: _heat(measurement, *band))
-    if near:
+    if len(bands) == 1:
+        notes.append("Doubtful: one frame has a band; without another its stage says nothing.")
+    elif near:
         notes.append(
             f"Assumed: the band at {measurement.times[number] * 1e6:.6g} µs is fully developed: "
             "it is the hottest and longest of those that begin near the cutting edge."
@@ -375,7 +377,7 @@ class _Reader:
         return np.asarray(sample(frame, self.measurement.raster, places).mean(axis=-1))
 
     def _calibration(self, number: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        if self.measurement.calibration_uncertainty is None:
+        if "calibration_uncertainty" not in self.measurement.data:
             return np.zeros(len(places))
         temperature = self._mean("radiance_temperature", number, places)
         radiance = self._mean("calibration_uncertainty", number, places)

@@ -125,6 +125,8 @@ def find_band(image: ThermalImage, tool: Tool) -> Line:
     ------
     NoShearBandError
         If no ridge is long and prominent enough to be a band.
+    ValueError
+        If the cutting edge is farther from the image than the image is wide or high.
 
     Notes
     -----
@@ -137,6 +139,7 @@ def find_band(image: ThermalImage, tool: Tool) -> Line:
     maximum across it, on a cubic spline, and smoothed by local parabolas.
     """
     pitch = image.raster.spacing
+    _check_edge(image.raster, tool)
     response = _response(image, tool)
     points = _path(image, response, tool)
     coefficients = spline_filter(image.temperature, order=3)
@@ -145,6 +148,17 @@ def find_band(image: ThermalImage, tool: Tool) -> Line:
     points = _within(points, image)
     _check(points, image, coefficients)
     return Line(arc_length(points) + float(np.hypot(*(points[0] - tool.edge_point))), points)
+
+
+def _check_edge(raster: Raster, tool: Tool) -> None:
+    x, y = tool.edge_point
+    left, right, bottom, top = raster.extent
+    away = max(left - x, x - right, bottom - y, y - top)
+    if away > max(right - left, top - bottom):
+        raise ValueError(
+            f"tool: its edge at x {x * 1e6:.4g} µm, y {y * 1e6:.4g} µm is {away * 1e6:.4g} µm "
+            "outside the image, expected in it or near it"
+        )
 
 
 def _response(image: ThermalImage, tool: Tool) -> NDArray[np.float64]:

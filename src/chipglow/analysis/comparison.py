@@ -13,7 +13,7 @@ from chipglow.analysis.band_ridge import ThermalImage
 from chipglow.analysis.lines import sample
 from chipglow.analysis.rake_grid import DEPTH, PIXELS, RakeGrid, rake_grid
 from chipglow.analysis.ridge import NoShearBandError
-from chipglow.camera import Measurement
+from chipglow.camera import UNUSABLE, Measurement
 from chipglow.scene import Tool
 
 COVERAGE: Final = 2.0
@@ -386,7 +386,7 @@ def _compare_grid(
     for label, item in simulated.items():
         grid = grids[label]
         mean = grid.frame_mean[:, :columns]
-        emissivity = doubts.emissivity * _relative_to_kelvin(item, mean)
+        emissivity = _of_the_emissivity(item, mean, doubts)
         readings.append(Reading(mean, emissivity, _of_the_mean(grid)[:, :columns]))
     return GridComparison(base.along[:columns], base.depth, readings[0], tuple(readings[1:]))
 
@@ -399,8 +399,7 @@ def _measured_squares(
     middles = (corners[1:, 1:] + corners[:-1, :-1]) / 2
     systematic = np.full(mean.shape, doubts.stated)
     if measured.calibration_uncertainty is not None:
-        relative = (measured.calibration_uncertainty / measured.radiance).mean(axis=0)
-        share = sample(relative, measured.raster, middles)
+        share = sample(_relative_calibration(measured), measured.raster, middles)
         systematic = np.hypot(systematic, share * _relative_to_kelvin(measured, mean))
     images = [_image(measured, k) for k in range(measured.times.size)]
     image = np.mean([item.temperature for item in images if item is not None], axis=0)
@@ -409,6 +408,15 @@ def _measured_squares(
     position = np.hypot(*slopes) * _position(measured, doubts)
     random = np.hypot(position, _of_the_mean(grid)[:, :columns])
     return Reading(mean, systematic, random)
+
+
+def _relative_calibration(measured: Measurement) -> NDArray[np.float64]:
+    """Uncertainty of the calibration over the radiance, mean over the frames, shape (y, x)."""
+    absolute = measured.calibration_uncertainty
+    assert absolute is not None
+    usable = (measured.flags & UNUSABLE == 0) & (measured.radiance > 0)
+    share = np.divide(absolute, measured.radiance, out=np.zeros(absolute.shape), where=usable)
+    return _mean(share, usable)
 
 
 def _image(measured: Measurement, frame: int) -> ThermalImage | None:
@@ -443,6 +451,15 @@ def _relative_to_kelvin(
     return radiance / radiance_slope(measurement, temperature)
 
 
+def _of_the_emissivity(
+    simulated: Measurement, temperature: NDArray[np.float64], doubts: Doubts
+) -> NDArray[np.float64]:
+    """Standard uncertainty in K that the assumed emissivity makes."""
+    if doubts.emissivity == 0.0:
+        return np.zeros(temperature.shape)
+    return doubts.emissivity * _relative_to_kelvin(simulated, temperature)
+
+
 def _compare_band(
     measured: Measurement,
     simulated: Mapping[str, Measurement],
@@ -472,7 +489,7 @@ def _compare_band(
     own = Reading(mean, np.hypot(calibration, doubts.stated), np.hypot(position, between))
     readings = []
     for item, (mean, _, _, between) in zip(simulated.values(), parts[1:], strict=True):
-        emissivity = doubts.emissivity * _relative_to_kelvin(item, mean)
+        emissivity = _of_the_emissivity(item, mean, doubts)
         readings.append(Reading(mean, emissivity, between))
     return BandComparison(distance, own, tuple(readings))
 

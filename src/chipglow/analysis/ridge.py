@@ -11,6 +11,7 @@ from scipy.signal import savgol_filter
 from chipglow.scene import Raster, Tool
 
 _RADIUS_STEP: Final = 2e-6
+_STEPS_A_SAMPLE: Final = 3
 _ANGLES: Final = 401
 _BELOW_HORIZONTAL: Final = radians(10.0)
 _STEEPEST: Final = 2.0
@@ -41,6 +42,8 @@ class PolarGrid:
         Whether it lies beyond the layer along the rake face, which friction shears and heats too.
     radii : ndarray
         Distances from the edge in m.
+    radius_step : float
+        Their distance in m: 2 µm, or a third of a sample that is over 6 µm wide.
     angle_step : float
         Angle between neighbours in rad.
     """
@@ -50,6 +53,7 @@ class PolarGrid:
     on_raster: NDArray[np.bool_]
     off_face: NDArray[np.bool_]
     radii: NDArray[np.float64]
+    radius_step: float
     angle_step: float
 
     @classmethod
@@ -58,8 +62,9 @@ class PolarGrid:
         edge = tool.edge_point
         left, right, _, top = raster.extent
         reach = float(np.hypot(max(edge[0] - left, right - edge[0]), max(top - edge[1], 1e-6)))
-        first = max(tool.corner_radius, _RADIUS_STEP)
-        radii = np.arange(first, reach + 2 * _RADIUS_STEP, _RADIUS_STEP)
+        step = max(_RADIUS_STEP, raster.spacing / _STEPS_A_SAMPLE)
+        first = max(tool.corner_radius, step)
+        radii = np.arange(first, reach + 2 * step, step)
         up = np.arctan2(tool.rake_direction[1], tool.rake_direction[0])
         angles = np.linspace(up, pi + _BELOW_HORIZONTAL, _ANGLES)
         rays = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
@@ -76,6 +81,7 @@ class PolarGrid:
             on_raster=on_raster,
             off_face=depth > layer,
             radii=radii,
+            radius_step=step,
             angle_step=float(angles[1] - angles[0]),
         )
 
@@ -150,7 +156,7 @@ class PolarGrid:
         self, total: NDArray[np.float64], i: int
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Greatest sum within reach at the radius before, less a little for turning."""
-        slope = self.radii[i] * self.angle_step / _RADIUS_STEP
+        slope = self.radii[i] * self.angle_step / self.radius_step
         reach = max(1, min(ceil(_STEEPEST / slope), total.size - 1))
         padded = np.pad(total, reach, constant_values=-np.inf)
         windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)

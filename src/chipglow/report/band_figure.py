@@ -17,6 +17,7 @@ from chipglow.scene import Tool
 _HEIGHT: Final = 4.2
 _AROUND: Final = 60.0
 _LEGEND_COLUMNS: Final = 3
+_MOST_NAMES: Final = 12
 _LINES: Final = {
     Stage.DEVELOPING: (0, (4, 2)),
     Stage.DEVELOPED: "solid",
@@ -48,8 +49,15 @@ def draw_band_profile(measurement: Measurement, tool: Tool, profile: BandProfile
         right.set_xlabel("distance from the cutting edge / µm")
         right.set_ylabel("radiance temperature / °C")
         right.set_title("b) along the band, ± 1 standard uncertainty")
-        handles, labels = right.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=_LEGEND_COLUMNS)
+        if profile.times.size > _MOST_NAMES:
+            handles = [
+                right.plot([], [], color="black", linestyle=_LINES[s], label=s)[0]
+                for s in Stage
+                if s in profile.stage
+            ]
+        else:
+            handles = right.get_legend_handles_labels()[0]
+        figure.legend(handles=handles, loc="outside lower center", ncols=_LEGEND_COLUMNS)
     return figure
 
 
