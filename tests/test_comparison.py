@@ -231,6 +231,13 @@ def test_a_single_simulation_has_a_statement_too():
     assert "chip is 0 K too" in result.places[0].sentence
 
 
+def test_a_simulation_may_be_called_measured():
+    base = frames(field(X, Y))
+    result = compare(base, {"measured": base, "other": base}, TOOL, CURVE, STATED)
+    assert result.band is not None
+    assert len(result.band.simulated) == 2
+
+
 def test_found_bands_are_compared_at_the_same_distance():
     """The band of the simulation is turned: its ridge is elsewhere, its temperature the same."""
     images = [BandImage(angle=angle, bend=1e-3, deviation=20e-6) for angle in (0.7, 0.8)]

@@ -115,7 +115,7 @@ class BandProfile:
 
     @property
     def in_place(self) -> NDArray[np.bool_]:
-        """Frames that the paper compares, shape (frames,): developing, or developed, not moved."""
+        """Which frames have a band that has not moved, as the paper compares, shape (frames,)."""
         kept = (Stage.DEVELOPING, Stage.DEVELOPED)
         return np.array([stage in kept for stage in self.stage], dtype=np.bool_)
 
@@ -166,7 +166,7 @@ def band_profile(
     developed, one on the workpiece's side is developing, one on the chip's side has moved.
 
     A curve that is off by a small random vector of standard uncertainty u reads a temperature of
-    the mean square error |grad T|² u² + 3/4 (d²T/dn²)² u⁴, with n across the curve: on a ridge,
+    the mean square error (grad T)² u² + 3/4 (d²T/dn²)² u⁴, with n across the curve: on a ridge,
     where the gradient across vanishes, the bend is what counts.
     """
     pitch = measurement.raster.spacing

@@ -82,7 +82,7 @@ class Reading:
 def normalised_error(measured: Reading, simulated: Reading) -> NDArray[np.float64]:
     """E_n number: magnitude of the difference over the expanded uncertainty of the difference.
 
-    E_n = |T_sim − T_meas| / sqrt(U_meas² + U_sim²) (ISO/IEC 17043). Up to 1 the two agree.
+    E_n = abs(T_sim − T_meas) / sqrt(U_meas² + U_sim²) (ISO/IEC 17043). Up to 1 the two agree.
     """
     away = np.abs(simulated.temperature - measured.temperature)
     expanded = np.hypot(measured.expanded, simulated.expanded)
@@ -469,24 +469,24 @@ def _compare_band(
     doubts: Doubts,
     notes: list[str],
 ) -> BandComparison | None:
+    files = [("measured", measured, tool)]
+    files += [(label, item, tools[label]) for label, item in simulated.items()]
+    position = _position(measured, doubts)
     profiles = []
-    for label, item in {"measured": measured, **simulated}.items():
-        placed = tools.get(label, tool) if item is not measured else tool
+    for name, item, placed in files:
         moved = None if curve is None else curve + (placed.edge_point - tool.edge_point)
         try:
-            profiles.append(
-                band_profile(item, placed, curve=moved, position=_position(measured, doubts))
-            )
+            profiles.append(band_profile(item, placed, curve=moved, position=position))
         except NoShearBandError as error:
-            notes.append(f"Doubtful: the shear band is left out: {label}: {error}.")
+            notes.append(f"Doubtful: the shear band is left out: {name}: {error}.")
             return None
-    names = ("measured", *simulated)
+    names = [name for name, _, _ in files]
     step = measured.raster.spacing
     last = max(float(profile.distance[-1]) for profile in profiles)
     distance = step * np.arange(1, int(last / step) + 1, dtype=np.float64)
     parts = [_along(name, p, distance, notes) for name, p in zip(names, profiles, strict=True)]
-    mean, calibration, position, between = parts[0]
-    own = Reading(mean, np.hypot(calibration, doubts.stated), np.hypot(position, between))
+    mean, calibration, off, between = parts[0]
+    own = Reading(mean, np.hypot(calibration, doubts.stated), np.hypot(off, between))
     readings = []
     for item, (mean, _, _, between) in zip(simulated.values(), parts[1:], strict=True):
         emissivity = _of_the_emissivity(item, mean, doubts)
