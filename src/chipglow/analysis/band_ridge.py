@@ -48,9 +48,9 @@ class ThermalImage:
     Parameters
     ----------
     temperature : ndarray
-        Radiance temperature in K, shape (y, x). Pixels under the camera's floor have that of their
-        radiance, at most the floor, else the floor; saturated and dead ones that of their nearest
-        usable neighbour.
+        Radiance temperature in K, shape (y, x). Pixels under the camera's floor have the floor, or
+        the lowest temperature of the frame where no floor is told; saturated and dead ones have
+        that of their nearest usable neighbour.
     usable : ndarray of bool
         Which pixels are measured.
     raster : Raster
