@@ -313,15 +313,17 @@ class RegionEmissivity:
             elif self.flagged[Flag.SATURATED]:
                 text += "; what is left is darker than the region"
             doubts.append(text)
-        for count, what in zip(self.outside, ("under 0", "over 1"), strict=True):
-            if count:
-                doubts.append(
-                    f"{self.name}: {count} of {self.pixels} pixels have an emissivity {what}, "
-                    "more than the true temperature allows"
-                    if what == "over 1"
-                    else f"{self.name}: {count} of {self.pixels} pixels have an emissivity {what}: "
-                    "they are darker than the environment"
-                )
+        under, over = self.outside
+        if under:
+            doubts.append(
+                f"{self.name}: {under} of {self.pixels} pixels have an emissivity under 0: they are "
+                "darker than the environment is said to be"
+            )
+        if over:
+            doubts.append(
+                f"{self.name}: {over} of {self.pixels} pixels have an emissivity over 1: they are "
+                "brighter than a black body of the true temperature"
+            )
         if not 0 <= self.mean <= 1:
             doubts.append(f"{self.name}: the mean emissivity is not within 0 to 1")
         return doubts
