@@ -208,7 +208,9 @@ def _print_sentences(
     if not first.truth_uncertainty:
         console.print("Assumed: the true temperature is exact (--truth-uncertainty).")
     if not first.environment_uncertainty:
-        console.print("Assumed: the environment's temperature is exact (--environment-uncertainty).")
+        console.print(
+            "Assumed: the environment's temperature is exact (--environment-uncertainty)."
+        )
     if any(one.calibration is None for one in maps):
         console.print(
             "Assumed: the camera's calibration is exact, the measurement tells no uncertainty "

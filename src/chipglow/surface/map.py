@@ -58,9 +58,7 @@ class MapSurface(Surface):
                 f"emissivity map: goes from {known.min():.4g} to {known.max():.4g}, expected 0 to 1"
             )
         if not 0 <= self.elsewhere <= 1:
-            raise ValueError(
-                f"emissivity map: elsewhere is {self.elsewhere!r}, expected 0 to 1"
-            )
+            raise ValueError(f"emissivity map: elsewhere is {self.elsewhere!r}, expected 0 to 1")
 
     def on(self, scene: Scene) -> "MapField":
         """Resample the image to a scene's samples."""
