@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf, isfinite, nan, sqrt
+from math import hypot, inf, isfinite, nan, sqrt
 from typing import Any, Final
 
 import numpy as np
@@ -23,6 +23,7 @@ LABORATORY: Final = 293.0
 
 _COVERAGE: Final = 0.975
 _DOUBTFUL_SHARE: Final = 0.05
+_CLEARLY: Final = 5.0
 _ZERO_CELSIUS: Final = 273.15
 
 
@@ -69,6 +70,12 @@ class Heating:
             value = getattr(self, name)
             if value is not None and not 0 <= value < inf:
                 raise ValueError(f"{name}: is {value!r} K, expected 0 K or more")
+        spread = hypot(self.truth_uncertainty, self.environment_uncertainty)
+        if self.truth - self.environment < _CLEARLY * spread:
+            raise ValueError(
+                f"truth: {_celsius(self.truth)} is over the environment by less than "
+                f"{_CLEARLY:g} standard uncertainties of {spread:.3g} K, expected a hotter object"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +174,7 @@ class EmissivityMap:
             whole=area.whole,
             heating=self.heating,
             pixels=count,
+            left_out=int(area.mask.sum()) - count,
             flagged=flagged,
             mean=float(pixels.mean()),
             deviation=float(pixels.std(ddof=1)),
@@ -239,8 +247,10 @@ class RegionEmissivity:
         How the object was heated.
     pixels : int
         Number of pixels that count.
+    left_out : int
+        How many more there are that do not count, because they are flagged.
     flagged : dict
-        How many more pixels were left out, by `Flag`.
+        How many have each `Flag`.
     mean : float
         Mean emissivity.
     deviation : float
@@ -260,6 +270,7 @@ class RegionEmissivity:
     whole: bool
     heating: Heating
     pixels: int
+    left_out: int
     flagged: dict[Flag, int]
     mean: float
     deviation: float
@@ -304,10 +315,12 @@ class RegionEmissivity:
 
     def _doubts(self) -> list[str]:
         doubts = []
-        left_out = max(self.flagged.values())
-        total = self.pixels + left_out
-        if left_out > _DOUBTFUL_SHARE * total:
-            text = f"{self.name}: {_flag_text(self.flagged)} of {total} pixels are left out"
+        total = self.pixels + self.left_out
+        if self.left_out > _DOUBTFUL_SHARE * total:
+            text = (
+                f"{self.name}: {self.left_out} of {total} pixels are left out "
+                f"({_flag_text(self.flagged)})"
+            )
             if self.flagged[Flag.BELOW_FLOOR]:
                 text += "; what is left is brighter than the region"
             elif self.flagged[Flag.SATURATED]:
@@ -316,13 +329,13 @@ class RegionEmissivity:
         under, over = self.outside
         if under:
             doubts.append(
-                f"{self.name}: {under} of {self.pixels} pixels have an emissivity under 0: they are "
-                "darker than the environment is said to be"
+                f"{self.name}: {under} of {self.pixels} pixels have an emissivity under 0: they "
+                "are darker than the environment is said to be"
             )
         if over:
             doubts.append(
-                f"{self.name}: {over} of {self.pixels} pixels have an emissivity over 1: they are "
-                "brighter than a black body of the true temperature"
+                f"{self.name}: {over} of {self.pixels} pixels have an emissivity over 1: they "
+                "are brighter than a black body of the true temperature"
             )
         if not 0 <= self.mean <= 1:
             doubts.append(f"{self.name}: the mean emissivity is not within 0 to 1")

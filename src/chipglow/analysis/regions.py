@@ -158,7 +158,7 @@ class Region:
         if self.unit == "m":
             return points
         corner = np.array([raster.left, raster.top])
-        return corner + raster.spacing * points * np.array([1.0, -1.0])
+        return np.asarray(corner + raster.spacing * points * [1.0, -1.0])
 
     def _check_inside(self, raster: Raster) -> None:
         points = self.outline(raster)

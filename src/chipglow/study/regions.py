@@ -4,10 +4,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
-from pydantic import PlainValidator, Strict, ValidationInfo, field_validator, model_validator
+from pydantic import PlainValidator, Strict, field_validator, model_validator
 
 from chipglow.analysis.regions import Circle, Point, Polygon, Region
-from chipglow.study.section import OR_NONE, Section, described
+from chipglow.study.section import OR_NONE, Part, Section, described
 from chipglow.study.units import POSITION
 
 _SHAPES: Final = ("polygon", "rectangle", "circle")
@@ -87,16 +87,14 @@ class RegionSection(Section):
         return Region(name, shape, self.feature, unit)
 
 
-class RegionsDescription(Section):
+class RegionsDescription(Part):
     """A file of regions."""
 
     regions: dict[str, RegionSection] = described({}, "Regions by name.")
 
     @field_validator("regions")
     @classmethod
-    def _at_least_one(
-        cls, regions: dict[str, RegionSection], info: ValidationInfo
-    ) -> dict[str, RegionSection]:
+    def _at_least_one(cls, regions: dict[str, RegionSection]) -> dict[str, RegionSection]:
         if not regions:
             raise ValueError("there are none, expected 1 region or more")
         return regions

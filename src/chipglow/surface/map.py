@@ -73,7 +73,7 @@ class MapSurface(Surface):
         total = _resampled(np.where(known, self.values, 0.0), across, down)
         result = np.full(raster.shape, self.elsewhere)
         np.divide(total, weight, out=result, where=weight > 1e-9)
-        return np.clip(result, 0.0, 1.0).astype(np.float32)
+        return np.asarray(np.clip(result, 0.0, 1.0), np.float32)
 
 
 @dataclass(frozen=True, eq=False)
