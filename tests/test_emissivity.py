@@ -19,6 +19,7 @@ from chipglow.analysis import (
     Region,
     areas,
     determine_emissivity,
+    emissivity_covariance,
     emissivity_line,
 )
 from chipglow.camera import Camera, Flag
@@ -222,6 +223,24 @@ def test_the_uncertainty_of_the_calibration_comes_from_the_measurement():
     assert own.budget["calibration"] == 0.0
 
 
+def test_the_difference_of_two_regions_is_known_better_than_either():
+    heating = Heating(TRUTH, 293.0, 4.0, 2.0, 3.0)
+    put_in = table_1((0.42, 0.001), (0.53, 0.001))
+    generator, differences = np.random.default_rng(8), []
+    for _ in range(400):
+        true, around, wrong = generator.normal((TRUTH, 293.0, 0.0), (4.0, 2.0, 3.0))
+        image = measured(put_in, true, around, frames=3, drift=5.0, seed=generator)
+        radiance = BAND.radiance(BAND.temperature(image.radiance) + wrong)
+        image.data["radiance"].values[:] = radiance
+        rows = rows_of(determine_emissivity([image], heating))
+        differences.append(rows["fissure"].mean - rows["chip body"].mean)
+    (a, b), (_, d) = emissivity_covariance([rows["fissure"], rows["chip body"]])
+    stated = np.sqrt(a - 2 * b + d)
+    # 400 differences: the standard deviation is known to 3.5 %; three of them.
+    assert np.std(differences) == pytest.approx(stated, rel=0.11)
+    assert stated < 0.25 * rows["fissure"].standard_uncertainty
+
+
 def test_the_uncertainty_of_a_pixel_has_its_noise():
     heating = replace(HEATING, truth_uncertainty=2.0)
     image = measured(np.full(RASTER.shape, 0.5), frames=200, noise=20.0)
@@ -319,6 +338,7 @@ def test_a_region_that_the_floor_cuts_says_that_it_is_too_bright():
     row = determine_emissivity([image], HEATING).of(WHOLE)
     assert row.mean > put_in.mean() + 0.01
     assert "under the floor); what is left is brighter than the region" in row.doubts[0]
+    assert row.doubts[0].endswith("the camera's floor hides emissivities under 0.38")
 
 
 def test_a_region_without_usable_pixels_is_refused():

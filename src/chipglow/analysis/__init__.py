@@ -8,6 +8,7 @@ from chipglow.analysis.emissivity import (
     Heating,
     RegionEmissivity,
     determine_emissivity,
+    emissivity_covariance,
     emissivity_line,
 )
 from chipglow.analysis.error import (
@@ -56,6 +57,7 @@ __all__ = [
     "chip_metrics",
     "contact_length",
     "determine_emissivity",
+    "emissivity_covariance",
     "emissivity_line",
     "error_images",
     "find_shear_band",

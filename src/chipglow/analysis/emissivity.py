@@ -97,6 +97,8 @@ class EmissivityMap:
         All `Flag` that a pixel has in any frame, uint8, shape (y, x).
     calibration : ndarray, optional
         Standard uncertainty of the radiance from the calibration in W/(m² sr), shape (y, x).
+    floor : float
+        Lowest radiance temperature in K that the camera measures; 0 if it has no floor.
     """
 
     heating: Heating
@@ -105,6 +107,15 @@ class EmissivityMap:
     radiance: NDArray[np.float64]
     flags: NDArray[np.uint8]
     calibration: NDArray[np.float64] | None
+    floor: float = 0.0
+
+    @property
+    def hidden(self) -> float:
+        """Emissivity under which the camera's floor hides a pixel; 0 without a floor."""
+        if self.floor <= self.heating.environment:
+            return 0.0
+        radiance = np.asarray(self.band.radiance(np.array(self.floor)), np.float64)
+        return float(emissivity_of_radiance(radiance, self.heating, self.band))
 
     @property
     def observations(self) -> int:
@@ -176,6 +187,7 @@ class EmissivityMap:
             pixels=count,
             left_out=int(area.mask.sum()) - count,
             flagged=flagged,
+            hidden=self.hidden,
             mean=float(pixels.mean()),
             deviation=float(pixels.std(ddof=1)),
             outside=(int((pixels < 0).sum()), int((pixels > 1).sum())),
@@ -183,6 +195,7 @@ class EmissivityMap:
                 cause: float(self._contribution(cause, mean_radiance, calibration))
                 for cause in COMMON
             },
+            observed=values.mean(axis=1),
             scatter=_scatter(values),
         )
 
@@ -251,6 +264,8 @@ class RegionEmissivity:
         How many more there are that do not count, because they are flagged.
     flagged : dict
         How many have each `Flag`.
+    hidden : float
+        Emissivity under which the camera's floor hides a pixel; 0 without a floor.
     mean : float
         Mean emissivity.
     deviation : float
@@ -261,6 +276,8 @@ class RegionEmissivity:
     common : dict
         Contributions to the standard uncertainty of the mean by the causes of `COMMON`, each with
         the sign of its effect: between areas and images they are fully correlated.
+    observed : ndarray
+        Mean emissivity of each observation, shape (observation,).
     scatter : Scatter
         The contributions that are chance.
     """
@@ -272,10 +289,12 @@ class RegionEmissivity:
     pixels: int
     left_out: int
     flagged: dict[Flag, int]
+    hidden: float
     mean: float
     deviation: float
     outside: tuple[int, int]
     common: dict[str, float]
+    observed: NDArray[np.float64]
     scatter: Scatter
 
     @property
@@ -322,7 +341,10 @@ class RegionEmissivity:
                 f"({_flag_text(self.flagged)})"
             )
             if self.flagged[Flag.BELOW_FLOOR]:
-                text += "; what is left is brighter than the region"
+                text += (
+                    "; what is left is brighter than the region, as the camera's floor hides "
+                    f"emissivities under {self.hidden:.3g}"
+                )
             elif self.flagged[Flag.SATURATED]:
                 text += "; what is left is darker than the region"
             doubts.append(text)
@@ -348,8 +370,8 @@ class EmissivityLine:
 
     Parameters
     ----------
-    name : str
-        The area's name.
+    name, feature : str
+        The area's name, and the feature that it belongs to.
     temperatures, means, uncertainties : tuple of float
         True temperatures in K, mean emissivities, and their standard uncertainties.
     middle : float
@@ -365,6 +387,7 @@ class EmissivityLine:
     """
 
     name: str
+    feature: str
     temperatures: tuple[float, ...]
     means: tuple[float, ...]
     uncertainties: tuple[float, ...]
@@ -431,7 +454,7 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
                 "expected images of one camera that see the same place"
             )
     for measurement in measurements:
-        floor = float(measurement.data.attrs.get("floor", 0.0))
+        floor = _floor(measurement)
         if heating.truth < floor:
             raise ValueError(
                 f"truth: {_celsius(heating.truth)} is under the camera's floor of "
@@ -448,7 +471,33 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
         radiance=radiance,
         flags=np.bitwise_or.reduce(flags, axis=0),
         calibration=_calibration(measurements, radiance.mean(axis=0), heating),
+        floor=max(map(_floor, measurements)),
     )
+
+
+def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> NDArray[np.float64]:
+    """Covariance of the mean emissivities of several areas of one map.
+
+    Parameters
+    ----------
+    rows : sequence of RegionEmissivity
+        Areas of one map.
+
+    Returns
+    -------
+    ndarray
+        Shape (areas, areas). The errors of `COMMON` are the same in all areas, so a difference or
+        a ratio of two areas is known better than either.
+    """
+    observed = np.stack([row.observed for row in rows])
+    chance = np.zeros((len(rows), len(rows)))
+    if observed.shape[1] > 1:
+        chance = np.atleast_2d(np.cov(observed)) / observed.shape[1]
+    np.fill_diagonal(chance, [row.scatter.standard_uncertainty**2 for row in rows])
+    for cause in COMMON:
+        effect = [row.common[cause] for row in rows]
+        chance += np.outer(effect, effect)
+    return chance
 
 
 def emissivity_line(rows: Sequence[RegionEmissivity]) -> EmissivityLine:
@@ -493,6 +542,7 @@ def emissivity_line(rows: Sequence[RegionEmissivity]) -> EmissivityLine:
         covariance = covariance + np.outer(effect, effect)
     return EmissivityLine(
         name=rows[0].name,
+        feature=rows[0].feature,
         temperatures=tuple(temperature.tolist()),
         means=tuple(means.tolist()),
         uncertainties=tuple(row.standard_uncertainty for row in rows),
@@ -506,6 +556,10 @@ def emissivity_line(rows: Sequence[RegionEmissivity]) -> EmissivityLine:
 
 def _emissivity(radiance: Any, truth: Any, environment: Any) -> Any:
     return (radiance - environment) / (truth - environment)
+
+
+def _floor(measurement: Measurement) -> float:
+    return float(measurement.data.attrs.get("floor", 0.0))
 
 
 def _usable_radiance(measurement: Measurement) -> NDArray[np.float64]:

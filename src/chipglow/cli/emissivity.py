@@ -108,7 +108,8 @@ def emissivity(
         from chipglow.cli.pictures import write_picture
         from chipglow.report.emissivity_figure import draw_emissivity
 
-        write_picture(draw_emissivity(maps[0], named, lines), plot)
+        whole = [line for line, area in zip(lines, found, strict=False) if area.whole]
+        write_picture(draw_emissivity(maps[0], named, whole), plot)
     for path in (out, table, plot):
         if path is not None:
             print(path)
@@ -171,16 +172,24 @@ def _print_tables(
     for of in rows:
         console.print(f"\nObject at {of[0].heating.truth - 273.15:.6g} °C")
         result = Table("region", "pixels", "mean", "sd of pixels", "u", "U 95 %", "k", box=None)
-        budget = Table("u from", "truth", "environment", "calibration", "repeatability", "noise")
+        budget = Table(
+            "parts of u", "truth", "environment", "calibration", "repeatability", "noise"
+        )
         budget.box = None
+        for column in (*result.columns[1:], *budget.columns[1:]):
+            column.justify = "right"
         for row in of:
             spread = row.standard_uncertainty, row.expanded_uncertainty
-            numbers = (row.mean, row.deviation, *spread)
             result.add_row(
-                row.name, str(row.pixels), *map(_number, numbers), f"{row.coverage_factor:.2f}"
+                row.name,
+                str(row.pixels),
+                f"{row.mean:.4f}",
+                *map(_spread, (row.deviation, *spread)),
+                f"{row.coverage_factor:.2f}",
             )
-            budget.add_row(row.name, *map(_number, row.budget.values()))
+            budget.add_row(row.name, *map(_spread, row.budget.values()))
         console.print(result)
+        console.print()
         console.print(budget)
     if lines:
         console.print("\nOver the temperature, with standard uncertainties")
@@ -188,16 +197,17 @@ def _print_tables(
         for line in lines:
             table.add_row(
                 line.name,
-                f"{_number(line.at_middle)} ± {_number(line.middle_uncertainty)}",
+                f"{line.at_middle:.4f} ± {_spread(line.middle_uncertainty)}",
                 f"{line.middle - 273.15:.6g} °C",
-                f"{100 * line.slope:+.4f} ± {_number(100 * line.slope_uncertainty)}",
-                _number(line.residual),
+                f"{100 * line.slope:+.4f} ± {_spread(100 * line.slope_uncertainty)}",
+                _spread(line.residual),
             )
         console.print(table)
 
 
-def _number(value: float) -> str:
-    return f"{value:.4f}" if value == value else "–"
+def _spread(value: float) -> str:
+    """Two digits that count, or a dash where nothing is known."""
+    return f"{value:#.2g}" if value == value else "–"
 
 
 def _print_sentences(
@@ -221,9 +231,10 @@ def _print_sentences(
             "Assumed: one frame of one image tells nothing of repeatability; noise is at most the "
             "spread over the pixels."
         )
-    for row in (row for of in rows for row in of):
-        for doubt in row.doubts:
-            console.print(f"Doubtful: {doubt}.")
+    for of in rows:
+        at = f" (object at {of[0].heating.truth - 273.15:.6g} °C)" if len(rows) > 1 else ""
+        for doubt in (doubt for row in of for doubt in row.doubts):
+            console.print(f"Doubtful: {doubt}{at}.")
 
 
 def _print_study(console: "Console", rows: "list[list[RegionEmissivity]]") -> None:

@@ -9,7 +9,12 @@ from typing import Any, Final
 import numpy as np
 import xarray as xr
 
-from chipglow.analysis.emissivity import COMMON, EmissivityMap, RegionEmissivity
+from chipglow.analysis.emissivity import (
+    COMMON,
+    EmissivityMap,
+    RegionEmissivity,
+    emissivity_covariance,
+)
 from chipglow.camera import Flag
 from chipglow.io.atomic import atomic_path
 from chipglow.io.measurement_file import write_dataset
@@ -46,17 +51,23 @@ def write_emissivity(
     tables = {f"region_{name}": _column(rows, name) for name in _COLUMNS}
     for cause in _BUDGET:
         tables[f"region_{cause}_uncertainty"] = [[row.budget[cause] for row in of] for of in rows]
+    names = np.array([row.name for row in rows[0]], dtype=object)
     data = xr.Dataset(
         {
             **{name: (("truth", "y", "x"), image) for name, image in images.items()},
             **{name: (("truth", "region"), np.array(table)) for name, table in tables.items()},
+            "region_covariance": (
+                ("truth", "region", "other_region"),
+                np.stack([emissivity_covariance(of) for of in rows]),
+            ),
             "environment": ("truth", [one.heating.environment for one in maps], {"units": "K"}),
             "feature": ("region", np.array([row.feature for row in rows[0]], dtype=object)),
         },
         coords={
             **raster_coordinates(raster, np.zeros(1)),
             "truth": ("truth", [one.heating.truth for one in maps], {"units": "K"}),
-            "region": ("region", np.array([row.name for row in rows[0]], dtype=object)),
+            "other_region": ("other_region", names),
+            "region": ("region", names),
         },
         attrs={"kind": _KIND, "pitch": raster.spacing},
     ).drop_vars("time")

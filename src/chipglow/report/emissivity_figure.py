@@ -1,6 +1,7 @@
 """The picture of an emissivity determination: what was seen, where, and what came out."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import Any, Final
 
 import numpy as np
@@ -14,11 +15,13 @@ from chipglow.analysis.emissivity import EmissivityLine, EmissivityMap
 from chipglow.analysis.regions import Region
 from chipglow.report import drawing
 from chipglow.report.drawing import BLUE, GREEN, KELVIN, VERMILLION, WIDTH, ImagePanel
+from chipglow.scene import Raster
 
 _COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 _PANEL_WIDTH: Final = 2.7
 _AROUND: Final = 0.75
 _LINES: Final = 2.6
+_SLENDER: Final = 3.0
 
 
 def draw_emissivity(
@@ -31,9 +34,9 @@ def draw_emissivity(
     found : EmissivityMap
         The map to draw.
     regions : sequence of Region
-        Regions to draw on both, those of one feature in one colour.
+        Regions to draw on both, those of one feature in one colour, named on the first.
     lines : sequence of EmissivityLine
-        Emissivity over the temperature, drawn below if there is any.
+        Emissivity of features over the temperature, drawn below if there is any.
     """
     raster = found.raster
     temperature = found.radiance_temperature - KELVIN
@@ -60,9 +63,9 @@ def draw_emissivity(
         parts: Any = figure.subfigures(2, 1, height_ratios=(height, _LINES)) if lines else (figure,)
         for axes, panel in zip(parts[0].subplots(1, 2, sharey=True), panels, strict=True):
             panel.draw(parts[0], axes, raster, None)
-            _draw_regions(axes, regions, found)
+            _draw_regions(axes, regions, raster, named=panel is panels[0])
         if lines:
-            _draw_lines(parts[1].subplots(), lines)
+            _draw_lines(parts[1].subplots(), lines, _colours(regions))
     return figure
 
 
@@ -72,22 +75,42 @@ def _ends(image: NDArray[np.float64]) -> tuple[float, float]:
     return low, high if high > low else low + 1.0
 
 
-def _draw_regions(axes: Axes, regions: Sequence[Region], found: EmissivityMap) -> None:
-    features = list(dict.fromkeys(region.feature for region in regions))
+def _draw_regions(axes: Axes, regions: Sequence[Region], raster: Raster, named: bool) -> None:
+    colours = _colours(regions)
     for region in regions:
-        outline = region.outline(found.raster)
-        colour = _COLOURS[features.index(region.feature) % len(_COLOURS)]
+        outline = region.outline(raster)
+        colour = colours[region.feature]
         drawing.draw_line(axes, np.concatenate([outline, outline[:1]]), colour)
-        x, y = outline[np.lexsort((outline[:, 0], -outline[:, 1]))[0]] * 1e6
-        text = axes.annotate(
-            region.name, (x, y), (1, 2), textcoords="offset points", fontsize=8, color=colour
-        )
-        text.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
+        if named:
+            _draw_name(axes, region.name, outline * 1e6, colour)
 
 
-def _draw_lines(axes: Axes, lines: Sequence[EmissivityLine]) -> None:
-    for number, line in enumerate(lines):
-        colour = _COLOURS[number % len(_COLOURS)]
+def _draw_name(axes: Axes, name: str, outline: NDArray[np.float64], colour: str) -> None:
+    """A region's name in its middle, upright where the region is slender."""
+    width, height = np.ptp(outline, axis=0)
+    x, y = (outline.min(axis=0) + outline.max(axis=0)) / 2
+    axes.text(
+        x,
+        y,
+        name,
+        rotation=90 if height > _SLENDER * width else 0,
+        ha="center",
+        va="center",
+        fontsize=8,
+        color=colour,
+        path_effects=[withStroke(linewidth=2.5, foreground="white")],
+    )
+
+
+def _colours(regions: Sequence[Region]) -> dict[str, str]:
+    """A colour for each feature."""
+    features = dict.fromkeys(region.feature for region in regions)
+    return dict(zip(features, cycle(_COLOURS), strict=False))
+
+
+def _draw_lines(axes: Axes, lines: Sequence[EmissivityLine], colours: Mapping[str, str]) -> None:
+    for line in lines:
+        colour = colours[line.feature]
         celsius = np.array(line.temperatures) - KELVIN
         axes.errorbar(
             celsius,
@@ -105,5 +128,5 @@ def _draw_lines(axes: Axes, lines: Sequence[EmissivityLine]) -> None:
         axes.fill_between(along, value - 2 * spread, value + 2 * spread, color=colour, alpha=0.15)
     axes.set_xlabel("true temperature / °C")
     axes.set_ylabel("emissivity")
-    axes.set_title("mean of each region; bars and bands: 2 standard uncertainties")
+    axes.set_title("means over the pixels; bars and bands: 2 standard uncertainties")
     axes.legend()

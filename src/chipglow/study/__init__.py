@@ -1,6 +1,7 @@
 """Studies: what to cut, look at and analyse, as a YAML file or in Python."""
 
 from chipglow.study.cache import CachedScene, cache_folder, cached_scenes, clear_cache
+from chipglow.study.emissivity import surface_text
 from chipglow.study.files import StudyError, load_import, load_regions, load_study
 from chipglow.study.import_schema import ImportDescription
 from chipglow.study.preview import preview_raster
@@ -32,4 +33,5 @@ __all__ = [
     "preview_raster",
     "run",
     "study_text",
+    "surface_text",
 ]
