@@ -507,7 +507,7 @@ def test_the_command_writes_table_map_and_picture(folder):
         assert float(lines[name]["expanded_uncertainty"]) == pytest.approx(
             row.expanded_uncertainty, rel=1e-6
         )
-    text = result.output.split("For a study:")[1].split("e.nc")[0]
+    text = result.stdout.split("For a study:")[1].split("e.nc")[0]
     assert Study(**yaml.safe_load(text)).surface.chips["measured chip"].body.mean == pytest.approx(
         float(lines["chip body"]["mean"]), abs=6e-5
     )
@@ -547,6 +547,30 @@ def test_bad_input_is_one_line(folder, arguments, message):
     assert message in result.output
     assert len(result.output.splitlines()) == 1
     assert set(folder.iterdir()) == before
+
+
+def test_images_of_different_pixels_are_one_line(folder):
+    small = measured(np.full((5, 5), 0.5), raster=Raster(0.0, 0.0, 6e-6, 5, 5))
+    write_measurement(small, folder / "small.nc")
+    result = command("a.nc", "small.nc", "--truth", "391degC", "--truth", "500degC")
+    assert result.exit_code == 2
+    assert result.output.startswith("chipglow: small.nc: has other pixels than a.nc, expected")
+
+
+def test_what_is_assumed_and_doubtful_is_said(folder):
+    flags = np.zeros((1, *RASTER.shape), np.uint8)
+    flags[0, :3] = Flag.DEAD
+    write_measurement(measured(table_1(), flags=flags), folder / "a.nc")
+    result = command("a.nc", "--truth", "391degC")
+    assert result.exit_code == 0
+    for sentence in (
+        "Assumed: the true temperature is exact",
+        "Assumed: the environment's temperature is exact",
+        "Assumed: the camera's calibration is exact",
+        "Assumed: nothing changes from frame to frame",
+    ):
+        assert sentence in result.stderr
+    assert "Doubtful: fissure: 18 of 180 pixels are left out (18 dead)." in result.stdout
 
 
 def test_a_region_outside_the_image_is_one_line(folder):

@@ -164,7 +164,7 @@ class EmissivityMap:
         ValueError
             If fewer than two of its pixels can be used.
         """
-        usable = area.mask & (self.flags & UNUSABLE == 0)
+        usable = area.mask & np.isfinite(self.mean_radiance)
         flagged = {
             flag: int((self.flags[area.mask] & flag != 0).sum())
             for flag in (Flag.BELOW_FLOOR, Flag.SATURATED, Flag.DEAD)

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from rich.console import Console
 
     from chipglow.analysis import EmissivityLine, EmissivityMap, Heating, RegionEmissivity
@@ -75,6 +77,7 @@ def emissivity(
     from rich.console import Console
 
     from chipglow.analysis import areas, determine_emissivity, emissivity_line, shared_pixels
+    from chipglow.cli.assumed import say_assumed
     from chipglow.cli.pictures import check_picture_path
     from chipglow.io.atomic import check_folder
     from chipglow.study.files import load_regions
@@ -89,19 +92,23 @@ def emissivity(
         images, truth, environment, truth_uncertainty, environment_uncertainty, camera_uncertainty
     )
     named = load_regions(regions)
+    measurements = [load_measurement(image, settings or ()) for image in images]
+    _check_same_pixels(images, measurements)
     groups: dict[Heating, list[Measurement]] = {}
-    for image, heating in zip(images, heatings, strict=True):
-        groups.setdefault(heating, []).append(load_measurement(image, settings or ()))
+    for measurement, heating in zip(measurements, heatings, strict=True):
+        groups.setdefault(heating, []).append(measurement)
     maps = [determine_emissivity(group, heating) for heating, group in groups.items()]
-    _check_same_pixels(maps)
     found = areas(named, maps[0].raster)
     rows = [[one.of(area) for area in found] for one in maps]
     lines = [emissivity_line(of) for of in zip(*rows, strict=True)] if len(maps) > 1 else []
     console = Console(highlight=False, markup=False)
     _print_tables(console, rows, lines)
-    _print_sentences(console, maps, rows)
-    for (one, other), count in shared_pixels(named, maps[0].raster).items():
-        console.print(f"Assumed: {one} and {other} share {count} pixels, which count in both.")
+    say_assumed(_assumptions(maps))
+    say_assumed(
+        f"{one} and {other} share {count} pixels, which count in both."
+        for (one, other), count in shared_pixels(named, maps[0].raster).items()
+    )
+    _print_doubts(console, rows)
     _print_study(console, rows)
     _write(maps, rows, out, table)
     if plot is not None:
@@ -155,11 +162,11 @@ def _parsed(option: str, quantity: "Quantity", text: str) -> float:
         raise ValueError(f"{option}: {error}") from None
 
 
-def _check_same_pixels(maps: "list[EmissivityMap]") -> None:
-    for one in maps[1:]:
-        if one.raster != maps[0].raster:
+def _check_same_pixels(images: list[Path], measurements: "list[Measurement]") -> None:
+    for image, measurement in zip(images, measurements, strict=True):
+        if measurement.raster != measurements[0].raster:
             raise ValueError(
-                "emissivity: images at different temperatures have different pixels, "
+                f"{image}: has other pixels than {images[0]}, "
                 "expected images of one camera that see the same place"
             )
 
@@ -210,31 +217,30 @@ def _spread(value: float) -> str:
     return f"{value:#.2g}" if value == value else "–"
 
 
-def _print_sentences(
-    console: "Console", maps: "list[EmissivityMap]", rows: "list[list[RegionEmissivity]]"
-) -> None:
-    first = maps[0].heating
-    console.print()
-    if not first.truth_uncertainty:
-        console.print("Assumed: the true temperature is exact (--truth-uncertainty).")
-    if not first.environment_uncertainty:
-        console.print(
-            "Assumed: the environment's temperature is exact (--environment-uncertainty)."
-        )
+def _assumptions(maps: "list[EmissivityMap]") -> "Iterator[str]":
+    heating = maps[0].heating
+    if not heating.truth_uncertainty:
+        yield "the true temperature is exact (--truth-uncertainty)."
+    if not heating.environment_uncertainty:
+        yield "the environment's temperature is exact (--environment-uncertainty)."
     if any(one.calibration is None for one in maps):
-        console.print(
-            "Assumed: the camera's calibration is exact, the measurement tells no uncertainty "
+        yield (
+            "the camera's calibration is exact, as the measurement tells no uncertainty of it "
             "(--camera-uncertainty)."
         )
     if any(one.observations == 1 for one in maps):
-        console.print(
-            "Assumed: one frame of one image tells nothing of repeatability; noise is at most the "
+        yield (
+            "nothing changes from frame to frame, as there is one only; noise is at most the "
             "spread over the pixels."
         )
+
+
+def _print_doubts(console: "Console", rows: "list[list[RegionEmissivity]]") -> None:
+    console.print()
     for of in rows:
         at = f" (object at {of[0].heating.truth - 273.15:.6g} °C)" if len(rows) > 1 else ""
         for doubt in (doubt for row in of for doubt in row.doubts):
-            console.print(f"Doubtful: {doubt}{at}.")
+            console.print(f"Doubtful: {doubt}{at}.\n", soft_wrap=True)
 
 
 def _print_study(console: "Console", rows: "list[list[RegionEmissivity]]") -> None:
@@ -243,7 +249,7 @@ def _print_study(console: "Console", rows: "list[list[RegionEmissivity]]") -> No
     text = surface_text(rows[0])
     if text:
         at = f" at {rows[0][0].heating.truth - 273.15:.6g} °C" if len(rows) > 1 else ""
-        console.print(f"\nFor a study{at}:\n\n{text}", soft_wrap=True)
+        console.print(f"For a study{at}:\n\n{text}", soft_wrap=True)
 
 
 def _write(
