@@ -1,4 +1,4 @@
-"""Draws the pictures of the page on emissivity, prints its numbers: ``python docs/NAME.py``."""
+"""Pictures and numbers of the page on emissivity: ``python docs/emissivity_pictures.py``."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -103,12 +103,14 @@ def emissivity(
     lines = [emissivity_line(of) for of in zip(*rows, strict=True)] if len(maps) > 1 else []
     console = Console(highlight=False, markup=False)
     _print_tables(console, rows, lines)
+    console.print()
     say_assumed(_assumptions(maps))
     say_assumed(
         f"{one} and {other} share {count} pixels, which count in both."
         for (one, other), count in shared_pixels(named, maps[0].raster).items()
     )
-    _print_doubts(console, rows)
+    for doubt in _doubts(rows):
+        console.print(doubt, soft_wrap=True)
     _print_study(console, rows)
     _write(maps, rows, out, table)
     if plot is not None:
@@ -235,12 +237,11 @@ def _assumptions(maps: "list[EmissivityMap]") -> "Iterator[str]":
         )
 
 
-def _print_doubts(console: "Console", rows: "list[list[RegionEmissivity]]") -> None:
-    console.print()
+def _doubts(rows: "list[list[RegionEmissivity]]") -> "Iterator[str]":
     for of in rows:
         at = f" (object at {of[0].heating.truth - 273.15:.6g} °C)" if len(rows) > 1 else ""
         for doubt in (doubt for row in of for doubt in row.doubts):
-            console.print(f"Doubtful: {doubt}{at}.\n", soft_wrap=True)
+            yield f"Doubtful: {doubt}{at}."
 
 
 def _print_study(console: "Console", rows: "list[list[RegionEmissivity]]") -> None:
@@ -249,7 +250,7 @@ def _print_study(console: "Console", rows: "list[list[RegionEmissivity]]") -> No
     text = surface_text(rows[0])
     if text:
         at = f" at {rows[0][0].heating.truth - 273.15:.6g} °C" if len(rows) > 1 else ""
-        console.print(f"For a study{at}:\n\n{text}", soft_wrap=True)
+        console.print(f"\nFor a study{at}:\n\n{text}", soft_wrap=True)
 
 
 def _write(
