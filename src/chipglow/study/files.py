@@ -82,7 +82,7 @@ def load_regions(path: str | Path) -> tuple[Region, ...]:
         If the file cannot be read.
     """
     path = Path(path)
-    return _validated(RegionsDescription, read_yaml(path), path.name, path.parent).build()
+    return validated(RegionsDescription, read_yaml(path), path.name, path.parent).build()
 
 
 def read_yaml(path: Path) -> Any:
