@@ -346,6 +346,16 @@ def test_tables_of_temperature_in_degrees_celsius(tmp_path):
     assert np.abs(recording.signal - PICTURES[:3] / 40 - 273.15).max() < 6e-4
 
 
+@pytest.mark.parametrize(("mark", "decimal"), [(";", ","), (",", "."), ("\t", ".")])
+def test_lines_of_text_before_an_exported_table_are_left_out(tmp_path, mark, decimal):
+    rows = [mark.join(f"{v:.2f}".replace(".", decimal) for v in row) for row in PICTURES[0] / 40]
+    text = f"File:{mark}IR_0001.jpg\n\nEmissivity:{mark}0{decimal}95\n" + "\n".join(rows)
+    path = make(tmp_path, "a.csv", text.encode())
+    recording = read_here(path, "csv", None, Told(unit="K"))
+    assert np.abs(recording.signal[0] - PICTURES[0] / 40).max() < 0.006
+    assert recording.notes[-1] == "Left out: 3 lines of text before the numbers."
+
+
 def test_a_file_that_says_units_times_and_packing_needs_no_more(tmp_path):
     temperature = 20.0 + PICTURES / 100
     data = xr.Dataset(
