@@ -402,11 +402,10 @@ def _object(fields: _Fields, notes: list[str]) -> ObjectParameters:
             f"{share * 100:g} %."
         )
         transmission *= _through_air(fields, distance, share, atmosphere)
-    if window not in (None, 1.0):
+    if window is not None and window != 1:
         notes.append(
-            f"The camera was told of a window that lets {transmission * 100:g} % pass, at "
-            f"{fields.number(0x30, 'f') - _ZERO:g} degC; it is taken to be at the temperature of the "
-            "atmosphere."
+            f"The camera was told of a window that lets {window * 100:g} % pass, at "
+            f"{fields.number(0x30, 'f') - _ZERO:g} degC; it is taken to be as warm as the atmosphere."
         )
     return object_parameters(
         notes,
