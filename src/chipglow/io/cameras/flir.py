@@ -405,7 +405,7 @@ def _object(fields: _Fields, notes: list[str]) -> ObjectParameters:
     if window is not None and window != 1:
         notes.append(
             f"The camera was told of a window that lets {window * 100:g} % pass, at "
-            f"{fields.number(0x30, 'f') - _ZERO:g} degC; it is taken to be as warm as the atmosphere."
+            f"{fields.number(0x30, 'f') - _ZERO:g} degC; here it is as warm as the air."
         )
     return object_parameters(
         notes,
