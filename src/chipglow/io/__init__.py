@@ -1,6 +1,7 @@
 """Readers and writers: scenes, measurements, and output that is whole or not there."""
 
 from chipglow.io.atomic import atomic_folder, atomic_path
+from chipglow.io.cameras import CAMERA_FORMATS, CameraFormat, read_recording, write_hcc
 from chipglow.io.emissivity_file import (
     read_emissivity_map,
     write_emissivity,
@@ -21,7 +22,9 @@ from chipglow.io.tool_file import read_tool_outline
 from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 
 __all__ = [
+    "CAMERA_FORMATS",
     "FORMAT_VERSION",
+    "CameraFormat",
     "Import",
     "SceneWriter",
     "StoredScene",
@@ -37,12 +40,14 @@ __all__ = [
     "prospect",
     "read_emissivity_map",
     "read_measurement",
+    "read_recording",
     "read_scene",
     "read_tool_outline",
     "unfinished_scenes",
     "write_dataset",
     "write_emissivity",
     "write_emissivity_table",
+    "write_hcc",
     "write_measurement",
     "write_rake_grid",
     "write_scene",
