@@ -778,12 +778,6 @@ def test_elements_of_nodes_that_do_not_exist(tmp_path):
         MeshSource(tmp_path / "chip.vtk").survey()
 
 
-def test_binary_tecplot_is_refused(tmp_path):
-    (tmp_path / "chip.dat").write_bytes(b"#!TDV112" + bytes(100))
-    with pytest.raises(SourceError, match="binary Tecplot"):
-        MeshSource(tmp_path / "chip.dat").survey()
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -6,13 +6,14 @@ import numpy as np
 import pyvista as pv
 from cgns_file import write_cgns
 from lasso.dyna import D3plot
+from tecplot_file import ZoneOfFile, write_tecplot
 from vtkmodules.vtkIOExodus import vtkExodusIIWriter
 from vtkmodules.vtkIOParallel import vtkEnSightWriter
 
 WRITTEN = (
     "chip.vtu", "chip.vtk", "chip.vtp", "chip.vtm", "chip.vtkhdf", "chip.e", "chip.case",
     "chip.xdmf", "chip.pvd", "chip.msh", "chip.med", "chip.avs", "chip.dat", "chip.inp", "d3plot",
-    "chip.cgns",
+    "chip.cgns", "chip.plt", "chip.foam",
 )  # fmt: skip
 """Names of the files that `write_meshes` writes, each of which is damaged."""
 
