@@ -549,6 +549,19 @@ def test_an_abaqus_input_with_tables(tmp_path):
         assert np.isnan(frame.fields["plastic_strain"][hard]).all()
 
 
+def test_labels_without_a_row_are_counted(tmp_path):
+    path = abaqus(tmp_path, ("_1", "_2"))
+    table = tmp_path / "chip_2_nodes.csv"
+    rows = table.read_text().split("\n")
+    table.write_text("\n".join([*rows[:3], *rows[5:]]))
+    said = survey_of(MeshSource(path)).from_file
+    assert [text.split(";")[0] for text in said] == [
+        "PEEQ: 36 of 72 elements have no value in the first frame",
+        "NT11: 2 of 70 nodes have no value in the last frame",
+        "PEEQ: 36 of 72 elements have no value in the last frame",
+    ]
+
+
 ASSEMBLY = """*ASSEMBLY, NAME=ALL
 *INSTANCE, NAME=CHIP-1, PART=CHIP
 {moved}*END INSTANCE

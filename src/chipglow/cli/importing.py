@@ -67,5 +67,7 @@ def _say(looked: Prospect) -> None:
         f"Sampled every {raster.spacing * 1e6:.4g} um: {raster.columns} x {raster.rows} samples, "
         f"x {left:.4g} um to {right:.4g} um, y {bottom:.4g} um to {top:.4g} um"
     )
+    for sentence in survey.from_file:
+        console.print(f"From the file: {sentence}")
     for sentence in looked.assumed:
         console.print(f"Assumed: {sentence}")

@@ -221,7 +221,7 @@ def import_scene(
     key = _key(wanted, looked)
     start = _unfinished(path, key) if resume else None
     done = len(start.frames()[0]) if start else 0
-    attributes = {"import": key, "assumed": "; ".join(looked.assumed)}
+    attributes = _attributes(key, looked)
     coordinates = {"material_x", "material_y"} <= set(survey.found)
     with SceneWriter(
         path,
@@ -283,8 +283,14 @@ def read_scene(source: Import | Source) -> Scene:
         [frame.time for frame in frames],
         {name: np.stack([getattr(frame, name) for frame in frames]) for name in names},
         wanted.completion.tool,
-        {"import": _key(wanted, looked), "assumed": "; ".join(looked.assumed)},
+        _attributes(_key(wanted, looked), looked),
     )
+
+
+def _attributes(key: str, looked: Prospect) -> dict[str, str]:
+    """What a scene keeps of where it is from."""
+    said = {"assumed": looked.assumed, "from_file": looked.survey.from_file}
+    return {"import": key, **{name: "; ".join(sentences) for name, sentences in said.items()}}
 
 
 def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:

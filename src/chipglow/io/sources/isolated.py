@@ -60,6 +60,7 @@ class Isolated(Source):
                 "extent": tuple(header["extent"]),
                 "unused": tuple(header["unused"]),
                 "assumed": tuple(header["assumed"]),
+                "from_file": tuple(header["from_file"]),
             }
         )
 
