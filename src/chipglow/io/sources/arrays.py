@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.file_order import natural
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import SourceError, missing_extra
 from chipglow.io.sources.text_table import TextTable
 
 MOST_SAMPLES: Final = 100_000_000
@@ -528,7 +528,7 @@ def _extra(module: str, path: Path) -> Any:
     try:
         return import_module(module)
     except ImportError:
-        raise SourceError(f"{path}: needs {module}, pip install 'chipglow[grid]'") from None
+        raise missing_extra(path, module, "grid") from None
 
 
 # Zarr

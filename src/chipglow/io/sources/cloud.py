@@ -100,6 +100,11 @@ class CloudSource(Source):
         if not isfinite(self.depth):
             raise ValueError(f"depth: {self.depth!r}, expected a finite length")
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The path or pattern."""
+        return (self.files,)
+
     def survey(self) -> Survey:
         """Look at what is there; see `Source.survey`."""
         with ExitStack() as stack:

@@ -115,6 +115,11 @@ class GridSource(Source):
         if self.placement.depth != 2:
             raise ValueError("placement: a grid has the axes x and y, expected no z")
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The path or pattern, or those of the fields."""
+        return (self.files,) if isinstance(self.files, str) else tuple(self.files.values())
+
     def survey(self) -> Survey:
         """Look at what is there; see `Source.survey`."""
         with ExitStack() as stack:

@@ -16,7 +16,14 @@ from chipglow.io.sources.mesh_abaqus import AbaqusReader
 from chipglow.io.sources.mesh_block import Block, FlatMesh, check_grid, fields_of, flatten
 from chipglow.io.sources.mesh_dyna import DynaReader
 from chipglow.io.sources.mesh_reader import MeshReader, files_of
-from chipglow.io.sources.source import READABLE, SampledFrame, Source, SourceError, Survey
+from chipglow.io.sources.source import (
+    READABLE,
+    SampledFrame,
+    Source,
+    SourceError,
+    Survey,
+    missing_extra,
+)
 from chipglow.scene import Material, Raster
 from chipglow.scene.rasterise import NOTHING, rasterise
 
@@ -97,6 +104,13 @@ class MeshSource(Source):
         if isinstance(self.section, float) and not isfinite(self.section):
             raise ValueError(f"section: expected a finite position, got {self.section!r}")
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The path or pattern; with its folder if such files name others."""
+        suffix = self.path.suffix.lower()
+        alone = suffix in (*mesh_vtk.ALONE, *mesh_meshio.KINDS, *mesh_tecplot.ENDINGS)
+        return (str(self.path),) if alone else (str(self.path), str(self.path.parent))
+
     def survey(self) -> Survey:
         """Look at the first and the last mesh; see `Source.survey`."""
         reader = self._reader()
@@ -128,9 +142,7 @@ class MeshSource(Source):
 
     def _reader(self) -> MeshReader:
         if find_spec("pyvista") is None or find_spec("meshio") is None:
-            raise SourceError(
-                f"{self.path}: needs PyVista and meshio, expected pip install 'chipglow[mesh]'"
-            )
+            raise missing_extra(self.path, "PyVista and meshio", "mesh")
         timed = bool(self.times)
         suffix = self.path.suffix.lower()
         if suffix in mesh_vtk.KINDS:

@@ -176,6 +176,11 @@ class MovieSource(Source):
                 "pixels"
             )
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The movies."""
+        return tuple(str(movie.path) for movie in self.movies.values())
+
     def survey(self) -> Survey:
         """Look at what is there: sizes, times, legends, the background, what colours leave open."""
         indices = self._indices()

@@ -20,7 +20,7 @@ from chipglow.io.sources.arrays import (
     reading,
 )
 from chipglow.io.sources.conventions import simple
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import SourceError, missing_extra
 from chipglow.io.sources.text_table import TextTable, line_of
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")
@@ -417,7 +417,7 @@ def _read_vtk(path: Path) -> PointTable:
     try:
         import pyvista as pv
     except ImportError:
-        raise SourceError(f"{path}: needs PyVista, pip install 'chipglow[mesh]'") from None
+        raise missing_extra(path, "PyVista", "mesh") from None
     with pv.VtkErrorCatcher(raise_errors=True):
         mesh = pv.read(path)
     if not isinstance(mesh, pv.DataSet) or mesh.n_points == 0:

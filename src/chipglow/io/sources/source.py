@@ -9,11 +9,24 @@ from numpy.typing import NDArray
 
 from chipglow.scene import READABLE, Raster, SampledFrame
 
-__all__ = ["READABLE", "Remarks", "SampledFrame", "Source", "SourceError", "Survey"]
+__all__ = [
+    "READABLE",
+    "Remarks",
+    "SampledFrame",
+    "Source",
+    "SourceError",
+    "Survey",
+    "missing_extra",
+]
 
 
 class SourceError(ValueError):
     """A source that cannot be read: the message names the file, the field and what was expected."""
+
+
+def missing_extra(file: object, needs: str, extra: str) -> SourceError:
+    """The error for a file that a library reads which is not installed, and how it comes."""
+    return SourceError(f"{file}: needs {needs}, expected pip install 'chipglow[{extra}]'")
 
 
 @dataclass
@@ -73,6 +86,11 @@ class Source(ABC):
     A source is a frozen dataclass that says where the fields are and what they mean; it opens files
     only in its methods, so that it can be handed to another process.
     """
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Its files, as paths and patterns, and folders where there may be more of them."""
+        return ()
 
     @abstractmethod
     def survey(self) -> Survey:
