@@ -31,10 +31,15 @@ def import_fields(description: ImportDescription, out: Path | None, resume: bool
     _say(looked)
     if out is None:
         return
-    _say_where_it_starts(kept_import(wanted, looked, out), resume)
+    kept = kept_import(wanted, looked, out)
+    _say_where_it_starts(kept.progress if kept else 0.0, resume)
     with progress_bars() as progress:
         import_scene(
-            wanted, out, lambda share: progress("import", share), looked=looked, resume=resume
+            wanted,
+            out,
+            lambda share: progress("import", share),
+            looked=looked,
+            resume=kept if resume else None,
         )
     print(out)
 

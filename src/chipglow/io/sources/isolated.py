@@ -29,7 +29,7 @@ MEMORY: Final = 2 * 1024**3
 PATIENCE: Final = 30.0
 """How long a reader may take for one answer about the smallest file, in s.
 
-A process takes about 5 s to start on a machine with four times as much to do as it has cores.
+A process takes about 6 s to start on a machine with four times as much to do as it has cores.
 """
 
 PATIENCE_PER_BYTE: Final = 1e-6
