@@ -189,6 +189,15 @@ def test_a_file_for_each_time(tmp_path):
     assert "no times in the files: frames are 1 s apart" in survey.assumed
 
 
+def test_zones_without_strands_are_of_their_times_if_no_two_are_of_one(tmp_path):
+    path = tmp_path / "chip.plt"
+    write_tecplot(path, NAMES, [zone_of(at=at) for at in (1.0, 0.0, 2.0)])
+    assert MeshSource(path).survey().times.tolist() == [0.0, 1.0, 2.0]
+    check(list(MeshSource(path).frames(RASTER))[1], 1.0)
+    write_tecplot(path, NAMES, [zone_of(at=at) for at in (1.0, 1.0, 2.0)])
+    assert len(MeshSource(path).survey().times) == 1
+
+
 @pytest.mark.parametrize("order", ["<", ">"])
 @pytest.mark.parametrize("version", [107, 112])
 def test_what_is_not_of_the_mesh_is_skipped(tmp_path, order, version):

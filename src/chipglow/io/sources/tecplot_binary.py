@@ -6,7 +6,7 @@ neighbours from 108, the type of the file from 111.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
@@ -262,7 +262,18 @@ def _headers(cursor: _Cursor, version: int, variables: int) -> list[_Header]:
             raise cursor.damaged(f"mark {marker:g} at byte {cursor.at - 4}")
     if not found:
         raise cursor.damaged("no zone")
-    return found
+    return _in_strands(found)
+
+
+def _in_strands(headers: list[_Header]) -> list[_Header]:
+    """Zones with a strand, if none has one and each has a time of its own.
+
+    To Tecplot they would be there at all times, but who writes such a file means their times.
+    """
+    static = all(header.strand == _STATIC for header in headers)
+    if static and len({header.time for header in headers}) == len(headers):
+        return [replace(header, strand=_STATIC + 1) for header in headers]
+    return headers
 
 
 def _header(cursor: _Cursor, version: int, variables: int, number: int) -> _Header:
