@@ -273,7 +273,9 @@ def test_deleted_elements_are_void(tmp_path):
     grid = grid_of()
     grid.cell_data["STATUS"] = (np.asarray(grid.cell_centers().points[:, 0]) < 5e-4).astype(float)
     grid.save(tmp_path / "chip.vtu")
-    check_linear(only_frame(MeshSource(tmp_path / "chip.vtu")), inside=X < 5e-4)
+    source = MeshSource(tmp_path / "chip.vtu")
+    check_linear(only_frame(source), inside=X < 5e-4)
+    assert survey_of(source).from_file == ("elements whose STATUS is 0 are deleted",)
 
 
 def test_a_displacement_is_added_if_it_is_named(tmp_path):
