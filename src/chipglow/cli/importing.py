@@ -5,6 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from chipglow.cli.assumed import say_assumed
 from chipglow.cli.progress import progress_bars
 from chipglow.io import import_scene, prospect
 from chipglow.io.atomic import check_folder
@@ -74,5 +75,4 @@ def _say(looked: Prospect) -> None:
     )
     for sentence in survey.from_file:
         console.print(f"From the file: {sentence}")
-    for sentence in looked.assumed:
-        console.print(f"Assumed: {sentence}")
+    say_assumed(looked.assumed)
