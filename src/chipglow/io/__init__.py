@@ -1,6 +1,11 @@
 """Readers and writers: scenes, measurements, and output that is whole or not there."""
 
 from chipglow.io.atomic import atomic_folder, atomic_path
+from chipglow.io.emissivity_file import (
+    read_emissivity_map,
+    write_emissivity,
+    write_emissivity_table,
+)
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
 from chipglow.io.movie_file import check_movie_path, movie_writer
@@ -28,11 +33,14 @@ __all__ = [
     "movie_writer",
     "open_scene",
     "prospect",
+    "read_emissivity_map",
     "read_measurement",
     "read_scene",
     "read_tool_outline",
     "unfinished_scenes",
     "write_dataset",
+    "write_emissivity",
+    "write_emissivity_table",
     "write_measurement",
     "write_scene",
 ]

@@ -1,6 +1,7 @@
 """The report: the paper's figures beside ours, as a page, pictures, numbers and arrays; movies."""
 
 from chipglow.report.comparison import Row, comparison_rows
+from chipglow.report.emissivity_figure import draw_emissivity
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
 from chipglow.report.report import write_report
 from chipglow.report.scene_figure import draw_scene
@@ -22,6 +23,7 @@ __all__ = [
     "ShownField",
     "comparison_rows",
     "cut_movie",
+    "draw_emissivity",
     "draw_scene",
     "scene_summary",
     "write_report",

@@ -1,7 +1,8 @@
 """Studies: what to cut, look at and analyse, as a YAML file or in Python."""
 
 from chipglow.study.cache import CachedScene, cache_folder, cached_scenes, clear_cache
-from chipglow.study.files import StudyError, load_import, load_study
+from chipglow.study.emissivity import surface_text
+from chipglow.study.files import StudyError, load_import, load_regions, load_study
 from chipglow.study.fitting import Fitted, fit
 from chipglow.study.import_schema import ImportDescription
 from chipglow.study.preview import preview_raster
@@ -30,8 +31,10 @@ __all__ = [
     "is_cut",
     "kept_progress",
     "load_import",
+    "load_regions",
     "load_study",
     "preview_raster",
     "run",
     "study_text",
+    "surface_text",
 ]
