@@ -17,10 +17,12 @@ from chipglow.analysis.error import (
     error_images,
     reference_temperature,
 )
+from chipglow.analysis.find_tool import FoundTool, find_tool
 from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.lines import Line, sample, straight_line
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
+from chipglow.analysis.rake_grid import RakeGrid, rake_grid
 from chipglow.analysis.regions import Area, Circle, Polygon, Region, areas, shared_pixels
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
@@ -36,6 +38,7 @@ __all__ = [
     "EmissivityLine",
     "EmissivityMap",
     "ErrorImages",
+    "FoundTool",
     "Heating",
     "Inertia",
     "Line",
@@ -43,6 +46,7 @@ __all__ = [
     "Plan",
     "Polygon",
     "RakeErrors",
+    "RakeGrid",
     "ReferenceKind",
     "Region",
     "RegionEmissivity",
@@ -61,8 +65,10 @@ __all__ = [
     "emissivity_line",
     "error_images",
     "find_shear_band",
+    "find_tool",
     "inertia",
     "rake_errors",
+    "rake_grid",
     "reference_temperature",
     "sample",
     "segmentation",

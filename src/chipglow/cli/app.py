@@ -10,6 +10,7 @@ import typer
 
 from chipglow.cli.boundary import Boundary
 from chipglow.cli.emissivity import emissivity
+from chipglow.cli.rake import rake
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 
@@ -239,6 +240,7 @@ def materials(
 
 
 app.command("emissivity")(emissivity)
+app.command("rake")(rake)
 
 
 @cache_app.command("list")

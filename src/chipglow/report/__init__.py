@@ -3,6 +3,7 @@
 from chipglow.report.comparison import Row, comparison_rows
 from chipglow.report.emissivity_figure import draw_emissivity
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
+from chipglow.report.rake_figure import draw_rake_grid
 from chipglow.report.report import write_report
 from chipglow.report.scene_figure import draw_scene
 from chipglow.report.scene_summary import (
@@ -24,6 +25,7 @@ __all__ = [
     "comparison_rows",
     "cut_movie",
     "draw_emissivity",
+    "draw_rake_grid",
     "draw_scene",
     "scene_summary",
     "write_report",
