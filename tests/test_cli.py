@@ -337,7 +337,7 @@ def test_measure_starts_when_told_with_the_chip_that_is_named(folder, scene):
     ("option", "value", "message"),
     [
         ("--start", "20", "--start: 20 has no unit, expected a time such as 10 us"),
-        ("--start", "35 us", "scene"),
+        ("--start", "35 us", "scene.nc: exposure: 3.5e-05 s to"),
         ("--chip", "chip 3", "--chip: 'chip 3' is unknown, expected one of chip 1, chip 2"),
         ("--out", "no/m.nc", "no folder no"),
     ],
