@@ -15,6 +15,15 @@ from chipglow.analysis.comparison import (
     compare,
     normalised_error,
 )
+from chipglow.analysis.emissivity import (
+    EmissivityLine,
+    EmissivityMap,
+    Heating,
+    RegionEmissivity,
+    determine_emissivity,
+    emissivity_covariance,
+    emissivity_line,
+)
 from chipglow.analysis.error import (
     ErrorImages,
     ReferenceKind,
@@ -27,6 +36,7 @@ from chipglow.analysis.lines import Line, sample, straight_line
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
 from chipglow.analysis.rake_grid import RakeGrid, rake_grid
+from chipglow.analysis.regions import Area, Circle, Polygon, Region, areas, shared_pixels
 from chipglow.analysis.ridge import NoShearBandError
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
@@ -34,26 +44,34 @@ from chipglow.analysis.shear_band import ShearBand, find_shear_band
 
 __all__ = [
     "PAPER",
+    "Area",
     "BandComparison",
     "BandErrors",
     "BandProfile",
     "ChipMetrics",
     "ChipScan",
+    "Circle",
     "Comparison",
     "Doubts",
+    "EmissivityLine",
+    "EmissivityMap",
     "ErrorImages",
     "Fit",
     "FoundTool",
     "GridComparison",
+    "Heating",
     "Inertia",
     "Line",
     "NoShearBandError",
     "PlaceResult",
     "Plan",
+    "Polygon",
     "RakeErrors",
     "RakeGrid",
     "Reading",
     "ReferenceKind",
+    "Region",
+    "RegionEmissivity",
     "Segmentation",
     "Sensitivity",
     "Setting",
@@ -62,11 +80,15 @@ __all__ = [
     "StudyResult",
     "ThermalImage",
     "analyse",
+    "areas",
     "band_errors",
     "band_profile",
     "chip_metrics",
     "compare",
     "contact_length",
+    "determine_emissivity",
+    "emissivity_covariance",
+    "emissivity_line",
     "error_images",
     "find_band",
     "find_shear_band",
@@ -79,5 +101,6 @@ __all__ = [
     "sample",
     "segmentation",
     "sensitivity",
+    "shared_pixels",
     "straight_line",
 ]

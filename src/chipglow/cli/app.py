@@ -10,6 +10,7 @@ import typer
 
 from chipglow.cli.boundary import Boundary
 from chipglow.cli.compare import compare
+from chipglow.cli.emissivity import emissivity
 from chipglow.cli.rake import rake
 from chipglow.cli.shearband import shearband
 
@@ -241,6 +242,7 @@ def materials(
 
 
 app.command("shearband")(shearband)
+app.command("emissivity")(emissivity)
 app.command("rake")(rake)
 app.command("compare")(compare)
 

@@ -2,7 +2,13 @@
 
 from chipglow.io.atomic import atomic_folder, atomic_path
 from chipglow.io.band_file import check_band_profile_path, read_curve, write_band_profile
+from chipglow.io.cameras import CAMERA_FORMATS, CameraFormat, read_recording, write_hcc
 from chipglow.io.comparison_file import write_comparison
+from chipglow.io.emissivity_file import (
+    read_emissivity_map,
+    write_emissivity,
+    write_emissivity_table,
+)
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
 from chipglow.io.movie_file import check_movie_path, movie_writer
@@ -18,7 +24,9 @@ from chipglow.io.tool_file import read_tool_outline
 from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 
 __all__ = [
+    "CAMERA_FORMATS",
     "FORMAT_VERSION",
+    "CameraFormat",
     "Import",
     "SceneWriter",
     "StoredScene",
@@ -34,13 +42,18 @@ __all__ = [
     "open_scene",
     "prospect",
     "read_curve",
+    "read_emissivity_map",
     "read_measurement",
+    "read_recording",
     "read_scene",
     "read_tool_outline",
     "unfinished_scenes",
     "write_band_profile",
     "write_comparison",
     "write_dataset",
+    "write_emissivity",
+    "write_emissivity_table",
+    "write_hcc",
     "write_measurement",
     "write_rake_grid",
     "write_scene",

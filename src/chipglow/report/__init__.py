@@ -3,6 +3,7 @@
 from chipglow.report.band_figure import draw_band_profile
 from chipglow.report.compare_figure import draw_comparison
 from chipglow.report.comparison import Row, comparison_rows
+from chipglow.report.emissivity_figure import draw_emissivity
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
 from chipglow.report.rake_figure import draw_rake_grid
 from chipglow.report.report import write_report
@@ -27,6 +28,7 @@ __all__ = [
     "cut_movie",
     "draw_band_profile",
     "draw_comparison",
+    "draw_emissivity",
     "draw_rake_grid",
     "draw_scene",
     "scene_summary",

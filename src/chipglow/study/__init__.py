@@ -1,7 +1,9 @@
 """Studies: what to cut, look at and analyse, as a YAML file or in Python."""
 
 from chipglow.study.cache import CachedScene, cache_folder, cached_scenes, clear_cache
-from chipglow.study.files import StudyError, load_import, load_study
+from chipglow.study.emissivity import surface_text
+from chipglow.study.files import StudyError, load_import, load_regions, load_study
+from chipglow.study.fitting import Fitted, fit
 from chipglow.study.import_schema import ImportDescription
 from chipglow.study.preview import preview_raster
 from chipglow.study.reference import FieldEntry, field_entries, field_tables
@@ -14,6 +16,7 @@ __all__ = [
     "CUTTING_STEP",
     "CachedScene",
     "FieldEntry",
+    "Fitted",
     "ImportDescription",
     "Progress",
     "Study",
@@ -24,14 +27,17 @@ __all__ = [
     "cut",
     "field_entries",
     "field_tables",
+    "fit",
     "import_text",
     "is_cut",
     "kept_progress",
     "load_import",
+    "load_regions",
     "load_study",
     "load_tool",
     "preview_raster",
     "run",
     "study_text",
+    "surface_text",
     "tool_of",
 ]

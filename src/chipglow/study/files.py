@@ -8,7 +8,9 @@ from typing import Any, Final, TypeVar
 import yaml
 from pydantic import BaseModel, ValidationError
 
+from chipglow.analysis.regions import Region
 from chipglow.study.import_schema import ImportDescription
+from chipglow.study.regions import RegionsDescription
 from chipglow.study.schema import Study
 
 Kind = TypeVar("Kind", bound=BaseModel)
@@ -62,6 +64,25 @@ def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescr
     for setting in settings:
         data = _with(data, setting)
     return validated(ImportDescription, data, path.name, path.parent)
+
+
+def load_regions(path: str | Path) -> tuple[Region, ...]:
+    """Read named regions of an image from a YAML file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Raises
+    ------
+    StudyError
+        If the file is no YAML or a region is not possible.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    return validated(RegionsDescription, read_yaml(path), path.name, path.parent).build()
 
 
 def read_yaml(path: Path) -> Any:
