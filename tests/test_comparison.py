@@ -260,6 +260,19 @@ def test_frames_that_have_moved_are_left_out():
     np.testing.assert_allclose(result.band.measured.random[known], 0.0, atol=1e-6)
 
 
+def test_the_reference_says_which_frames_are_compared():
+    """Two places of the band; the later one is 40 µm on and hotter."""
+    images = [BandImage(bend=1e-3, shift=shift).temperature() for shift in (0.0, 40e-6)]
+    images[1] = images[1] + 30.0
+    one, other = measured([images[0], images[1]]), frames(images[0])
+    early, late = (
+        compare(one, {"a": other}, TOOL, doubts=STATED, reference=number).places[-1].fits[0]
+        for number in (0, 1)
+    )
+    assert early.bias == pytest.approx(0.0, abs=1e-6)
+    assert late.bias < -10.0
+
+
 # What cannot be compared
 
 
@@ -355,6 +368,7 @@ def test_the_command_writes_what_it_says(folder):
         ((*FILES, "--emissivity-uncertainty", "2"), "--emissivity-uncertainty: 2, expected 0"),
         ((*FILES, "--position", "1 s"), "--position: '1 s' is not a length"),
         ((*FILES, "--curve", "one.nc"), "one.nc: expected"),
+        ((*FILES, "--reference", "1 s"), "--reference: 1 s, expected 0 us to 20 us"),
         ((*FILES, "--plot", "a.txt"), "a.txt, expected a file that ends in .png"),
         (("measured.nc", "curve.csv"), "curve.csv: not a measurement"),
         ((*FILES, *USUAL, "--out", "."), "holds something that is not a result"),

@@ -295,6 +295,7 @@ def compare(
     tool: Tool,
     curve: NDArray[np.float64] | None = None,
     doubts: Doubts | None = None,
+    reference: int | None = None,
 ) -> Comparison:
     """Lay a measurement and simulations over each other.
 
@@ -313,6 +314,8 @@ def compare(
         the measurement's coordinates in m, shape (k, 2). By default the ridge of each frame.
     doubts : Doubts, optional
         Uncertainties that the files do not tell.
+    reference : int, optional
+        Number of the measured frame whose band is fully developed; see `band_profile`.
 
     Raises
     ------
@@ -342,7 +345,9 @@ def compare(
         )
     tools = {label: _tool_of(label, item, tool, notes) for label, item in simulated.items()}
     grid = _compare_grid(measured, simulated, tool, tools, doubts, notes)
-    band = _compare_band(measured, simulated, tool, tools, curve, doubts, notes)
+    files = [("measured", measured, tool, reference)]
+    files += [(label, item, tools[label], None) for label, item in simulated.items()]
+    band = _compare_band(files, curve, doubts, notes)
     places = _places(tuple(simulated), grid, band)
     if not places:
         reasons = " ".join(notes)
@@ -461,34 +466,33 @@ def _of_the_emissivity(
 
 
 def _compare_band(
-    measured: Measurement,
-    simulated: Mapping[str, Measurement],
-    tool: Tool,
-    tools: Mapping[str, Tool],
+    files: Sequence[tuple[str, Measurement, Tool, int | None]],
     curve: NDArray[np.float64] | None,
     doubts: Doubts,
     notes: list[str],
 ) -> BandComparison | None:
-    files = [("measured", measured, tool)]
-    files += [(label, item, tools[label]) for label, item in simulated.items()]
+    """The band of the measurement, which comes first, and of the simulations."""
+    _, measured, tool, _ = files[0]
     position = _position(measured, doubts)
     profiles = []
-    for name, item, placed in files:
+    for name, item, placed, reference in files:
         moved = None if curve is None else curve + (placed.edge_point - tool.edge_point)
         try:
-            profiles.append(band_profile(item, placed, curve=moved, position=position))
+            profiles.append(
+                band_profile(item, placed, curve=moved, reference=reference, position=position)
+            )
         except NoShearBandError as error:
             notes.append(f"Doubtful: the shear band is left out: {name}: {error}.")
             return None
-    names = [name for name, _, _ in files]
     step = measured.raster.spacing
     last = max(float(profile.distance[-1]) for profile in profiles)
     distance = step * np.arange(1, int(last / step) + 1, dtype=np.float64)
+    names = [name for name, *_ in files]
     parts = [_along(name, p, distance, notes) for name, p in zip(names, profiles, strict=True)]
     mean, calibration, off, between = parts[0]
     own = Reading(mean, np.hypot(calibration, doubts.stated), np.hypot(off, between))
     readings = []
-    for item, (mean, _, _, between) in zip(simulated.values(), parts[1:], strict=True):
+    for (_, item, *_), (mean, _, _, between) in zip(files[1:], parts[1:], strict=True):
         emissivity = _of_the_emissivity(item, mean, doubts)
         readings.append(Reading(mean, emissivity, between))
     return BandComparison(distance, own, tuple(readings))

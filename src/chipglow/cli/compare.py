@@ -39,6 +39,14 @@ def compare(
             "is x_um,y_um, from the cutting edge outward; by default along the ridge of each.",
         ),
     ] = None,
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME",
+            help="The measured frame whose band is fully developed; by default the given curve is "
+            "its place, or the hottest and longest found band that begins near the cutting edge.",
+        ),
+    ] = None,
     uncertainty: Annotated[
         str | None,
         typer.Option(
@@ -87,6 +95,7 @@ def compare(
 
     from chipglow.analysis import compare as compare_all
     from chipglow.cli.pictures import check_picture_path, write_picture
+    from chipglow.cli.times import frame_at
     from chipglow.cli.tools import chosen_tool
     from chipglow.io import read_curve
     from chipglow.report import draw_comparison
@@ -108,6 +117,7 @@ def compare(
         placed,
         None if curve is None else read_curve(curve),
         doubts,
+        None if reference is None else frame_at("--reference", reference, whole.times),
     )
     console = Console(highlight=False, markup=False)
     console.print(_table(result))

@@ -45,7 +45,7 @@ def shearband(
         typer.Option(
             metavar="TIME",
             help="The frame whose band is fully developed; by default the given curve is its "
-            "place, or the hottest found band that begins at the cutting edge.",
+            "place, or the hottest and longest found band that begins near the cutting edge.",
         ),
     ] = None,
     width: Annotated[
