@@ -1,7 +1,20 @@
 """Analysis: errors of the measurement, the rake face, the shear band and the segments."""
 
 from chipglow.analysis.band_error import BandErrors, band_errors
+from chipglow.analysis.band_profile import BandProfile, Stage, band_profile
+from chipglow.analysis.band_ridge import ThermalImage, find_band
 from chipglow.analysis.chip import ChipMetrics, ChipScan, chip_metrics
+from chipglow.analysis.comparison import (
+    BandComparison,
+    Comparison,
+    Doubts,
+    Fit,
+    GridComparison,
+    PlaceResult,
+    Reading,
+    compare,
+    normalised_error,
+)
 from chipglow.analysis.emissivity import (
     EmissivityLine,
     EmissivityMap,
@@ -24,29 +37,38 @@ from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
 from chipglow.analysis.rake_grid import RakeGrid, rake_grid
 from chipglow.analysis.regions import Area, Circle, Polygon, Region, areas, shared_pixels
+from chipglow.analysis.ridge import NoShearBandError
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
-from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear_band
+from chipglow.analysis.shear_band import ShearBand, find_shear_band
 
 __all__ = [
     "PAPER",
     "Area",
+    "BandComparison",
     "BandErrors",
+    "BandProfile",
     "ChipMetrics",
     "ChipScan",
     "Circle",
+    "Comparison",
+    "Doubts",
     "EmissivityLine",
     "EmissivityMap",
     "ErrorImages",
+    "Fit",
     "FoundTool",
+    "GridComparison",
     "Heating",
     "Inertia",
     "Line",
     "NoShearBandError",
+    "PlaceResult",
     "Plan",
     "Polygon",
     "RakeErrors",
     "RakeGrid",
+    "Reading",
     "ReferenceKind",
     "Region",
     "RegionEmissivity",
@@ -54,19 +76,25 @@ __all__ = [
     "Sensitivity",
     "Setting",
     "ShearBand",
+    "Stage",
     "StudyResult",
+    "ThermalImage",
     "analyse",
     "areas",
     "band_errors",
+    "band_profile",
     "chip_metrics",
+    "compare",
     "contact_length",
     "determine_emissivity",
     "emissivity_covariance",
     "emissivity_line",
     "error_images",
+    "find_band",
     "find_shear_band",
     "find_tool",
     "inertia",
+    "normalised_error",
     "rake_errors",
     "rake_grid",
     "reference_temperature",

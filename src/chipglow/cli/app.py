@@ -9,8 +9,10 @@ from typing import Annotated, Final
 import typer
 
 from chipglow.cli.boundary import Boundary
+from chipglow.cli.compare import compare
 from chipglow.cli.emissivity import emissivity
 from chipglow.cli.rake import rake
+from chipglow.cli.shearband import shearband
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 
@@ -239,8 +241,10 @@ def materials(
         print(plot)
 
 
+app.command("shearband")(shearband)
 app.command("emissivity")(emissivity)
 app.command("rake")(rake)
+app.command("compare")(compare)
 
 
 @cache_app.command("list")

@@ -1,7 +1,9 @@
 """Readers and writers: scenes, measurements, and output that is whole or not there."""
 
 from chipglow.io.atomic import atomic_folder, atomic_path
+from chipglow.io.band_file import check_band_profile_path, read_curve, write_band_profile
 from chipglow.io.cameras import CAMERA_FORMATS, CameraFormat, read_recording, write_hcc
+from chipglow.io.comparison_file import write_comparison
 from chipglow.io.emissivity_file import (
     read_emissivity_map,
     write_emissivity,
@@ -32,18 +34,22 @@ __all__ = [
     "View",
     "atomic_folder",
     "atomic_path",
+    "check_band_profile_path",
     "check_movie_path",
     "check_rake_grid_path",
     "import_scene",
     "movie_writer",
     "open_scene",
     "prospect",
+    "read_curve",
     "read_emissivity_map",
     "read_measurement",
     "read_recording",
     "read_scene",
     "read_tool_outline",
     "unfinished_scenes",
+    "write_band_profile",
+    "write_comparison",
     "write_dataset",
     "write_emissivity",
     "write_emissivity_table",

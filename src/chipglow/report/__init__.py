@@ -1,5 +1,7 @@
 """The report: the paper's figures beside ours, as a page, pictures, numbers and arrays; movies."""
 
+from chipglow.report.band_figure import draw_band_profile
+from chipglow.report.compare_figure import draw_comparison
 from chipglow.report.comparison import Row, comparison_rows
 from chipglow.report.emissivity_figure import draw_emissivity
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
@@ -24,6 +26,8 @@ __all__ = [
     "ShownField",
     "comparison_rows",
     "cut_movie",
+    "draw_band_profile",
+    "draw_comparison",
     "draw_emissivity",
     "draw_rake_grid",
     "draw_scene",
