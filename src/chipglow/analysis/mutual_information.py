@@ -37,7 +37,10 @@ _REACH: Final = 0.25
 _SCALES: Final = (0.8, 0.9, 1.0, 1.1, 1.25)
 _TURNS: Final = (-4.0, 0.0, 4.0)
 _CANDIDATES: Final = 5
+_SURVEY: Final = (-4.5, -3.0, -1.5, 0.0, 1.5, 3.0, 4.5)
+_THINNED: Final = 4
 _FINALS: Final = 3
+_FAR: Final = 8.0
 _APART: Final = 3.0
 _RIVAL: Final = 0.8
 _UNRELATED: Final = 19
@@ -126,8 +129,10 @@ def fit_images(
     candidates = _placements(coarse, frame) if start is None else [frame.done(start.matrix)]
     score, chance = _against_chance(coarse, frame, candidates[0])
     candidates = [_settled(coarse, frame, matrix)[0] for matrix in candidates]
-    settled = sorted((_settled(middle, frame, matrix) for matrix in candidates), key=_last)
-    fits = sorted((_settled(fine, frame, matrix) for matrix, _ in settled[-_FINALS:]), key=_last)
+    settled = sorted((_settled(middle, frame, matrix) for matrix in candidates), key=_last)[::-1]
+    starts = _surveyed(fine, frame, settled[0][0])
+    starts += [matrix for matrix, _ in settled[1:] if _apart(matrix, starts[0], fine, frame) > _FAR]
+    fits = sorted((_settled(fine, frame, matrix) for matrix in starts), key=_last)
     matrix, _ = _climb(fine, frame, _climb(fine, frame, fits[-1][0], "similarity")[0], model)
     basis = _scaled_basis(fine, frame, matrix, model)
     spread, flat = _sandwich(fine, frame, matrix, basis)
@@ -409,6 +414,22 @@ def _settled(
 
     found = minimize(loss, np.zeros(4), method="Powell", options=_SETTLE)
     return moved(found.x), -float(found.fun)
+
+
+def _surveyed(
+    level: _Level, frame: Frame, matrix: NDArray[np.float64]
+) -> list[NDArray[np.float64]]:
+    """The best similarities on a grid of shifts, turns and scales around a matrix."""
+    basis = _scaled_basis(level, frame, matrix, "similarity")
+    unit, thin = frame.unit(level.places[::_THINNED]), slice(None, None, _THINNED)
+    found = []
+    for parameters in product(_SURVEY, repeat=4):
+        moved = matrix + (basis @ parameters).reshape(3, 3)
+        pixels = mapped_places(moved, unit) * frame.pixel_scale + frame.pixel_centre
+        score = _score(level, pixels, level.bins[thin], level.edges[thin])
+        found.append((score or 0.0, parameters))
+    found.sort(reverse=True)
+    return [matrix + (basis @ best).reshape(3, 3) for _, best in found[:_FINALS]]
 
 
 def _climb(
