@@ -8,10 +8,12 @@ from chipglow.analysis.error import (
     error_images,
     reference_temperature,
 )
+from chipglow.analysis.find_tool import FoundTool, find_tool
 from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.lines import Line, sample, straight_line
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
+from chipglow.analysis.rake_grid import RakeGrid, rake_grid
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
 from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear_band
@@ -22,11 +24,13 @@ __all__ = [
     "ChipMetrics",
     "ChipScan",
     "ErrorImages",
+    "FoundTool",
     "Inertia",
     "Line",
     "NoShearBandError",
     "Plan",
     "RakeErrors",
+    "RakeGrid",
     "ReferenceKind",
     "Segmentation",
     "Sensitivity",
@@ -39,8 +43,10 @@ __all__ = [
     "contact_length",
     "error_images",
     "find_shear_band",
+    "find_tool",
     "inertia",
     "rake_errors",
+    "rake_grid",
     "reference_temperature",
     "sample",
     "segmentation",

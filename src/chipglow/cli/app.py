@@ -9,6 +9,7 @@ from typing import Annotated, Final
 import typer
 
 from chipglow.cli.boundary import Boundary
+from chipglow.cli.rake import rake
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 
@@ -235,6 +236,9 @@ def materials(
     if plot is not None:
         plot_material(name, plot)
         print(plot)
+
+
+app.command("rake")(rake)
 
 
 @cache_app.command("list")

@@ -4,6 +4,7 @@ from chipglow.io.atomic import atomic_folder, atomic_path
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
 from chipglow.io.movie_file import check_movie_path, movie_writer
+from chipglow.io.rake_grid_file import check_rake_grid_path, write_rake_grid
 from chipglow.io.scene_file import (
     FORMAT_VERSION,
     SceneWriter,
@@ -24,6 +25,7 @@ __all__ = [
     "atomic_folder",
     "atomic_path",
     "check_movie_path",
+    "check_rake_grid_path",
     "import_scene",
     "movie_writer",
     "open_scene",
@@ -34,5 +36,6 @@ __all__ = [
     "unfinished_scenes",
     "write_dataset",
     "write_measurement",
+    "write_rake_grid",
     "write_scene",
 ]

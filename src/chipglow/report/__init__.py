@@ -2,6 +2,7 @@
 
 from chipglow.report.comparison import Row, comparison_rows
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
+from chipglow.report.rake_figure import draw_rake_grid
 from chipglow.report.report import write_report
 from chipglow.report.scene_figure import draw_scene
 from chipglow.report.scene_summary import (
@@ -22,6 +23,7 @@ __all__ = [
     "ShownField",
     "comparison_rows",
     "cut_movie",
+    "draw_rake_grid",
     "draw_scene",
     "scene_summary",
     "write_report",

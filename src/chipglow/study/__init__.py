@@ -8,6 +8,7 @@ from chipglow.study.reference import FieldEntry, field_entries, field_tables
 from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, kept_progress, run
 from chipglow.study.schema import Study
 from chipglow.study.template import import_text, study_text
+from chipglow.study.tool_description import load_tool, tool_of
 
 __all__ = [
     "CUTTING_STEP",
@@ -28,7 +29,9 @@ __all__ = [
     "kept_progress",
     "load_import",
     "load_study",
+    "load_tool",
     "preview_raster",
     "run",
     "study_text",
+    "tool_of",
 ]

@@ -145,7 +145,8 @@ def is_bare_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-Length = Annotated[float, Quantity("a length", "m", "um", "6 um")]
+LENGTH: Final = Quantity("a length", "m", "um", "6 um")
+Length = Annotated[float, LENGTH]
 Position = Annotated[float, Quantity("a position", "m", "um", "-420 um", positive=False)]
 CutLength = Annotated[float, Quantity("a length", "m", "mm", "0.3 mm")]
 Wavelength = Annotated[float, Quantity("a wavelength", "m", "um", "4.5 um")]
