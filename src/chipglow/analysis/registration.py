@@ -414,18 +414,14 @@ def _depth(matrix: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[
     return np.asarray(places @ matrix[2, :2] + matrix[2, 2])
 
 
-def mapped_places(
-    matrix: NDArray[np.float64], places: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def mapped_places(matrix: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
     """What a matrix makes of places, shape (..., 2)."""
     return np.asarray(
         (places @ matrix[:2, :2].T + matrix[:2, 2]) / _depth(matrix, places)[..., None]
     )
 
 
-def element_slopes(
-    matrix: NDArray[np.float64], places: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def element_slopes(matrix: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
     """Derivative of what a matrix maps places to by its elements, shape (..., 2, 9)."""
     whole = np.concatenate([places, np.ones((*places.shape[:-1], 1))], axis=-1)
     whole = whole / _depth(matrix, places)[..., None]
