@@ -36,10 +36,10 @@ _LEAST_OVERLAP: Final = 0.5
 _REACH: Final = 0.25
 _SCALES: Final = (0.8, 0.9, 1.0, 1.1, 1.25)
 _TURNS: Final = (-4.0, 0.0, 4.0)
-_CANDIDATES: Final = 5
+_CANDIDATES: Final = 4
 _SURVEY: Final = (-4.5, -3.0, -1.5, 0.0, 1.5, 3.0, 4.5)
 _THINNED: Final = 4
-_FINALS: Final = 3
+_FINALS: Final = 2
 _FAR: Final = 8.0
 _APART: Final = 3.0
 _RIVAL: Final = 0.8
@@ -515,7 +515,7 @@ def _rivals(
     best, most = fits[0]
     for matrix, common in fits[1:]:
         distance = _apart(best, matrix, level, frame)
-        if distance > _APART and common > _RIVAL * most:
+        if distance > _FAR and common > _RIVAL * most:
             return (
                 f"another placement, {distance:.0f} infrared pixels away, fits nearly as well, "
                 "points to begin from would decide",

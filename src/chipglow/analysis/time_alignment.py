@@ -10,6 +10,9 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from chipglow.analysis.registration import Registration
+from chipglow.scene import Raster
+
 _FEWEST: Final = 6
 _LEAST_OVERLAP: Final = 0.5
 _RIVAL: Final = 9.0
@@ -87,8 +90,8 @@ def align_times(
     -----
     The visible signal, a cubic spline through its frames, is put to the infrared times; the
     correlation of both is greatest at the offset that is least squares for
-    infrared = a + b visible(time). All offsets are tried, a third of a visible frame apart, at which
-    at least half of the infrared frames have visible ones; Gauss-Newton ends it. What the spline
+    infrared = a + b visible(time). All offsets are tried, a third of a visible frame apart, at
+    which at least half of the infrared frames have visible ones; Gauss-Newton ends it. What the spline
     cannot follow, faster than the visible camera's frames, goes into the residuals and with them
     into the uncertainty.
     """
@@ -147,6 +150,52 @@ def simultaneous_frames(
         np.flatnonzero((visible_times < last) & (visible_times + visible_exposure > first))
         for first, last in zip(begin, end, strict=True)
     ]
+
+
+def region_signals(
+    registration: Registration,
+    infrared: NDArray[np.floating],
+    raster: Raster,
+    visible: NDArray[np.generic],
+    region: tuple[float, float, float, float],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean brightness of one region in every frame of both cameras.
+
+    Parameters
+    ----------
+    registration : Registration
+        Where the region is in the visible pictures.
+    infrared : ndarray
+        Radiance, shape (time, y, x).
+    raster : Raster
+        The infrared sensors.
+    visible : ndarray
+        Brightness, shape (frame, row, column).
+    region : tuple of float
+        Left, bottom, right and top in m.
+
+    Returns
+    -------
+    tuple of ndarray
+        A number for every infrared and for every visible frame.
+
+    Raises
+    ------
+    ValueError
+        If the region is outside an image.
+    """
+    left, bottom, right, top = region
+    columns = (raster.x >= left) & (raster.x <= right)
+    rows = (raster.y >= bottom) & (raster.y <= top)
+    down, across = np.indices(visible.shape[1:])
+    place = registration.positions(np.stack([across, down], axis=-1))
+    inside = (place[..., 0] >= left) & (place[..., 0] <= right)
+    inside &= (place[..., 1] >= bottom) & (place[..., 1] <= top)
+    if not (columns.any() and rows.any() and inside.any()):
+        raise ValueError("region: is outside an image, expected one that both cameras see")
+    hot = infrared[:, rows][:, :, columns].reshape(len(infrared), -1).mean(axis=1)
+    bright = visible.reshape(len(visible), -1)[:, inside.ravel()].mean(axis=1)
+    return np.asarray(hot, np.float64), np.asarray(bright, np.float64)
 
 
 def _check(name: str, times: NDArray[np.float64], values: NDArray[np.float64]) -> None:

@@ -8,12 +8,14 @@ from numpy.typing import NDArray
 from PIL import Image, ImageSequence, UnidentifiedImageError
 
 from chipglow.camera import Recording
+from chipglow.io.atomic import atomic_path
 from chipglow.io.cameras import CAMERA_FORMATS, read_recording
 from chipglow.io.cameras.recordings import find_format
 
 PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".gif")
 
 _MOST_PIXELS: Final = 400_000_000
+_TURN: Final = 600
 
 
 def read_pictures(path: str | Path, interval: float | None = None) -> Recording:
@@ -73,3 +75,23 @@ def _brightness(page: Image.Image) -> NDArray[np.float32]:
         page if page.mode in ("1", "L", "I", "F") or page.mode[:2] == "I;" else page.convert("L")
     )
     return np.asarray(plain, np.float32)
+
+
+def write_blink(pictures: tuple[NDArray[np.uint8], ...], path: str | Path) -> None:
+    """Write pictures that are shown in turns, again and again, as a GIF.
+
+    Parameters
+    ----------
+    pictures : tuple of ndarray
+        Red, green and blue, shape (rows, columns, 3), all of one size.
+    path : str or Path
+        The file.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    first, *others = (Image.fromarray(picture).quantize(255) for picture in pictures)
+    with atomic_path(path) as temporary:
+        first.save(temporary, "GIF", save_all=True, append_images=others, duration=_TURN, loop=0)

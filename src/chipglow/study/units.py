@@ -147,7 +147,8 @@ def is_bare_number(value: object) -> bool:
 
 LENGTH: Final = Quantity("a length", "m", "um", "6 um")
 Length = Annotated[float, LENGTH]
-Position = Annotated[float, Quantity("a position", "m", "um", "-420 um", positive=False)]
+POSITION: Final = Quantity("a position", "m", "um", "-420 um", positive=False)
+Position = Annotated[float, POSITION]
 CutLength = Annotated[float, Quantity("a length", "m", "mm", "0.3 mm")]
 Wavelength = Annotated[float, Quantity("a wavelength", "m", "um", "4.5 um")]
 WavelengthRange = Annotated[
