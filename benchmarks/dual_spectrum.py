@@ -23,6 +23,9 @@ FINE = Raster(left=-620e-6, top=520e-6, spacing=2e-6, rows=360, columns=480)
 SHEAR_ANGLE, FEED, BAND_SPACING, CHIP_ANGLE = radians(32.0), 300e-6, 130e-6, radians(14.0)
 
 
+TOOL = ToolGeometry()
+
+
 @dataclass(frozen=True)
 class DualSpectrum:
     """One experiment; what is random follows the seed.
@@ -38,7 +41,7 @@ class DualSpectrum:
     stretch: float = 1.02
     shift: tuple[float, float] = (11.3, -7.6)
     chip_brightness: float = 0.75
-    tool: Tool = ToolGeometry()
+    tool: Tool = TOOL
 
     @cached_property
     def matrix(self) -> NDArray[np.float64]:

@@ -243,7 +243,7 @@ def _edges(image: NDArray[np.float64], scale: float, faint: float) -> NDArray[np
     mean = gaussian_filter(image, _WINDOW * scale)
     variance = gaussian_filter((image - image.mean()) ** 2, _WINDOW * scale)
     variance = np.maximum(variance - (mean - image.mean()) ** 2, 0.0)
-    return np.stack([right, down]) * scale / np.sqrt(variance + faint**2)
+    return np.asarray(np.stack([right, down]) * scale / np.sqrt(variance + faint**2))
 
 
 def _sharp(edges: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -263,7 +263,7 @@ def _binned(image: NDArray[np.float64]) -> NDArray[np.int64]:
     """Bins of equal width from nearly the least to nearly the greatest value."""
     low, high = np.percentile(image, _ENDS)
     share = (image - low) / max(high - low, np.finfo(float).tiny)
-    return np.clip(share * _BINS, 0, _BINS - 1).astype(np.int64)
+    return np.asarray(np.clip(share * _BINS, 0, _BINS - 1), np.int64)
 
 
 def _frame(raster: Raster, shape: tuple[int, ...], start: Registration | None) -> Frame:
@@ -343,7 +343,7 @@ def _score(
     place = row[here], column[here]
     joint = np.bincount(bins[here] * _BINS + level.codes[place], None, _BINS**2) / here.size
     along = (edges[here] * level.directions[place]).sum(axis=1)
-    return _shared(joint.reshape(_BINS, _BINS)) * float(along @ along) / here.size
+    return _shared(joint.reshape(_BINS, _BINS)) * float(along @ along) / float(here.size)
 
 
 def _shared(joint: NDArray[np.float64]) -> float:
@@ -369,10 +369,9 @@ def _against_chance(
     for number in range(_UNRELATED):
         signs = ((-1, 1), (1, -1), (-1, -1))[number % 3]
         shift = tuple(int(generator.integers(side)) for side in level.bin_image.shape)
-        bins, edges = (
-            np.roll(field[:: signs[0], :: signs[1]], shift, (0, 1))[level.known]
-            for field in (level.bin_image, level.edge_image)
-        )
+        flip = np.s_[:: signs[0], :: signs[1]]
+        bins = np.roll(level.bin_image[flip], shift, (0, 1))[level.known]
+        edges = np.roll(level.edge_image[flip], shift, (0, 1))[level.known]
         chance.append(best(bins, edges * signs[::-1]))
     return best(level.bins, level.edges), np.array(chance)
 

@@ -86,7 +86,8 @@ class Registration:
 
     def positions(self, pixels: ArrayLike) -> NDArray[np.float64]:
         """Position x, y in m of columns and rows of the visible picture, shape (..., 2)."""
-        return mapped_places(np.linalg.inv(self.matrix), np.asarray(pixels, np.float64))
+        back = np.asarray(np.linalg.inv(self.matrix), np.float64)
+        return mapped_places(back, np.asarray(pixels, np.float64))
 
     def pixel_covariance(self, positions: ArrayLike) -> NDArray[np.float64]:
         """Covariance of `pixels` in pixels², shape (..., 2, 2)."""

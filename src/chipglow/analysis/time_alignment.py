@@ -91,9 +91,9 @@ def align_times(
     The visible signal, a cubic spline through its frames, is put to the infrared times; the
     correlation of both is greatest at the offset that is least squares for
     infrared = a + b visible(time). All offsets are tried, a third of a visible frame apart, at
-    which at least half of the infrared frames have visible ones; Gauss-Newton ends it. What the spline
-    cannot follow, faster than the visible camera's frames, goes into the residuals and with them
-    into the uncertainty.
+    which at least half of the infrared frames have visible ones; Gauss-Newton ends it. What the
+    spline cannot follow, faster than the visible camera's frames, goes into the residuals and with
+    them into the uncertainty.
     """
     for name, times, values in (
         ("infrared", infrared_times, infrared_signal),

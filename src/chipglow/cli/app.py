@@ -10,6 +10,7 @@ import typer
 
 from chipglow.cli.boundary import Boundary
 from chipglow.cli.rake import rake
+from chipglow.cli.register import register
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 
@@ -239,6 +240,7 @@ def materials(
 
 
 app.command("rake")(rake)
+app.command("register")(register)
 
 
 @cache_app.command("list")

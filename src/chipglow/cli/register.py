@@ -88,7 +88,7 @@ def register(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="With --align, write the visible frames of every infrared one, CSV.",
+            help="With --align, write each infrared frame's visible ones, CSV.",
         ),
     ] = None,
     overlay: Annotated[

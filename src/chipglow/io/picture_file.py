@@ -44,7 +44,7 @@ def read_pictures(path: str | Path, interval: float | None = None) -> Recording:
     path = Path(path)
     if path.suffix.lower() in PICTURE_SUFFIXES:
         frames = _frames(path)
-        times = np.arange(len(frames)) * (1.0 if interval is None else interval)
+        times = np.arange(len(frames), dtype=np.float64) * (1.0 if interval is None else interval)
         return Recording(frames, "counts", times, f"picture {path.name}")
     if CAMERA_FORMATS[find_format(path)].tells_quantity:
         return read_recording(path, interval=interval)
@@ -71,10 +71,8 @@ def _frames(path: Path) -> NDArray[np.float32]:
 
 def _brightness(page: Image.Image) -> NDArray[np.float32]:
     """Pages of one channel as they are, with 16 bits or more too; others as luminance."""
-    plain = (
-        page if page.mode in ("1", "L", "I", "F") or page.mode[:2] == "I;" else page.convert("L")
-    )
-    return np.asarray(plain, np.float32)
+    one = page.mode in ("1", "L", "I", "F") or page.mode.startswith("I;")
+    return np.asarray(page if one else page.convert("L"), np.float32)
 
 
 def write_blink(pictures: tuple[NDArray[np.uint8], ...], path: str | Path) -> None:

@@ -104,7 +104,7 @@ def _rendered(
 ) -> NDArray[np.uint8]:
     height = _BLINK_WIDTH * visible.shape[0] / visible.shape[1]
     figure = Figure(figsize=(_BLINK_WIDTH, height), dpi=100)
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     if celsius is None:
         _draw_visible(axes, visible)

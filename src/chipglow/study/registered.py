@@ -13,7 +13,8 @@ from chipglow.io import atomic_path
 from chipglow.study.files import StudyError, read_yaml, validated
 from chipglow.study.section import Part, described
 
-_Numbers = Annotated[tuple[tuple[float, ...], ...], Strict(False)]
+_Row = Annotated[tuple[float, ...], Strict(False)]
+_Rows = Annotated[tuple[_Row, ...], Strict(False)]
 
 _HEAD: Final = """\
 # Map from the infrared image onto the visible picture, by chipglow register.
@@ -27,8 +28,8 @@ class RegistrationDescription(Part):
 
     model: Model = described("affine", "What the matrix may be.")
     method: Method = described("points", "How it was found.")
-    matrix: _Numbers = described(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), "The map.")
-    covariance: _Numbers = described(((0.0,) * 9,) * 9, "Of the elements of the matrix.")
+    matrix: _Rows = described(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), "The map.")
+    covariance: _Rows = described(((0.0,) * 9,) * 9, "Of the elements of the matrix.")
     degrees_of_freedom: float | None = described(None, "Of the covariance; none: infinite.")
     doubts: Annotated[tuple[str, ...], Strict(False)] = described((), "Why it is not trusted.")
 
