@@ -69,7 +69,7 @@ class DualSpectrum:
         radiance = clean.radiance + generator.normal(0.0, noise, clean.radiance.shape)
         return Measurement.from_radiance(
             radiance, clean.band, clean.times, clean.raster, 573.15, attributes=dict(CAMERA)
-        )
+        ).with_tool(self.tool)
 
     @cached_property
     def visible(self) -> NDArray[np.uint8]:

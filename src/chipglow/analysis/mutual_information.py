@@ -37,7 +37,7 @@ _REACH: Final = 0.25
 _SCALES: Final = (0.8, 0.9, 1.0, 1.1, 1.25)
 _TURNS: Final = (-4.0, 0.0, 4.0)
 _CANDIDATES: Final = 4
-_SURVEY: Final = (-4.5, -3.0, -1.5, 0.0, 1.5, 3.0, 4.5)
+_SURVEY: Final = (-4.0, -2.0, 0.0, 2.0, 4.0)
 _THINNED: Final = 4
 _FINALS: Final = 2
 _FAR: Final = 8.0
@@ -48,7 +48,7 @@ _BLOCK: Final = 16
 _UNSURE: Final = 1.0
 _FLAT: Final = 1e-4
 _SYSTEMATIC: Final = 0.5
-_SETTLE: Final = {"xtol": 0.1, "ftol": 1e-3, "maxfev": 300}
+_SETTLE: Final = {"xtol": 0.1, "ftol": 1e-3, "maxfev": 200}
 _CLIMB: Final = {"gtol": 1e-7, "maxiter": 100}
 
 
@@ -128,10 +128,10 @@ def fit_images(
     frame = _frame(raster, visible.shape, start)
     candidates = _placements(coarse, frame) if start is None else [frame.done(start.matrix)]
     score, chance = _against_chance(coarse, frame, candidates[0])
-    candidates = [_settled(coarse, frame, matrix)[0] for matrix in candidates]
-    settled = sorted((_settled(middle, frame, matrix) for matrix in candidates), key=_last)[::-1]
-    starts = _surveyed(fine, frame, settled[0][0])
-    starts += [matrix for matrix, _ in settled[1:] if _apart(matrix, starts[0], fine, frame) > _FAR]
+    if start is None:
+        candidates = _narrowed(coarse, middle, frame, candidates)
+    starts = _surveyed(fine, frame, candidates[0])
+    starts += [other for other in candidates[1:] if _apart(other, starts[0], fine, frame) > _FAR]
     fits = sorted((_settled(fine, frame, matrix) for matrix in starts), key=_last)
     matrix, _ = _climb(fine, frame, _climb(fine, frame, fits[-1][0], "similarity")[0], model)
     basis = _scaled_basis(fine, frame, matrix, model)
@@ -413,6 +413,15 @@ def _settled(
 
     found = minimize(loss, np.zeros(4), method="Powell", options=_SETTLE)
     return moved(found.x), -float(found.fun)
+
+
+def _narrowed(
+    coarse: _Level, middle: _Level, frame: Frame, candidates: list[NDArray[np.float64]]
+) -> list[NDArray[np.float64]]:
+    """Candidates after a search at a quarter and at half of the resolution, the best first."""
+    found = [_settled(coarse, frame, matrix)[0] for matrix in candidates]
+    fits = sorted((_settled(middle, frame, matrix) for matrix in found), key=_last)
+    return [matrix for matrix, _ in fits[::-1]]
 
 
 def _surveyed(

@@ -20,6 +20,7 @@ _PARAMETERS: Final = {"similarity": 4, "affine": 6, "homography": 8}
 _FLATTEST: Final = 0.01
 _WORST_CONDITION: Final = 1e6
 _UNLIKELY: Final = 0.01
+_EXACT: Final = 1e-9
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class Registration:
                 raise ValueError(f"registration: {name}: expected finite numbers, shape {shape}")
         if self.matrix[2, 2] != 1.0:
             raise ValueError(
-                f"registration: matrix: its last element is {self.matrix[2, 2]!r}, expected 1"
+                f"registration: matrix: its last element is {self.matrix[2, 2]:g}, expected 1"
             )
         if not abs(np.linalg.det(self.matrix)) > 0:
             raise ValueError("registration: matrix: is singular, expected one with an inverse")
@@ -399,7 +400,7 @@ def _misplaced(
 ) -> NDArray[np.bool_]:
     """The F test of every point against the scatter of the others, 1 % over all points."""
     count = residual.size // 2
-    if freedom <= 2 or variance <= np.finfo(float).eps ** 2:
+    if freedom <= 2 or variance <= _EXACT**2:
         return np.zeros(count, np.bool_)
     misplaced = np.zeros(count, np.bool_)
     for i in range(count):

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, make_smoothing_spline
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
@@ -18,6 +18,7 @@ _LEAST_OVERLAP: Final = 0.5
 _RIVAL: Final = 9.0
 _CHANCE: Final = 0.01
 _MOST_OFFSETS: Final = 2_000_000
+_AT_ONCE: Final = 200_000
 
 
 @dataclass(frozen=True)
@@ -88,9 +89,9 @@ def align_times(
 
     Notes
     -----
-    The visible signal, a cubic spline through its frames, is put to the infrared times; the
-    correlation of both is greatest at the offset that is least squares for
-    infrared = a + b visible(time). All offsets are tried, a third of a visible frame apart, at
+    The visible signal, a spline smoothed by generalised cross-validation (Craven and Wahba, Numer.
+    Math. 31 (1979) 377), is put to the infrared times; the correlation of both is greatest at the
+    offset that is least squares for infrared = a + b visible(time). All offsets are tried, a third of a visible frame apart, at
     which at least half of the infrared frames have visible ones; Gauss-Newton ends it. What the
     spline cannot follow, faster than the visible camera's frames, goes into the residuals and with
     them into the uncertainty.
@@ -100,7 +101,10 @@ def align_times(
         ("visible", visible_times, visible_signal),
     ):
         _check(name, times, values)
-    spline = CubicSpline(visible_times, visible_signal / np.std(visible_signal), extrapolate=False)
+    unit = float(np.median(np.diff(visible_times)))
+    clock = (visible_times - visible_times[0]) / unit
+    smooth = make_smoothing_spline(clock, visible_signal / np.std(visible_signal))
+    spline = CubicSpline(visible_times, smooth(clock), extrapolate=False)
     target = (infrared_signal - infrared_signal.mean()) / infrared_signal.std()
     reference = float(infrared_times.mean())
     offsets, correlations = _correlations(infrared_times, target, visible_times, spline)
@@ -228,17 +232,22 @@ def _correlations(
             f"{_MOST_OFFSETS // 3} visible frames and half of the infrared ones among them"
         )
     offsets = low + step * np.arange(count)
-    found = np.array([_correlation(target, spline(times + offset)) for offset in offsets])
-    return offsets, found
+    parts = np.array_split(offsets, max(offsets.size * times.size // _AT_ONCE, 1))
+    found = [_correlation(target, spline(times + part[:, None])) for part in parts]
+    return offsets, np.concatenate(found)
 
 
-def _correlation(target: NDArray[np.float64], values: NDArray[np.float64]) -> float:
+def _correlation(target: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Correlation of each row of values with the target where both are known, shape (n,)."""
     known = np.isfinite(values)
-    if known.sum() < max(_FEWEST, _LEAST_OVERLAP * target.size):
-        return 0.0
-    one, other = target[known] - target[known].mean(), values[known] - values[known].mean()
-    size = float(np.sqrt((one @ one) * (other @ other)))
-    return float(one @ other) / size if size > 0 else 0.0
+    count = np.maximum(known.sum(axis=1, keepdims=True), 1)
+    one, other = np.where(known, target, 0.0), np.where(known, values, 0.0)
+    one = np.where(known, one - one.sum(axis=1, keepdims=True) / count, 0.0)
+    other = np.where(known, other - other.sum(axis=1, keepdims=True) / count, 0.0)
+    size = np.sqrt((one**2).sum(axis=1) * (other**2).sum(axis=1))
+    enough = count[:, 0] >= max(_FEWEST, _LEAST_OVERLAP * target.size)
+    product = (one * other).sum(axis=1)
+    return np.where(enough & (size > 0), product / np.maximum(size, 1e-300), 0.0)
 
 
 def _refined(
