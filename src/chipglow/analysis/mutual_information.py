@@ -36,10 +36,10 @@ _LEAST_OVERLAP: Final = 0.5
 _REACH: Final = 0.25
 _SCALES: Final = (0.8, 0.9, 1.0, 1.1, 1.25)
 _TURNS: Final = (-4.0, 0.0, 4.0)
-_CANDIDATES: Final = 4
-_SURVEY: Final = (-4.0, -2.0, 0.0, 2.0, 4.0)
+_CANDIDATES: Final = 5
+_SURVEY: Final = (-4.5, -3.0, -1.5, 0.0, 1.5, 3.0, 4.5)
 _THINNED: Final = 4
-_FINALS: Final = 2
+_FINALS: Final = 3
 _FAR: Final = 8.0
 _APART: Final = 3.0
 _RIVAL: Final = 0.8
@@ -48,7 +48,7 @@ _BLOCK: Final = 16
 _UNSURE: Final = 1.0
 _FLAT: Final = 1e-4
 _SYSTEMATIC: Final = 0.5
-_SETTLE: Final = {"xtol": 0.1, "ftol": 1e-3, "maxfev": 200}
+_SETTLE: Final = {"xtol": 0.1, "ftol": 1e-3, "maxfev": 300}
 _CLIMB: Final = {"gtol": 1e-7, "maxiter": 100}
 
 

@@ -91,8 +91,8 @@ def align_times(
     -----
     The visible signal, a spline smoothed by generalised cross-validation (Craven and Wahba, Numer.
     Math. 31 (1979) 377), is put to the infrared times; the correlation of both is greatest at the
-    offset that is least squares for infrared = a + b visible(time). All offsets are tried, a third of a visible frame apart, at
-    which at least half of the infrared frames have visible ones; Gauss-Newton ends it. What the
+    offset that is least squares for infrared = a + b visible(time). All offsets are tried, a third
+    of a visible frame apart, at which at least half of the infrared frames have visible ones; Gauss-Newton ends it. What the
     spline cannot follow, faster than the visible camera's frames, goes into the residuals and with
     them into the uncertainty.
     """
