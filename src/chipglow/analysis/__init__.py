@@ -33,14 +33,17 @@ from chipglow.analysis.error import (
 from chipglow.analysis.find_tool import FoundTool, find_tool
 from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.lines import Line, sample, straight_line
+from chipglow.analysis.mutual_information import ImageFit, fit_images
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
 from chipglow.analysis.rake_grid import RakeGrid, rake_grid
 from chipglow.analysis.regions import Area, Circle, Polygon, Region, areas, shared_pixels
+from chipglow.analysis.registration import PointFit, Registration, fit_points
 from chipglow.analysis.ridge import NoShearBandError
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
 from chipglow.analysis.shear_band import ShearBand, find_shear_band
+from chipglow.analysis.time_alignment import TimeAlignment, align_times, simultaneous_frames
 
 __all__ = [
     "PAPER",
@@ -60,11 +63,13 @@ __all__ = [
     "FoundTool",
     "GridComparison",
     "Heating",
+    "ImageFit",
     "Inertia",
     "Line",
     "NoShearBandError",
     "PlaceResult",
     "Plan",
+    "PointFit",
     "Polygon",
     "RakeErrors",
     "RakeGrid",
@@ -72,6 +77,7 @@ __all__ = [
     "ReferenceKind",
     "Region",
     "RegionEmissivity",
+    "Registration",
     "Segmentation",
     "Sensitivity",
     "Setting",
@@ -79,6 +85,8 @@ __all__ = [
     "Stage",
     "StudyResult",
     "ThermalImage",
+    "TimeAlignment",
+    "align_times",
     "analyse",
     "areas",
     "band_errors",
@@ -93,6 +101,8 @@ __all__ = [
     "find_band",
     "find_shear_band",
     "find_tool",
+    "fit_images",
+    "fit_points",
     "inertia",
     "normalised_error",
     "rake_errors",
@@ -102,5 +112,6 @@ __all__ = [
     "segmentation",
     "sensitivity",
     "shared_pixels",
+    "simultaneous_frames",
     "straight_line",
 ]

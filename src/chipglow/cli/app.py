@@ -12,6 +12,7 @@ from chipglow.cli.boundary import Boundary
 from chipglow.cli.compare import compare
 from chipglow.cli.emissivity import emissivity
 from chipglow.cli.rake import rake
+from chipglow.cli.register import register
 from chipglow.cli.shearband import shearband
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
@@ -245,6 +246,7 @@ app.command("shearband")(shearband)
 app.command("emissivity")(emissivity)
 app.command("rake")(rake)
 app.command("compare")(compare)
+app.command("register")(register)
 
 
 @cache_app.command("list")

@@ -12,6 +12,8 @@ from chipglow.io.emissivity_file import (
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
 from chipglow.io.movie_file import check_movie_path, movie_writer
+from chipglow.io.picture_file import read_pictures
+from chipglow.io.points_file import read_points
 from chipglow.io.rake_grid_file import check_rake_grid_path, write_rake_grid
 from chipglow.io.scene_file import (
     FORMAT_VERSION,
@@ -44,6 +46,8 @@ __all__ = [
     "read_curve",
     "read_emissivity_map",
     "read_measurement",
+    "read_pictures",
+    "read_points",
     "read_recording",
     "read_scene",
     "read_tool_outline",

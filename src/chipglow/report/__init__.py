@@ -6,6 +6,7 @@ from chipglow.report.comparison import Row, comparison_rows
 from chipglow.report.emissivity_figure import draw_emissivity
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
 from chipglow.report.rake_figure import draw_rake_grid
+from chipglow.report.registration_figure import blink_pictures, draw_registration
 from chipglow.report.report import write_report
 from chipglow.report.scene_figure import draw_scene
 from chipglow.report.scene_summary import (
@@ -24,12 +25,14 @@ __all__ = [
     "Row",
     "SceneSummary",
     "ShownField",
+    "blink_pictures",
     "comparison_rows",
     "cut_movie",
     "draw_band_profile",
     "draw_comparison",
     "draw_emissivity",
     "draw_rake_grid",
+    "draw_registration",
     "draw_scene",
     "scene_summary",
     "write_report",

@@ -7,6 +7,7 @@ from chipglow.study.fitting import Fitted, fit
 from chipglow.study.import_schema import ImportDescription
 from chipglow.study.preview import preview_raster
 from chipglow.study.reference import FieldEntry, field_entries, field_tables
+from chipglow.study.registered import load_registration, write_registration
 from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, kept_progress, run
 from chipglow.study.schema import Study
 from chipglow.study.template import import_text, study_text
@@ -33,6 +34,7 @@ __all__ = [
     "kept_progress",
     "load_import",
     "load_regions",
+    "load_registration",
     "load_study",
     "load_tool",
     "preview_raster",
@@ -40,4 +42,5 @@ __all__ = [
     "study_text",
     "surface_text",
     "tool_of",
+    "write_registration",
 ]
