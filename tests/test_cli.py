@@ -4,16 +4,22 @@ import resource
 import subprocess
 import sys
 from contextlib import contextmanager
+from json import dumps, loads
 
 import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
 from typer.testing import CliRunner
 
+from chipglow.analysis import Area, Heating, determine_emissivity
+from chipglow.camera import Camera, Measurement
 from chipglow.cli import app
 from chipglow.cutting import CuttingSimulation, SolverError
-from chipglow.io import open_scene, read_measurement, write_scene
+from chipglow.io import open_scene, read_measurement, write_emissivity, write_scene
+from chipglow.radiometry import Band
+from chipglow.scene import Material, Raster
 from chipglow.study import Study, cut, load_study
+from chipglow.surface import UniformSurface
 
 RASTER = AnalyticChip().raster
 STUDY = f"""
@@ -226,6 +232,60 @@ def test_cut_warns_of_too_much_inertia(folder, runs):
     assert "lower mass_scaling, now 200." in result.stderr
 
 
+def write_foreign_chip(path, scene):
+    """The chip's fields as another program might write them: no tool, no material coordinates."""
+    names = ("temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y")
+    material = scene.data["material"].values
+    void = material == Material.VOID
+    fields = {name: np.where(void, np.nan, scene.data[name].values) for name in names}
+    np.savez(path, material=material, **fields)
+
+
+def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(folder, runs, chip_scene):
+    write_foreign_chip(folder / "chip.npz", chip_scene)
+    described = {
+        "source": "chip.npz",
+        "interval": "0.5 us",
+        "grid": {
+            "left": f"{RASTER.left * 1e6} um",
+            "top": f"{RASTER.top * 1e6} um",
+            "spacing": "2 um",
+        },
+    }
+    (folder / "import.yaml").write_text(dumps(described))
+    result = chipglow("import", "import.yaml", "--out", "scene.nc")
+    assert result.exit_code == 0, result.output
+    (folder / "study.yaml").write_text("scene: scene.nc\nanalysis: {instants: 3}\n")
+    result = chipglow("run", "study.yaml", "--out", "results")
+    assert result.exit_code == 0, result.output
+    assert runs == []
+    assert "Assumed: The scene does not tell its tool" in result.stderr
+    assert "Assumed: The scene does not say where each point was" in result.stderr
+    report = (folder / "results" / "report.html").read_text()
+    assert "The scene does not tell its tool" in report
+    assert str(folder / "scene.nc") in report
+    foreign = loads((folder / "results" / "summary.json").read_text())["results"]
+
+    # The same chip with its own tool and coordinates: textures differ, but not by much.
+    write_scene(chip_scene, folder / "scene.nc")
+    result = chipglow("run", "study.yaml", "--out", "own")
+    assert result.exit_code == 0, result.output
+    assert "Assumed" not in result.stderr
+    own = loads((folder / "own" / "summary.json").read_text())["results"]
+    for name in ("rake_error_degC", "band_error_degC"):
+        assert foreign[name] == pytest.approx(own[name], rel=0.2), name
+
+
+def test_a_scene_that_is_too_short_for_the_study_is_named(folder, scene):
+    (folder / "study.yaml").write_text(
+        "scene: scene.nc\ncamera: {integration_time: 1 ms, frame_rate: 600 Hz}\n"
+    )
+    assert_refused(
+        chipglow("run", "study.yaml", "--out", "results"), "scene.nc", "lasts 4e-05 s", "0.001 s"
+    )
+    assert not (folder / "results").exists()
+
+
 def test_measure_writes_frames_at_the_camera_rate(folder, scene):
     (folder / "study.yaml").write_text("camera: {frame_rate: 60 kHz}")
     result = chipglow("measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc")
@@ -233,6 +293,35 @@ def test_measure_writes_frames_at_the_camera_rate(folder, scene):
     measurement = read_measurement("m.nc")
     np.testing.assert_allclose(measurement.times, [0.0, 1 / 60e3], atol=1e-12)
     assert measurement.data.attrs["surface"] == "chip 1"
+
+
+def test_measure_lays_a_measured_emissivity_map_on_the_scene(folder, scene, chip_scene):
+    band, raster = Band(3.8e-6, 5.1e-6), Raster(RASTER.left, RASTER.top, 6e-6, 56, 70)
+    share = np.where(raster.x < -100e-6, 0.3, 0.8) * np.ones((56, 1))
+    image = Measurement.from_radiance(
+        (share * band.radiance(800.0))[None], band, np.zeros(1), raster
+    )
+    found = determine_emissivity([image], Heating(800.0, environment=200.0))
+    everywhere = Area("all", "chip", np.ones(raster.shape, bool), whole=True)
+    write_emissivity([found], [[found.of(everywhere)]], "e.nc")
+    study = (
+        "surface: {maps: {seen: e.nc}}\nanalysis: {band_chip: seen}\n"
+        "camera: {psf: none, floor: none}"
+    )
+    (folder / "study.yaml").write_text(study)
+    arguments = ("measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc")
+    assert_refused(chipglow(*arguments, "--chip", "gone"), "expected one of chip 1, chip 2, seen")
+    result = chipglow(*arguments, "--chip", "seen")
+    assert result.exit_code == 0, result.output
+    measured = read_measurement("m.nc")
+    truth = Camera(psf=None, floor=None).measure(chip_scene, UniformSurface(1.0), 0.0)
+    solid = truth.radiance[0] > 0
+    ratio = np.divide(measured.radiance[0], truth.radiance[0], out=np.zeros((56, 70)), where=solid)
+    # The environment at 200 K adds nothing that counts; the map's edge is one sensor wide.
+    np.testing.assert_allclose(ratio[solid & (raster.x < -106e-6)], 0.3, atol=2e-3)
+    np.testing.assert_allclose(ratio[solid & (raster.x > -94e-6)], 0.8, atol=2e-3)
+    (folder / "study.yaml").write_text(study.replace("seen: e.nc", "chip 1: e.nc"))
+    assert_refused(chipglow(*arguments), "surface: maps: 'chip 1' is the name of a chip too")
 
 
 def test_measure_starts_when_told_with_the_chip_that_is_named(folder, scene):
@@ -248,7 +337,7 @@ def test_measure_starts_when_told_with_the_chip_that_is_named(folder, scene):
     ("option", "value", "message"),
     [
         ("--start", "20", "--start: 20 has no unit, expected a time such as 10 us"),
-        ("--start", "35 us", "scene"),
+        ("--start", "35 us", "scene.nc: exposure: 3.5e-05 s to"),
         ("--chip", "chip 3", "--chip: 'chip 3' is unknown, expected one of chip 1, chip 2"),
         ("--out", "no/m.nc", "no folder no"),
     ],

@@ -9,7 +9,12 @@ from typing import Annotated, Final
 import typer
 
 from chipglow.cli.boundary import Boundary
+from chipglow.cli.compare import compare
+from chipglow.cli.emissivity import emissivity
 from chipglow.cli.psf import psf
+from chipglow.cli.rake import rake
+from chipglow.cli.register import register
+from chipglow.cli.shearband import shearband
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 
@@ -236,6 +241,13 @@ def materials(
     if plot is not None:
         plot_material(name, plot)
         print(plot)
+
+
+app.command("shearband")(shearband)
+app.command("emissivity")(emissivity)
+app.command("rake")(rake)
+app.command("compare")(compare)
+app.command("register")(register)
 
 
 @cache_app.command("list")

@@ -1,8 +1,13 @@
 """The report: the paper's figures beside ours, as a page, pictures, numbers and arrays; movies."""
 
+from chipglow.report.band_figure import draw_band_profile
+from chipglow.report.compare_figure import draw_comparison
 from chipglow.report.comparison import Row, comparison_rows
+from chipglow.report.emissivity_figure import draw_emissivity
 from chipglow.report.knife_edge_figure import draw_knife_edge
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
+from chipglow.report.rake_figure import draw_rake_grid
+from chipglow.report.registration_figure import blink_pictures, draw_registration
 from chipglow.report.report import write_report
 from chipglow.report.scene_figure import draw_scene
 from chipglow.report.scene_summary import (
@@ -21,9 +26,15 @@ __all__ = [
     "Row",
     "SceneSummary",
     "ShownField",
+    "blink_pictures",
     "comparison_rows",
     "cut_movie",
+    "draw_band_profile",
+    "draw_comparison",
+    "draw_emissivity",
     "draw_knife_edge",
+    "draw_rake_grid",
+    "draw_registration",
     "draw_scene",
     "scene_summary",
     "write_report",

@@ -9,7 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.scene.motion import nearest_filled, optical_flow, strain_rate_along
+from chipglow.scene.motion import optical_flow, strain_rate_along
+from chipglow.scene.nearest import fill
+from chipglow.scene.polygon import in_polygon
 from chipglow.scene.raster import Raster
 from chipglow.scene.sampled import SampledFrame
 from chipglow.scene.scene import (
@@ -184,7 +186,8 @@ def _prepared(
 def _without_holes(values: NDArray[np.float32], solid: NDArray[np.bool_]) -> NDArray[np.float32]:
     """A field that is known everywhere in the material, and NaN elsewhere."""
     known = solid & np.isfinite(values)
-    whole = values if known.sum() == solid.sum() else nearest_filled(values, known)
+    whole = np.where(known, values, np.float32(0.0))
+    fill(whole, known, solid & ~known)
     return np.where(solid, whole, np.float32(np.nan))
 
 
@@ -265,10 +268,4 @@ def _inside(corners: Sequence[tuple[float, float]] | None, raster: Raster) -> ND
     """Which samples lie in a polygon."""
     if corners is None:
         return np.zeros(raster.shape, np.bool_)
-    x, y = np.meshgrid(raster.x, raster.y)
-    inside = np.zeros(raster.shape, np.bool_)
-    for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
-        if y1 != y2:
-            crossed = (y1 > y) != (y2 > y)
-            inside ^= crossed & (x < x1 + (y - y1) * (x2 - x1) / (y2 - y1))
-    return inside
+    return in_polygon(corners, raster.x[None, :], raster.y[:, None])

@@ -1,18 +1,23 @@
 """Studies: what to cut, look at and analyse, as a YAML file or in Python."""
 
 from chipglow.study.cache import CachedScene, cache_folder, cached_scenes, clear_cache
-from chipglow.study.files import StudyError, load_apertures, load_import, load_study
+from chipglow.study.emissivity import surface_text
+from chipglow.study.files import StudyError, load_apertures, load_import, load_regions, load_study
+from chipglow.study.fitting import Fitted, fit
 from chipglow.study.import_schema import ImportDescription
 from chipglow.study.preview import preview_raster
 from chipglow.study.reference import FieldEntry, field_entries, field_tables
+from chipglow.study.registered import load_registration, write_registration
 from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, kept_progress, run
 from chipglow.study.schema import Study
 from chipglow.study.template import import_text, study_text
+from chipglow.study.tool_description import load_tool, tool_of
 
 __all__ = [
     "CUTTING_STEP",
     "CachedScene",
     "FieldEntry",
+    "Fitted",
     "ImportDescription",
     "Progress",
     "Study",
@@ -23,13 +28,20 @@ __all__ = [
     "cut",
     "field_entries",
     "field_tables",
+    "fit",
     "import_text",
     "is_cut",
     "kept_progress",
     "load_apertures",
     "load_import",
+    "load_regions",
+    "load_registration",
     "load_study",
+    "load_tool",
     "preview_raster",
     "run",
     "study_text",
+    "surface_text",
+    "tool_of",
+    "write_registration",
 ]

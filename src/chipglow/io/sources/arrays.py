@@ -10,15 +10,15 @@ from functools import partial
 from glob import glob, has_magic
 from math import prod
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal, TypeAlias
 from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.file_order import natural
-from chipglow.io.sources.source import SourceError
-from chipglow.io.sources.text_table import TextTable
+from chipglow.io.sources.source import SourceError, missing_extra
+from chipglow.io.sources.text_table import TextTable, lines_of_text
 
 MOST_SAMPLES: Final = 100_000_000
 """Most samples that are read at once."""
@@ -28,6 +28,7 @@ MOST_ON_A_SIDE: Final = 1_000_000
 
 _MOST_ARRAYS: Final = 10_000
 _KINDS: Final = "fiub"
+_MATLAB_HEAD: Final = 128
 _UNPACKED_BY_TIFFFILE: Final = (1, 8, 32946)
 """None, and two names of deflate: the other compressions need libtiff, which Pillow has."""
 _NO_COORDINATE: Final = b"This is a netCDF dimension but not a netCDF variable"
@@ -65,6 +66,10 @@ class StoredArray:
     dims: tuple[str, ...] = ()
     attributes: Mapping[str, Any] = field(default_factory=dict)
     chunks: tuple[int, ...] | None = None
+
+
+ArrayReader: TypeAlias = Callable[[Path, ExitStack], Iterator[StoredArray]]
+"""Opens a file, which the stack closes, and gives its arrays."""
 
 
 @contextmanager
@@ -115,7 +120,9 @@ def matching_files(pattern: str) -> list[Path]:
     return [Path(path) for path in paths]
 
 
-def open_arrays(pattern: str, stack: ExitStack) -> dict[str, StoredArray]:
+def open_arrays(
+    pattern: str, stack: ExitStack, reader: ArrayReader | None = None
+) -> dict[str, StoredArray]:
     """Arrays of a file by their names, or of several files, one a frame.
 
     Parameters
@@ -125,6 +132,8 @@ def open_arrays(pattern: str, stack: ExitStack) -> dict[str, StoredArray]:
         first axis ``time``.
     stack : ExitStack
         Closes the files.
+    reader : callable, optional
+        Reader of such files; by the ending of the name by default.
 
     Raises
     ------
@@ -135,13 +144,13 @@ def open_arrays(pattern: str, stack: ExitStack) -> dict[str, StoredArray]:
     """
     paths = matching_files(pattern)
     several = len(paths) > 1 or paths[0] != Path(pattern)
-    first = _open_file(paths[0], stack)
+    first = _open_file(paths[0], stack, reader)
     if not first:
         raise SourceError(f"{paths[0]}: there is no array of numbers in it")
     if len(first) > _MOST_ARRAYS:
         raise SourceError(f"{paths[0]}: {len(first)} arrays, expected up to {_MOST_ARRAYS}")
     if several:
-        first = {name: _series(paths, name, array) for name, array in first.items()}
+        first = {name: _series(paths, name, array, reader) for name, array in first.items()}
     return {name or _stem(pattern): array for name, array in first.items()}
 
 
@@ -150,23 +159,29 @@ def _stem(pattern: str) -> str:
     return re.sub(r"[\W\d_]+$", "", Path(pattern).stem) or "values"
 
 
-def _open_file(path: Path, stack: ExitStack) -> dict[str, StoredArray]:
+def _open_file(
+    path: Path, stack: ExitStack, reader: ArrayReader | None = None
+) -> dict[str, StoredArray]:
     suffix = path.suffix.lower()
-    if suffix not in _READERS:
+    reader = reader or ARRAY_READERS.get(suffix)
+    if reader is None:
         raise SourceError(
-            f"{path}: unknown ending {suffix!r}, expected one of {', '.join(sorted(_READERS))}"
+            f"{path}: unknown ending {suffix!r}, expected one of {', '.join(sorted(ARRAY_READERS))}"
         )
     if path.is_file() and path.stat().st_size == 0:
         raise SourceError(f"{path}: is empty")
     with reading(path):
-        return {array.name: array for array in _READERS[suffix](path, stack)}
+        return {array.name: array for array in reader(path, stack)}
 
 
-def _series(paths: Sequence[Path], name: str, first: StoredArray) -> StoredArray:
+def _series(
+    paths: Sequence[Path], name: str, first: StoredArray, reader: ArrayReader | None
+) -> StoredArray:
     def read(key: Key) -> NDArray[Any]:
         chosen = paths[key[0]]
         check_samples(str(chosen[0]), len(chosen) * prod(first.shape))
-        return np.stack([_read_whole(path, name, first.shape)[key[1:]] for path in chosen])
+        whole = [_read_whole(path, name, first.shape, reader) for path in chosen]
+        return np.stack([values[key[1:]] for values in whole])
 
     dims = ("time", *first.dims) if first.dims else ()
     return replace(
@@ -174,9 +189,11 @@ def _series(paths: Sequence[Path], name: str, first: StoredArray) -> StoredArray
     )
 
 
-def _read_whole(path: Path, name: str, shape: tuple[int, ...]) -> NDArray[Any]:
+def _read_whole(
+    path: Path, name: str, shape: tuple[int, ...], reader: ArrayReader | None
+) -> NDArray[Any]:
     with ExitStack() as stack:
-        array = _open_file(path, stack).get(name)
+        array = _open_file(path, stack, reader).get(name)
         if array is None or array.shape != shape:
             found = "none" if array is None else f"one of shape {array.shape}"
             raise SourceError(
@@ -393,12 +410,29 @@ def _matlab(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
         return
     from scipy.io import whosmat
 
+    _check_matlab_length(path)
     for name, shape, kind in whosmat(path):
         if name.startswith("__"):
             continue
         if kind.startswith(("double", "single", "int", "uint", "logical")):
             whole = _MatlabArray(path, name)
             yield StoredArray(name, tuple(int(n) for n in shape), whole.read)
+
+
+def _check_matlab_length(path: Path) -> None:
+    """Refuse a file that ends before its last element does; formats 5 to 7.2."""
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        head = stream.read(_MATLAB_HEAD)
+        if not head.startswith(b"MATLAB"):  # format 4, or something else
+            return
+        order: Literal["little", "big"] = "little" if head[-2:] == b"IM" else "big"
+        end = _MATLAB_HEAD
+        while end + 8 <= size:
+            stream.seek(end + 4)
+            end += 8 + int.from_bytes(stream.read(4), order)
+    if end > size:
+        raise SourceError(f"{path}: is cut short, it should have {end} bytes and has {size}")
 
 
 class _MatlabArray:
@@ -510,7 +544,7 @@ def _extra(module: str, path: Path) -> Any:
     try:
         return import_module(module)
     except ImportError:
-        raise SourceError(f"{path}: needs {module}, pip install 'chipglow[grid]'") from None
+        raise missing_extra(path, module, "grid") from None
 
 
 # Zarr
@@ -573,12 +607,20 @@ def _csv(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
     yield StoredArray("", values.shape, lambda key: values[key])
 
 
-def _csv_matrix(path: Path) -> NDArray[np.float32]:
+def exported_table(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
+    """A matrix behind lines of text, as cameras' programs export it; an `ArrayReader`."""
+    skipped = lines_of_text(path)
+    values = _csv_matrix(path, skipped)
+    attributes = {"lines_of_text": skipped}
+    yield StoredArray("", values.shape, lambda key: values[key], attributes=attributes)
+
+
+def _csv_matrix(path: Path, skipped: int = 0) -> NDArray[np.float32]:
     import pandas as pd
 
-    table = TextTable.look_at(path)
+    table = TextTable.look_at(path, skipped)
     with path.open(encoding="utf-8-sig") as stream:
-        values = pd.read_csv(stream, header=None, **table.options)
+        values = pd.read_csv(stream, header=None, skiprows=skipped, **table.options)
     for column, kind in enumerate(values.dtypes):
         if kind.kind not in _KINDS:
             raise SourceError(
@@ -588,7 +630,7 @@ def _csv_matrix(path: Path) -> NDArray[np.float32]:
     return np.asarray(values.to_numpy(np.float32))
 
 
-_READERS: Final[Mapping[str, Callable[[Path, ExitStack], Iterator[StoredArray]]]] = {
+ARRAY_READERS: Final[Mapping[str, ArrayReader]] = {
     ".npy": _npy,
     ".npz": _npz,
     ".h5": _hdf5,
@@ -607,3 +649,4 @@ _READERS: Final[Mapping[str, Callable[[Path, ExitStack], Iterator[StoredArray]]]
     ".txt": _csv,
     ".dat": _csv,
 }
+"""Readers of arrays by the ending of the file's name."""
