@@ -4,6 +4,7 @@ import resource
 import subprocess
 import sys
 from contextlib import contextmanager
+from json import dumps, loads
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from typer.testing import CliRunner
 from chipglow.cli import app
 from chipglow.cutting import CuttingSimulation, SolverError
 from chipglow.io import open_scene, read_measurement, write_scene
+from chipglow.scene import Material
 from chipglow.study import Study, cut, load_study
 
 RASTER = AnalyticChip().raster
@@ -224,6 +226,60 @@ def test_cut_warns_of_too_much_inertia(folder, runs):
     assert result.exit_code == 0, result.output
     assert "Warning: The scaled mass's momentum is worth 1.8% of the cutting force" in result.stderr
     assert "lower mass_scaling, now 200." in result.stderr
+
+
+def write_foreign_chip(path, scene):
+    """The chip's fields as another program might write them: no tool, no material coordinates."""
+    names = ("temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y")
+    material = scene.data["material"].values
+    void = material == Material.VOID
+    fields = {name: np.where(void, np.nan, scene.data[name].values) for name in names}
+    np.savez(path, material=material, **fields)
+
+
+def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(folder, runs, chip_scene):
+    write_foreign_chip(folder / "chip.npz", chip_scene)
+    described = {
+        "source": "chip.npz",
+        "interval": "0.5 us",
+        "grid": {
+            "left": f"{RASTER.left * 1e6} um",
+            "top": f"{RASTER.top * 1e6} um",
+            "spacing": "2 um",
+        },
+    }
+    (folder / "import.yaml").write_text(dumps(described))
+    result = chipglow("import", "import.yaml", "--out", "scene.nc")
+    assert result.exit_code == 0, result.output
+    (folder / "study.yaml").write_text("scene: scene.nc\nanalysis: {instants: 3}\n")
+    result = chipglow("run", "study.yaml", "--out", "results")
+    assert result.exit_code == 0, result.output
+    assert runs == []
+    assert "Assumed: The scene does not tell its tool" in result.stderr
+    assert "Assumed: The scene does not say where each point was" in result.stderr
+    report = (folder / "results" / "report.html").read_text()
+    assert "The scene does not tell its tool" in report
+    assert str(folder / "scene.nc") in report
+    foreign = loads((folder / "results" / "summary.json").read_text())["results"]
+
+    # The same chip with its own tool and coordinates: textures differ, but not by much.
+    write_scene(chip_scene, folder / "scene.nc")
+    result = chipglow("run", "study.yaml", "--out", "own")
+    assert result.exit_code == 0, result.output
+    assert "Assumed" not in result.stderr
+    own = loads((folder / "own" / "summary.json").read_text())["results"]
+    for name in ("rake_error_degC", "band_error_degC"):
+        assert foreign[name] == pytest.approx(own[name], rel=0.2), name
+
+
+def test_a_scene_that_is_too_short_for_the_study_is_named(folder, scene):
+    (folder / "study.yaml").write_text(
+        "scene: scene.nc\ncamera: {integration_time: 1 ms, frame_rate: 600 Hz}\n"
+    )
+    assert_refused(
+        chipglow("run", "study.yaml", "--out", "results"), "scene.nc", "lasts 4e-05 s", "0.001 s"
+    )
+    assert not (folder / "results").exists()
 
 
 def test_measure_writes_frames_at_the_camera_rate(folder, scene):

@@ -22,13 +22,14 @@ from chipglow.cutting import (
 )
 from chipglow.io import open_scene, read_tool_outline
 from chipglow.io.atomic import KeptErrorFile
-from chipglow.scene import Chamfer, Hone, ToolGeometry
+from chipglow.scene import FIELD_UNITS, Chamfer, Hone, Material, Scene, ToolGeometry
 from chipglow.study import (
     Study,
     StudyError,
     cached_scenes,
     clear_cache,
     cut,
+    fit,
     is_cut,
     load_study,
     study_text,
@@ -590,3 +591,22 @@ def test_runs_at_the_same_time_leave_one_whole_scene(cache, runs):
     assert len(set(found)) == 1
     assert is_cut(small_study())
     assert [Path(path) for path in cache.iterdir()] == [found[0]]
+
+
+def test_a_scene_without_tool_and_coordinates_is_fitted_and_says_so():
+    whole = AnalyticChip(frames=2).scene()
+    untouched = fit(Study(), whole)
+    assert untouched.scene is whole
+    assert untouched.assumed == ()
+    fields = {name: whole.data[name].values for name in FIELD_UNITS}
+    fields["material"] = np.where(fields["material"] == Material.TOOL, Material.VOID, 1)
+    bare = Scene.from_fields(whole.raster, whole.times, fields)
+    fitted = fit(Study(cutting={"tool": {"rake_angle": "5 deg"}}), bare)
+    assert fitted.scene.tool == ToolGeometry(rake_angle=radians(5.0))
+    assert bare.tool is None
+    assert [surface.follow for surface in fitted.surfaces.values()] == ["mean", "mean"]
+    assert [sentence[:23] for sentence in fitted.assumed] == [
+        "The scene does not tell",
+        "The scene shows no tool",
+        "The scene does not say ",
+    ]

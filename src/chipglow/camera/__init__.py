@@ -10,6 +10,7 @@ from chipglow.camera.calibration import (
 )
 from chipglow.camera.calibration_fit import CalibrationFit, fit_linear, fit_sakuma_hattori
 from chipglow.camera.camera import Camera
+from chipglow.camera.detector import Detector
 from chipglow.camera.developing import ImagePosition, develop_recording, flag_shares
 from chipglow.camera.exposure import Exposure
 from chipglow.camera.measurement import UNUSABLE, Flag, Measurement
@@ -24,6 +25,7 @@ __all__ = [
     "Calibration",
     "CalibrationFit",
     "Camera",
+    "Detector",
     "Exposure",
     "FittedCalibration",
     "Flag",

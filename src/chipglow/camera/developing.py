@@ -20,6 +20,8 @@ MIRRORS: Final = ("none", "horizontal", "vertical")
 
 _SAME: Final = 0.01
 """Relative difference up to which two integration times or limits of bands are the same."""
+_ASSUMED: Final = "Assumed: "
+"""How notes of a recording begin that are no more than that."""
 _FULL_SCALES: Final = tuple(2**bits - 1 for bits in (8, 10, 12, 13, 14, 16))
 
 
@@ -269,7 +271,7 @@ def _attributes(
         "range": recording.range_name,
         "calibration": calibration.description if calibration else None,
         "object_parameters": _told(recording),
-        "notes": "\n".join(recording.notes),
+        "notes": "\n".join(note for note in recording.notes if not note.startswith(_ASSUMED)),
         "assumed": "\n".join(_assumed(recording, calibration, position)),
         "doubtful": "\n".join(_doubtful(recording, uncertainty_known)),
     }
@@ -296,6 +298,9 @@ def _told(recording: Recording) -> str | None:
 def _assumed(
     recording: Recording, calibration: Calibration | None, position: ImagePosition
 ) -> Iterator[str]:
+    for note in recording.notes:
+        if note.startswith(_ASSUMED):
+            yield note.removeprefix(_ASSUMED)
     told = recording.object_parameters
     if recording.quantity == "temperature" and told is None:
         yield (

@@ -5,6 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from chipglow.cli.assumed import say_assumed
 from chipglow.cli.progress import progress_bars
 from chipglow.io import import_scene, prospect
 from chipglow.io.atomic import check_folder
@@ -67,5 +68,4 @@ def _say(looked: Prospect) -> None:
         f"Sampled every {raster.spacing * 1e6:.4g} um: {raster.columns} x {raster.rows} samples, "
         f"x {left:.4g} um to {right:.4g} um, y {bottom:.4g} um to {top:.4g} um"
     )
-    for sentence in looked.assumed:
-        console.print(f"Assumed: {sentence}")
+    say_assumed(looked.assumed)

@@ -1,16 +1,14 @@
 """The camera alone, from a scene's file to a measurement's."""
 
-from dataclasses import replace
 from math import floor
 from pathlib import Path
 
-from rich.console import Console
-
 from chipglow.camera import Measurement
+from chipglow.cli.assumed import say_assumed
 from chipglow.cli.progress import progress_bars
 from chipglow.cli.times import parse_instant
 from chipglow.io import open_scene, write_measurement
-from chipglow.study import Study
+from chipglow.study import Study, fit
 
 
 def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: str | None) -> None:
@@ -38,24 +36,18 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
     ValueError
         If there is no such chip, or no exposure fits into the scene.
     """
-    surfaces = study.surface.build(study.seed)
+    fitted, camera = fit(study, open_scene(path)), study.camera.build()
+    scene, surfaces = fitted.scene, fitted.surfaces
     name = next(iter(surfaces)) if chip is None else chip
     if name not in surfaces:
         raise ValueError(f"--chip: {name!r} is unknown, expected one of {', '.join(surfaces)}")
-    scene, camera = open_scene(path), study.camera.build()
+    say_assumed(fitted.assumed)
     first = float(scene.times[0]) if start is None else parse_instant("--start", start)
     left = float(scene.times[-1]) + scene.frame_spacing - first - camera.integration_time
     count = max(floor(left * camera.frame_rate) + 1, 1)
-    surface = surfaces[name]
-    if surface.follow == "material" and not scene.has_material_coordinates:
-        Console(stderr=True).print(
-            "The scene does not say where each point was before the cut: textures move with the "
-            "mean velocity of their feature (surface.follow: mean)."
-        )
-        surface = replace(surface, follow="mean")
     with progress_bars() as progress:
         progress("measurement", 0.0)
         starts = camera.frame_times(first, count)
-        measured = camera.measure(scene, surface, starts).data.assign_attrs(surface=name)
+        measured = camera.measure(scene, surfaces[name], starts).data.assign_attrs(surface=name)
         progress("measurement", 1.0)
     write_measurement(Measurement(measured), out)

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from chipglow.analysis.paper import StudyResult
+from chipglow.cli.assumed import say_assumed
 from chipglow.cli.inertia import say_inertia
 from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.cutting import SOLVER_VERSION
@@ -31,21 +32,27 @@ def write_results(study: Study, folder: Path, resume: bool) -> None:
         Whether to go on with a cut that an earlier run left unfinished.
     """
     with atomic_folder(folder) as temporary:
-        say_where_it_starts(study, resume)
+        if study.scene is None:
+            say_where_it_starts(study, resume)
+        assumed: list[str] = []
         with progress_bars() as progress:
-            result = run(study, progress, resume)
+            result = run(study, progress, resume, assumed.append)
             progress("report", 0.0)
-            report = write_report(result, temporary, study_text(study), _provenance(study))
+            provenance = _provenance(study, assumed)
+            report = write_report(result, temporary, study_text(study), provenance)
             progress("report", 1.0)
+    say_assumed(assumed)
     _print_comparison(result)
     say_inertia(result.forces.inertia if result.forces else None)
     print(f"Report: {folder / report.relative_to(temporary)}")
 
 
-def _provenance(study: Study) -> dict[str, str]:
+def _provenance(study: Study, assumed: list[str]) -> dict[str, str]:
+    origin = {"solver": SOLVER_VERSION} if study.scene is None else {"scene": study.scene}
     return {
         "chipglow": version("chipglow"),
-        "solver": SOLVER_VERSION,
+        **origin,
+        **({"assumed": " ".join(assumed)} if assumed else {}),
         "seed": str(study.seed),
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         "python": platform.python_version(),

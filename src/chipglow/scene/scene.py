@@ -1,11 +1,12 @@
 """The scene: what is truly there, as fields on a regular grid over time."""
 
 from collections.abc import Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
 from math import isfinite
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 import xarray as xr
@@ -186,6 +187,18 @@ class Scene:
     def tool(self) -> Tool | None:
         """The tool's outline, if the scene says it."""
         return stored_tool(self.data.attrs)
+
+    def with_tool(self, tool: Tool) -> Self:
+        """The same scene with this tool's outline.
+
+        Parameters
+        ----------
+        tool : Tool
+            The tool.
+        """
+        scene = copy(self)
+        scene.data = self.data.assign_attrs(tool_attributes(tool))
+        return scene
 
     @property
     def has_material_coordinates(self) -> bool:

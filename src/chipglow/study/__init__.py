@@ -2,6 +2,7 @@
 
 from chipglow.study.cache import CachedScene, cache_folder, cached_scenes, clear_cache
 from chipglow.study.files import StudyError, load_import, load_study
+from chipglow.study.fitting import Fitted, fit
 from chipglow.study.import_schema import ImportDescription
 from chipglow.study.preview import preview_raster
 from chipglow.study.reference import FieldEntry, field_entries, field_tables
@@ -13,6 +14,7 @@ __all__ = [
     "CUTTING_STEP",
     "CachedScene",
     "FieldEntry",
+    "Fitted",
     "ImportDescription",
     "Progress",
     "Study",
@@ -23,6 +25,7 @@ __all__ = [
     "cut",
     "field_entries",
     "field_tables",
+    "fit",
     "import_text",
     "is_cut",
     "kept_progress",

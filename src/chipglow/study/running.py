@@ -19,6 +19,7 @@ from chipglow.io import SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.interrupts import uninterrupted
 from chipglow.scene import Frame, SceneError, ToolOutline
 from chipglow.study.cache import scene_path
+from chipglow.study.fitting import fit
 from chipglow.study.preview import preview_of, show_scene
 from chipglow.study.schema import Study
 
@@ -87,8 +88,13 @@ def kept_progress(study: Study) -> float:
     return max((left.progress for left in unfinished_scenes(scene_path(_inputs(study)))), default=0)
 
 
-def run(study: Study, progress: Progress | None = None, resume: bool = False) -> StudyResult:
-    """Run a study from the cut to the analysis.
+def run(
+    study: Study,
+    progress: Progress | None = None,
+    resume: bool = False,
+    assume: Callable[[str], None] | None = None,
+) -> StudyResult:
+    """Run a study from the cut, or from the scene that takes its place, to the analysis.
 
     Parameters
     ----------
@@ -98,15 +104,38 @@ def run(study: Study, progress: Progress | None = None, resume: bool = False) ->
         Told which step is under way and how much of it is done.
     resume : bool
         As for `cut`.
+    assume : callable, optional
+        Told a sentence of each thing that the scene does not say and that had to be assumed.
 
     Returns
     -------
     StudyResult
         All that the report shows.
+
+    Raises
+    ------
+    ValueError
+        If the scene cannot be analysed as the study wants it; the message names the scene's file.
     """
-    scene = open_scene(cut(study, progress, resume))
-    surfaces = study.surface.build(study.seed)
-    return analyse(scene, surfaces, study.camera.build(), study.analysis.build(), progress)
+    if study.scene is None:
+        return _look(study, cut(study, progress, resume), progress, assume)
+    try:
+        return _look(study, Path(study.scene), progress, assume)
+    except SceneError:
+        raise
+    except ValueError as error:
+        raise ValueError(f"{study.scene}: {error}") from None
+
+
+def _look(
+    study: Study, path: Path, progress: Progress | None, assume: Callable[[str], None] | None
+) -> StudyResult:
+    fitted = fit(study, open_scene(path))
+    if assume:
+        for sentence in fitted.assumed:
+            assume(sentence)
+    camera, plan = study.camera.build(), study.analysis.build()
+    return analyse(fitted.scene, fitted.surfaces, camera, plan, progress)
 
 
 def _inputs(study: Study) -> dict[str, Any]:

@@ -567,6 +567,12 @@ class Study(Section):
         "What the report is headed with.",
     )
     seed: int = described(2010, "Seed of all random numbers.")
+    scene: Annotated[FileBeside | None, *OR_NONE] = described(
+        "none",
+        "File of a scene that takes the place of the cut, such as one of chipglow import. Its own\n"
+        "times and samples count; of the section cutting only the tool, if the scene has none.",
+        "none, or a file beside this one: scene.nc",
+    )
     cutting: CuttingSection = described(
         {}, "The cutting simulation; defaults: the paper's Table 2."
     )
@@ -607,6 +613,8 @@ class Study(Section):
 
     @model_validator(mode="after")
     def _camera_fits_scene(self) -> Self:
+        if self.scene is not None:
+            return self
         camera, cutting = self.camera, self.cutting
         if camera.integration_time > cutting.duration:
             raise ValueError(

@@ -1,0 +1,12 @@
+"""What had to be assumed, on the terminal."""
+
+from collections.abc import Iterable
+
+from rich.console import Console
+
+
+def say_assumed(sentences: Iterable[str]) -> None:
+    """Say on stderr what had to be assumed, a sentence each."""
+    console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+    for sentence in sentences:
+        console.print(f"Assumed: {sentence}")
