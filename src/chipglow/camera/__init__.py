@@ -1,6 +1,6 @@
 """Cameras, virtual and real: optics, exposure, calibration, and the measurement that comes out."""
 
-from chipglow.camera.bad_pixels import BadPixels, find_bad_pixels, replace_bad_pixels
+from chipglow.camera.bad_pixels import LEAST_FRAMES, BadPixels, find_bad_pixels, replace_bad_pixels
 from chipglow.camera.calibration import (
     Calibration,
     FittedCalibration,
@@ -19,6 +19,7 @@ from chipglow.camera.psf import AnnularAperturePSF, GaussianPSF, MeasuredPSF, Po
 from chipglow.camera.recording import PlanckConversion, Recording
 
 __all__ = [
+    "LEAST_FRAMES",
     "UNUSABLE",
     "AnnularAperturePSF",
     "BadPixels",

@@ -2,7 +2,12 @@
 
 from chipglow.io.atomic import atomic_folder, atomic_path
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
-from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
+from chipglow.io.measurement_file import (
+    is_measurement,
+    read_measurement,
+    write_dataset,
+    write_measurement,
+)
 from chipglow.io.movie_file import check_movie_path, movie_writer
 from chipglow.io.scene_file import (
     FORMAT_VERSION,
@@ -25,6 +30,7 @@ __all__ = [
     "atomic_path",
     "check_movie_path",
     "import_scene",
+    "is_measurement",
     "movie_writer",
     "open_scene",
     "prospect",

@@ -77,7 +77,9 @@ class CalibrationDescription(Part):
             range=calibration.range_name,
             parameters=dict(values),
             covariance=tuple(map(tuple, calibration.covariance.tolist())),
-            points=tuple(tuple(float(f"{value:.9g}") for value in row) for row in zip(*points, strict=True)),
+            points=tuple(
+                tuple(float(f"{value:.9g}") for value in row) for row in zip(*points, strict=True)
+            ),
         )
 
     def build(self) -> FittedCalibration:

@@ -149,9 +149,8 @@ Length = Annotated[float, Quantity("a length", "m", "um", "6 um")]
 Position = Annotated[float, Quantity("a position", "m", "um", "-420 um", positive=False)]
 CutLength = Annotated[float, Quantity("a length", "m", "mm", "0.3 mm")]
 Wavelength = Annotated[float, Quantity("a wavelength", "m", "um", "4.5 um")]
-WavelengthRange = Annotated[
-    tuple[float, float], Quantity("a band of wavelengths", "m", "um", "3.8-5.1 um")
-]
+WAVELENGTHS: Final = Quantity("a band of wavelengths", "m", "um", "3.8-5.1 um")
+WavelengthRange = Annotated[tuple[float, float], WAVELENGTHS]
 TIME: Final = Quantity("a time", "s", "us", "10 us")
 Time = Annotated[float, TIME]
 INSTANT: Final = Quantity("a time", "s", "us", "10 us", positive=False)
@@ -162,7 +161,8 @@ HeatTransfer = Annotated[
     float,
     Quantity("a coefficient of heat transfer", "W/m^2/K", "W/m^2/K", "50 W/m^2/K", positive=False),
 ]
-Temperature = Annotated[float, Quantity("a temperature", "K", "degC", "300 degC")]
+TEMPERATURE: Final = Quantity("a temperature", "K", "degC", "300 degC")
+Temperature = Annotated[float, TEMPERATURE]
 
 
 @cache
