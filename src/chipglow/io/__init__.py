@@ -1,6 +1,7 @@
 """Readers and writers: scenes, measurements, and output that is whole or not there."""
 
 from chipglow.io.atomic import atomic_folder, atomic_path
+from chipglow.io.cameras import CAMERA_FORMATS, CameraFormat, read_recording, write_hcc
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import (
     is_measurement,
@@ -20,7 +21,9 @@ from chipglow.io.tool_file import read_tool_outline
 from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 
 __all__ = [
+    "CAMERA_FORMATS",
     "FORMAT_VERSION",
+    "CameraFormat",
     "Import",
     "SceneWriter",
     "StoredScene",
@@ -35,10 +38,12 @@ __all__ = [
     "open_scene",
     "prospect",
     "read_measurement",
+    "read_recording",
     "read_scene",
     "read_tool_outline",
     "unfinished_scenes",
     "write_dataset",
+    "write_hcc",
     "write_measurement",
     "write_scene",
 ]
