@@ -1,6 +1,9 @@
 """The report: the paper's figures beside ours, as a page, pictures, numbers and arrays; movies."""
 
+from chipglow.report.calibration_figure import draw_calibrations
 from chipglow.report.comparison import Row, comparison_rows
+from chipglow.report.measurement_figure import draw_measurement
+from chipglow.report.measurement_summary import MeasurementSummary, measurement_summary
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
 from chipglow.report.report import write_report
 from chipglow.report.scene_figure import draw_scene
@@ -15,6 +18,7 @@ from chipglow.report.scene_summary import (
 __all__ = [
     "CutPicture",
     "FieldSummary",
+    "MeasurementSummary",
     "MovieScales",
     "QualitySummary",
     "Row",
@@ -22,7 +26,10 @@ __all__ = [
     "ShownField",
     "comparison_rows",
     "cut_movie",
+    "draw_calibrations",
+    "draw_measurement",
     "draw_scene",
+    "measurement_summary",
     "scene_summary",
     "write_report",
 ]

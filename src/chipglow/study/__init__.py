@@ -11,7 +11,7 @@ from chipglow.study.files import (
 )
 from chipglow.study.fitting import Fitted, fit
 from chipglow.study.import_schema import ImportDescription
-from chipglow.study.measured import develop, load_measurement, load_recording
+from chipglow.study.measured import load_measurement, load_recording, measurement_of
 from chipglow.study.measurement_schema import MeasurementDescription
 from chipglow.study.preview import preview_raster
 from chipglow.study.reference import FieldEntry, field_entries, field_tables
@@ -35,7 +35,6 @@ __all__ = [
     "calibration_text",
     "clear_cache",
     "cut",
-    "develop",
     "field_entries",
     "field_tables",
     "fit",
@@ -48,6 +47,7 @@ __all__ = [
     "load_measurement",
     "load_recording",
     "load_study",
+    "measurement_of",
     "measurement_text",
     "preview_raster",
     "run",

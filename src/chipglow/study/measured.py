@@ -50,12 +50,7 @@ def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measur
             raise ValueError(f"--set: {setting!r} describes nothing of a measurement's own file")
         return read_measurement(source)
     described = load_description(source, settings)
-    recorded = load_recording(described)
-    try:
-        return develop(described, recorded)
-    except ValueError as error:
-        name = Path(source).name
-        raise StudyError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from error
+    return measurement_of(described, load_recording(described), Path(source).name)
 
 
 def load_recording(description: MeasurementDescription) -> Recording:
@@ -86,26 +81,40 @@ def _read(description: MeasurementDescription, file: str, every: bool = False) -
     )
 
 
-def develop(description: MeasurementDescription, recording: Recording) -> Measurement:
+def measurement_of(
+    description: MeasurementDescription, recording: Recording, name: str
+) -> Measurement:
     """Make a measurement of a recording as its description says.
+
+    Parameters
+    ----------
+    description : MeasurementDescription
+        What is done with it.
+    recording : Recording
+        As `load_recording` gives it for this description.
+    name : str
+        Name of the file, for errors.
 
     Raises
     ------
     ValueError
-        If something is missing or does not fit.
+        If something is missing or does not fit; the message names the file.
     OSError
         If a file that the description names cannot be read.
     """
-    uniform = _uniform_frames(description, recording)
-    calibration = description.calibration
-    return develop_recording(
-        recording,
-        None if calibration is None else load_calibration(calibration),
-        uniform.correction if uniform and description.uniform.correct else None,
-        _bad_pixels(description, recording, uniform),
-        description.floor,
-        description.position(),
-    )
+    try:
+        uniform = _uniform_frames(description, recording)
+        calibration = description.calibration
+        return develop_recording(
+            recording,
+            None if calibration is None else load_calibration(calibration),
+            uniform.correction if uniform and description.uniform.correct else None,
+            _bad_pixels(description, recording, uniform),
+            description.floor,
+            description.position(),
+        )
+    except ValueError as error:
+        raise StudyError(f"{name}: {error}") from error
 
 
 @dataclass(frozen=True, eq=False)

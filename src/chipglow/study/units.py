@@ -138,6 +138,21 @@ class Quantity:
         return float(_registry().Quantity(decimal, self.unit).to(self.base).magnitude) == value
 
 
+class Difference(Quantity):
+    """How a difference of temperatures is written: 2 degC is then as much as 2 K."""
+
+    def _to_base(self, value: str, number: str, unit: str) -> float:
+        return super()._to_base(value, number, _DIFFERENCES.get(unit.strip(), unit))
+
+
+_DIFFERENCES: Final = {
+    "degC": "delta_degC",
+    "°C": "delta_degC",
+    "degF": "delta_degF",
+    "°F": "delta_degF",
+}
+
+
 def is_bare_number(value: object) -> bool:
     """Whether a value from a YAML file is a number without a unit."""
     if isinstance(value, str):
@@ -146,7 +161,8 @@ def is_bare_number(value: object) -> bool:
 
 
 Length = Annotated[float, Quantity("a length", "m", "um", "6 um")]
-Position = Annotated[float, Quantity("a position", "m", "um", "-420 um", positive=False)]
+POSITION: Final = Quantity("a position", "m", "um", "-420 um", positive=False)
+Position = Annotated[float, POSITION]
 CutLength = Annotated[float, Quantity("a length", "m", "mm", "0.3 mm")]
 Wavelength = Annotated[float, Quantity("a wavelength", "m", "um", "4.5 um")]
 WAVELENGTHS: Final = Quantity("a band of wavelengths", "m", "um", "3.8-5.1 um")
@@ -163,6 +179,9 @@ HeatTransfer = Annotated[
 ]
 TEMPERATURE: Final = Quantity("a temperature", "K", "degC", "300 degC")
 Temperature = Annotated[float, TEMPERATURE]
+TEMPERATURE_DIFFERENCE: Final = Difference(
+    "a difference of temperatures", "K", "K", "2 K", positive=False
+)
 
 
 @cache
