@@ -302,6 +302,7 @@ def test_what_the_file_does_not_say_is_the_calibrations():
     measured = develop_recording(recording(np.ones((1, 2, 2)), band=None), calibration)
     assert "integration time is the calibration's" in measured.data.attrs["assumed"]
     assert "range is the calibration's, A" in measured.data.attrs["assumed"]
+    assert measured.data.attrs["integration_time"] == 1e-5
 
 
 @pytest.mark.parametrize(

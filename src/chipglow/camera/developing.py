@@ -267,8 +267,8 @@ def _attributes(
     attributes: dict[str, float | str | None] = {
         "camera": recording.camera,
         "quantity": recording.quantity,
-        "integration_time": recording.integration_time,
-        "range": recording.range_name,
+        "integration_time": _known(recording, calibration, "integration_time"),
+        "range": _known(recording, calibration, "range_name"),
         "calibration": calibration.description if calibration else None,
         "object_parameters": _told(recording),
         "notes": "\n".join(note for note in recording.notes if not note.startswith(_ASSUMED)),
@@ -276,6 +276,12 @@ def _attributes(
         "doubtful": "\n".join(_doubtful(recording, uncertainty_known)),
     }
     return {name: value for name, value in attributes.items() if value not in (None, "")}
+
+
+def _known(recording: Recording, calibration: Calibration | None, name: str) -> Any:
+    """What the file says, or else the calibration that holds for it."""
+    said = getattr(recording, name)
+    return getattr(calibration, name, None) if said is None else said
 
 
 def _told(recording: Recording) -> str | None:

@@ -106,7 +106,7 @@ def calibrate(
         }
     except ValueError as error:
         raise ValueError(f"{points}: {error}") from None
-    console = Console(highlight=False, markup=False)
+    console = Console(highlight=False, markup=False, soft_wrap=True)
     for name, fit in fits.items():
         _print_fit(console, name, fit)
     chosen = min(fits, key=lambda name: fits[name].information_criterion)

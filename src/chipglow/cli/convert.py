@@ -49,7 +49,7 @@ def convert(
         raise ValueError(f"{source}: is a measurement already, expected a camera's file")
     description = load_description(source, settings or ())
     recording = load_recording(description)
-    console = Console(highlight=False, markup=False)
+    console = Console(highlight=False, markup=False, soft_wrap=True)
     console.print("The file says:")
     console.print(listed(_facts(recording)))
     try:

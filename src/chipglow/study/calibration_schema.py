@@ -49,8 +49,8 @@ class CalibrationDescription(Part):
         description="offset and C in counts, gain in counts per W/(m^2 sr), A in m, B in m K."
     )
     covariance: Rows = Field(
-        description="Covariance of the parameters, in their order: of the fit, and of what the\n"
-        "temperatures of the black body have in common."
+        description="Covariance of offset and gain, or of offset, A, B and C: of the fit, and of\n"
+        "what the temperatures of the black body have in common."
     )
     points: Annotated[tuple[PointRow, ...], Strict(False)] = described(
         [],
@@ -85,7 +85,7 @@ class CalibrationDescription(Part):
     def build(self) -> FittedCalibration:
         """The calibration."""
         kind = MODELS[self.model]
-        if tuple(self.parameters) != kind.NAMES:
+        if set(self.parameters) != set(kind.NAMES):
             raise ValueError(
                 f"parameters: {', '.join(self.parameters)}, expected {', '.join(kind.NAMES)}"
             )
@@ -97,7 +97,7 @@ class CalibrationDescription(Part):
             highest=self.highest,
             integration_time=self.integration_time,
             range_name=self.range,
-            parameters=np.array(list(self.parameters.values())),
+            parameters=np.array([self.parameters[name] for name in kind.NAMES]),
             covariance=np.array(self.covariance),
         )
 
