@@ -17,6 +17,8 @@ from chipglow.radiometry import ObjectParameters
 MOST_FRAMES: Final = 10_000_000
 """Most frames of a file."""
 
+_CLOCK_WAS_SET: Final = 31_536_000.0 * 10
+
 
 @dataclass(frozen=True)
 class Binary:
@@ -136,9 +138,12 @@ def text_of(raw: bytes) -> str:
     return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
 
 
-def moment(seconds: float) -> str:
-    """A time since 1970 as people and programs read it, in UTC."""
-    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds")
+def first_moment(seconds: float) -> tuple[str, ...]:
+    """A sentence on when frame 0 was taken, in s since 1970; none if the clock was not set."""
+    if not _CLOCK_WAS_SET < seconds < 2**32:
+        return ()
+    when = datetime.fromtimestamp(seconds, UTC).isoformat(" ", "milliseconds")
+    return (f"Frame 0 was taken at {when}.",)
 
 
 def even_times(frames: Sequence[int], interval: float) -> NDArray[np.float64]:
@@ -174,11 +179,11 @@ def stamped_times(
         return stamps
     if not (np.isfinite(rate) and rate > 0):
         raise SourceError(
-            f"{path}: its time stamps do not ascend and it says no frame rate, give an interval"
+            f"{path}: has neither time stamps that ascend nor a frame rate, give an interval"
         )
     notes.append(
-        f"Assumed: the frames are 1/{rate:g} s apart, as the file says; its time stamps do not "
-        "ascend."
+        f"Assumed: the frames are 1/{rate:g} s apart, as the file says; it has no time stamps "
+        "that ascend."
     )
     return even_times(frames, 1 / rate)
 

@@ -15,7 +15,7 @@ from chipglow.io.cameras.binary import (
     check_picture,
     chosen_frames,
     even_times,
-    moment,
+    first_moment,
     opened,
     stamped_times,
 )
@@ -160,8 +160,8 @@ def _pictures(binary: Binary, header: dict[str, Any], setup: dict[str, Any]) -> 
         return _Pictures(height, width, height * width * 3 // 2, _unpack_12, False, 12)
     if packing != 0 or bits not in (8, 16):
         raise SourceError(
-            f"{path}: has pictures of {bits} bits in packing {packing} of {width} columns, expected "
-            "8 or 16 bits plain, or 10 or 12 bits packed"
+            f"{path}: has pictures of {bits} bits in packing {packing} of {width} columns, "
+            "expected 8 or 16 bits plain, or 10 or 12 bits packed"
         )
     line = -(-width * bits // 32) * 4  # as in Windows' bitmaps
     real = setup["bits"] if 8 <= setup["bits"] <= bits else bits
@@ -194,12 +194,14 @@ def _curve() -> NDArray[np.uint16]:
     """Counts of 12 bits by code of 10 bits.
 
     The maker publishes a table. This is the curve of Recommendation ITU-R BT.709 with constants
-    fitted to it, within one count of the table everywhere.
+    fitted to it: within two counts of the table, and clipped where it is.
     """
-    share = (np.arange(1024) - 63.5573) / (1041.4199 - 63.5573)
+    codes = np.arange(1024)
+    share = (codes - 63.5573) / (1041.4199 - 63.5573)
     power = (np.maximum(share + 0.0962, 0) / 1.0962) ** (1 / 0.4502)
     light = np.where(share < 0.081, share / 4.6157, power)
-    return np.clip(np.round(64.0143 + 4237.8147 * light), 0, 4095).astype(np.uint16)
+    counts = np.clip(np.round(64.0143 + 4237.8147 * light), 0, 4095)
+    return np.where(codes < 1015, counts, 4095).astype(np.uint16)
 
 
 _CURVE: Final = _curve()
@@ -261,7 +263,7 @@ def _times(
         return stamped_times(binary.path, np.full(len(chosen), np.nan), chosen, rate, notes)
     ticks = stamps >> 2 << 2  # the two lowest bits are flags
     after = float(int(header["trigger"]) - int(ticks[0])) * _TICK
-    notes.append(f"Frame 0 was taken at {moment(float(ticks[0]) * _TICK)}.")
+    notes += first_moment(float(ticks[0]) * _TICK)
     notes.append(f"The trigger was at {after:.9g} s.")
     since = (ticks[list(chosen)] - ticks[0]).astype(np.int64) * _TICK
     return stamped_times(binary.path, since, chosen, rate, notes)

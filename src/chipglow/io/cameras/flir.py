@@ -19,7 +19,7 @@ from chipglow.io.cameras.binary import (
     check_picture,
     chosen_frames,
     even_times,
-    moment,
+    first_moment,
     object_parameters,
     opened,
     stamped_times,
@@ -44,6 +44,8 @@ _MOST_PADDING: Final = 1 << 20
 _MOST_PACKED: Final = 1100
 """More samples than that a byte are in no picture that is packed without loss."""
 _ZERO: Final = 273.15
+_LARGE: Final = 100.0
+"""An exponent that is possible, and no transmission."""
 
 
 def is_flir(head: bytes) -> bool:
@@ -113,14 +115,13 @@ def read_flir(path: Path, frames: slice | None = None, interval: float | None = 
             signal[position] = _image(binary, places[number], number, (height, width))
             stamps[position] = _moment(_camera_fields(binary, places[number])) - start
         fields = _camera_fields(binary, places[chosen[0]])
-    notes: list[str] = []
-    if isfinite(start):
-        notes.append(f"Frame 0 was taken at {moment(start)}.")
+    notes = list(first_moment(start))
     return Recording(
         signal=signal,
         quantity="counts",
         times=_times(path, stamps, fields, chosen, interval, len(places), notes),
         camera=_camera(fields),
+        saturation=_saturation(fields),
         conversion=_conversion(fields, notes),
         object_parameters=_object(fields, notes),
         notes=(*notes, *_further(fields)),
@@ -178,16 +179,19 @@ def _frames(binary: Binary) -> list[_Frame]:
 
 
 def _next(binary: Binary, end: int) -> int | None:
-    """Where the next frame begins: there may be zeros or records before it."""
+    """Where the next frame begins: there may be zeros or something else before it."""
+    if binary.read(end, min(4, binary.size - end), "what follows a frame") == _MAGIC:
+        return end
     rest = binary.read(end, min(_MOST_PADDING, binary.size - end), "what follows a frame")
-    if rest[:4] == _MAGIC or not rest.strip(b"\0"):
-        return end if rest[:4] == _MAGIC else None
     begin = rest.find(_MAGIC)
-    if begin < 0:
+    if begin >= 0:
+        return end + begin
+    if rest.strip(b"\0") or end + len(rest) < binary.size:
         raise SourceError(
-            f"{binary.path}: is cut short or damaged, no frame begins at byte {end} of {binary.size}"
+            f"{binary.path}: is cut short or damaged, no frame begins at byte {end} of "
+            f"{binary.size}"
         )
-    return end + begin
+    return None
 
 
 def _frame(binary: Binary, start: int, number: int) -> _Frame:
@@ -367,6 +371,12 @@ def _camera(fields: _Fields) -> str:
     return f"{name}, serial number {serial}" if serial else name
 
 
+def _saturation(fields: _Fields) -> float | None:
+    """The greatest count of the camera's range; cameras that do not know it say all 16 bits."""
+    low, high = fields.number(0x310, "H"), fields.number(0x312, "H")
+    return high if low < high < 65_535 else None
+
+
 def _conversion(fields: _Fields, notes: list[str]) -> PlanckConversion | None:
     try:
         return PlanckConversion(
@@ -416,7 +426,7 @@ def _through_air(fields: _Fields, distance: float, humidity: float, temperature:
         1.5587 + 6.939e-2 * celsius - 2.7816e-4 * celsius**2 + 6.8455e-7 * celsius**3
     )
     first, second = (
-        exp(min(0.0, -sqrt(distance) * (a + b * sqrt(water))))
+        exp(min(_LARGE, -sqrt(distance) * (a + b * sqrt(water))))
         for a, b in zip(alpha, beta, strict=True)
     )
     return share * first + (1 - share) * second

@@ -15,7 +15,7 @@ from chipglow.io.cameras.binary import (
     check_picture,
     chosen_frames,
     even_times,
-    moment,
+    first_moment,
     opened,
     stamped_times,
 )
@@ -108,9 +108,8 @@ def read_hcc(path: Path, frames: slice | None = None, interval: float | None = N
         chosen = chosen_frames(path, frames, binary.size // stride, height * width)
         stored = np.empty(len(chosen), _frame(header_length, height, width))
         for position, number in enumerate(chosen):
-            stored[position] = binary.numbers(number * stride, 1, stored.dtype, f"frame {number}")[
-                0
-            ]
+            frame = binary.numbers(number * stride, 1, stored.dtype, f"frame {number}")
+            stored[position] = frame[0]
     headers = stored["header"]
     _check_alike(path, headers, first, chosen)
     notes = [f"The samples are {label} (Telops header {first['major']}.{first['minor']})."]
@@ -163,10 +162,11 @@ def _signal(stored: NDArray[Any], quantity: Quantity, path: Path) -> NDArray[Any
         return np.ascontiguousarray(stored["image"])
     headers = stored["header"]
     scale = np.exp2(headers["data_exponent"].astype(np.float64))[:, None, None]
-    values = stored["image"] * scale + headers["data_offset"].astype(np.float64)[:, None, None]
-    if not np.isfinite(values).all():
-        raise SourceError(f"{path}: DataOffset is not a number, expected one")
-    return np.asarray(values, np.float32)
+    offset = headers["data_offset"].astype(np.float64)[:, None, None]
+    greatest = _MOST * scale + np.abs(offset)
+    if not (greatest < np.finfo(np.float32).max).all():
+        raise SourceError(f"{path}: DataOffset and DataExp give {greatest.max():g}, expected less")
+    return np.asarray(stored["image"] * scale + offset, np.float32)
 
 
 def _times(
@@ -183,9 +183,7 @@ def _times(
     if first["major"] < _WITH_TIME or not headers["seconds"].any():
         nowhere = np.full(len(chosen), np.nan)
         return stamped_times(path, nowhere, chosen, rate, notes)
-    notes.append(
-        f"Frame 0 was taken at {moment(first['seconds'] + _SUBSECOND * first['subseconds'])}."
-    )
+    notes += first_moment(first["seconds"] + _SUBSECOND * first["subseconds"])
     # Whole seconds first: their difference is exact.
     stamps = (
         headers["seconds"].astype(np.int64)

@@ -229,8 +229,8 @@ def _notes(header: dict[str, Any], skipped: int) -> list[str]:
         notes.append(f"Distance to the object: {header['distance']:g} m.")
     if header["scale"]:
         notes.append(
-            f"The file has a scale of its own in {text_of(header['scale_unit']) or 'some unit'}; it "
-            "is not applied."
+            f"The file has a scale of its own in {text_of(header['scale_unit']) or 'some unit'}; "
+            "it is not applied."
         )
     if skipped:
         notes.append("The first line of each frame holds lock-in data and is left out.")

@@ -132,7 +132,8 @@ def read_recording(
     kind = format or find_format(path)
     if CAMERA_FORMATS[kind].tells_quantity and told != Told(interval=interval):
         raise ValueError(
-            f"{path}: quantity, unit, dataset and axes are not for {CAMERA_FORMATS[kind].description}"
+            f"{path}: is {CAMERA_FORMATS[kind].description}, which says itself what was measured: "
+            "expected no quantity, unit, dataset or axes"
         )
     if _through_libraries(path, kind):
         return read_apart(path, kind, frames, told)
