@@ -346,6 +346,10 @@ def test_calibrate_says_what_is_doubtful(laboratory):
     assert code == 0, said
     assert "Doubtful: The residuals of linear are larger" in said
     assert "--common-uncertainty" in said
+    (laboratory / "bare.csv").write_text("temperature_K,counts\n600,1000\n800,2500\n1000,5000\n")
+    code, said = run("calibrate", "bare.csv", "--band", "3.8-5.1 um")
+    assert code == 0, said
+    assert "Doubtful: The uncertainty is from the scatter" in said
 
 
 @pytest.mark.parametrize(

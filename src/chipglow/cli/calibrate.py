@@ -221,6 +221,11 @@ def _doubtful(
             f"The residuals of {name} are larger than the stated uncertainties explain: the form, "
             "the band or the uncertainties are wrong, and the radiance is less certain than stated."
         )
+    if not fit.stated:
+        yield (
+            "The uncertainty is from the scatter of the points, as if all counts were equally "
+            "uncertain: count_uncertainty and temperature_uncertainty_K would tell it."
+        )
     if not common_known:
         yield (
             "The uncertainty holds no error that all temperatures of the black body have in common "
