@@ -1,5 +1,6 @@
 """From a camera's file to a measurement's: descriptions, calibration files, commands."""
 
+import camera_files
 import numpy as np
 import pytest
 import yaml
@@ -123,6 +124,7 @@ def test_a_calibration_comes_back_from_its_file(tmp_path):
         ("model", "cubic", "model: 'cubic', expected"),
         ("parameters", {"offset": 1.0}, "parameters: offset, expected offset, gain"),
         ("parameters", {"offset": 1.0, "gain": -2.0}, "gain is -2"),
+        ("parameters", {"offset": 1.0, "gain": 0.0}, "gain is 0"),
         ("covariance", [[1.0, 0.0], [0.0]], "covariance: rows are of different lengths"),
         ("lowest", "2000 degC", "lowest is 2273.15 K and highest"),
         ("response", [[3.8, 1.0, 2.0]], "response: expected pairs"),
@@ -139,6 +141,17 @@ def test_an_impossible_calibration_file_is_one_clear_error(
         load_calibration(tmp_path / "bad.yaml")
     assert str(caught.value).startswith("bad.yaml: ")
     assert "\n" not in str(caught.value)
+
+
+def test_counts_that_fall_are_no_calibration(tmp_path):
+    described = {
+        "model": "sakuma-hattori", "band": "3.8-5.1 um", "lowest": "300 degC",
+        "highest": "900 degC", "parameters": {"offset": 0.0, "A": -4e-6, "B": 1e-2, "C": 1e5},
+        "covariance": np.eye(4).tolist(),
+    }  # fmt: skip
+    (tmp_path / "falls.yaml").write_text(yaml.safe_dump(described))
+    with pytest.raises(StudyError, match="counts fall with the temperature"):
+        load_calibration(tmp_path / "falls.yaml")
 
 
 def test_tables_are_read_with_their_units(tmp_path):
@@ -263,6 +276,22 @@ def test_object_parameters_are_said_or_as_recorded(laboratory, tmp_path):
     expected = 0.5 * BAND.radiance(900.0) + 0.5 * BAND.radiance(293.15)
     np.testing.assert_allclose(told.radiance, expected, rtol=1e-6)
     assert "emissivity 0.5" in told.data.attrs["object_parameters"]
+
+
+def test_a_flir_sequence_by_its_makers_conversion(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    counts = camera_files.pictures()
+    (tmp_path / "chip.seq").write_bytes(camera_files.seq(counts))
+    measured = load_measurement("chip.seq", ["pitch=50 um", "band=7.5-13 um"])
+    told = camera_files.PLANCK
+    logarithm = np.log(told["r1"] / (told["r2"] * (counts + float(told["o"]))) + told["f"])
+    expected = told["b"] / logarithm
+    usable = measured.flags == 0
+    assert usable.any()
+    # Radiance is kept in 32 bits.
+    np.testing.assert_allclose(measured.radiance_temperature()[usable], expected[usable], rtol=1e-6)
+    assert "emissivity 0.95" in measured.data.attrs["object_parameters"]
+    assert "not known" in measured.data.attrs["doubtful"]
 
 
 def test_a_response_takes_the_place_of_limits(tmp_path):
