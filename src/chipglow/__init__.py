@@ -4,12 +4,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from chipglow.analysis import StudyResult, analyse, error_images
+    from chipglow.analysis import StudyResult, analyse, determine_emissivity, error_images
     from chipglow.camera import AnnularAperturePSF, Camera, GaussianPSF, MeasuredPSF, Measurement
     from chipglow.cutting import CuttingSimulation
     from chipglow.io import (
         import_scene,
         open_scene,
+        read_emissivity_map,
         read_measurement,
         read_scene,
         write_measurement,
@@ -19,7 +20,14 @@ if TYPE_CHECKING:
     from chipglow.report import write_report
     from chipglow.scene import Raster, Scene, ToolGeometry
     from chipglow.study import Study, cut, load_import, load_study, run
-    from chipglow.surface import CHIP_1, CHIP_2, Emissivity, FeatureSurface, UniformSurface
+    from chipglow.surface import (
+        CHIP_1,
+        CHIP_2,
+        Emissivity,
+        FeatureSurface,
+        MapSurface,
+        UniformSurface,
+    )
 
 __all__ = [
     "CHIP_1",
@@ -31,6 +39,7 @@ __all__ = [
     "Emissivity",
     "FeatureSurface",
     "GaussianPSF",
+    "MapSurface",
     "MeasuredPSF",
     "Measurement",
     "Raster",
@@ -41,11 +50,13 @@ __all__ = [
     "UniformSurface",
     "analyse",
     "cut",
+    "determine_emissivity",
     "error_images",
     "import_scene",
     "load_import",
     "load_study",
     "open_scene",
+    "read_emissivity_map",
     "read_measurement",
     "read_scene",
     "run",
@@ -56,12 +67,13 @@ __all__ = [
 __version__ = "0.1.0"
 
 _ROOMS: Final = {
-    "analysis": ("StudyResult", "analyse", "error_images"),
+    "analysis": ("StudyResult", "analyse", "determine_emissivity", "error_images"),
     "camera": ("AnnularAperturePSF", "Camera", "GaussianPSF", "MeasuredPSF", "Measurement"),
     "cutting": ("CuttingSimulation",),
     "io": (
         "import_scene",
         "open_scene",
+        "read_emissivity_map",
         "read_measurement",
         "read_scene",
         "write_measurement",
@@ -71,7 +83,7 @@ _ROOMS: Final = {
     "report": ("write_report",),
     "scene": ("Raster", "Scene", "ToolGeometry"),
     "study": ("Study", "cut", "load_import", "load_study", "run"),
-    "surface": ("CHIP_1", "CHIP_2", "Emissivity", "FeatureSurface", "UniformSurface"),
+    "surface": ("CHIP_1", "CHIP_2", "Emissivity", "FeatureSurface", "MapSurface", "UniformSurface"),
 }
 _ROOM_OF: Final = {name: room for room, names in _ROOMS.items() for name in names}
 

@@ -11,6 +11,8 @@ import typer
 from chipglow.cli.boundary import Boundary
 from chipglow.cli.calibrate import calibrate
 from chipglow.cli.convert import convert
+from chipglow.cli.emissivity import emissivity
+from chipglow.cli.rake import rake
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 
@@ -268,6 +270,8 @@ def materials(
 
 app.command("calibrate")(calibrate)
 app.command("convert")(convert)
+app.command("emissivity")(emissivity)
+app.command("rake")(rake)
 
 
 @cache_app.command("list")

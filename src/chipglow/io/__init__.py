@@ -2,6 +2,11 @@
 
 from chipglow.io.atomic import atomic_folder, atomic_path
 from chipglow.io.cameras import CAMERA_FORMATS, CameraFormat, read_recording, write_hcc
+from chipglow.io.emissivity_file import (
+    read_emissivity_map,
+    write_emissivity,
+    write_emissivity_table,
+)
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import (
     is_measurement,
@@ -10,6 +15,7 @@ from chipglow.io.measurement_file import (
     write_measurement,
 )
 from chipglow.io.movie_file import check_movie_path, movie_writer
+from chipglow.io.rake_grid_file import check_rake_grid_path, write_rake_grid
 from chipglow.io.scene_file import (
     FORMAT_VERSION,
     SceneWriter,
@@ -32,18 +38,23 @@ __all__ = [
     "atomic_folder",
     "atomic_path",
     "check_movie_path",
+    "check_rake_grid_path",
     "import_scene",
     "is_measurement",
     "movie_writer",
     "open_scene",
     "prospect",
+    "read_emissivity_map",
     "read_measurement",
     "read_recording",
     "read_scene",
     "read_tool_outline",
     "unfinished_scenes",
     "write_dataset",
+    "write_emissivity",
+    "write_emissivity_table",
     "write_hcc",
     "write_measurement",
+    "write_rake_grid",
     "write_scene",
 ]

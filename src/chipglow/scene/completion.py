@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.scene.motion import nearest_filled, optical_flow, strain_rate_along
+from chipglow.scene.polygon import in_polygon
 from chipglow.scene.raster import Raster
 from chipglow.scene.sampled import SampledFrame
 from chipglow.scene.scene import (
@@ -265,10 +266,4 @@ def _inside(corners: Sequence[tuple[float, float]] | None, raster: Raster) -> ND
     """Which samples lie in a polygon."""
     if corners is None:
         return np.zeros(raster.shape, np.bool_)
-    x, y = np.meshgrid(raster.x, raster.y)
-    inside = np.zeros(raster.shape, np.bool_)
-    for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
-        if y1 != y2:
-            crossed = (y1 > y) != (y2 > y)
-            inside ^= crossed & (x < x1 + (y - y1) * (x2 - x1) / (y2 - y1))
-    return inside
+    return in_polygon(corners, raster.x[None, :], raster.y[:, None])

@@ -2,11 +2,13 @@
 
 from chipglow.study.cache import CachedScene, cache_folder, cached_scenes, clear_cache
 from chipglow.study.calibration_schema import CalibrationDescription
+from chipglow.study.emissivity import surface_text
 from chipglow.study.files import (
     StudyError,
     load_calibration,
     load_description,
     load_import,
+    load_regions,
     load_study,
 )
 from chipglow.study.fitting import Fitted, fit
@@ -18,6 +20,7 @@ from chipglow.study.reference import FieldEntry, field_entries, field_tables
 from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, kept_progress, run
 from chipglow.study.schema import Study
 from chipglow.study.template import calibration_text, import_text, measurement_text, study_text
+from chipglow.study.tool_description import load_tool, tool_of
 
 __all__ = [
     "CUTTING_STEP",
@@ -46,10 +49,14 @@ __all__ = [
     "load_import",
     "load_measurement",
     "load_recording",
+    "load_regions",
     "load_study",
+    "load_tool",
     "measurement_of",
     "measurement_text",
     "preview_raster",
     "run",
     "study_text",
+    "surface_text",
+    "tool_of",
 ]

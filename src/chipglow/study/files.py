@@ -8,10 +8,12 @@ from typing import Any, Final, TypeVar
 import yaml
 from pydantic import BaseModel, ValidationError
 
+from chipglow.analysis.regions import Region
 from chipglow.camera import FittedCalibration
 from chipglow.study.calibration_schema import CalibrationDescription
 from chipglow.study.import_schema import ImportDescription
 from chipglow.study.measurement_schema import MeasurementDescription
+from chipglow.study.regions import RegionsDescription
 from chipglow.study.schema import Study
 
 Kind = TypeVar("Kind", bound=BaseModel)
@@ -39,7 +41,7 @@ def load_study(path: str | Path) -> Study:
         If the file cannot be read.
     """
     path = Path(path)
-    return _validated(Study, read_yaml(path), path.name, path.parent)
+    return validated(Study, read_yaml(path), path.name, path.parent)
 
 
 def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescription:
@@ -93,7 +95,7 @@ def load_calibration(path: str | Path) -> FittedCalibration:
         If the file cannot be read.
     """
     path = Path(path)
-    return _validated(CalibrationDescription, read_yaml(path), path.name, path.parent).build()
+    return validated(CalibrationDescription, read_yaml(path), path.name, path.parent).build()
 
 
 def _described(kind: type[Kind], path: Path, field: str, settings: Iterable[str]) -> Kind:
@@ -102,7 +104,26 @@ def _described(kind: type[Kind], path: Path, field: str, settings: Iterable[str]
     data = read_yaml(path) if described else {field: path.name}
     for setting in settings:
         data = _with(data, setting)
-    return _validated(kind, data, path.name, path.parent)
+    return validated(kind, data, path.name, path.parent)
+
+
+def load_regions(path: str | Path) -> tuple[Region, ...]:
+    """Read named regions of an image from a YAML file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Raises
+    ------
+    StudyError
+        If the file is no YAML or a region is not possible.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    return validated(RegionsDescription, read_yaml(path), path.name, path.parent).build()
 
 
 def read_yaml(path: Path) -> Any:
@@ -125,7 +146,25 @@ def read_yaml(path: Path) -> Any:
         raise StudyError(f"{path.name}: {_yaml_problem(error)}") from None
 
 
-def _validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
+def validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
+    """What a YAML file holds, as the section that it should be.
+
+    Parameters
+    ----------
+    kind : type
+        The section.
+    data : object
+        As `read_yaml` gives it.
+    name : str
+        The file, as errors call it.
+    folder : Path
+        Where files that it names are looked up.
+
+    Raises
+    ------
+    StudyError
+        If a field is not possible; the message names it, its value and what was expected.
+    """
     try:
         return kind.model_validate(data, context={"folder": folder.resolve()})
     except ValidationError as error:

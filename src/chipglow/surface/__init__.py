@@ -9,6 +9,7 @@ from chipglow.surface.feature import (
     chip_share,
     shear_band_share,
 )
+from chipglow.surface.map import MapField, MapSurface
 from chipglow.surface.surface import EmissivityField, Surface, UniformSurface
 from chipglow.surface.texture import Texture
 
@@ -19,6 +20,8 @@ __all__ = [
     "EmissivityField",
     "FeatureField",
     "FeatureSurface",
+    "MapField",
+    "MapSurface",
     "Surface",
     "Texture",
     "UniformSurface",

@@ -14,6 +14,7 @@ from chipglow.io.sources.colour_scale import ColourScale, lab
 from chipglow.io.sources.legend import Box
 from chipglow.io.sources.source import SourceError
 from chipglow.scene import FILLED, Material
+from chipglow.scene.polygon import in_polygon
 
 Colour = tuple[int, int, int]
 """Red, green and blue of 0 to 255."""
@@ -219,16 +220,13 @@ def polygon_mask(
     shape: tuple[int, int], corners: Sequence[tuple[float, float]]
 ) -> NDArray[np.bool_]:
     """Pixels whose middle is within a polygon; two corners are opposite ones of a box."""
-    from matplotlib.path import Path
-
     if not corners:
         return np.zeros(shape, np.bool_)
     if len(corners) == 2:
         (left, top), (right, bottom) = corners
         corners = ((left, top), (right, top), (right, bottom), (left, bottom))
     rows, columns = np.mgrid[: shape[0], : shape[1]] + 0.5
-    points = np.stack([columns.ravel(), rows.ravel()], axis=1)
-    return np.asarray(Path(corners).contains_points(points)).reshape(shape)
+    return in_polygon(corners, columns, rows)
 
 
 def _border(picture: NDArray[Any]) -> NDArray[Any]:

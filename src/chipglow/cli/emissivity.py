@@ -1,0 +1,267 @@
+"""The command ``chipglow emissivity``: emissivity from images of heated objects."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rich.console import Console
+
+    from chipglow.analysis import EmissivityLine, EmissivityMap, Heating, RegionEmissivity
+    from chipglow.camera import Measurement
+    from chipglow.study.units import Quantity
+
+
+def emissivity(
+    images: Annotated[
+        list[Path],
+        typer.Argument(metavar="IMAGE...", help="Measurements of the heated object."),
+    ],
+    truth: Annotated[
+        list[str],
+        typer.Option(
+            metavar="TEMPERATURE",
+            help="True temperature of the object, such as 391degC: once for all images, or once "
+            "for each in their order. Images at one temperature are repetitions.",
+        ),
+    ],
+    regions: Annotated[
+        Path, typer.Option(metavar="FILE", help="The regions of the image, a YAML file.")
+    ],
+    environment: Annotated[
+        str,
+        typer.Option(
+            metavar="TEMPERATURE", help="Temperature of the surroundings that the object reflects."
+        ),
+    ] = "293 K",
+    truth_uncertainty: Annotated[
+        str | None,
+        typer.Option(metavar="KELVINS", help="Its standard uncertainty, such as '2 K'."),
+    ] = None,
+    environment_uncertainty: Annotated[
+        str | None,
+        typer.Option(metavar="KELVINS", help="Standard uncertainty of the surroundings'."),
+    ] = None,
+    camera_uncertainty: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KELVINS",
+            help="Standard uncertainty of radiance temperatures from the camera's calibration; "
+            "by default that which the measurement tells.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write maps and regions, NetCDF."),
+    ] = None,
+    table: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the table of regions, CSV.")
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw image, regions and map, PNG, PDF or SVG."),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="FIELD=VALUE",
+            help="Set a field of the description of a camera's file; may be repeated.",
+        ),
+    ] = None,
+) -> None:
+    """Determine emissivity from images of an object of known temperature."""
+    from rich.console import Console
+
+    from chipglow.analysis import areas, determine_emissivity, emissivity_line, shared_pixels
+    from chipglow.cli.assumed import say_assumed
+    from chipglow.cli.pictures import check_picture_path
+    from chipglow.io.atomic import check_folder
+    from chipglow.study.files import load_regions
+    from chipglow.study.measured import load_measurement
+
+    if plot is not None:
+        check_picture_path(plot)
+    for path in (out, table, plot):
+        if path is not None:
+            check_folder(path)
+    heatings = _heatings(
+        images, truth, environment, truth_uncertainty, environment_uncertainty, camera_uncertainty
+    )
+    named = load_regions(regions)
+    measurements = [load_measurement(image, settings or ()) for image in images]
+    _check_same_pixels(images, measurements)
+    groups: dict[Heating, list[Measurement]] = {}
+    for measurement, heating in zip(measurements, heatings, strict=True):
+        groups.setdefault(heating, []).append(measurement)
+    maps = [determine_emissivity(group, heating) for heating, group in groups.items()]
+    found = areas(named, maps[0].raster)
+    rows = [[one.of(area) for area in found] for one in maps]
+    lines = [emissivity_line(of) for of in zip(*rows, strict=True)] if len(maps) > 1 else []
+    console = Console(highlight=False, markup=False)
+    _print_tables(console, rows, lines)
+    console.print()
+    say_assumed(_assumptions(maps))
+    say_assumed(
+        f"{one} and {other} share {count} pixels, which count in both."
+        for (one, other), count in shared_pixels(named, maps[0].raster).items()
+    )
+    for doubt in _doubts(rows):
+        console.print(doubt, soft_wrap=True)
+    _print_study(console, rows)
+    _write(maps, rows, out, table)
+    if plot is not None:
+        from chipglow.cli.pictures import write_picture
+        from chipglow.report.emissivity_figure import draw_emissivity
+
+        whole = [line for line, area in zip(lines, found, strict=False) if area.whole]
+        write_picture(draw_emissivity(maps[0], named, whole), plot)
+    for path in (out, table, plot):
+        if path is not None:
+            print(path)
+
+
+def _heatings(
+    images: list[Path],
+    truths: list[str],
+    environment: str,
+    truth_uncertainty: str | None,
+    environment_uncertainty: str | None,
+    camera_uncertainty: str | None,
+) -> "list[Heating]":
+    """How the object was heated for each image."""
+    from chipglow.analysis import Heating
+    from chipglow.study.units import TEMPERATURE, TEMPERATURE_DIFFERENCE
+
+    if len(truths) not in (1, len(images)):
+        raise ValueError(
+            f"--truth: {len(truths)} temperatures for {len(images)} images, "
+            "expected one for all or one for each"
+        )
+
+    def spread(option: str, text: str | None) -> float | None:
+        return None if text is None else _parsed(option, TEMPERATURE_DIFFERENCE, text)
+
+    return [
+        Heating(
+            _parsed("--truth", TEMPERATURE, text),
+            _parsed("--environment", TEMPERATURE, environment),
+            spread("--truth-uncertainty", truth_uncertainty) or 0.0,
+            spread("--environment-uncertainty", environment_uncertainty) or 0.0,
+            spread("--camera-uncertainty", camera_uncertainty),
+        )
+        for text in (truths if len(truths) > 1 else truths * len(images))
+    ]
+
+
+def _parsed(option: str, quantity: "Quantity", text: str) -> float:
+    try:
+        return quantity.parse(text)
+    except ValueError as error:
+        raise ValueError(f"{option}: {error}") from None
+
+
+def _check_same_pixels(images: list[Path], measurements: "list[Measurement]") -> None:
+    for image, measurement in zip(images, measurements, strict=True):
+        if measurement.raster != measurements[0].raster:
+            raise ValueError(
+                f"{image}: has other pixels than {images[0]}, "
+                "expected images of one camera that see the same place"
+            )
+
+
+def _print_tables(
+    console: "Console", rows: "list[list[RegionEmissivity]]", lines: "list[EmissivityLine]"
+) -> None:
+    from rich.table import Table
+
+    for of in rows:
+        console.print(f"\nObject at {of[0].heating.truth - 273.15:.6g} °C")
+        result = Table("region", "pixels", "mean", "sd of pixels", "u", "U 95 %", "k", box=None)
+        budget = Table(
+            "parts of u", "truth", "environment", "calibration", "repeatability", "noise"
+        )
+        budget.box = None
+        for column in (*result.columns[1:], *budget.columns[1:]):
+            column.justify = "right"
+        for row in of:
+            spread = row.standard_uncertainty, row.expanded_uncertainty
+            result.add_row(
+                row.name,
+                str(row.pixels),
+                f"{row.mean:.4f}",
+                *map(_spread, (row.deviation, *spread)),
+                f"{row.coverage_factor:.2f}",
+            )
+            budget.add_row(row.name, *map(_spread, row.budget.values()))
+        console.print(result)
+        console.print()
+        console.print(budget)
+    if lines:
+        console.print("\nOver the temperature, with standard uncertainties")
+        table = Table("region", "emissivity", "at", "change in 100 K", "sd about line", box=None)
+        for line in lines:
+            table.add_row(
+                line.name,
+                f"{line.at_middle:.4f} ± {_spread(line.middle_uncertainty)}",
+                f"{line.middle - 273.15:.6g} °C",
+                f"{100 * line.slope:+.4f} ± {_spread(100 * line.slope_uncertainty)}",
+                _spread(line.residual),
+            )
+        console.print(table)
+
+
+def _spread(value: float) -> str:
+    """Two digits that count, or a dash where nothing is known."""
+    return f"{value:#.2g}" if value == value else "–"
+
+
+def _assumptions(maps: "list[EmissivityMap]") -> "Iterator[str]":
+    heating = maps[0].heating
+    if not heating.truth_uncertainty:
+        yield "the true temperature is exact (--truth-uncertainty)."
+    if not heating.environment_uncertainty:
+        yield "the environment's temperature is exact (--environment-uncertainty)."
+    if any(one.calibration is None for one in maps):
+        yield (
+            "the camera's calibration is exact, as the measurement tells no uncertainty of it "
+            "(--camera-uncertainty)."
+        )
+    if any(one.observations == 1 for one in maps):
+        yield (
+            "nothing changes from frame to frame, as there is one only; noise is at most the "
+            "spread over the pixels."
+        )
+
+
+def _doubts(rows: "list[list[RegionEmissivity]]") -> "Iterator[str]":
+    for of in rows:
+        at = f" (object at {of[0].heating.truth - 273.15:.6g} °C)" if len(rows) > 1 else ""
+        for doubt in (doubt for row in of for doubt in row.doubts):
+            yield f"Doubtful: {doubt}{at}."
+
+
+def _print_study(console: "Console", rows: "list[list[RegionEmissivity]]") -> None:
+    from chipglow.study.emissivity import surface_text
+
+    text = surface_text(rows[0])
+    if text:
+        at = f" at {rows[0][0].heating.truth - 273.15:.6g} °C" if len(rows) > 1 else ""
+        console.print(f"\nFor a study{at}:\n\n{text}", soft_wrap=True)
+
+
+def _write(
+    maps: "list[EmissivityMap]",
+    rows: "list[list[RegionEmissivity]]",
+    out: Path | None,
+    table: Path | None,
+) -> None:
+    from chipglow.io import write_emissivity, write_emissivity_table
+
+    if out is not None:
+        write_emissivity(maps, rows, out)
+    if table is not None:
+        write_emissivity_table([row for of in rows for row in of], table)

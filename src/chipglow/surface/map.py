@@ -1,0 +1,116 @@
+"""A surface whose emissivity was measured, as a fixed image."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.scene import Frame, Material, Raster, Scene
+from chipglow.scene.regrid import Taps, taps
+from chipglow.surface.surface import EmissivityField, Surface
+
+
+@dataclass(frozen=True, eq=False)
+class MapSurface(Surface):
+    """Emissivity as an image that stays where it is, such as the measured one of a tool.
+
+    Parameters
+    ----------
+    values : ndarray
+        Emissivity, shape `raster.shape`; NaN where it is not known.
+    raster : Raster
+        The image's pixels, in the coordinates of the scene.
+    elsewhere : float
+        Emissivity off the image, and where no pixel around is known; 0 by default, the paper's for
+        what is not defined.
+
+    Raises
+    ------
+    ValueError
+        If the shape is another, a value is not within 0 to 1, or none is known.
+
+    Notes
+    -----
+    On samples larger than its pixels the image is the mean over the area of the sample, on smaller
+    ones it is interpolated linearly; of what is known alone. "The tool emissivity characteristics
+    […] can simply be applied to the tool […], since the tool does not move": Heigel and Whitenton
+    (2010), Equation 3 and what follows.
+    """
+
+    values: NDArray[np.floating]
+    raster: Raster
+    elsewhere: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.values.shape != self.raster.shape:
+            raise ValueError(
+                f"emissivity map: has shape {self.values.shape}, expected {self.raster.shape}"
+            )
+        if min(self.raster.shape) < 2:
+            raise ValueError(
+                f"emissivity map: has shape {self.raster.shape}, expected 2 pixels or more each way"
+            )
+        known = self.values[np.isfinite(self.values)]
+        if known.size == 0:
+            raise ValueError("emissivity map: no pixel is known, expected 1 or more")
+        if known.min() < 0 or known.max() > 1:
+            raise ValueError(
+                f"emissivity map: goes from {known.min():.4g} to {known.max():.4g}, expected 0 to 1"
+            )
+        if not 0 <= self.elsewhere <= 1:
+            raise ValueError(f"emissivity map: elsewhere is {self.elsewhere!r}, expected 0 to 1")
+
+    def on(self, scene: Scene) -> "MapField":
+        """Resample the image to a scene's samples."""
+        return MapField(self.at(scene.raster))
+
+    def at(self, raster: Raster) -> NDArray[np.float32]:
+        """Emissivity on other samples, float32 of shape `raster.shape`."""
+        across = taps(self.raster.x, raster.spacing, raster.x)
+        down = taps(-self.raster.y, raster.spacing, -raster.y)
+        known = np.isfinite(self.values)
+        weight = _resampled(known.astype(np.float64), across, down)
+        total = _resampled(np.where(known, self.values, 0.0), across, down)
+        result = np.full(raster.shape, self.elsewhere)
+        np.divide(total, weight, out=result, where=weight > 1e-9)
+        return np.asarray(np.clip(result, 0.0, 1.0), np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class MapField(EmissivityField):
+    """A `MapSurface` on one scene; made by `MapSurface.on`.
+
+    Parameters
+    ----------
+    image : ndarray
+        Emissivity of the scene's samples, float32 of shape (y, x).
+    """
+
+    image: NDArray[np.float32]
+
+    def emissivity(self, frame: Frame) -> NDArray[np.float32]:
+        """Emissivity of every sample of a frame, shape (y, x); 0 in the void.
+
+        Raises
+        ------
+        ValueError
+            If the frame is not of the scene's shape.
+        """
+        if frame.material.shape != self.image.shape:
+            raise ValueError(
+                f"frame: has shape {frame.material.shape}, expected {self.image.shape}"
+            )
+        return np.where(frame.material == Material.VOID, np.float32(0.0), self.image)
+
+
+def _resampled(image: NDArray[np.float64], across: Taps, down: Taps) -> NDArray[np.float64]:
+    return _along_columns(_along_columns(image, across).T, down).T
+
+
+def _along_columns(image: NDArray[np.float64], wanted: Taps) -> NDArray[np.float64]:
+    """Weighted sums over neighbouring columns, shape (rows, wanted)."""
+    first, weights = wanted
+    result = np.zeros((len(image), first.size))
+    for tap, weight in enumerate(weights.T):
+        result += image[:, np.minimum(first + tap, image.shape[1] - 1)] * weight
+    return result

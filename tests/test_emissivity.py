@@ -1,0 +1,583 @@
+"""Emissivity from heated chips: what was put in comes out, within its stated uncertainty."""
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from chipglow.analysis import (
+    Area,
+    Heating,
+    Polygon,
+    Region,
+    areas,
+    determine_emissivity,
+    emissivity_covariance,
+    emissivity_line,
+)
+from chipglow.camera import Camera, Flag
+from chipglow.cli import app
+from chipglow.io import (
+    read_emissivity_map,
+    write_emissivity,
+    write_measurement,
+)
+from chipglow.scene import FIELD_UNITS, Raster, Scene
+from chipglow.study import Study, load_regions
+from chipglow.study.emissivity import surface_text
+from chipglow.study.units import TEMPERATURE_DIFFERENCE
+from chipglow.surface import MapSurface
+
+TRUTH = 391.0 + CELSIUS
+HEATING = Heating(TRUTH)
+WHOLE = Area("all", "all", np.ones(RASTER.shape, bool), True)
+REGION_LIST = (
+    Region("body left", Polygon.rectangle((0, 0), (16, 30)), "chip body"),
+    Region("body right", Polygon.rectangle((24, 0), (40, 30)), "chip body"),
+    Region("fissure", Polygon.rectangle((17, 0), (23, 30))),
+)
+
+
+def rows_of(found):
+    return {area.name: found.of(area) for area in areas(REGION_LIST, found.raster)}
+
+
+def slopes(truth=TRUTH, environment=293.0):
+    """Radiances of truth and environment, and their derivatives with temperature."""
+    points = np.array([truth, environment])
+    return BAND.radiance(points), (BAND.radiance(points + 0.5) - BAND.radiance(points - 0.5))
+
+
+# What was put in
+
+
+@given(st.floats(0.02, 1.0), st.floats(500.0, 1500.0), st.floats(200.0, 350.0))
+@settings(max_examples=50, deadline=None)
+def test_equation_2_is_undone(emissivity, truth, environment):
+    small = Raster(0.0, 0.0, 6e-6, 2, 2)
+    image = measured(np.full((2, 2), emissivity), truth, environment, raster=small)
+    found = determine_emissivity([image], Heating(truth, environment))
+    np.testing.assert_allclose(found.emissivity, emissivity, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("body", "fissure", "celsius"),
+    [((0.42, 0.07), (0.53, 0.05), 391.0), ((0.77, 0.03), (0.85, 0.02), 570.0)],
+)
+def test_table_1_of_the_paper_comes_back_through_camera_and_scene(body, fissure, celsius):
+    put_in = table_1(body, fissure)
+    fields = {name: np.zeros((11, *RASTER.shape)) for name in FIELD_UNITS}
+    fields["temperature"] += celsius + CELSIUS
+    fields["material"] += 1
+    scene = Scene.from_fields(RASTER, np.arange(11) * 1e-6, fields)
+    camera = Camera(psf=None, floor=None, reflected=293.0)
+    image = camera.measure(scene, MapSurface(put_in, RASTER), 0.0)
+    rows = rows_of(determine_emissivity([image], Heating(celsius + CELSIUS)))
+    # A camera without blur whose sensors are the samples; emissivities are float32 on their way.
+    parts = {"chip body": put_in[:, np.r_[:16, 24:40]], "fissure": put_in[:, 17:23]}
+    for name, (mean, deviation) in (("chip body", body), ("fissure", fissure)):
+        row = rows[name]
+        assert row.pixels == parts[name].size
+        assert row.mean == pytest.approx(parts[name].mean(), abs=1e-6)
+        assert row.deviation == pytest.approx(parts[name].std(ddof=1), abs=1e-6)
+        # And so the table's, but for drawing 960 and 180 pixels: four standard deviations of both.
+        assert row.mean == pytest.approx(mean, abs=4 * deviation / row.pixels**0.5)
+        assert row.deviation == pytest.approx(deviation, rel=4 / (2 * row.pixels) ** 0.5)
+
+
+def test_the_spread_over_pixels_is_no_uncertainty_of_the_mean():
+    heating = replace(HEATING, truth_uncertainty=2.0)
+    smooth, rough = (table_1((0.42, sd), (0.53, sd)) for sd in (0.001, 0.07))
+    rows = [
+        rows_of(determine_emissivity([measured(one, frames=20, noise=0.1)], heating))["chip body"]
+        for one in (smooth, rough)
+    ]
+    assert rows[1].deviation > 50 * rows[0].deviation
+    # The mean itself differs by 0.07 / sqrt(960) = 0.5 % and so does what is proportional to it.
+    assert rows[1].standard_uncertainty == pytest.approx(rows[0].standard_uncertainty, rel=0.02)
+
+
+# Uncertainty
+
+
+def test_the_budget_is_that_of_the_derivatives():
+    heating = Heating(TRUTH, 293.0, 2.0, 1.5, 0.8)
+    row = determine_emissivity([measured(np.full(RASTER.shape, 0.5))], heating).of(WHOLE)
+    (hot, cold), (hot_slope, cold_slope) = slopes()
+    contrast = hot - cold
+    seen = 0.5 * (hot + cold)
+    temperature = BAND.temperature(seen)
+    slope = BAND.radiance(temperature + 0.5) - BAND.radiance(temperature - 0.5)
+    # Second-order terms of 2 K in 664 K are 1e-4 of the first.
+    assert row.common["truth"] == pytest.approx(-0.5 * hot_slope / contrast * 2.0, rel=1e-3)
+    assert row.common["environment"] == pytest.approx(-0.5 * cold_slope / contrast * 1.5, rel=1e-3)
+    assert row.common["calibration"] == pytest.approx(slope * 0.8 / contrast, rel=1e-3)
+    assert row.standard_uncertainty == pytest.approx(
+        np.linalg.norm(list(row.common.values())), rel=1e-9
+    )
+    assert row.coverage_factor == pytest.approx(1.959964, abs=1e-6)
+
+
+def test_propagation_is_that_of_monte_carlo():
+    # All at once, uncertainties of a poor laboratory: 5 K of truth, 5 K of environment, 4 K camera.
+    heating = Heating(TRUTH, 293.0, 5.0, 5.0, 4.0)
+    row = determine_emissivity([measured(table_1())], heating).of(WHOLE)
+    draws, generator = 200_000, np.random.default_rng(3)
+    truth, environment, camera = generator.normal(
+        (TRUTH, 293.0, 0.0), (5.0, 5.0, 4.0), (draws, 3)
+    ).T
+    temperature = BAND.temperature(measured(table_1()).radiance[0].mean())
+    hot, cold, seen = (BAND.radiance(t) for t in (truth, environment, temperature + camera))
+    found = (seen - cold) / (hot - cold)
+    # The standard deviation of 200 000 draws is known to 0.16 %; terms of higher order and the
+    # camera's error at the mean radiance in the place of each pixel's take 1 %.
+    assert row.standard_uncertainty == pytest.approx(found.std(), rel=0.015)
+    low, high = np.quantile(found, (0.025, 0.975))
+    assert high - low == pytest.approx(2 * row.expanded_uncertainty, rel=0.02)
+
+
+def coverage(observe, repeats=200):
+    """How often the 95 % interval of the body's mean holds the truth."""
+    put_in = table_1()
+    area = Area("body", "body", np.arange(40)[None, :] + np.zeros((30, 1)) < 16, True)
+    held = 0
+    for seed in range(repeats):
+        row = observe(put_in, np.random.default_rng(seed)).of(area)
+        held += abs(row.mean - put_in[area.mask].mean()) <= row.expanded_uncertainty
+    return held
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    heating = Heating(TRUTH, 293.0, 2.0, 1.0, 1.5)
+
+    def observe(put_in, generator):
+        true, around, wrong = generator.normal((TRUTH, 293.0, 0.0), (2.0, 1.0, 1.5))
+        image = measured(put_in, true, around, frames=4, noise=3.0, seed=generator, drift=0.5)
+        radiance = BAND.radiance(BAND.temperature(image.radiance) + wrong)
+        image.data["radiance"].values[:] = radiance
+        return determine_emissivity([image], heating)
+
+    # 190 of 200 expected, standard deviation 3.1: three of them.
+    assert 181 <= coverage(observe) <= 199
+
+
+@pytest.mark.parametrize("frames", [2, 3, 8])
+def test_intervals_of_chance_alone_hold_the_truth(frames):
+    def observe(put_in, generator):
+        image = measured(put_in, frames=frames, noise=3.0, seed=generator, drift=2.0)
+        return determine_emissivity([image], HEATING)
+
+    assert 181 <= coverage(observe) <= 199
+
+
+def test_intervals_from_noise_alone_are_not_too_short():
+    def observe(put_in, generator):
+        return determine_emissivity(
+            [measured(put_in, frames=3, noise=5.0, seed=generator)], HEATING
+        )
+
+    # Half the time chance makes frames differ by less than the noise would; the interval is then
+    # that of the noise, otherwise longer: never too short.
+    assert coverage(observe) >= 181
+
+
+def test_drift_and_noise_are_told_apart():
+    noise, drift, frames = 4.0, 1.0, 400
+    (hot, cold), _ = slopes()
+    image = measured(np.full(RASTER.shape, 0.5), frames=frames, noise=noise, drift=drift)
+    row = determine_emissivity([image], HEATING).of(WHOLE)
+    contrast = hot - cold
+    # The standard deviation of 400 frames is known to 3.5 %, that of 480 000 pixels to 0.1 %.
+    expected = drift / frames**0.5 / contrast
+    assert row.budget["repeatability"] == pytest.approx(expected, rel=0.15)
+    assert row.budget["noise"] == pytest.approx(
+        noise / (frames * RASTER.rows * RASTER.columns) ** 0.5 / contrast, rel=0.005
+    )
+
+
+def test_images_are_the_repetitions_where_there_are_several():
+    put_in = np.full(RASTER.shape, 0.5)
+    images = [measured(put_in * (1 + step), frames=50, noise=0.1) for step in (-0.01, 0.0, 0.01)]
+    row = determine_emissivity(images, HEATING).of(WHOLE)
+    # Means of 0.495, 0.5 and 0.505: s = 0.005, and s / sqrt(3) with 2 degrees of freedom.
+    assert row.scatter.standard_uncertainty == pytest.approx(0.005 / 3**0.5, rel=1e-3)
+    assert row.degrees_of_freedom == pytest.approx(2.0, rel=1e-6)
+    assert row.coverage_factor == pytest.approx(4.302653, rel=1e-6)
+
+
+def test_the_uncertainty_of_the_calibration_comes_from_the_measurement():
+    put_in = table_1()
+    image = measured(put_in, calibration_uncertainty=np.full((1, *RASTER.shape), 5.0))
+    (hot, cold), _ = slopes()
+    row = determine_emissivity([image], HEATING).of(WHOLE)
+    # It is common to all pixels: a mean over them does not lessen it.
+    assert row.budget["calibration"] == pytest.approx(5.0 / (hot - cold), rel=1e-12)
+    own = determine_emissivity([image], replace(HEATING, camera_uncertainty=0.0)).of(WHOLE)
+    assert own.budget["calibration"] == 0.0
+
+
+def test_the_difference_of_two_regions_is_known_better_than_either():
+    heating = Heating(TRUTH, 293.0, 4.0, 2.0, 3.0)
+    put_in = table_1((0.42, 0.001), (0.53, 0.001))
+    generator, differences = np.random.default_rng(8), []
+    for _ in range(400):
+        true, around, wrong = generator.normal((TRUTH, 293.0, 0.0), (4.0, 2.0, 3.0))
+        image = measured(put_in, true, around, frames=3, drift=5.0, seed=generator)
+        radiance = BAND.radiance(BAND.temperature(image.radiance) + wrong)
+        image.data["radiance"].values[:] = radiance
+        rows = rows_of(determine_emissivity([image], heating))
+        differences.append(rows["fissure"].mean - rows["chip body"].mean)
+    (a, b), (_, d) = emissivity_covariance([rows["fissure"], rows["chip body"]])
+    stated = np.sqrt(a - 2 * b + d)
+    # 400 differences: the standard deviation is known to 3.5 %; three of them.
+    assert np.std(differences) == pytest.approx(stated, rel=0.11)
+    assert stated < 0.25 * rows["fissure"].standard_uncertainty
+
+
+def test_the_uncertainty_of_a_pixel_has_its_noise():
+    heating = replace(HEATING, truth_uncertainty=2.0)
+    image = measured(np.full(RASTER.shape, 0.5), frames=200, noise=20.0)
+    found = determine_emissivity([image], heating)
+    (hot, cold), _ = slopes()
+    common = found.of(WHOLE).common["truth"]
+    expected = np.hypot(common, 20.0 / 200**0.5 / (hot - cold))
+    # Each pixel's own noise is known to 5 % from 200 frames; of 1200 pixels, well within 1 %.
+    assert found.standard_uncertainty.mean() == pytest.approx(expected, rel=0.01)
+
+
+# Over the temperature
+
+
+def heated_series(generator, temperatures, errors=(0.0, 0.0), frames=4):
+    """A body whose emissivity is 0.4 + 2e-4 (T − 700 K), with a wrong thermocouple and camera."""
+    rows = []
+    for temperature in temperatures:
+        emissivity = np.full(RASTER.shape, 0.4 + 2e-4 * (temperature - 700.0))
+        image = measured(emissivity, temperature, frames=frames, drift=1.0, seed=generator)
+        radiance = BAND.radiance(BAND.temperature(image.radiance) + errors[1])
+        image.data["radiance"].values[:] = radiance
+        heating = Heating(temperature + errors[0], 293.0, 2.0, 0.0, 1.0)
+        rows.append(determine_emissivity([image], heating).of(WHOLE))
+    return emissivity_line(rows)
+
+
+def test_a_straight_line_comes_back():
+    line = heated_series(np.random.default_rng(1), (600.0, 700.0, 850.0), frames=2000)
+    # Frames drift by 1 W/(m² sr), of which 2000 leave 0.02: 1e-5 of the contrast at 600 K or more.
+    assert line.slope == pytest.approx(2e-4, abs=1e-6)
+    value, _ = line.at(700.0)
+    assert value == pytest.approx(0.4, abs=1e-4)
+
+
+@pytest.mark.parametrize("temperatures", [(600.0, 800.0), (600.0, 700.0, 800.0, 900.0)])
+def test_the_line_is_as_uncertain_as_it_says(temperatures):
+    generator = np.random.default_rng(5)
+    lines = [
+        heated_series(generator, temperatures, generator.normal((0.0, 0.0), (2.0, 1.0)))
+        for _ in range(150)
+    ]
+    for name, truth in (("slope", 2e-4), ("at_middle", None)):
+        off = np.array(
+            [getattr(line, name) - (truth or 0.4 + 2e-4 * (line.middle - 700.0)) for line in lines]
+        )
+        index = 1 if name == "slope" else 0
+        stated = np.sqrt(np.mean([line.covariance[index, index] for line in lines]))
+        # 150 standard deviations: 5.8 % of one; three of them.
+        assert off.std() == pytest.approx(stated, rel=0.18)
+        assert abs(off.mean()) < 3 * stated / 150**0.5
+
+
+def test_scatter_about_the_line_counts():
+    rows = [
+        determine_emissivity([measured(np.full(RASTER.shape, e), t)], Heating(t)).of(WHOLE)
+        for e, t in ((0.4, 600.0), (0.5, 700.0), (0.4, 800.0))
+    ]
+    line = emissivity_line(rows)
+    # Sum of squares about the mean 13/30: 0.02/3; one degree of freedom.
+    assert line.residual == pytest.approx((0.02 / 3) ** 0.5, rel=1e-6)
+    assert line.middle_uncertainty == pytest.approx(line.residual / 3**0.5, rel=1e-6)
+    assert line.slope_uncertainty == pytest.approx(line.residual / 20000**0.5, rel=1e-6)
+
+
+# Doubtful and impossible
+
+
+def test_flagged_pixels_are_left_out_counted_and_doubted():
+    put_in = table_1()
+    flags = np.zeros((3, *RASTER.shape), np.uint8)
+    flags[1, 0, :10] = Flag.DEAD
+    flags[2, 1, :100] = Flag.SATURATED
+    flags[:, 2, :5] = Flag.REPLACED
+    found = determine_emissivity([measured(put_in, frames=3, flags=flags)], HEATING)
+    row = found.of(WHOLE)
+    out = (flags & (Flag.DEAD | Flag.SATURATED)).any(axis=0)
+    np.testing.assert_array_equal(np.isnan(found.emissivity), out)
+    assert (row.pixels, row.left_out) == (1150, 50)
+    assert row.flagged == {Flag.BELOW_FLOOR: 0, Flag.SATURATED: 40, Flag.DEAD: 10}
+    assert row.mean == pytest.approx(put_in[~out].mean(), rel=1e-12)
+    assert row.doubts == ()
+    flags[0, 5, :20] = Flag.SATURATED
+    row = determine_emissivity([measured(put_in, frames=3, flags=flags)], HEATING).of(WHOLE)
+    assert row.doubts == (
+        "all: 70 of 1200 pixels are left out (60 saturated, 10 dead); "
+        "what is left is darker than the region",
+    )
+
+
+def test_a_region_that_the_floor_cuts_says_that_it_is_too_bright():
+    put_in = table_1((0.42, 0.07))
+    floor = float(BAND.temperature(measured(np.full(RASTER.shape, 0.38)).radiance[0, 0, 0]))
+    image = measured(put_in, floor=floor)
+    row = determine_emissivity([image], HEATING).of(WHOLE)
+    assert row.mean > put_in.mean() + 0.01
+    assert "under the floor); what is left is brighter than the region" in row.doubts[0]
+    assert row.doubts[0].endswith("the camera's floor hides emissivities under 0.38")
+
+
+def test_a_region_without_usable_pixels_is_refused():
+    flags = np.full((1, *RASTER.shape), Flag.SATURATED, np.uint8)
+    found = determine_emissivity([measured(table_1(), flags=flags)], HEATING)
+    with pytest.raises(ValueError, match=r"region all: 0 of its 1200 pixels can be used \(1200 sa"):
+        found.of(WHOLE)
+
+
+def test_impossible_emissivities_are_told():
+    put_in = np.full(RASTER.shape, 0.9)
+    put_in[0] = 1.1
+    put_in[1, :7] = -0.0005
+    row = determine_emissivity([measured(put_in)], HEATING).of(WHOLE)
+    assert row.outside == (7, 40)
+    assert "7 of 1200 pixels have an emissivity under 0" in row.doubts[0]
+    assert "40 of 1200 pixels have an emissivity over 1" in row.doubts[1]
+    bright = determine_emissivity([measured(np.full(RASTER.shape, 1.2))], HEATING).of(WHOLE)
+    assert bright.doubts[-1] == "all: the mean emissivity is not within 0 to 1"
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"truth": 293.0}, "truth: 19.85 °C is not hotter than the environment's 19.85 °C"),
+        ({"truth": 280.0}, "truth: 6.85 °C is not hotter"),
+        ({"truth": float("nan")}, "truth: is nan K, expected over 0 K"),
+        ({"environment": -1.0}, "environment: is -1.0 K"),
+        ({"truth_uncertainty": -1.0}, "truth_uncertainty: is -1.0 K"),
+        ({"camera_uncertainty": float("inf")}, "camera_uncertainty: is inf"),
+        (
+            {"truth": 300.0, "truth_uncertainty": 3.0},
+            "by less than 5 standard uncertainties of 3 K",
+        ),
+    ],
+)
+def test_impossible_heatings_are_refused(values, message):
+    with pytest.raises(ValueError, match=message):
+        Heating(**{"truth": TRUTH, **values})
+
+
+def test_a_truth_under_the_floor_and_images_that_do_not_fit_are_refused():
+    image = measured(table_1(), floor=700.0)
+    with pytest.raises(ValueError, match=r"truth: 391 °C is under the camera's floor of 426.85 °C"):
+        determine_emissivity([image], HEATING)
+    other = measured(np.full((5, 5), 0.5), raster=Raster(0.0, 0.0, 6e-6, 5, 5))
+    with pytest.raises(ValueError, match="image 2: has other pixels"):
+        determine_emissivity([measured(table_1()), other], HEATING)
+    with pytest.raises(ValueError, match="expected 2 temperatures"):
+        emissivity_line([determine_emissivity([measured(table_1())], HEATING).of(WHOLE)])
+
+
+# The map as a surface, the regions as a study
+
+
+def test_a_map_on_its_own_raster_is_itself_and_off_it_what_is_said():
+    put_in = table_1()
+    surface = MapSurface(put_in, RASTER, elsewhere=0.3)
+    np.testing.assert_allclose(surface.at(RASTER), put_in, atol=1e-7)
+    wide = Raster(RASTER.left - 12e-6, RASTER.top, 6e-6, 30, 44)
+    wider = surface.at(wide)
+    np.testing.assert_allclose(wider[:, 2:42], put_in, atol=1e-7)
+    np.testing.assert_allclose(wider[:, [0, 1, 42, 43]], 0.3, atol=1e-7)
+
+
+def test_a_map_is_averaged_over_areas_and_interpolated_between():
+    put_in = table_1()
+    coarse = MapSurface(put_in, RASTER).at(Raster(RASTER.left, RASTER.top, 12e-6, 15, 20))
+    np.testing.assert_allclose(coarse, put_in.reshape(15, 2, 20, 2).mean(axis=(1, 3)), atol=1e-6)
+    fine = Raster(RASTER.left + 12e-6, RASTER.top - 12e-6, 1.5e-6, 100, 140)
+    plane, expected = (
+        0.2 + 1500.0 * (r.x[None, :] - RASTER.left) + 1000.0 * (RASTER.top - r.y[:, None])
+        for r in (RASTER, fine)
+    )
+    np.testing.assert_allclose(MapSurface(plane, RASTER).at(fine), expected, atol=1e-6)
+
+
+def test_unknown_pixels_of_a_map_do_not_pull_their_neighbours():
+    put_in = np.full(RASTER.shape, 0.6)
+    put_in[10, 10] = np.nan
+    coarse = MapSurface(put_in, RASTER).at(Raster(RASTER.left, RASTER.top, 12e-6, 15, 20))
+    np.testing.assert_allclose(coarse, 0.6, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (np.full((3, 3), 0.5), "has shape"),
+        (np.full(RASTER.shape, 1.01), "goes from 1.01 to 1.01, expected 0 to 1"),
+        (np.full(RASTER.shape, np.nan), "no pixel is known"),
+    ],
+)
+def test_impossible_maps_are_refused(values, message):
+    with pytest.raises(ValueError, match=message):
+        MapSurface(values, RASTER)
+
+
+def test_a_study_takes_the_regions():
+    found = determine_emissivity([measured(table_1())], HEATING)
+    rows = rows_of(found)
+    study = Study(**yaml.safe_load(surface_text(rows.values())))
+    (surface,) = study.surface.build(1).values()
+    assert surface.chip.mean == pytest.approx(rows["chip body"].mean, abs=6e-5)
+    assert surface.chip.deviation == pytest.approx(rows["chip body"].deviation, abs=6e-5)
+    assert surface.shear_band.mean == pytest.approx(rows["fissure"].mean, abs=6e-5)
+    assert surface_text([rows["body left"]]) == ""
+
+
+def test_difference_of_temperatures():
+    assert TEMPERATURE_DIFFERENCE.parse("2 degC") == 2.0
+    assert TEMPERATURE_DIFFERENCE.parse("2 K") == 2.0
+    assert TEMPERATURE_DIFFERENCE.parse("1.8 degF") == pytest.approx(1.0)
+
+
+# Files and the command
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "regions.yaml").write_text(REGIONS)
+    write_measurement(measured(table_1(), frames=5, noise=1.0), tmp_path / "a.nc")
+    hot = measured(table_1((0.46, 0.07)), 500.0 + CELSIUS, frames=5, noise=1.0)
+    write_measurement(hot, tmp_path / "b.nc")
+    return tmp_path
+
+
+def command(*arguments):
+    return CliRunner().invoke(app, ["emissivity", *arguments, "--regions", "regions.yaml"])
+
+
+def test_the_map_comes_back_from_its_file(folder):
+    found = determine_emissivity([measured(table_1())], HEATING)
+    rows = [found.of(area) for area in areas(load_regions("regions.yaml"), RASTER)]
+    write_emissivity([found], [rows], "e.nc")
+    surface = read_emissivity_map("e.nc")
+    np.testing.assert_allclose(surface.values, found.emissivity, rtol=1e-15)
+    np.testing.assert_allclose(surface.raster.extent, RASTER.extent, atol=1e-12)
+    assert surface.raster.shape == RASTER.shape
+
+
+def test_files_that_are_no_maps_are_refused(folder):
+    with pytest.raises(ValueError, match=r"a\.nc: not an emissivity map"):
+        read_emissivity_map("a.nc")
+    (folder / "empty.nc").touch()
+    with pytest.raises(ValueError, match=r"empty\.nc: not an emissivity map"):
+        read_emissivity_map("empty.nc")
+    with pytest.raises(FileNotFoundError, match=r"none\.nc"):
+        read_emissivity_map("none.nc")
+
+
+def test_the_command_writes_table_map_and_picture(folder):
+    outputs = ["--out", "e.nc", "--table", "t.csv", "--plot", "p.png"]
+    spread = ["--truth-uncertainty", "2 K", "--environment-uncertainty", "1 degC"]
+    result = command("a.nc", "--truth", "391degC", *spread, *outputs)
+    assert result.exit_code == 0, result.output
+    assert "Assumed: the camera's calibration is exact" in result.output
+    assert "repeatability" in result.output
+    with Path("t.csv").open(encoding="utf-8", newline="") as file:
+        lines = {line["region"]: line for line in csv.DictReader(file)}
+    found = determine_emissivity(
+        [measured(table_1(), frames=5, noise=1.0)], Heating(TRUTH, 293.0, 2.0, 1.0)
+    )
+    for name, row in rows_of(found).items():
+        assert float(lines[name]["mean"]) == pytest.approx(row.mean, rel=1e-6)
+        assert float(lines[name]["expanded_uncertainty"]) == pytest.approx(
+            row.expanded_uncertainty, rel=1e-6
+        )
+    text = result.stdout.split("For a study:")[1].split("e.nc")[0]
+    assert Study(**yaml.safe_load(text)).surface.chips["measured chip"].body.mean == pytest.approx(
+        float(lines["chip body"]["mean"]), abs=6e-5
+    )
+    assert read_emissivity_map("e.nc").raster.shape == RASTER.shape
+    assert (folder / "p.png").stat().st_size > 10_000
+
+
+def test_the_command_fits_over_the_temperature(folder):
+    truths = ["--truth", "391 degC", "--truth", "500 degC"]
+    result = command("a.nc", "b.nc", *truths, "--plot", "p.svg", "--out", "e.nc")
+    assert result.exit_code == 0, result.output
+    assert "change in 100 K" in result.output
+    assert (folder / "p.svg").is_file()
+    hotter = read_emissivity_map("e.nc", truth=770.0)
+    # The body's emissivity is 0.04 more; its mean over 960 pixels varies by 0.07 / 31.
+    assert hotter.values[:, :16].mean() == pytest.approx(0.46, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["a.nc", "--truth", "391"], "--truth: 391 has no unit"),
+        (["a.nc", "--truth", "10degC"], "truth: 10 °C is not hotter than the environment's"),
+        (["a.nc", "--truth", "391degC", "--environment", "3 um"], "--environment: '3 um'"),
+        (["a.nc", "--truth", "391degC", "--truth-uncertainty", "2"], "--truth-uncertainty: 2 has"),
+        (["a.nc", "--truth", "1 K", "--truth", "2 K"], "--truth: 2 temperatures for 1 images"),
+        (["none.nc", "--truth", "391degC"], "none.nc: there is no such file"),
+        (["a.nc", "--truth", "391degC", "--plot", "p.doc"], "--plot: p.doc"),
+        (["a.nc", "--truth", "391degC", "--out", "no/e.nc"], "there is no folder no"),
+        (["a.nc", "--truth", "391degC", "--set", "band=1"], "--set"),
+    ],
+)
+def test_bad_input_is_one_line(folder, arguments, message):
+    before = set(folder.iterdir())
+    result = command(*arguments)
+    assert result.exit_code == 2
+    assert message in result.output
+    assert len(result.output.splitlines()) == 1
+    assert set(folder.iterdir()) == before
+
+
+def test_images_of_different_pixels_are_one_line(folder):
+    small = measured(np.full((5, 5), 0.5), raster=Raster(0.0, 0.0, 6e-6, 5, 5))
+    write_measurement(small, folder / "small.nc")
+    result = command("a.nc", "small.nc", "--truth", "391degC", "--truth", "500degC")
+    assert result.exit_code == 2
+    assert result.output.startswith("chipglow: small.nc: has other pixels than a.nc, expected")
+
+
+def test_what_is_assumed_and_doubtful_is_said(folder):
+    flags = np.zeros((1, *RASTER.shape), np.uint8)
+    flags[0, :3] = Flag.DEAD
+    write_measurement(measured(table_1(), flags=flags), folder / "a.nc")
+    result = command("a.nc", "--truth", "391degC")
+    assert result.exit_code == 0
+    for sentence in (
+        "Assumed: the true temperature is exact",
+        "Assumed: the environment's temperature is exact",
+        "Assumed: the camera's calibration is exact",
+        "Assumed: nothing changes from frame to frame",
+    ):
+        assert sentence in result.stderr
+    assert "Doubtful: fissure: 18 of 180 pixels are left out (18 dead)." in result.stdout
+
+
+def test_a_region_outside_the_image_is_one_line(folder):
+    (folder / "regions.yaml").write_text("regions: {a: {rectangle: [[0, 0], [400, 3]]}}")
+    result = command("a.nc", "--truth", "391degC", "--out", "e.nc")
+    assert result.exit_code == 2
+    assert result.output == (
+        "chipglow: region a: reaches over columns 0 to 400, expected within the image's 0 to 40\n"
+    )
+    assert not (folder / "e.nc").exists()
