@@ -11,6 +11,7 @@ from chipglow.cli import app
 from chipglow.io import is_measurement, read_measurement, write_measurement
 from chipglow.io.column_file import POINT_COLUMNS, read_bad_pixels, read_columns, read_response
 from chipglow.radiometry import Band, TabulatedResponse
+from chipglow.scene import ToolGeometry
 from chipglow.study import (
     CalibrationDescription,
     MeasurementDescription,
@@ -284,12 +285,12 @@ def test_a_flir_sequence_by_its_makers_conversion(tmp_path, monkeypatch):
     (tmp_path / "chip.seq").write_bytes(camera_files.seq(counts))
     measured = load_measurement("chip.seq", ["pitch=50 um", "band=7.5-13 um"])
     told = camera_files.PLANCK
-    logarithm = np.log(told["r1"] / (told["r2"] * (counts + float(told["o"]))) + told["f"])
-    expected = told["b"] / logarithm
     usable = measured.flags == 0
     assert usable.any()
+    signal = counts[usable] + float(told["o"])
+    expected = told["b"] / np.log(told["r1"] / (told["r2"] * signal) + told["f"])
     # Radiance is kept in 32 bits.
-    np.testing.assert_allclose(measured.radiance_temperature()[usable], expected[usable], rtol=1e-6)
+    np.testing.assert_allclose(measured.radiance_temperature()[usable], expected, rtol=1e-6)
     assert "emissivity 0.95" in measured.data.attrs["object_parameters"]
     assert "not known" in measured.data.attrs["doubtful"]
 
@@ -430,10 +431,17 @@ def test_convert_only_looks_without_out(laboratory):
 
 def test_show_shows_a_measurement(laboratory, tmp_path):
     out, plot = tmp_path / "measured.nc", tmp_path / "measured.svg"
-    write_measurement(load_measurement("chip.yaml", ["floor=450 degC"]), out)
+    measured = load_measurement("chip.yaml", ["floor=450 degC"])
+    write_measurement(measured.with_tool(ToolGeometry()), out)
     code, said = run("show", out, "--at", "4 ms", "--plot", plot)
     assert code == 0, said
-    for words in ("40 x 30 of 6 µm", "at 4000 µs", "below the floor", "3.8 µm to 5.1 µm"):
+    for words in (
+        "40 x 30 of 6 µm",
+        "at 4000 µs",
+        "below the floor",
+        "3.8 µm to 5.1 µm",
+        "rake -7°",
+    ):
         assert words in said
     assert plot.read_text().startswith("<?xml")
     code, said = run("show", out, "--at", "1 s")
