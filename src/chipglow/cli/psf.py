@@ -59,8 +59,7 @@ def psf(
     """Determine a camera's point spread function and MTF from images of an edge."""
     from chipglow.analysis import aperture_image, edge_image, knife_edge
     from chipglow.cli.pictures import check_picture_path, write_picture
-    from chipglow.study import load_apertures
-    from chipglow.study.measured import load_measurement
+    from chipglow.study import load_apertures, load_measurement
 
     if plot is not None:
         check_picture_path(plot)

@@ -10,7 +10,12 @@ from chipglow.io.emissivity_file import (
     write_emissivity_table,
 )
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
-from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
+from chipglow.io.measurement_file import (
+    is_measurement,
+    read_measurement,
+    write_dataset,
+    write_measurement,
+)
 from chipglow.io.movie_file import check_movie_path, movie_writer
 from chipglow.io.picture_file import read_pictures
 from chipglow.io.points_file import read_points
@@ -41,6 +46,7 @@ __all__ = [
     "check_movie_path",
     "check_rake_grid_path",
     "import_scene",
+    "is_measurement",
     "movie_writer",
     "open_scene",
     "prospect",
