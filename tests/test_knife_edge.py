@@ -462,9 +462,12 @@ def test_a_measurement_becomes_an_image():
     assert image.footprint == pytest.approx(PITCH)
     assert any("fill factor 1" in note for note in image.notes)
     measurement.data.attrs |= {"fill_factor": 0.81, "psf_order": "sensor"}
+    measurement.data.attrs |= {"assumed": "No pixel is saturated.", "doubtful": "A few are old."}
     told = edge_image(measurement, "m")
+    assert told.doubts == ("A few are old.",)
     assert told.footprint == pytest.approx(0.9 * PITCH)
-    assert "acts twice" in told.notes[0]
+    assert told.notes[0] == "No pixel is saturated."
+    assert "acts twice" in told.notes[1]
     with pytest.raises(ValueError, match=r"m: the region has 0 x 40 pixels, expected 8 x 8"):
         edge_image(measurement, "m", (slice(50, 60), slice(None)))
 
