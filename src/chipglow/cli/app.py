@@ -13,6 +13,7 @@ from chipglow.cli.calibrate import calibrate
 from chipglow.cli.compare import compare
 from chipglow.cli.convert import convert
 from chipglow.cli.emissivity import emissivity
+from chipglow.cli.psf import psf
 from chipglow.cli.rake import rake
 from chipglow.cli.register import register
 from chipglow.cli.shearband import shearband
@@ -301,6 +302,9 @@ def clear() -> None:
     from chipglow.study.cache import cache_folder, clear_cache
 
     print(f"{_megabytes(clear_cache())} freed in {cache_folder()}")
+
+
+app.command("psf")(psf)
 
 
 def _megabytes(size: int) -> str:

@@ -19,6 +19,7 @@ from chipglow.io.measurement_file import (
 from chipglow.io.movie_file import check_movie_path, movie_writer
 from chipglow.io.picture_file import read_pictures
 from chipglow.io.points_file import read_points
+from chipglow.io.psf_file import write_psf
 from chipglow.io.rake_grid_file import check_rake_grid_path, write_rake_grid
 from chipglow.io.scene_file import (
     FORMAT_VERSION,
@@ -65,6 +66,7 @@ __all__ = [
     "write_emissivity_table",
     "write_hcc",
     "write_measurement",
+    "write_psf",
     "write_rake_grid",
     "write_scene",
 ]
