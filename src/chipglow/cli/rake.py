@@ -49,7 +49,7 @@ def rake(
     from chipglow.cli.pictures import check_picture_path, write_picture
     from chipglow.cli.quantities import parse
     from chipglow.cli.tools import chosen_tool
-    from chipglow.io import check_rake_grid_path, write_rake_grid
+    from chipglow.io import check_table_path, write_rake_grid
     from chipglow.report import draw_rake_grid
     from chipglow.study.measured import load_measurement
     from chipglow.study.units import LENGTH
@@ -57,7 +57,7 @@ def rake(
     if plot is not None:
         check_picture_path(plot)
     if out is not None:
-        check_rake_grid_path(out)
+        check_table_path(out)
     reach = parse("--depth", LENGTH, depth)
     measured = load_measurement(measurement, settings or ())
     frames = _frames(measured, frame, at)

@@ -74,7 +74,7 @@ def shearband(
     from chipglow.cli.quantities import parse
     from chipglow.cli.times import frame_at
     from chipglow.cli.tools import chosen_tool
-    from chipglow.io import check_band_profile_path, read_curve, write_band_profile
+    from chipglow.io import check_table_path, read_curve, write_band_profile
     from chipglow.report import draw_band_profile
     from chipglow.study.measured import load_measurement
     from chipglow.study.units import LENGTH
@@ -82,7 +82,7 @@ def shearband(
     if plot is not None:
         check_picture_path(plot)
     if out is not None:
-        check_band_profile_path(out)
+        check_table_path(out)
     measured = load_measurement(measurement, settings or ())
     times = measured.times
     placed, remarks = chosen_tool(measured, tool)

@@ -1,9 +1,7 @@
 """Curves through a shear band, and the temperature along them, in files."""
 
-import csv
 import os
 from collections.abc import Iterator
-from math import isnan
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,12 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis import BandProfile
-from chipglow.io.atomic import atomic_path
-from chipglow.io.measurement_file import write_dataset
 from chipglow.io.point_table import read_points
-
-BAND_PROFILE_KINDS: Final = (".csv", ".nc")
-"""Endings of the files that `write_band_profile` can write."""
+from chipglow.io.table_file import number_text, write_table_or_dataset
 
 _COLUMNS: Final = (
     "time_us",
@@ -63,18 +57,6 @@ def read_curve(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     return curve
 
 
-def check_band_profile_path(path: Path) -> None:
-    """Check the name of a profile's file before anything is computed.
-
-    Raises
-    ------
-    ValueError
-        If it ends in something else than `BAND_PROFILE_KINDS`.
-    """
-    if path.suffix.lower() not in BAND_PROFILE_KINDS:
-        raise ValueError(f"{path}: expected a file that ends in {' or '.join(BAND_PROFILE_KINDS)}")
-
-
 def write_band_profile(profile: BandProfile, path: Path) -> None:
     """Write the temperature along a shear band to a file.
 
@@ -94,14 +76,7 @@ def write_band_profile(profile: BandProfile, path: Path) -> None:
     OSError
         If the file cannot be written.
     """
-    check_band_profile_path(path)
-    if path.suffix.lower() == ".nc":
-        write_dataset(_dataset(profile), path)
-        return
-    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(_COLUMNS)
-        table.writerows(_rows(profile))
+    write_table_or_dataset(path, _COLUMNS, _rows(profile), lambda: _dataset(profile))
 
 
 def _rows(profile: BandProfile) -> Iterator[tuple[Any, ...]]:
@@ -111,11 +86,7 @@ def _rows(profile: BandProfile) -> Iterator[tuple[Any, ...]]:
             x, y = profile.points[frame, n]
             places = [f"{1e6 * value:.6g}" for value in (profile.distance[n], x, y)]
             values = (profile.temperature[frame, n] - _FREEZING, uncertainty[frame, n])
-            yield (f"{1e6 * time:.10g}", stage.value, *places, *map(_number, values))
-
-
-def _number(value: float) -> str:
-    return "" if isnan(value) else f"{value:.4f}"
+            yield (f"{1e6 * time:.10g}", stage.value, *places, *map(number_text, values))
 
 
 def _dataset(profile: BandProfile) -> xr.Dataset:

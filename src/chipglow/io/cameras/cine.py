@@ -23,7 +23,6 @@ from chipglow.io.cameras.binary import (
 )
 from chipglow.io.sources.source import SourceError
 
-
 _FILE: Final = layout(
     44,
     mark=("S2", 0),
