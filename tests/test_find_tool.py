@@ -159,11 +159,11 @@ def test_a_given_and_a_found_tool(folder):
     (folder / "tool.yaml").write_text("rake_angle: -7 deg\ntip: [0 um, 0 um]\n")
     code, given, _ = command("real.nc", "--tool", "tool.yaml", "--at", "9 us")
     assert code == 0 and "over a square's pixels" in given
-    code, found, _ = command("real.nc", "--tool", "found", "--frame", "0")
+    code, found, assumed = command("real.nc", "--tool", "found", "--frame", "0")
     assert code == 0
     angle = degrees(find_tool(read_measurement(folder / "real.nc")).tool.rake_angle)
     assert f"Found: rake angle {angle:.1f} ± " in found
-    assert "Assumed: clearance angle 7 deg, edge radius 20 um." in found
+    assert "Assumed: clearance angle 7 deg, edge radius 20 um." in assumed
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,11 @@ from chipglow.analysis.chip import ChipMetrics, ChipScan, chip_metrics
 from chipglow.analysis.comparison import (
     BandComparison,
     Comparison,
-    Doubts,
     Fit,
     GridComparison,
     PlaceResult,
     Reading,
+    StatedUncertainties,
     compare,
     normalised_error,
 )
@@ -62,7 +62,6 @@ __all__ = [
     "ChipScan",
     "Circle",
     "Comparison",
-    "Doubts",
     "EdgeImage",
     "EdgeLine",
     "EdgeResult",
@@ -97,6 +96,7 @@ __all__ = [
     "Setting",
     "ShearBand",
     "Stage",
+    "StatedUncertainties",
     "StudyResult",
     "ThermalImage",
     "TimeAlignment",

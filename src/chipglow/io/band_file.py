@@ -114,5 +114,9 @@ def _dataset(profile: BandProfile) -> xr.Dataset:
                 {"units": "m"},
             ),
         },
-        attrs={"width": profile.width, "notes": " ".join(profile.notes)},
+        attrs={
+            "width": profile.width,
+            "assumed": "\n".join(profile.assumptions),
+            "doubtful": "\n".join(profile.doubts),
+        },
     )

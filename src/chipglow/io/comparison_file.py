@@ -37,15 +37,16 @@ def write_comparison(comparison: Comparison, folder: Path) -> None:
         What to write.
     folder : Path
         Gets ``comparison.csv``, a line for each value of each simulation with its expanded
-        uncertainty (k = 2), and ``summary.json``, the fits, sentences and notes; both with units
-        in the names of the columns and keys.
+        uncertainty (k = 2), and ``summary.json``, the fits, sentences and what is
+        assumed or doubtful; both with units in the names of the columns and keys.
     """
     write_rows(folder / _TABLE, _COLUMNS, _rows(comparison))
     summary = {
         "statement": comparison.statement,
         "simulations": list(comparison.labels),
         "places": [_place(result) for result in comparison.places],
-        "notes": list(comparison.notes),
+        "assumed": list(comparison.assumptions),
+        "doubtful": list(comparison.doubts),
     }
     text = json.dumps(summary, indent=1, ensure_ascii=False)
     (folder / RESULT_MARK).write_text(f"{text}\n", encoding="utf-8")
