@@ -308,7 +308,9 @@ def test_another_rake_angle_and_no_tool_are_said():
     assert any("none tells no tool" in text for text in result.assumptions)
 
 
-@pytest.mark.parametrize("wrong", [{"temperature": -1.0}, {"emissivity": np.nan}, {"position": -1e-6}])
+@pytest.mark.parametrize(
+    "wrong", [{"temperature": -1.0}, {"emissivity": np.nan}, {"position": -1e-6}]
+)
 def test_impossible_uncertainties_are_refused(wrong):
     with pytest.raises(ValueError, match=f"uncertainty: {next(iter(wrong))} is"):
         StatedUncertainties(**wrong)

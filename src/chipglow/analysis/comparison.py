@@ -14,7 +14,7 @@ from chipglow.analysis.lines import sample
 from chipglow.analysis.rake_grid import DEPTH, PIXELS, RakeGrid, rake_grid
 from chipglow.analysis.remarks import Remarks
 from chipglow.analysis.ridge import NoShearBandError
-from chipglow.camera import UNUSABLE, Measurement
+from chipglow.camera import Measurement
 from chipglow.scene import Tool
 
 COVERAGE: Final = 2.0
@@ -430,7 +430,7 @@ def _relative_calibration(measured: Measurement) -> NDArray[np.float64]:
     """Uncertainty of the calibration over the radiance, mean over the frames, shape (y, x)."""
     absolute = measured.calibration_uncertainty
     assert absolute is not None
-    usable = (measured.flags & UNUSABLE == 0) & (measured.radiance > 0)
+    usable = measured.usable & (measured.radiance > 0)
     share = np.divide(absolute, measured.radiance, out=np.zeros(absolute.shape), where=usable)
     return _mean(share, usable)
 

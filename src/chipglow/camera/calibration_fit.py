@@ -148,17 +148,7 @@ def fit_linear(
     gain, offset = np.polyfit(radiance, points.counts, 1)
     _expect_rising(gain > 0)
 
-    def build(parameters: NDArray[np.float64], covariance: NDArray[Any]) -> LinearCalibration:
-        return LinearCalibration(
-            band=band,
-            lowest=float(points.temperatures.min()),
-            highest=float(points.temperatures.max()),
-            integration_time=integration_time,
-            range_name=range_name,
-            parameters=parameters,
-            covariance=covariance,
-        )
-
+    build = points.builder(LinearCalibration, band, integration_time, range_name)
     return _fit(points, np.array([offset, gain]), build)
 
 
@@ -187,17 +177,7 @@ def fit_sakuma_hattori(
         temperatures, counts, count_uncertainty, temperature_uncertainty, common_uncertainty, 4
     )
 
-    def build(parameters: NDArray[np.float64], covariance: NDArray[Any]) -> SakumaHattori:
-        return SakumaHattori(
-            band=band,
-            lowest=float(points.temperatures.min()),
-            highest=float(points.temperatures.max()),
-            integration_time=integration_time,
-            range_name=range_name,
-            parameters=parameters,
-            covariance=covariance,
-        )
-
+    build = points.builder(SakumaHattori, band, integration_time, range_name)
     return _fit(points, _first_guess(points, band, build), build)
 
 
@@ -262,6 +242,24 @@ class _Points:
                 f"{needed} points or more at {parameters} temperatures or more"
             )
         return points
+
+    def builder(
+        self, kind: type[Kind], band: Band, integration_time: float | None, range_name: str | None
+    ) -> Callable[[NDArray[np.float64], NDArray[Any]], Kind]:
+        """What makes a calibration that holds over the points, of parameters and covariance."""
+
+        def build(parameters: NDArray[np.float64], covariance: NDArray[Any]) -> Kind:
+            return kind(
+                band=band,
+                lowest=float(self.temperatures.min()),
+                highest=float(self.temperatures.max()),
+                integration_time=integration_time,
+                range_name=range_name,
+                parameters=parameters,
+                covariance=covariance,
+            )
+
+        return build
 
     @property
     def stated(self) -> bool:

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from chipglow.camera import CalibrationFit, FittedCalibration
-    from chipglow.radiometry import Band
 
     Fits = Mapping[str, CalibrationFit[FittedCalibration]]
 
@@ -75,6 +74,7 @@ def calibrate(
     from chipglow.cli.quantities import parse
     from chipglow.io.atomic import check_folder
     from chipglow.io.column_file import POINT_COLUMNS, read_columns
+    from chipglow.study.measurement_schema import band_of
     from chipglow.study.units import TEMPERATURE_DIFFERENCE, TIME
 
     if plot is not None:
@@ -98,7 +98,10 @@ def calibrate(
         Model.SAKUMA_HATTORI: fit_sakuma_hattori,
     }
     wanted: list[Model] = list(kinds) if model is Model.BOTH else [model]
-    seen = _band(band)
+    try:
+        seen = band_of(band)
+    except ValueError as error:
+        raise ValueError(f"--band: {error}") from None
     try:
         fits: Fits = {
             name.value: kinds[name](table["temperature"], table["counts"], seen, **known)
@@ -123,20 +126,6 @@ def calibrate(
     for path in (out, plot):
         if path is not None:
             print(path)
-
-
-def _band(text: str) -> "Band":
-    from chipglow.io.column_file import read_response
-    from chipglow.radiometry import Band
-    from chipglow.study.units import WAVELENGTHS
-
-    if text.lower().endswith(".csv"):
-        response = read_response(text)
-        return Band(*response.limits, response)
-    try:
-        return Band(*WAVELENGTHS.parse_range(text))
-    except ValueError as error:
-        raise ValueError(f"--band: {error}") from None
 
 
 def _write(fit: "CalibrationFit[FittedCalibration]", out: Path) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera import UNUSABLE, Flag, Measurement, flag_shares
+from chipglow.camera import Flag, Measurement, flag_shares
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def measurement_summary(measurement: Measurement, time: float | None = None) -> 
     kelvins = measurement.radiance_temperature()
     return MeasurementSummary(
         index,
-        float(np.mean(measurement.flags & UNUSABLE == 0)),
+        float(np.mean(measurement.usable)),
         flag_shares(measurement),
         _spread(kelvins[index]),
         _spread(kelvins),
