@@ -284,8 +284,8 @@ def test_a_coarse_image_of_a_wide_band_is_searched_as_well():
     [
         ({"width": -1e-6}, "width is -1e-06 m, expected 0 m or more"),
         ({"position": np.nan}, "position is nan m"),
-        ({"frames": [3]}, r"frames are \[3\], expected of 0 to 0"),
-        ({"reference": -1}, r"frames are \[-1\]"),
+        ({"frames": [3]}, "frame 3, expected 0 to 0"),
+        ({"reference": -1}, "frame -1, expected 0 to 0"),
         ({"curve": STRAIGHT[::-1]}, "expected from the edge outward"),
         ({"curve": STRAIGHT[:1]}, "expected 2 or more"),
         ({"curve": STRAIGHT[[0, 0, 1]]}, "two points are the same"),

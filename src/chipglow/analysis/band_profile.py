@@ -12,6 +12,7 @@ from scipy.integrate import trapezoid
 from scipy.ndimage import map_coordinates
 
 from chipglow.analysis.band_ridge import ThermalImage, find_band
+from chipglow.analysis.frames import frame_numbers
 from chipglow.analysis.lines import Line, sample
 from chipglow.analysis.remarks import Remarks
 from chipglow.analysis.ridge import NoShearBandError, arc_length, normals_of
@@ -178,7 +179,7 @@ def band_profile(
     for name, value in (("width", width), ("position", position)):
         if not (isfinite(value) and value >= 0):
             raise ValueError(f"band profile: {name} is {value!r} m, expected 0 m or more")
-    numbers = _numbers(measurement, frames)
+    numbers = frame_numbers(frames, measurement.times.size)
     images = _Images(measurement)
     given = None if curve is None else _given(curve, tool, pitch)
     found, reason = _found(images, tool, numbers)
@@ -225,16 +226,6 @@ class _Images:
         if frame not in self._made:
             self._made[frame] = ThermalImage.of(self._measurement, frame)
         return self._made[frame]
-
-
-def _numbers(measurement: Measurement, frames: Sequence[int] | None) -> NDArray[np.int64]:
-    count = measurement.times.size
-    if frames is None:
-        return np.arange(count)
-    numbers = np.asarray(frames, dtype=np.int64)
-    if numbers.size == 0 or numbers.min() < 0 or numbers.max() >= count:
-        raise ValueError(f"band profile: frames are {list(frames)}, expected of 0 to {count - 1}")
-    return numbers
 
 
 def _given(curve: NDArray[np.float64], tool: Tool, pitch: float) -> Line:
@@ -289,7 +280,7 @@ def _reference(
 ) -> Line:
     """The curve of the fully developed band."""
     if reference is not None:
-        _numbers(measurement, [reference])
+        frame_numbers([reference], measurement.times.size)
         return find_band(images[reference], tool)
     if given is not None:
         remarks.assumptions.append("the given curve is the place of the fully developed band.")

@@ -10,8 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis import BandProfile
-from chipglow.io.point_table import read_points
-from chipglow.io.table_file import number_text, write_table_or_dataset
+from chipglow.io.polyline_file import read_polyline
+from chipglow.io.table_file import celsius_text, number_text, write_table_or_dataset
 
 _COLUMNS: Final = (
     "time_us",
@@ -22,7 +22,6 @@ _COLUMNS: Final = (
     "radiance_temperature_degC",
     "standard_uncertainty_K",
 )
-_FREEZING: Final = 273.15
 
 
 def read_curve(path: str | os.PathLike[str]) -> NDArray[np.float64]:
@@ -47,7 +46,7 @@ def read_curve(path: str | os.PathLike[str]) -> NDArray[np.float64]:
         If it cannot be read.
     """
     path = Path(path)
-    points = read_points(path)
+    points = read_polyline(path)
     if len(points) < 2:
         raise ValueError(f"{path}: {len(points)} points, expected 2 or more")
     curve = np.array(points)
@@ -85,8 +84,11 @@ def _rows(profile: BandProfile) -> Iterator[tuple[Any, ...]]:
         for n in np.flatnonzero(np.isfinite(profile.points[frame, :, 0])):
             x, y = profile.points[frame, n]
             places = [f"{1e6 * value:.6g}" for value in (profile.distance[n], x, y)]
-            values = (profile.temperature[frame, n] - _FREEZING, uncertainty[frame, n])
-            yield (f"{1e6 * time:.10g}", stage.value, *places, *map(number_text, values))
+            values = (
+                celsius_text(profile.temperature[frame, n]),
+                number_text(uncertainty[frame, n]),
+            )
+            yield (f"{1e6 * time:.10g}", stage.value, *places, *values)
 
 
 def _dataset(profile: BandProfile) -> xr.Dataset:

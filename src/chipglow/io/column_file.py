@@ -10,11 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.io.small_text import read_small_text
 from chipglow.io.sources.conventions import Unit
 from chipglow.io.sources.unit_text import parse_unit
 from chipglow.radiometry import TabulatedResponse
-
-_LARGEST_FILE: Final = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -86,12 +85,7 @@ def read_columns(
         If it cannot be read.
     """
     path = Path(path)
-    if path.stat().st_size > _LARGEST_FILE:
-        raise ValueError(f"{path}: expected a file of up to {_LARGEST_FILE // 1000} kB")
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        raise ValueError(f"{path}: expected text in UTF-8") from None
+    lines = read_small_text(path).splitlines()
     rows = [(number, row) for number, row in enumerate(csv.reader(lines), 1) if any(row)]
     if len(rows) < 2:
         raise ValueError(

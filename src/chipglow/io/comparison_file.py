@@ -9,7 +9,7 @@ import numpy as np
 
 from chipglow.analysis import Comparison, PlaceResult, Reading, normalised_error
 from chipglow.io.atomic import RESULT_MARK
-from chipglow.io.table_file import number_text, write_rows
+from chipglow.io.table_file import celsius_text, number_text, write_rows
 
 _TABLE: Final = "comparison.csv"
 _COLUMNS: Final = (
@@ -25,7 +25,6 @@ _COLUMNS: Final = (
     "difference_K",
     "E_n",
 )
-_FREEZING: Final = 273.15
 
 
 def write_comparison(comparison: Comparison, folder: Path) -> None:
@@ -76,10 +75,10 @@ def _values(
 ) -> tuple[str, ...]:
     own, other = measured.temperature[at], simulated.temperature[at]
     return (
-        number_text(own - _FREEZING),
+        celsius_text(own),
         number_text(measured.expanded[at]),
         label,
-        number_text(other - _FREEZING),
+        celsius_text(other),
         number_text(simulated.expanded[at]),
         number_text(other - own),
         number_text(normalised_error(measured, simulated)[at]),

@@ -7,7 +7,7 @@ from typing import Any, Final
 import xarray as xr
 
 from chipglow.analysis import RakeGrid
-from chipglow.io.table_file import number_text, write_table_or_dataset
+from chipglow.io.table_file import celsius_text, number_text, write_table_or_dataset
 from chipglow.scene.tool_attributes import tool_attributes
 
 _COLUMNS: Final = (
@@ -18,7 +18,6 @@ _COLUMNS: Final = (
     "deviation_K",
     "usable_pixels",
 )
-_FREEZING: Final = 273.15
 
 
 def write_rake_grid(grid: RakeGrid, path: Path) -> None:
@@ -50,7 +49,7 @@ def _rows(grid: RakeGrid) -> Iterator[tuple[Any, ...]]:
             for n, along in enumerate(grid.along):
                 place = (f"{1e6 * time:.10g}", f"{1e6 * depth:.10g}", f"{1e6 * along:.10g}")
                 mean, deviation = grid.mean[frame, m, n], grid.deviation[frame, m, n]
-                values = (number_text(mean - _FREEZING), number_text(deviation))
+                values = (celsius_text(mean), number_text(deviation))
                 yield (*place, *values, int(grid.count[frame, m, n]))
 
 

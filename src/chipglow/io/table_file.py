@@ -11,6 +11,7 @@ import xarray as xr
 from chipglow.io.atomic import atomic_path, check_folder
 from chipglow.io.measurement_file import write_dataset
 
+_ZERO_CELSIUS: Final = 273.15
 _KINDS: Final = (".csv", ".nc")
 
 
@@ -71,6 +72,11 @@ def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]
         table.writerows(rows)
 
 
+def celsius_text(kelvins: float) -> str:
+    """A temperature in K as a cell in degrees Celsius, to 0.1 mK; empty where there is none."""
+    return number_text(kelvins - _ZERO_CELSIUS)
+
+
 def number_text(value: float) -> str:
-    """A temperature or a difference as a cell, to 0.1 mK; empty where there is none."""
+    """A number as a cell, to four digits after the point; empty where there is none."""
     return f"{value:.4f}" if isfinite(value) else ""
