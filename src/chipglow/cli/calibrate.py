@@ -154,7 +154,7 @@ def _print_fit(console: "Console", name: str, fit: "CalibrationFit[FittedCalibra
         parameters.add_row(label, f"{value:.7g}", f"{deviation:.2g}", unit)
     console.print(parameters)
     table = Table(
-        "black body / °C", "counts", "residual / counts", "residual / K", "uncertainty / K",
+        "black body / °C", "counts", "residual / counts", "residual / K", "u / K",
         box=None,
     )  # fmt: skip
     for column in table.columns:

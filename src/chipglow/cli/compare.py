@@ -44,7 +44,7 @@ def compare(
     uncertainty: Annotated[
         str | None,
         typer.Option(
-            metavar="DIFFERENCE",
+            metavar="KELVINS",
             help="Standard uncertainty of the measured radiance temperatures, such as '10 K', for "
             "a measurement that does not tell its own.",
         ),
@@ -158,6 +158,8 @@ def _labelled(paths: list[Path]) -> "dict[str, Measurement]":
 def _table(result: "Comparison") -> "Table":
     from rich.table import Table
 
+    from chipglow.analysis.comparison import COVERAGE
+
     table = Table(
         "place",
         "simulation",
@@ -165,7 +167,8 @@ def _table(result: "Comparison") -> "Table":
         "RMS / K",
         "E_n up to 1",
         box=None,
-        title="simulated less measured radiance temperature, ± expanded uncertainty (k = 2)",
+        title="simulated less measured radiance temperature, ± expanded uncertainty "
+        f"(k = {COVERAGE:g})",
         title_justify="left",
     )
     for place in result.places:
@@ -173,7 +176,7 @@ def _table(result: "Comparison") -> "Table":
             table.add_row(
                 "" if i else place.place.rstrip(","),
                 fit.label,
-                f"{fit.bias:+.1f} ± {2 * fit.bias_uncertainty:.1f}",
+                f"{fit.bias:+.1f} ± {COVERAGE * fit.bias_uncertainty:.1f}",
                 f"{fit.rms:.1f}",
                 f"{fit.agreeing} of {fit.count}",
             )
