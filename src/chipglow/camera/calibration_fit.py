@@ -16,6 +16,7 @@ from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT
 
 Kind = TypeVar("Kind", bound=FittedCalibration)
 
+_PROBABILITY: Final = 0.95
 _MOST_ROUNDS: Final = 50
 _SETTLED: Final = 1e-9
 
@@ -86,13 +87,13 @@ class CalibrationFit(Generic[Kind]):
         misfit = self.chi_squared if self.stated else points * np.log(max(scatter, 1e-300))
         return misfit + 2 * estimated * points / (points - estimated - 1)
 
-    def coverage_factor(self, probability: float = 0.95) -> float:
-        """Factor on the standard uncertainty that gives an interval of this probability.
+    def coverage_factor(self) -> float:
+        """Factor on the standard uncertainty that gives an interval of 95 %.
 
         Student's, with the degrees of freedom of the fit, if the scatter of the residuals is all
         that is known of the uncertainty (JCGM 100, G.3); else that of the normal distribution.
         """
-        share = 0.5 + probability / 2
+        share = 0.5 + _PROBABILITY / 2
         return float(norm.ppf(share) if self.stated else t.ppf(share, self.degrees_of_freedom))
 
 
