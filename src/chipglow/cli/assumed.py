@@ -10,3 +10,10 @@ def say_assumed(sentences: Iterable[str]) -> None:
     console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
     for sentence in sentences:
         console.print(f"Assumed: {sentence}")
+
+
+def say_doubtful(sentences: Iterable[str]) -> None:
+    """Say on stderr what cannot be relied on, a sentence each."""
+    console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+    for sentence in sentences:
+        console.print(f"Doubtful: {sentence}")

@@ -1,13 +1,19 @@
 """Readers and writers: scenes, measurements, and output that is whole or not there."""
 
 from chipglow.io.atomic import atomic_folder, atomic_path
+from chipglow.io.cameras import CAMERA_FORMATS, CameraFormat, read_recording, write_hcc
 from chipglow.io.emissivity_file import (
     read_emissivity_map,
     write_emissivity,
     write_emissivity_table,
 )
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
-from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
+from chipglow.io.measurement_file import (
+    is_measurement,
+    read_measurement,
+    write_dataset,
+    write_measurement,
+)
 from chipglow.io.movie_file import check_movie_path, movie_writer
 from chipglow.io.scene_file import (
     FORMAT_VERSION,
@@ -20,7 +26,9 @@ from chipglow.io.tool_file import read_tool_outline
 from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 
 __all__ = [
+    "CAMERA_FORMATS",
     "FORMAT_VERSION",
+    "CameraFormat",
     "Import",
     "SceneWriter",
     "StoredScene",
@@ -30,17 +38,20 @@ __all__ = [
     "atomic_path",
     "check_movie_path",
     "import_scene",
+    "is_measurement",
     "movie_writer",
     "open_scene",
     "prospect",
     "read_emissivity_map",
     "read_measurement",
+    "read_recording",
     "read_scene",
     "read_tool_outline",
     "unfinished_scenes",
     "write_dataset",
     "write_emissivity",
     "write_emissivity_table",
+    "write_hcc",
     "write_measurement",
     "write_scene",
 ]

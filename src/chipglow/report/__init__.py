@@ -1,7 +1,10 @@
 """The report: the paper's figures beside ours, as a page, pictures, numbers and arrays; movies."""
 
+from chipglow.report.calibration_figure import draw_calibrations
 from chipglow.report.comparison import Row, comparison_rows
 from chipglow.report.emissivity_figure import draw_emissivity
+from chipglow.report.measurement_figure import draw_measurement
+from chipglow.report.measurement_summary import MeasurementSummary, measurement_summary
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
 from chipglow.report.report import write_report
 from chipglow.report.scene_figure import draw_scene
@@ -16,6 +19,7 @@ from chipglow.report.scene_summary import (
 __all__ = [
     "CutPicture",
     "FieldSummary",
+    "MeasurementSummary",
     "MovieScales",
     "QualitySummary",
     "Row",
@@ -23,8 +27,11 @@ __all__ = [
     "ShownField",
     "comparison_rows",
     "cut_movie",
+    "draw_calibrations",
     "draw_emissivity",
+    "draw_measurement",
     "draw_scene",
+    "measurement_summary",
     "scene_summary",
     "write_report",
 ]

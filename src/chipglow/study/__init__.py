@@ -1,27 +1,40 @@
 """Studies: what to cut, look at and analyse, as a YAML file or in Python."""
 
 from chipglow.study.cache import CachedScene, cache_folder, cached_scenes, clear_cache
+from chipglow.study.calibration_schema import CalibrationDescription
 from chipglow.study.emissivity import surface_text
-from chipglow.study.files import StudyError, load_import, load_regions, load_study
+from chipglow.study.files import (
+    StudyError,
+    load_calibration,
+    load_description,
+    load_import,
+    load_regions,
+    load_study,
+)
 from chipglow.study.fitting import Fitted, fit
 from chipglow.study.import_schema import ImportDescription
+from chipglow.study.measured import load_measurement, load_recording, measurement_of
+from chipglow.study.measurement_schema import MeasurementDescription
 from chipglow.study.preview import preview_raster
 from chipglow.study.reference import FieldEntry, field_entries, field_tables
 from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, kept_progress, run
 from chipglow.study.schema import Study
-from chipglow.study.template import import_text, study_text
+from chipglow.study.template import calibration_text, import_text, measurement_text, study_text
 
 __all__ = [
     "CUTTING_STEP",
     "CachedScene",
+    "CalibrationDescription",
     "FieldEntry",
     "Fitted",
     "ImportDescription",
+    "MeasurementDescription",
     "Progress",
     "Study",
     "StudyError",
     "cache_folder",
     "cached_scenes",
+    "calibration_text",
     "clear_cache",
     "cut",
     "field_entries",
@@ -30,9 +43,15 @@ __all__ = [
     "import_text",
     "is_cut",
     "kept_progress",
+    "load_calibration",
+    "load_description",
     "load_import",
+    "load_measurement",
+    "load_recording",
     "load_regions",
     "load_study",
+    "measurement_of",
+    "measurement_text",
     "preview_raster",
     "run",
     "study_text",

@@ -115,7 +115,9 @@ def matching_files(pattern: str) -> list[Path]:
     return [Path(path) for path in paths]
 
 
-def open_arrays(pattern: str, stack: ExitStack) -> dict[str, StoredArray]:
+def open_arrays(
+    pattern: str, stack: ExitStack, ending: str | None = None
+) -> dict[str, StoredArray]:
     """Arrays of a file by their names, or of several files, one a frame.
 
     Parameters
@@ -125,6 +127,8 @@ def open_arrays(pattern: str, stack: ExitStack) -> dict[str, StoredArray]:
         first axis ``time``.
     stack : ExitStack
         Closes the files.
+    ending : str, optional
+        Ending of the names of such files, where theirs is another.
 
     Raises
     ------
@@ -135,13 +139,13 @@ def open_arrays(pattern: str, stack: ExitStack) -> dict[str, StoredArray]:
     """
     paths = matching_files(pattern)
     several = len(paths) > 1 or paths[0] != Path(pattern)
-    first = _open_file(paths[0], stack)
+    first = _open_file(paths[0], stack, ending)
     if not first:
         raise SourceError(f"{paths[0]}: there is no array of numbers in it")
     if len(first) > _MOST_ARRAYS:
         raise SourceError(f"{paths[0]}: {len(first)} arrays, expected up to {_MOST_ARRAYS}")
     if several:
-        first = {name: _series(paths, name, array) for name, array in first.items()}
+        first = {name: _series(paths, name, array, ending) for name, array in first.items()}
     return {name or _stem(pattern): array for name, array in first.items()}
 
 
@@ -150,8 +154,8 @@ def _stem(pattern: str) -> str:
     return re.sub(r"[\W\d_]+$", "", Path(pattern).stem) or "values"
 
 
-def _open_file(path: Path, stack: ExitStack) -> dict[str, StoredArray]:
-    suffix = path.suffix.lower()
+def _open_file(path: Path, stack: ExitStack, ending: str | None = None) -> dict[str, StoredArray]:
+    suffix = ending or path.suffix.lower()
     if suffix not in _READERS:
         raise SourceError(
             f"{path}: unknown ending {suffix!r}, expected one of {', '.join(sorted(_READERS))}"
@@ -162,11 +166,14 @@ def _open_file(path: Path, stack: ExitStack) -> dict[str, StoredArray]:
         return {array.name: array for array in _READERS[suffix](path, stack)}
 
 
-def _series(paths: Sequence[Path], name: str, first: StoredArray) -> StoredArray:
+def _series(
+    paths: Sequence[Path], name: str, first: StoredArray, ending: str | None
+) -> StoredArray:
     def read(key: Key) -> NDArray[Any]:
         chosen = paths[key[0]]
         check_samples(str(chosen[0]), len(chosen) * prod(first.shape))
-        return np.stack([_read_whole(path, name, first.shape)[key[1:]] for path in chosen])
+        whole = [_read_whole(path, name, first.shape, ending) for path in chosen]
+        return np.stack([values[key[1:]] for values in whole])
 
     dims = ("time", *first.dims) if first.dims else ()
     return replace(
@@ -174,9 +181,9 @@ def _series(paths: Sequence[Path], name: str, first: StoredArray) -> StoredArray
     )
 
 
-def _read_whole(path: Path, name: str, shape: tuple[int, ...]) -> NDArray[Any]:
+def _read_whole(path: Path, name: str, shape: tuple[int, ...], ending: str | None) -> NDArray[Any]:
     with ExitStack() as stack:
-        array = _open_file(path, stack).get(name)
+        array = _open_file(path, stack, ending).get(name)
         if array is None or array.shape != shape:
             found = "none" if array is None else f"one of shape {array.shape}"
             raise SourceError(

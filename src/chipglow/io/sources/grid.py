@@ -29,6 +29,7 @@ from chipglow.io.sources.layout import (
     find_fields,
     read_list,
     unit_of,
+    unpacked,
     unused_names,
 )
 from chipglow.io.sources.source import READABLE, SampledFrame, Source, SourceError, Survey
@@ -210,20 +211,7 @@ class _Layer:
         if raw.shape != expected:
             raise SourceError(f"{self.chosen}: has shape {raw.shape}, expected {expected}")
         with reading(self.chosen):
-            return _decoded(raw, self.array.attributes)
-
-
-def _decoded(raw: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[np.float32]:
-    """Numbers that are packed as NetCDF's conventions say."""
-    values = np.asarray(raw, np.float32)
-    scale, offset = (attributes.get(name) for name in ("scale_factor", "add_offset"))
-    if scale is not None or offset is not None:
-        scaled = raw * float(1.0 if scale is None else scale) + float(offset or 0.0)
-        values = np.asarray(scaled, np.float32)
-    for name in ("_FillValue", "missing_value"):
-        if attributes.get(name) is not None:
-            values = np.where(raw == raw.dtype.type(attributes[name]), np.float32(np.nan), values)
-    return values
+            return np.asarray(unpacked(raw, self.array.attributes), np.float32)
 
 
 @dataclass(frozen=True)

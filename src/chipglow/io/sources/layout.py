@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -252,6 +252,26 @@ def read_list(chosen: Chosen, unit: Unit) -> NDArray[np.float64]:
         raw = chosen.array.read((slice(None),) * len(chosen.array.shape))
     values = np.asarray(raw, np.float64).reshape(-1) * unit.scale + unit.offset
     check_finite(str(chosen), values)
+    return values
+
+
+def unpacked(raw: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[Any]:
+    """Numbers that may be packed as NetCDF's conventions say; NaN where there is none.
+
+    Parameters
+    ----------
+    raw : ndarray
+        Numbers as they are in the file.
+    attributes : mapping
+        What it says of them: ``scale_factor``, ``add_offset``, ``_FillValue``, ``missing_value``.
+    """
+    values = raw
+    scale, offset = (attributes.get(name) for name in ("scale_factor", "add_offset"))
+    if scale is not None or offset is not None:
+        values = raw * float(1.0 if scale is None else scale) + float(offset or 0.0)
+    for name in ("_FillValue", "missing_value"):
+        if attributes.get(name) is not None:
+            values = np.where(raw == raw.dtype.type(attributes[name]), np.nan, values)
     return values
 
 

@@ -1,0 +1,209 @@
+"""What the readers of cameras' own formats share: bytes that are there, and frames chosen."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, BinaryIO, Final
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from chipglow.io.sources.arrays import check_samples
+from chipglow.io.sources.source import SourceError
+from chipglow.radiometry import ObjectParameters
+
+MOST_FRAMES: Final = 10_000_000
+"""Most frames of a file."""
+
+_CLOCK_WAS_SET: Final = 31_536_000.0 * 10
+
+
+@dataclass(frozen=True)
+class Binary:
+    """Bytes of a file, of which none is read that is not there.
+
+    Parameters
+    ----------
+    path : Path
+        The file, as errors call it.
+    stream : binary file
+        Its bytes.
+    size : int
+        How many there are.
+    """
+
+    path: Path
+    stream: BinaryIO
+    size: int
+
+    def read(self, start: int, count: int, what: str) -> bytes:
+        """Bytes from a place.
+
+        Parameters
+        ----------
+        start, count : int
+            Which.
+        what : str
+            What they are, for errors.
+
+        Raises
+        ------
+        SourceError
+            If the file has not so many.
+        """
+        if not (start >= 0 and count >= 0 and start + count <= self.size):
+            raise SourceError(
+                f"{self.path}: is cut short or damaged, {what} should lie at bytes {start} to "
+                f"{start + count} of {self.size}"
+            )
+        self.stream.seek(start)
+        return self.stream.read(count)
+
+    def numbers(self, start: int, count: int, dtype: DTypeLike, what: str) -> NDArray[Any]:
+        """Numbers, or records of a structured type, from a place; see `read`."""
+        kind: np.dtype[Any] = np.dtype(dtype)
+        return np.frombuffer(self.read(start, count * kind.itemsize, what), kind)
+
+    def record(self, start: int, dtype: DTypeLike, what: str) -> dict[str, Any]:
+        """Fields of one record of a structured type; see `read`."""
+        row = self.numbers(start, 1, dtype, what)[0]
+        return {name: row[name].item() for name in row.dtype.names}
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Binary]:
+    """Open a file.
+
+    Raises
+    ------
+    SourceError
+        If it is empty or no file.
+    OSError
+        If it is missing or not accessible.
+    """
+    if path.is_dir():
+        raise SourceError(f"{path}: is a folder, expected a file")
+    with path.open("rb") as stream:
+        size = path.stat().st_size
+        if size == 0:
+            raise SourceError(f"{path}: is empty")
+        yield Binary(path, stream, size)
+
+
+def chosen_frames(path: Path, frames: slice | None, count: int, samples: int) -> range:
+    """Numbers of the frames to read.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    frames : slice, optional
+        Which; all by default.
+    count : int
+        How many it has.
+    samples : int
+        Samples of a frame.
+
+    Raises
+    ------
+    SourceError
+        If there is none, or they are too many to be read at once.
+    """
+    numbers = range(count)[frames or slice(None)]
+    if not numbers:
+        raise SourceError(f"{path}: has {count} frames, none of them is among frames={frames}")
+    check_samples(str(path), len(numbers) * samples)
+    return numbers
+
+
+def check_picture(path: Path, rows: int, columns: int, most: int = 65_535) -> None:
+    """Refuse pictures without or with absurdly many rows or columns.
+
+    Raises
+    ------
+    SourceError
+        If it is so.
+    """
+    if not (0 < rows <= most and 0 < columns <= most):
+        raise SourceError(
+            f"{path}: says {columns} columns and {rows} rows, expected 1 to {most} of each"
+        )
+
+
+def text_of(raw: bytes) -> str:
+    """Text up to the first zero, without what cannot be printed."""
+    text = raw.split(b"\0")[0].decode("latin-1")
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+
+
+def first_moment(seconds: float) -> tuple[str, ...]:
+    """A sentence on when frame 0 was taken, in s since 1970; none if the clock was not set."""
+    if not _CLOCK_WAS_SET < seconds < 2**32:
+        return ()
+    when = datetime.fromtimestamp(seconds, UTC).isoformat(" ", "milliseconds")
+    return (f"Frame 0 was taken at {when}.",)
+
+
+def even_times(frames: Sequence[int], interval: float) -> NDArray[np.float64]:
+    """Times in s of frames that are as far apart, from the first one of the file on."""
+    return np.asarray(frames, np.float64) * interval
+
+
+def stamped_times(
+    path: Path, stamps: NDArray[np.float64], frames: range, rate: float, notes: list[str]
+) -> NDArray[np.float64]:
+    """Times of frames from their stamps, or from the frame rate where the stamps are no good.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    stamps : ndarray
+        Stamps of the frames in s after the first one of the file, shape (frames,).
+    frames : range
+        Their numbers.
+    rate : float
+        Frame rate in Hz; 0 if it is not known.
+    notes : list of str
+        Takes what had to be assumed.
+
+    Raises
+    ------
+    SourceError
+        If the stamps do not ascend and the frame rate is not known.
+    """
+    steps = np.diff(stamps) * np.sign(frames.step)
+    if np.isfinite(stamps).all() and (steps > 0).all():
+        return stamps
+    if not (np.isfinite(rate) and rate > 0):
+        raise SourceError(
+            f"{path}: has neither time stamps that ascend nor a frame rate, give an interval"
+        )
+    notes.append(
+        f"Assumed: the frames are 1/{rate:g} s apart, as the file says; it has no time stamps "
+        "that ascend."
+    )
+    return even_times(frames, 1 / rate)
+
+
+def object_parameters(notes: list[str], **given: float | None) -> ObjectParameters:
+    """What a camera was told of the object; impossible values are noted and left out.
+
+    Parameters
+    ----------
+    notes : list of str
+        Takes what is left out.
+    **given
+        Fields of `ObjectParameters`.
+    """
+    known: dict[str, float] = {}
+    for name, value in given.items():
+        try:
+            known |= (
+                {} if value is None else {name: ObjectParameters(**{name: value}).__dict__[name]}
+            )
+        except ValueError:
+            notes.append(f"Left out: the file says {value:g} for {name}, which cannot be.")
+    return ObjectParameters(**known)

@@ -1,0 +1,237 @@
+"""Files of FLIR's older research cameras, PTW: Cedip's, written by Altair."""
+
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.camera.recording import Recording
+from chipglow.io.cameras.binary import (
+    MOST_FRAMES,
+    Binary,
+    check_picture,
+    chosen_frames,
+    even_times,
+    object_parameters,
+    opened,
+    stamped_times,
+    text_of,
+)
+from chipglow.io.sources.source import SourceError
+
+# Places as in the Altair Reference Guide DL002U-D, after pyradi's ryptw.
+_FIELDS: Final = {
+    "signature": ("S5", 0),
+    "header_size": ("<u4", 11),
+    "frame_header_size": ("<u4", 15),
+    "frame_size": ("<u4", 19),
+    "frames": ("<u4", 27),
+    "year": ("<u2", 35),
+    "day": ("u1", 37),
+    "month": ("u1", 38),
+    "minute": ("u1", 39),
+    "hour": ("u1", 40),
+    "camera": ("S20", 44),
+    "lens": ("S20", 64),
+    "filter": ("S20", 84),
+    "emissivity": ("<f4", 141),
+    "ambient": ("<f4", 145),
+    "distance": ("<f4", 149),
+    "transmission": ("<f4", 170),
+    "atmosphere": ("<f4", 184),
+    "cut_on": ("<f4", 188),
+    "cut_off": ("<f4", 192),
+    "serial": ("S11", 220),
+    "scale": ("<u2", 277),
+    "scale_unit": ("S10", 279),
+    "columns": ("<u2", 377),
+    "rows": ("<u2", 379),
+    "bits": ("<u2", 381),
+    "period": ("<f4", 403),
+    "integration_time": ("<f4", 407),
+    "comment": ("S1000", 563),
+}
+_HEADER: Final = np.dtype(
+    {
+        "names": list(_FIELDS),
+        "formats": [kind for kind, _ in _FIELDS.values()],
+        "offsets": [offset for _, offset in _FIELDS.values()],
+        "itemsize": 1563,
+    }
+)
+_STAMP: Final = np.dtype(
+    {
+        "names": ["minute", "hour", "hundredths", "second", "thousandths"],
+        "formats": ["u1"] * 5,
+        "offsets": [80, 81, 82, 83, 160],
+        "itemsize": 161,
+    }
+)
+_LOCK_IN: Final = (1220, 3907, 1204, 2382)
+_DAY: Final = 86_400.0
+_LONGEST_PERIOD: Final = 86_400.0
+
+
+def is_ptw(head: bytes) -> bool:
+    """Whether a file begins like one of Cedip's or Agema's cameras."""
+    return head[:5] == b"CEDIP" or head[:3] == b"AIO"
+
+
+def read_ptw(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
+    """Read frames of FLIR's PTW as counts.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    frames : slice, optional
+        Which frames to read.
+    interval : float, optional
+        Time between frames in s, in the place of the file's own.
+
+    Raises
+    ------
+    SourceError
+        If it is damaged, cut short or of another kind.
+    OSError
+        If it is missing or not accessible.
+    """
+    with opened(path) as binary:
+        signature = binary.read(0, 5, "the signature")
+        if signature != b"CEDIP":
+            raise SourceError(f"{path}: begins with {signature!r}, expected 'CEDIP' (PTW)")
+        header = binary.record(0, _HEADER, "the header")
+        rows, columns = int(header["rows"]), int(header["columns"])
+        check_picture(path, rows, columns)
+        stride = _stride(binary, header, rows, columns)
+        chosen = chosen_frames(path, frames, header["frames"], rows * columns)
+        skipped, rows = _lock_in(binary, header, stride, rows, columns)
+        signal = np.empty((len(chosen), rows, columns), np.uint16)
+        start = header["header_size"] + header["frame_header_size"] + 2 * columns * skipped
+        for position, number in enumerate(chosen):
+            what = f"frame {number}"
+            signal[position] = binary.numbers(
+                start + number * stride, rows * columns, "<u2", what
+            ).reshape(rows, columns)
+        notes = _notes(header, skipped)
+        times = _times(binary, header, stride, chosen, interval, notes)
+    return Recording(
+        signal=signal,
+        quantity="counts",
+        times=times,
+        camera=_camera(header),
+        integration_time=_positive(header["integration_time"]),
+        saturation=2.0 ** header["bits"] - 2 if 8 <= header["bits"] <= 16 else None,
+        object_parameters=object_parameters(
+            notes,
+            emissivity=header["emissivity"],
+            reflected=header["ambient"],
+            transmission=_positive(header["transmission"]),
+            atmosphere=_positive(header["atmosphere"]),
+        ),
+        notes=tuple(notes),
+    )
+
+
+def _stride(binary: Binary, header: dict[str, Any], rows: int, columns: int) -> int:
+    """Bytes from frame to frame; refuses a header that does not fit the file."""
+    path, count = binary.path, header["frames"]
+    stride = int(header["frame_size"])
+    if stride < header["frame_header_size"] + 2 * rows * columns:
+        raise SourceError(
+            f"{path}: a frame has {stride} bytes, {rows} rows of {columns} columns need "
+            f"{header['frame_header_size'] + 2 * rows * columns}"
+        )
+    if not 0 < count <= MOST_FRAMES:
+        raise SourceError(f"{path}: says {count} frames, expected 1 to {MOST_FRAMES}")
+    end = header["header_size"] + count * stride
+    if header["header_size"] < _HEADER.itemsize or end > binary.size:
+        raise SourceError(
+            f"{path}: is cut short or damaged, its {count} frames end at byte {end}, it has "
+            f"{binary.size} bytes"
+        )
+    return stride
+
+
+def _lock_in(
+    binary: Binary, header: dict[str, Any], stride: int, rows: int, columns: int
+) -> tuple[int, int]:
+    """Lines to skip before the picture, and rows of it: lock-in data may come first."""
+    start = header["header_size"] + header["frame_header_size"]
+    first = binary.numbers(start, min(columns, 4), "<u2", "the first line")
+    if tuple(first) != _LOCK_IN or rows == 1:
+        return 0, rows
+    lines = (stride - header["frame_header_size"]) // (2 * columns)
+    return 1, min(rows, lines - 1)
+
+
+def _times(
+    binary: Binary,
+    header: dict[str, Any],
+    stride: int,
+    chosen: range,
+    interval: float | None,
+    notes: list[str],
+) -> NDArray[np.float64]:
+    if interval is not None:
+        return even_times(chosen, interval)
+    start = header["header_size"]
+    has_stamps = header["frame_header_size"] >= _STAMP.itemsize
+    numbers = (0, *chosen) if has_stamps else ()
+    stamps = np.array([_stamp(binary, start + number * stride) for number in numbers])
+    since = np.mod(stamps[1:] - stamps[0], _DAY) if has_stamps else np.full(len(chosen), np.nan)
+    period = header["period"]
+    if not 0 < period < _LONGEST_PERIOD:
+        return stamped_times(binary.path, since, chosen, 0.0, notes)
+    times = even_times(chosen, period)
+    # The stamps are whole milliseconds, so that the period is the finer measure.
+    apart = np.abs(times - since).max()
+    if has_stamps and since.any() and apart > 0.002 + 0.01 * period:
+        notes.append(
+            f"Doubtful: the times are from the frame period, {period * 1e6:g} us; the frames' own "
+            f"stamps are up to {apart:.3g} s off: frames may be missing."
+        )
+    return times
+
+
+def _stamp(binary: Binary, start: int) -> float:
+    stamp = binary.record(start, _STAMP, "a frame's header")
+    seconds = stamp["second"] + stamp["hundredths"] / 100 + stamp["thousandths"] / 1000
+    return float(3600 * stamp["hour"] + 60 * stamp["minute"] + seconds)
+
+
+def _positive(value: float) -> float | None:
+    return value if 0 < value < np.inf else None
+
+
+def _camera(header: dict[str, Any]) -> str:
+    name, serial = text_of(header["camera"]), text_of(header["serial"])
+    return ", ".join(
+        part for part in (name or "Cedip", serial and f"serial number {serial}") if part
+    )
+
+
+def _notes(header: dict[str, Any], skipped: int) -> list[str]:
+    notes = [
+        f"Saved on {header['year']:04d}-{header['month']:02d}-{header['day']:02d} at "
+        f"{header['hour']:02d}:{header['minute']:02d}, by the clock of the computer."
+    ]
+    for name in ("lens", "filter", "comment"):
+        if text := text_of(header[name]):
+            notes.append(f"{name.capitalize()}: {text}.")
+    if 0 < header["cut_on"] < header["cut_off"] < 100:
+        notes.append(
+            f"The file says that the camera is sensitive from {header['cut_on']:g} to "
+            f"{header['cut_off']:g}, in um presumably."
+        )
+    if _positive(header["distance"]) is not None:
+        notes.append(f"Distance to the object: {header['distance']:g} m.")
+    if header["scale"]:
+        notes.append(
+            f"The file has a scale of its own in {text_of(header['scale_unit']) or 'some unit'}; "
+            "it is not applied."
+        )
+    if skipped:
+        notes.append("The first line of each frame holds lock-in data and is left out.")
+    return notes

@@ -1,0 +1,216 @@
+"""Frames in files of arrays, which do not say what was measured: the user does."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.camera.recording import QUANTITIES, Quantity, Recording
+from chipglow.io.cameras.binary import check_picture, chosen_frames, even_times
+from chipglow.io.sources.arrays import MOST_ON_A_SIDE, StoredArray, open_arrays, reading
+from chipglow.io.sources.conventions import SI
+from chipglow.io.sources.layout import (
+    AXES,
+    Chosen,
+    axes_of,
+    check_times,
+    coordinate,
+    read_list,
+    unit_of,
+    unpacked,
+)
+from chipglow.io.sources.source import SourceError
+
+RECORDING_UNITS: Final[Mapping[str, tuple[Quantity, float]]] = {
+    "counts": ("counts", 0.0),
+    "W/m2/sr": ("radiance", 0.0),
+    "K": ("temperature", 0.0),
+    "degC": ("temperature", 273.15),
+}
+"""Units of the samples: which quantity has them, and what to add for that of a `Recording`."""
+
+_SPELLINGS: Final = {
+    "count": "counts",
+    "dn": "counts",
+    "dl": "counts",
+    "adu": "counts",
+    "w m-2 sr-1": "W/m2/sr",
+    "w/(m2 sr)": "W/m2/sr",
+    "w/(m^2 sr)": "W/m2/sr",
+    "w/m^2/sr": "W/m2/sr",
+    "kelvin": "K",
+    "c": "degC",
+    "°c": "degC",
+    "celsius": "degC",
+    "degrees_celsius": "degC",
+    "degree_celsius": "degC",
+}
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the user says of a file that does not say it itself; see `read_recording`."""
+
+    quantity: str | None = None
+    unit: str | None = None
+    interval: float | None = None
+    dataset: str | None = None
+    axes: Sequence[str] | None = None
+
+    def __post_init__(self) -> None:
+        if self.quantity is not None and self.quantity not in QUANTITIES:
+            raise ValueError(
+                f"quantity: is {self.quantity!r}, expected one of {', '.join(QUANTITIES)}"
+            )
+        if self.unit is not None and self.unit not in RECORDING_UNITS:
+            raise ValueError(
+                f"unit: is {self.unit!r}, expected one of {', '.join(RECORDING_UNITS)}"
+            )
+        if self.interval is not None and not 0 < self.interval < float("inf"):
+            raise ValueError(f"interval: is {self.interval!r} s, expected over 0")
+        if self.quantity and self.unit and RECORDING_UNITS[self.unit][0] != self.quantity:
+            raise ValueError(f"unit: {self.quantity} is not in {self.unit}")
+        if self.axes is not None and sorted(self.axes) not in (sorted(AXES), ["x", "y"]):
+            raise ValueError(f"axes: are {', '.join(self.axes)}, expected {', '.join(AXES)}")
+
+
+def read_stack(path: Path, ending: str | None, frames: slice | None, told: Told) -> Recording:
+    """Read frames of an array in a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file, or a pattern with ``*``: a file a frame.
+    ending : str, optional
+        Ending of the names of such files, where the file's own is another.
+    frames : slice, optional
+        Which frames to read.
+    told : Told
+        What the user says of it.
+
+    Raises
+    ------
+    SourceError
+        If it is damaged, or what is needed is neither said by the user nor by the file.
+    OSError
+        If it is missing or not accessible.
+    """
+    with ExitStack() as stack:
+        arrays = open_arrays(str(path), stack, ending)
+        one = _dataset(path, arrays, told.dataset)
+        assumed: list[str] = []
+        axes = axes_of(one, told.axes, assumed)
+        lengths = dict(zip(axes, one.array.shape, strict=True))
+        check_picture(path, lengths["y"], lengths["x"], MOST_ON_A_SIDE)
+        unit = _unit(one, told)
+        chosen = chosen_frames(path, frames, lengths.get("time", 1), lengths["y"] * lengths["x"])
+        times = _times(one, arrays, axes, chosen, told, assumed)
+        signal = _signal(one, axes, chosen)
+    quantity, offset = RECORDING_UNITS[unit]
+    if quantity != "counts":
+        # 32 bits hold temperature to 1e-4 K, where the file does not hold more.
+        kind = np.float32 if signal.dtype.itemsize <= 4 else np.float64
+        signal = (signal.astype(np.float64) + offset).astype(kind)
+    return Recording(
+        signal=signal,
+        quantity=quantity,
+        times=times,
+        camera="unknown",
+        notes=tuple(f"Assumed: {sentence}." for sentence in assumed),
+    )
+
+
+def _dataset(path: Path, arrays: Mapping[str, StoredArray], name: str | None) -> Chosen:
+    if name is not None:
+        found = [label for label in arrays if name in (label, label.rsplit("/", 1)[-1])]
+        if name in arrays:
+            found = [name]
+        if len(found) != 1:
+            raise SourceError(f"{path}: has no dataset {name!r}, it has {_listed(arrays)}")
+        return Chosen(str(path), found[0], arrays[found[0]])
+    pictures = [label for label, array in arrays.items() if _may_be_pictures(array)]
+    if len(pictures) != 1:
+        raise SourceError(f"{path}: give the dataset with the frames, it has {_listed(arrays)}")
+    return Chosen(str(path), pictures[0], arrays[pictures[0]])
+
+
+def _may_be_pictures(array: StoredArray) -> bool:
+    # MATLAB keeps lists as matrices of one row or column.
+    return len(array.shape) in (2, 3) and sum(length > 1 for length in array.shape) > 1
+
+
+def _listed(arrays: Mapping[str, StoredArray]) -> str:
+    return ", ".join(f"{name!r} of shape {arrays[name].shape}" for name in sorted(arrays)[:10])
+
+
+def _unit(one: Chosen, told: Told) -> str:
+    """Unit of the samples, as the user or the file says."""
+    if told.unit is not None:
+        return told.unit
+    said = one.unit if isinstance(one.unit, str) else ""
+    unit = said if said in RECORDING_UNITS else _SPELLINGS.get(said.strip().lower())
+    if unit is None and told.quantity in ("counts", "radiance"):
+        unit = "counts" if told.quantity == "counts" else "W/m2/sr"
+    if unit is None:
+        raise SourceError(
+            f"{one}: give the unit of the samples, the file says {said or 'none'}: expected one of "
+            f"{', '.join(RECORDING_UNITS)}"
+        )
+    if told.quantity is not None and RECORDING_UNITS[unit][0] != told.quantity:
+        raise SourceError(f"{one}: is in {said}, which is no unit of {told.quantity}")
+    return unit
+
+
+def _times(
+    one: Chosen,
+    arrays: Mapping[str, StoredArray],
+    axes: tuple[str, ...],
+    chosen: range,
+    told: Told,
+    assumed: list[str],
+) -> NDArray[np.float64]:
+    if told.interval is not None:
+        return even_times(chosen, told.interval)
+    count = one.array.shape[axes.index("time")] if "time" in axes else 1
+    if count == 1:
+        return np.zeros(1)
+    dim = one.array.dims[axes.index("time")] if one.array.dims else ""
+    found = coordinate("time", {one.path: arrays}, None, dim, count)
+    if found is None or found.label == one.label:
+        raise SourceError(f"{one}: give the interval between frames, the file says no times")
+    unit = unit_of("time", str(found), found.unit, SI, assumed)
+    times = check_times(str(found), read_list(found, unit))
+    if not isfinite(times[-1] - times[0]):
+        raise SourceError(f"{found}: is not finite")
+    since: NDArray[np.float64] = (times - times[0])[list(chosen)]
+    return since
+
+
+def _signal(one: Chosen, axes: tuple[str, ...], chosen: range) -> NDArray[Any]:
+    """Samples of the chosen frames, shape (time, y, x)."""
+    if "time" not in axes:
+        parts = [_part(one, axes, slice(None))[None]]
+    elif abs(chosen.step) == 1:
+        first, last = min(chosen[0], chosen[-1]), max(chosen[0], chosen[-1])
+        parts = [_part(one, axes, slice(first, last + 1))[:: chosen.step]]
+    else:
+        parts = [_part(one, axes, slice(number, number + 1)) for number in chosen]
+    signal = np.concatenate(parts)
+    shape = (len(chosen), *(one.array.shape[axes.index(axis)] for axis in ("y", "x")))
+    if signal.shape != shape:
+        raise SourceError(f"{one}: has shape {signal.shape}, expected {shape}")
+    if np.isinf(signal).any():
+        raise SourceError(f"{one}: has infinite numbers, expected finite ones or NaN")
+    return signal.astype(np.uint8 if signal.dtype.kind == "b" else signal.dtype.newbyteorder("="))
+
+
+def _part(one: Chosen, axes: tuple[str, ...], frames: slice) -> NDArray[Any]:
+    key = tuple(frames if axis == "time" else slice(None) for axis in axes)
+    with reading(one):
+        raw = unpacked(one.array.read(key), one.array.attributes)
+        return raw.transpose([axes.index(axis) for axis in AXES if axis in axes])

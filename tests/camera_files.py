@@ -1,0 +1,201 @@
+"""Files of cameras, byte by byte as their formats are described, of pictures that are known."""
+
+import struct
+from io import BytesIO
+
+import numpy as np
+from PIL import Image
+
+ROWS, COLUMNS, FRAMES = 48, 64, 5
+
+PLANCK = {"r1": 16125.79, "b": 1420.1, "f": 1.0, "o": -5588, "r2": 0.0109034}
+OBJECT = {"emissivity": 0.95, "reflected": 295.15, "atmosphere": 292.15, "window": 0.9}
+START = 1_700_000_000
+STAMPS = 0.033 * np.arange(FRAMES)
+
+
+def pictures(frames=FRAMES, bits=14):
+    """Smooth pictures with noise in which each pixel and frame differs."""
+    y, x = np.mgrid[:ROWS, :COLUMNS]
+    base = 0.3 + 0.4 * np.exp(-((x - 30.0) ** 2 + (y - 20.0) ** 2) / 300)
+    noise = np.random.default_rng(7).normal(0, 0.002, (frames, ROWS, COLUMNS))
+    level = base + noise + 0.01 * np.arange(frames)[:, None, None]
+    return np.round(level * (2**bits - 1)).astype(np.uint16)
+
+
+# FLIR
+
+
+def png(image, swapped=True):
+    stream = BytesIO()
+    Image.fromarray(image.byteswap() if swapped else image).save(stream, "PNG")
+    return stream.getvalue()
+
+
+def plain(image):
+    return image.astype("<u2").tobytes()
+
+
+def flir_camera(order, stamp, planck=PLANCK, told=OBJECT, rate=30):
+    raw = bytearray(2476)
+
+    def put(place, kind, *values):
+        struct.pack_into(order + kind, raw, place, *values)
+
+    put(0, "HHH", 2, COLUMNS, ROWS)
+    put(0x20, "fffff", told["emissivity"], 2.0, told["reflected"], told["atmosphere"], 293.15)
+    put(0x34, "f", told["window"])
+    put(0x3C, "f", 0.5)
+    put(0x58, "fff", planck["r1"], planck["b"], planck["f"])
+    put(0x70, "fffff", 0.006569, 0.01262, -0.002276, -0.00667, 1.9)
+    put(0x90, "ff", 393.15, 253.15)
+    raw[0xD4:0xE8] = b"FLIR T420".ljust(20, b"\0")
+    raw[0x104:0x10C] = b"62109905"
+    put(0x308, "if", planck["o"], planck["r2"])
+    put(0x310, "HH", 7481, 59029)
+    seconds, rest = divmod(stamp, 1)
+    put(0x384, "IIh", START + int(seconds), round(1000 * rest), -60)
+    put(0x464, "H", rate)
+    return bytes(raw)
+
+
+def fff(image, stamp=0.0, pack=plain, order="<", sort=2, **camera):
+    """One frame: header, list of two records, counts, what the camera says."""
+    counts = struct.pack("<HHH", 2, image.shape[1], image.shape[0]).ljust(32, b"\0") + pack(image)
+    said = flir_camera(order, stamp, **camera)
+    start = 64 + 2 * 32
+    header = b"FFF\0" + b"FLIR".ljust(16, b"\0") + struct.pack(order + "III", 100, 64, 2)
+    entries = [(1, sort, start, len(counts)), (32, 1, start + len(counts), len(said))]
+    table = b"".join(
+        struct.pack(order + "HHIIIIIII", kind, how, 100, 1, place, length, 0, 0, 0)
+        for kind, how, place, length in entries
+    )
+    return header.ljust(64, b"\0") + table + counts + said
+
+
+def seq(images, stamps=STAMPS, **options):
+    frames = zip(images, stamps, strict=True)
+    return b"".join(fff(image, stamp, **options) for image, stamp in frames)
+
+
+def flir_jpeg(image, part=1000, **options):
+    """A JPEG with FLIR's records in several segments."""
+    stream = BytesIO()
+    Image.new("L", (8, 8), 99).save(stream, "JPEG")
+    visible, inside = stream.getvalue(), fff(image, **options)
+    parts = [inside[i : i + part] for i in range(0, len(inside), part)]
+    segments = b"".join(
+        b"\xff\xe1"
+        + struct.pack(">H", len(one) + 10)
+        + b"FLIR\0\x01"
+        + bytes([number, len(parts) - 1])
+        + one
+        for number, one in enumerate(parts)
+    )
+    return visible[:2] + segments + visible[2:]
+
+
+# PTW
+
+
+def ptw(images, period=1 / 600, stamps=None, lock_in=False):
+    count, rows, columns = images.shape
+    extra = 2 * columns if lock_in else 0
+    frame = 1016 + extra + 2 * rows * columns
+    header = bytearray(3476)
+
+    def put(place, kind, *values):
+        struct.pack_into("<" + kind, header, place, *values)
+
+    header[0:10] = b"CEDIP05.60"
+    put(11, "IIIII", len(header), 1016, frame, frame - 1016, count)
+    put(35, "HBBBBBB", 2009, 17, 6, 42, 15, 7, 31)
+    header[44:51] = b"JADE MW"
+    header[64:70] = b"G1 1:1"
+    put(141, "fff", 0.8, 296.15, 0.3)
+    put(170, "f", 0.98)
+    put(184, "f", 295.15)
+    put(188, "ff", 3.8, 5.1)
+    header[220:226] = b"J-1234"
+    put(377, "HHH", columns, rows, 14)
+    put(403, "ff", period, 30e-6)
+    header[563:572] = b"AISI 1045"
+    frames = []
+    for number, image in enumerate(images):
+        own = bytearray(1016)
+        when = number / 600 if stamps is None else stamps[number]
+        milliseconds = round(1000 * when)
+        own[80:84] = bytes([59, 23, milliseconds // 10 % 100, 58 + milliseconds // 1000])
+        own[160] = milliseconds % 10
+        line = np.zeros(columns, "<u2")
+        line[:4] = 1220, 3907, 1204, 2382
+        frames.append(bytes(own) + (line.tobytes() if lock_in else b"") + plain(image))
+    return bytes(header) + b"".join(frames)
+
+
+# CINE
+
+
+def _packed_10(codes):
+    a, b, c, d = np.moveaxis(codes.reshape(-1, 4).astype(np.uint64), -1, 0)
+    whole = a << 30 | b << 20 | c << 10 | d
+    return b"".join(int(one).to_bytes(5, "big") for one in whole)
+
+
+def _packed_12(counts):
+    a, b = np.moveaxis(counts.reshape(-1, 2).astype(np.uint64), -1, 0)
+    return b"".join(int(one).to_bytes(3, "big") for one in (a << 12 | b))
+
+
+def cine(images, kind="16", rate=30_000, exposures=None, times=True):
+    """A recording; 8 and 16 bits lie upside down, as bitmaps do."""
+    count, rows, columns = images.shape
+    bits, packing, real = {"8": (8, 0, 8), "16": (16, 0, 12), "10p": (16, 256, 10)}.get(
+        kind, (16, 1024, 12)
+    )
+    pack = {
+        "8": lambda image: image[::-1].astype("u1").tobytes(),
+        "16": lambda image: image[::-1].astype("<u2").tobytes(),
+        "10p": _packed_10,
+        "12p": _packed_12,
+    }[kind]
+    setup = bytearray(12432)
+
+    def put(place, form, *values):
+        struct.pack_into("<" + form, setup, place, *values)
+
+    setup[140:142] = b"ST"
+    put(142, "H", len(setup))
+    put(743, "I", 12345)
+    put(768, "I", rate)
+    put(792, "I", 711)
+    put(896, "I", real)
+    put(1568, "I", 3000)
+    ticks = [(START << 32) + round((0.25 + n / rate) * 2**32) & ~3 | 1 for n in range(count)]
+    exposures = [3e-6] * count if exposures is None else exposures
+    blocks = []
+    if times:
+        blocks.append(struct.pack(f"<IHH{count}Q", 8 + 8 * count, 1002, 1, *ticks))
+    lengths = [round(one * 2**32) for one in exposures]
+    blocks.append(struct.pack(f"<IHH{count}I", 8 + 4 * count, 1003, 0, *lengths))
+    tagged = b"".join(blocks)
+    picture = struct.pack("<IiiHHIIiiII", 40, columns, rows, 1, bits, packing, 0, 0, 0, 0, 0)
+    places_at = 44 + 40 + len(setup) + len(tagged)
+    header = struct.pack(
+        "<2sHHHiIiIIII", b"CI", 44, 0, 1, -100, count, -3, count, 44, 84, places_at
+    ) + struct.pack("<Q", ticks[1] if count > 1 else ticks[0])
+    frames, places, place = [], [], places_at + 8 * count
+    for image in images:
+        raw = pack(image)
+        one = struct.pack("<II", 8, len(raw)) + raw
+        places.append(place)
+        place += len(one)
+        frames.append(one)
+    return (
+        header
+        + picture
+        + bytes(setup)
+        + tagged
+        + struct.pack(f"<{count}q", *places)
+        + b"".join(frames)
+    )

@@ -1,0 +1,508 @@
+"""Files of cameras: what is read is what was there, and what is wrong is one clear error."""
+
+import lzma
+import struct
+import sys
+from functools import partial
+from pathlib import Path
+
+import camera_files as files
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+import tifffile
+import xarray as xr
+
+from chipglow.camera import PlanckConversion, Recording
+from chipglow.io import CAMERA_FORMATS, read_recording, write_hcc
+from chipglow.io.cameras import apart
+from chipglow.io.cameras.recordings import find_format, read_here
+from chipglow.io.cameras.stacks import Told
+from chipglow.io.sources import SourceError
+
+REFERENCE = Path(__file__).parent / "reference" / "flir"
+PICTURES = files.pictures()
+
+
+def jpeg_ls(image):
+    return pytest.importorskip("imagecodecs").jpegls_encode(image)
+
+
+def a_recording(signal=PICTURES, quantity="counts", **changed):
+    known = {"times": np.arange(len(signal)) / 600, "integration_time": 30e-6, "saturation": 16382}
+    return Recording(signal=signal, quantity=quantity, camera="any", **{**known, **changed})
+
+
+def hcc(path):
+    write_hcc(path, a_recording())
+    return path.read_bytes()
+
+
+def make(folder, name, content):
+    path = folder / name
+    path.write_bytes(content)
+    return path
+
+
+# FLIR
+
+
+def test_a_frame_of_a_real_camera(tmp_path):
+    path = tmp_path / "t420.fff"
+    path.write_bytes(lzma.decompress((REFERENCE / "t420.fff.xz").read_bytes()))
+    recording = read_recording(path)
+    assert recording.signal.shape == (1, 240, 320)
+    assert recording.camera == "FLIR T420 (with SC, serial number 62109905"
+    assert recording.quantity == "counts"
+    # Beside its counts the camera keeps the middle and the range that it shows, here 784 counts.
+    assert abs(np.median(recording.signal) - 18044) < 0.05 * 784
+    told = recording.object_parameters
+    assert (told.emissivity, told.reflected, told.atmosphere) == pytest.approx(
+        (0.95, 295.15, 292.15)
+    )
+    assert told.transmission == 1  # an object at 0 m
+    # A room, and the upper end of its range is 150 degC as it says elsewhere.
+    temperature = recording.conversion.temperature(recording.signal)
+    assert 295 < temperature.min() < temperature.max() < 303
+    assert recording.conversion.temperature(recording.saturation) == pytest.approx(423.15, abs=0.5)
+    assert "Frame 0 was taken at 2024-08-23 14:29:24.092+00:00." in recording.notes
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_a_sequence_of_flir(tmp_path, order):
+    recording = read_recording(make(tmp_path, "a.seq", files.seq(PICTURES, order=order)))
+    assert np.array_equal(recording.signal, PICTURES)
+    assert recording.times == pytest.approx(files.STAMPS)
+    assert vars(recording.conversion) == pytest.approx(files.PLANCK, rel=1e-6)
+    assert recording.saturation == 59029
+
+
+def test_big_endian_counts_and_zeros_between_frames(tmp_path):
+    one = partial(files.fff, pack=lambda image: image.astype(">u2").tobytes(), sort=1)
+    content = bytes(100).join(one(PICTURES[n], files.STAMPS[n]) for n in range(3)) + bytes(64)
+    recording = read_recording(make(tmp_path, "a.seq", content))
+    assert np.array_equal(recording.signal, PICTURES[:3])
+
+
+@pytest.mark.parametrize("swapped", [True, False])
+def test_png_is_read_whatever_the_order_of_its_bytes(tmp_path, swapped):
+    content = files.flir_jpeg(PICTURES[0], pack=partial(files.png, swapped=swapped))
+    path = make(tmp_path, "a.jpg", content)
+    recording = read_here(path, "flir", None, Told())
+    assert np.array_equal(recording.signal, PICTURES[:1])
+
+
+def test_jpeg_ls_is_read_in_a_process_of_its_own(tmp_path):
+    path = make(tmp_path, "a.csq", files.seq(PICTURES, pack=jpeg_ls))
+    recording = read_recording(path, slice(1, 4))
+    assert np.array_equal(recording.signal, PICTURES[1:4])
+    assert recording.times == pytest.approx(files.STAMPS[1:4])
+    assert recording.object_parameters.emissivity == pytest.approx(0.95)
+    assert recording.conversion.b == pytest.approx(1420.1)
+
+
+def test_the_air_takes_what_flirs_formula_says(tmp_path):
+    recording = read_recording(make(tmp_path, "a.fff", files.fff(PICTURES[0])))
+    # By hand: 2 m of air of 19 degC and 50 %, omega = 8.14, between 0.9 of a window.
+    water = 0.5 * np.exp(1.5587 + 0.06939 * 19 - 2.7816e-4 * 19**2 + 6.8455e-7 * 19**3)
+    alpha, beta = np.array([[0.006569, 0.01262], [-0.002276, -0.00667]])
+    thick = np.sqrt(2) * (alpha + beta * np.sqrt(water))
+    air = np.array([1.9, -0.9]) @ np.exp(-thick)
+    assert recording.object_parameters.transmission == pytest.approx(0.9 * air, rel=1e-6)
+    assert recording.object_parameters.atmosphere == pytest.approx(292.15)
+
+
+def test_what_a_camera_cannot_have_been_told_is_left_out_and_said(tmp_path):
+    told = {**files.OBJECT, "emissivity": 0.0}
+    planck = {**files.PLANCK, "b": -1.0}
+    path = make(tmp_path, "a.fff", files.fff(PICTURES[0], told=told, planck=planck))
+    recording = read_recording(path)
+    assert recording.conversion is None
+    assert recording.object_parameters.emissivity == 1
+    assert sum(note.startswith("Left out") for note in recording.notes) == 2
+
+
+def test_stamps_that_do_not_ascend_give_way_to_the_frame_rate(tmp_path):
+    path = make(tmp_path, "a.seq", files.seq(PICTURES, np.zeros(5), rate=50))
+    recording = read_recording(path)
+    assert recording.times == pytest.approx(np.arange(5) / 50)
+    assert any("Assumed: the frames are 1/50 s apart" in note for note in recording.notes)
+    assert read_recording(path, interval=0.1).times == pytest.approx(0.1 * np.arange(5))
+    without = make(tmp_path, "b.seq", files.seq(PICTURES, np.zeros(5), rate=0))
+    with pytest.raises(SourceError, match="give an interval"):
+        read_recording(without)
+
+
+# PTW, CINE
+
+
+@pytest.mark.parametrize("lock_in", [False, True])
+def test_ptw(tmp_path, lock_in):
+    recording = read_recording(make(tmp_path, "a.ptw", files.ptw(PICTURES, lock_in=lock_in)))
+    assert np.array_equal(recording.signal, PICTURES)
+    assert recording.times == pytest.approx(np.arange(5) / 600, rel=1e-6)
+    assert recording.integration_time == pytest.approx(30e-6)
+    assert recording.saturation == 2**14 - 2
+    assert recording.camera == "JADE MW, serial number J-1234"
+    told = vars(recording.object_parameters)
+    assert told == pytest.approx(
+        {"emissivity": 0.8, "reflected": 296.15, "transmission": 0.98, "atmosphere": 295.15}
+    )
+    assert any("lock-in" in note for note in recording.notes) == lock_in
+    assert not any("Doubtful" in note for note in recording.notes)
+
+
+def test_frames_missing_in_ptw_are_said(tmp_path):
+    stamps = np.array([0, 1, 2, 12, 13]) / 600
+    recording = read_recording(make(tmp_path, "a.ptw", files.ptw(PICTURES, stamps=stamps)))
+    assert any("frames may be missing" in note for note in recording.notes)
+
+
+def test_ptw_without_period_has_the_times_of_its_stamps_also_over_midnight(tmp_path):
+    stamps = np.array([0.0, 0.5, 1.0, 2.5, 3.0])
+    content = bytearray(files.ptw(PICTURES, period=0.0, stamps=stamps))
+    frame = (len(content) - 3476) // 5
+    for number in (3, 4):  # 60 seconds and more of a minute: the next day
+        start = 3476 + number * frame
+        content[start + 80], content[start + 81] = 0, 0
+        content[start + 83] -= 60
+    recording = read_recording(make(tmp_path, "a.ptw", bytes(content)))
+    assert recording.times == pytest.approx(stamps, abs=1e-9)
+
+
+@pytest.mark.parametrize(("kind", "bits"), [("8", 8), ("16", 12), ("12p", 12)])
+def test_cine(tmp_path, kind, bits):
+    truth = files.pictures(bits=bits)
+    recording = read_recording(make(tmp_path, "a.cine", files.cine(truth, kind)))
+    assert np.array_equal(recording.signal, truth)
+    # Stamps of 4 / 2^32 s, the frames a 30000th of a second apart.
+    assert recording.times == pytest.approx(np.arange(5) / 30_000, abs=2e-9)
+    assert recording.integration_time == pytest.approx(3e-6, abs=2.0**-32)
+    assert recording.saturation == 2**bits - 2
+    assert recording.camera == "Phantom 711, serial number 12345"
+    assert any(note.startswith("The trigger was at 3.3") for note in recording.notes)
+
+
+def test_codes_of_ten_bits_become_counts_that_are_proportional_to_light(tmp_path):
+    codes = np.broadcast_to(np.arange(1024, dtype=np.uint16).reshape(16, 64), (1, 16, 64))
+    recording = read_recording(make(tmp_path, "a.cine", files.cine(codes, "10p")))
+    counts = recording.signal.ravel().astype(int)
+    assert (np.diff(counts) >= 0).all()
+    # From the maker's table, which every reader of such files has.
+    known = {1: 5, 16: 19, 200: 204, 512: 998, 700: 1872, 900: 3159, 1014: 4064, 1023: 4095}
+    assert {code: counts[code] for code in known} == pytest.approx(known, abs=2)
+
+
+@pytest.mark.parametrize(("kind", "bits", "shift"), [("8", 8, 0), ("16", 12, 4)])
+def test_ffmpeg_sees_the_same_in_cine(tmp_path, kind, bits, shift):
+    av = pytest.importorskip("av")
+    path = make(tmp_path, "a.cine", files.cine(files.pictures(bits=bits), kind))
+    with av.open(str(path)) as container:
+        seen = np.stack([frame.to_ndarray() for frame in container.decode(video=0)])
+    assert np.array_equal(seen >> shift, read_recording(path).signal)
+
+
+def test_cine_whose_exposure_changes_has_no_integration_time(tmp_path):
+    exposures = [3e-6, 3e-6, 5e-6, 5e-6, 5e-6]
+    path = make(tmp_path, "a.cine", files.cine(PICTURES, exposures=exposures))
+    recording = read_recording(path)
+    assert recording.integration_time is None
+    assert any("Doubtful: the integration time goes" in note for note in recording.notes)
+    assert read_recording(path, slice(2, 5)).integration_time == pytest.approx(5e-6, rel=1e-4)
+
+
+def test_cine_without_stamps_has_the_times_of_its_rate(tmp_path):
+    recording = read_recording(make(tmp_path, "a.cine", files.cine(PICTURES, times=False)))
+    assert recording.times == pytest.approx(np.arange(5) / 30_000)
+
+
+# HCC
+
+
+def test_counts_come_back_from_hcc(tmp_path):
+    write_hcc(tmp_path / "a.hcc", a_recording())
+    recording = read_recording(tmp_path / "a.hcc")
+    assert np.array_equal(recording.signal, PICTURES)
+    assert recording.quantity == "counts"
+    assert recording.times == pytest.approx(np.arange(5) / 600, abs=1e-7)  # steps of 0.1 us
+    assert recording.integration_time == pytest.approx(30e-6)
+    assert recording.saturation == 16382
+
+
+@pytest.mark.parametrize("quantity", ["temperature", "radiance"])
+def test_calibrated_values_come_back_from_hcc_within_half_a_step(tmp_path, quantity):
+    values = 300.0 + PICTURES / 20
+    write_hcc(tmp_path / "a.hcc", a_recording(values, quantity, saturation=None))
+    recording = read_recording(tmp_path / "a.hcc")
+    assert recording.quantity == quantity
+    step = 2.0 ** np.ceil(np.log2(np.ptp(values) / 65535))
+    # Half a step, and 32 bits of a value near 1000.
+    assert np.abs(recording.signal - values).max() <= 0.5 * step + 6.2e-5
+
+
+def test_fasthcc_sees_the_same(tmp_path):
+    fasthcc = pytest.importorskip("fasthcc")
+    write_hcc(tmp_path / "a.hcc", a_recording(300.0 + PICTURES / 20, "temperature"))
+    theirs, headers = fasthcc.read_hcc(tmp_path / "a.hcc", metadata=True)
+    assert theirs.shape == PICTURES.shape
+    assert headers[3]["AcquisitionFrameRate"] == 600
+    calibrated = fasthcc.read_hcc(tmp_path / "a.hcc", calibrated=True)
+    assert np.array_equal(calibrated, read_recording(tmp_path / "a.hcc").signal)
+    fasthcc.write_hcc(tmp_path / "b.hcc", PICTURES, frame_rate=100.0, exposure_time=55.5)
+    recording = read_recording(tmp_path / "b.hcc")
+    assert recording.times == pytest.approx(np.arange(5) / 100)
+    assert recording.integration_time == pytest.approx(55.5e-6)
+    calibrated = fasthcc.read_hcc(tmp_path / "b.hcc", calibrated=True)
+    assert np.array_equal(recording.signal, calibrated)
+
+
+@pytest.mark.parametrize(
+    ("recording", "text"),
+    [
+        (a_recording(PICTURES + 0.5), "whole numbers"),
+        (a_recording(PICTURES.astype(int) * 100), "from 0 to 65535"),
+        (a_recording(np.full((5, 9, 64), np.nan), "temperature"), "not finite"),
+        (a_recording(PICTURES[..., :60]), "64 to"),
+        (a_recording(times=np.zeros(5)), "do not ascend"),
+    ],
+)
+def test_what_hcc_cannot_hold_is_refused_and_nothing_is_left(tmp_path, recording, text):
+    with pytest.raises(ValueError, match=text):
+        write_hcc(tmp_path / "a.hcc", recording)
+    assert not list(tmp_path.iterdir())
+
+
+# Arrays
+
+
+def stack_npy(folder):
+    np.save(folder / "a.npy", PICTURES)
+    return folder / "a.npy", {}
+
+
+def stack_npz(folder):
+    np.savez(folder / "a.npz", frames=PICTURES, other=np.zeros(3))
+    return folder / "a.npz", {}
+
+
+def stack_tiff(folder):
+    tifffile.imwrite(folder / "a.tif", PICTURES, photometric="minisblack")
+    return folder / "a.tif", {}
+
+
+def stack_tiffs(folder):
+    for number, image in enumerate(PICTURES):
+        tifffile.imwrite(folder / f"a_{number}.tif", image)
+    return folder / "a_*.tif", {}
+
+
+def stack_mat(folder):
+    scipy.io.savemat(folder / "a.mat", {"S": PICTURES.transpose(1, 2, 0), "t": np.arange(5.0)})
+    return folder / "a.mat", {"axes": ("y", "x", "time")}
+
+
+def stack_hdf5(folder):
+    with h5py.File(folder / "a.h5", "w") as file:
+        file["run/frames"] = PICTURES
+        file["run/dark"] = PICTURES[:1]
+    return folder / "a.h5", {"dataset": "frames"}
+
+
+def stack_netcdf(folder):
+    data = xr.Dataset({"counts": (("time", "y", "x"), PICTURES)})
+    data.to_netcdf(folder / "a.nc", engine="h5netcdf")
+    return folder / "a.nc", {}
+
+
+def stack_zarr(folder):
+    zarr = pytest.importorskip("zarr")
+    array = zarr.create_array(folder / "a.zarr", shape=PICTURES.shape, dtype="u2", chunks=(2, 9, 9))
+    array[:] = PICTURES
+    return folder / "a.zarr", {}
+
+
+STACKS = [stack_npy, stack_npz, stack_tiff, stack_tiffs, stack_mat, stack_hdf5, stack_netcdf]
+
+
+@pytest.mark.parametrize("frames", [None, slice(1, 3), slice(None, None, -2)])
+@pytest.mark.parametrize("write", [*STACKS, stack_zarr])
+def test_arrays(tmp_path, write, frames):
+    path, told = write(tmp_path)
+    told = Told(quantity="counts", interval=1e-3, **told)
+    recording = read_here(path, find_format(path), frames, told)
+    chosen = frames or slice(None)
+    assert np.array_equal(recording.signal, PICTURES[chosen])
+    assert recording.times == pytest.approx(1e-3 * np.arange(5)[chosen])
+
+
+def test_tables_of_temperature_in_degrees_celsius(tmp_path):
+    for number in range(3):
+        np.savetxt(tmp_path / f"T_{number}.csv", PICTURES[number] / 40, fmt="%.3f", delimiter=";")
+    told = Told(unit="degC", interval=0.1)
+    recording = read_here(tmp_path / "T_*.csv", "csv", None, told)
+    assert recording.quantity == "temperature"
+    # Three digits in the file, and 32 bits of a value near 600.
+    assert np.abs(recording.signal - PICTURES[:3] / 40 - 273.15).max() < 6e-4
+
+
+def test_a_file_that_says_units_times_and_packing_needs_no_more(tmp_path):
+    temperature = 20.0 + PICTURES / 100
+    data = xr.Dataset(
+        {"T": (("time", "y", "x"), temperature, {"units": "celsius"})},
+        {"time": ("time", 10 + np.arange(5) / 4, {"units": "ms"})},
+    )
+    scale = {"scale_factor": 0.01, "add_offset": 100.0}
+    packing = {"T": {"dtype": "i2", "_FillValue": -32768, **scale}}
+    data.to_netcdf(tmp_path / "a.nc", engine="h5netcdf", encoding=packing)
+    recording = read_recording(tmp_path / "a.nc", slice(1, None))
+    assert recording.quantity == "temperature"
+    assert np.abs(recording.signal - temperature[1:] - 273.15).max() < 0.006
+    assert recording.times == pytest.approx(np.arange(1, 5) * 0.25e-3)
+
+
+@pytest.mark.parametrize(
+    ("told", "text"),
+    [
+        ({"interval": 1e-3}, "give the unit of the samples"),
+        ({"quantity": "temperature", "interval": 1e-3}, "give the unit of the samples"),
+        ({"quantity": "counts"}, "give the interval between frames"),
+        ({"quantity": "counts", "interval": 0.0}, "interval: is 0.0 s"),
+        ({"quantity": "heat"}, "quantity: is 'heat'"),
+        ({"unit": "degF"}, "unit: is 'degF'"),
+        ({"quantity": "radiance", "unit": "K"}, "radiance is not in K"),
+        ({"quantity": "counts", "interval": 1.0, "dataset": "b"}, "no dataset 'b'"),
+        ({"quantity": "counts", "interval": 1.0, "axes": ("y", "z")}, "axes: are y, z"),
+        ({"format": "avi"}, "format: is 'avi'"),
+        ({"quantity": "counts", "interval": 1.0, "frames": slice(9, 12)}, "none of them"),
+    ],
+)
+def test_what_is_not_known_must_be_told_and_must_be_possible(tmp_path, told, text):
+    path, _ = stack_npy(tmp_path)
+    with pytest.raises(ValueError, match=text) as caught:
+        read_recording(path, **told)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_camera_file_says_itself_what_was_measured(tmp_path):
+    path = make(tmp_path, "a.fff", files.fff(PICTURES[0]))
+    with pytest.raises(ValueError, match="says itself what was measured"):
+        read_recording(path, quantity="temperature")
+
+
+# Any file
+
+
+OWN = {
+    "flir": lambda folder: files.seq(PICTURES),
+    "ptw": lambda folder: files.ptw(PICTURES),
+    "cine": lambda folder: files.cine(PICTURES),
+    "hcc": lambda folder: hcc(folder / "written.hcc"),
+}
+
+
+@pytest.mark.parametrize("kind", OWN)
+def test_only_the_chosen_frames_are_read(tmp_path, kind, monkeypatch):
+    path = make(tmp_path, "any.bin", OWN[kind](tmp_path))
+    assert find_format(path) == kind
+    whole = read_recording(path)
+    for frames in (slice(1, 3), slice(-1, None), slice(None, None, 2), slice(3, 0, -1)):
+        part = read_recording(path, frames)
+        assert np.array_equal(part.signal, PICTURES[frames])
+        assert np.array_equal(part.times, whole.times[frames])
+    from chipglow.io.cameras import binary
+
+    read = []
+    own = binary.Binary.read
+    monkeypatch.setattr(
+        binary.Binary, "read", lambda self, a, n, what: read.append(n) or own(self, a, n, what)
+    )
+    read_recording(path, slice(4, 5))
+    assert sum(n for n in read if n > PICTURES[0].nbytes // 2) < 2 * PICTURES[0].nbytes + 4000
+
+
+@pytest.mark.parametrize("kind", OWN)
+def test_a_file_cut_anywhere_is_one_error(tmp_path, kind):
+    content = OWN[kind](tmp_path)
+    for length in np.linspace(1, len(content) - 1, 60).astype(int):
+        with pytest.raises(SourceError) as caught:
+            read_here(make(tmp_path, "a.bin", content[:length]), kind, None, Told())
+        assert "a.bin" in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", OWN)
+def test_any_change_of_a_file_is_one_error_or_a_recording(tmp_path, kind):
+    random = np.random.default_rng(11)
+    content = OWN[kind](tmp_path)
+    # Most of what can go wrong is in the headers: of the file, and of its first frame.
+    near = {"cine": 44 + 40 + 12432 + 200, "ptw": 3476 + 200, "flir": 200, "hcc": 256}[kind]
+    refused = 0
+    for turn in range(300):
+        changed = bytearray(content)
+        for _ in range(random.integers(1, 4)):
+            place = int(random.integers(near if turn % 4 else len(content)))
+            if turn % 2:
+                place %= {"cine": 150, "ptw": 150, "flir": 150, "hcc": 48}[kind]
+            changed[place] = random.choice([0, 1, 127, 128, 255, random.integers(256)])
+        path = make(tmp_path, "a.bin", bytes(changed))
+        try:
+            recording = read_here(path, kind, None, Told())
+        except SourceError as error:
+            refused += 1
+            assert "\n" not in str(error)
+            assert len(str(error)) < 500
+        else:
+            assert recording.signal.size <= 10 * PICTURES.size
+            assert np.isfinite(recording.times).all()
+    assert 20 < refused < 300
+
+
+@pytest.mark.parametrize("name", ["a.seq", "a.ptw", "a.hcc", "a.cine", "a.tif", "a.xyz", "a.csv"])
+@pytest.mark.parametrize("content", [b"", b"GIF89a" + bytes(500), b"\xff\xd8\xff\xe0" + bytes(50)])
+def test_a_file_of_another_kind_is_one_error(tmp_path, name, content):
+    path = make(tmp_path, name, content)
+    with pytest.raises(SourceError, match=name.replace(".", "[.]")):
+        read_here(path, find_format(path), None, Told("counts", interval=1.0))
+
+
+def test_absurd_dimensions_are_refused_before_memory_is_taken(tmp_path):
+    wide = np.zeros((1, 2), np.uint16)
+    one = bytearray(files.fff(wide, pack=partial(files.png, swapped=False)))
+    struct.pack_into("<HH", one, 128 + 2, 60_000, 60_000)
+    with pytest.raises(SourceError, match="60000 columns and 60000 rows"):
+        read_here(make(tmp_path, "a.fff", bytes(one)), "flir", None, Told())
+    cine = bytearray(files.cine(PICTURES))
+    struct.pack_into("<ii", cine, 48, 65_000, -65_000)
+    with pytest.raises(SourceError, match="samples at once"):
+        read_recording(make(tmp_path, "a.cine", bytes(cine)))
+
+
+def test_a_reader_that_dies_is_one_error(tmp_path, monkeypatch):
+    path, _ = stack_tiff(tmp_path)
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    with pytest.raises(SourceError, match="its reader ended with code 1"):
+        read_recording(path, quantity="counts", interval=1.0)
+
+
+def test_an_answer_that_is_not_whole_is_no_recording():
+    recording = Recording(PICTURES, "counts", np.arange(5.0), "any")
+    header = {**apart._header(recording), "kind": "<u2"}
+    assert np.array_equal(apart._recording(header, memoryview(PICTURES.tobytes())).signal, PICTURES)
+    for wrong in ({"kind": "<u4"}, {"kind": "O"}, {"shape": [10**6, 10**6, 1]}):
+        with pytest.raises(SourceError, match="no whole answer"):
+            apart._recording({**header, **wrong}, memoryview(PICTURES.tobytes()))
+
+
+def test_what_a_process_of_its_own_refuses_is_the_same_error(tmp_path):
+    content = bytearray(files.seq(PICTURES, pack=jpeg_ls))
+    content[128 + 32 + 40 : 128 + 32 + 90] = bytes(50)
+    path = make(tmp_path, "a.csq", bytes(content))
+    with pytest.raises(SourceError, match=r"a\.csq: frame 0"):
+        read_recording(path)
+
+
+def test_formats_have_endings_of_their_own():
+    endings = [ending for one in CAMERA_FORMATS.values() for ending in one.suffixes]
+    assert len(set(endings)) == len(endings)
+    assert PlanckConversion(**files.PLANCK).temperature(np.array([1e4])) > 0
