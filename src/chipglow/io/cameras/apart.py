@@ -6,6 +6,7 @@ import subprocess
 import sys
 from dataclasses import asdict
 from math import prod
+from operator import index
 from pathlib import Path
 from typing import Any, Final
 
@@ -36,13 +37,14 @@ def read_apart(path: Path, kind: str, frames: slice | None, told: Told) -> Recor
     OSError
         If the file is missing or not accessible.
     """
-    chosen = None if frames is None else (frames.start, frames.stop, frames.step)
+    parts = () if frames is None else (frames.start, frames.stop, frames.step)
+    chosen = [None if part is None else index(part) for part in parts]
     request = {"path": str(path), "kind": kind, "frames": chosen, "told": asdict(told)}
     try:
         done = subprocess.run(
             # -P: nothing beside the data is taken for a module.
             [sys.executable, "-P", "-m", "chipglow.io.cameras.apart"],
-            input=json.dumps(request).encode(),
+            input=json.dumps(request, default=float).encode(),
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             timeout=PATIENCE,
@@ -111,7 +113,7 @@ def main() -> None:
 def _read(request: dict[str, Any]) -> Recording:
     from chipglow.io.cameras.recordings import read_here
 
-    frames = None if request["frames"] is None else slice(*request["frames"])
+    frames = slice(*request["frames"]) if request["frames"] else None
     return read_here(Path(request["path"]), request["kind"], frames, Told(**request["told"]))
 
 

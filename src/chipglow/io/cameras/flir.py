@@ -103,8 +103,9 @@ def read_flir(path: Path, frames: slice | None = None, interval: float | None = 
     -----
     The layout is that of ExifTool's documentation of FLIR's tags.
     """
+    notes: list[str] = []
     with _records(path) as binary:
-        places = _frames(binary)
+        places = _frames(binary, notes)
         first = places[0]
         height, width = _shape(binary, first, 0)
         chosen = chosen_frames(path, frames, len(places), height * width)
@@ -115,7 +116,7 @@ def read_flir(path: Path, frames: slice | None = None, interval: float | None = 
             signal[position] = _image(binary, places[number], number, (height, width))
             stamps[position] = _moment(_camera_fields(binary, places[number])) - start
         fields = _camera_fields(binary, places[chosen[0]])
-    notes = list(first_moment(start))
+    notes += first_moment(start)
     return Recording(
         signal=signal,
         quantity="counts",
@@ -166,19 +167,19 @@ def _inside_jpeg(binary: Binary) -> bytes:
     return b"".join(parts[number] for number in range(last + 1))
 
 
-def _frames(binary: Binary) -> list[_Frame]:
-    """Where all frames are; refuses what is behind the last one and no frame."""
+def _frames(binary: Binary, notes: list[str]) -> list[_Frame]:
+    """Where all frames are."""
     found: list[_Frame] = []
     place: int | None = 0
     while place is not None:
         found.append(_frame(binary, place, len(found)))
         if len(found) > MOST_FRAMES:
             raise SourceError(f"{binary.path}: has over {MOST_FRAMES} frames")
-        place = _next(binary, found[-1].end)
+        place = _next(binary, found[-1].end, notes)
     return found
 
 
-def _next(binary: Binary, end: int) -> int | None:
+def _next(binary: Binary, end: int, notes: list[str]) -> int | None:
     """Where the next frame begins: there may be zeros or something else before it."""
     if binary.read(end, min(4, binary.size - end), "what follows a frame") == _MAGIC:
         return end
@@ -186,11 +187,10 @@ def _next(binary: Binary, end: int) -> int | None:
     begin = rest.find(_MAGIC)
     if begin >= 0:
         return end + begin
-    if rest.strip(b"\0") or end + len(rest) < binary.size:
-        raise SourceError(
-            f"{binary.path}: is cut short or damaged, no frame begins at byte {end} of "
-            f"{binary.size}"
-        )
+    if rest and _MAGIC.startswith(rest):
+        raise SourceError(f"{binary.path}: is cut short, a frame begins at byte {end}, its last")
+    if rest.strip(b"\0"):
+        notes.append(f"Doubtful: {binary.size - end} bytes behind the last frame are no frame.")
     return None
 
 
@@ -259,7 +259,7 @@ def packed_counts(path: Path) -> bool:
 def _packing(stored: bytes) -> str:
     if stored[:8] == _PNG:
         return "PNG"
-    return "JPEG-LS" if stored[:3] == _JPEG and _JPEG_LS in stored[:64] else ""
+    return "JPEG-LS" if stored[:3] == _JPEG and _JPEG_LS in stored[:256] else ""
 
 
 def _image(

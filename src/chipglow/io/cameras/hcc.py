@@ -63,6 +63,8 @@ _MODES: Final[dict[int, tuple[str, Quantity | None]]] = {
 _WRITTEN_MODE: Final = {"counts": 0, "temperature": 2, "radiance": 3}
 _VERSION: Final = (12, 7)
 _MOST: Final = 65_535
+_GREATEST: Final = 1e30
+_LEAST_EXPONENT: Final = -100
 
 
 def is_hcc(head: bytes) -> bool:
@@ -251,8 +253,10 @@ def write_hcc(path: str | Path, recording: Recording) -> None:
 def _samples(path: Path, recording: Recording) -> tuple[NDArray[np.uint16], int, float]:
     values = np.asarray(recording.signal, np.float64)
     low, high = float(values.min()), float(values.max())
-    if not np.isfinite(high - low):
-        raise ValueError(f"{path}: signal has values that are not finite, expected numbers")
+    if not (low > -_GREATEST and high < _GREATEST):
+        raise ValueError(
+            f"{path}: signal has values that are not finite or beyond {_GREATEST:g}, expected less"
+        )
     if recording.quantity == "counts":
         if low < 0 or high > _MOST or (values != np.round(values)).any():
             raise ValueError(
@@ -262,7 +266,7 @@ def _samples(path: Path, recording: Recording) -> tuple[NDArray[np.uint16], int,
         return values.astype(np.uint16), 0, 0.0
     # The header keeps the offset in 32 bits, rounded down here so that no sample is under 0.
     offset = float(np.nextafter(np.float32(low), np.float32(-np.inf)))
-    exponent = ceil(log2((high - offset) / _MOST)) if high > offset else 0
+    exponent = max(ceil(log2((high - offset) / _MOST)), _LEAST_EXPONENT)
     return np.round((values - offset) / 2.0**exponent).astype(np.uint16), exponent, offset
 
 

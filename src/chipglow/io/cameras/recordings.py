@@ -76,8 +76,8 @@ _BEGINNINGS: Final = {
     b"II+\0": "tiff",
     b"MM\0+": "tiff",
 }
-_SAME_READER: Final = ({"hdf5", "netcdf", "mat"},)
-"""Formats of which a file may be several: the ending of its name says which."""
+_INSIDE_HDF5: Final = {"hdf5", "netcdf", "mat"}
+"""Formats that begin alike: the ending of the name says which it is."""
 
 
 def read_recording(
@@ -161,7 +161,7 @@ def find_format(path: Path) -> str:
     if not head:
         raise SourceError(f"{first}: is empty")
     found = _by_content(head)
-    if found is None or any({found, by_name} <= same for same in _SAME_READER):
+    if found is None or {found, by_name} <= _INSIDE_HDF5:
         found = by_name or found
     if found is None:
         raise SourceError(

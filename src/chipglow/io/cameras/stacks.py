@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from chipglow.camera.recording import QUANTITIES, Quantity, Recording
 from chipglow.io.cameras.binary import check_picture, chosen_frames, even_times
-from chipglow.io.sources.arrays import MOST_ON_A_SIDE, StoredArray, open_arrays, reading
+from chipglow.io.sources.arrays import (
+    ARRAY_READERS,
+    MOST_ON_A_SIDE,
+    StoredArray,
+    exported_table,
+    open_arrays,
+    reading,
+)
 from chipglow.io.sources.conventions import SI
 from chipglow.io.sources.layout import (
     AXES,
@@ -79,15 +86,15 @@ class Told:
             raise ValueError(f"axes: are {', '.join(self.axes)}, expected {', '.join(AXES)}")
 
 
-def read_stack(path: Path, ending: str | None, frames: slice | None, told: Told) -> Recording:
+def read_stack(path: Path, kind: str, frames: slice | None, told: Told) -> Recording:
     """Read frames of an array in a file.
 
     Parameters
     ----------
     path : Path
         The file, or a pattern with ``*``: a file a frame.
-    ending : str, optional
-        Ending of the names of such files, where the file's own is another.
+    kind : str
+        Ending of the names of such files; the file's own may be another.
     frames : slice, optional
         Which frames to read.
     told : Told
@@ -101,7 +108,8 @@ def read_stack(path: Path, ending: str | None, frames: slice | None, told: Told)
         If it is missing or not accessible.
     """
     with ExitStack() as stack:
-        arrays = open_arrays(str(path), stack, ending)
+        reader = exported_table if kind == ".csv" else ARRAY_READERS[kind]
+        arrays = open_arrays(str(path), stack, reader)
         one = _dataset(path, arrays, told.dataset)
         assumed: list[str] = []
         axes = axes_of(one, told.axes, assumed)
@@ -111,17 +119,20 @@ def read_stack(path: Path, ending: str | None, frames: slice | None, told: Told)
         chosen = chosen_frames(path, frames, lengths.get("time", 1), lengths["y"] * lengths["x"])
         times = _times(one, arrays, axes, chosen, told, assumed)
         signal = _signal(one, axes, chosen)
+    notes = [f"Assumed: {sentence}." for sentence in assumed]
+    if skipped := one.array.attributes.get("lines_of_text"):
+        notes.append(f"Left out: {skipped} lines of text before the numbers.")
     quantity, offset = RECORDING_UNITS[unit]
     if quantity != "counts":
         # 32 bits hold temperature to 1e-4 K, where the file does not hold more.
-        kind = np.float32 if signal.dtype.itemsize <= 4 else np.float64
-        signal = (signal.astype(np.float64) + offset).astype(kind)
+        precision = np.float32 if signal.dtype.itemsize <= 4 else np.float64
+        signal = (signal.astype(np.float64) + offset).astype(precision)
     return Recording(
         signal=signal,
         quantity=quantity,
         times=times,
         camera="unknown",
-        notes=tuple(f"Assumed: {sentence}." for sentence in assumed),
+        notes=tuple(notes),
     )
 
 

@@ -10,7 +10,7 @@ from functools import partial
 from glob import glob, has_magic
 from math import prod
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 from zipfile import ZipFile
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.file_order import natural
 from chipglow.io.sources.source import SourceError
-from chipglow.io.sources.text_table import TextTable
+from chipglow.io.sources.text_table import TextTable, lines_of_text
 
 MOST_SAMPLES: Final = 100_000_000
 """Most samples that are read at once."""
@@ -65,6 +65,10 @@ class StoredArray:
     dims: tuple[str, ...] = ()
     attributes: Mapping[str, Any] = field(default_factory=dict)
     chunks: tuple[int, ...] | None = None
+
+
+ArrayReader: TypeAlias = Callable[[Path, ExitStack], Iterator[StoredArray]]
+"""Opens a file, which the stack closes, and gives its arrays."""
 
 
 @contextmanager
@@ -116,7 +120,7 @@ def matching_files(pattern: str) -> list[Path]:
 
 
 def open_arrays(
-    pattern: str, stack: ExitStack, ending: str | None = None
+    pattern: str, stack: ExitStack, reader: ArrayReader | None = None
 ) -> dict[str, StoredArray]:
     """Arrays of a file by their names, or of several files, one a frame.
 
@@ -127,8 +131,8 @@ def open_arrays(
         first axis ``time``.
     stack : ExitStack
         Closes the files.
-    ending : str, optional
-        Ending of the names of such files, where theirs is another.
+    reader : callable, optional
+        Reader of such files; by the ending of the name by default.
 
     Raises
     ------
@@ -139,13 +143,13 @@ def open_arrays(
     """
     paths = matching_files(pattern)
     several = len(paths) > 1 or paths[0] != Path(pattern)
-    first = _open_file(paths[0], stack, ending)
+    first = _open_file(paths[0], stack, reader)
     if not first:
         raise SourceError(f"{paths[0]}: there is no array of numbers in it")
     if len(first) > _MOST_ARRAYS:
         raise SourceError(f"{paths[0]}: {len(first)} arrays, expected up to {_MOST_ARRAYS}")
     if several:
-        first = {name: _series(paths, name, array, ending) for name, array in first.items()}
+        first = {name: _series(paths, name, array, reader) for name, array in first.items()}
     return {name or _stem(pattern): array for name, array in first.items()}
 
 
@@ -154,25 +158,28 @@ def _stem(pattern: str) -> str:
     return re.sub(r"[\W\d_]+$", "", Path(pattern).stem) or "values"
 
 
-def _open_file(path: Path, stack: ExitStack, ending: str | None = None) -> dict[str, StoredArray]:
-    suffix = ending or path.suffix.lower()
-    if suffix not in _READERS:
+def _open_file(
+    path: Path, stack: ExitStack, reader: ArrayReader | None = None
+) -> dict[str, StoredArray]:
+    suffix = path.suffix.lower()
+    reader = reader or ARRAY_READERS.get(suffix)
+    if reader is None:
         raise SourceError(
-            f"{path}: unknown ending {suffix!r}, expected one of {', '.join(sorted(_READERS))}"
+            f"{path}: unknown ending {suffix!r}, expected one of {', '.join(sorted(ARRAY_READERS))}"
         )
     if path.is_file() and path.stat().st_size == 0:
         raise SourceError(f"{path}: is empty")
     with reading(path):
-        return {array.name: array for array in _READERS[suffix](path, stack)}
+        return {array.name: array for array in reader(path, stack)}
 
 
 def _series(
-    paths: Sequence[Path], name: str, first: StoredArray, ending: str | None
+    paths: Sequence[Path], name: str, first: StoredArray, reader: ArrayReader | None
 ) -> StoredArray:
     def read(key: Key) -> NDArray[Any]:
         chosen = paths[key[0]]
         check_samples(str(chosen[0]), len(chosen) * prod(first.shape))
-        whole = [_read_whole(path, name, first.shape, ending) for path in chosen]
+        whole = [_read_whole(path, name, first.shape, reader) for path in chosen]
         return np.stack([values[key[1:]] for values in whole])
 
     dims = ("time", *first.dims) if first.dims else ()
@@ -181,9 +188,11 @@ def _series(
     )
 
 
-def _read_whole(path: Path, name: str, shape: tuple[int, ...], ending: str | None) -> NDArray[Any]:
+def _read_whole(
+    path: Path, name: str, shape: tuple[int, ...], reader: ArrayReader | None
+) -> NDArray[Any]:
     with ExitStack() as stack:
-        array = _open_file(path, stack, ending).get(name)
+        array = _open_file(path, stack, reader).get(name)
         if array is None or array.shape != shape:
             found = "none" if array is None else f"one of shape {array.shape}"
             raise SourceError(
@@ -580,12 +589,20 @@ def _csv(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
     yield StoredArray("", values.shape, lambda key: values[key])
 
 
-def _csv_matrix(path: Path) -> NDArray[np.float32]:
+def exported_table(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
+    """A matrix behind lines of text, as cameras' programs export it; an `ArrayReader`."""
+    skipped = lines_of_text(path)
+    values = _csv_matrix(path, skipped)
+    attributes = {"lines_of_text": skipped}
+    yield StoredArray("", values.shape, lambda key: values[key], attributes=attributes)
+
+
+def _csv_matrix(path: Path, skipped: int = 0) -> NDArray[np.float32]:
     import pandas as pd
 
-    table = TextTable.look_at(path)
+    table = TextTable.look_at(path, skipped)
     with path.open(encoding="utf-8-sig") as stream:
-        values = pd.read_csv(stream, header=None, **table.options)
+        values = pd.read_csv(stream, header=None, skiprows=skipped, **table.options)
     for column, kind in enumerate(values.dtypes):
         if kind.kind not in _KINDS:
             raise SourceError(
@@ -595,7 +612,7 @@ def _csv_matrix(path: Path) -> NDArray[np.float32]:
     return np.asarray(values.to_numpy(np.float32))
 
 
-_READERS: Final[Mapping[str, Callable[[Path, ExitStack], Iterator[StoredArray]]]] = {
+ARRAY_READERS: Final[Mapping[str, ArrayReader]] = {
     ".npy": _npy,
     ".npz": _npz,
     ".h5": _hdf5,
@@ -614,3 +631,4 @@ _READERS: Final[Mapping[str, Callable[[Path, ExitStack], Iterator[StoredArray]]]
     ".txt": _csv,
     ".dat": _csv,
 }
+"""Readers of arrays by the ending of the file's name."""

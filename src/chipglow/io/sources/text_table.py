@@ -1,5 +1,6 @@
 """How a table in text is written: what is between its numbers, and whether it is whole."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,8 @@ from chipglow.io.sources.source import SourceError
 _LARGEST_TABLE: Final = 1_000_000_000
 _LONGEST_LINE: Final = 4_000_000
 _MOST_COMMENTS: Final = 1000
+_NUMBER: Final = r"[-+]?(?:\d++(?:[.,]\d*+)?|[.,]\d++)(?:[eE][-+]?\d++)?|nan"
+_NUMBERS: Final = re.compile(rf"(?:{_NUMBER})(?:[;,\s]\s*+(?:{_NUMBER}))*+[;,\s]*", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -34,8 +37,15 @@ class TextTable:
         return [cell.strip().strip("\"'") for cell in _split(self.first, separator)]
 
     @classmethod
-    def look_at(cls, path: Path) -> "TextTable":
+    def look_at(cls, path: Path, skipped: int = 0) -> "TextTable":
         """Find out how a table is written, from its first lines.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+        skipped : int
+            Number of lines before the table.
 
         Raises
         ------
@@ -46,7 +56,7 @@ class TextTable:
             raise SourceError(
                 f"{path}: has {path.stat().st_size} bytes, expected up to {_LARGEST_TABLE}"
             )
-        first, second = _two_lines(path)
+        first, second = _two_lines(path, skipped)
         separator = next((mark for mark in ";\t," if mark in first), r"\s+")
         text = second or first
         decimal = "," if separator != "," and "," in text and "." not in text else "."
@@ -72,10 +82,24 @@ def _last_line(path: Path) -> str:
     return next((line for line in reversed(known) if line), "")
 
 
-def _two_lines(path: Path) -> tuple[str, str]:
-    """The first two lines that are no comments."""
+def lines_of_text(path: Path) -> int:
+    """Number of lines before the first one that holds nothing but numbers; 0 if there is none."""
+    with path.open(encoding="utf-8-sig") as stream:
+        for number in range(_MOST_COMMENTS):
+            line = stream.readline(_LONGEST_LINE)
+            if not line:
+                return 0
+            if _NUMBERS.fullmatch(line.split("#")[0].strip()):
+                return number
+    return 0
+
+
+def _two_lines(path: Path, skipped: int) -> tuple[str, str]:
+    """The first two lines that are no comments, of those behind the skipped ones."""
     lines: list[str] = []
     with path.open(encoding="utf-8-sig") as stream:
+        for _ in range(skipped):
+            stream.readline(_LONGEST_LINE)
         for _ in range(_MOST_COMMENTS):
             line = stream.readline(_LONGEST_LINE)
             if len(line) == _LONGEST_LINE:
