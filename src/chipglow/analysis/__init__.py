@@ -2,6 +2,8 @@
 
 from chipglow.analysis.band_error import BandErrors, band_errors
 from chipglow.analysis.chip import ChipMetrics, ChipScan, chip_metrics
+from chipglow.analysis.edge_image import EdgeImage, edge_image
+from chipglow.analysis.edge_line import EdgeLine, NoEdgeError, find_edge
 from chipglow.analysis.emissivity import (
     EmissivityLine,
     EmissivityMap,
@@ -18,30 +20,42 @@ from chipglow.analysis.error import (
     reference_temperature,
 )
 from chipglow.analysis.inertia import Inertia, inertia
+from chipglow.analysis.knife_edge import EdgeResult, KnifeEdge, knife_edge
 from chipglow.analysis.lines import Line, sample, straight_line
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
+from chipglow.analysis.psf_fit import ModelFit
+from chipglow.analysis.radial_psf import RadialPSF
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
 from chipglow.analysis.regions import Area, Circle, Polygon, Region, areas, shared_pixels
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
 from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear_band
+from chipglow.analysis.size_of_source import ApertureImage, aperture_image
 
 __all__ = [
     "PAPER",
+    "ApertureImage",
     "Area",
     "BandErrors",
     "ChipMetrics",
     "ChipScan",
     "Circle",
+    "EdgeImage",
+    "EdgeLine",
+    "EdgeResult",
     "EmissivityLine",
     "EmissivityMap",
     "ErrorImages",
     "Heating",
     "Inertia",
+    "KnifeEdge",
     "Line",
+    "ModelFit",
+    "NoEdgeError",
     "NoShearBandError",
     "Plan",
     "Polygon",
+    "RadialPSF",
     "RakeErrors",
     "ReferenceKind",
     "Region",
@@ -52,16 +66,20 @@ __all__ = [
     "ShearBand",
     "StudyResult",
     "analyse",
+    "aperture_image",
     "areas",
     "band_errors",
     "chip_metrics",
     "contact_length",
     "determine_emissivity",
+    "edge_image",
     "emissivity_covariance",
     "emissivity_line",
     "error_images",
+    "find_edge",
     "find_shear_band",
     "inertia",
+    "knife_edge",
     "rake_errors",
     "reference_temperature",
     "sample",

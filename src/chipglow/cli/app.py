@@ -12,6 +12,7 @@ from chipglow.cli.boundary import Boundary
 from chipglow.cli.calibrate import calibrate
 from chipglow.cli.convert import convert
 from chipglow.cli.emissivity import emissivity
+from chipglow.cli.psf import psf
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 
@@ -293,6 +294,9 @@ def clear() -> None:
     from chipglow.study.cache import cache_folder, clear_cache
 
     print(f"{_megabytes(clear_cache())} freed in {cache_folder()}")
+
+
+app.command("psf")(psf)
 
 
 def _megabytes(size: int) -> str:

@@ -15,6 +15,7 @@ from chipglow.io.measurement_file import (
     write_measurement,
 )
 from chipglow.io.movie_file import check_movie_path, movie_writer
+from chipglow.io.psf_file import write_psf
 from chipglow.io.scene_file import (
     FORMAT_VERSION,
     SceneWriter,
@@ -53,5 +54,6 @@ __all__ = [
     "write_emissivity_table",
     "write_hcc",
     "write_measurement",
+    "write_psf",
     "write_scene",
 ]

@@ -5,6 +5,7 @@ from chipglow.study.calibration_schema import CalibrationDescription
 from chipglow.study.emissivity import surface_text
 from chipglow.study.files import (
     StudyError,
+    load_apertures,
     load_calibration,
     load_description,
     load_import,
@@ -43,6 +44,7 @@ __all__ = [
     "import_text",
     "is_cut",
     "kept_progress",
+    "load_apertures",
     "load_calibration",
     "load_description",
     "load_import",

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from chipglow.analysis.regions import Region
 from chipglow.camera import FittedCalibration
+from chipglow.study.apertures import ApertureList
 from chipglow.study.calibration_schema import CalibrationDescription
 from chipglow.study.import_schema import ImportDescription
 from chipglow.study.measurement_schema import MeasurementDescription
@@ -124,6 +125,32 @@ def load_regions(path: str | Path) -> tuple[Region, ...]:
     """
     path = Path(path)
     return _validated(RegionsDescription, read_yaml(path), path.name, path.parent).build()
+
+
+def load_apertures(path: str | Path) -> list[tuple[Path, float]]:
+    """Read a list of images of apertures from a YAML file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file: ``apertures: [{file: small.nc, diameter: 50 um}, ...]``. Images are looked up
+        beside it.
+
+    Returns
+    -------
+    list of tuple
+        Each image's file and the aperture's diameter in m.
+
+    Raises
+    ------
+    StudyError
+        If the file is no YAML or no such list.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    found = _validated(ApertureList, read_yaml(path), path.name, path.parent)
+    return [(Path(aperture.file), aperture.diameter) for aperture in found.apertures]
 
 
 def read_yaml(path: Path) -> Any:
