@@ -31,6 +31,12 @@ from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
 from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear_band
 from chipglow.analysis.size_of_source import ApertureImage, aperture_image
+from chipglow.analysis.temperature import (
+    KnownEmissivity,
+    Surroundings,
+    TrueTemperature,
+    true_temperature,
+)
 
 __all__ = [
     "PAPER",
@@ -49,6 +55,7 @@ __all__ = [
     "Heating",
     "Inertia",
     "KnifeEdge",
+    "KnownEmissivity",
     "Line",
     "ModelFit",
     "NoEdgeError",
@@ -65,6 +72,8 @@ __all__ = [
     "Setting",
     "ShearBand",
     "StudyResult",
+    "Surroundings",
+    "TrueTemperature",
     "analyse",
     "aperture_image",
     "areas",
@@ -87,4 +96,5 @@ __all__ = [
     "sensitivity",
     "shared_pixels",
     "straight_line",
+    "true_temperature",
 ]

@@ -142,7 +142,7 @@ def _drawn(fit: ModelFit, generator: np.random.Generator) -> NDArray[np.float64]
     spread = vectors * np.sqrt(np.maximum(values, 0.0))
     drawn = fit.values + generator.standard_normal((_REPEATS, values.size)) @ spread.T
     low, high = fit.model.bounds(0.0, np.inf)
-    return np.clip(drawn, low, high)
+    return np.asarray(np.clip(drawn, low, high))
 
 
 def _spread(values: NDArray[np.float64]) -> NDArray[np.float64]:
