@@ -120,6 +120,7 @@ def test_the_air_takes_what_flirs_formula_says(tmp_path):
     air = np.array([1.9, -0.9]) @ np.exp(-thick)
     assert recording.object_parameters.transmission == pytest.approx(0.9 * air, rel=1e-6)
     assert recording.object_parameters.atmosphere == pytest.approx(292.15)
+    assert any("a window that lets 90 % pass, at 20 degC" in note for note in recording.notes)
 
 
 def test_what_a_camera_cannot_have_been_told_is_left_out_and_said(tmp_path):

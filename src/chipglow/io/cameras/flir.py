@@ -398,10 +398,15 @@ def _object(fields: _Fields, notes: list[str]) -> ObjectParameters:
     if distance is not None and humidity is not None and atmosphere is not None:
         share = humidity / 100 if humidity > 2 else humidity
         notes.append(
-            f"The camera was told of an object at {distance:g} m, a humidity of {share * 100:g} % "
-            f"and a window that lets {transmission * 100:g} % pass."
+            f"The camera was told of an object at {distance:g} m and a humidity of "
+            f"{share * 100:g} %."
         )
         transmission *= _through_air(fields, distance, share, atmosphere)
+    if window is not None and window != 1:
+        notes.append(
+            f"The camera was told of a window that lets {window * 100:g} % pass, at "
+            f"{fields.number(0x30, 'f') - _ZERO:g} degC; here it is as warm as the air."
+        )
     return object_parameters(
         notes,
         emissivity=_finite(fields, 0x20),

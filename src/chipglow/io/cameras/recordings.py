@@ -98,7 +98,7 @@ def read_recording(
     path : str or Path
         The file. Of TIFF and tables also a pattern with ``*``: a file a frame.
     frames : slice, optional
-        Which frames to read, all by default; no others are.
+        Which frames to read, all by default; the others are not read.
     format : str, optional
         One of `CAMERA_FORMATS`; found by the file's content and name by default.
     quantity : {"counts", "radiance", "temperature"}, optional
