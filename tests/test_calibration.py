@@ -184,10 +184,12 @@ def test_sakuma_hattori_needs_more_points():
         ({"covariance": -np.eye(2)}, "variance is negative"),
         ({"covariance": np.full((2, 2), np.nan)}, "not finite"),
         ({"lowest": 900.0, "highest": 800.0}, "lowest is 900.0 K and highest 800.0 K"),
+        ({"highest": np.inf}, "temperatures of black bodies"),
     ],
 )
 def test_impossible_calibrations_are_refused(changed, message):
     right = {"band": BAND, "parameters": np.array([0.0, 1.0]), "covariance": np.eye(2)}
+    right |= {"lowest": 600.0, "highest": 900.0}
     with pytest.raises(ValueError, match=message):
         LinearCalibration(**(right | changed))
 

@@ -1,5 +1,6 @@
 """From a camera's file to a measurement's: descriptions, calibration files, commands."""
 
+import camera_files
 import numpy as np
 import pytest
 import yaml
@@ -10,6 +11,7 @@ from chipglow.cli import app
 from chipglow.io import is_measurement, read_measurement, write_measurement
 from chipglow.io.column_file import POINT_COLUMNS, read_bad_pixels, read_columns, read_response
 from chipglow.radiometry import Band, TabulatedResponse
+from chipglow.scene import ToolGeometry
 from chipglow.study import (
     CalibrationDescription,
     MeasurementDescription,
@@ -123,6 +125,7 @@ def test_a_calibration_comes_back_from_its_file(tmp_path):
         ("model", "cubic", "model: 'cubic', expected"),
         ("parameters", {"offset": 1.0}, "parameters: offset, expected offset, gain"),
         ("parameters", {"offset": 1.0, "gain": -2.0}, "gain is -2"),
+        ("parameters", {"offset": 1.0, "gain": 0.0}, "gain is 0"),
         ("covariance", [[1.0, 0.0], [0.0]], "covariance: rows are of different lengths"),
         ("lowest", "2000 degC", "lowest is 2273.15 K and highest"),
         ("response", [[3.8, 1.0, 2.0]], "response: expected pairs"),
@@ -139,6 +142,17 @@ def test_an_impossible_calibration_file_is_one_clear_error(
         load_calibration(tmp_path / "bad.yaml")
     assert str(caught.value).startswith("bad.yaml: ")
     assert "\n" not in str(caught.value)
+
+
+def test_counts_that_fall_are_no_calibration(tmp_path):
+    described = {
+        "model": "sakuma-hattori", "band": "3.8-5.1 um", "lowest": "300 degC",
+        "highest": "900 degC", "parameters": {"offset": 0.0, "A": -4e-6, "B": 1e-2, "C": 1e5},
+        "covariance": np.eye(4).tolist(),
+    }  # fmt: skip
+    (tmp_path / "falls.yaml").write_text(yaml.safe_dump(described))
+    with pytest.raises(StudyError, match="counts fall with the temperature"):
+        load_calibration(tmp_path / "falls.yaml")
 
 
 def test_tables_are_read_with_their_units(tmp_path):
@@ -263,6 +277,22 @@ def test_object_parameters_are_said_or_as_recorded(laboratory, tmp_path):
     expected = 0.5 * BAND.radiance(900.0) + 0.5 * BAND.radiance(293.15)
     np.testing.assert_allclose(told.radiance, expected, rtol=1e-6)
     assert "emissivity 0.5" in told.data.attrs["object_parameters"]
+
+
+def test_a_flir_sequence_by_its_makers_conversion(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    counts = camera_files.pictures()
+    (tmp_path / "chip.seq").write_bytes(camera_files.seq(counts))
+    measured = load_measurement("chip.seq", ["pitch=50 um", "band=7.5-13 um"])
+    told = camera_files.PLANCK
+    usable = measured.flags == 0
+    assert usable.any()
+    signal = counts[usable] + float(told["o"])
+    expected = told["b"] / np.log(told["r1"] / (told["r2"] * signal) + told["f"])
+    # Radiance is kept in 32 bits.
+    np.testing.assert_allclose(measured.radiance_temperature()[usable], expected, rtol=1e-6)
+    assert "emissivity 0.95" in measured.data.attrs["object_parameters"]
+    assert "not known" in measured.data.attrs["doubtful"]
 
 
 def test_a_response_takes_the_place_of_limits(tmp_path):
@@ -401,10 +431,17 @@ def test_convert_only_looks_without_out(laboratory):
 
 def test_show_shows_a_measurement(laboratory, tmp_path):
     out, plot = tmp_path / "measured.nc", tmp_path / "measured.svg"
-    write_measurement(load_measurement("chip.yaml", ["floor=450 degC"]), out)
+    measured = load_measurement("chip.yaml", ["floor=450 degC"])
+    write_measurement(measured.with_tool(ToolGeometry()), out)
     code, said = run("show", out, "--at", "4 ms", "--plot", plot)
     assert code == 0, said
-    for words in ("40 x 30 of 6 µm", "at 4000 µs", "below the floor", "3.8 µm to 5.1 µm"):
+    for words in (
+        "40 x 30 of 6 µm",
+        "at 4000 µs",
+        "below the floor",
+        "3.8 µm to 5.1 µm",
+        "rake -7°",
+    ):
         assert words in said
     assert plot.read_text().startswith("<?xml")
     code, said = run("show", out, "--at", "1 s")

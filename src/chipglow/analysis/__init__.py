@@ -19,6 +19,7 @@ from chipglow.analysis.error import (
     error_images,
     reference_temperature,
 )
+from chipglow.analysis.find_tool import FoundTool, find_tool
 from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.knife_edge import EdgeResult, KnifeEdge, knife_edge
 from chipglow.analysis.lines import Line, sample, straight_line
@@ -26,6 +27,7 @@ from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
 from chipglow.analysis.psf_fit import ModelFit
 from chipglow.analysis.radial_psf import RadialPSF
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
+from chipglow.analysis.rake_grid import RakeGrid, rake_grid
 from chipglow.analysis.regions import Area, Circle, Polygon, Region, areas, shared_pixels
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
@@ -52,6 +54,7 @@ __all__ = [
     "EmissivityLine",
     "EmissivityMap",
     "ErrorImages",
+    "FoundTool",
     "Heating",
     "Inertia",
     "KnifeEdge",
@@ -64,6 +67,7 @@ __all__ = [
     "Polygon",
     "RadialPSF",
     "RakeErrors",
+    "RakeGrid",
     "ReferenceKind",
     "Region",
     "RegionEmissivity",
@@ -87,9 +91,11 @@ __all__ = [
     "error_images",
     "find_edge",
     "find_shear_band",
+    "find_tool",
     "inertia",
     "knife_edge",
     "rake_errors",
+    "rake_grid",
     "reference_temperature",
     "sample",
     "segmentation",

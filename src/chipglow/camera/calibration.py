@@ -3,14 +3,17 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from math import inf
-from typing import Any, ClassVar, final
+from typing import Any, ClassVar, Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.camera.recording import PlanckConversion
 from chipglow.radiometry import Band
+from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT
+
+_CHECKED: Final = 101
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,6 +95,12 @@ class FittedCalibration(Calibration):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not (self.lowest >= TABLE_COLDEST and self.highest <= TABLE_HOTTEST):
+            raise ValueError(
+                f"calibration: lowest is {self.lowest:g} K and highest {self.highest:g} K, "
+                f"expected the temperatures of black bodies, {TABLE_COLDEST:g} to "
+                f"{TABLE_HOTTEST:g} K"
+            )
         count = len(self.NAMES)
         if self.parameters.shape != (count,) or self.covariance.shape != (count, count):
             raise ValueError(
@@ -118,6 +127,13 @@ class FittedCalibration(Calibration):
     @abstractmethod
     def temperature(self, counts: ArrayLike) -> NDArray[np.float64]:
         """Temperature in K of the black body that gives these counts; NaN where there is none."""
+
+    @property
+    def rises(self) -> bool:
+        """Whether the counts rise with the temperature wherever it holds."""
+        kelvins = np.linspace(self.lowest, self.highest, _CHECKED)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            return bool((self.slope(kelvins) > 0).all())
 
     def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
         """In-band radiance in W/(m² sr) of counts, of the same shape; NaN where there is none."""

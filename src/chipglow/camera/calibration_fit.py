@@ -146,7 +146,7 @@ def fit_linear(
     )
     radiance = np.asarray(band.radiance(points.temperatures), np.float64)
     gain, offset = np.polyfit(radiance, points.counts, 1)
-    start = _expect_rising(gain, np.array([offset, gain]))
+    _expect_rising(gain > 0)
 
     def build(parameters: NDArray[np.float64], covariance: NDArray[Any]) -> LinearCalibration:
         return LinearCalibration(
@@ -159,7 +159,7 @@ def fit_linear(
             covariance=covariance,
         )
 
-    return _fit(points, start, build)
+    return _fit(points, np.array([offset, gain]), build)
 
 
 def fit_sakuma_hattori(
@@ -211,7 +211,8 @@ def _first_guess(
     a, b = mean * (1 - 6 * relative), SECOND_RADIATION_CONSTANT * relative / 2
     form = build(np.array([0.0, a, b, 1.0]), np.zeros((4, 4))).counts(points.temperatures)
     scale, offset = np.polyfit(form, points.counts, 1)
-    return _expect_rising(scale, np.array([offset, a, b, scale]))
+    _expect_rising(scale > 0)
+    return np.array([offset, a, b, scale])
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,12 +285,11 @@ def _uncertainty(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> 
     return values
 
 
-def _expect_rising(rise: float, start: NDArray[np.float64]) -> NDArray[np.float64]:
-    if not rise > 0:
+def _expect_rising(rises: bool) -> None:
+    if not rises:
         raise ValueError(
             "calibration: the counts do not rise with the temperature, expected counts that do"
         )
-    return start
 
 
 def _fit(
@@ -313,6 +313,7 @@ def _fit(
             break
     else:
         raise ValueError("calibration: the fit does not settle, expected smoother points")
+    _expect_rising(calibration.rises)
     residuals = points.counts - calibration.counts(points.temperatures)
     if not points.stated:
         free = points.counts.size - start.size

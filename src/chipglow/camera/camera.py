@@ -223,7 +223,7 @@ class Camera:
         Returns
         -------
         Measurement
-            As many frames as starts.
+            As many frames as starts; it tells the scene's tool.
 
         Raises
         ------
@@ -232,10 +232,11 @@ class Camera:
         """
         self.sensors(scene.raster)
         emissivity = surface.on(scene)
-        return self.develop(
+        measured = self.develop(
             expose(scene, emissivity, self.band, at, self.integration_time, self.reflected)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
         )
+        return measured.with_tool(scene.tool) if scene.tool else measured
 
     def _read_out(self, exposure: Exposure, sensors: Raster) -> NDArray[np.float64]:
         """Radiance of every sensor, shape `sensors.shape`."""

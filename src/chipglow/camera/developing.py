@@ -1,14 +1,14 @@
 """From what a camera wrote to a measurement."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera.bad_pixels import replace_bad_pixels
-from chipglow.camera.calibration import Calibration, MakersCalibration
+from chipglow.camera.calibration import Calibration, FittedCalibration, MakersCalibration
 from chipglow.camera.measurement import Flag, Measurement
 from chipglow.camera.nonuniformity import NonUniformity
 from chipglow.camera.recording import Recording
@@ -20,6 +20,8 @@ MIRRORS: Final = ("none", "horizontal", "vertical")
 
 _SAME: Final = 0.01
 """Relative difference up to which two integration times or limits of bands are the same."""
+_PIXELS_AT_ONCE: Final = 1 << 22
+_NODES: Final = 513
 _ASSUMED: Final = "Assumed: "
 """How notes of a recording begin that are no more than that."""
 _FULL_SCALES: Final = tuple(2**bits - 1 for bits in (8, 10, 12, 13, 14, 16))
@@ -127,23 +129,33 @@ def develop_recording(
             "uniform frames: the recording holds temperatures, which are not linear in light, "
             "expected counts or radiance"
         )
-    signal, flags = _repaired(recording, non_uniformity, bad_pixels)
-    radiance, uncertainty = _radiance(recording, calibration, band, signal)
+    parts = [
+        _develop_frames(part, calibration, band, non_uniformity, bad_pixels)
+        for part in _parts(recording)
+    ]
+    known = [part.uncertainty for part in parts if part.uncertainty is not None]
+    radiance = position.place(np.concatenate([part.radiance for part in parts]))
     if calibration is not None:
         floor = max(floor or 0.0, calibration.lowest) or None
-        hotter = band.temperature(radiance) > calibration.highest
-        flags |= np.where(hotter, Flag.SATURATED, 0).astype(np.uint8)
-    placed = position.place(radiance)
     return Measurement.from_radiance(
-        placed,
+        radiance,
         band,
         recording.times,
-        position.raster((placed.shape[1], placed.shape[2]), recording.pitch),
+        position.raster((radiance.shape[1], radiance.shape[2]), recording.pitch),
         floor,
-        position.place(flags),
-        None if uncertainty is None else position.place(uncertainty),
-        _attributes(recording, calibration, position, uncertainty is not None),
+        position.place(np.concatenate([part.flags for part in parts])),
+        position.place(np.concatenate(known)) if known else None,
+        _attributes(recording, calibration, position, bool(known)),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Developed:
+    """Radiance, flags and, if it is known, uncertainty of some frames, of shape (time, y, x)."""
+
+    radiance: NDArray[np.float32]
+    flags: NDArray[np.uint8]
+    uncertainty: NDArray[np.float32] | None
 
 
 def _calibration(recording: Recording, given: Calibration | None) -> Calibration | None:
@@ -207,6 +219,30 @@ def _band_text(band: Band) -> str:
     return f"{1e6 * band.lower:g}-{1e6 * band.upper:g} um"
 
 
+def _parts(recording: Recording) -> Iterator[Recording]:
+    """Some frames after the other: the numbers in between take several times the memory."""
+    step = max(_PIXELS_AT_ONCE // recording.signal[0].size, 1)
+    for start in range(0, len(recording.times), step):
+        some = slice(start, start + step)
+        yield replace(recording, signal=recording.signal[some], times=recording.times[some])
+
+
+def _develop_frames(
+    recording: Recording,
+    calibration: Calibration | None,
+    band: Band,
+    non_uniformity: NonUniformity | None,
+    bad_pixels: NDArray[np.bool_] | None,
+) -> _Developed:
+    """Radiance in 32 bits, which hold more than counts can tell, with flags and uncertainty."""
+    signal, flags = _repaired(recording, non_uniformity, bad_pixels)
+    radiance = _radiance(recording, calibration, band, signal)
+    if calibration is not None and calibration.highest < np.inf:
+        flags[radiance > band.radiance(calibration.highest)] |= np.uint8(Flag.SATURATED)
+    uncertainty = _uncertainty(calibration, signal)
+    return _Developed(radiance.astype(np.float32), flags, uncertainty)
+
+
 def _repaired(
     recording: Recording,
     non_uniformity: NonUniformity | None,
@@ -237,10 +273,11 @@ def _over(
     over: NDArray[np.bool_], bad: NDArray[np.bool_], replaced: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     """A replaced sensor is saturated if a neighbour is: its median cannot be trusted."""
-    result = over & ~bad
+    trusted = over & ~bad
+    result = trusted.copy()
     for y, x in np.argwhere(replaced):
         around = np.s_[:, max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]
-        result[:, y, x] = (over & ~bad)[around].any(axis=(1, 2))
+        result[:, y, x] = trusted[around].any(axis=(1, 2))
     return result
 
 
@@ -249,13 +286,27 @@ def _radiance(
     calibration: Calibration | None,
     band: Band,
     signal: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+) -> NDArray[np.float64]:
     if calibration is not None:
-        return calibration.radiance(signal), calibration.uncertainty(signal)
+        return calibration.radiance(signal)
     if recording.quantity == "radiance":
-        return signal, None
+        return signal
     told = recording.object_parameters or ObjectParameters()
-    return told.apparent_radiance(signal, band), None
+    return told.apparent_radiance(signal, band)
+
+
+def _uncertainty(
+    calibration: Calibration | None, signal: NDArray[np.float64]
+) -> NDArray[np.float32] | None:
+    """From a table over the calibrated range: it is smooth, and there are many pixels."""
+    if calibration is None:
+        return None
+    if isinstance(calibration, FittedCalibration):
+        coldest, hottest = calibration.counts([calibration.lowest, calibration.highest]).tolist()
+        counts = np.linspace(coldest, hottest, _NODES)
+        return np.interp(signal, counts, calibration.uncertainty(counts)).astype(np.float32)
+    values = calibration.uncertainty(signal)
+    return None if values is None else values.astype(np.float32)
 
 
 def _attributes(

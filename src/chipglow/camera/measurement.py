@@ -10,8 +10,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.radiometry import Band, TabulatedResponse
-from chipglow.scene import Raster
+from chipglow.scene import Raster, Tool
 from chipglow.scene.scene import raster_coordinates
+from chipglow.scene.tool_attributes import stored_tool, tool_attributes
 
 MEASUREMENT_UNITS: Final = {"radiance_temperature": "K", "radiance": "W m-2 sr-1", "flags": "1"}
 """The variables that every measurement has, and their units."""
@@ -46,9 +47,9 @@ class Measurement:
         ``x`` ascending and ``y`` descending in m, the middles of the sensors. Attributes tell the
         camera; ``pitch`` is the distance between sensors in m, ``band_lower`` and ``band_upper``
         in m limit the band. Of a band that is not shaped like a box, ``response`` over
-        ``wavelength`` in m is the relative spectral response. ``calibration_uncertainty``, of the
-        shape and unit of ``radiance``, may be there: its standard uncertainty from the
-        calibration, which is common to all pixels and frames.
+        ``wavelength`` in m is the relative spectral response. A tool may be told as in a scene.
+        ``calibration_uncertainty``, of the shape and unit of ``radiance``, may be there: its
+        standard uncertainty from the calibration, which is common to all pixels and frames.
 
     Raises
     ------
@@ -166,6 +167,30 @@ class Measurement:
         """The grid of the sensors."""
         x, y, pitch = self.data["x"].values, self.data["y"].values, float(self.data.attrs["pitch"])
         return Raster(float(x[0]) - pitch / 2, float(y[0]) + pitch / 2, pitch, len(y), len(x))
+
+    @property
+    def tool(self) -> Tool | None:
+        """The tool in the measurement's coordinates, if it is told.
+
+        Raises
+        ------
+        ValueError
+            If what is told is no tool that can be.
+        """
+        return stored_tool(self.data.attrs)
+
+    def with_tool(self, tool: Tool) -> "Measurement":
+        """The same frames, telling the tool.
+
+        Parameters
+        ----------
+        tool : Tool
+            The tool in the measurement's coordinates.
+        """
+        other = {k: v for k, v in self.data.attrs.items() if not str(k).startswith("tool_")}
+        data = self.data.copy(deep=False)
+        data.attrs = {**other, **tool_attributes(tool)}
+        return Measurement(data)
 
     @property
     def flags(self) -> NDArray[np.uint8]:

@@ -13,6 +13,7 @@ from chipglow.cli.calibrate import calibrate
 from chipglow.cli.convert import convert
 from chipglow.cli.emissivity import emissivity
 from chipglow.cli.psf import psf
+from chipglow.cli.rake import rake
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 
@@ -268,9 +269,10 @@ def materials(
         print(plot)
 
 
-app.command("emissivity")(emissivity)
 app.command("calibrate")(calibrate)
 app.command("convert")(convert)
+app.command("emissivity")(emissivity)
+app.command("rake")(rake)
 
 
 @cache_app.command("list")

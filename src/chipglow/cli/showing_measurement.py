@@ -1,6 +1,7 @@
 """What is in a measurement, as text and as a picture."""
 
 from collections.abc import Iterator
+from math import degrees
 from pathlib import Path
 from typing import Final
 
@@ -21,7 +22,7 @@ _FLAG_NAMES: Final = {
     Flag.DEAD: "dead",
     Flag.REPLACED: "replaced by neighbours",
 }
-_SAID_APART: Final = ("assumed", "doubtful", "band_lower", "band_upper", "pitch")
+_SAID_APART: Final = ("assumed", "doubtful", "band_lower", "band_upper", "pitch", "tool_")
 
 
 def show_measurement(path: Path, at: str | None, plot: Path | None) -> None:
@@ -67,7 +68,9 @@ def say_measurement(measurement: Measurement, time: float | None = None) -> None
     console = Console(highlight=False, markup=False)
     console.print(listed(_facts(measurement, summary)))
     attributes = {
-        name: value for name, value in measurement.data.attrs.items() if name not in _SAID_APART
+        str(name): value
+        for name, value in measurement.data.attrs.items()
+        if not str(name).startswith(_SAID_APART)
     }
     if attributes:
         console.print("\nAttributes:")
@@ -89,6 +92,10 @@ def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tu
         band = measurement.band
         shape = "" if band.response is None else ", with a response curve"
         yield "band", f"{1e6 * band.lower:.4g} µm to {1e6 * band.upper:.4g} µm{shape}"
+    if measurement.tool is not None:
+        angles = measurement.tool.rake_angle, measurement.tool.clearance_angle
+        rake, clearance = (f"{degrees(angle):.4g}°" for angle in angles)
+        yield "tool", f"rake {rake}, clearance {clearance}"
     yield "radiance temperature", _celsius(summary.overall)
     yield f"at {microseconds(times[summary.index])}", _celsius(summary.now)
     if summary.uncertainty is None:

@@ -16,6 +16,7 @@ from chipglow.io.measurement_file import (
 )
 from chipglow.io.movie_file import check_movie_path, movie_writer
 from chipglow.io.psf_file import write_psf
+from chipglow.io.rake_grid_file import check_rake_grid_path, write_rake_grid
 from chipglow.io.scene_file import (
     FORMAT_VERSION,
     SceneWriter,
@@ -38,6 +39,7 @@ __all__ = [
     "atomic_folder",
     "atomic_path",
     "check_movie_path",
+    "check_rake_grid_path",
     "import_scene",
     "is_measurement",
     "movie_writer",
@@ -55,5 +57,6 @@ __all__ = [
     "write_hcc",
     "write_measurement",
     "write_psf",
+    "write_rake_grid",
     "write_scene",
 ]

@@ -6,6 +6,7 @@ from chipglow.report.emissivity_figure import draw_emissivity
 from chipglow.report.measurement_figure import draw_measurement
 from chipglow.report.measurement_summary import MeasurementSummary, measurement_summary
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
+from chipglow.report.rake_figure import draw_rake_grid
 from chipglow.report.report import write_report
 from chipglow.report.scene_figure import draw_scene
 from chipglow.report.scene_summary import (
@@ -30,6 +31,7 @@ __all__ = [
     "draw_calibrations",
     "draw_emissivity",
     "draw_measurement",
+    "draw_rake_grid",
     "draw_scene",
     "measurement_summary",
     "scene_summary",

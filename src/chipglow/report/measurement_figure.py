@@ -53,7 +53,7 @@ def draw_measurement(measurement: Measurement, time: float | None = None) -> Fig
         panel = ImagePanel(
             title, "radiance temperature / °C", celsius, _ends(celsius), drawing.HEAT
         )
-        panel.draw(figure, upper, raster, None)
+        panel.draw(figure, upper, raster, measurement.tool)
         upper.set_xlabel("x / µm")
         upper.tick_params(labelbottom=True)
         _draw_flags(upper, flags, measurement)

@@ -1,5 +1,6 @@
 """The scene: fields on a regular grid over time, and the tool in it."""
 
+from chipglow.scene.placed_tool import PlacedTool
 from chipglow.scene.raster import Raster
 from chipglow.scene.sampled import READABLE, SampledFrame
 from chipglow.scene.scene import (
@@ -27,6 +28,7 @@ __all__ = [
     "Frame",
     "Hone",
     "Material",
+    "PlacedTool",
     "Raster",
     "SampledFrame",
     "Scene",

@@ -5,6 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from chipglow.scene.placed_tool import PlacedTool
 from chipglow.scene.tool import Chamfer, Hone, Tool, ToolGeometry
 from chipglow.scene.tool_outline import ToolOutline
 
@@ -16,8 +17,11 @@ _HONE: Final = ("tool_hone_rake", "tool_hone_clearance")
 def tool_attributes(tool: Tool) -> dict[str, Any]:
     """The tool as attributes of a dataset: angles in rad, lengths in m.
 
-    An outline is one row of numbers, x and y by turns.
+    An outline is one row of numbers, x and y by turns; the tip of a tool that is not at the origin
+    is x and y.
     """
+    if isinstance(tool, PlacedTool):
+        return {**tool_attributes(tool.tool), "tool_tip": np.array(tool.tip)}
     if isinstance(tool, ToolOutline):
         return {"tool_outline": tool.corners.ravel()}
     assert isinstance(tool, ToolGeometry)
@@ -37,6 +41,14 @@ def stored_tool(attributes: Mapping[str, Any]) -> Tool | None:
     ValueError
         If they describe a tool that cannot be.
     """
+    tool = _tool_at_origin(attributes)
+    if tool is None or "tool_tip" not in attributes:
+        return tool
+    x, y = np.asarray(attributes["tool_tip"], dtype=np.float64).tolist()
+    return PlacedTool(tool, (x, y))
+
+
+def _tool_at_origin(attributes: Mapping[str, Any]) -> Tool | None:
     if "tool_outline" in attributes:
         line = np.asarray(attributes["tool_outline"], dtype=np.float64).reshape(-1, 2)
         return ToolOutline(tuple((float(x), float(y)) for x, y in line))

@@ -21,6 +21,7 @@ from chipglow.study.reference import FieldEntry, field_entries, field_tables
 from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, kept_progress, run
 from chipglow.study.schema import Study
 from chipglow.study.template import calibration_text, import_text, measurement_text, study_text
+from chipglow.study.tool_description import load_tool, tool_of
 
 __all__ = [
     "CUTTING_STEP",
@@ -52,10 +53,12 @@ __all__ = [
     "load_recording",
     "load_regions",
     "load_study",
+    "load_tool",
     "measurement_of",
     "measurement_text",
     "preview_raster",
     "run",
     "study_text",
     "surface_text",
+    "tool_of",
 ]

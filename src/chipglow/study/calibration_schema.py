@@ -91,7 +91,7 @@ class CalibrationDescription(Part):
             )
         if len({len(row) for row in self.covariance}) > 1:
             raise ValueError("covariance: rows are of different lengths, expected a square")
-        return kind(
+        calibration = kind(
             band=Band(*self.band, self._response()),
             lowest=self.lowest,
             highest=self.highest,
@@ -100,6 +100,9 @@ class CalibrationDescription(Part):
             parameters=np.array([self.parameters[name] for name in kind.NAMES]),
             covariance=np.array(self.covariance),
         )
+        if not calibration.rises:
+            raise ValueError("parameters: the counts fall with the temperature, expected a rise")
+        return calibration
 
     def _response(self) -> TabulatedResponse | None:
         if self.response is None:

@@ -42,7 +42,7 @@ def load_study(path: str | Path) -> Study:
         If the file cannot be read.
     """
     path = Path(path)
-    return _validated(Study, read_yaml(path), path.name, path.parent)
+    return validated(Study, read_yaml(path), path.name, path.parent)
 
 
 def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescription:
@@ -96,7 +96,7 @@ def load_calibration(path: str | Path) -> FittedCalibration:
         If the file cannot be read.
     """
     path = Path(path)
-    return _validated(CalibrationDescription, read_yaml(path), path.name, path.parent).build()
+    return validated(CalibrationDescription, read_yaml(path), path.name, path.parent).build()
 
 
 def _described(kind: type[Kind], path: Path, field: str, settings: Iterable[str]) -> Kind:
@@ -105,7 +105,7 @@ def _described(kind: type[Kind], path: Path, field: str, settings: Iterable[str]
     data = read_yaml(path) if described else {field: path.name}
     for setting in settings:
         data = _with(data, setting)
-    return _validated(kind, data, path.name, path.parent)
+    return validated(kind, data, path.name, path.parent)
 
 
 def load_regions(path: str | Path) -> tuple[Region, ...]:
@@ -124,7 +124,7 @@ def load_regions(path: str | Path) -> tuple[Region, ...]:
         If the file cannot be read.
     """
     path = Path(path)
-    return _validated(RegionsDescription, read_yaml(path), path.name, path.parent).build()
+    return validated(RegionsDescription, read_yaml(path), path.name, path.parent).build()
 
 
 def load_apertures(path: str | Path) -> list[tuple[Path, float]]:
@@ -173,7 +173,25 @@ def read_yaml(path: Path) -> Any:
         raise StudyError(f"{path.name}: {_yaml_problem(error)}") from None
 
 
-def _validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
+def validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
+    """What a YAML file holds, as the section that it should be.
+
+    Parameters
+    ----------
+    kind : type
+        The section.
+    data : object
+        As `read_yaml` gives it.
+    name : str
+        The file, as errors call it.
+    folder : Path
+        Where files that it names are looked up.
+
+    Raises
+    ------
+    StudyError
+        If a field is not possible; the message names it, its value and what was expected.
+    """
     try:
         return kind.model_validate(data, context={"folder": folder.resolve()})
     except ValidationError as error:

@@ -121,7 +121,7 @@ class ToolSection(Part):
     @model_validator(mode="after")
     def _nothing_unused(self) -> Self:
         if self.outline:
-            self._refuse_beside("outline", set(type(self).model_fields) - {"outline", "material"})
+            self._refuse_beside("outline", set(ToolSection.model_fields) - {"outline", "material"})
         elif self.hone:
             self._refuse_beside("hone", {"edge_radius"})
         return self

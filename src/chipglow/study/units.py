@@ -160,9 +160,10 @@ def is_bare_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-Length = Annotated[float, Quantity("a length", "m", "um", "6 um")]
 POSITION: Final = Quantity("a position", "m", "um", "-420 um", positive=False)
 Position = Annotated[float, POSITION]
+LENGTH: Final = Quantity("a length", "m", "um", "6 um")
+Length = Annotated[float, LENGTH]
 CutLength = Annotated[float, Quantity("a length", "m", "mm", "0.3 mm")]
 Wavelength = Annotated[float, Quantity("a wavelength", "m", "um", "4.5 um")]
 WAVELENGTHS: Final = Quantity("a band of wavelengths", "m", "um", "3.8-5.1 um")

@@ -1,0 +1,197 @@
+"""The command ``chipglow rake``: the analysis grid on the rake face."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from chipglow.analysis import FoundTool, RakeGrid
+    from chipglow.camera import Measurement
+    from chipglow.scene import Tool
+
+
+def rake(
+    measurement: Annotated[
+        Path, typer.Argument(metavar="MEASUREMENT", help="A measurement's file.")
+    ],
+    tool: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE|found",
+            help="The tool, a YAML file with the keys of a study's cutting.tool and tip; or "
+            "'found', to look for the rake face in the image; by default what the measurement "
+            "tells, as a simulated one does.",
+        ),
+    ] = None,
+    frame: Annotated[
+        str, typer.Option(metavar="N|all", help="Number of the frame, from 0, or all.")
+    ] = "all",
+    at: Annotated[
+        str | None,
+        typer.Option(metavar="TIME", help="Only the frame nearest to this time, such as '2 ms'."),
+    ] = None,
+    pixels: Annotated[
+        float, typer.Option(metavar="NUMBER", help="Side of a square in pixels.")
+    ] = 3.0,
+    depth: Annotated[
+        str, typer.Option(metavar="LENGTH", help="How far into the chip the grid reaches.")
+    ] = "90 um",
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the squares of every frame, .csv or .nc."),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Draw the grid on the image and its profiles, PNG, PDF or SVG."
+        ),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="FIELD=VALUE",
+            help="Set a field of the description of a camera's file; may be repeated.",
+        ),
+    ] = None,
+) -> None:
+    """Average radiance temperature in squares along the rake face, as the paper's Figure 7."""
+    from rich.console import Console
+
+    from chipglow.analysis import rake_grid
+    from chipglow.cli.pictures import check_picture_path, write_picture
+    from chipglow.io import check_rake_grid_path, write_rake_grid
+    from chipglow.report import draw_rake_grid
+    from chipglow.study.measured import load_measurement
+
+    if plot is not None:
+        check_picture_path(plot)
+    if out is not None:
+        check_rake_grid_path(out)
+    reach = _length("--depth", depth)
+    measured = load_measurement(measurement, settings or ())
+    frames = _frames(measured, frame, at)
+    console = Console(highlight=False, markup=False)
+    placed, remarks = _tool(measured, tool)
+    grid = rake_grid(measured, placed, pixels, reach, frames)
+    console.print(_table(grid))
+    for remark in (*remarks, *_remarks(measured, grid)):
+        console.print(remark)
+    if out is not None:
+        write_rake_grid(grid, out)
+        print(out)
+    if plot is not None:
+        write_picture(draw_rake_grid(measured, grid), plot)
+        print(plot)
+
+
+def _length(option: str, text: str) -> float:
+    from chipglow.study.units import LENGTH
+
+    try:
+        return LENGTH.parse(text)
+    except ValueError as error:
+        raise ValueError(f"{option}: {error}") from None
+
+
+def _frames(measurement: "Measurement", frame: str, at: str | None) -> list[int] | None:
+    """Numbers of the chosen frames; None for all."""
+    from chipglow.cli.times import parse_instant
+
+    times = measurement.times
+    if at is not None:
+        if frame != "all":
+            raise ValueError(f"--frame: {frame!r} beside --at, expected one or the other")
+        instant = parse_instant("--at", at)
+        if not times[0] <= instant <= times[-1]:
+            first, last = (f"{1e6 * time:.7g} us" for time in (times[0], times[-1]))
+            raise ValueError(f"--at: {at}, expected {first} to {last}, when frames began")
+        return [int(abs(times - instant).argmin())]
+    if frame == "all":
+        return None
+    if not (frame.isdecimal() and int(frame) < times.size):
+        raise ValueError(f"--frame: {frame!r}, expected 0 to {times.size - 1}, or all")
+    return [int(frame)]
+
+
+def _tool(measurement: "Measurement", tool: str | None) -> "tuple[Tool, list[str]]":
+    """The tool, and what is to be said of it."""
+    from chipglow.analysis import find_tool
+    from chipglow.study import tool_of
+
+    if tool != "found":
+        return tool_of(measurement, tool), []
+    found = find_tool(measurement)
+    return found.tool, [*_found(found), *(f"Doubtful: {doubt}" for doubt in found.doubts)]
+
+
+def _found(found: "FoundTool") -> list[str]:
+    """What was found, with standard uncertainties, and what was assumed."""
+    from math import degrees
+
+    shape, (x, y) = found.tool.tool, (1e6 * part for part in found.tool.tip)
+    return [
+        f"Found: rake angle {degrees(found.tool.rake_angle):.1f} ± "
+        f"{degrees(found.angle_uncertainty):.1f} deg; the rake face to "
+        f"± {1e6 * found.position_uncertainty:.1f} um across itself; tip at x {x:.1f} um, "
+        f"y {y:.1f} um, to ± {1e6 * found.tip_uncertainty:.0f} um along the face (standard "
+        "uncertainties).",
+        f"Assumed: clearance angle {degrees(shape.clearance_angle):.3g} deg, edge radius "
+        f"{1e6 * shape.corner_radius:.3g} um.",
+    ]
+
+
+def _table(grid: "RakeGrid") -> "Table":
+    from rich.table import Table
+
+    several = grid.times.size > 1
+    mean = grid.frame_mean - 273.15
+    deviation = grid.frame_deviation if several else grid.deviation[0]
+    over = f"between {grid.times.size} frames" if several else "over a square's pixels"
+    table = Table(
+        "along / µm",
+        *(f"{1e6 * depth:.4g} µm deep" for depth in grid.depth),
+        box=None,
+        title=f"radiance temperature / °C ± standard deviation {over}",
+        title_justify="left",
+    )
+    for column in table.columns:
+        column.justify = "right"
+        column.no_wrap = True
+    for n, along in enumerate(grid.along):
+        values = zip(mean[:, n], deviation[:, n], strict=True)
+        table.add_row(f"{1e6 * along:.4g}", *(_cell(*value) for value in values))
+    return table
+
+
+def _cell(mean: float, deviation: float) -> str:
+    from math import isnan
+
+    if isnan(mean):
+        return "–"
+    return f"{mean:.1f}" if isnan(deviation) else f"{mean:.1f} ± {deviation:.1f}"
+
+
+def _remarks(measurement: "Measurement", grid: "RakeGrid") -> list[str]:
+    """What is left out, and what is doubtful."""
+    seen, frames = grid.frame_count, grid.times.size
+    remarks = []
+    if (seen == 0).any():
+        remarks.append(
+            f"{int((seen == 0).sum())} of {seen.size} squares are left out (–): a pixel of theirs "
+            "is under the camera's floor, saturated or dead, or outside the image."
+        )
+    partly = int(((seen > 0) & (seen < frames)).sum())
+    if partly:
+        remarks.append(
+            f"Doubtful: {partly} squares are usable in some of the {frames} frames only; their "
+            "means are of those frames, which are the hotter ones where the floor is the reason."
+        )
+    if measurement.calibration_uncertainty is not None:
+        remarks.append(
+            "The uncertainty of the calibration is common to all squares and not in the deviations."
+        )
+    return remarks

@@ -1,0 +1,100 @@
+"""Analysis grids on the rake face in files."""
+
+import csv
+from collections.abc import Iterator
+from math import isnan
+from pathlib import Path
+from typing import Any, Final
+
+import xarray as xr
+
+from chipglow.analysis import RakeGrid
+from chipglow.io.atomic import atomic_path
+from chipglow.io.measurement_file import write_dataset
+from chipglow.scene.tool_attributes import tool_attributes
+
+RAKE_GRID_KINDS: Final = (".csv", ".nc")
+"""Endings of the files that `write_rake_grid` can write."""
+
+_COLUMNS: Final = (
+    "time_us",
+    "depth_um",
+    "along_um",
+    "mean_degC",
+    "deviation_K",
+    "usable_pixels",
+)
+_FREEZING: Final = 273.15
+
+
+def check_rake_grid_path(path: Path) -> None:
+    """Check the name of a grid's file before anything is computed.
+
+    Raises
+    ------
+    ValueError
+        If it ends in something else than `RAKE_GRID_KINDS`.
+    """
+    if path.suffix.lower() not in RAKE_GRID_KINDS:
+        raise ValueError(f"{path}: expected a file that ends in {' or '.join(RAKE_GRID_KINDS)}")
+
+
+def write_rake_grid(grid: RakeGrid, path: Path) -> None:
+    """Write an analysis grid to a file.
+
+    Parameters
+    ----------
+    grid : RakeGrid
+        What to write.
+    path : Path
+        ``.csv``: a line for each square of each frame, with its units in the names of the columns;
+        what is left out has no mean. ``.nc``: NetCDF-4 in SI units with the dimensions (time,
+        depth, along), and the tool as a scene tells it. A file that is there is replaced at the
+        end.
+
+    Raises
+    ------
+    ValueError
+        If the name ends in something else.
+    OSError
+        If the file cannot be written.
+    """
+    check_rake_grid_path(path)
+    if path.suffix.lower() == ".nc":
+        write_dataset(_dataset(grid), path)
+        return
+    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(_COLUMNS)
+        table.writerows(_rows(grid))
+
+
+def _rows(grid: RakeGrid) -> Iterator[tuple[Any, ...]]:
+    for frame, time in enumerate(grid.times):
+        for m, depth in enumerate(grid.depth):
+            for n, along in enumerate(grid.along):
+                place = (f"{1e6 * time:.10g}", f"{1e6 * depth:.10g}", f"{1e6 * along:.10g}")
+                mean, deviation = grid.mean[frame, m, n], grid.deviation[frame, m, n]
+                values = (_number(mean - _FREEZING), _number(deviation))
+                yield (*place, *values, int(grid.count[frame, m, n]))
+
+
+def _number(value: float) -> str:
+    return "" if isnan(value) else f"{value:.4f}"
+
+
+def _dataset(grid: RakeGrid) -> xr.Dataset:
+    dimensions = ("time", "depth", "along")
+    return xr.Dataset(
+        {
+            "mean": (dimensions, grid.mean, {"units": "K", "long_name": "radiance temperature"}),
+            "deviation": (dimensions, grid.deviation, {"units": "K"}),
+            "count": (dimensions, grid.count, {"units": "1"}),
+        },
+        coords={
+            "time": ("time", grid.times, {"units": "s"}),
+            "depth": ("depth", grid.depth, {"units": "m"}),
+            "along": ("along", grid.along, {"units": "m"}),
+        },
+        attrs={"size": grid.size, **tool_attributes(grid.tool)},
+    )

@@ -1,0 +1,199 @@
+"""The rake face found in an image, within the uncertainty that is stated; the command `rake`."""
+
+from math import degrees, radians
+
+import numpy as np
+import pytest
+import xarray as xr
+from analytic_chip import AnalyticChip
+from typer.testing import CliRunner
+
+from chipglow.analysis import find_tool, rake_grid
+from chipglow.camera import Camera, GaussianPSF, Measurement
+from chipglow.cli import app
+from chipglow.io import read_measurement, write_measurement
+from chipglow.radiometry import Band
+from chipglow.scene import PlacedTool, Raster, ToolGeometry
+from chipglow.surface import CHIP_1, CHIP_2
+
+BAND = Band(3.8e-6, 5.1e-6)
+FLOOR = 573.15
+STARTS = [0.0, 10e-6]
+
+
+def look(angle, surface):
+    chip = AnalyticChip(tool=ToolGeometry(rake_angle=radians(angle)), frames=31)
+    camera = Camera(integration_time=5e-6, floor=FLOOR, psf=GaussianPSF(8e-6))
+    return camera.measure(chip.scene(), surface, STARTS)
+
+
+def noisy(measurement, seed):
+    """The same with noise of 1 % and of 3 W/(m² sr), and without knowledge of the tool."""
+    rng = np.random.default_rng(seed)
+    clean = measurement.radiance
+    noise = rng.normal(0.0, 0.01 * clean) + rng.normal(0.0, 3.0, clean.shape)
+    return Measurement.from_radiance(
+        clean + noise, BAND, measurement.times, measurement.raster, FLOOR
+    )
+
+
+@pytest.fixture(scope="module")
+def seen():
+    return {
+        (angle, name): look(angle, surface)
+        for angle in (-12.0, -7.0, 0.0)
+        for name, surface in (("chip 1", CHIP_1), ("chip 2", CHIP_2))
+    }
+
+
+def test_the_face_is_within_its_stated_uncertainty(seen):
+    """24 images: an expanded uncertainty of k = 2 shall hold in 95 %, so in 21 or more of them.
+
+    Binomial: at 95 %, fewer than 21 of 24 have a probability of 3 %.
+    """
+    within_angle, within_place, within_tip, count = 0, 0, 0, 0
+    for measurement in seen.values():
+        true = measurement.tool
+        for seed in range(4):
+            found = find_tool(noisy(measurement, seed))
+            off = found.tool.rake_point(80e-6) - true.rake_foot
+            tip = (found.tool.rake_foot - true.rake_foot) @ true.rake_direction
+            away = found.tool.rake_angle - true.rake_angle
+            within_angle += abs(away) < 2 * found.angle_uncertainty
+            within_place += abs(off @ true.rake_normal) < 2 * found.position_uncertainty
+            within_tip += abs(tip) < 2 * found.tip_uncertainty
+            count += 1
+            # An uncertainty that covers everything would say nothing.
+            assert found.angle_uncertainty < radians(4.0)
+            assert found.position_uncertainty < 6e-6
+    assert count == 24
+    assert min(within_angle, within_place, within_tip) >= 21
+
+
+def test_a_found_tool_moves_with_the_image(seen):
+    measurement = noisy(seen[-7.0, "chip 2"], 1)
+    raster = measurement.raster
+    elsewhere = Raster(
+        raster.left + 1.3e-3, raster.top - 0.4e-3, raster.spacing, raster.rows, raster.columns
+    )
+    moved = Measurement.from_radiance(
+        measurement.radiance, BAND, measurement.times, elsewhere, FLOOR
+    )
+    here, there = find_tool(measurement), find_tool(moved)
+    np.testing.assert_allclose(
+        np.subtract(there.tool.tip, here.tool.tip), [1.3e-3, -0.4e-3], atol=1e-8
+    )
+    assert abs(there.tool.rake_angle - here.tool.rake_angle) < 1e-6
+
+
+def test_a_weak_edge_is_doubtful():
+    """A chip that is hardly brighter than the tool."""
+    raster = Raster(-300e-6, 300e-6, 6e-6, 60, 80)
+    x, y = np.meshgrid(raster.x, raster.y)
+    image = np.where(x + 0.12 * y < 0.0, 106.5, 100.0)
+    image = image + np.random.default_rng(0).normal(0.0, 2.0, image.shape)
+    measurement = Measurement.from_radiance(image[None], BAND, np.zeros(1), raster)
+    doubts = find_tool(measurement).doubts
+    assert any("hardly stands out" in doubt for doubt in doubts)
+    assert any("the tip is not in the image" in doubt for doubt in doubts)
+
+
+@pytest.mark.parametrize("noise", [0.0, 3.0])
+def test_an_image_without_an_edge_is_one_error(noise):
+    raster = Raster(-300e-6, 300e-6, 6e-6, 60, 80)
+    image = 100.0 + np.random.default_rng(2).normal(0.0, noise, (1, *raster.shape))
+    measurement = Measurement.from_radiance(image, BAND, np.zeros(1), raster)
+    with pytest.raises(ValueError, match="find tool: no rake face is found, nothing stands out"):
+        find_tool(measurement)
+    narrow = Raster(0.0, 0.0, 6e-6, 60, 8)
+    few = Measurement.from_radiance(image[:, :, :8], BAND, np.zeros(1), narrow)
+    with pytest.raises(ValueError, match="the image is 8 pixels wide"):
+        find_tool(few)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch, seen):
+    monkeypatch.chdir(tmp_path)
+    write_measurement(seen[-7.0, "chip 2"], tmp_path / "told.nc")
+    write_measurement(noisy(seen[-7.0, "chip 2"], 0), tmp_path / "real.nc")
+    return tmp_path
+
+
+def command(*arguments):
+    result = CliRunner().invoke(app, ["rake", *arguments], env={"COLUMNS": "160"})
+    return result.exit_code, result.stdout, result.stderr.strip()
+
+
+def test_the_command_writes_what_the_function_gives(folder, seen):
+    code, text, _ = command("told.nc", "--out", "grid.nc", "--plot", "grid.png")
+    assert code == 0
+    measurement = seen[-7.0, "chip 2"]
+    grid = rake_grid(measurement, measurement.tool)
+    with xr.open_dataset(folder / "grid.nc", engine="h5netcdf", decode_times=False) as data:
+        np.testing.assert_array_equal(data["mean"], grid.mean)
+        np.testing.assert_array_equal(data["count"], grid.count)
+        assert data["mean"].dims == ("time", "depth", "along")
+        assert data["mean"].attrs["units"] == "K" and data.attrs["size"] == grid.size
+        assert data.attrs["tool_rake_angle"] == radians(-7.0)
+    assert (folder / "grid.png").read_bytes().startswith(b"\x89PNG")
+    value, spread = grid.frame_mean[0, 4] - 273.15, grid.frame_deviation[0, 4]
+    assert f"{value:.1f} ± {spread:.1f}" in text
+    assert "squares are left out" in text
+
+
+def test_the_table_has_units_and_gaps(folder, seen):
+    assert command("told.nc", "--frame", "1", "--out", "grid.csv")[0] == 0
+    lines = (folder / "grid.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "time_us,depth_um,along_um,mean_degC,deviation_K,usable_pixels"
+    measurement = seen[-7.0, "chip 2"]
+    grid = rake_grid(measurement, measurement.tool, frames=[1])
+    assert len(lines) == 1 + grid.mean.size
+    first = [float(cell) for cell in lines[1].split(",")]
+    expected = [10.0, 9.0, 9.0, grid.mean[0, 0, 0] - 273.15, grid.deviation[0, 0, 0]]
+    # Four digits after the point are written.
+    np.testing.assert_allclose(first[:-1], expected, atol=6e-5)
+    assert sum(",,," in line for line in lines) == np.isnan(grid.mean).sum()
+
+
+def test_a_given_and_a_found_tool(folder):
+    (folder / "tool.yaml").write_text("rake_angle: -7 deg\ntip: [0 um, 0 um]\n")
+    code, given, _ = command("real.nc", "--tool", "tool.yaml", "--at", "9 us")
+    assert code == 0 and "over a square's pixels" in given
+    code, found, _ = command("real.nc", "--tool", "found", "--frame", "0")
+    assert code == 0
+    angle = degrees(find_tool(read_measurement(folder / "real.nc")).tool.rake_angle)
+    assert f"Found: rake angle {angle:.1f} ± " in found
+    assert "Assumed: clearance angle 7 deg, edge radius 20 um." in found
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["real.nc"], "--tool: the measurement tells no tool"),
+        (["told.nc", "--frame", "2"], "--frame: '2', expected 0 to 1, or all"),
+        (["told.nc", "--frame", "0", "--at", "1 us"], "--frame: '0' beside --at"),
+        (["told.nc", "--at", "1 s"], "--at: 1 s, expected 0 us to 10 us"),
+        (["told.nc", "--depth", "3 s"], "--depth: '3 s' is not a length"),
+        (["told.nc", "--depth", "3 um"], "rake grid: depth is 3e-06 m"),
+        (["told.nc", "--out", "grid.txt"], "grid.txt: expected a file that ends in .csv or .nc"),
+        (["told.nc", "--plot", "grid.gif"], "--plot: grid.gif"),
+        (["told.nc", "--tool", "away.yaml"], "no square on the rake face is inside the image"),
+        (["told.nc", "--tool", "none.yaml"], "none.yaml: No such file"),
+    ],
+)
+def test_what_is_wrong_is_one_line(folder, arguments, message):
+    (folder / "away.yaml").write_text("tip: [5 mm, 0 mm]\n")
+    before = sorted(folder.iterdir())
+    code, _, error = command(*arguments)
+    assert code == 2 and "\n" not in error
+    assert message in error
+    assert sorted(folder.iterdir()) == before
+
+
+def test_a_placed_tool_reads_the_same_grid(seen):
+    measurement = seen[-7.0, "chip 2"]
+    placed = PlacedTool(measurement.tool, (0.0, 0.0))
+    np.testing.assert_array_equal(
+        rake_grid(measurement, placed).mean, rake_grid(measurement, measurement.tool).mean
+    )
+    assert degrees(placed.rake_angle) == pytest.approx(-7.0)

@@ -1,0 +1,254 @@
+"""The analysis grid on the rake face, and tools that stand where an image has them."""
+
+from dataclasses import replace
+from math import cos, radians, sin
+
+import numpy as np
+import pytest
+from analytic_chip import AnalyticChip
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chipglow.analysis import rake_grid
+from chipglow.camera import Camera, Flag, Measurement
+from chipglow.io import read_measurement, write_measurement
+from chipglow.radiometry import Band
+from chipglow.scene import PlacedTool, Raster, ToolGeometry, ToolOutline
+from chipglow.study import StudyError, load_tool, tool_of
+from chipglow.surface import CHIP_2
+
+BAND = Band(3.8e-6, 5.1e-6)
+RASTER = Raster(left=-400e-6, top=400e-6, spacing=6e-6, rows=70, columns=80)
+PIXEL = RASTER.spacing
+# A radiance temperature comes back from its radiance to well under this.
+EXACT = 1e-3
+
+
+def plane(x, y):
+    """A temperature in K that is linear in x and y."""
+    return 900.0 + 4e5 * x - 7e5 * y
+
+
+def measured(*temperatures, flags=None, raster=RASTER):
+    """A measurement of radiance temperatures in K."""
+    radiance = BAND.radiance(np.stack(temperatures))
+    times = np.arange(len(temperatures)) / 600
+    return Measurement.from_radiance(radiance, BAND, times, raster, flags=flags)
+
+
+def linear_image(raster=RASTER):
+    return plane(*np.meshgrid(raster.x, raster.y))
+
+
+def middles(grid):
+    """Middles of the squares, x and y each of shape (m, n)."""
+    normal = np.array(grid.tool.rake_normal)
+    return np.moveaxis(grid.tool.rake_point(grid.along) + grid.depth[:, None, None] * normal, 2, 0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    angle=st.floats(-25.0, 25.0),
+    x=st.floats(-30e-6, 30e-6),
+    y=st.floats(-30e-6, 30e-6),
+    pixels=st.sampled_from([2, 3, 3.5, 5]),
+)
+def test_a_linear_field_is_exact_at_the_middles_of_the_squares(angle, x, y, pixels):
+    tool = PlacedTool(ToolGeometry(rake_angle=radians(angle)), (x, y))
+    grid = rake_grid(measured(linear_image()), tool, pixels)
+    expected = plane(*middles(grid))
+    enough = grid.usable[0] & (grid.count[0] >= 3)
+    assert enough.sum() > 9
+    assert np.abs(grid.mean[0] - expected)[enough].max() < EXACT
+    assert grid.size == pixels * PIXEL
+
+
+def test_squares_on_the_pixels_are_plain_means_of_nine():
+    tool = PlacedTool(ToolGeometry(rake_angle=0.0, edge_radius=6e-6), (8e-6, 4e-6))
+    foot = tool.rake_foot
+    image = np.random.default_rng(3).uniform(800.0, 1200.0, RASTER.shape)
+    grid = rake_grid(measured(image), tool)
+    column = round((foot[0] - RASTER.left) / PIXEL)
+    row = round((RASTER.top - foot[1]) / PIXEL)
+    for m, n in ((0, 0), (2, 5)):
+        square = image[row - 3 * n - 3 : row - 3 * n, column - 3 * m - 3 : column - 3 * m]
+        assert grid.count[0, m, n] == 9
+        assert abs(grid.mean[0, m, n] - square.mean()) < EXACT
+        assert abs(grid.deviation[0, m, n] - square.std(ddof=1)) < EXACT
+    np.testing.assert_allclose(grid.along[:2], [9e-6, 27e-6])
+    np.testing.assert_allclose(grid.depth, 18e-6 * (np.arange(5) + 0.5))
+
+
+def test_every_pixel_beside_the_face_counts_once():
+    tool = ToolGeometry()
+    grid = rake_grid(measured(linear_image()), tool)
+    corners = grid.corners()
+    x, y = np.meshgrid(RASTER.x, RASTER.y)
+    offset = np.stack([x, y], -1) - tool.rake_foot
+    up, in_chip = offset @ tool.rake_direction, offset @ tool.rake_normal
+    inside = (up >= 0) & (up < grid.size * grid.along.size)
+    inside &= (in_chip >= 0) & (in_chip < grid.size * grid.depth.size)
+    assert grid.count.sum() == inside.sum()
+    np.testing.assert_allclose(corners[0], tool.rake_point(grid.size * np.arange(len(corners[0]))))
+    into = grid.depth.size * grid.size * np.array([-cos(tool.rake_angle), sin(tool.rake_angle)])
+    np.testing.assert_allclose(corners[-1, 0] - corners[0, 0], into)
+
+
+@pytest.mark.parametrize("flag", [Flag.BELOW_FLOOR, Flag.SATURATED, Flag.DEAD])
+def test_one_unusable_pixel_removes_its_square_alone(flag):
+    tool = ToolGeometry()
+    whole = rake_grid(measured(linear_image()), tool)
+    m, n = 2, 6
+    x, y = (part[m, n] for part in middles(whole))
+    flags = np.zeros((1, *RASTER.shape), np.uint8)
+    row, column = int((RASTER.top - y) / PIXEL), int((x - RASTER.left) / PIXEL)
+    flags[0, row, column] = flag
+    holed = rake_grid(measured(linear_image(), flags=flags), tool)
+    missing = whole.usable & ~holed.usable
+    assert missing.sum() == 1 and missing[0, m, n]
+    assert holed.count[0, m, n] == whole.count[0, m, n] - 1
+    same = holed.usable
+    np.testing.assert_array_equal(holed.mean[same], whole.mean[same])
+
+
+def test_a_replaced_pixel_is_used():
+    flags = np.full((1, *RASTER.shape), Flag.REPLACED, np.uint8)
+    tool = ToolGeometry()
+    kept = rake_grid(measured(linear_image(), flags=flags), tool)
+    np.testing.assert_array_equal(kept.mean, rake_grid(measured(linear_image()), tool).mean)
+
+
+def test_frames_have_a_mean_and_a_deviation_between_them():
+    shifts = np.array([-20.0, 0.0, 50.0, 10.0])
+    frames = measured(*(linear_image() + shift for shift in shifts))
+    grid = rake_grid(frames, ToolGeometry())
+    np.testing.assert_allclose(
+        (grid.frame_mean - grid.mean[1])[grid.usable[1]], shifts.mean(), atol=EXACT
+    )
+    np.testing.assert_allclose(grid.frame_deviation[grid.usable[1]], shifts.std(ddof=1), atol=EXACT)
+    chosen = rake_grid(frames, ToolGeometry(), frames=[2])
+    np.testing.assert_array_equal(chosen.mean[0], grid.mean[2])
+    assert chosen.times[0] == frames.times[2]
+    assert np.isnan(chosen.frame_deviation).all()
+
+
+def test_a_square_is_averaged_over_the_frames_that_show_it():
+    flags = np.zeros((2, *RASTER.shape), np.uint8)
+    flags[1, :, :] = Flag.BELOW_FLOOR
+    grid = rake_grid(measured(linear_image(), linear_image() + 9, flags=flags), ToolGeometry())
+    seen = grid.usable[0]
+    assert (grid.frame_count[seen] == 1).all()
+    np.testing.assert_array_equal(grid.frame_mean[seen], grid.mean[0][seen])
+
+
+def test_noise_averages_as_the_number_of_pixels_says():
+    """The weights that centre the pixels raise the noise by 6 % on average at -7 degrees."""
+    noise = np.random.default_rng(5).normal(0.0, 5.0, (60, *RASTER.shape))
+    grid = rake_grid(measured(*(linear_image() + noise)), ToolGeometry())
+    seen = grid.usable.all(axis=0)
+    scaled = (grid.frame_deviation * np.sqrt(grid.count[0]) / 5.0)[seen]
+    # 60 frames give each deviation to 9 %, about 60 squares their mean to 1.2 %.
+    assert 0.97 < scaled.mean() < 1.10
+
+
+def test_a_tool_outside_the_image_is_one_error():
+    away = PlacedTool(ToolGeometry(), (5e-3, 0.0))
+    with pytest.raises(ValueError, match="no square on the rake face is inside the image"):
+        rake_grid(measured(linear_image()), away)
+
+
+def test_a_chip_that_does_not_touch_is_one_error():
+    tool = ToolGeometry()
+    distance = tool.signed_distance(*np.meshgrid(RASTER.x, RASTER.y))
+    flags = np.where((distance > 0) & (distance < 30e-6), Flag.BELOW_FLOOR, 0).astype(np.uint8)
+    with pytest.raises(ValueError, match=r"none of the \d+ squares .* touches the tool"):
+        rake_grid(measured(linear_image(), flags=flags[None]), tool)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"pixels": 0.5}, "pixels is 0.5, expected 1 or more"),
+        ({"depth": 10e-6}, "depth is 1e-05 m, expected a square's 1.8e-05 m"),
+        ({"frames": [3]}, "frame 3, expected 0 to 0"),
+        ({"frames": []}, "frame none, expected 0 to 0"),
+    ],
+)
+def test_what_is_asked_must_be_possible(wrong, message):
+    with pytest.raises(ValueError, match=message):
+        rake_grid(measured(linear_image()), ToolGeometry(), **wrong)
+
+
+def test_a_simulated_measurement_tells_its_tool(tmp_path):
+    chip = AnalyticChip(frames=30)
+    measurement = Camera(integration_time=5e-6, floor=None).measure(chip.scene(), CHIP_2, 2e-6)
+    assert measurement.tool == chip.tool
+    write_measurement(measurement, tmp_path / "m.nc")
+    assert tool_of(read_measurement(tmp_path / "m.nc"), None) == chip.tool
+
+
+OUTLINE = ToolOutline.placed([(-20e-6, 300e-6), (0.0, 30e-6), (10e-6, 0.0), (300e-6, 30e-6)])
+
+
+@pytest.mark.parametrize("tool", [ToolGeometry(), OUTLINE])
+def test_a_placed_tool_is_the_tool_moved(tool, tmp_path):
+    placed = PlacedTool(tool, (120e-6, -40e-6))
+    moved = np.array(placed.tip)
+    np.testing.assert_allclose(placed.rake_foot, tool.rake_foot + moved, atol=1e-12)
+    np.testing.assert_allclose(placed.edge_point, tool.edge_point + moved, atol=1e-12)
+    np.testing.assert_allclose(placed.outline(1e-4), tool.outline(1e-4) + moved, atol=1e-12)
+    x, y = np.meshgrid(RASTER.x, RASTER.y)
+    np.testing.assert_allclose(
+        placed.signed_distance(x + moved[0], y + moved[1]), tool.signed_distance(x, y), atol=1e-12
+    )
+    write_measurement(measured(linear_image()).with_tool(placed), tmp_path / "m.nc")
+    stored = read_measurement(tmp_path / "m.nc").tool
+    assert isinstance(stored, PlacedTool) and stored.tip == placed.tip
+    np.testing.assert_array_equal(stored.corners, placed.corners)
+    replaced = measured(linear_image()).with_tool(placed).with_tool(tool)
+    assert not isinstance(replaced.tool, PlacedTool)
+
+
+def test_a_tool_is_read_from_its_file(tmp_path):
+    path = tmp_path / "tool.yaml"
+    path.write_text("rake_angle: 6 deg\nedge_radius: 8 um\ntip: [-12 um, 3.5 um]\n")
+    expected = PlacedTool(ToolGeometry(rake_angle=radians(6.0), edge_radius=8e-6), (-12e-6, 3.5e-6))
+    assert load_tool(path) == expected
+    path.write_text("")
+    assert load_tool(path) == ToolGeometry()
+    (tmp_path / "edge.csv").write_text("x_um,y_um\n-20,300\n0,30\n10,0\n300,30\n")
+    path.write_text("outline: edge.csv\ntip: [10 um, 0 um]\n")
+    found = load_tool(path)
+    assert isinstance(found, PlacedTool) and isinstance(found.tool, ToolOutline)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "rake_angel: 3 deg\n",
+            r"tool.yaml: unknown key 'rake_angel', did you mean 'rake_angle'\?",
+        ),
+        ("tip: [1 um]\n", "tool.yaml: tip"),
+        ("tip: [1, 2]\n", "tool.yaml: tip.0: 1 has no unit"),
+        ("rake_angle: 80 deg\n", "tool.yaml: rake_angle: expected -60 to 60 degrees"),
+        ("[1, 2\n", "tool.yaml: line"),
+        ("outline: none.csv\n", "tool.yaml: outline: .*none.csv"),
+    ],
+)
+def test_a_file_that_is_no_tool_is_one_error(tmp_path, text, message):
+    (tmp_path / "tool.yaml").write_text(text)
+    with pytest.raises(StudyError, match=message):
+        load_tool(tmp_path / "tool.yaml")
+
+
+def test_a_measurement_without_a_tool_needs_a_file():
+    with pytest.raises(ValueError, match="--tool: the measurement tells no tool"):
+        tool_of(measured(linear_image()), None)
+    with pytest.raises(ValueError, match=r"tip: .* finite"):
+        PlacedTool(ToolGeometry(), (0.0, np.nan))
+    with pytest.raises(ValueError, match="already"):
+        PlacedTool(PlacedTool(ToolGeometry(), (0.0, 0.0)), (0.0, 0.0))
+    grid = rake_grid(measured(linear_image()), ToolGeometry())
+    with pytest.raises(ValueError, match="rake grid: mean has shape"):
+        replace(grid, along=grid.along[:-1])
