@@ -152,10 +152,10 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
         pixels = _pixels_of(image, x, y, line)
         quick = _quick_fit(pixels)
         doubts = _bent(straightness, image)
-        limits, clipped = _limits(image, x, y, quick.edges[0].line)
+        limits, clipped = _limits(image, x, y, line)
         doubts += clipped
         if clipped:
-            pixels = _within_limits(pixels, quick.edges[0].line, limits)
+            pixels = _within_limits(pixels, line, limits)
             quick = _quick_fit(pixels)
         else:
             _check_edge(pixels, quick)
@@ -165,7 +165,8 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
     except NoEdgeError as error:
         raise NoEdgeError(f"{image.name}: {error}") from None
     said = [f"{image.name}: {doubt}" for doubt in doubts]
-    return replace(pixels, line=quick.edges[0].line), said
+    # A Gaussian with a free step can put the edge of a clipped image far away.
+    return (pixels if clipped else replace(pixels, line=quick.edges[0].line)), said
 
 
 def _pixels_of(

@@ -46,8 +46,9 @@ from chipglow.camera import MeasuredPSF, PointSpreadFunction
 RADIAL: Final = "radial"
 """Name of the point spread function without a model."""
 
-_ROUGHLY: Final = 1e-4
+_ROUGHLY: Final = 1e-6
 _MISFIT: Final = 1.6
+_TRIES: Final = 6
 _PLATEAU: Final = 3.0
 _UNRESOLVED: Final = 0.3
 _ALIGNED: Final = np.pi / 9
@@ -224,6 +225,9 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     models, assumptions = _models(images, edges)
     assumptions += dict.fromkeys(note for image in images for note in image.notes)
     first = [fit_model(model, edges, signals, tolerance=_ROUGHLY) for model in models]
+    if min(fit.misfit for fit in first) > _MISFIT:
+        # Where much is clipped there are several minima.
+        first = [fit_model(model, edges, signals, None, _ROUGHLY, _TRIES) for model in models]
     found = min(first, key=lambda fit: fit.bic)
     edges = [with_noise(edge, found.predicted(k, edge)) for k, edge in enumerate(edges)]
     fits = sorted(

@@ -198,6 +198,7 @@ def fit_model(
     apertures: ApertureSignals | None = None,
     start: ModelFit | None = None,
     tolerance: float = 1e-8,
+    tries: int = 1,
 ) -> ModelFit:
     """Weighted least squares with the edges' places, backgrounds and steps free.
 
@@ -213,30 +214,13 @@ def fit_model(
         An earlier fit of the same model to begin with.
     tolerance : float
         Relative change of the parameters at which the fit ends.
-
-    Raises
-    ------
-    ValueError
-        If the fit does not end.
+    tries : int
+        How many of the model's own starts are tried if there is no earlier fit.
     """
     problem = _Problem(model, tuple(edges), apertures)
-    vector = problem.start() if start is None else problem.vector_of(start)
-    low, high = problem.bounds()
-    vector = np.clip(vector, low + 1e-9 * problem.scales, high - 1e-9 * problem.scales)
-    scales = problem.scales
-    result = least_squares(
-        lambda v: problem.residual(v * scales),
-        vector / scales,
-        jac=lambda v: problem.jacobian(v * scales) * scales,
-        bounds=(low / scales, high / scales),
-        x_scale="jac",
-        xtol=tolerance,
-        ftol=tolerance,
-        max_nfev=60,
-    )
-    if not np.isfinite(result.cost):
-        raise ValueError(f"{model.name}: the fit did not end")
-    return problem.fitted(result.x * scales)
+    starts = problem.starts()[:tries] if start is None else [problem.vector_of(start)]
+    ends = [problem.least(vector, tolerance) for vector in starts]
+    return problem.fitted(min(ends, key=problem.cost))
 
 
 class _Problem:
@@ -247,15 +231,38 @@ class _Problem:
     ) -> None:
         self.model, self.edges, self.apertures = model, edges, apertures
         self.shapes = len(model.parameters)
-        self.steps = [_step_guess(edge) for edge in edges]
         self.count = sum(edge.x.size for edge in edges)
         self.scales = self._scales()
 
-    def start(self) -> NDArray[np.float64]:
-        """Of some widths the one that fits best as it is."""
+    def least(self, vector: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+        """Parameters with the least squares near some others."""
+        low, high = (limit / self.scales for limit in self.bounds())
+        result = least_squares(
+            lambda v: self.residual(v * self.scales),
+            np.clip(vector / self.scales, low + 1e-9, high - 1e-9),
+            jac=lambda v: self.jacobian(v * self.scales) * self.scales,
+            bounds=(low, high),
+            x_scale="jac",
+            xtol=tolerance,
+            ftol=tolerance,
+            max_nfev=60,
+        )
+        return np.asarray(result.x * self.scales)
+
+    def cost(self, vector: NDArray[np.float64]) -> float:
+        """Sum of the squared residuals."""
+        return float(np.sum(self.residual(vector) ** 2))
+
+    def starts(self) -> list[NDArray[np.float64]]:
+        """Some parameters to begin with, those first that fit best as they are."""
         pitch = max(edge.pitch for edge in self.edges)
-        candidates = [self._beginning(width * pitch) for width in _START_WIDTHS]
-        return min(candidates, key=lambda vector: float(np.sum(self.residual(vector) ** 2)))
+        low, high = (limit[: self.shapes] for limit in self.bounds())
+        candidates = [
+            self._beginning(np.clip(values, low, high))
+            for width in _START_WIDTHS
+            for values in self.model.starts(width * pitch)
+        ]
+        return sorted(candidates, key=self.cost)
 
     def vector_of(self, fit: ModelFit) -> NDArray[np.float64]:
         """All parameters of an earlier fit."""
@@ -410,22 +417,26 @@ class _Problem:
             places.append((background, step, EdgeLine(float(normal), float(position))))
         return places
 
-    def _beginning(self, width: float) -> NDArray[np.float64]:
-        parts = [self.model.start(width)]
-        for edge, (background, step) in zip(self.edges, self.steps, strict=True):
+    def _beginning(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """All parameters with these of the model: backgrounds and steps by linear least squares."""
+        parts = [values]
+        for edge in self.edges:
+            response = _response(self.model, values, edge.line, edge)
+            shares = response(edge.line.distance(edge.x, edge.y))
+            background, step = _straight_line(shares, edge.radiance, edge.sigma)
             parts.append(np.array([background, step, edge.line.position, edge.line.normal]))
         if self.apertures is not None:
-            least, most = self.apertures.radiance.min(), self.apertures.radiance.max()
-            shares = self._shares(parts[0])
-            slope = (most - least) / max(float(np.ptp(shares)), 1e-9)
-            parts.append(np.array([most - slope * shares.max(), slope]))
+            signals = self.apertures
+            line = _straight_line(self._shares(values), signals.radiance, signals.sigma)
+            parts.append(np.array(line))
         return np.concatenate(parts)
 
     def _scales(self) -> NDArray[np.float64]:
         pitch = min(edge.pitch for edge in self.edges)
         parts = [self.model.scales(pitch)]
-        for edge, (_, step) in zip(self.edges, self.steps, strict=True):
-            parts.append(np.array([step, step, edge.pitch, edge.pitch / edge.reach]))
+        for edge in self.edges:
+            contrast = max(float(np.ptp(edge.radiance)), 1e-300)
+            parts.append(np.array([contrast, contrast, edge.pitch, edge.pitch / edge.reach]))
         if self.apertures is not None:
             parts.append(np.full(_SOURCE_PARAMETERS, max(np.ptp(self.apertures.radiance), 1e-30)))
         return np.concatenate(parts)
@@ -474,14 +485,15 @@ def _response(
     )
 
 
-def _step_guess(edge: EdgePixels) -> tuple[float, float]:
-    """Background and step from the medians of the two sides."""
-    bright = edge.line.distance(edge.x, edge.y) > 0
-    if not bright.any() or bright.all():
-        low, high = np.percentile(edge.radiance, (5, 95))
-        return float(low), max(float(high - low), 1e-30)
-    low, high = np.median(edge.radiance[~bright]), np.median(edge.radiance[bright])
-    return float(low), max(float(high - low), 1e-30)
+def _straight_line(
+    x: NDArray[np.float64], y: NDArray[np.float64], sigma: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Value at x = 0 and slope of the straight line through points, by least squares."""
+    weight = sigma**-2.0
+    middle = float(weight @ x / weight.sum()), float(weight @ y / weight.sum())
+    off = x - middle[0]
+    slope = float(weight @ (off * (y - middle[1]))) / max(float(weight @ off**2), 1e-300)
+    return middle[1] - slope * middle[0], slope
 
 
 def orientations(edges: Sequence[EdgePixels], least: float = pi / 18) -> list[float]:

@@ -38,7 +38,7 @@ class PSFModel(ABC):
     parameters: tuple[str, ...]
 
     @abstractmethod
-    def start(self, fwhm: float) -> NDArray[np.float64]:
+    def starts(self, fwhm: float) -> list[list[float]]:
         """Parameters to begin a fit with, for about this full width at half maximum in m."""
 
     @abstractmethod
@@ -87,9 +87,9 @@ class GaussianModel(PSFModel):
     name = "gaussian"
     parameters = ("fwhm",)
 
-    def start(self, fwhm: float) -> NDArray[np.float64]:
-        """See `PSFModel.start`."""
-        return np.array([fwhm])
+    def starts(self, fwhm: float) -> list[list[float]]:
+        """See `PSFModel.starts`."""
+        return [[fwhm]]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
         """See `PSFModel.bounds`."""
@@ -122,9 +122,9 @@ class GaussianTailModel(PSFModel):
     name = "gaussian with tail"
     parameters = ("core_fwhm", "tail_share", "tail_ratio")
 
-    def start(self, fwhm: float) -> NDArray[np.float64]:
-        """See `PSFModel.start`."""
-        return np.array([0.9 * fwhm, 0.15, 2.0])
+    def starts(self, fwhm: float) -> list[list[float]]:
+        """See `PSFModel.starts`."""
+        return [[0.9 * fwhm, share, ratio] for share, ratio in ((0.1, 4.0), (0.25, 1.5))]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
         """See `PSFModel.bounds`."""
@@ -183,9 +183,10 @@ class AnnularModel(PSFModel):
     name = "annular aperture"
     parameters = ("numerical_aperture", "obscured_area")
 
-    def start(self, fwhm: float) -> NDArray[np.float64]:
-        """See `PSFModel.start`."""
-        return np.array([min(0.9, 0.49 * self.wavelength / fwhm), 0.1])
+    def starts(self, fwhm: float) -> list[list[float]]:
+        """See `PSFModel.starts`."""
+        aperture = min(0.9, 0.49 * self.wavelength / fwhm)
+        return [[aperture, area] for area in (0.02, 0.12, 0.35)]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
         """See `PSFModel.bounds`."""
@@ -232,9 +233,9 @@ class EllipticalModel(PSFModel):
         """Widths along x and y and, if the axes may be tilted, their correlation."""
         return ("fwhm_x", "fwhm_y", "correlation") if self.tilted else ("fwhm_x", "fwhm_y")
 
-    def start(self, fwhm: float) -> NDArray[np.float64]:
-        """See `PSFModel.start`."""
-        return np.array([fwhm, fwhm, 0.0] if self.tilted else [fwhm, fwhm])
+    def starts(self, fwhm: float) -> list[list[float]]:
+        """See `PSFModel.starts`."""
+        return [[fwhm, fwhm, 0.0] if self.tilted else [fwhm, fwhm]]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
         """See `PSFModel.bounds`."""

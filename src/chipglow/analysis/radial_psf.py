@@ -7,10 +7,10 @@ changes as smoothly from ring to ring as the data let it: what the data do not t
 of the core and the farthest of the tails, is the model's.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ from chipglow.analysis.edge_spread import EdgeSpread
 from chipglow.analysis.psf_fit import ApertureSignals, EdgePixels, ModelFit
 from chipglow.analysis.psf_models import disc_response, edge_response, sampled_psf
 from chipglow.camera import MeasuredPSF
+
+Values: TypeAlias = NDArray[np.float64]
 
 _RINGS: Final = 32
 _SMOOTHNESS: Final[list[float]] = np.geomspace(1e2, 1e-4, 13).tolist()
@@ -109,7 +111,8 @@ def radial_psf(
     radii = _radii(fit, edges)
     design, left = _rows(fit, edges, spreads, apertures, radii)
     penalty = _penalty(radii, _core(fit, edges))
-    model = _model_shares(fit, radii)
+    shares_by = _shares_by(fit, radii)
+    model = shares_by(fit.values)
     # Light of the model beyond the last ring stays in it.
     data, beyond = left + design @ model, 1.0 - float(model.sum())
     solutions = [_solved(design, data, weight * penalty, model) for weight in _SMOOTHNESS]
@@ -120,8 +123,8 @@ def radial_psf(
     chosen = int(np.argmin(criteria))
     weight = _SMOOTHNESS[chosen]
     repeats = []
-    for other in _drawn(fit, generator):
-        shares = _model_shares(replace(fit, values=other), radii)
+    for values in _drawn(fit, edges, generator):
+        shares = shares_by(values)
         noisy = left + generator.standard_normal(left.size) + design @ shares
         repeats.append(_solved(design, noisy, weight * penalty, shares))
     rougher = solutions[min(chosen + _ROUGHER, len(solutions) - 1)]
@@ -136,12 +139,14 @@ def radial_psf(
     )
 
 
-def _drawn(fit: ModelFit, generator: np.random.Generator) -> NDArray[np.float64]:
+def _drawn(
+    fit: ModelFit, edges: Sequence[EdgePixels], generator: np.random.Generator
+) -> NDArray[np.float64]:
     """Parameters of the model as other noise would have given them, shape (repeat, parameter)."""
     values, vectors = np.linalg.eigh(fit.covariance)
     spread = vectors * np.sqrt(np.maximum(values, 0.0))
     drawn = fit.values + generator.standard_normal((_REPEATS, values.size)) @ spread.T
-    low, high = fit.model.bounds(0.0, np.inf)
+    low, high = fit.model.bounds(edges[0].pitch, edges[0].reach)
     return np.asarray(np.clip(drawn, low, high))
 
 
@@ -220,16 +225,15 @@ def _penalty(radii: NDArray[np.float64], width: float) -> NDArray[np.float64]:
     return np.asarray(np.diff(padded, n=2, axis=0) * 1e3)
 
 
-def _model_shares(fit: ModelFit, radii: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share of a model's light in each ring."""
+def _shares_by(fit: ModelFit, radii: NDArray[np.float64]) -> Callable[[Values], Values]:
+    """What gives the share of a model's light in each ring by the model's parameters."""
     frequency = np.arange(0.0, 6 / fit.fwhm, 1 / (32 * float(radii[-1])))
-    transfer = fit.model.mean_transfer(fit.values, frequency)
     middle = np.zeros(1)
-    encircled = [
-        float(disc_response(frequency, 2 * radius, middle, 0.0) @ transfer)
-        for radius in radii.tolist()
-    ]
-    return np.maximum(np.diff(encircled), 0.0)
+    encircled = np.array(
+        [disc_response(frequency, 2 * radius, middle, 0.0) for radius in radii.tolist()]
+    )
+    rings = np.diff(encircled, axis=0)
+    return lambda values: np.maximum(rings @ fit.model.mean_transfer(values, frequency), 0.0)
 
 
 def _solved(

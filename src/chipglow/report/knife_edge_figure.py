@@ -120,7 +120,7 @@ def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
     axes.set_ylim(-0.05, 1.05)
     axes.set_title("modulation transfer function")
     axes.set_xlabel("frequency / (1/mm)")
-    axes.legend(loc="upper right")
+    axes.legend(loc="upper right", frameon=True, edgecolor="none")
 
 
 def _draw_apertures(axes: Axes, found: KnifeEdge) -> None:

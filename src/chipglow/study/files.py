@@ -149,7 +149,7 @@ def load_apertures(path: str | Path) -> list[tuple[Path, float]]:
         If the file cannot be read.
     """
     path = Path(path)
-    found = _validated(ApertureList, read_yaml(path), path.name, path.parent)
+    found = validated(ApertureList, read_yaml(path), path.name, path.parent)
     return [(Path(aperture.file), aperture.diameter) for aperture in found.apertures]
 
 
