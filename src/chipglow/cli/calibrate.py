@@ -32,8 +32,9 @@ def calibrate(
         Path,
         typer.Argument(
             metavar="POINTS.csv",
-            help="Black bodies: columns temperature_degC (or _K), counts and, if known, their "
-            "standard uncertainties count_uncertainty and temperature_uncertainty_K.",
+            help="Black bodies: columns temperature_degC (or _K), counts (or file, a recording of "
+            "each) and, if known, their standard uncertainties count_uncertainty and "
+            "temperature_uncertainty_K.",
         ),
     ],
     band: Annotated[
@@ -63,6 +64,15 @@ def calibrate(
     range_name: Annotated[
         str | None, typer.Option("--range", metavar="NAME", help="The camera's measuring range.")
     ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="FIELD=VALUE",
+            help="Set a field of the description of the recordings, such as bad_pixels=find; may "
+            "be repeated.",
+        ),
+    ] = None,
 ) -> None:
     """Fit a calibration of a camera's counts to black bodies.
 
@@ -74,7 +84,8 @@ def calibrate(
     from chipglow.cli.assumed import say_doubtful
     from chipglow.cli.pictures import check_picture_path
     from chipglow.io.atomic import check_folder
-    from chipglow.io.column_file import POINT_COLUMNS, read_columns
+    from chipglow.io.column_file import read_points
+    from chipglow.study.measured import uniform_counts
     from chipglow.study.units import TEMPERATURE_DIFFERENCE, TIME
 
     if plot is not None:
@@ -82,7 +93,11 @@ def calibrate(
     for path in (out, plot):
         if path is not None:
             check_folder(path)
-    table = read_columns(points, POINT_COLUMNS)
+
+    def counts_of(file: str) -> float:
+        return uniform_counts(points.parent / file, settings or ())
+
+    table = read_points(points, counts_of)
     known: dict[str, Any] = {
         "count_uncertainty": table.get("count_uncertainty"),
         "temperature_uncertainty": table.get("temperature_uncertainty"),
