@@ -273,7 +273,9 @@ class Laboratory:
             self._record(folder / f"heated-{number}.hcc", self._seen(self.oven), FRAMES)
             self._record(folder / f"chip-{number}.npy", self._seen(self._field()), FRAMES)
         for number, normal in enumerate(self.normals, 1):
-            self._record(folder / f"edge-{number}{self.edge_format}", self._edge(normal), EDGE_FRAMES)
+            self._record(
+                folder / f"edge-{number}{self.edge_format}", self._edge(normal), EDGE_FRAMES
+            )
         (folder / "regions.yaml").write_text(REGIONS)
         notes = {"thermocouple_degC": round(self.reading - CELSIUS, 2)}
         (folder / "notes.yaml").write_text(yaml.safe_dump(notes))

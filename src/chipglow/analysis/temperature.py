@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from scipy.special import stdtrit
 
-from chipglow.analysis.emissivity import LABORATORY, RegionEmissivity
+from chipglow.analysis.emissivity import LABORATORY, Heating
 from chipglow.analysis.observations import (
     Scatter,
     check_same_pixels,
@@ -25,6 +25,26 @@ from chipglow.radiometry import Band
 _COVERAGE: Final = 0.975
 _DOUBTFUL_SHARE: Final = 0.05
 _UNEVEN: Final = 0.5
+
+
+class DeterminedEmissivity(Protocol):
+    """An area's emissivity that was determined with the same camera: a `RegionEmissivity`."""
+
+    @property
+    def mean(self) -> float:
+        """Mean emissivity."""
+
+    @property
+    def heating(self) -> Heating:
+        """How the object was heated."""
+
+    @property
+    def common(self) -> dict[str, float]:
+        """Contributions to the standard uncertainty by the causes of `COMMON`, with signs."""
+
+    @property
+    def scatter(self) -> Scatter:
+        """The contributions that are chance."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +197,7 @@ class TrueTemperature:
 def true_temperature(
     measurements: Sequence[Measurement],
     area: Area,
-    emissivity: RegionEmissivity | KnownEmissivity,
+    emissivity: DeterminedEmissivity | KnownEmissivity,
     surroundings: Surroundings | None = None,
     calibration: FittedCalibration | None = None,
 ) -> TrueTemperature:
@@ -290,7 +310,7 @@ class _Sensitivity:
 
 
 def _surroundings(
-    emissivity: RegionEmissivity | KnownEmissivity, given: Surroundings | None
+    emissivity: DeterminedEmissivity | KnownEmissivity, given: Surroundings | None
 ) -> Surroundings:
     if given is not None:
         return given
@@ -301,7 +321,7 @@ def _surroundings(
 
 
 def _correlation(
-    emissivity: RegionEmissivity | KnownEmissivity,
+    emissivity: DeterminedEmissivity | KnownEmissivity,
     radiance: float,
     calibration: FittedCalibration | None,
     band: Band,
@@ -319,7 +339,7 @@ def _correlation(
 
 def _budget(
     sensitivity: _Sensitivity,
-    emissivity: RegionEmissivity | KnownEmissivity,
+    emissivity: DeterminedEmissivity | KnownEmissivity,
     reflecting: Surroundings,
     same_room: bool,
     error: float,

@@ -14,6 +14,7 @@ from chipglow.cli.convert import convert
 from chipglow.cli.emissivity import emissivity
 from chipglow.cli.psf import psf
 from chipglow.cli.rake import rake
+from chipglow.cli.temperature import temperature
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 
@@ -299,6 +300,7 @@ def clear() -> None:
 
 
 app.command("psf")(psf)
+app.command("temperature")(temperature)
 
 
 def _megabytes(size: int) -> str:

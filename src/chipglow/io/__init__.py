@@ -3,9 +3,12 @@
 from chipglow.io.atomic import atomic_folder, atomic_path
 from chipglow.io.cameras import CAMERA_FORMATS, CameraFormat, read_recording, write_hcc
 from chipglow.io.emissivity_file import (
+    StoredEmissivity,
     read_emissivity_map,
+    read_region_emissivity,
     write_emissivity,
     write_emissivity_table,
+    write_temperature_table,
 )
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import (
@@ -33,6 +36,7 @@ __all__ = [
     "CameraFormat",
     "Import",
     "SceneWriter",
+    "StoredEmissivity",
     "StoredScene",
     "UnfinishedScene",
     "View",
@@ -48,6 +52,7 @@ __all__ = [
     "read_emissivity_map",
     "read_measurement",
     "read_recording",
+    "read_region_emissivity",
     "read_scene",
     "read_tool_outline",
     "unfinished_scenes",
@@ -59,4 +64,5 @@ __all__ = [
     "write_psf",
     "write_rake_grid",
     "write_scene",
+    "write_temperature_table",
 ]
