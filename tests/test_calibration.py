@@ -71,17 +71,19 @@ def test_the_planckian_form_follows_the_band_within_millikelvins():
 def test_the_interval_covers_as_often_as_it_says(model, case):
     """95 % intervals hold the truth in 95 % of 200 repeats, within three standard deviations."""
     fit, signal = FITS[model], counts_of(model, BETWEEN)
+    # With few degrees of freedom Student's factor is far from that of the normal distribution.
+    kelvins = KELVINS[[0, 2, 4, 5, 7, 9]] if case == "scatter" else KELVINS
     repeats, covered, scores = 200, np.zeros(BETWEEN.size), []
     for seed in range(repeats):
         rng = np.random.default_rng(seed)
-        black_body = KELVINS + rng.normal(0, 1.0) * (case == "common")
+        black_body = kelvins + rng.normal(0, 1.0) * (case == "common")
         if case != "scatter":
-            black_body = black_body + rng.normal(0, 0.5, KELVINS.size)
-        counts = counts_of(model, black_body) + rng.normal(0, 3.0, KELVINS.size)
+            black_body = black_body + rng.normal(0, 0.5, kelvins.size)
+        counts = counts_of(model, black_body) + rng.normal(0, 3.0, kelvins.size)
         said = {"count_uncertainty": 3.0, "temperature_uncertainty": 0.5}
         if case == "common":
             said["common_uncertainty"] = 1.0
-        found = fit(KELVINS, counts, BAND, **({} if case == "scatter" else said))
+        found = fit(kelvins, counts, BAND, **({} if case == "scatter" else said))
         error = found.calibration.radiance(signal) - BAND.radiance(BETWEEN)
         scores.append(error / found.calibration.uncertainty(signal))
         covered += np.abs(scores[-1]) < found.coverage_factor()

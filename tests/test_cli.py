@@ -11,11 +11,15 @@ import pytest
 from analytic_chip import AnalyticChip
 from typer.testing import CliRunner
 
+from chipglow.analysis import Area, Heating, determine_emissivity
+from chipglow.camera import Camera, Measurement
 from chipglow.cli import app
 from chipglow.cutting import CuttingSimulation, SolverError
-from chipglow.io import open_scene, read_measurement, write_scene
-from chipglow.scene import Material
+from chipglow.io import open_scene, read_measurement, write_emissivity, write_scene
+from chipglow.radiometry import Band
+from chipglow.scene import Material, Raster
 from chipglow.study import Study, cut, load_study
+from chipglow.surface import UniformSurface
 
 RASTER = AnalyticChip().raster
 STUDY = f"""
@@ -291,6 +295,35 @@ def test_measure_writes_frames_at_the_camera_rate(folder, scene):
     assert measurement.data.attrs["surface"] == "chip 1"
 
 
+def test_measure_lays_a_measured_emissivity_map_on_the_scene(folder, scene, chip_scene):
+    band, raster = Band(3.8e-6, 5.1e-6), Raster(RASTER.left, RASTER.top, 6e-6, 56, 70)
+    share = np.where(raster.x < -100e-6, 0.3, 0.8) * np.ones((56, 1))
+    image = Measurement.from_radiance(
+        (share * band.radiance(800.0))[None], band, np.zeros(1), raster
+    )
+    found = determine_emissivity([image], Heating(800.0, environment=200.0))
+    everywhere = Area("all", "chip", np.ones(raster.shape, bool), whole=True)
+    write_emissivity([found], [[found.of(everywhere)]], "e.nc")
+    study = (
+        "surface: {maps: {seen: e.nc}}\nanalysis: {band_chip: seen}\n"
+        "camera: {psf: none, floor: none}"
+    )
+    (folder / "study.yaml").write_text(study)
+    arguments = ("measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc")
+    assert_refused(chipglow(*arguments, "--chip", "gone"), "expected one of chip 1, chip 2, seen")
+    result = chipglow(*arguments, "--chip", "seen")
+    assert result.exit_code == 0, result.output
+    measured = read_measurement("m.nc")
+    truth = Camera(psf=None, floor=None).measure(chip_scene, UniformSurface(1.0), 0.0)
+    solid = truth.radiance[0] > 0
+    ratio = np.divide(measured.radiance[0], truth.radiance[0], out=np.zeros((56, 70)), where=solid)
+    # The environment at 200 K adds nothing that counts; the map's edge is one sensor wide.
+    np.testing.assert_allclose(ratio[solid & (raster.x < -106e-6)], 0.3, atol=2e-3)
+    np.testing.assert_allclose(ratio[solid & (raster.x > -94e-6)], 0.8, atol=2e-3)
+    (folder / "study.yaml").write_text(study.replace("seen: e.nc", "chip 1: e.nc"))
+    assert_refused(chipglow(*arguments), "surface: maps: 'chip 1' is the name of a chip too")
+
+
 def test_measure_starts_when_told_with_the_chip_that_is_named(folder, scene):
     arguments = ("measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc")
     result = chipglow(*arguments, "--start", "20 us", "--chip", "chip 2")
@@ -304,7 +337,7 @@ def test_measure_starts_when_told_with_the_chip_that_is_named(folder, scene):
     ("option", "value", "message"),
     [
         ("--start", "20", "--start: 20 has no unit, expected a time such as 10 us"),
-        ("--start", "35 us", "scene"),
+        ("--start", "35 us", "scene.nc: exposure: 3.5e-05 s to"),
         ("--chip", "chip 3", "--chip: 'chip 3' is unknown, expected one of chip 1, chip 2"),
         ("--out", "no/m.nc", "no folder no"),
     ],

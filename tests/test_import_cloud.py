@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import PNG, refused_on
 
-from chipglow.io.sources import CELSIUS, Placement, Unit, Units
+from chipglow.io.sources import CELSIUS, Placement, SourceError, Unit, Units
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.scene import Raster
 from chipglow.scene.cloud import Cloud, neighbour_distance, sample_cloud
@@ -441,7 +441,10 @@ def test_a_very_long_line(tmp_path):
     [
         ("x,temperature\n1,300\n", "no column 'y'"),
         ("x,y,heat\n1,2,300\n", "no column is known as temperature, it has heat"),
-        ("x,y,temperature\n1,2,hot\n", "temperature has text in it"),
+        ("x,y,temperature\n1,2,hot\n", "p.csv, line 2: temperature is 'hot', expected a number"),
+        ("#a\nx,y,temperature\n\n1,2,300\n# b\n2,x 3,300\n", "p.csv, line 6: y is 'x 3'"),
+        ("x;y;temperature\n1,5;2;300\n1,6;2;3,0,0\n", "p.csv, line 3: temperature is '3,0,0'"),
+        ("time,x,y,temperature\n1,0,0,3\nsoon,0,0,3\n", "p.csv, line 3: time is 'soon'"),
         ("x,y,temperature\n1,2,300,4,5\n1,2,3,4,5,6\n", "p.csv"),
         ("x,x,temperature\n1,2,300\n", "two columns have one name"),
         ("time,x,y,temperature\n1,0,0,300\n2,0,0,300\n1,0,0,300\n", "does not ascend"),
@@ -452,6 +455,18 @@ def test_tables_that_go_wrong(tmp_path, text, said):
     (tmp_path / "p.csv").write_text(text)
     spacing = None if "one place" in said else 1.0
     refused(CloudSource(str(tmp_path / "p.csv"), spacing=spacing), said)
+
+
+def test_text_in_a_later_part_of_a_long_table_is_told_with_its_line(tmp_path, monkeypatch):
+    monkeypatch.setattr("chipglow.io.sources.point_files._ROWS", 4)
+    rows = [f"{time},{x},{y},300" for time in range(3) for x in range(3) for y in range(3)]
+    rows[22] = "2,1,wide,300"
+    (tmp_path / "p.csv").write_text("\n".join(["time,x,y,temperature", *rows]) + "\n")
+    source = CloudSource(str(tmp_path / "p.csv"), spacing=1.0)
+    with pytest.raises(SourceError, match="line 24: y is 'wide'"):
+        list(source.frames(Raster(0.0, 2.0, 0.5, 4, 4)))
+    with pytest.raises(SourceError, match="line 24: y is 'wide'"):
+        list(source.frames(Raster(0.0, 2.0, 0.5, 4, 4), start=2))
 
 
 def test_a_wrong_unit_of_length_is_noticed(tmp_path):

@@ -1,5 +1,6 @@
 """The command import: its description, what it says, what it writes, what it refuses."""
 
+import h5py
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -50,6 +51,21 @@ def test_a_grid_becomes_a_scene_and_the_command_says_what_it_assumed(arrays, tmp
     assert frame.temperature[-1, 29] == pytest.approx(403.15 + 29 * 5.0, abs=0.02)
     assert "plastic strain rate: from the change" in scene.data.attrs["assumed"]
     assert "NT11" in scene.data.attrs["import"]
+
+
+def test_what_the_file_says_is_told_from_what_is_assumed(arrays, tmp_path):
+    with h5py.File(tmp_path / "cut.h5", "w") as file:
+        file["T"] = np.load(arrays)["NT11"]
+        file["T"].attrs["units"] = "degC"
+    settings = ["fields.temperature=T", *SETTINGS[2:], "units.length=mm"]
+    out = tmp_path / "scene.nc"
+    result = RUNNER.invoke(
+        app, ["import", str(tmp_path / "cut.h5"), "--out", str(out), *options(settings)]
+    )
+    assert result.exit_code == 0, result.output
+    assert "From the file: T is in 'degC'\n" in result.output
+    assert "degC" not in " ".join(result.output.split("Assumed: ")[1:])
+    assert open_scene(out).data.attrs["from_file"] == "T is in 'degC'"
 
 
 def test_without_out_the_command_only_looks(arrays, tmp_path):

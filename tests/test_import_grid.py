@@ -316,7 +316,8 @@ def test_units_from_the_file_are_honoured_and_said(tmp_path):
         for name, unit in {"x": "mm", "y": "um", "time": "microseconds since 2020-01-01"}.items():
             file[name].attrs["units"] = unit
     source = GridSource(str(tmp_path / "all.h5"))
-    assert "temp is in 'degC', as the file says" in source.survey().assumed
+    assert "temp is in 'degC'" in source.survey().from_file
+    assert not any("degC" in text for text in source.survey().assumed)
     np.testing.assert_allclose(source.survey().times, TIMES)
     (frame, *_) = source.frames(INNER)
     np.testing.assert_allclose(frame.fields["temperature"], linear(INNER.x, INNER.y), atol=3e-4)
@@ -324,7 +325,18 @@ def test_units_from_the_file_are_honoured_and_said(tmp_path):
     (other, *_) = given.frames(INNER)
     moved = other.fields["temperature"] - frame.fields["temperature"]
     np.testing.assert_allclose(moved, 100.0 - 273.15, atol=3e-4)
-    assert any("unit given" in text for text in given.survey().assumed)
+    assert "temp is in 'degC', but the unit given is taken" in given.survey().from_file
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("size", [100, 150, 500])
+def test_a_matlab_file_that_is_cut_short_is_told_from_a_strange_one(tmp_path, packed, size):
+    path = tmp_path / "T.mat"
+    scipy.io.savemat(path, {"T": np.random.default_rng(1).random((9, 9))}, do_compression=packed)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:size])
+    said = f"is cut short, it should have {128 if size < 128 else len(whole)} bytes and has {size}"
+    refused(a_source(str(path)), "T.mat", said)
 
 
 def test_units_given_where_the_file_says_none(tmp_path):

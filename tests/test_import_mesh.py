@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fuzz.cgns_file import write_cgns
+from fuzz.foam_case import write_foam
 
 from chipglow.io.sources import CELSIUS, Placement, SourceError, Unit, Units
 from chipglow.io.sources.mesh import MeshSource
@@ -272,7 +273,9 @@ def test_deleted_elements_are_void(tmp_path):
     grid = grid_of()
     grid.cell_data["STATUS"] = (np.asarray(grid.cell_centers().points[:, 0]) < 5e-4).astype(float)
     grid.save(tmp_path / "chip.vtu")
-    check_linear(only_frame(MeshSource(tmp_path / "chip.vtu")), inside=X < 5e-4)
+    source = MeshSource(tmp_path / "chip.vtu")
+    check_linear(only_frame(source), inside=X < 5e-4)
+    assert survey_of(source).from_file == ("elements whose STATUS is 0 are deleted",)
 
 
 def test_a_displacement_is_added_if_it_is_named(tmp_path):
@@ -548,6 +551,19 @@ def test_an_abaqus_input_with_tables(tmp_path):
         assert np.isnan(frame.fields["plastic_strain"][hard]).all()
 
 
+def test_labels_without_a_row_are_counted(tmp_path):
+    path = abaqus(tmp_path, ("_1", "_2"))
+    table = tmp_path / "chip_2_nodes.csv"
+    rows = table.read_text().split("\n")
+    table.write_text("\n".join([*rows[:3], *rows[5:]]))
+    said = survey_of(MeshSource(path)).from_file
+    assert [text.split(";")[0] for text in said] == [
+        "PEEQ: 36 of 72 elements have no value in the first frame",
+        "NT11: 2 of 70 nodes have no value in the last frame",
+        "PEEQ: 36 of 72 elements have no value in the last frame",
+    ]
+
+
 ASSEMBLY = """*ASSEMBLY, NAME=ALL
 *INSTANCE, NAME=CHIP-1, PART=CHIP
 {moved}*END INSTANCE
@@ -606,60 +622,8 @@ def test_a_damaged_table_says_what_is_wrong(tmp_path, text, said):
         MeshSource(path).survey()
 
 
-def foam(folder):
-    """A case of two cells of 1 mm, as blockMesh writes it, with times 0 and 0.5."""
-    mesh = folder / "constant" / "polyMesh"
-    mesh.mkdir(parents=True)
-    (folder / "system").mkdir()
-    head = "FoamFile {{ version 2.0; format ascii; class {}; object {}; }}\n"
-    points = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1, 2)]
-    corner = {point: number for number, point in enumerate(points)}
-    faces, owner = [], []
-
-    def face(*of):
-        faces.append(f"4({' '.join(str(corner[point]) for point in of)})")
-
-    face((1, 0, 0), (1, 1, 0), (1, 1, 1), (1, 0, 1))
-    owner.append(0)
-    face((0, 0, 0), (0, 0, 1), (0, 1, 1), (0, 1, 0))
-    owner.append(0)
-    face((2, 0, 0), (2, 1, 0), (2, 1, 1), (2, 0, 1))
-    owner.append(1)
-    for cell in (0, 1):
-        a, b = cell, cell + 1
-        face((a, 0, 0), (b, 0, 0), (b, 0, 1), (a, 0, 1))
-        face((a, 1, 0), (a, 1, 1), (b, 1, 1), (b, 1, 0))
-        face((a, 0, 0), (a, 1, 0), (b, 1, 0), (b, 0, 0))
-        face((a, 0, 1), (b, 0, 1), (b, 1, 1), (a, 1, 1))
-        owner += [cell] * 4
-    tables = {
-        "points": ("vectorField", [f"({x} {y} {z})" for x, y, z in points]),
-        "faces": ("faceList", faces),
-        "owner": ("labelList", owner),
-        "neighbour": ("labelList", [1]),
-    }
-    for name, (kind, rows) in tables.items():
-        body = f"{len(rows)}\n(\n" + "\n".join(map(str, rows)) + "\n)\n"
-        (mesh / name).write_text(head.format(kind, name) + body)
-    boundary = "1\n(\nsides { type patch; nFaces 10; startFace 1; }\n)\n"
-    (mesh / "boundary").write_text(head.format("polyBoundaryMesh", "boundary") + boundary)
-    control = "application none; startFrom startTime; startTime 0; stopAt endTime; endTime 1;\n"
-    control += "deltaT 0.5; writeControl runTime; writeInterval 0.5;\n"
-    (folder / "system" / "controlDict").write_text(
-        head.format("dictionary", "controlDict") + control
-    )
-    for time in ("0", "0.5"):
-        (folder / time).mkdir()
-        values = f"nonuniform List<scalar> 2({300 + 10 * float(time)} 400)"
-        field = f"dimensions [0 0 0 1 0 0 0];\ninternalField {values};\n"
-        field += "boundaryField { sides { type zeroGradient; } }\n"
-        (folder / time / "T").write_text(head.format("volScalarField", "T") + field)
-    (folder / "case.foam").touch()
-    return folder / "case.foam"
-
-
 def test_an_openfoam_case_is_cut_and_its_cells_are_constant(tmp_path):
-    source = MeshSource(foam(tmp_path), section=0.5)
+    source = MeshSource(write_foam(tmp_path), section=0.5)
     survey = survey_of(source)
     assert survey.times.tolist() == [0.0, 0.5]
     assert survey.extent == pytest.approx((0.0, 2.0, 0.0, 1.0))
@@ -776,12 +740,6 @@ def test_elements_of_nodes_that_do_not_exist(tmp_path):
     (tmp_path / "chip.vtk").write_text(text + "SCALARS T float 1\nLOOKUP_TABLE default\n1 2 3\n")
     with pytest.raises(SourceError, match="nodes 0 to 9, expected 0 to 2"):
         MeshSource(tmp_path / "chip.vtk").survey()
-
-
-def test_binary_tecplot_is_refused(tmp_path):
-    (tmp_path / "chip.dat").write_bytes(b"#!TDV112" + bytes(100))
-    with pytest.raises(SourceError, match="binary Tecplot"):
-        MeshSource(tmp_path / "chip.dat").survey()
 
 
 @pytest.mark.parametrize(

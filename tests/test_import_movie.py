@@ -25,9 +25,10 @@ from chipglow.io.sources.movie import (
     metre_per_pixel,
 )
 from chipglow.io.sources.moving_pictures import index_movie, pictures
-from chipglow.io.sources.overlays import find_background, nearest
+from chipglow.io.sources.overlays import find_background
 from chipglow.io.sources.picture_sampling import PictureSampling
 from chipglow.scene import FILLED, Material, Raster
+from chipglow.scene.nearest import extended, nearest
 
 ENDS = (293.0, 1400.0)
 LEVEL = (ENDS[1] - ENDS[0]) / 256
@@ -483,6 +484,8 @@ def test_the_nearest_known_pixel_is_found(seed, share):
     at = np.argwhere(known)
     best = ((y[:, None] - at[:, 0]) ** 2 + (x[:, None] - at[:, 1]) ** 2).min(axis=1)
     np.testing.assert_array_equal((rows - y) ** 2 + (columns - x) ** 2, best)
+    whole = extended(np.where(known, np.arange(23 * 31).reshape(23, 31), -1), known)[y, x]
+    np.testing.assert_array_equal((whole // 31 - y) ** 2 + (whole % 31 - x) ** 2, best)
 
 
 # What is refused

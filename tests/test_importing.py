@@ -12,7 +12,9 @@ from moving_block import RATE, SPEED, UP, Broken, MovingBlock, strain_at
 from chipglow.io import open_scene, unfinished_scenes
 from chipglow.io.importing import Import, import_scene, kept_import, prospect, read_scene
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.isolated import Isolated
+from chipglow.io.sources.grid import GridSource
+from chipglow.io.sources.isolated import Isolated, patience_for
+from chipglow.io.sources.mesh import MeshSource
 from chipglow.io.sources.worker import read_message
 from chipglow.scene import FILLED, Material, Raster, SampledFrame, SceneError, ToolGeometry
 from chipglow.scene.completion import Completion, complete
@@ -238,6 +240,35 @@ def test_a_reader_that_goes_wrong_leaves_one_error_and_no_file(
     assert not list(tmp_path.iterdir())
 
 
+def test_the_patience_follows_the_size_of_the_files(tmp_path):
+    def sparse(name, size):
+        path = tmp_path / name
+        path.parent.mkdir(exist_ok=True)
+        path.touch()
+        os.truncate(path, size)
+        return path
+
+    small, large = sparse("a/small_1.vtu", 1000), sparse("a/small_2.vtu", 200_000_000)
+    sparse("a/store.zarr/c", 50_000_000)
+    assert patience_for(MeshSource(small).inputs) == pytest.approx(30.001)
+    assert patience_for(MeshSource(large).inputs) == pytest.approx(230.0)
+    # Files of a pattern together; a collection names files of its folder and of those below.
+    assert patience_for(MeshSource(small.parent / "small_*.vtu").inputs) == pytest.approx(230.001)
+    assert patience_for(MeshSource(small.parent / "all.pvd").inputs) == pytest.approx(280.001)
+    assert patience_for(GridSource(str(small.parent / "store.zarr")).inputs) == pytest.approx(80.0)
+    assert patience_for((str(sparse("b/huge.npy", 10**12)),)) == 1800.0
+    assert patience_for((str(tmp_path / "none.vtu"),)) == 30.0
+    assert Isolated(MeshSource(large), "large").inputs == (str(large),)
+
+
+def test_a_reader_that_hangs_on_a_small_file_is_left_after_that_time(
+    worker_finds_tests, monkeypatch
+):
+    monkeypatch.setattr("chipglow.io.sources.isolated.PATIENCE", 4.0)
+    with pytest.raises(SourceError, match="no answer in 4 s"):
+        list(Isolated(Broken(WHOLE, how="hang"), "block").frames(RASTER))
+
+
 def test_what_a_library_prints_does_not_mix_with_the_frames(worker_finds_tests):
     source = Broken(WHOLE, how="chatter")
     frames = list(Isolated(source, "block").frames(RASTER))
@@ -258,9 +289,10 @@ def test_an_import_that_was_ended_goes_on_to_the_same_file(tmp_path, monkeypatch
     kept = len(unfinished_scenes(tmp_path / "scene.nc")[0].frames()[0])
     assert 0 < kept < 8
     assert str(ended.value) == f"{kept} frames are kept"
-    assert kept_import(wanted, prospect(wanted), tmp_path / "scene.nc") == kept / 8
+    left = kept_import(wanted, prospect(wanted), tmp_path / "scene.nc")
+    assert left.progress == kept / 8
     shares = []
-    import_scene(wanted, tmp_path / "scene.nc", shares.append, resume=True)
+    import_scene(wanted, tmp_path / "scene.nc", shares.append, resume=left)
     assert len(shares) == 8 - kept
     import_scene(wanted, tmp_path / "whole.nc")
     assert [path.name for path in sorted(tmp_path.iterdir())] == ["scene.nc", "whole.nc"]
@@ -279,10 +311,8 @@ def test_another_import_does_not_go_on_with_what_is_left(tmp_path, monkeypatch):
 
     with pytest.raises(KeyboardInterrupt):
         import_scene(Import(MovingBlock()), tmp_path / "scene.nc", stop)
-    shares = []
     other = Import(MovingBlock(), description={"units": "mm"})
-    import_scene(other, tmp_path / "scene.nc", shares.append, resume=True)
-    assert len(shares) == 8
+    assert kept_import(other, prospect(other), tmp_path / "scene.nc") is None
 
 
 def test_an_answer_that_is_none_is_neither_unpickled_nor_given_room():

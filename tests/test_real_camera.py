@@ -125,11 +125,13 @@ def test_larger_clusters_stay_dead():
     bad = np.zeros((12, 16), bool)
     bad[4:6, 4:6] = True  # four: replaced
     bad[8, 8:13] = True  # five: not
+    bad[np.arange(6, 11), np.arange(5)] = True  # five over corner: not
     bad[0, 14:] = bad[1, 15] = True  # the corner of the image has no good neighbour
     replaced, done = replace_bad_pixels(np.ones((3, 12, 16)), bad)
     assert done[4:6, 4:6].all()
     assert not done[8, 8:13].any()
     assert np.isnan(replaced[:, 8, 8:13]).all()
+    assert not done[6:11, :5].any()
     assert not done[0, 15]
 
 

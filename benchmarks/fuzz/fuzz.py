@@ -217,6 +217,8 @@ def fuzz(seed, others, cases, folder, reader, escaped):
                 escaped.append(f"{seed.name}: {changes}: {type(error).__name__}: {error}")
 
     case()
+    if seed.is_part:
+        seed.written(folder)
     return counts
 
 

@@ -6,13 +6,14 @@ import numpy as np
 import pyvista as pv
 from cgns_file import write_cgns
 from lasso.dyna import D3plot
+from tecplot_file import ZoneOfFile, extras_of_header, write_tecplot
 from vtkmodules.vtkIOExodus import vtkExodusIIWriter
 from vtkmodules.vtkIOParallel import vtkEnSightWriter
 
 WRITTEN = (
     "chip.vtu", "chip.vtk", "chip.vtp", "chip.vtm", "chip.vtkhdf", "chip.e", "chip.case",
     "chip.xdmf", "chip.pvd", "chip.msh", "chip.med", "chip.avs", "chip.dat", "chip.inp", "d3plot",
-    "chip.cgns",
+    "chip.cgns", "chip.plt",
 )  # fmt: skip
 """Names of the files that `write_meshes` writes, each of which is damaged."""
 
@@ -44,6 +45,7 @@ def write_meshes(folder: Path) -> None:
     _d3plot(grid, folder)
     fields = {"Temperature": grid.point_data["NT11"]}
     write_cgns(folder / "chip.cgns", grid.points, grid.cells_dict[9], fields, {})
+    _tecplot_binary(grid, folder / "chip.plt")
 
 
 def _grid():
@@ -84,6 +86,19 @@ def _tecplot(grid):
     lines += [f"{point[0]:.6g} {point[1]:.6g} {value:.6g}" for point, value in values]
     lines += [" ".join(map(str, quad)) for quad in quads]
     return "\n".join(lines) + "\n"
+
+
+def _tecplot_binary(grid, path):
+    """Two times of elements, the later with the positions of the first, and points in order."""
+    x, y, _ = np.array(grid.points, np.float64).T
+    quads, names = grid.cells_dict[9], ("X", "Y", "NT11", "PEEQ")
+    values, strain = (np.array(grid[name], np.float64) for name in ("NT11", "PEEQ"))
+    centred, shape = (False, False, False, True), (len(x), len(quads))
+    first = ZoneOfFile([x, y, values, strain], shape, "quads", quads, centred, strand=1)
+    shared = [("shared", 0), ("shared", 0), values.astype("f4"), "passive"]
+    later = ZoneOfFile(shared, shape, "quads", 0, centred, strand=1, time=1.0)
+    ordered = ZoneOfFile([x + 1.0, y, values, np.zeros(10 * 7)], (10, 7, 1), centred=centred)
+    write_tecplot(path, names, [first, later, ordered], extras=extras_of_header())
 
 
 def _d3plot(grid, folder):

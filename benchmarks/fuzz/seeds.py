@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import scipy.io
 import xarray as xr
+from foam_case import PARTS, write_foam
 from mesh_seeds import WRITTEN, cloud_table, write_meshes
 
 from chipglow.io.sources import Source
@@ -22,16 +23,24 @@ ROWS, COLUMNS, FRAMES = 24, 32, 3
 
 @dataclass(frozen=True)
 class Seed:
-    """A whole file, and the source that reads it or a damaged copy of it."""
+    """A whole file, and the source that reads it or a damaged copy of it.
+
+    A part of a folder stands there among the other parts, which are whole.
+    """
 
     name: str
     content: bytes
     source: Callable[[Path], Source]
 
     @property
+    def is_part(self) -> bool:
+        """Whether it is a file of a folder that is read as one."""
+        return len(Path(self.name).parts) > 1
+
+    @property
     def suffix(self) -> str:
-        """How the name ends."""
-        return Path(self.name).suffix
+        """How the name ends, of a part that of its folder."""
+        return Path(Path(self.name).parts[0]).suffix
 
     def written(self, folder: Path) -> Path:
         """The file, written into a folder."""
@@ -44,7 +53,8 @@ def seeds(folder: Path) -> list[Seed]:
     """All files; those that only a library can write are written into the folder first."""
     found = [*_grids(folder), *_movies(folder), *_meshes(folder), *_clouds(folder)]
     for seed in found:
-        (folder / seed.name).unlink(missing_ok=True)
+        if not seed.is_part:
+            (folder / seed.name).unlink(missing_ok=True)
     return found
 
 
@@ -79,6 +89,21 @@ def _grids(folder: Path) -> list[Seed]:
     return [
         *(Seed(name, (folder / name).read_bytes(), _grid) for name in written),
         Seed("grid.tif", _tiff(values), _grid),
+        *(seed for version in (2, 3) for seed in _zarr(folder, values, version)),
+    ]
+
+
+def _zarr(folder: Path, values, version: int) -> list[Seed]:
+    import zarr
+
+    store = folder / f"{version}.zarr"
+    group = zarr.open_group(store, mode="w", zarr_format=version)
+    array = group.create_array("temperature", shape=values.shape, dtype="f4")
+    array[:] = values
+    parts = sorted(path for path in store.rglob("*") if path.is_file())
+    return [
+        Seed(str(path.relative_to(folder)), path.read_bytes(), lambda _: _grid(store))
+        for path in parts
     ]
 
 
@@ -96,7 +121,18 @@ def _mesh(path: Path) -> MeshSource:
 
 def _meshes(folder: Path) -> list[Seed]:
     write_meshes(folder)
-    return [Seed(name, (folder / name).read_bytes(), _mesh) for name in WRITTEN]
+    case = write_foam(folder / "case.foam")
+    return [
+        *(Seed(name, (folder / name).read_bytes(), _mesh) for name in WRITTEN),
+        *(
+            Seed(f"case.foam/{part}", (case.parent / part).read_bytes(), lambda _: _cut(case))
+            for part in PARTS
+        ),
+    ]
+
+
+def _cut(path: Path) -> MeshSource:
+    return MeshSource(path, section=0.5)
 
 
 def _cloud(path: Path) -> CloudSource:

@@ -1,7 +1,20 @@
 """Analysis: errors of the measurement, the rake face, the shear band and the segments."""
 
 from chipglow.analysis.band_error import BandErrors, band_errors
+from chipglow.analysis.band_profile import BandProfile, Stage, band_profile
+from chipglow.analysis.band_ridge import ThermalImage, find_band
 from chipglow.analysis.chip import ChipMetrics, ChipScan, chip_metrics
+from chipglow.analysis.comparison import (
+    BandComparison,
+    Comparison,
+    Doubts,
+    Fit,
+    GridComparison,
+    PlaceResult,
+    Reading,
+    compare,
+    normalised_error,
+)
 from chipglow.analysis.edge_image import EdgeImage, edge_image
 from chipglow.analysis.edge_line import EdgeLine, NoEdgeError, find_edge
 from chipglow.analysis.emissivity import (
@@ -23,15 +36,18 @@ from chipglow.analysis.find_tool import FoundTool, find_tool
 from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.knife_edge import EdgeResult, KnifeEdge, knife_edge
 from chipglow.analysis.lines import Line, sample, straight_line
+from chipglow.analysis.mutual_information import ImageFit, fit_images
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
 from chipglow.analysis.psf_fit import ModelFit
 from chipglow.analysis.radial_psf import RadialPSF
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
 from chipglow.analysis.rake_grid import RakeGrid, rake_grid
 from chipglow.analysis.regions import Area, Circle, Polygon, Region, areas, shared_pixels
+from chipglow.analysis.registration import PointFit, Registration, fit_points
+from chipglow.analysis.ridge import NoShearBandError
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
-from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear_band
+from chipglow.analysis.shear_band import ShearBand, find_shear_band
 from chipglow.analysis.size_of_source import ApertureImage, aperture_image
 from chipglow.analysis.temperature import (
     KnownEmissivity,
@@ -39,23 +55,31 @@ from chipglow.analysis.temperature import (
     TrueTemperature,
     true_temperature,
 )
+from chipglow.analysis.time_alignment import TimeAlignment, align_times, simultaneous_frames
 
 __all__ = [
     "PAPER",
     "ApertureImage",
     "Area",
+    "BandComparison",
     "BandErrors",
+    "BandProfile",
     "ChipMetrics",
     "ChipScan",
     "Circle",
+    "Comparison",
+    "Doubts",
     "EdgeImage",
     "EdgeLine",
     "EdgeResult",
     "EmissivityLine",
     "EmissivityMap",
     "ErrorImages",
+    "Fit",
     "FoundTool",
+    "GridComparison",
     "Heating",
+    "ImageFit",
     "Inertia",
     "KnifeEdge",
     "KnownEmissivity",
@@ -63,37 +87,51 @@ __all__ = [
     "ModelFit",
     "NoEdgeError",
     "NoShearBandError",
+    "PlaceResult",
     "Plan",
+    "PointFit",
     "Polygon",
     "RadialPSF",
     "RakeErrors",
     "RakeGrid",
+    "Reading",
     "ReferenceKind",
     "Region",
     "RegionEmissivity",
+    "Registration",
     "Segmentation",
     "Sensitivity",
     "Setting",
     "ShearBand",
+    "Stage",
     "StudyResult",
     "Surroundings",
+    "ThermalImage",
+    "TimeAlignment",
     "TrueTemperature",
+    "align_times",
     "analyse",
     "aperture_image",
     "areas",
     "band_errors",
+    "band_profile",
     "chip_metrics",
+    "compare",
     "contact_length",
     "determine_emissivity",
     "edge_image",
     "emissivity_covariance",
     "emissivity_line",
     "error_images",
+    "find_band",
     "find_edge",
     "find_shear_band",
     "find_tool",
+    "fit_images",
+    "fit_points",
     "inertia",
     "knife_edge",
+    "normalised_error",
     "rake_errors",
     "rake_grid",
     "reference_temperature",
@@ -101,6 +139,7 @@ __all__ = [
     "segmentation",
     "sensitivity",
     "shared_pixels",
+    "simultaneous_frames",
     "straight_line",
     "true_temperature",
 ]

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.lines import nearest, sample
 from chipglow.analysis.rake import contact_length
+from chipglow.analysis.ridge import NoShearBandError
 from chipglow.analysis.segmentation import Segmentation, segmentation
-from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear_band
+from chipglow.analysis.shear_band import ShearBand, find_shear_band
 from chipglow.scene import Frame, Material, Raster, Scene, Tool
 
 _MOST_FRAMES: Final = 64

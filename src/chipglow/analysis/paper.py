@@ -14,9 +14,10 @@ from chipglow.analysis.error import ErrorImages, ReferenceKind, error_images
 from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.lines import nearest, sample
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
+from chipglow.analysis.ridge import NoShearBandError
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import PSF_ORDERS, Sensitivity, Setting, sensitivity
-from chipglow.analysis.shear_band import NoShearBandError, ShearBand, find_shear_band
+from chipglow.analysis.shear_band import ShearBand, find_shear_band
 from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.camera.exposure import expose, frame_weights
 from chipglow.cutting import EnergyHistory

@@ -1,36 +1,31 @@
 """The shear band: the ridge of the plastic strain rate from the edge to the free surface."""
 
 from dataclasses import dataclass
-from math import ceil, pi, radians
+from math import ceil
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
-from scipy.signal import savgol_filter
 
 from chipglow.analysis.lines import Line, sample, straight_line
+from chipglow.analysis.ridge import (
+    NoShearBandError,
+    PolarGrid,
+    arc_length,
+    even_steps,
+    highest,
+    normals_of,
+)
 from chipglow.scene import Raster, Tool
 
 BAND_RATE: Final = 6000.0
 """Plastic strain rate in 1/s under which the paper sees no shear band."""
 
-_RADIUS_STEP: Final = 2e-6
-_ANGLES: Final = 401
-_BELOW_HORIZONTAL: Final = radians(10.0)
-_STEEPEST: Final = 2.0
-_STRAIGHTNESS: Final = 0.2
 _TOLL: Final = 0.8
-_RAKE_LAYER: Final = 25e-6
-_RAKE_LAYER_SHARE: Final = 0.4
-_SMOOTHING: Final = 50e-6
 _SEARCH: Final = 15e-6
 _CLIMB_BLUR: Final = (3.0, 1.5)
 _WIDEST: Final = 80e-6
-
-
-class NoShearBandError(ValueError):
-    """A strain-rate field in which no band leads from the edge to the chip's surface."""
 
 
 @dataclass(frozen=True)
@@ -135,20 +130,18 @@ def find_shear_band(
     """
     rate = np.where(workpiece, strain_rate, 0.0).astype(np.float64)
     edge = tool.edge_point
-    polar = _Polar.of(raster, rate, workpiece, tool, edge)
-    path, reaches_surface = polar.best_path()
-    points = _even_steps(np.concatenate([edge[None], path]), 2 * raster.spacing)
+    path, reaches_surface = _best_path(raster, rate, workpiece, tool)
+    points = even_steps(np.concatenate([edge[None], path]), 2 * raster.spacing)
     for _ in range(3):
-        points = _even_steps(_climb(points, raster, rate), 2 * raster.spacing)
-    normals = _normals(points)
+        points = even_steps(_climb(points, raster, rate), 2 * raster.spacing)
+    normals = normals_of(points)
     ridge_rate = np.nan_to_num(sample(rate, raster, points))
     if not ridge_rate.max() >= BAND_RATE:
         raise NoShearBandError(
             f"shear band: the greatest plastic strain rate on the best path is "
             f"{ridge_rate.max():.3g} 1/s, expected {BAND_RATE:g} 1/s or more"
         )
-    steps = np.hypot(*np.diff(points, axis=0).T)
-    distance = np.concatenate([[0.0], np.cumsum(steps)]) + float(np.hypot(*(points[0] - edge)))
+    distance = arc_length(points) + float(np.hypot(*(points[0] - edge)))
     return ShearBand(
         ridge=Line(distance, points),
         normals=normals,
@@ -158,133 +151,33 @@ def find_shear_band(
     )
 
 
-@dataclass(frozen=True)
-class _Polar:
-    """Strain rate about the edge: radii down, angles across."""
-
-    points: NDArray[np.float64]
-    score: NDArray[np.float64]
-    allowed: NDArray[np.bool_]
-    outside: NDArray[np.bool_]
-    on_raster: NDArray[np.bool_]
-    radii: NDArray[np.float64]
-    angle_step: float
-
-    @classmethod
-    def of(
-        cls,
-        raster: Raster,
-        rate: NDArray[np.float64],
-        workpiece: NDArray[np.bool_],
-        tool: Tool,
-        edge: NDArray[np.float64],
-    ) -> "_Polar":
-        left, right, _, top = raster.extent
-        reach = float(np.hypot(max(edge[0] - left, right - edge[0]), max(top - edge[1], 1e-6)))
-        first = max(tool.corner_radius, _RADIUS_STEP)
-        radii = np.arange(first, reach + 2 * _RADIUS_STEP, _RADIUS_STEP)
-        up = np.arctan2(tool.rake_direction[1], tool.rake_direction[0])
-        angles = np.linspace(up, pi + _BELOW_HORIZONTAL, _ANGLES)
-        rays = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        points = edge + radii[:, None, None] * rays
-        column = (points[..., 0] - left) / raster.spacing - 0.5
-        row = (top - points[..., 1]) / raster.spacing - 0.5
-        on_raster = (column >= 0) & (column <= raster.columns - 1)
-        on_raster &= (row >= 0) & (row <= raster.rows - 1)
-        values = map_coordinates(np.asarray(rate, np.float64), [row, column], order=1)
-        material = map_coordinates(workpiece.astype(np.uint8), [row, column], order=0) > 0
-        material &= on_raster
-        depth = tool.signed_distance(points[..., 0], points[..., 1])
-        layer = np.minimum(_RAKE_LAYER, _RAKE_LAYER_SHARE * radii)[:, None]
-        return cls(
-            points=points,
-            score=np.log1p(np.maximum(values, 0.0) / BAND_RATE),
-            allowed=material & (depth > layer),
-            outside=~material & (depth > layer),
-            on_raster=on_raster,
-            radii=radii,
-            angle_step=float(angles[1] - angles[0]),
-        )
-
-    def best_path(self) -> tuple[NDArray[np.float64], bool]:
-        """Points from the first radius to the surface, and whether it is a free surface."""
-        first = self._best(0.0)
-        # Once more, so that what is well under the band's strength costs: else the path would
-        # gain by running on along the surface where the band has ended.
-        i, j = self._best(_TOLL * float(np.median(self.score[first])))
-        return np.asarray(self.points[i, j]), bool(self.on_raster[i[-1] + 1, j[-1]])
-
-    def _best(self, toll: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Indices of the path with the greatest sum of score less toll."""
-        total = np.where(self.allowed, self.score - toll, -np.inf)
-        came_from = np.zeros(total.shape, dtype=np.int64)
-        for i in range(1, self.radii.size):
-            before, came_from[i] = self._best_before(total[i - 1], i)
-            total[i] += before
-        ends = np.zeros_like(self.allowed)
-        ends[:-1] = self.allowed[:-1] & self.outside[1:]
-        ends &= np.isfinite(total)
-        if not ends.any():
-            raise NoShearBandError("shear band: no path leads from the edge through the chip")
-        best = np.where(ends, total, -np.inf)
-        last, column = np.unravel_index(int(np.argmax(best)), best.shape)
-        columns = np.empty(int(last) + 1, dtype=np.int64)
-        columns[-1] = column
-        for k in range(int(last), 0, -1):
-            columns[k - 1] = came_from[k, columns[k]]
-        return np.arange(columns.size), columns
-
-    def _best_before(
-        self, total: NDArray[np.float64], i: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Greatest sum within reach at the radius before, less a little for turning."""
-        slope = self.radii[i] * self.angle_step / _RADIUS_STEP
-        reach = max(1, min(ceil(_STEEPEST / slope), total.size - 1))
-        padded = np.pad(total, reach, constant_values=-np.inf)
-        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
-        turns = np.arange(-reach, reach + 1)
-        candidates = windows - _STRAIGHTNESS * (turns * slope) ** 2
-        choice = candidates.argmax(axis=1)
-        best = candidates[np.arange(total.size), choice]
-        came_from = np.clip(np.arange(total.size) + choice - reach, 0, total.size - 1)
-        return best, came_from.astype(np.int64)
-
-
-def _even_steps(points: NDArray[np.float64], step: float) -> NDArray[np.float64]:
-    """Smoothed by local parabolas and laid out anew at even steps of arc length."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    even = np.linspace(0.0, along[-1], max(ceil(along[-1] / step) + 1, 5))
-    resampled = np.stack([np.interp(even, along, points[:, axis]) for axis in (0, 1)], axis=1)
-    window = min(2 * round(_SMOOTHING / step / 2) + 1, (even.size - 1) // 2 * 2 + 1)
-    if window < 5:
-        return resampled
-    return np.asarray(savgol_filter(resampled, window, 2, axis=0, mode="interp"))
-
-
-def _normals(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit normals of a curve that runs to the left: those that point up."""
-    tangent = np.gradient(points, axis=0)
-    tangent /= np.hypot(tangent[:, 0], tangent[:, 1])[:, None]
-    return np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+def _best_path(
+    raster: Raster, rate: NDArray[np.float64], workpiece: NDArray[np.bool_], tool: Tool
+) -> tuple[NDArray[np.float64], bool]:
+    """Points from the first radius to the surface, and whether it is a free surface."""
+    polar = PolarGrid.about(tool, raster)
+    values = map_coordinates(rate, polar.index, order=1)
+    material = map_coordinates(workpiece.astype(np.uint8), polar.index, order=0) > 0
+    material &= polar.on_raster
+    allowed, outside = material & polar.off_face, ~material & polar.off_face
+    ends = np.zeros_like(allowed)
+    ends[:-1] = allowed[:-1] & outside[1:]
+    score = np.log1p(np.maximum(values, 0.0) / BAND_RATE)
+    i, j = polar.best_path(score, allowed, ends, _TOLL)
+    return polar.points[i, j], bool(polar.on_raster[i[-1] + 1, j[-1]])
 
 
 def _climb(
     points: NDArray[np.float64], raster: Raster, rate: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Move each point to the maximum of the strain rate across the curve, if there is one."""
-    normals = _normals(points)
+    normals = normals_of(points)
     count = ceil(_SEARCH / raster.spacing)
-    offsets = raster.spacing * np.arange(-count, count + 1)
+    offsets = raster.spacing * np.arange(-count, count + 1, dtype=np.float64)
     across = points[:, None] + offsets[:, None] * normals[:, None]
     values = gaussian_filter(np.nan_to_num(sample(rate, raster, across)), _CLIMB_BLUR)
-    peak = values.argmax(axis=1)
-    inside = (peak > 0) & (peak < offsets.size - 1)
-    peak = np.clip(peak, 1, offsets.size - 2)
-    index = np.arange(peak.size)
-    left, top, right = (values[index, peak + k] for k in (-1, 0, 1))
-    bend = left - 2 * top + right
-    shift = np.divide(0.5 * (left - right), bend, out=np.zeros_like(bend), where=bend < 0)
-    moved = np.where(inside, offsets[peak] + raster.spacing * shift, 0.0)
+    place, inside = highest(values, offsets)
+    moved = np.where(inside, place, 0.0)
     return np.asarray(points + moved[:, None] * normals)
 
 

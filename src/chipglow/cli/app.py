@@ -10,10 +10,13 @@ import typer
 
 from chipglow.cli.boundary import Boundary
 from chipglow.cli.calibrate import calibrate
+from chipglow.cli.compare import compare
 from chipglow.cli.convert import convert
 from chipglow.cli.emissivity import emissivity
 from chipglow.cli.psf import psf
 from chipglow.cli.rake import rake
+from chipglow.cli.register import register
+from chipglow.cli.shearband import shearband
 from chipglow.cli.temperature import temperature
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
@@ -270,10 +273,13 @@ def materials(
         print(plot)
 
 
+app.command("shearband")(shearband)
 app.command("calibrate")(calibrate)
 app.command("convert")(convert)
 app.command("emissivity")(emissivity)
 app.command("rake")(rake)
+app.command("compare")(compare)
+app.command("register")(register)
 
 
 @cache_app.command("list")

@@ -32,10 +32,15 @@ def import_fields(description: ImportDescription, out: Path | None, resume: bool
     _say(looked)
     if out is None:
         return
-    _say_where_it_starts(kept_import(wanted, looked, out), resume)
+    kept = kept_import(wanted, looked, out)
+    _say_where_it_starts(kept.progress if kept else 0.0, resume)
     with progress_bars() as progress:
         import_scene(
-            wanted, out, lambda share: progress("import", share), looked=looked, resume=resume
+            wanted,
+            out,
+            lambda share: progress("import", share),
+            looked=looked,
+            resume=kept if resume else None,
         )
     print(out)
 
@@ -68,4 +73,6 @@ def _say(looked: Prospect) -> None:
         f"Sampled every {raster.spacing * 1e6:.4g} um: {raster.columns} x {raster.rows} samples, "
         f"x {left:.4g} um to {right:.4g} um, y {bottom:.4g} um to {top:.4g} um"
     )
+    for sentence in survey.from_file:
+        console.print(f"From the file: {sentence}")
     say_assumed(looked.assumed)

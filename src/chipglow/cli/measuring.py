@@ -48,6 +48,9 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
     with progress_bars() as progress:
         progress("measurement", 0.0)
         starts = camera.frame_times(first, count)
-        measured = camera.measure(scene, surfaces[name], starts).data.assign_attrs(surface=name)
+        try:
+            measured = camera.measure(scene, surfaces[name], starts).data.assign_attrs(surface=name)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
         progress("measurement", 1.0)
     write_measurement(Measurement(measured), out)

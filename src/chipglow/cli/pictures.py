@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def check_picture_path(path: Path) -> None:
+def check_picture_path(path: Path, option: str = "--plot") -> None:
     """Check the name of a picture before anything is computed.
 
     Raises
@@ -16,7 +16,7 @@ def check_picture_path(path: Path) -> None:
         If it ends in something else than .png, .pdf or .svg.
     """
     if path.suffix.lower() not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"--plot: {path}, expected a file that ends in .png, .pdf or .svg")
+        raise ValueError(f"{option}: {path}, expected a file that ends in .png, .pdf or .svg")
 
 
 def write_picture(figure: "Figure", path: Path) -> None:

@@ -8,9 +8,8 @@ import typer
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from chipglow.analysis import FoundTool, RakeGrid
+    from chipglow.analysis import RakeGrid
     from chipglow.camera import Measurement
-    from chipglow.scene import Tool
 
 
 def rake(
@@ -62,7 +61,9 @@ def rake(
     from rich.console import Console
 
     from chipglow.analysis import rake_grid
+    from chipglow.cli.lengths import parse_length
     from chipglow.cli.pictures import check_picture_path, write_picture
+    from chipglow.cli.tools import chosen_tool
     from chipglow.io import check_rake_grid_path, write_rake_grid
     from chipglow.report import draw_rake_grid
     from chipglow.study.measured import load_measurement
@@ -71,11 +72,11 @@ def rake(
         check_picture_path(plot)
     if out is not None:
         check_rake_grid_path(out)
-    reach = _length("--depth", depth)
+    reach = parse_length("--depth", depth)
     measured = load_measurement(measurement, settings or ())
     frames = _frames(measured, frame, at)
     console = Console(highlight=False, markup=False)
-    placed, remarks = _tool(measured, tool)
+    placed, remarks = chosen_tool(measured, tool)
     grid = rake_grid(measured, placed, pixels, reach, frames)
     console.print(_table(grid))
     for remark in (*remarks, *_remarks(measured, grid)):
@@ -86,15 +87,6 @@ def rake(
     if plot is not None:
         write_picture(draw_rake_grid(measured, grid), plot)
         print(plot)
-
-
-def _length(option: str, text: str) -> float:
-    from chipglow.study.units import LENGTH
-
-    try:
-        return LENGTH.parse(text)
-    except ValueError as error:
-        raise ValueError(f"{option}: {error}") from None
 
 
 def _frames(measurement: "Measurement", frame: str, at: str | None) -> list[int] | None:
@@ -115,33 +107,6 @@ def _frames(measurement: "Measurement", frame: str, at: str | None) -> list[int]
     if not (frame.isdecimal() and int(frame) < times.size):
         raise ValueError(f"--frame: {frame!r}, expected 0 to {times.size - 1}, or all")
     return [int(frame)]
-
-
-def _tool(measurement: "Measurement", tool: str | None) -> "tuple[Tool, list[str]]":
-    """The tool, and what is to be said of it."""
-    from chipglow.analysis import find_tool
-    from chipglow.study import tool_of
-
-    if tool != "found":
-        return tool_of(measurement, tool), []
-    found = find_tool(measurement)
-    return found.tool, [*_found(found), *(f"Doubtful: {doubt}" for doubt in found.doubts)]
-
-
-def _found(found: "FoundTool") -> list[str]:
-    """What was found, with standard uncertainties, and what was assumed."""
-    from math import degrees
-
-    shape, (x, y) = found.tool.tool, (1e6 * part for part in found.tool.tip)
-    return [
-        f"Found: rake angle {degrees(found.tool.rake_angle):.1f} ± "
-        f"{degrees(found.angle_uncertainty):.1f} deg; the rake face to "
-        f"± {1e6 * found.position_uncertainty:.1f} um across itself; tip at x {x:.1f} um, "
-        f"y {y:.1f} um, to ± {1e6 * found.tip_uncertainty:.0f} um along the face (standard "
-        "uncertainties).",
-        f"Assumed: clearance angle {degrees(shape.clearance_angle):.3g} deg, edge radius "
-        f"{1e6 * shape.corner_radius:.3g} um.",
-    ]
 
 
 def _table(grid: "RakeGrid") -> "Table":

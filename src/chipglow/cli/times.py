@@ -1,5 +1,8 @@
 """Times on the command line."""
 
+import numpy as np
+from numpy.typing import NDArray
+
 from chipglow.study.units import INSTANT
 
 
@@ -15,3 +18,28 @@ def parse_instant(option: str, text: str) -> float:
         return INSTANT.parse(text)
     except ValueError as error:
         raise ValueError(f"{option}: {error}") from None
+
+
+def frame_at(option: str, text: str, times: NDArray[np.float64]) -> int:
+    """Number of the frame that is nearest to a time such as ``400 us``.
+
+    Parameters
+    ----------
+    option : str
+        Name of the option.
+    text : str
+        The time with its unit.
+    times : ndarray
+        When the frames began in s, shape (n,).
+
+    Raises
+    ------
+    ValueError
+        If it is no time, or before the first frame or after the last one.
+    """
+    instant = parse_instant(option, text)
+    slack = 0.5 * float(np.diff(times).min()) if times.size > 1 else 1e-6
+    if not times[0] - slack <= instant <= times[-1] + slack:
+        first, last = (f"{1e6 * time:.7g} us" for time in (times[0], times[-1]))
+        raise ValueError(f"{option}: {text}, expected {first} to {last}, when frames began")
+    return int(np.abs(times - instant).argmin())

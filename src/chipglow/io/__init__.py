@@ -1,7 +1,9 @@
 """Readers and writers: scenes, measurements, and output that is whole or not there."""
 
 from chipglow.io.atomic import atomic_folder, atomic_path
+from chipglow.io.band_file import check_band_profile_path, read_curve, write_band_profile
 from chipglow.io.cameras import CAMERA_FORMATS, CameraFormat, read_recording, write_hcc
+from chipglow.io.comparison_file import write_comparison
 from chipglow.io.emissivity_file import (
     StoredEmissivity,
     read_emissivity_map,
@@ -18,6 +20,8 @@ from chipglow.io.measurement_file import (
     write_measurement,
 )
 from chipglow.io.movie_file import check_movie_path, movie_writer
+from chipglow.io.picture_file import read_pictures
+from chipglow.io.points_file import read_points
 from chipglow.io.psf_file import write_psf
 from chipglow.io.rake_grid_file import check_rake_grid_path, write_rake_grid
 from chipglow.io.scene_file import (
@@ -42,6 +46,7 @@ __all__ = [
     "View",
     "atomic_folder",
     "atomic_path",
+    "check_band_profile_path",
     "check_movie_path",
     "check_rake_grid_path",
     "import_scene",
@@ -49,13 +54,18 @@ __all__ = [
     "movie_writer",
     "open_scene",
     "prospect",
+    "read_curve",
     "read_emissivity_map",
     "read_measurement",
+    "read_pictures",
+    "read_points",
     "read_recording",
     "read_region_emissivity",
     "read_scene",
     "read_tool_outline",
     "unfinished_scenes",
+    "write_band_profile",
+    "write_comparison",
     "write_dataset",
     "write_emissivity",
     "write_emissivity_table",

@@ -190,7 +190,7 @@ def import_scene(
     progress: Callable[[float], None] | None = None,
     *,
     looked: Prospect | None = None,
-    resume: bool = False,
+    resume: UnfinishedScene | None = None,
 ) -> Prospect:
     """Read a source into a scene's file; no more than a few frames are in memory.
 
@@ -204,8 +204,8 @@ def import_scene(
         Told the share that is done, 0 to 1.
     looked : Prospect, optional
         What `prospect` said, if it was asked before.
-    resume : bool
-        Go on where an earlier import of the same was ended.
+    resume : UnfinishedScene, optional
+        What `kept_import` found of an earlier import of the same, to go on from there.
 
     Raises
     ------
@@ -219,9 +219,8 @@ def import_scene(
     looked = looked or prospect(wanted)
     survey, raster, completion = looked.survey, looked.raster, wanted.completion
     key = _key(wanted, looked)
-    start = _unfinished(path, key) if resume else None
-    done = len(start.frames()[0]) if start else 0
-    attributes = {"import": key, "assumed": "; ".join(looked.assumed)}
+    done = len(resume.frames()[0]) if resume else 0
+    attributes = _attributes(key, looked)
     coordinates = {"material_x", "material_y"} <= set(survey.found)
     with SceneWriter(
         path,
@@ -231,7 +230,7 @@ def import_scene(
         coordinates,
         quality=True,
         hottest=HOTTEST_PLAUSIBLE,
-        resume=start,
+        resume=resume,
     ) as writer:
         kept = f"{done} frames are kept" if done else ""
         due = monotonic() + _CHECKPOINT_INTERVAL
@@ -252,10 +251,12 @@ def import_scene(
     return looked
 
 
-def kept_import(wanted: Import, looked: Prospect, path: str | os.PathLike[str]) -> float:
-    """Share of an import to a file that an earlier run left at a checkpoint, 0 to 1."""
-    left = _unfinished(path, _key(wanted, looked))
-    return left.progress if left else 0.0
+def kept_import(
+    wanted: Import, looked: Prospect, path: str | os.PathLike[str]
+) -> UnfinishedScene | None:
+    """What an earlier run of the same import to a file left at a checkpoint, the furthest."""
+    key = _key(wanted, looked)
+    return next((left for left in unfinished_scenes(Path(path)) if _is_of(left, key)), None)
 
 
 def read_scene(source: Import | Source) -> Scene:
@@ -283,8 +284,16 @@ def read_scene(source: Import | Source) -> Scene:
         [frame.time for frame in frames],
         {name: np.stack([getattr(frame, name) for frame in frames]) for name in names},
         wanted.completion.tool,
-        {"import": _key(wanted, looked), "assumed": "; ".join(looked.assumed)},
+        _attributes(_key(wanted, looked), looked),
     )
+
+
+def _attributes(key: str, looked: Prospect) -> dict[str, str]:
+    """What a scene keeps of where it is from."""
+    kept = {"import": key, "assumed": "; ".join(looked.assumed)}
+    if looked.survey.from_file:
+        kept["from_file"] = "; ".join(looked.survey.from_file)
+    return kept
 
 
 def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
@@ -338,11 +347,6 @@ def _key(wanted: Import, looked: Prospect) -> str:
     """What makes two imports the same."""
     raster = vars(looked.raster)
     return json.dumps({**wanted.description, "raster": raster}, sort_keys=True, default=str)
-
-
-def _unfinished(path: str | os.PathLike[str], key: str) -> UnfinishedScene | None:
-    """What an earlier run of the same import left, the furthest."""
-    return next((left for left in unfinished_scenes(Path(path)) if _is_of(left, key)), None)
 
 
 def _is_of(left: UnfinishedScene, key: str) -> bool:

@@ -1,14 +1,10 @@
 """Outlines of tools from files."""
 
-import csv
 import os
 from pathlib import Path
-from typing import Final
 
+from chipglow.io.point_table import read_points
 from chipglow.scene import ToolOutline, ToolOutlineError
-
-_HEADER: Final = ["x_um", "y_um"]
-_LARGEST_FILE: Final = 1_000_000
 
 
 def read_tool_outline(path: str | os.PathLike[str]) -> ToolOutline:
@@ -30,28 +26,8 @@ def read_tool_outline(path: str | os.PathLike[str]) -> ToolOutline:
         If it cannot be read.
     """
     path = Path(path)
-    if path.stat().st_size > _LARGEST_FILE:
-        raise ValueError(f"{path}: expected a file of up to {_LARGEST_FILE // 1000} kB")
+    points = read_points(path)
     try:
-        lines = path.read_text(encoding="utf-8-sig").rstrip().splitlines()
-    except UnicodeDecodeError:
-        raise ValueError(f"{path}: expected text in UTF-8") from None
-    rows = [[cell.strip() for cell in row] for row in csv.reader(lines)] or [[]]
-    if rows[0] != _HEADER:
-        raise ValueError(
-            f"{path}, line 1: {','.join(rows[0])!r}, expected {','.join(_HEADER)!r}, the unit named"
-        )
-    try:
-        return ToolOutline.placed([_point(row, i) for i, row in enumerate(rows[1:])])
+        return ToolOutline.placed(points)
     except ToolOutlineError as error:
         raise ValueError(f"{path}, line {error.point + 2}: {error}") from None
-
-
-def _point(row: list[str], number: int) -> tuple[float, float]:
-    try:
-        x, y = (float(cell) * 1e-6 for cell in row)
-    except ValueError:
-        raise ToolOutlineError(
-            f"{','.join(row)!r}, expected two numbers such as -3.5,12", number
-        ) from None
-    return x, y

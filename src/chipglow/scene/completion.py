@@ -9,7 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.scene.motion import nearest_filled, optical_flow, strain_rate_along
+from chipglow.scene.motion import optical_flow, strain_rate_along
+from chipglow.scene.nearest import fill
 from chipglow.scene.polygon import in_polygon
 from chipglow.scene.raster import Raster
 from chipglow.scene.sampled import SampledFrame
@@ -185,7 +186,8 @@ def _prepared(
 def _without_holes(values: NDArray[np.float32], solid: NDArray[np.bool_]) -> NDArray[np.float32]:
     """A field that is known everywhere in the material, and NaN elsewhere."""
     known = solid & np.isfinite(values)
-    whole = values if known.sum() == solid.sum() else nearest_filled(values, known)
+    whole = np.where(known, values, np.float32(0.0))
+    fill(whole, known, solid & ~known)
     return np.where(solid, whole, np.float32(np.nan))
 
 

@@ -4,7 +4,9 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, map_coordinates, zoom
+from scipy.ndimage import map_coordinates, zoom
+
+from chipglow.scene.nearest import extended
 
 _FLOW_SAMPLES: Final = 320
 """Most samples across a picture of which the optical flow is computed: it takes seconds else."""
@@ -42,7 +44,7 @@ def strain_rate_along(
     shift = np.float32(interval / spacing)
     origin = rows + velocity[1] * shift, columns - velocity[0] * shift
     there = np.isfinite(before)
-    earlier = map_coordinates(nearest_filled(before, there), origin, order=3, mode="nearest")
+    earlier = map_coordinates(extended(before, there), origin, order=3, mode="nearest")
     known = map_coordinates(there.astype(np.float32), origin, order=1, mode="constant") > 0.5
     rate = np.maximum((strain - earlier) / np.float32(interval), 0.0)
     rate[~known & np.isfinite(strain)] = 0.0
@@ -81,14 +83,6 @@ def optical_flow(
     back = [_resized(flow, before.shape) for flow in (right, -down)]
     speed = np.float32(spacing * before.shape[1] / small[0].shape[1] / interval)
     return back[0] * speed, back[1] * speed
-
-
-def nearest_filled(values: NDArray[np.float32], known: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Values with those that are not known taken from the nearest that is, shape (y, x)."""
-    if known.all() or not known.any():
-        return np.where(known, values, np.float32(0.0))
-    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
-    return np.asarray(values[tuple(nearest)])
 
 
 def _resized(values: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:

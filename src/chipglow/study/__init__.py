@@ -18,6 +18,7 @@ from chipglow.study.measured import load_measurement, load_recording, measuremen
 from chipglow.study.measurement_schema import MeasurementDescription
 from chipglow.study.preview import preview_raster
 from chipglow.study.reference import FieldEntry, field_entries, field_tables
+from chipglow.study.registered import load_registration, write_registration
 from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, kept_progress, run
 from chipglow.study.schema import Study
 from chipglow.study.template import calibration_text, import_text, measurement_text, study_text
@@ -52,6 +53,7 @@ __all__ = [
     "load_measurement",
     "load_recording",
     "load_regions",
+    "load_registration",
     "load_study",
     "load_tool",
     "measurement_of",
@@ -62,4 +64,5 @@ __all__ = [
     "surface_text",
     "tool_of",
     "uniform_counts",
+    "write_registration",
 ]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from chipglow.scene import Material, Scene
 from chipglow.study.schema import Study
-from chipglow.surface import FeatureSurface
+from chipglow.surface import FeatureSurface, Surface
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Fitted:
     """
 
     scene: Scene
-    surfaces: Mapping[str, FeatureSurface]
+    surfaces: Mapping[str, Surface]
     assumed: tuple[str, ...]
 
 
@@ -52,9 +52,13 @@ def fit(study: Study, scene: Scene) -> Fitted:
             "The scene shows no tool: beyond the rake face nothing shines into the blur of the "
             "chip, and errors there are larger than with a warm tool."
         )
-    following = any(surface.follow == "material" for surface in surfaces.values())
+    following = {
+        name: surface
+        for name, surface in surfaces.items()
+        if isinstance(surface, FeatureSurface) and surface.follow == "material"
+    }
     if following and not scene.has_material_coordinates:
-        surfaces = {name: replace(surface, follow="mean") for name, surface in surfaces.items()}
+        surfaces |= {name: replace(surface, follow="mean") for name, surface in following.items()}
         assumed.append(
             "The scene does not say where each point was before the cut: textures move with the "
             "mean velocity of their feature (surface.follow: mean)."

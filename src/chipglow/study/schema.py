@@ -32,7 +32,7 @@ from chipglow.cutting import (
     tool_material,
     workpiece,
 )
-from chipglow.io import read_tool_outline
+from chipglow.io import read_emissivity_map, read_tool_outline
 from chipglow.radiometry import Band
 from chipglow.scene import Chamfer, Hone, Raster, Tool, ToolGeometry
 from chipglow.study.section import OR_NONE, FileBeside, Part, Section, described
@@ -49,7 +49,7 @@ from chipglow.study.units import (
     Wavelength,
     WavelengthRange,
 )
-from chipglow.surface import CHIP_1, CHIP_2, Emissivity, FeatureSurface
+from chipglow.surface import CHIP_1, CHIP_2, Emissivity, FeatureSurface, Surface
 
 CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2}
 """Chips of the paper's Table 1 by the names of a study."""
@@ -377,6 +377,12 @@ class SurfaceSection(Section):
         "Chips by name, each laid on the same scene. A chip is chip-1 or chip-2 (the paper's\n"
         "Table 1), or the numbers of its body and shear bands.",
     )
+    maps: dict[str, FileBeside] = described(
+        {},
+        "Emissivity maps by name, files of chipglow emissivity: each is laid on the scene where\n"
+        "its pixels lie, as one more chip. Of several true temperatures the first counts.",
+        "{} or names and files beside this one: {measured: emissivity.nc}",
+    )
     workpiece: EmissivitySection = described(
         _numbers(CHIP_1.workpiece), "The uncut workpiece; the paper assumed these numbers."
     )
@@ -398,15 +404,34 @@ class SurfaceSection(Section):
             raise ValueError("{} is empty, expected one chip or more, such as chip 1: chip-1")
         return chips
 
-    def build(self, seed: int) -> dict[str, FeatureSurface]:
+    @model_validator(mode="after")
+    def _different_names(self) -> Self:
+        for name in self.maps:
+            if name in self.chips:
+                raise ValueError(f"maps: {name!r} is the name of a chip too, expected another")
+        return self
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the surfaces: the chips, then the maps."""
+        return (*self.chips, *self.maps)
+
+    def build(self, seed: int) -> dict[str, Surface]:
         """The surfaces by name.
 
         Parameters
         ----------
         seed : int
             Seed of the textures, the same for every chip: they differ by their numbers only.
+
+        Raises
+        ------
+        ValueError
+            If a file is no emissivity map.
+        OSError
+            If it is not there.
         """
-        return {
+        chips = {
             name: FeatureSurface(
                 chip=chip.body.build(),
                 shear_band=chip.shear_band.build(),
@@ -419,6 +444,7 @@ class SurfaceSection(Section):
             )
             for name, chip in self.chips.items()
         }
+        return {**chips, **{name: read_emissivity_map(file) for name, file in self.maps.items()}}
 
 
 class AnnularApertureSection(Part):
@@ -611,8 +637,8 @@ class Study(Section):
     def _chips_are_there(self) -> Self:
         for field in ("rake_chip", "band_chip"):
             name = getattr(self.analysis, field)
-            if name not in self.surface.chips:
-                known = ", ".join(self.surface.chips)
+            if name not in self.surface.names:
+                known = ", ".join(self.surface.names)
                 raise ValueError(f"analysis.{field}: {name!r} is unknown, expected one of {known}")
         return self
 

@@ -15,7 +15,7 @@ import numpy as np
 from chipglow.camera.recording import PlanckConversion, Recording
 from chipglow.io.cameras.stacks import Told
 from chipglow.io.sources.arrays import MOST_SAMPLES
-from chipglow.io.sources.isolated import MEMORY, PATIENCE
+from chipglow.io.sources.isolated import MEMORY, patience_for
 from chipglow.io.sources.source import SourceError
 from chipglow.io.sources.worker import limit_memory
 from chipglow.radiometry import ObjectParameters
@@ -40,6 +40,7 @@ def read_apart(path: Path, kind: str, frames: slice | None, told: Told) -> Recor
     parts = () if frames is None else (frames.start, frames.stop, frames.step)
     chosen = [None if part is None else index(part) for part in parts]
     request = {"path": str(path), "kind": kind, "frames": chosen, "told": asdict(told)}
+    patience = patience_for((str(path),))
     try:
         done = subprocess.run(
             # -P: nothing beside the data is taken for a module.
@@ -47,11 +48,11 @@ def read_apart(path: Path, kind: str, frames: slice | None, told: Told) -> Recor
             input=json.dumps(request, default=float).encode(),
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            timeout=PATIENCE,
+            timeout=patience,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise SourceError(f"{path}: its reader had no answer in {PATIENCE:g} s") from None
+        raise SourceError(f"{path}: its reader had no answer in {patience:.0f} s") from None
     header, samples = _parts(done.stdout)
     if "missing" in header:
         raise FileNotFoundError(header["missing"])

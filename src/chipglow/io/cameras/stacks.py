@@ -31,7 +31,7 @@ from chipglow.io.sources.layout import (
     unit_of,
     unpacked,
 )
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import Remarks, SourceError
 
 RECORDING_UNITS: Final[Mapping[str, tuple[Quantity, float]]] = {
     "counts": ("counts", 0.0),
@@ -111,15 +111,16 @@ def read_stack(path: Path, kind: str, frames: slice | None, told: Told) -> Recor
         reader = exported_table if kind == ".csv" else ARRAY_READERS[kind]
         arrays = open_arrays(str(path), stack, reader)
         one = _dataset(path, arrays, told.dataset)
-        assumed: list[str] = []
-        axes = axes_of(one, told.axes, assumed)
+        remarks = Remarks()
+        axes = axes_of(one, told.axes, remarks)
         lengths = dict(zip(axes, one.array.shape, strict=True))
         check_picture(path, lengths["y"], lengths["x"], MOST_ON_A_SIDE)
         unit = _unit(one, told)
         chosen = chosen_frames(path, frames, lengths.get("time", 1), lengths["y"] * lengths["x"])
-        times = _times(one, arrays, axes, chosen, told, assumed)
+        times = _times(one, arrays, axes, chosen, told, remarks)
         signal = _signal(one, axes, chosen)
-    notes = [f"Assumed: {sentence}." for sentence in assumed]
+    notes = [f"From the file: {sentence}." for sentence in remarks.from_file]
+    notes += [f"Assumed: {sentence}." for sentence in remarks.assumed]
     if skipped := one.array.attributes.get("lines_of_text"):
         notes.append(f"Left out: {skipped} lines of text before the numbers.")
     quantity, offset = RECORDING_UNITS[unit]
@@ -183,7 +184,7 @@ def _times(
     axes: tuple[str, ...],
     chosen: range,
     told: Told,
-    assumed: list[str],
+    remarks: Remarks,
 ) -> NDArray[np.float64]:
     if told.interval is not None:
         return even_times(chosen, told.interval)
@@ -194,7 +195,7 @@ def _times(
     found = coordinate("time", {one.path: arrays}, None, dim, count)
     if found is None or found.label == one.label:
         raise SourceError(f"{one}: give the interval between frames, the file says no times")
-    unit = unit_of("time", str(found), found.unit, SI, assumed)
+    unit = unit_of("time", str(found), found.unit, SI, remarks)
     times = check_times(str(found), read_list(found, unit))
     if not isfinite(times[-1] - times[0]):
         raise SourceError(f"{found}: is not finite")

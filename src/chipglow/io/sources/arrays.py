@@ -10,14 +10,14 @@ from functools import partial
 from glob import glob, has_magic
 from math import prod
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.file_order import natural
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import SourceError, missing_extra
 from chipglow.io.sources.text_table import TextTable, lines_of_text
 
 MOST_SAMPLES: Final = 100_000_000
@@ -28,6 +28,7 @@ MOST_ON_A_SIDE: Final = 1_000_000
 
 _MOST_ARRAYS: Final = 10_000
 _KINDS: Final = "fiub"
+_MATLAB_HEAD: Final = 128
 _UNPACKED_BY_TIFFFILE: Final = (1, 8, 32946)
 """None, and two names of deflate: the other compressions need libtiff, which Pillow has."""
 _NO_COORDINATE: Final = b"This is a netCDF dimension but not a netCDF variable"
@@ -409,12 +410,29 @@ def _matlab(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
         return
     from scipy.io import whosmat
 
+    _check_matlab_length(path)
     for name, shape, kind in whosmat(path):
         if name.startswith("__"):
             continue
         if kind.startswith(("double", "single", "int", "uint", "logical")):
             whole = _MatlabArray(path, name)
             yield StoredArray(name, tuple(int(n) for n in shape), whole.read)
+
+
+def _check_matlab_length(path: Path) -> None:
+    """Refuse a file that ends before its last element does; formats 5 to 7.2."""
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        head = stream.read(_MATLAB_HEAD)
+        if not head.startswith(b"MATLAB"):  # format 4, or something else
+            return
+        order: Literal["little", "big"] = "little" if head[-2:] == b"IM" else "big"
+        end = _MATLAB_HEAD
+        while end + 8 <= size:
+            stream.seek(end + 4)
+            end += 8 + int.from_bytes(stream.read(4), order)
+    if end > size:
+        raise SourceError(f"{path}: is cut short, it should have {end} bytes and has {size}")
 
 
 class _MatlabArray:
@@ -526,7 +544,7 @@ def _extra(module: str, path: Path) -> Any:
     try:
         return import_module(module)
     except ImportError:
-        raise SourceError(f"{path}: needs {module}, pip install 'chipglow[grid]'") from None
+        raise missing_extra(path, module, "grid") from None
 
 
 # Zarr

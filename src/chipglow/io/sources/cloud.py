@@ -19,7 +19,7 @@ from chipglow.io.sources.conventions import (
 )
 from chipglow.io.sources.layout import check_times, unit_of
 from chipglow.io.sources.point_files import MOST_POINTS, PointFrames, PointTable, open_points
-from chipglow.io.sources.source import READABLE, SampledFrame, Source, SourceError, Survey
+from chipglow.io.sources.source import READABLE, Remarks, SampledFrame, Source, SourceError, Survey
 from chipglow.scene import Material, Raster
 from chipglow.scene.cloud import Cloud, neighbour_distance, sample_cloud
 
@@ -100,6 +100,11 @@ class CloudSource(Source):
         if not isfinite(self.depth):
             raise ValueError(f"depth: {self.depth!r}, expected a finite length")
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The path or pattern."""
+        return (self.files,)
+
     def survey(self) -> Survey:
         """Look at what is there; see `Source.survey`."""
         with ExitStack() as stack:
@@ -112,7 +117,8 @@ class CloudSource(Source):
                 found=points.found,
                 unused=points.unused,
                 spacing=float(np.median(clouds[0].spacing)),
-                assumed=tuple(dict.fromkeys(points.assumed)),
+                assumed=tuple(dict.fromkeys(points.remarks.assumed)),
+                from_file=tuple(dict.fromkeys(points.remarks.from_file)),
             )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
@@ -137,7 +143,7 @@ class _Points:
 
     def __init__(self, source: CloudSource, stack: ExitStack) -> None:
         self._source = source
-        self.assumed: list[str] = []
+        self.remarks = Remarks()
         self.files: PointFrames = open_points(source.files, source.names.get("time"), stack)
         if self.files.count < 1:
             raise SourceError(f"{source.files}: has no frame")
@@ -223,7 +229,7 @@ class _Points:
     def _unit(self, path: str, name: str, label: str, table: PointTable) -> Unit:
         own = self._source.units.of(name)
         known = name.replace("_z", "_x")
-        return unit_of(known, f"{path}: {label}", table.units.get(label), own, self.assumed)
+        return unit_of(known, f"{path}: {label}", table.units.get(label), own, self.remarks)
 
     def _times(self, path: str) -> NDArray[np.float64]:
         source, count = self._source, self.files.count
@@ -231,10 +237,10 @@ class _Points:
             return source.interval * np.arange(count, dtype=np.float64)
         if self.files.times is None:
             if count > 1:
-                self.assumed.append("no times in the files: frames are 1 s apart")
+                self.remarks.assumed.append("no times in the files: frames are 1 s apart")
             return np.arange(count, dtype=np.float64)
         name = f"{path}: time"
-        unit = unit_of("time", name, self.files.time_unit, source.units.time, self.assumed)
+        unit = unit_of("time", name, self.files.time_unit, source.units.time, self.remarks)
         return check_times(name, self.files.times * unit.scale)
 
     def _places(self, path: str, table: PointTable) -> NDArray[np.float64]:
@@ -244,7 +250,7 @@ class _Points:
             label = self._extra.get(axis)
             if label is not None:
                 own, text = self._source.units.length, table.units.get(label)
-                unit = unit_of(axis, f"{path}: {label}", text, own, self.assumed)
+                unit = unit_of(axis, f"{path}: {label}", text, own, self.remarks)
                 places[:, number] = _column(path, table, label) * unit.scale
         return places
 
@@ -307,7 +313,7 @@ class _Points:
             spacing = neighbour_distance(np.ascontiguousarray(places[:, axes]))
             if not spacing > 0:
                 raise SourceError(f"{path}: its points are in one place, expected spacing")
-            self.assumed.append(
+            self.remarks.assumed.append(
                 f"the points are {spacing:.4g} m apart, as neighbours are in the first frame"
             )
         if source.thickness is not None and source.thickness < spacing:
@@ -368,11 +374,7 @@ def _in_file(name: str, placement: Placement) -> str:
 
 
 def _column(path: str, table: PointTable, label: str) -> NDArray[np.float64]:
-    if label not in table.columns:
-        raise SourceError(f"{path}: there is no column {label!r}")
-    if table.columns[label].dtype.kind not in "fiub":
-        raise SourceError(f"{path}: {label} has text in it, expected numbers")
-    values = np.asarray(table.columns[label], np.float64)
+    values = np.asarray(table.numbers(path, label), np.float64)
     if len(values) != len(next(iter(table.columns.values()))):
         raise SourceError(f"{path}: {label} has {len(values)} points, others have more or fewer")
     return values

@@ -32,7 +32,7 @@ from chipglow.io.sources.layout import (
     unpacked,
     unused_names,
 )
-from chipglow.io.sources.source import READABLE, SampledFrame, Source, SourceError, Survey
+from chipglow.io.sources.source import READABLE, Remarks, SampledFrame, Source, SourceError, Survey
 from chipglow.scene import Material, Raster
 from chipglow.scene.regrid import regrid, taps
 
@@ -116,6 +116,11 @@ class GridSource(Source):
         if self.placement.depth != 2:
             raise ValueError("placement: a grid has the axes x and y, expected no z")
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The path or pattern, or those of the fields."""
+        return (self.files,) if isinstance(self.files, str) else tuple(self.files.values())
+
     def survey(self) -> Survey:
         """Look at what is there; see `Source.survey`."""
         with ExitStack() as stack:
@@ -128,7 +133,8 @@ class GridSource(Source):
                 found={name: layer.chosen.label for name, layer in grid.layers.items()},
                 unused=grid.unused,
                 spacing=min(grid.steps),
-                assumed=grid.assumed,
+                assumed=tuple(dict.fromkeys(grid.remarks.assumed)),
+                from_file=tuple(dict.fromkeys(grid.remarks.from_file)),
             )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
@@ -227,7 +233,7 @@ class _Grid:
     y: NDArray[np.float64]
     turned: tuple[bool, bool, bool]
     unused: tuple[str, ...]
-    assumed: tuple[str, ...]
+    remarks: Remarks
 
     @property
     def steps(self) -> tuple[float, float]:
@@ -308,15 +314,15 @@ def _turn(values: NDArray[Any], turned: tuple[bool, bool, bool]) -> NDArray[Any]
 
 
 def _open(source: GridSource, stack: ExitStack) -> _Grid:
-    assumed: list[str] = []
-    files, chosen = _choose(source, stack, assumed)
+    remarks = Remarks()
+    files, chosen = _choose(source, stack, remarks)
     layers: dict[str, _Layer] = {}
     for name, one in chosen.items():
-        axes = axes_of(one, source.axes, assumed)
+        axes = axes_of(one, source.axes, remarks)
         unit = (
             SI
             if name == "material"
-            else unit_of(name, str(one), one.unit, source.units.of(name), assumed)
+            else unit_of(name, str(one), one.unit, source.units.of(name), remarks)
         )
         layers[name] = _Layer(one, axes, unit)
         layers[name].check()
@@ -326,7 +332,7 @@ def _open(source: GridSource, stack: ExitStack) -> _Grid:
     material = layers.pop("material", None)
     if not layers:
         raise SourceError(f"{first.chosen}: is a material, expected a temperature too")
-    x, y = (_positions(source, axis, files, first, assumed) for axis in ("x", "y"))
+    x, y = (_positions(source, axis, files, first, remarks) for axis in ("x", "y"))
     x, y, turned = _placed(source.placement, x, y)
     used = {one.label for one in chosen.values()} | set(source.names.values())
     return _Grid(
@@ -334,17 +340,17 @@ def _open(source: GridSource, stack: ExitStack) -> _Grid:
         layers={_placed_name(name, source.placement): layer for name, layer in layers.items()},
         material=material,
         source=source,
-        times=_times(source, files, first, assumed),
+        times=_times(source, files, first, remarks),
         x=x,
         y=y,
         turned=turned,
         unused=unused_names((label for arrays in files.values() for label in arrays), used),
-        assumed=tuple(dict.fromkeys(assumed)),
+        remarks=remarks,
     )
 
 
 def _choose(
-    source: GridSource, stack: ExitStack, assumed: list[str]
+    source: GridSource, stack: ExitStack, remarks: Remarks
 ) -> tuple[dict[str, Arrays], dict[str, Chosen]]:
     """Open the files and find every field: arrays by file, and fields by name."""
     given = {name: label for name, label in source.names.items() if name not in COORDINATES}
@@ -352,7 +358,7 @@ def _choose(
         path = source.files
         arrays = open_arrays(path, stack)
         candidates = _candidates(path, arrays, source)
-        return {path: arrays}, find_fields(path, candidates, given, _KNOWN, assumed)
+        return {path: arrays}, find_fields(path, candidates, given, _KNOWN, remarks)
     files: dict[str, Arrays] = {}
     chosen: dict[str, Chosen] = {}
     for name, path in source.files.items():
@@ -361,7 +367,7 @@ def _choose(
         own = {name: given[name]} if name in given else {}
         if len(candidates) == 1 and not own:
             own = {name: next(iter(candidates))}
-        chosen.update(find_fields(path, candidates, own, (name,), assumed))
+        chosen.update(find_fields(path, candidates, own, (name,), remarks))
     return files, chosen
 
 
@@ -383,7 +389,7 @@ def _positions(
     axis: str,
     files: Mapping[str, Arrays],
     layer: _Layer,
-    assumed: list[str],
+    remarks: Remarks,
 ) -> NDArray[np.float64]:
     """Centres of the columns or rows in m, as they follow in the file."""
     count = layer.length(axis)
@@ -396,18 +402,18 @@ def _positions(
             )
         return check_even(
             str(one),
-            read_list(one, unit_of(axis, str(one), one.unit, source.units.length, assumed)),
+            read_list(one, unit_of(axis, str(one), one.unit, source.units.length, remarks)),
         )
     if coordinate(axis, files, source.names.get(axis), layer.dim(axis), count) is not None:
-        assumed.append(f"the file's coordinate {axis} is not used, as the spacing is given")
+        remarks.from_file.append(f"its coordinate {axis} is not used, as the spacing is given")
     if axis == "x":
         return source.left + source.spacing[0] * number
-    assumed.append(f"row 0 is the {'upper' if source.top_first else 'lower'} edge")
+    remarks.assumed.append(f"row 0 is the {'upper' if source.top_first else 'lower'} edge")
     return source.top - source.spacing[1] * (number if source.top_first else number[::-1])
 
 
 def _times(
-    source: GridSource, files: Mapping[str, Arrays], layer: _Layer, assumed: list[str]
+    source: GridSource, files: Mapping[str, Arrays], layer: _Layer, remarks: Remarks
 ) -> NDArray[np.float64]:
     count = layer.frames
     if source.interval is not None:
@@ -415,10 +421,10 @@ def _times(
     one = coordinate("time", files, source.names.get("time"), layer.dim("time"), count)
     if one is None:
         if count > 1:
-            assumed.append("no times in the files: frames are 1 s apart")
+            remarks.assumed.append("no times in the files: frames are 1 s apart")
         return np.arange(count, dtype=np.float64)
     return check_times(
-        str(one), read_list(one, unit_of("time", str(one), one.unit, source.units.time, assumed))
+        str(one), read_list(one, unit_of("time", str(one), one.unit, source.units.time, remarks))
     )
 
 

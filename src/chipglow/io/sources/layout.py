@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.arrays import StoredArray, check_samples, reading
 from chipglow.io.sources.conventions import SI, Unit, match_names, simple
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import Remarks, SourceError
 from chipglow.io.sources.unit_text import SI_UNITS, parse_unit
 
 AXES: Final = ("time", "y", "x")
@@ -48,7 +48,7 @@ def find_fields(
     arrays: Mapping[str, StoredArray],
     given: Mapping[str, str],
     known: Sequence[str],
-    assumed: list[str],
+    remarks: Remarks,
 ) -> dict[str, Chosen]:
     """Which of a file's arrays are which fields.
 
@@ -63,7 +63,7 @@ def find_fields(
     known : sequence of str
         Fields to look for, ``material`` among them if it may be there. If the file has one array
         only, it is the first of them.
-    assumed : list of str
+    remarks : Remarks
         Takes what had to be assumed.
 
     Raises
@@ -94,7 +94,7 @@ def find_fields(
         found["material"] = material
     if not found and len(arrays) == 1:
         found[known[0]] = next(iter(arrays))
-        assumed.append(f"the only array {found[known[0]]!r} of {path} is {known[0]}")
+        remarks.assumed.append(f"the only array {found[known[0]]!r} of {path} is {known[0]}")
     if not found:
         listed = ", ".join(sorted(arrays)[:20]) or "none of this kind"
         raise SourceError(
@@ -113,7 +113,7 @@ def _short_names(labels: Collection[str]) -> dict[str, str]:
     }
 
 
-def axes_of(chosen: Chosen, given: Sequence[str] | None, assumed: list[str]) -> tuple[str, ...]:
+def axes_of(chosen: Chosen, given: Sequence[str] | None, remarks: Remarks) -> tuple[str, ...]:
     """What the axes of an array are: ``time``, ``y`` and ``x`` in their order.
 
     Parameters
@@ -122,7 +122,7 @@ def axes_of(chosen: Chosen, given: Sequence[str] | None, assumed: list[str]) -> 
         The array.
     given : sequence of str, optional
         What the user says.
-    assumed : list of str
+    remarks : Remarks
         Takes what had to be assumed.
 
     Raises
@@ -136,7 +136,7 @@ def axes_of(chosen: Chosen, given: Sequence[str] | None, assumed: list[str]) -> 
         names = tuple(given)
     elif sorted(names) not in (sorted(AXES), ["x", "y"]):
         names = AXES[-len(shape) :]
-        assumed.append(f"the axes of {chosen.label} are {', '.join(names)}")
+        remarks.assumed.append(f"the axes of {chosen.label} are {', '.join(names)}")
     if len(names) != len(shape) or len(shape) not in (2, 3):
         raise SourceError(
             f"{chosen}: has shape {shape}, expected the axes {', '.join(given or AXES)}"
@@ -148,7 +148,7 @@ def _axis(dim: str) -> str:
     return next((axis for axis, names in COORDINATES.items() if simple(dim) in names), "")
 
 
-def unit_of(name: str, label: str, text: object, own: Unit, assumed: list[str]) -> Unit:
+def unit_of(name: str, label: str, text: object, own: Unit, remarks: Remarks) -> Unit:
     """Unit of a field or coordinate: as given if that is not SI, else as the file says.
 
     Parameters
@@ -161,7 +161,7 @@ def unit_of(name: str, label: str, text: object, own: Unit, assumed: list[str]) 
         What the file says; anything but text is nothing said.
     own : Unit
         What the user says.
-    assumed : list of str
+    remarks : Remarks
         Takes what had to be assumed, and which unit the file says.
 
     Raises
@@ -172,18 +172,18 @@ def unit_of(name: str, label: str, text: object, own: Unit, assumed: list[str]) 
     short = label.rsplit(": ", 1)[-1]
     if own != SI:
         if isinstance(text, str):
-            assumed.append(f"{short} is in the unit given, the file says {text!r}")
+            remarks.from_file.append(f"{short} is in {text!r}, but the unit given is taken")
         return own
     if not isinstance(text, str):
         if SI_UNITS[name]:
-            assumed.append(f"{short} is in {SI_UNITS[name]}: the file says no unit")
+            remarks.assumed.append(f"{short} is in {SI_UNITS[name]}: the file says no unit")
         return own
     try:
         unit = parse_unit(name, text)
     except ValueError as error:
         raise SourceError(f"{label}: {error}") from None
     if unit != SI:
-        assumed.append(f"{short} is in {text!r}, as the file says")
+        remarks.from_file.append(f"{short} is in {text!r}")
     return unit
 
 

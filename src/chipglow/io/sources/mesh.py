@@ -16,7 +16,14 @@ from chipglow.io.sources.mesh_abaqus import AbaqusReader
 from chipglow.io.sources.mesh_block import Block, FlatMesh, check_grid, fields_of, flatten
 from chipglow.io.sources.mesh_dyna import DynaReader
 from chipglow.io.sources.mesh_reader import MeshReader, files_of
-from chipglow.io.sources.source import READABLE, SampledFrame, Source, SourceError, Survey
+from chipglow.io.sources.source import (
+    READABLE,
+    SampledFrame,
+    Source,
+    SourceError,
+    Survey,
+    missing_extra,
+)
 from chipglow.scene import Material, Raster
 from chipglow.scene.rasterise import NOTHING, rasterise
 
@@ -97,22 +104,31 @@ class MeshSource(Source):
         if isinstance(self.section, float) and not isfinite(self.section):
             raise ValueError(f"section: expected a finite position, got {self.section!r}")
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The path or pattern; with its folder if such files name others."""
+        suffix = self.path.suffix.lower()
+        alone = suffix in (*mesh_vtk.ALONE, *mesh_meshio.KINDS, *mesh_tecplot.ENDINGS)
+        return (str(self.path),) if alone else (str(self.path), str(self.path.parent))
+
     def survey(self) -> Survey:
         """Look at the first and the last mesh; see `Source.survey`."""
         reader = self._reader()
         blocks = self._read(reader, 0)
         found = self._found(blocks, reader.file(0))
-        first = self._flat(reader, 0, blocks, found)
-        last = first if reader.count == 1 else self._flat(reader, reader.count - 1, None, found)
+        last = reader.count - 1
+        ends = {0: blocks} if last == 0 else {0: blocks, last: self._read(reader, last)}
+        flat = [self._flat(reader, number, there, found) for number, there in ends.items()]
         times, assumed = self._times(reader)
         every = fields_of(blocks)
         return Survey(
             reader.kind,
             times,
-            self._extent(reader, (first, last)),
+            self._extent(reader, flat),
             {ours: found[ours] for ours in READABLE if ours in found},
             tuple(sorted(set(every) - set(found.values()))),
             assumed=(*reader.assumed, *assumed, *self._assumed(blocks, found)),
+            from_file=_from_file(found, tuple(ends.values())),
         )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
@@ -126,9 +142,7 @@ class MeshSource(Source):
 
     def _reader(self) -> MeshReader:
         if find_spec("pyvista") is None or find_spec("meshio") is None:
-            raise SourceError(
-                f"{self.path}: needs PyVista and meshio, expected pip install 'chipglow[mesh]'"
-            )
+            raise missing_extra(self.path, "PyVista and meshio", "mesh")
         timed = bool(self.times)
         suffix = self.path.suffix.lower()
         if suffix in mesh_vtk.KINDS:
@@ -260,8 +274,6 @@ class MeshSource(Source):
         moving = [names[name] for name in ("displacement", "u") if name in names]
         if moving and self.displacement is None and not _is_exodus(self.path):
             sentences.append(f"positions are those of the file, {moving[0]} is not added to them")
-        if any("STATUS" in block.grid.cell_data for block in blocks):
-            sentences.append("elements whose STATUS is 0 are deleted")
         if not self.tool_parts:
             sentences.append("no part is named as tool: all that is there is the workpiece")
         return tuple(sentences)
@@ -332,6 +344,35 @@ def _check_size(file: Path, ours: str, theirs: str, sizes: Mapping[str, int]) ->
         raise SourceError(
             f"{file}: fields: {ours}: {theirs!r} has {size} components, expected one value"
         )
+
+
+def _from_file(found: Mapping[str, str], frames: Sequence[Sequence[Block]]) -> tuple[str, ...]:
+    """What the first and the last frame lack."""
+    sentences = []
+    for when, blocks in zip(("first", "last"), frames, strict=False):
+        for theirs in dict.fromkeys(found.values()):
+            for of in ("nodes", "elements"):
+                lacking, count = _without_value(blocks, theirs, of)
+                if lacking:
+                    sentences.append(
+                        f"{theirs}: {lacking} of {count} {of} have no value in the {when} frame; "
+                        "what they touch is filled from the nearest and marked in quality"
+                    )
+    if any("STATUS" in block.grid.cell_data for blocks in frames for block in blocks):
+        sentences.append("elements whose STATUS is 0 are deleted")
+    return tuple(dict.fromkeys(sentences))
+
+
+def _without_value(blocks: Sequence[Block], name: str, of: str) -> tuple[int, int]:
+    """How many nodes or elements of those that could have no value of a field."""
+    lacking = count = 0
+    for block in blocks:
+        data = block.grid.point_data if of == "nodes" else block.grid.cell_data
+        if name in data:
+            values = np.asarray(data[name], np.float64).reshape(len(data[name]), -1)
+            lacking += int((~np.isfinite(values)).any(axis=1).sum())
+            count += len(values)
+    return lacking, count
 
 
 def _columns(columns: Sequence[NDArray[np.float32]]) -> NDArray[np.float64] | None:

@@ -154,6 +154,8 @@ def flatten(
     solid = False
     for block, is_tool in zip(blocks, tool, strict=True):
         grid = _with_only(block.grid, wanted, is_tool)
+        if not grid.n_cells:
+            continue
         is_solid = bool(np.isin(grid.celltypes, (*_FLAT, *_OTHER_FLAT), invert=True).any())
         solid |= is_solid
         flat += _solid(grid, placement, section) if is_solid else _flat(grid)

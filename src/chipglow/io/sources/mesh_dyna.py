@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.mesh_block import Block
 from chipglow.io.sources.mesh_reader import MeshReader
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import SourceError, missing_extra
 
 _FAMILIES: Final = ("shell", "solid")
 _AVERAGED: Final = ("effective_plastic_strain", "thermal_data")
@@ -61,9 +61,7 @@ class DynaReader(MeshReader):
         try:
             from lasso.dyna import D3plot
         except ImportError:
-            raise SourceError(
-                f"{self._file}: needs lasso-python, expected pip install 'chipglow[dyna]'"
-            ) from None
+            raise missing_extra(self._file, "lasso-python", "dyna") from None
         logging.getLogger("lasso").setLevel(logging.CRITICAL)
         if self._file.stat().st_size == 0:
             raise SourceError(f"{self._file}: is empty, expected an LS-DYNA d3plot")

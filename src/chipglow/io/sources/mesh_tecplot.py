@@ -1,10 +1,12 @@
-"""Meshes of Tecplot: ASCII files with zones of finite elements or of ordered points."""
+"""Meshes of Tecplot: ASCII and binary files, zones of finite elements or of ordered points."""
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,33 +14,22 @@ from numpy.typing import NDArray
 from chipglow.io.sources.mesh_block import Block
 from chipglow.io.sources.mesh_reader import MeshReader
 from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.tecplot_binary import MAGIC, binary_zones
+from chipglow.io.sources.tecplot_zone import ELEMENTS, ORDERED, Zone, block_of
 
 ENDINGS: Final = (".dat", ".tec", ".plt")
 
-_BINARY: Final = b"#!TD"
 _KEY: Final = r'(\w+)\s*=\s*("[^"]*"|\((?:[^()]|\([^()]*\))*\)|[^\s,]+)'
 _NUMBER: Final = re.compile(rb"\s*[-+.]?\d")
-_ELEMENTS: Final[Mapping[str, tuple[int, int]]] = {
-    "TRIANGLE": (3, 5), "QUADRILATERAL": (4, 9), "TETRAHEDRON": (4, 10), "BRICK": (8, 12),
-}  # fmt: skip
-_ORDERED: Final = ("ORDERED", "POINT", "BLOCK")
+_ORDERED: Final = (ORDERED, "POINT", "BLOCK")
 _NOT_READ: Final = ("VARSHARELIST", "CONNECTIVITYSHAREZONE", "D", "PASSIVEVARLIST")
 
 
-@dataclass(frozen=True)
-class _Zone:
-    """Where a zone is in a file, and what its header says."""
-
-    file: Path
-    number: int
-    names: tuple[str, ...]
-    keys: Mapping[str, str]
-    begin: int
-    end: int
-
-
 class TecplotReader(MeshReader):
-    """One file for each frame, or one file with zones whose ``SOLUTIONTIME`` differs.
+    """One file for each frame, or one file with zones of different times.
+
+    Times are ``SOLUTIONTIME`` of ASCII files and the solution times of zones in strands of binary
+    ones. Zones without are there at all times.
 
     Parameters
     ----------
@@ -48,16 +39,16 @@ class TecplotReader(MeshReader):
     Raises
     ------
     SourceError
-        If a file is no ASCII file of Tecplot.
+        If a file is none of Tecplot.
     """
 
     def __init__(self, files: Sequence[Path]) -> None:
         self._files = files
         self._zones = _zones(files[0]) if len(files) == 1 else ()
-        times = sorted({time for zone in self._zones if (time := _time(zone)) is not None})
-        self.times = tuple(times) or None
-        self.count = max(len(times), len(files))
-        self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of Tecplot ASCII"
+        self.times = _times(self._zones) if self._zones else _times_of_series(files)
+        self.count = max(len(self.times or ()), len(files))
+        form = "binary" if _is_binary(files[0]) else "ASCII"
+        self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of Tecplot {form}"
 
     def file(self, number: int) -> Path:
         """The file of a frame."""
@@ -68,17 +59,67 @@ class TecplotReader(MeshReader):
         zones = self._zones or _zones(self.file(number))
         if self.times:
             wanted = self.times[number]
-            zones = tuple(zone for zone in zones if _time(zone) in (None, wanted))
-        return tuple(_read(zone) for zone in zones)
+            zones = tuple(zone for zone in zones if zone.time in (None, wanted))
+        return tuple(zone.read() for zone in zones)
 
 
-def _zones(file: Path) -> tuple[_Zone, ...]:
+def _is_binary(file: Path) -> bool:
+    with file.open("rb") as stream:
+        return stream.read(len(MAGIC)) == MAGIC
+
+
+def _times(zones: Sequence[Zone]) -> tuple[float, ...] | None:
+    return tuple(sorted({zone.time for zone in zones if zone.time is not None})) or None
+
+
+def _times_of_series(files: Sequence[Path]) -> tuple[float, ...] | None:
+    """Times of a file each, if those are binary: ASCII ones would have to be read as a whole."""
+    if not _is_binary(files[0]):
+        return None
+    times = [_times(_zones(file)) or () for file in files]
+    found = tuple(of_file[0] for of_file in times if len(of_file) == 1)
+    rising = all(before < after for before, after in pairwise(found))
+    return found if rising and len(found) == len(files) else None
+
+
+def _zones(file: Path) -> tuple[Zone, ...]:
+    return binary_zones(file) if _is_binary(file) else _ascii_zones(file)
+
+
+@dataclass(frozen=True)
+class _AsciiZone(Zone):
+    """Where a zone is in a file, and what its header says."""
+
+    file: Path
+    number: int
+    names: tuple[str, ...]
+    keys: Mapping[str, str]
+    begin: int
+    end: int
+
+    @cached_property
+    def time(self) -> float | None:
+        """Its time, if it says one."""
+        text = self.keys.get("SOLUTIONTIME")
+        try:
+            return None if text is None else float(text)
+        except ValueError:
+            raise SourceError(
+                f"{self.file}: zone {self.number}: SOLUTIONTIME is {text!r}, expected a number"
+            ) from None
+
+    def read(self) -> Block:
+        """Its mesh and fields."""
+        try:
+            return _block(self)
+        except (ValueError, KeyError, IndexError) as error:
+            raise self.refusal(error) from None
+
+
+def _ascii_zones(file: Path) -> tuple[Zone, ...]:
     header, begins, ends, texts = b"", list[int](), list[int](), list[bytes]()
     inside = False
     with file.open("rb") as stream:
-        if stream.read(4) == _BINARY:
-            raise SourceError(f"{file}: is a binary Tecplot file, expected an ASCII one")
-        stream.seek(0)
         at = 0
         for line in stream:
             if line.lstrip().startswith(b"#"):
@@ -103,7 +144,7 @@ def _zones(file: Path) -> tuple[_Zone, ...]:
         )
     keys = [_keys(text.decode(errors="replace")) for text in texts]
     rows = zip(keys, begins, [*ends[1:], at], strict=True)
-    return tuple(_Zone(file, 1 + k, names, *row) for k, row in enumerate(rows))
+    return tuple(_AsciiZone(file, 1 + k, names, *row) for k, row in enumerate(rows))
 
 
 def _names(header: str) -> tuple[str, ...]:
@@ -119,31 +160,7 @@ def _keys(text: str) -> dict[str, str]:
     return {key.upper(): value.strip('"') for key, value in pairs}
 
 
-def _time(zone: _Zone) -> float | None:
-    text = zone.keys.get("SOLUTIONTIME")
-    try:
-        return None if text is None else float(text)
-    except ValueError:
-        raise SourceError(
-            f"{zone.file}: zone {zone.number}: SOLUTIONTIME is {text!r}, expected a number"
-        ) from None
-
-
-def _read(zone: _Zone) -> Block:
-    try:
-        return _block(zone)
-    except (ValueError, KeyError, IndexError) as error:
-        if isinstance(error, SourceError):
-            raise
-        said = " ".join(f"{type(error).__name__}: {error}".split())[:120]
-        raise SourceError(
-            f"{zone.file}: zone {zone.number} is damaged or of a kind that is not read ({said})"
-        ) from None
-
-
-def _block(zone: _Zone) -> Block:
-    import pyvista
-
+def _block(zone: _AsciiZone) -> Block:
     keys = zone.keys
     for key in _NOT_READ:
         if key in keys:
@@ -155,39 +172,23 @@ def _block(zone: _Zone) -> Block:
         text = stream.read(zone.end - zone.begin)
         words = re.sub(rb"(?m)^\s*#.*$", b"", text).split()
     if kind in _ORDERED:
-        counts = tuple(int(keys.get(axis, "1")) for axis in "IJK")
+        across, down, deep = (int(keys.get(axis, "1")) for axis in "IJK")
+        counts = (across, down, deep)
         nodes, elements = int(np.prod(counts)), int(np.prod([max(c - 1, 1) for c in counts]))
     else:
         nodes = int(keys.get("N") or keys["NODES"])
         elements = int(keys.get("E") or keys["ELEMENTS"])
     columns, rest = _columns(zone, words, nodes, elements)
-    points = np.zeros((nodes, 3))
-    for axis, name in enumerate("XYZ"):
-        own = next((own for own in columns if own.split("[")[0].strip().upper() == name), None)
-        if own is not None:
-            points[:, axis] = columns.pop(own)
-        elif axis < 2:
-            raise ValueError(f"there is no {name}")
-    if kind in _ORDERED:
-        grid: Any = pyvista.StructuredGrid()
-        grid.points = points
-        grid.dimensions = counts
-        grid = grid.cast_to_unstructured_grid()
-    else:
-        size, vtk = _ELEMENTS[kind]
-        cells = np.array(rest, np.int64).reshape(elements, size) - 1
-        if cells.min() < 0 or cells.max() >= nodes:
-            raise ValueError(f"elements have nodes {cells.min() + 1} to {cells.max() + 1}")
-        table = np.insert(cells, 0, size, axis=1)
-        grid = pyvista.UnstructuredGrid(table.ravel(), np.full(elements, vtk, np.uint8), points)
+    names = tuple(filter(None, (keys.get("T", "").strip(), str(zone.number))))
     centred = _centred(keys, zone.names)
-    for name, values in columns.items():
-        (grid.cell_data if name in centred else grid.point_data)[name] = values
-    return Block(tuple(filter(None, (keys.get("T", "").strip(), str(zone.number)))), grid)
+    if kind in _ORDERED:
+        return block_of(names, columns, centred, ORDERED, counts)
+    cells = np.array(rest, np.int64).reshape(elements, ELEMENTS[kind][0]) - 1
+    return block_of(names, columns, centred, kind, cells)
 
 
 def _columns(
-    zone: _Zone, words: Sequence[bytes], nodes: int, elements: int
+    zone: _AsciiZone, words: Sequence[bytes], nodes: int, elements: int
 ) -> tuple[dict[str, NDArray[np.float64]], Sequence[bytes]]:
     """Values of each variable, and the words after them."""
     packing = zone.keys.get("DATAPACKING", zone.keys.get("F", "POINT")).upper()

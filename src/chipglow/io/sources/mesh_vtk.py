@@ -36,6 +36,12 @@ KINDS: Final[Mapping[str, str]] = {
 }
 """Formats by the ending of a file's name."""
 
+ALONE: Final = (
+    ".vtu", ".vtp", ".vts", ".vtr", ".vti", ".vtk", ".vtkhdf", ".e", ".ex2", ".exo", ".exii",
+    ".cgns",
+)  # fmt: skip
+"""Those whose files name no others."""
+
 _AS: Final[Mapping[str, str]] = {".xmf": ".xdmf", ".encas": ".case"}
 _HEAD: Final = 100_000
 _CLAIMS: Final = (

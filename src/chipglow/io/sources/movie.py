@@ -19,13 +19,13 @@ from chipglow.io.sources.overlays import (
     FieldPicture,
     FieldReader,
     box_mask,
-    fill,
     find_background,
     polygon_mask,
 )
 from chipglow.io.sources.picture_sampling import PictureSampling
 from chipglow.io.sources.source import SampledFrame, Source, SourceError, Survey
 from chipglow.scene import FIELD_UNITS, FILLED, Material, Raster
+from chipglow.scene.nearest import fill
 
 MOVIE_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate")
 """Fields that a movie can show, the first of those given decides on the material."""
@@ -175,6 +175,11 @@ class MovieSource(Source):
                 f"placement: {self.placement}, expected x and y of the picture; the origin is in "
                 "pixels"
             )
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The movies."""
+        return tuple(str(movie.path) for movie in self.movies.values())
 
     def survey(self) -> Survey:
         """Look at what is there: sizes, times, legends, the background, what colours leave open."""

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import SourceError, missing_extra
 
 _MOST_PIXELS: Final = 1 << 26
 # No playlists, scripts or numbered files: a movie may not lead to other files or to the network.
@@ -237,7 +237,7 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
         import av
         from av.error import FFmpegError
     except ImportError:
-        raise SourceError(f"{path}: movies need PyAV, pip install 'chipglow[movie]'") from None
+        raise missing_extra(path, "PyAV", "movie") from None
     try:
         with av.open(f"file:{path}", options=_OPTIONS, metadata_errors="replace") as container:
             if not container.streams.video:

@@ -6,14 +6,14 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, maximum_filter, minimum_filter
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from chipglow.io.sources.colour_scale import ColourScale, lab
 from chipglow.io.sources.legend import Box
 from chipglow.io.sources.source import SourceError
 from chipglow.scene import FILLED, Material
+from chipglow.scene.nearest import fill
 from chipglow.scene.polygon import in_polygon
 
 Colour = tuple[int, int, int]
@@ -25,7 +25,6 @@ MARK_TOLERANCE: Final = 10.0
 _GREY: Final = 10.0
 _BORDER_SHARE: Final = 0.1
 _COARSE: Final = 16
-_REACH: Final = 8
 
 
 @dataclass(frozen=True)
@@ -181,32 +180,6 @@ def find_background(
     return tuple(found), tuple(refused)
 
 
-def nearest(known: NDArray[np.bool_], wanted: NDArray[np.bool_]) -> tuple[NDArray[np.intp], ...]:
-    """Rows and columns of the known pixels that are nearest to the wanted ones, shape (n,) each.
-
-    Parameters
-    ----------
-    known : ndarray
-        Pixels to choose from, one or more, shape (y, x), bool.
-    wanted : ndarray
-        Pixels to find the nearest for, n of them, shape (y, x), bool.
-    """
-    at = np.argwhere(wanted)
-    found = np.full(at.shape, -1, np.intp)
-    _search(known, at, found)
-    far = found[:, 0] < 0
-    if far.any():
-        indices = distance_transform_edt(~known, return_distances=False, return_indices=True)
-        found[far] = indices[:, at[far, 0], at[far, 1]].T
-    return found[:, 0], found[:, 1]
-
-
-def fill(values: NDArray[Any], known: NDArray[np.bool_], wanted: NDArray[np.bool_]) -> None:
-    """Give wanted pixels the value of the nearest known one, if there is any, in place."""
-    if wanted.any() and known.any():
-        values[wanted] = values[nearest(known, wanted)]
-
-
 def box_mask(shape: tuple[int, int], boxes: Sequence[Box], margin: int = 0) -> NDArray[np.bool_]:
     """Pixels within boxes, with a margin around them."""
     mask = np.zeros(shape, np.bool_)
@@ -255,25 +228,3 @@ def _without_lines(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     wide = minimum_filter(mask.view(np.uint8), 3)
     # At the border of the picture the mirrored pixels would let it grow.
     return np.asarray(maximum_filter(wide, 3)).view(np.bool_) & mask
-
-
-@njit(cache=True)
-def _search(known, at, found):  # type: ignore[no-untyped-def]
-    """Look for the nearest known pixel in squares that grow."""
-    height, width = known.shape
-    for index in range(len(at)):
-        row, column = at[index]
-        best = np.inf
-        side = 1
-        while side <= _REACH and side * side < best:
-            for other in range(max(row - side, 0), min(row + side, height - 1) + 1):
-                whole = abs(other - row) == side
-                step = 1 if whole else 2 * side
-                for beside in range(column - side, column + side + 1, step):
-                    apart = (other - row) ** 2 + (beside - column) ** 2
-                    if 0 <= beside < width and apart < best and known[other, beside]:
-                        best = apart
-                        found[index] = other, beside
-            side += 1
-        if best > _REACH**2:
-            found[index, 0] = -1  # one beyond the last square may be nearer

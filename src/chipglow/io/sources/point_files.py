@@ -20,8 +20,8 @@ from chipglow.io.sources.arrays import (
     reading,
 )
 from chipglow.io.sources.conventions import simple
-from chipglow.io.sources.source import SourceError
-from chipglow.io.sources.text_table import TextTable
+from chipglow.io.sources.source import SourceError, missing_extra
+from chipglow.io.sources.text_table import TextTable, line_of
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")
 TEXT_SUFFIXES: Final = (".csv", ".txt", ".dat", ".tsv")
@@ -45,10 +45,34 @@ class PointTable:
         Numbers of the points by name, shape (points,) each.
     units : mapping
         Texts of the units that the file says, by the names of the columns.
+    texts : mapping
+        Columns with text in them: the row of the first such cell in the file, and what it says.
     """
 
     columns: Mapping[str, NDArray[Any]]
     units: Mapping[str, str] = field(default_factory=dict)
+    texts: Mapping[str, tuple[int, str]] = field(default_factory=dict)
+
+    def numbers(self, path: str, label: str) -> NDArray[Any]:
+        """Numbers of a column.
+
+        Raises
+        ------
+        SourceError
+            If there is no such column, or text in it.
+        """
+        if label not in self.columns:
+            raise SourceError(f"{path}: there is no column {label!r}")
+        if label in self.texts:
+            row, cell = self.texts[label]
+            raise SourceError(
+                f"{path}, line {line_of(Path(path), row)}: {label} is {cell[:40]!r}, expected a "
+                "number"
+            )
+        values = self.columns[label]
+        if values.dtype.kind not in "fiub":
+            raise SourceError(f"{path}: {label} has text in it, expected numbers")
+        return values
 
 
 class PointFrames(ABC):
@@ -226,13 +250,31 @@ class _TimedTable(PointFrames):
             )
             with reader if rows is not None else ExitStack():
                 for part in reader if rows is not None else [reader]:
-                    yield self._checked(part)
+                    yield self._checked(part, skip)
 
-    def _checked(self, part: Any) -> PointTable:
+    def _checked(self, part: Any, skip: int) -> PointTable:
         columns = {label: part[label].to_numpy() for label in part.columns}
-        if self._time in columns and columns[self._time].dtype.kind not in "fiub":
-            raise SourceError(f"{self._path}: {self._time} has text in it, expected numbers")
-        return PointTable(columns, self._units)
+        first = skip + int(part.index[0]) if len(part) else skip
+        texts = {
+            label: (first + text[0], text[1])
+            for label, values in columns.items()
+            if (text := self._first_text(values)) is not None
+        }
+        table = PointTable(columns, self._units, texts)
+        if self._time in columns:
+            table.numbers(str(self._path), self._time)
+        return table
+
+    def _first_text(self, values: NDArray[Any]) -> tuple[int, str] | None:
+        """Row and content of the first cell that is no number."""
+        if values.dtype.kind in "fiub":
+            return None
+        for row, cell in enumerate(values):
+            try:
+                float(str(cell).replace(self._table.options["decimal"], "."))
+            except ValueError:
+                return row, str(cell)
+        return None
 
 
 def _label(cell: str) -> str:
@@ -253,11 +295,12 @@ def _joined(first: PointTable, second: PointTable) -> PointTable:
         return second
     names = first.columns
     joined = {n: np.concatenate([first.columns[n], second.columns[n]]) for n in names}
-    return PointTable(joined, first.units)
+    return PointTable(joined, first.units, {**second.texts, **first.texts})
 
 
 def _cut(table: PointTable, part: slice) -> PointTable:
-    return PointTable({name: values[part] for name, values in table.columns.items()}, table.units)
+    columns = {name: values[part] for name, values in table.columns.items()}
+    return PointTable(columns, table.units, table.texts)
 
 
 # Arrays
@@ -374,7 +417,7 @@ def _read_vtk(path: Path) -> PointTable:
     try:
         import pyvista as pv
     except ImportError:
-        raise SourceError(f"{path}: needs PyVista, pip install 'chipglow[mesh]'") from None
+        raise missing_extra(path, "PyVista", "mesh") from None
     with pv.VtkErrorCatcher(raise_errors=True):
         mesh = pv.read(path)
     if not isinstance(mesh, pv.DataSet) or mesh.n_points == 0:

@@ -2,18 +2,47 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.scene import READABLE, Raster, SampledFrame
 
-__all__ = ["READABLE", "SampledFrame", "Source", "SourceError", "Survey"]
+__all__ = [
+    "READABLE",
+    "Remarks",
+    "SampledFrame",
+    "Source",
+    "SourceError",
+    "Survey",
+    "missing_extra",
+]
 
 
 class SourceError(ValueError):
     """A source that cannot be read: the message names the file, the field and what was expected."""
+
+
+def missing_extra(file: object, needs: str, extra: str) -> SourceError:
+    """The error for a file that a library reads which is not installed, and how it comes."""
+    return SourceError(f"{file}: needs {needs}, expected pip install 'chipglow[{extra}]'")
+
+
+@dataclass
+class Remarks:
+    """Takes what there is to say of a source while it is looked at, a sentence each.
+
+    Parameters
+    ----------
+    assumed : list of str
+        What had to be assumed.
+    from_file : list of str
+        What the file itself says or lacks.
+    """
+
+    assumed: list[str] = field(default_factory=list)
+    from_file: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -37,6 +66,8 @@ class Survey:
         Side of the source's own samples in m, if they are regular.
     assumed : tuple of str
         What had to be assumed, a sentence each.
+    from_file : tuple of str
+        What the file itself says or lacks, and how that is taken, a sentence each.
     """
 
     kind: str
@@ -46,6 +77,7 @@ class Survey:
     unused: tuple[str, ...] = ()
     spacing: float | None = None
     assumed: tuple[str, ...] = ()
+    from_file: tuple[str, ...] = ()
 
 
 class Source(ABC):
@@ -54,6 +86,11 @@ class Source(ABC):
     A source is a frozen dataclass that says where the fields are and what they mean; it opens files
     only in its methods, so that it can be handed to another process.
     """
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Its files, as paths and patterns, and folders where there may be more of them."""
+        return ()
 
     @abstractmethod
     def survey(self) -> Survey:

@@ -69,6 +69,17 @@ class TextTable:
         return cls(first, options)
 
 
+def line_of(path: Path, row: int) -> int:
+    """Number of the line that holds a row of a table, 0 being that after the names of columns."""
+    seen = -1
+    with path.open(encoding="utf-8-sig") as stream:
+        for number, line in enumerate(stream, start=1):
+            seen += bool(line.split("#")[0].strip())
+            if seen > row:
+                return number
+    raise ValueError(f"row: {row} of {path}, expected up to {seen - 1}")
+
+
 def _split(line: str, separator: str) -> list[str]:
     return line.split() if separator == r"\s+" else line.split(separator)
 

@@ -1,0 +1,159 @@
+"""An infrared image and a visible picture of one chip, with a known map between them.
+
+The geometry is NIST's: infrared 160 x 120 sensors of 6 um, and a visible camera with finer pixels
+that looks through the same optics (Heigel and Whitenton, 2010). What is bright differs: infrared
+by temperature and emissivity, visible by reflection and texture.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import cos, pi, radians, sin
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from chipglow.camera import Camera, GaussianPSF, Measurement
+from chipglow.scene import Material, Raster, Scene, Tool, ToolGeometry
+from chipglow.surface import CHIP_1
+
+ROWS, COLUMNS, PITCH = 120, 160, 6e-6
+VISIBLE_SHAPE = (480, 640)
+FINE = Raster(left=-620e-6, top=520e-6, spacing=2e-6, rows=360, columns=480)
+SHEAR_ANGLE, FEED, BAND_SPACING, CHIP_ANGLE = radians(32.0), 300e-6, 130e-6, radians(14.0)
+
+
+TOOL = ToolGeometry()
+
+
+@dataclass(frozen=True)
+class DualSpectrum:
+    """One experiment; what is random follows the seed.
+
+    `matrix` maps a position in m to a visible pixel.
+    """
+
+    seed: int = 1
+    noise: float = 0.005
+    visible_noise: float = 4.0
+    pitch: float = 1.5e-6
+    turn: float = radians(1.5)
+    stretch: float = 1.02
+    shift: tuple[float, float] = (11.3, -7.6)
+    chip_brightness: float = 0.75
+    tool: Tool = TOOL
+
+    @cached_property
+    def matrix(self) -> NDArray[np.float64]:
+        """Position in m to column and row."""
+        scale = 1 / self.pitch
+        middle = np.array([FINE.left + COLUMNS * PITCH / 2, FINE.top - ROWS * PITCH / 2])
+        turn = np.array([[cos(self.turn), -sin(self.turn)], [sin(self.turn), cos(self.turn)]])
+        linear = scale * turn @ np.diag([self.stretch, -1.0])
+        centre = np.array([VISIBLE_SHAPE[1], VISIBLE_SHAPE[0]]) / 2 - 0.5 + self.shift
+        matrix = np.eye(3)
+        matrix[:2, :2], matrix[:2, 2] = linear, centre - linear @ middle
+        return matrix
+
+    def pixels(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where positions in m truly are in the visible picture."""
+        return np.asarray(positions @ self.matrix[:2, :2].T + self.matrix[:2, 2])
+
+    @cached_property
+    def infrared(self) -> Measurement:
+        """What the infrared camera measures of the chip, with noise."""
+        camera = Camera(pitch=PITCH, psf=GaussianPSF(12e-6), shape=(ROWS, COLUMNS))
+        clean = camera.measure(self.scene, replace(CHIP_1, follow="mean"), 0.0)
+        generator = np.random.default_rng([self.seed, 1])
+        noise = self.noise * np.percentile(clean.radiance, 98)
+        radiance = clean.radiance + generator.normal(0.0, noise, clean.radiance.shape)
+        return Measurement.from_radiance(
+            radiance, clean.band, clean.times, clean.raster, 573.15, attributes=dict(CAMERA)
+        ).with_tool(self.tool)
+
+    @cached_property
+    def visible(self) -> NDArray[np.uint8]:
+        """What the visible camera sees: bright flanks with grain, dark gaps, the tool's edge."""
+        rows, columns = np.indices(VISIBLE_SHAPE)
+        pixels = np.stack([columns, rows], axis=-1)
+        back = np.linalg.inv(self.matrix[:2, :2])
+        place = (pixels - self.matrix[:2, 2]) @ back.T
+        chip, work, tool, phase = shapes(place, self.tool)
+        generator = np.random.default_rng([self.seed, 2])
+        lamella = self.chip_brightness * (1.0 - 0.55 * np.exp(-((phase / 0.09) ** 2)))
+        grain = texture(generator, place, 9e-6)
+        scratch = texture(generator, place * [0.1, 1.0], 4e-6)
+        bright = np.full(VISIBLE_SHAPE, 0.08)
+        bright = np.where(work, 0.45 + 0.10 * grain, bright)
+        bright = np.where(chip, lamella * (1.0 + 0.15 * grain), bright)
+        bright = np.where(tool, 0.30 + 0.06 * scratch, bright)
+        light = 1.0 - 0.25 * ((columns / VISIBLE_SHAPE[1]) - 0.4) ** 2
+        seen = gaussian_filter(bright * light, 1.2) * 220.0
+        seen += generator.normal(0.0, self.visible_noise, VISIBLE_SHAPE)
+        return np.clip(np.rint(seen), 0, 255).astype(np.uint8)
+
+    @cached_property
+    def scene(self) -> Scene:
+        """One frame of the chip as it truly is."""
+        place = np.stack(np.meshgrid(FINE.x, FINE.y), axis=-1)
+        chip, work, tool, phase = shapes(place, self.tool)
+        depth = self.tool.signed_distance(place[..., 0], place[..., 1])
+        along = (place - self.tool.rake_point(0.0)) @ np.array(self.tool.rake_direction)
+        contact = np.exp(-np.maximum(along - 180e-6, 0.0) / 60e-6) * (along > -40e-6)
+        friction = 480.0 * contact * np.exp(-np.abs(depth) / 45e-6)
+        band = 260.0 * np.exp(-((phase / 0.1) ** 2))
+        shear = place[..., 0] * sin(SHEAR_ANGLE) + place[..., 1] * cos(SHEAR_ANGLE)
+        primary = 330.0 / (1 + np.exp(-np.clip(shear / 12e-6, -50, 50)))
+        rise = np.where(chip, primary + band + friction, 0.0)
+        machined = 230.0 * np.exp(np.minimum(place[..., 1], 0.0) / 25e-6)
+        ahead = np.where(place[..., 0] < 5e-6, primary, machined)
+        rise = np.where(work, ahead, rise)
+        rise = np.where(tool, 40.0 + friction, rise)
+        material = np.where(chip | work, Material.WORKPIECE, Material.VOID)
+        material = np.where(tool, Material.TOOL, material).astype(np.uint8)
+        none = np.zeros((1, *FINE.shape))
+        fields = {
+            "temperature": (293.15 + rise)[None],
+            "plastic_strain": np.where(chip, 1.5, 0.0)[None],
+            "plastic_strain_rate": none,
+            "velocity_x": none,
+            "velocity_y": none,
+            "material": material[None],
+        }
+        frames = {name: np.repeat(values, 2, axis=0) for name, values in fields.items()}
+        return Scene.from_fields(FINE, [0.0, 20e-6], frames, tool=self.tool)
+
+
+CAMERA = {"integration_time": 10e-6, "frame_rate": 600.0}
+
+
+def shapes(
+    place: NDArray[np.float64], tool: Tool
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
+    """Chip, workpiece and tool, and how far a point of the chip is between two shear bands."""
+    x, y = place[..., 0], place[..., 1]
+    depth = tool.signed_distance(x, y)
+    inside = depth < 0
+    shear = x * sin(SHEAR_ANGLE) + y * cos(SHEAR_ANGLE)
+    along = (place - tool.rake_point(0.0)) @ np.array(tool.rake_direction)
+    turns = (along + 0.55 * depth) / BAND_SPACING
+    phase = turns - np.rint(turns)
+    thickness = 330e-6 - 60e-6 * np.abs(2 * phase) - 20e-6 * np.cos(2 * pi * turns / 3)
+    lift = np.maximum(along - 260e-6, 0.0) * np.tan(CHIP_ANGLE)
+    left = x < 5e-6
+    chip = (shear > 0) & left & (depth > lift) & (depth - lift < thickness) & ~inside
+    chip &= y > 0
+    work = ((shear <= 0) | ~left) & (y < np.where(left, FEED, 0.0)) & ~inside & ~chip
+    return chip, work, inside, phase
+
+
+def texture(
+    generator: np.random.Generator, place: NDArray[np.float64], size: float
+) -> NDArray[np.float64]:
+    """Grain of about a size in m, mean 0, standard deviation 1, the same at the same place."""
+    side = 512
+    field = gaussian_filter(generator.standard_normal((side, side)), 1.5, mode="wrap")
+    field /= field.std()
+    step = size / 3
+    where = np.moveaxis((place + 1e-3) / step, -1, 0)
+    return np.asarray(map_coordinates(field, where % side, order=1, mode="grid-wrap"))

@@ -1,0 +1,439 @@
+"""Temperature along the shear band of a measurement, and how far the band has developed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from math import isfinite, nan, sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import trapezoid
+from scipy.ndimage import map_coordinates
+
+from chipglow.analysis.band_ridge import ThermalImage, find_band
+from chipglow.analysis.lines import Line, sample
+from chipglow.analysis.ridge import NoShearBandError, arc_length, normals_of
+from chipglow.camera import Measurement
+from chipglow.scene import Tool
+
+NEAR_THE_EDGE: Final = 15.0
+"""Distance from the edge in pixels within which a band has not left it."""
+
+MOVED: Final = 1.0
+"""Offset in pixels beyond which a band is not where the reference is."""
+
+_STEP: Final = 0.5
+_FINE: Final = 4
+_DIFFERENCE: Final = 1e-3
+
+
+class Stage(StrEnum):
+    """How far a shear band has developed, by where it is (Heigel and Whitenton 2010, Figure 8)."""
+
+    DEVELOPING = "developing"
+    """It has not come to the reference."""
+    DEVELOPED = "fully developed"
+    """It is where the reference is."""
+    MOVED = "moved"
+    """The next segment has moved it on."""
+    NONE = "no band"
+    """No band is found in the frame."""
+
+
+@dataclass(frozen=True)
+class BandProfile:
+    """Radiance temperature along the shear band in several frames.
+
+    Parameters
+    ----------
+    reference : Line
+        The curve of the fully developed band, with distances as below.
+    distance : ndarray
+        Distances in m, common to all frames, shape (n,): from the cutting edge straight to the
+        curve's first point, then along the curve.
+    points : ndarray
+        Where they are in each frame, x and y in m, shape (frames, n, 2); NaN where the frame's
+        band does not reach.
+    temperature : ndarray
+        Mean radiance temperature in K over the width, shape (frames, n); NaN where a pixel in it
+        is not usable.
+    calibration : ndarray
+        Its standard uncertainty in K from the calibration, common to all, of the same shape; 0
+        where the measurement tells none.
+    position : ndarray
+        Its standard uncertainty in K from the position of the curve, of the same shape.
+    offset : ndarray
+        Median distance in m of each frame's band from the reference, shape (frames,): positive
+        toward the chip, negative toward the workpiece; NaN without a band.
+    stage : tuple of Stage
+        How far each frame's band has developed.
+    times : ndarray
+        When each frame's integration began in s, shape (frames,).
+    width : float
+        Width of the mean across the curve in m.
+    notes : tuple of str
+        What is assumed or doubtful, a sentence each.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit.
+    """
+
+    reference: Line
+    distance: NDArray[np.float64]
+    points: NDArray[np.float64]
+    temperature: NDArray[np.float64]
+    calibration: NDArray[np.float64]
+    position: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    stage: tuple[Stage, ...]
+    times: NDArray[np.float64]
+    width: float
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        shape = (self.times.size, self.distance.size)
+        expected = {"points": (*shape, 2), "offset": shape[:1]} | dict.fromkeys(
+            ("temperature", "calibration", "position"), shape
+        )
+        for name, size in expected.items():
+            found = getattr(self, name).shape
+            if found != size:
+                raise ValueError(f"band profile: {name} has shape {found}, expected {size}")
+        if len(self.stage) != self.times.size:
+            raise ValueError(
+                f"band profile: {len(self.stage)} stages for {self.times.size} frames, "
+                "expected as many"
+            )
+
+    @property
+    def uncertainty(self) -> NDArray[np.float64]:
+        """Standard uncertainty of `temperature` in K, shape (frames, n)."""
+        return np.hypot(self.calibration, self.position)
+
+    @property
+    def in_place(self) -> NDArray[np.bool_]:
+        """Which frames have a band that has not moved, as the paper compares, shape (frames,)."""
+        kept = (Stage.DEVELOPING, Stage.DEVELOPED)
+        return np.array([stage in kept for stage in self.stage], dtype=np.bool_)
+
+
+def band_profile(
+    measurement: Measurement,
+    tool: Tool,
+    frames: Sequence[int] | None = None,
+    curve: NDArray[np.float64] | None = None,
+    reference: int | None = None,
+    width: float | None = None,
+    position: float | None = None,
+) -> BandProfile:
+    """Read the radiance temperature along the shear band.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Frames of a camera.
+    tool : Tool
+        The tool, in the measurement's coordinates.
+    frames : sequence of int, optional
+        Numbers of the frames; all by default.
+    curve : ndarray, optional
+        Corners of a polyline along which to read all frames, from the cutting edge outward, x and
+        y in m, shape (k, 2). By default the ridge that `find_band` finds in each frame.
+    reference : int, optional
+        Number of the frame whose band is fully developed. By default the given curve is its place;
+        without a curve, the frame in which the band that begins near the edge has the greatest
+        integral of its temperature over the camera's floor.
+    width : float, optional
+        Width across the curve in m over which to average; a pixel by default.
+    position : float, optional
+        Standard uncertainty of the curve's position in m, the same in x and y. By default that of
+        one pixel: its side over the root of 12.
+
+    Raises
+    ------
+    NoShearBandError
+        If no frame has a band; of a single frame with the reason.
+    ValueError
+        If a number is impossible, or nothing on a given curve is usable.
+
+    Notes
+    -----
+    The stage is judged as in the paper, "by the location of the shear band in the images compared
+    to the reference fully developed shear band": a band within one pixel of the reference is fully
+    developed, one on the workpiece's side is developing, one on the chip's side has moved.
+
+    A curve that is off by a small random vector of standard uncertainty u reads a temperature of
+    the mean square error (grad T)² u² + 3/4 (d²T/dn²)² u⁴, with n across the curve: on a ridge,
+    where the gradient across vanishes, the bend is what counts.
+    """
+    pitch = measurement.raster.spacing
+    width = pitch if width is None else width
+    position = pitch / sqrt(12.0) if position is None else position
+    for name, value in (("width", width), ("position", position)):
+        if not (isfinite(value) and value >= 0):
+            raise ValueError(f"band profile: {name} is {value!r} m, expected 0 m or more")
+    numbers = _numbers(measurement, frames)
+    images = _Images(measurement)
+    given = None if curve is None else _given(curve, tool, pitch)
+    found, reason = _found(images, tool, numbers)
+    notes: list[str] = []
+    if given is None and not any(found):
+        raise NoShearBandError(reason if numbers.size == 1 else _none(numbers.size, reason))
+    base = _reference(measurement, images, tool, found, numbers, given, reference, notes)
+    lines = found if given is None else [given] * numbers.size
+    distance = _common(lines, pitch) if given is None else given.distance
+    points = np.stack([_laid(line, distance) for line in lines])
+    reader = _Reader(measurement, images, width, position)
+    read = [reader(int(k), p) for k, p in zip(numbers, points, strict=True)]
+    temperature, calibration, from_position = (np.stack(part) for part in zip(*read, strict=True))
+    if not np.isfinite(temperature).any():
+        raise ValueError(
+            "shear band: no point of the curve is on usable pixels in any frame, expected a curve "
+            "in the image where the chip is hotter than the camera's floor"
+        )
+    offset = np.array([_offset(line, base) for line in found])
+    return BandProfile(
+        reference=base,
+        distance=distance,
+        points=points,
+        temperature=temperature,
+        calibration=calibration,
+        position=from_position,
+        offset=offset,
+        stage=tuple(_stage(value, pitch) for value in offset),
+        times=measurement.times[numbers],
+        width=width,
+        notes=tuple(notes),
+    )
+
+
+class _Images:
+    """Frames of a measurement with a temperature everywhere, made when they are asked for."""
+
+    def __init__(self, measurement: Measurement) -> None:
+        self._measurement = measurement
+        self._made: dict[int, ThermalImage] = {}
+
+    def __getitem__(self, frame: int) -> ThermalImage:
+        if frame not in self._made:
+            self._made[frame] = ThermalImage.of(self._measurement, frame)
+        return self._made[frame]
+
+
+def _numbers(measurement: Measurement, frames: Sequence[int] | None) -> NDArray[np.int64]:
+    count = measurement.times.size
+    if frames is None:
+        return np.arange(count)
+    numbers = np.asarray(frames, dtype=np.int64)
+    if numbers.size == 0 or numbers.min() < 0 or numbers.max() >= count:
+        raise ValueError(f"band profile: frames are {list(frames)}, expected of 0 to {count - 1}")
+    return numbers
+
+
+def _given(curve: NDArray[np.float64], tool: Tool, pitch: float) -> Line:
+    """A given polyline at steps of half a pixel."""
+    if curve.ndim != 2 or curve.shape[1] != 2 or len(curve) < 2 or not np.isfinite(curve).all():
+        raise ValueError(
+            f"curve: points of shape {curve.shape}, expected 2 or more of x and y, all finite"
+        )
+    first, last = np.hypot(*(curve[[0, -1]] - tool.edge_point).T).tolist()
+    if first > last:
+        raise ValueError(
+            f"curve: it begins {first * 1e6:.4g} µm from the cutting edge and ends "
+            f"{last * 1e6:.4g} µm from it, expected from the edge outward"
+        )
+    corners = first + arc_length(curve)
+    if (np.diff(corners) <= 0).any():
+        raise ValueError("curve: two points are the same, expected each apart from the one before")
+    steps = max(round((corners[-1] - first) / (_STEP * pitch)), 2)
+    distance = np.linspace(first, corners[-1], steps + 1)
+    columns = [np.interp(distance, corners, curve[:, axis]) for axis in (0, 1)]
+    return Line(distance, np.stack(columns, axis=1))
+
+
+def _found(
+    images: _Images, tool: Tool, numbers: NDArray[np.int64]
+) -> tuple[list[Line | None], str]:
+    """The ridge of every frame, and why the last one without has none."""
+    lines: list[Line | None] = []
+    reason = ""
+    for number in numbers.tolist():
+        try:
+            lines.append(find_band(images[number], tool))
+        except NoShearBandError as error:
+            lines.append(None)
+            reason = str(error)
+    return lines, reason
+
+
+def _none(count: int, reason: str) -> str:
+    return f"shear band: none is found in any of {count} frames; in the last: {reason}"
+
+
+def _reference(
+    measurement: Measurement,
+    images: _Images,
+    tool: Tool,
+    found: list[Line | None],
+    numbers: NDArray[np.int64],
+    given: Line | None,
+    reference: int | None,
+    notes: list[str],
+) -> Line:
+    """The curve of the fully developed band."""
+    if reference is not None:
+        _numbers(measurement, [reference])
+        return find_band(images[reference], tool)
+    if given is not None:
+        notes.append("Assumed: the given curve is the place of the fully developed band.")
+        return given
+    pitch = measurement.raster.spacing
+    bands = [(line, k) for line, k in zip(found, numbers.tolist(), strict=True) if line]
+    near = [(line, k) for line, k in bands if line.distance[0] < NEAR_THE_EDGE * pitch]
+    if not near:
+        notes.append(
+            "Doubtful: no band begins near the cutting edge, so that all may have moved; the "
+            "stages are judged against the hottest and longest one."
+        )
+    line, number = max(near or bands, key=lambda band: _heat(measurement, *band))
+    if len(bands) == 1:
+        notes.append("Doubtful: one frame has a band; without another its stage says nothing.")
+    elif near:
+        notes.append(
+            f"Assumed: the band at {measurement.times[number] * 1e6:.6g} µs is fully developed: "
+            "it is the hottest and longest of those that begin near the cutting edge."
+        )
+    return line
+
+
+def _heat(measurement: Measurement, line: Line, number: int) -> float:
+    """Integral along a line of a frame of the temperature over the camera's floor in K m."""
+    frame = measurement.data["radiance_temperature"][number].values
+    floor = float(measurement.data.attrs.get("floor", np.nanmin(frame)))
+    values = np.nan_to_num(sample(frame, measurement.raster, line.points) - floor)
+    return float(trapezoid(values, line.distance))
+
+
+def _common(lines: Sequence[Line | None], pitch: float) -> NDArray[np.float64]:
+    """Distances that cover all lines, at steps of half a pixel."""
+    first = min(float(line.distance[0]) for line in lines if line)
+    last = max(float(line.distance[-1]) for line in lines if line)
+    step = _STEP * pitch
+    return step * np.arange(np.ceil(first / step - 1e-6), np.floor(last / step + 1e-6) + 1)
+
+
+def _laid(line: Line | None, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points of a line at these distances, NaN beyond its ends."""
+    if line is None:
+        return np.full((distance.size, 2), nan)
+    slack = 1e-9 * float(line.distance[-1])
+    beyond = (distance < line.distance[0] - slack) | (distance > line.distance[-1] + slack)
+    columns = [np.interp(distance, line.distance, line.points[:, axis]) for axis in (0, 1)]
+    return np.where(beyond[:, None], nan, np.stack(columns, axis=1))
+
+
+class _Reader:
+    """Reads means across a curve, and what makes them uncertain, in one frame after another."""
+
+    def __init__(
+        self, measurement: Measurement, images: _Images, width: float, position: float
+    ) -> None:
+        self.measurement, self.images = measurement, images
+        self.pitch = measurement.raster.spacing
+        self.position = position
+        count = max(round(width / self.pitch * _FINE), 1)
+        self.offsets = width * ((np.arange(count) + 0.5) / count - 0.5)
+
+    def __call__(
+        self, number: int, points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Temperature, its uncertainty from the calibration and from the position, in K."""
+        empty = np.full(len(points), nan)
+        there = np.isfinite(points[:, 0])
+        if there.sum() < 2:
+            return empty, empty.copy(), empty.copy()
+        curve = points[there]
+        across = self.offsets[:, None] * normals_of(curve)[:, None]
+        places = curve[:, None] + across
+        results = []
+        for part in (
+            self._mean("radiance_temperature", number, places),
+            self._calibration(number, places),
+            self._position(number, curve),
+        ):
+            whole = empty.copy()
+            whole[there] = part
+            results.append(whole)
+        known = np.isfinite(results[0])
+        for part in results[1:]:
+            part[~known] = nan
+        return results[0], results[1], results[2]
+
+    def _mean(self, name: str, number: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        frame = self.measurement.data[name][number].values
+        return np.asarray(sample(frame, self.measurement.raster, places).mean(axis=-1))
+
+    def _calibration(self, number: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        if "calibration_uncertainty" not in self.measurement.data:
+            return np.zeros(len(places))
+        temperature = self._mean("radiance_temperature", number, places)
+        radiance = self._mean("calibration_uncertainty", number, places)
+        return radiance / radiance_slope(self.measurement, temperature)
+
+    def _position(self, number: int, curve: NDArray[np.float64]) -> NDArray[np.float64]:
+        image = self.images[number]
+        slopes = (
+            map_coordinates(slope, image.index(curve), order=1, mode="nearest")
+            for slope in np.gradient(image.temperature, self.pitch)
+        )
+        squared = sum(slope**2 for slope in slopes)
+        ahead, here, behind = (
+            map_coordinates(image.temperature, image.index(place), order=1, mode="nearest")
+            for place in (curve + self.pitch * k * normals_of(curve) for k in (-1, 0, 1))
+        )
+        bend = (ahead - 2 * here + behind) / self.pitch**2
+        u = self.position
+        return np.asarray(np.sqrt(squared * u**2 + 0.75 * bend**2 * u**4))
+
+
+def radiance_slope(
+    measurement: Measurement, temperature: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Derivative of the in-band radiance by the temperature in W/(m² sr K).
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Tells the camera's band.
+    temperature : ndarray
+        Radiance temperature in K, of any shape.
+    """
+    step = _DIFFERENCE * temperature
+    band = measurement.band
+    rise = band.radiance(temperature + step) - band.radiance(temperature - step)
+    return np.asarray(rise / (2 * step))
+
+
+def _offset(line: Line | None, reference: Line) -> float:
+    """Median distance of a band from the reference in m, positive toward the chip."""
+    if line is None:
+        return nan
+    away = line.points[:, None] - reference.points[None]
+    nearest = (away**2).sum(axis=-1).argmin(axis=1)
+    beside = (nearest > 0) & (nearest < reference.distance.size - 1)
+    if not beside.any():
+        beside[:] = True
+    index = np.arange(nearest.size)
+    distance = (away[index, nearest] * normals_of(reference.points)[nearest]).sum(axis=1)
+    return float(np.median(distance[beside]))
+
+
+def _stage(offset: float, pitch: float) -> Stage:
+    if not isfinite(offset):
+        return Stage.NONE
+    if abs(offset) <= MOVED * pitch:
+        return Stage.DEVELOPED
+    return Stage.MOVED if offset > 0 else Stage.DEVELOPING

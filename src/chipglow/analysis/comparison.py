@@ -1,0 +1,615 @@
+"""Measured beside simulated: at the rake face and in the shear band, for several emissivities."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import degrees, hypot, isfinite, sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.analysis.band_profile import BandProfile, band_profile, radiance_slope
+from chipglow.analysis.band_ridge import ThermalImage
+from chipglow.analysis.lines import sample
+from chipglow.analysis.rake_grid import DEPTH, PIXELS, RakeGrid, rake_grid
+from chipglow.analysis.ridge import NoShearBandError
+from chipglow.camera import UNUSABLE, Measurement
+from chipglow.scene import Tool
+
+COVERAGE: Final = 2.0
+"""Factor between standard and expanded uncertainty: about 95 %."""
+
+TIP_REACH: Final = 100e-6
+"""Distance from the cutting edge in m within which the paper looks at the band by itself."""
+
+SURE: Final = 0.95
+"""Share of the draws in which the best set must be best to be called so."""
+
+_DRAWS: Final = 4000
+_SEED: Final = 2010
+_FEW: Final = 3
+_SAME_ANGLE: Final = 0.1
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Radiance temperatures with their standard uncertainties, all of one shape.
+
+    Parameters
+    ----------
+    temperature : ndarray
+        In K; NaN where there is none.
+    systematic : ndarray
+        Standard uncertainty in K of what all values have in common: calibration, a stated one,
+        the emissivity of a simulation.
+    random : ndarray
+        Standard uncertainty in K of what differs from value to value: position, and the mean over
+        the frames.
+
+    Raises
+    ------
+    ValueError
+        If the shapes differ.
+    """
+
+    temperature: NDArray[np.float64]
+    systematic: NDArray[np.float64]
+    random: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        for name in ("systematic", "random"):
+            if getattr(self, name).shape != self.temperature.shape:
+                raise ValueError(
+                    f"reading: {name} has shape {getattr(self, name).shape}, "
+                    f"expected {self.temperature.shape}"
+                )
+
+    @property
+    def uncertainty(self) -> NDArray[np.float64]:
+        """Standard uncertainty in K."""
+        return np.hypot(self.systematic, self.random)
+
+    @property
+    def expanded(self) -> NDArray[np.float64]:
+        """Expanded uncertainty in K, by the factor `COVERAGE`."""
+        return COVERAGE * self.uncertainty
+
+    def part(self, where: NDArray[np.bool_]) -> "Reading":
+        """The values at some places, flat."""
+        return Reading(self.temperature[where], self.systematic[where], self.random[where])
+
+
+def normalised_error(measured: Reading, simulated: Reading) -> NDArray[np.float64]:
+    """E_n number: magnitude of the difference over the expanded uncertainty of the difference.
+
+    E_n = abs(T_sim − T_meas) / sqrt(U_meas² + U_sim²) (ISO/IEC 17043). Up to 1 the two agree.
+    """
+    away = np.abs(simulated.temperature - measured.temperature)
+    expanded = np.hypot(measured.expanded, simulated.expanded)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(away / expanded)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How one simulation fits the measurement at one place.
+
+    Parameters
+    ----------
+    label : str
+        Name of the simulation.
+    bias : float
+        Mean of simulated less measured in K.
+    bias_uncertainty : float
+        Its standard uncertainty in K.
+    rms : float
+        Root of the mean square of the differences in K.
+    agreeing : int
+        Number of values with E_n up to 1.
+    count : int
+        Number of values that both have.
+    """
+
+    label: str
+    bias: float
+    bias_uncertainty: float
+    rms: float
+    agreeing: int
+    count: int
+
+
+@dataclass(frozen=True)
+class PlaceResult:
+    """Which simulation fits best at one place.
+
+    Parameters
+    ----------
+    place : str
+        Where, in words.
+    fits : tuple of Fit
+        One for each simulation, in the given order.
+    best : int
+        Number of the one with the least root mean square.
+    confidence : float
+        Share of draws of all uncertainties in which it has the least one.
+    """
+
+    place: str
+    fits: tuple[Fit, ...]
+    best: int
+    confidence: float
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the best one is best in `SURE` of the draws."""
+        return self.confidence >= SURE
+
+    @property
+    def sentence(self) -> str:
+        """Which simulation fits here, in one sentence from the numbers."""
+        best = self.fits[self.best]
+        others = [fit for i, fit in enumerate(self.fits) if i != self.best]
+        what = f"{_warmth(best)}, RMS {best.rms:.0f} K, {_agreement(best)}"
+        if not others:
+            return f"{_upper(self.place)} {best.label} is {what}."
+        rest = "; ".join(
+            f"{fit.label} is {_warmth(fit)}, RMS {fit.rms:.0f} K, {fit.agreeing} of {fit.count}"
+            for fit in others
+        )
+        how = f"{100 * self.confidence:.3g} % of the draws of the uncertainties"
+        if self.is_sure:
+            return f"{_upper(self.place)} {best.label} fits best (in {how}): it is {what}; {rest}."
+        return (
+            f"{_upper(self.place)} the sets cannot be told apart ({best.label} is nearest, in "
+            f"{how}): {best.label} is {what}; {rest}."
+        )
+
+
+def _upper(text: str) -> str:
+    return text[0].upper() + text[1:]
+
+
+def _warmth(fit: Fit) -> str:
+    word = "too hot" if fit.bias > 0 else "too cold"
+    return f"{abs(fit.bias):.0f} K {word} (± {COVERAGE * fit.bias_uncertainty:.0f} K)"
+
+
+def _agreement(fit: Fit) -> str:
+    return f"{fit.agreeing} of {fit.count} values agree (E_n up to 1)"
+
+
+@dataclass(frozen=True)
+class GridComparison:
+    """The analysis grid on the rake face, measured and simulated.
+
+    Parameters
+    ----------
+    along, depth : ndarray
+        Middles of the squares up the face and into the chip in m, shapes (n,) and (m,).
+    measured : Reading
+        Shape (m, n).
+    simulated : tuple of Reading
+        One for each simulation.
+    """
+
+    along: NDArray[np.float64]
+    depth: NDArray[np.float64]
+    measured: Reading
+    simulated: tuple[Reading, ...]
+
+
+@dataclass(frozen=True)
+class BandComparison:
+    """The temperature along the shear band, measured and simulated.
+
+    Parameters
+    ----------
+    distance : ndarray
+        Distance from the cutting edge in m, at steps of a measured pixel, shape (n,).
+    measured : Reading
+        Shape (n,).
+    simulated : tuple of Reading
+        One for each simulation.
+    """
+
+    distance: NDArray[np.float64]
+    measured: Reading
+    simulated: tuple[Reading, ...]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A measurement beside simulations.
+
+    Parameters
+    ----------
+    labels : tuple of str
+        Names of the simulations.
+    grid : GridComparison or None
+        At the rake face; None if there is nothing to compare.
+    band : BandComparison or None
+        Along the shear band; None if there is nothing to compare.
+    places : tuple of PlaceResult
+        Which simulation fits where.
+    notes : tuple of str
+        What is assumed or doubtful, a sentence each.
+    """
+
+    labels: tuple[str, ...]
+    grid: GridComparison | None
+    band: BandComparison | None
+    places: tuple[PlaceResult, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def statement(self) -> str:
+        """Which simulation fits where, as the paper's conclusion says it."""
+        if len(self.labels) == 1:
+            agreeing = sum(result.fits[0].agreeing for result in self.places)
+            count = sum(result.fits[0].count for result in self.places)
+            return f"{self.labels[0]}: {agreeing} of {count} values agree (E_n up to 1)."
+        parts = []
+        for i, label in enumerate(self.labels):
+            where = [r.place.rstrip(",") for r in self.places if r.is_sure and r.best == i]
+            if where:
+                parts.append(f"{label} fits best {'; '.join(where)}.")
+        unsure = [r.place.rstrip(",") for r in self.places if not r.is_sure]
+        if unsure:
+            parts.append(f"The sets cannot be told apart {'; '.join(unsure)}.")
+        return " ".join(parts)
+
+
+@dataclass(frozen=True)
+class Doubts:
+    """Uncertainties that the files do not tell.
+
+    Parameters
+    ----------
+    stated : float
+        Standard uncertainty of the measured radiance temperature in K, common to all values, for a
+        measurement without its own.
+    emissivity : float
+        Relative standard uncertainty of the emissivities that the simulations assume.
+    position : float, optional
+        Standard uncertainty of positions in the measured image in m; by default that of a pixel.
+
+    Raises
+    ------
+    ValueError
+        If one is negative or not finite.
+    """
+
+    stated: float = 0.0
+    emissivity: float = 0.0
+    position: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if value is not None and not (isfinite(value) and value >= 0):
+                raise ValueError(f"uncertainty: {name} is {value!r}, expected 0 or more")
+
+
+def compare(
+    measured: Measurement,
+    simulated: Mapping[str, Measurement],
+    tool: Tool,
+    curve: NDArray[np.float64] | None = None,
+    doubts: Doubts | None = None,
+    reference: int | None = None,
+) -> Comparison:
+    """Lay a measurement and simulations over each other.
+
+    Parameters
+    ----------
+    measured : Measurement
+        Frames of the camera.
+    simulated : mapping
+        Frames of the simulated camera by name, such as one for each set of emissivities. Pitch and
+        grid of pixels may differ from the measured ones.
+    tool : Tool
+        The tool, in the measurement's coordinates. A simulation that tells its own is placed by
+        that.
+    curve : ndarray, optional
+        Polyline along which to read the shear band in all files, from the cutting edge outward, in
+        the measurement's coordinates in m, shape (k, 2). By default the ridge of each frame.
+    doubts : Doubts, optional
+        Uncertainties that the files do not tell.
+    reference : int, optional
+        Number of the measured frame whose band is fully developed; see `band_profile`.
+
+    Raises
+    ------
+    ValueError
+        If there is no simulation, or nothing that can be compared.
+
+    Notes
+    -----
+    Squares of 3 measured pixels stand on the rake face in all images alike. Along the shear band
+    values at the same distance from the cutting edge are compared, as means over the frames in
+    which the band is developing or fully developed, as in the paper.
+
+    The measured values have the uncertainty of the calibration (or a stated one), of the position
+    and of the mean over the frames, the simulated ones that of the emissivity and of the mean over
+    the frames. Which set fits best is the one with the least root mean square of the differences;
+    how sure that is, is found by drawing all values anew from their uncertainties: what is
+    systematic with one deviate a file, what is random with one a value.
+    """
+    if not simulated:
+        raise ValueError("comparison: no simulation, expected 1 or more")
+    doubts = doubts or Doubts()
+    notes: list[str] = []
+    if measured.calibration_uncertainty is None and doubts.stated == 0.0:
+        notes.append(
+            "Doubtful: the measurement does not tell the uncertainty of its calibration and none "
+            "is stated, so that the E_n are too great."
+        )
+    tools = {label: _tool_of(label, item, tool, notes) for label, item in simulated.items()}
+    grid = _compare_grid(measured, simulated, tool, tools, doubts, notes)
+    files = [("measured", measured, tool, reference)]
+    files += [(label, item, tools[label], None) for label, item in simulated.items()]
+    band = _compare_band(files, curve, doubts, notes)
+    places = _places(tuple(simulated), grid, band)
+    if not places:
+        reasons = " ".join(notes)
+        raise ValueError(f"comparison: there is nothing that can be compared: {reasons}")
+    return Comparison(tuple(simulated), grid, band, places, tuple(notes))
+
+
+def _tool_of(label: str, simulated: Measurement, tool: Tool, notes: list[str]) -> Tool:
+    own = simulated.tool
+    if own is None:
+        notes.append(f"Assumed: {label} tells no tool; it is where the measurement has it.")
+        return tool
+    turn = degrees(abs(own.rake_angle - tool.rake_angle))
+    if turn > _SAME_ANGLE:
+        notes.append(f"Doubtful: the rake angle of {label} differs by {turn:.2g} degrees.")
+    return own
+
+
+def _compare_grid(
+    measured: Measurement,
+    simulated: Mapping[str, Measurement],
+    tool: Tool,
+    tools: Mapping[str, Tool],
+    doubts: Doubts,
+    notes: list[str],
+) -> GridComparison | None:
+    size = PIXELS * measured.raster.spacing
+    try:
+        base = rake_grid(measured, tool, PIXELS, max(DEPTH, size))
+        grids = {
+            label: rake_grid(item, tools[label], size / item.raster.spacing, max(DEPTH, size))
+            for label, item in simulated.items()
+        }
+    except ValueError as error:
+        notes.append(f"Doubtful: the rake face is left out: {error}.")
+        return None
+    if base.times.size < _FEW:
+        notes.append(_few_frames("measured", base.times.size))
+    columns = min(grid.along.size for grid in (base, *grids.values()))
+    readings = [_measured_squares(measured, base, columns, doubts)]
+    for label, item in simulated.items():
+        grid = grids[label]
+        mean = grid.frame_mean[:, :columns]
+        emissivity = _of_the_emissivity(item, mean, doubts)
+        readings.append(Reading(mean, emissivity, _of_the_mean(grid)[:, :columns]))
+    return GridComparison(base.along[:columns], base.depth, readings[0], tuple(readings[1:]))
+
+
+def _measured_squares(
+    measured: Measurement, grid: RakeGrid, columns: int, doubts: Doubts
+) -> Reading:
+    mean = grid.frame_mean[:, :columns]
+    corners = grid.corners()[:, : columns + 1]
+    middles = (corners[1:, 1:] + corners[:-1, :-1]) / 2
+    systematic = np.full(mean.shape, doubts.stated)
+    if measured.calibration_uncertainty is not None:
+        share = sample(_relative_calibration(measured), measured.raster, middles)
+        systematic = np.hypot(systematic, share * _relative_to_kelvin(measured, mean))
+    images = [_image(measured, k) for k in range(measured.times.size)]
+    image = np.mean([item.temperature for item in images if item is not None], axis=0)
+    pitch = measured.raster.spacing
+    slopes = [sample(slope, measured.raster, middles) for slope in np.gradient(image, pitch)]
+    position = np.hypot(*slopes) * _position(measured, doubts)
+    random = np.hypot(position, _of_the_mean(grid)[:, :columns])
+    return Reading(mean, systematic, random)
+
+
+def _relative_calibration(measured: Measurement) -> NDArray[np.float64]:
+    """Uncertainty of the calibration over the radiance, mean over the frames, shape (y, x)."""
+    absolute = measured.calibration_uncertainty
+    assert absolute is not None
+    usable = (measured.flags & UNUSABLE == 0) & (measured.radiance > 0)
+    share = np.divide(absolute, measured.radiance, out=np.zeros(absolute.shape), where=usable)
+    return _mean(share, usable)
+
+
+def _image(measured: Measurement, frame: int) -> ThermalImage | None:
+    try:
+        return ThermalImage.of(measured, frame)
+    except NoShearBandError:
+        return None
+
+
+def _position(measured: Measurement, doubts: Doubts) -> float:
+    return measured.raster.spacing / sqrt(12.0) if doubts.position is None else doubts.position
+
+
+def _of_the_mean(grid: RakeGrid) -> NDArray[np.float64]:
+    """Standard deviation of the mean over the frames in K; 0 for a single frame."""
+    return np.nan_to_num(grid.frame_deviation / np.sqrt(np.maximum(grid.frame_count, 1)))
+
+
+def _few_frames(name: str, count: int) -> str:
+    frames = "frame" if count == 1 else "frames"
+    return (
+        f"Doubtful: {name}: {count} {frames} only, which do not tell how the temperature varies "
+        "between frames."
+    )
+
+
+def _relative_to_kelvin(
+    measurement: Measurement, temperature: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Kelvins of radiance temperature for a radiance that is off by its own amount."""
+    radiance = np.asarray(measurement.band.radiance(temperature), np.float64)
+    return radiance / radiance_slope(measurement, temperature)
+
+
+def _of_the_emissivity(
+    simulated: Measurement, temperature: NDArray[np.float64], doubts: Doubts
+) -> NDArray[np.float64]:
+    """Standard uncertainty in K that the assumed emissivity makes."""
+    if doubts.emissivity == 0.0:
+        return np.zeros(temperature.shape)
+    return doubts.emissivity * _relative_to_kelvin(simulated, temperature)
+
+
+def _compare_band(
+    files: Sequence[tuple[str, Measurement, Tool, int | None]],
+    curve: NDArray[np.float64] | None,
+    doubts: Doubts,
+    notes: list[str],
+) -> BandComparison | None:
+    """The band of the measurement, which comes first, and of the simulations."""
+    _, measured, tool, _ = files[0]
+    position = _position(measured, doubts)
+    profiles = []
+    for name, item, placed, reference in files:
+        moved = None if curve is None else curve + (placed.edge_point - tool.edge_point)
+        try:
+            profiles.append(
+                band_profile(item, placed, curve=moved, reference=reference, position=position)
+            )
+        except NoShearBandError as error:
+            notes.append(f"Doubtful: the shear band is left out: {name}: {error}.")
+            return None
+    step = measured.raster.spacing
+    last = max(float(profile.distance[-1]) for profile in profiles)
+    distance = step * np.arange(1, int(last / step) + 1, dtype=np.float64)
+    names = [name for name, *_ in files]
+    parts = [_along(name, p, distance, notes) for name, p in zip(names, profiles, strict=True)]
+    mean, calibration, off, between = parts[0]
+    own = Reading(mean, np.hypot(calibration, doubts.stated), np.hypot(off, between))
+    readings = []
+    for (_, item, *_), (mean, _, _, between) in zip(files[1:], parts[1:], strict=True):
+        emissivity = _of_the_emissivity(item, mean, doubts)
+        readings.append(Reading(mean, emissivity, between))
+    return BandComparison(distance, own, tuple(readings))
+
+
+def _along(
+    name: str, profile: BandProfile, distance: NDArray[np.float64], notes: list[str]
+) -> tuple[NDArray[np.float64], ...]:
+    """Means over the frames: temperature, calibration, position; and that of the mean itself.
+
+    Where a single frame reaches, the variance between frames is the mean of it where several do.
+    """
+    used = profile.in_place
+    notes.extend(f"{note} ({name})" for note in profile.notes)
+    if not used.any():
+        notes.append(
+            f"Doubtful: {name}: no frame has a band that is in place; all frames are used."
+        )
+        used = np.ones(used.size, np.bool_)
+    elif used.sum() < _FEW:
+        notes.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
+    fields = (profile.temperature, profile.calibration, profile.position)
+    read = [
+        np.stack([_at(distance, profile.distance, row) for row in field[used]]) for field in fields
+    ]
+    known = np.isfinite(read[0])
+    count = known.sum(axis=0)
+    mean, calibration, position = (_mean(field, known) for field in read)
+    squares = np.where(known, (read[0] - mean) ** 2, 0.0).sum(axis=0)
+    several = count > 1
+    variance = np.divide(squares, count - 1, out=np.zeros_like(squares), where=several)
+    if several.any():
+        variance[count == 1] = variance[several].mean()
+    return mean, calibration, position, np.sqrt(variance / np.maximum(count, 1))
+
+
+def _at(
+    distance: NDArray[np.float64], own: NDArray[np.float64], values: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Values at other distances; NaN beside a NaN and beyond the ends."""
+    return np.asarray(np.interp(distance, own, values, left=np.nan, right=np.nan))
+
+
+def _mean(values: NDArray[np.float64], known: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Mean over the first axis of what is known; NaN where nothing is."""
+    count = known.sum(axis=0)
+    total = np.where(known, values, 0.0).sum(axis=0)
+    return np.asarray(np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0))
+
+
+def _places(
+    labels: Sequence[str], grid: GridComparison | None, band: BandComparison | None
+) -> tuple[PlaceResult, ...]:
+    """Which simulation fits where both have values."""
+    results: list[PlaceResult | None] = []
+    if grid is not None:
+        face = np.zeros(grid.measured.temperature.shape, dtype=np.bool_)
+        face[0] = True
+        reach = grid.depth[0] * 2e6
+        results.append(_judged(f"at the rake face, up to {reach:.3g} µm deep,", labels, grid, face))
+        results.append(
+            _judged(f"in the chip, over {reach:.3g} µm from the face,", labels, grid, ~face)
+        )
+    if band is not None:
+        near, reach = band.distance < TIP_REACH, 1e6 * TIP_REACH
+        results.append(
+            _judged(f"in the shear band, under {reach:.3g} µm from the edge,", labels, band, near)
+        )
+        results.append(
+            _judged(f"in the shear band, {reach:.3g} µm and farther,", labels, band, ~near)
+        )
+    return tuple(result for result in results if result is not None)
+
+
+def _judged(
+    place: str,
+    labels: Sequence[str],
+    pair: GridComparison | BandComparison,
+    where: NDArray[np.bool_],
+) -> PlaceResult | None:
+    """The fits at one place; None where not all files have a value together."""
+    common = where & np.isfinite(pair.measured.temperature)
+    for item in pair.simulated:
+        common &= np.isfinite(item.temperature)
+    if not common.any():
+        return None
+    measured = pair.measured.part(common)
+    simulated = [item.part(common) for item in pair.simulated]
+    fits = tuple(_fit(label, measured, item) for label, item in zip(labels, simulated, strict=True))
+    best = int(np.argmin([fit.rms for fit in fits]))
+    return PlaceResult(place, fits, best, _confidence(measured, simulated, best))
+
+
+def _fit(label: str, measured: Reading, simulated: Reading) -> Fit:
+    away = simulated.temperature - measured.temperature
+    systematic = hypot(float(measured.systematic.mean()), float(simulated.systematic.mean()))
+    random = sqrt(float((measured.random**2 + simulated.random**2).sum())) / away.size
+    return Fit(
+        label=label,
+        bias=float(away.mean()),
+        bias_uncertainty=hypot(systematic, random),
+        rms=float(np.sqrt((away**2).mean())),
+        agreeing=int((normalised_error(measured, simulated) <= 1).sum()),
+        count=away.size,
+    )
+
+
+def _confidence(measured: Reading, simulated: Sequence[Reading], best: int) -> float:
+    """Share of draws of all uncertainties in which the best set stays the best."""
+    generator = np.random.default_rng(_SEED)
+    base = _drawn(measured, generator)
+    rms = [((_drawn(item, generator) - base) ** 2).mean(axis=1) for item in simulated]
+    return float((np.argmin(rms, axis=0) == best).mean())
+
+
+def _drawn(reading: Reading, generator: np.random.Generator) -> NDArray[np.float64]:
+    """Values drawn anew from their uncertainties, shape (draws, n)."""
+    common = generator.standard_normal((_DRAWS, 1)) * reading.systematic
+    each = generator.standard_normal((_DRAWS, reading.temperature.size)) * reading.random
+    return reading.temperature + common + each

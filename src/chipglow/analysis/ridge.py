@@ -1,0 +1,220 @@
+"""A ridge that leads from the cutting edge outward: found about the edge, smoothed, climbed."""
+
+from dataclasses import dataclass
+from math import ceil, pi, radians
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from chipglow.scene import Raster, Tool
+
+_RADIUS_STEP: Final = 2e-6
+_STEPS_A_SAMPLE: Final = 3
+_ANGLES: Final = 401
+_BELOW_HORIZONTAL: Final = radians(10.0)
+_STEEPEST: Final = 2.0
+_STRAIGHTNESS: Final = 0.2
+_RAKE_LAYER: Final = 25e-6
+_RAKE_LAYER_SHARE: Final = 0.4
+_SMOOTHING: Final = 50e-6
+_NOWHERE: Final = np.int64(-1)
+
+
+class NoShearBandError(ValueError):
+    """A field in which no band leads from the edge to the chip's surface."""
+
+
+@dataclass(frozen=True)
+class PolarGrid:
+    """Places about the cutting edge: radii down, angles from the rake face downward across.
+
+    Parameters
+    ----------
+    points : ndarray
+        x and y in m, shape (radii, angles, 2).
+    index : ndarray
+        Row and column of the raster at these places, shape (2, radii, angles).
+    on_raster : ndarray of bool
+        Whether a place lies between the outermost centres of the raster.
+    off_face : ndarray of bool
+        Whether it lies beyond the layer along the rake face, which friction shears and heats too.
+    radii : ndarray
+        Distances from the edge in m.
+    radius_step : float
+        Their distance in m: 2 µm, or a third of a sample that is over 6 µm wide.
+    angle_step : float
+        Angle between neighbours in rad.
+    """
+
+    points: NDArray[np.float64]
+    index: NDArray[np.float64]
+    on_raster: NDArray[np.bool_]
+    off_face: NDArray[np.bool_]
+    radii: NDArray[np.float64]
+    radius_step: float
+    angle_step: float
+
+    @classmethod
+    def about(cls, tool: Tool, raster: Raster) -> "PolarGrid":
+        """Places about a tool's edge that reach over a raster."""
+        edge = tool.edge_point
+        left, right, _, top = raster.extent
+        reach = float(np.hypot(max(edge[0] - left, right - edge[0]), max(top - edge[1], 1e-6)))
+        step = max(_RADIUS_STEP, raster.spacing / _STEPS_A_SAMPLE)
+        first = max(tool.corner_radius, step)
+        radii = np.arange(first, reach + 2 * step, step)
+        up = np.arctan2(tool.rake_direction[1], tool.rake_direction[0])
+        angles = np.linspace(up, pi + _BELOW_HORIZONTAL, _ANGLES)
+        rays = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        points = edge + radii[:, None, None] * rays
+        column = (points[..., 0] - left) / raster.spacing - 0.5
+        row = (top - points[..., 1]) / raster.spacing - 0.5
+        on_raster = (column >= 0) & (column <= raster.columns - 1)
+        on_raster &= (row >= 0) & (row <= raster.rows - 1)
+        depth = tool.signed_distance(points[..., 0], points[..., 1])
+        layer = np.minimum(_RAKE_LAYER, _RAKE_LAYER_SHARE * radii)[:, None]
+        return cls(
+            points=points,
+            index=np.stack([row, column]),
+            on_raster=on_raster,
+            off_face=depth > layer,
+            radii=radii,
+            radius_step=step,
+            angle_step=float(angles[1] - angles[0]),
+        )
+
+    def best_path(
+        self,
+        score: NDArray[np.float64],
+        allowed: NDArray[np.bool_],
+        ends: NDArray[np.bool_],
+        toll: float,
+        anywhere: bool = False,
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Path with one angle at every radius that gathers the most.
+
+        Parameters
+        ----------
+        score : ndarray
+            What a place adds, shape (radii, angles).
+        allowed : ndarray of bool
+            Where the path may run.
+        ends : ndarray of bool
+            Where it may end.
+        toll : float
+            What every step costs, as a share of the median score on the best path without.
+        anywhere : bool
+            Whether the path may begin at any radius, not only at the first.
+
+        Returns
+        -------
+        tuple of ndarray
+            Indices of the radii, one after the other, and of the angles.
+
+        Raises
+        ------
+        NoShearBandError
+            If there is no path to an end.
+
+        Notes
+        -----
+        Dynamic programming over the radii, with a cost of turning. It is done twice: the second
+        time what is well under the strength of the first path costs, else the path would gain by
+        running on where the band has ended.
+        """
+        first = self._best(score, allowed, ends, anywhere)
+        after = score - toll * float(np.median(score[first]))
+        return self._best(after, allowed, ends, anywhere)
+
+    def _best(
+        self,
+        score: NDArray[np.float64],
+        allowed: NDArray[np.bool_],
+        ends: NDArray[np.bool_],
+        anywhere: bool,
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        total = np.where(allowed, score, -np.inf)
+        came_from = np.full(total.shape, _NOWHERE)
+        for i in range(1, self.radii.size):
+            before, choice = self._best_before(total[i - 1], i)
+            goes_on = before > 0.0 if anywhere else np.ones(before.size, np.bool_)
+            came_from[i] = np.where(goes_on, choice, _NOWHERE)
+            total[i] += np.where(goes_on, before, 0.0)
+        ends = ends & np.isfinite(total)
+        if not ends.any():
+            raise NoShearBandError("shear band: no path leads from the edge through the chip")
+        best = np.where(ends, total, -np.inf)
+        last, column = map(int, np.unravel_index(int(np.argmax(best)), best.shape))
+        columns = [column]
+        while came_from[last + 1 - len(columns), columns[-1]] != _NOWHERE:
+            columns.append(int(came_from[last + 1 - len(columns), columns[-1]]))
+        return np.arange(last + 1 - len(columns), last + 1), np.array(columns[::-1])
+
+    def _best_before(
+        self, total: NDArray[np.float64], i: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Greatest sum within reach at the radius before, less a little for turning."""
+        slope = self.radii[i] * self.angle_step / self.radius_step
+        reach = max(1, min(ceil(_STEEPEST / slope), total.size - 1))
+        padded = np.pad(total, reach, constant_values=-np.inf)
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
+        turns = np.arange(-reach, reach + 1)
+        candidates = windows - _STRAIGHTNESS * (turns * slope) ** 2
+        choice = candidates.argmax(axis=1)
+        best = candidates[np.arange(total.size), choice]
+        came_from = np.clip(np.arange(total.size) + choice - reach, 0, total.size - 1)
+        return best, came_from.astype(np.int64)
+
+
+def even_steps(points: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """Curve smoothed by local parabolas and laid out anew at even steps of arc length in m."""
+    along = arc_length(points)
+    even = np.linspace(0.0, along[-1], max(ceil(along[-1] / step) + 1, 5))
+    resampled = np.stack([np.interp(even, along, points[:, axis]) for axis in (0, 1)], axis=1)
+    window = min(2 * round(_SMOOTHING / step / 2) + 1, (even.size - 1) // 2 * 2 + 1)
+    if window < 5:
+        return resampled
+    return np.asarray(savgol_filter(resampled, window, 2, axis=0, mode="interp"))
+
+
+def arc_length(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance along a polyline from its first point in m, shape (n,)."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+
+
+def normals_of(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit normals of a curve, shape (n, 2): those that point up if it runs to the left."""
+    tangent = np.gradient(points, axis=0)
+    tangent /= np.hypot(tangent[:, 0], tangent[:, 1])[:, None]
+    return np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+
+
+def highest(
+    values: NDArray[np.float64], offsets: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Place of each row's greatest value by a parabola through it and its neighbours.
+
+    Parameters
+    ----------
+    values : ndarray
+        Profiles across a curve, shape (n, m).
+    offsets : ndarray
+        Where they are read, evenly spaced, shape (m,).
+
+    Returns
+    -------
+    place : ndarray
+        Offset of the top, shape (n,).
+    inside : ndarray of bool
+        Whether it is a maximum, not an end of the profile.
+    """
+    peak = values.argmax(axis=1)
+    inside = (peak > 0) & (peak < offsets.size - 1)
+    peak = np.clip(peak, 1, offsets.size - 2)
+    index = np.arange(peak.size)
+    left, top, right = (values[index, peak + k] for k in (-1, 0, 1))
+    bend = left - 2 * top + right
+    shift = np.divide(0.5 * (left - right), bend, out=np.zeros_like(bend), where=bend < 0)
+    return offsets[peak] + (offsets[1] - offsets[0]) * shift, inside

@@ -1,0 +1,200 @@
+"""The command ``chipglow compare``: a measurement beside simulations."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from chipglow.analysis import Comparison, Doubts
+    from chipglow.camera import Measurement
+
+
+def compare(
+    measured: Annotated[Path, typer.Argument(metavar="MEASURED", help="A measurement's file.")],
+    simulated: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="SIMULATED...",
+            help="Simulated measurements, such as one for each set of emissivities; each is called "
+            "by its attribute 'surface' or its file's name.",
+        ),
+    ],
+    tool: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE|found",
+            help="The tool, a YAML file with the keys of a study's cutting.tool and tip; or "
+            "'found', to look for the rake face in the image; by default what the measurement "
+            "tells, as a simulated one does.",
+        ),
+    ] = None,
+    curve: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Read the shear band of all files along this curve, a CSV file whose first line "
+            "is x_um,y_um, from the cutting edge outward; by default along the ridge of each.",
+        ),
+    ] = None,
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME",
+            help="The measured frame whose band is fully developed; by default the given curve is "
+            "its place, or the hottest and longest found band that begins near the cutting edge.",
+        ),
+    ] = None,
+    uncertainty: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DIFFERENCE",
+            help="Standard uncertainty of the measured radiance temperatures, such as '10 K', for "
+            "a measurement that does not tell its own.",
+        ),
+    ] = None,
+    emissivity_uncertainty: Annotated[
+        float,
+        typer.Option(
+            metavar="SHARE",
+            help="Relative standard uncertainty of the emissivities of the simulations, of 1.",
+        ),
+    ] = 0.0,
+    position: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH",
+            help="Standard uncertainty of positions in the measured image; by default that of a "
+            "pixel, its side over the root of 12.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Folder of the results: comparison.csv, summary.json, comparison.png and .svg.",
+        ),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw the comparison, PNG, PDF or SVG."),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="FIELD=VALUE",
+            help="Set a field of the description of the measurement's file; may be repeated.",
+        ),
+    ] = None,
+) -> None:
+    """Lay a measurement and simulations over each other and tell which fits where."""
+    from rich.console import Console
+
+    from chipglow.analysis import compare as compare_all
+    from chipglow.cli.pictures import check_picture_path, write_picture
+    from chipglow.cli.times import frame_at
+    from chipglow.cli.tools import chosen_tool
+    from chipglow.io import read_curve
+    from chipglow.report import draw_comparison
+    from chipglow.study.measured import load_measurement
+
+    if plot is not None:
+        check_picture_path(plot)
+    doubts = _doubts(uncertainty, emissivity_uncertainty, position)
+    whole = load_measurement(measured, settings or ())
+    if uncertainty is not None and whole.calibration_uncertainty is not None:
+        raise ValueError(
+            f"--uncertainty: {uncertainty} beside the uncertainty that {measured} tells, "
+            "expected one or the other"
+        )
+    placed, remarks = chosen_tool(whole, tool)
+    result = compare_all(
+        whole,
+        _labelled(simulated),
+        placed,
+        None if curve is None else read_curve(curve),
+        doubts,
+        None if reference is None else frame_at("--reference", reference, whole.times),
+    )
+    console = Console(highlight=False, markup=False)
+    console.print(_table(result))
+    for text in (*remarks, *result.notes, "", *(place.sentence for place in result.places)):
+        console.print(text)
+    console.print(f"\n{result.statement}")
+    if out is not None:
+        _write(result, out)
+        print(out)
+    if plot is not None:
+        write_picture(draw_comparison(result), plot)
+        print(plot)
+
+
+def _doubts(uncertainty: str | None, emissivity: float, position: str | None) -> "Doubts":
+    from chipglow.analysis import Doubts
+    from chipglow.cli.lengths import parse_length
+    from chipglow.study.units import TEMPERATURE_DIFFERENCE
+
+    if not 0.0 <= emissivity < 1.0:
+        raise ValueError(f"--emissivity-uncertainty: {emissivity:g}, expected 0 to under 1")
+    stated = 0.0
+    if uncertainty is not None:
+        try:
+            stated = TEMPERATURE_DIFFERENCE.parse(uncertainty)
+        except ValueError as error:
+            raise ValueError(f"--uncertainty: {error}") from None
+        if not stated > 0.0:
+            raise ValueError(f"--uncertainty: {uncertainty}, expected over 0 K")
+    known = None if position is None else parse_length("--position", position)
+    return Doubts(stated, emissivity, known)
+
+
+def _labelled(paths: list[Path]) -> "dict[str, Measurement]":
+    from chipglow.study.measured import load_measurement
+
+    found: dict[str, Measurement] = {}
+    for path in paths:
+        item = load_measurement(path)
+        label = str(item.data.attrs.get("surface", path.stem))
+        if label in found:
+            label = f"{label} ({path.stem})"
+        if label in found:
+            raise ValueError(f"{path}: is there twice, expected each simulation once")
+        found[label] = item
+    return found
+
+
+def _table(result: "Comparison") -> "Table":
+    from rich.table import Table
+
+    table = Table(
+        "place",
+        "simulation",
+        "bias / K",
+        "RMS / K",
+        "E_n up to 1",
+        box=None,
+        title="simulated less measured radiance temperature, ± expanded uncertainty (k = 2)",
+        title_justify="left",
+    )
+    for place in result.places:
+        for i, fit in enumerate(place.fits):
+            table.add_row(
+                "" if i else place.place.rstrip(","),
+                fit.label,
+                f"{fit.bias:+.1f} ± {2 * fit.bias_uncertainty:.1f}",
+                f"{fit.rms:.1f}",
+                f"{fit.agreeing} of {fit.count}",
+            )
+    return table
+
+
+def _write(result: "Comparison", out: Path) -> None:
+    from chipglow.io import atomic_folder, write_comparison
+    from chipglow.report import draw_comparison, drawing
+
+    with atomic_folder(out) as folder:
+        write_comparison(result, folder)
+        drawing.save(draw_comparison(result), folder, "comparison")

@@ -1,0 +1,372 @@
+"""The command ``chipglow register``: infrared images on visible pictures."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+    from rich.console import Console
+
+    from chipglow.analysis import ImageFit, PointFit, Registration
+    from chipglow.camera import Measurement, Recording
+    from chipglow.scene import Tool
+
+
+class ModelName(StrEnum):
+    """What the map may be."""
+
+    SIMILARITY = "similarity"
+    AFFINE = "affine"
+    HOMOGRAPHY = "homography"
+
+
+class MethodName(StrEnum):
+    """How the map is found."""
+
+    POINTS = "points"
+    MUTUAL_INFORMATION = "mutual-information"
+
+
+def register(
+    infrared: Annotated[Path, typer.Argument(metavar="INFRARED", help="A measurement's file.")],
+    visible: Annotated[
+        Path,
+        typer.Argument(
+            metavar="VISIBLE", help="A picture, or a visible camera's file (CINE, ...)."
+        ),
+    ],
+    points: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Points seen in both, CSV: x_um,y_um,visible_column,visible_row, or "
+            "infrared_column,infrared_row and the same.",
+        ),
+    ] = None,
+    model: Annotated[ModelName, typer.Option(help="What the map may be.")] = ModelName.AFFINE,
+    method: Annotated[
+        MethodName | None,
+        typer.Option(
+            help="By default points if there are some; mutual-information begins from points if "
+            "there are some."
+        ),
+    ] = None,
+    tool: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="The tool to draw, a YAML file with the keys of a study's cutting.tool and tip; "
+            "by default what the measurement tells, if it does.",
+        ),
+    ] = None,
+    frame: Annotated[int, typer.Option(metavar="N", help="Number of the infrared frame.")] = 0,
+    visible_frame: Annotated[
+        int, typer.Option(metavar="N", help="Number of the visible frame, from 0.")
+    ] = 0,
+    align: Annotated[
+        str | None,
+        typer.Option(
+            metavar="REGION",
+            help="Also find the offset of the clocks by the mean brightness of a region, such as "
+            "'-90 um, 20 um, -10 um, 120 um': left, bottom, right, top.",
+        ),
+    ] = None,
+    visible_interval: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME", help="Time between visible frames, for files that do not say it."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the map, .yaml, to be used again.")
+    ] = None,
+    pairs: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="With --align, write each infrared frame's visible ones, CSV.",
+        ),
+    ] = None,
+    overlay: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw both images on each other, PNG, PDF or SVG."),
+    ] = None,
+    blink: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Show both images in turns, .gif.")
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="FIELD=VALUE",
+            help="Set a field of the description of the infrared camera's file; may be repeated.",
+        ),
+    ] = None,
+) -> None:
+    """Find where each point of an infrared image is in a visible picture."""
+    from rich.console import Console
+
+    from chipglow.io import read_pictures, read_points
+    from chipglow.study import tool_of, write_registration
+    from chipglow.study.measured import load_measurement
+
+    _check_names(out, pairs, overlay, blink, align)
+    interval = None if visible_interval is None else _interval(visible_interval)
+    region = None if align is None else _region(align)
+    measured, seen = load_measurement(infrared, settings or ()), read_pictures(visible, interval)
+    if region is not None:
+        _check_times(visible, measured, seen, interval)
+    _check_frame("--frame", frame, measured.times.size)
+    _check_frame("--visible-frame", visible_frame, seen.times.size)
+    picture = seen.signal[visible_frame]
+    outline = measured.tool if tool is None else tool_of(measured, tool)
+    given = None if points is None else read_points(points, measured.raster, picture.shape)
+    console = Console(highlight=False, markup=False)
+    found = _found(console, measured, frame, picture, given, model, method)
+    _say(console, found, measured)
+    if align is not None and region is not None:
+        _align(console, found, measured, seen, region, pairs)
+    if out is not None:
+        write_registration(found, out)
+        print(out)
+    temperature = measured.radiance_temperature()[frame]
+    if overlay is not None:
+        _write_overlay(overlay, found, temperature, measured, picture, outline, given)
+    if blink is not None:
+        _write_blink(blink, found, temperature, measured, picture, outline)
+
+
+def _check_names(
+    out: Path | None,
+    pairs: Path | None,
+    overlay: Path | None,
+    blink: Path | None,
+    align: str | None,
+) -> None:
+    from chipglow.cli.pictures import check_picture_path
+
+    if overlay is not None:
+        check_picture_path(overlay, "--overlay")
+    for option, path, suffixes in (
+        ("--out", out, (".yaml", ".yml")),
+        ("--pairs", pairs, (".csv",)),
+        ("--blink", blink, (".gif",)),
+    ):
+        if path is not None and path.suffix.lower() not in suffixes:
+            raise ValueError(f"{option}: {path}, expected a file that ends in {suffixes[0]}")
+    if pairs is not None and align is None:
+        raise ValueError(f"--pairs: {pairs} without --align, expected both")
+
+
+def _interval(text: str) -> float:
+    from chipglow.study.units import TIME
+
+    try:
+        return TIME.parse(text)
+    except ValueError as error:
+        raise ValueError(f"--visible-interval: {error}") from None
+
+
+def _region(text: str) -> tuple[float, float, float, float]:
+    from chipglow.study.units import POSITION
+
+    try:
+        left, bottom, right, top = (POSITION.parse(part.strip()) for part in text.split(","))
+    except ValueError as error:
+        raise ValueError(
+            f"--align: {text!r}, expected left, bottom, right, top such as "
+            f"'-90 um, 20 um, -10 um, 120 um' ({error})"
+        ) from None
+    if not (left < right and bottom < top):
+        raise ValueError(f"--align: {text!r}, expected left under right and bottom under top")
+    return left, bottom, right, top
+
+
+def _check_frame(option: str, number: int, count: int) -> None:
+    if not 0 <= number < count:
+        raise ValueError(f"{option}: {number}, expected 0 to {count - 1}")
+
+
+def _check_times(
+    path: Path, measured: "Measurement", seen: "Recording", interval: float | None
+) -> None:
+    from chipglow.io.picture_file import PICTURE_SUFFIXES
+
+    if path.suffix.lower() in PICTURE_SUFFIXES and interval is None:
+        raise ValueError(f"--align: {path} tells no times, expected --visible-interval")
+    if "integration_time" not in measured.data.attrs:
+        raise ValueError("--align: the measurement does not tell its integration_time")
+
+
+def _found(
+    console: "Console",
+    measured: "Measurement",
+    frame: int,
+    picture: "NDArray[Any]",
+    given: "tuple[NDArray[np.float64], NDArray[np.float64]] | None",
+    model: ModelName,
+    method: MethodName | None,
+) -> "Registration":
+    """The registration, its numbers printed."""
+    import numpy as np
+
+    from chipglow.analysis import fit_images, fit_points
+    from chipglow.camera import Flag
+
+    if given is None and method == MethodName.POINTS:
+        raise ValueError("--method: points without --points, expected a file of points")
+    by_points = None if given is None else fit_points(*given, model.value)
+    if by_points is not None and given is not None:
+        _print_points(console, by_points, given)
+        if method != MethodName.MUTUAL_INFORMATION:
+            return by_points.registration
+    start = None if by_points is None else by_points.registration
+    dead = measured.flags[frame] & Flag.DEAD > 0
+    radiance = np.where(dead, np.nan, measured.radiance[frame])
+    fit = fit_images(radiance, measured.raster, picture, model.value, start)
+    _print_images(console, fit, start is not None)
+    return fit.registration
+
+
+def _print_points(
+    console: "Console",
+    fit: "PointFit",
+    given: "tuple[NDArray[np.float64], NDArray[np.float64]]",
+) -> None:
+    from rich.table import Table
+
+    table = Table("point", "x / um", "y / um", "column", "row", "off by / pixel", box=None)
+    for number, (place, pixel, off) in enumerate(zip(*given, fit.residuals, strict=True), 1):
+        cells = (f"{1e6 * place[0]:.1f}", f"{1e6 * place[1]:.1f}", *(f"{v:.1f}" for v in pixel))
+        table.add_row(str(number), *cells, f"{float((off @ off) ** 0.5):.2f}")
+    console.print(table)
+    console.print(
+        f"Scatter of the points: {fit.scatter:.2f} visible pixels in column and in row, with "
+        f"{fit.registration.degrees_of_freedom:.0f} degrees of freedom."
+    )
+
+
+def _print_images(console: "Console", fit: "ImageFit", started: bool) -> None:
+    console.print(
+        f"Mutual information: {fit.information:.3f} bits a sensor; score of the placement "
+        f"{fit.placement:.3g}, of {fit.by_chance.size} unrelated images at most "
+        f"{fit.by_chance.max():.3g}."
+    )
+    if not started:
+        console.print(
+            "Assumed: the visible picture is not mirrored, and shows the infrared image's width "
+            "within 25 % and its middle within a quarter of the width; else give --points."
+        )
+
+
+def _say(console: "Console", found: "Registration", measured: "Measurement") -> None:
+    import numpy as np
+
+    raster = measured.raster
+    left, right, bottom, top = raster.extent
+    slope = found.jacobian(np.array([(left + right) / 2, (bottom + top) / 2]))
+    size = 1e6 / np.sqrt(abs(np.linalg.det(slope)))
+    typical, worst = found.uncertainty(raster)
+    mirrored = ", mirrored" if np.linalg.det(slope) > 0 else ""
+    turn = np.degrees(np.arctan2(-slope[1, 0] * np.sign(np.linalg.det(slope)), slope[0, 0]))
+    console.print(
+        f"A visible pixel is {size:.4g} um in the middle of the infrared image, turned by "
+        f"{turn:.2f} degrees{mirrored}."
+    )
+    console.print(
+        f"Standard uncertainty of a mapped position: {1e6 * typical:.2g} um "
+        f"({typical / raster.spacing:.2g} infrared pixels) in the median, {1e6 * worst:.2g} um "
+        "at most."
+    )
+    for doubt in found.doubts:
+        console.print(f"Doubtful: {doubt}.")
+
+
+def _align(
+    console: "Console",
+    found: "Registration",
+    measured: "Measurement",
+    seen: "Recording",
+    region: tuple[float, float, float, float],
+    pairs: Path | None,
+) -> None:
+    import numpy as np
+
+    from chipglow.analysis import align_times, simultaneous_frames
+    from chipglow.analysis.time_alignment import region_signals
+
+    integration = float(measured.data.attrs["integration_time"])
+    frames, pictures = region_signals(
+        found, measured.radiance, measured.raster, seen.signal, region
+    )
+    exposure = seen.integration_time or float(np.median(np.diff(seen.times)))
+    if seen.integration_time is None:
+        console.print(
+            f"Assumed: a visible exposure lasts as long as its frame, {1e6 * exposure:.4g} us."
+        )
+    alignment = align_times(
+        measured.times + integration / 2, frames, seen.times + exposure / 2, pictures
+    )
+    unsure = float(np.sqrt(alignment.covariance[0, 0]))
+    console.print(
+        f"Visible clock = infrared clock + {1e6 * alignment.offset:.2f} us, standard uncertainty "
+        f"{1e6 * unsure:.2g} us, correlation {alignment.correlation:.3f}."
+    )
+    for doubt in alignment.doubts:
+        console.print(f"Doubtful: {doubt}.")
+    within = simultaneous_frames(alignment, measured.times, integration, seen.times, exposure)
+    empty = sum(1 for numbers in within if numbers.size == 0)
+    if empty:
+        console.print(f"{empty} of {len(within)} infrared frames have no visible one.")
+    if pairs is not None:
+        _write_pairs(pairs, measured.times, within)
+
+
+def _write_pairs(
+    path: Path, times: "NDArray[np.float64]", within: "list[NDArray[np.int64]]"
+) -> None:
+    from chipglow.io import atomic_path
+
+    lines = ["infrared_frame,infrared_time_us,visible_frames"]
+    for number, (time, frames) in enumerate(zip(times, within, strict=True)):
+        lines.append(f"{number},{1e6 * time:.9g},{' '.join(map(str, frames.tolist()))}")
+    with atomic_path(path) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    print(path)
+
+
+def _write_overlay(
+    path: Path,
+    found: "Registration",
+    temperature: "NDArray[np.float64]",
+    measured: "Measurement",
+    picture: "NDArray[Any]",
+    outline: "Tool | None",
+    given: "tuple[NDArray[np.float64], NDArray[np.float64]] | None",
+) -> None:
+    from chipglow.cli.pictures import write_picture
+    from chipglow.report import draw_registration
+
+    figure = draw_registration(found, temperature, measured.raster, picture, outline, given)
+    write_picture(figure, path)
+    print(path)
+
+
+def _write_blink(
+    path: Path,
+    found: "Registration",
+    temperature: "NDArray[np.float64]",
+    measured: "Measurement",
+    picture: "NDArray[Any]",
+    outline: "Tool | None",
+) -> None:
+    from chipglow.io.picture_file import write_blink
+    from chipglow.report import blink_pictures
+
+    pictures = blink_pictures(found, temperature, measured.raster, picture, outline)
+    write_blink(pictures, path)
+    print(path)

@@ -1,0 +1,165 @@
+"""The command ``chipglow shearband``: the temperature along the shear band."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from chipglow.analysis import BandProfile
+
+
+def shearband(
+    measurement: Annotated[
+        Path, typer.Argument(metavar="MEASUREMENT", help="A measurement's file.")
+    ],
+    curve: Annotated[
+        str,
+        typer.Option(
+            metavar="FILE|found",
+            help="Where to read: a CSV file whose first line is x_um,y_um, from the cutting edge "
+            "outward; or 'found', the ridge of the radiance temperature in each frame.",
+        ),
+    ] = "found",
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="TIME",
+            help="The frame nearest to this time, such as '400 us'; may be repeated; by default "
+            "all frames.",
+        ),
+    ] = None,
+    tool: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE|found",
+            help="The tool, a YAML file with the keys of a study's cutting.tool and tip; or "
+            "'found', to look for the rake face in the image; by default what the measurement "
+            "tells, as a simulated one does.",
+        ),
+    ] = None,
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME",
+            help="The frame whose band is fully developed; by default the given curve is its "
+            "place, or the hottest and longest found band that begins near the cutting edge.",
+        ),
+    ] = None,
+    width: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH", help="Width across the curve of the mean; by default a pixel."
+        ),
+    ] = None,
+    position: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH",
+            help="Standard uncertainty of the curve's position; by default that of a pixel, its "
+            "side over the root of 12.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the temperatures along the band, .csv or .nc."),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Draw the curves on the image and the profiles, PNG, PDF or SVG."
+        ),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="FIELD=VALUE",
+            help="Set a field of the description of a camera's file; may be repeated.",
+        ),
+    ] = None,
+) -> None:
+    """Read the radiance temperature along the shear band, as the paper's Figure 9."""
+    from rich.console import Console
+
+    from chipglow.analysis import band_profile
+    from chipglow.cli.lengths import parse_length
+    from chipglow.cli.pictures import check_picture_path, write_picture
+    from chipglow.cli.times import frame_at
+    from chipglow.cli.tools import chosen_tool
+    from chipglow.io import check_band_profile_path, read_curve, write_band_profile
+    from chipglow.report import draw_band_profile
+    from chipglow.study.measured import load_measurement
+
+    if plot is not None:
+        check_picture_path(plot)
+    if out is not None:
+        check_band_profile_path(out)
+    measured = load_measurement(measurement, settings or ())
+    times = measured.times
+    placed, remarks = chosen_tool(measured, tool)
+    profile = band_profile(
+        measured,
+        placed,
+        frames=sorted({frame_at("--at", text, times) for text in at}) if at else None,
+        curve=None if curve == "found" else read_curve(curve),
+        reference=None if reference is None else frame_at("--reference", reference, times),
+        width=None if width is None else parse_length("--width", width),
+        position=None if position is None else parse_length("--position", position),
+    )
+    console = Console(highlight=False, markup=False)
+    console.print(_table(profile))
+    for note in (*remarks, *profile.notes):
+        console.print(note)
+    if measured.calibration_uncertainty is None:
+        console.print(
+            "Doubtful: the measurement does not tell the uncertainty of its calibration; the "
+            "uncertainty is that of the position only."
+        )
+    if out is not None:
+        write_band_profile(profile, out)
+        print(out)
+    if plot is not None:
+        write_picture(draw_band_profile(measured, placed, profile), plot)
+        print(plot)
+
+
+def _table(profile: "BandProfile") -> "Table":
+    import numpy as np
+    from rich.table import Table
+
+    table = Table(
+        "at / µs",
+        "stage",
+        "offset / µm",
+        "from / µm",
+        "to / µm",
+        "mean / °C",
+        "most / °C",
+        "u / K",
+        box=None,
+        title=f"radiance temperature along the band, over a width of {1e6 * profile.width:.4g} µm",
+        title_justify="left",
+    )
+    table.columns[1].no_wrap = True
+    for frame, time in enumerate(profile.times):
+        values, uncertainty = profile.temperature[frame], profile.uncertainty[frame]
+        known = np.isfinite(values)
+        row = [f"{1e6 * time:.7g}", str(profile.stage[frame])]
+        offset = profile.offset[frame]
+        row.append(f"{1e6 * offset:+.1f}" if np.isfinite(offset) else "–")
+        if known.any():
+            ends = profile.distance[known][[0, -1]] * 1e6
+            row += [
+                f"{ends[0]:.0f}",
+                f"{ends[1]:.0f}",
+                f"{values[known].mean() - 273.15:.1f}",
+                f"{values[known].max() - 273.15:.1f}",
+                f"{np.sqrt((uncertainty[known] ** 2).mean()):.1f}",
+            ]
+        else:
+            row += ["–"] * 5
+        table.add_row(*row)
+    return table

@@ -1,0 +1,113 @@
+"""A comparison of measured and simulated in files."""
+
+import csv
+import json
+from collections.abc import Iterator
+from math import isfinite
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from chipglow.analysis import Comparison, PlaceResult, Reading, normalised_error
+from chipglow.io.atomic import RESULT_MARK
+
+_TABLE: Final = "comparison.csv"
+_COLUMNS: Final = (
+    "place",
+    "along_um",
+    "depth_um",
+    "distance_um",
+    "measured_degC",
+    "measured_expanded_K",
+    "simulation",
+    "simulated_degC",
+    "simulated_expanded_K",
+    "difference_K",
+    "E_n",
+)
+_FREEZING: Final = 273.15
+
+
+def write_comparison(comparison: Comparison, folder: Path) -> None:
+    """Write a comparison into a folder that is there.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        What to write.
+    folder : Path
+        Gets ``comparison.csv``, a line for each value of each simulation with its expanded
+        uncertainty (k = 2), and ``summary.json``, the fits, sentences and notes; both with units
+        in the names of the columns and keys.
+    """
+    with (folder / _TABLE).open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        table.writerow(_COLUMNS)
+        table.writerows(_rows(comparison))
+    summary = {
+        "statement": comparison.statement,
+        "simulations": list(comparison.labels),
+        "places": [_place(result) for result in comparison.places],
+        "notes": list(comparison.notes),
+    }
+    text = json.dumps(summary, indent=1, ensure_ascii=False)
+    (folder / RESULT_MARK).write_text(f"{text}\n", encoding="utf-8")
+
+
+def _rows(comparison: Comparison) -> Iterator[tuple[Any, ...]]:
+    grid, band = comparison.grid, comparison.band
+    if grid is not None:
+        for label, simulated in zip(comparison.labels, grid.simulated, strict=True):
+            for m, n in np.ndindex(grid.measured.temperature.shape):
+                middle = float(grid.along[n]), float(grid.depth[m])
+                place = ("rake face", *_micro(*middle), "")
+                yield (*place, *_values(grid.measured, label, simulated, (m, n)))
+    if band is not None:
+        for label, simulated in zip(comparison.labels, band.simulated, strict=True):
+            for n, distance in enumerate(band.distance):
+                place = ("shear band", "", "", *_micro(float(distance)))
+                yield (*place, *_values(band.measured, label, simulated, (n,)))
+
+
+def _micro(*lengths: float) -> list[str]:
+    return [f"{1e6 * length:.8g}" for length in lengths]
+
+
+def _values(
+    measured: Reading, label: str, simulated: Reading, at: tuple[int, ...]
+) -> tuple[str, ...]:
+    own, other = measured.temperature[at], simulated.temperature[at]
+    return (
+        _number(own - _FREEZING),
+        _number(measured.expanded[at]),
+        label,
+        _number(other - _FREEZING),
+        _number(simulated.expanded[at]),
+        _number(other - own),
+        _number(normalised_error(measured, simulated)[at]),
+    )
+
+
+def _number(value: float) -> str:
+    return f"{value:.4f}" if isfinite(value) else ""
+
+
+def _place(result: PlaceResult) -> dict[str, Any]:
+    return {
+        "place": result.place.rstrip(","),
+        "sentence": result.sentence,
+        "best": result.fits[result.best].label,
+        "confidence": result.confidence,
+        "fits": [
+            {
+                "simulation": fit.label,
+                "bias_K": fit.bias,
+                "bias_standard_uncertainty_K": fit.bias_uncertainty,
+                "rms_K": fit.rms,
+                "values": fit.count,
+                "values_with_E_n_up_to_1": fit.agreeing,
+            }
+            for fit in result.fits
+        ],
+    }

@@ -1,0 +1,106 @@
+"""Measured beside simulated, and their difference (the paper's Figures 7 and 9)."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from chipglow.analysis import Comparison, Reading
+from chipglow.report import drawing
+from chipglow.report.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION
+
+_HEIGHT: Final = 5.2
+_COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
+
+
+def draw_comparison(comparison: Comparison) -> Figure:
+    """Draw what was measured and simulated, and the differences with expanded uncertainties.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        The comparison; the squares nearest to the rake face are drawn, and the shear band.
+    """
+    columns = []
+    if comparison.grid is not None:
+        grid = comparison.grid
+        title = f"at the rake face, {1e6 * grid.depth[0]:.3g} µm deep"
+        readings = [_row(item) for item in (grid.measured, *grid.simulated)]
+        columns.append((title, "along the rake face / µm", grid.along, readings))
+    if comparison.band is not None:
+        band = comparison.band
+        label = "distance from the cutting edge / µm"
+        readings = [band.measured, *band.simulated]
+        columns.append(("along the shear band", label, band.distance, readings))
+    with drawing.style():
+        figure = drawing.new_figure(_HEIGHT)
+        panels = figure.subplots(
+            2, len(columns), squeeze=False, sharex="col", sharey="row", height_ratios=(1.4, 1)
+        )
+        for (above, below), column in zip(panels.T, columns, strict=True):
+            title, label, place, readings = column
+            above.set_title(title)
+            below.set_xlabel(label)
+            _draw_values(above, place, readings, comparison.labels)
+            _draw_differences(below, place, readings)
+        panels[0, 0].set_ylabel("radiance temperature / °C")
+        panels[1, 0].set_ylabel("simulated − measured / K")
+        handles, labels = panels[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _row(reading: Reading) -> Reading:
+    """What is nearest to the rake face."""
+    return Reading(reading.temperature[0], reading.systematic[0], reading.random[0])
+
+
+def _colour(number: int) -> str:
+    return _COLOURS[number % len(_COLOURS)]
+
+
+def _draw_values(
+    axes: Axes, place: NDArray[np.float64], readings: Sequence[Reading], labels: Sequence[str]
+) -> None:
+    measured, *simulated = readings
+    x, values = 1e6 * place, measured.temperature - KELVIN
+    axes.plot(x, values, "k.", markersize=4, label="measured")
+    axes.fill_between(
+        x,
+        values - measured.expanded,
+        values + measured.expanded,
+        color=GREY,
+        alpha=0.3,
+        linewidth=0,
+        label="expanded uncertainty, k = 2",
+    )
+    for i, (reading, label) in enumerate(zip(simulated, labels, strict=True)):
+        values = reading.temperature - KELVIN
+        axes.plot(x, values, color=_colour(i), label=label)
+        axes.fill_between(
+            x,
+            values - reading.expanded,
+            values + reading.expanded,
+            color=_colour(i),
+            alpha=0.15,
+            linewidth=0,
+        )
+
+
+def _draw_differences(axes: Axes, place: NDArray[np.float64], readings: Sequence[Reading]) -> None:
+    measured, *simulated = readings
+    axes.axhline(0.0, color="black", linewidth=0.8)
+    for i, reading in enumerate(simulated):
+        axes.errorbar(
+            1e6 * place,
+            reading.temperature - measured.temperature,
+            np.hypot(reading.expanded, measured.expanded),
+            color=_colour(i),
+            marker=".",
+            markersize=4,
+            linewidth=0.8,
+            elinewidth=0.5,
+        )

@@ -1,0 +1,415 @@
+"""The shear band of a measured image: its curve, the temperature along it, its stage."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from measured_band import BAND, LENGTH, RASTER, TOOL, BandImage, measured
+from PIL import Image
+from typer.testing import CliRunner
+
+from chipglow.analysis import (
+    BandProfile,
+    Line,
+    NoShearBandError,
+    Stage,
+    ThermalImage,
+    band_profile,
+    find_band,
+)
+from chipglow.camera import Flag, Measurement
+from chipglow.cli import app
+from chipglow.io import read_curve, write_measurement
+from chipglow.report import draw_band_profile
+from chipglow.scene import PlacedTool
+
+PITCH = RASTER.spacing
+X, Y = np.meshgrid(RASTER.x, RASTER.y)
+DEPTH = TOOL.signed_distance(X, Y)
+STRAIGHT = TOOL.edge_point + np.array([[-30e-6, 30e-6], [-230e-6, 230e-6]])
+
+
+def found(image, noise=0.0):
+    return find_band(ThermalImage.of(measured([image.temperature()], noise), 0), TOOL)
+
+
+def inner(along):
+    """Without the two ends, which the tool and the fading band cut off aslant."""
+    return (along > 60e-6) & (along < LENGTH - 40e-6)
+
+
+# The curve
+
+
+@pytest.mark.parametrize("angle", [0.6, 0.7, 0.85])
+@pytest.mark.parametrize("bend", [1e-3, 600.0, 1200.0])
+@pytest.mark.parametrize("deviation", [9e-6, 15e-6])
+def test_the_ridge_is_found_within_a_tenth_of_a_pixel(angle, bend, deviation):
+    image = BandImage(angle=angle, bend=bend, deviation=deviation)
+    line = found(image)
+    along, across = image.place(line.points)
+    assert np.abs(across[inner(along)]).max() < 0.1 * PITCH
+    assert along[0] < 30e-6
+    # It fades to half at its length.
+    assert along[-1] == pytest.approx(LENGTH, abs=4 * PITCH)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_of_5_kelvin_moves_the_ridge_by_less_than_a_quarter_of_a_pixel(seed):
+    image = BandImage(deviation=12e-6)
+    frame = measured([image.temperature()], 5.0, seed)
+    along, across = image.place(find_band(ThermalImage.of(frame, 0), TOOL).points)
+    assert np.sqrt((across[inner(along)] ** 2).mean()) < 0.25 * PITCH
+
+
+def test_a_band_that_has_left_the_edge_is_found_where_it_is():
+    image = BandImage(shift=60e-6)
+    x, y = np.meshgrid(RASTER.x, RASTER.y)
+    along, _ = image.place(np.stack([x, y], axis=-1))
+    temperature = np.where(along > 60e-6, image.temperature(), 600.0)
+    line = find_band(ThermalImage.of(measured([temperature]), 0), TOOL)
+    along, across = image.place(line.points)
+    assert np.abs(across[(along > 100e-6) & (along < LENGTH - 40e-6)]).max() < 0.1 * PITCH
+    assert line.distance[0] > 50e-6
+
+
+NO_BANDS = {
+    "uniform": np.full(RASTER.shape, 650.0),
+    "slope": 650.0 + 2e5 * X,
+    "step": np.where((X + Y > 0) & (DEPTH > 0), 700.0, 500.0),
+    "smooth step": 500.0 + 200.0 / (1.0 + np.exp(-(X + Y) / 8e-6)),
+    "heat along the rake face": 600.0 + 200.0 * np.exp(-(((DEPTH - 40e-6) / 20e-6) ** 2) / 2),
+    "spot": 600.0 + 200.0 * np.exp(-((X + 1e-4) ** 2 + (Y - 1e-4) ** 2) / (2 * (20e-6) ** 2)),
+}
+
+
+@pytest.mark.parametrize("name", NO_BANDS)
+@pytest.mark.parametrize("noise", [0.0, 20.0])
+def test_an_image_without_a_band_is_one_clear_error(name, noise):
+    with pytest.raises(NoShearBandError, match=r"^shear band: [^\n]+expected [^\n]+$"):
+        band_profile(measured([NO_BANDS[name]], noise), TOOL)
+
+
+def test_an_image_under_the_floor_is_one_clear_error():
+    with pytest.raises(NoShearBandError, match="no pixel of the frame has a radiance temperature"):
+        band_profile(measured([np.full(RASTER.shape, 400.0)]), TOOL)
+
+
+def test_of_several_frames_those_without_a_band_say_so():
+    frames = [BandImage().temperature(), NO_BANDS["uniform"]]
+    profile = band_profile(measured(frames), TOOL)
+    assert profile.stage == (Stage.DEVELOPED, Stage.NONE)
+    assert np.isnan(profile.temperature[1]).all()
+    assert np.isnan(profile.offset[1])
+    with pytest.raises(NoShearBandError, match="none is found in any of 2 frames"):
+        band_profile(measured(frames[1:] * 2), TOOL)
+
+
+def test_dead_and_saturated_pixels_do_not_lead_the_ridge_astray():
+    image = BandImage()
+    clean = measured([image.temperature()])
+    flags, radiance = clean.flags.copy(), clean.radiance.copy()
+    rows, columns = np.random.default_rng(3).integers(0, 60, (2, 80))
+    flags[0, rows, columns] = np.where(rows % 2, Flag.DEAD, Flag.SATURATED)
+    radiance[0, rows, columns] = 0.0
+    damaged = Measurement.from_radiance(radiance, BAND, clean.times, RASTER, 573.15, flags)
+    along, across = image.place(find_band(ThermalImage.of(damaged, 0), TOOL).points)
+    assert np.abs(across[inner(along)]).max() < 0.5 * PITCH
+
+
+def test_the_noise_of_an_image_is_estimated():
+    image = ThermalImage.of(measured([NO_BANDS["slope"]], 7.0), 0)
+    # 4992 differences that share pixels: a few per cent.
+    assert image.noise() == pytest.approx(7.0, rel=0.05)
+
+
+# The temperature
+
+
+def test_the_temperature_of_a_found_band_is_returned():
+    image = BandImage(deviation=20e-6)
+    profile = band_profile(measured([image.temperature()]), TOOL, width=0.0)
+    along, _ = image.place(profile.points[0])
+    kept = inner(along) & np.isfinite(profile.temperature[0])
+    # Reading between four pixels of a Gaussian of 200 K, 3.3 pixels wide: up to 1/4 of 200/3.3² K.
+    error = profile.temperature[0] - image.ridge_temperature(along)
+    assert np.abs(error[kept]).max() < 4.6
+    assert kept.sum() > 80
+    # The distance counts from the edge along the curve.
+    np.testing.assert_allclose(profile.distance[kept], along[kept], atol=PITCH)
+
+
+def test_a_linear_field_is_read_exactly_along_a_given_curve():
+    temperature = 700.0 + 1e5 * X - 5e4 * Y
+    profile = band_profile(measured([temperature]), TOOL, curve=STRAIGHT, width=24e-6)
+    x, y = profile.points[0].T
+    np.testing.assert_allclose(profile.temperature[0], 700.0 + 1e5 * x - 5e4 * y, atol=1e-6)
+    assert profile.distance[0] == pytest.approx(np.hypot(30e-6, 30e-6))
+    assert profile.distance[-1] - profile.distance[0] == pytest.approx(np.hypot(2e-4, 2e-4))
+    assert profile.stage == (Stage.NONE,)
+    assert any(note.startswith("Assumed: the given curve") for note in profile.notes)
+
+
+def test_the_mean_is_over_the_stated_width():
+    raster = replace(RASTER, spacing=2e-6, rows=150, columns=150, left=-280e-6, top=290e-6)
+    x, y = np.meshgrid(raster.x, raster.y)
+    across = ((x - TOOL.edge_point[0]) + (y - TOOL.edge_point[1])) / np.sqrt(2)
+    temperature = 900.0 - 1e11 * across**2
+    curve = TOOL.edge_point + np.array([[-30e-6, 30e-6], [-200e-6, 200e-6]])
+    narrow, wide = (
+        band_profile(measured([temperature], raster=raster), TOOL, curve=curve, width=width)
+        for width in (1e-6, 40e-6)
+    )
+    # The mean of -k n² over a width w is -k w²/12; 80 points come within 1/80² of it.
+    drop = narrow.temperature[0] - wide.temperature[0]
+    np.testing.assert_allclose(drop, 1e11 * (40e-6**2 - 1e-6**2) / 12, rtol=0.01)
+
+
+def test_pixels_under_the_floor_give_no_temperature():
+    temperature = np.where(X < -130e-6, 500.0, 700.0)
+    profile = band_profile(measured([temperature]), TOOL, curve=STRAIGHT)
+    beyond = profile.points[0, :, 0] < -135e-6
+    assert np.isnan(profile.temperature[0][beyond]).all()
+    assert np.isnan(profile.uncertainty[0][beyond]).all()
+    assert np.isfinite(profile.temperature[0][profile.points[0, :, 0] > -115e-6]).all()
+
+
+# Its uncertainty
+
+
+def test_the_calibration_s_uncertainty_becomes_kelvins():
+    frame = measured([np.full(RASTER.shape, 800.0)], relative_uncertainty=0.02)
+    profile = band_profile(frame, TOOL, curve=STRAIGHT, position=0.0)
+    radiance = float(BAND.radiance(800.0))
+    expected = float(BAND.temperature(1.02 * radiance)) - 800.0
+    # The slope of the radiance rises by 1 % over the step.
+    np.testing.assert_allclose(profile.uncertainty[0], expected, rtol=0.02)
+
+
+@settings(max_examples=8, deadline=None)
+@given(shift=st.sampled_from([0.0, 12e-6, 20e-6]), error=st.sampled_from([1e-6, 3e-6]))
+def test_the_position_s_uncertainty_is_that_of_curves_that_are_off(shift, error):
+    """On the ridge, where the bend counts, and beside it, where the slope does."""
+    image = BandImage(deviation=20e-6, bend=1e-3)
+    frame = measured([image.temperature()])
+    along = np.array([60e-6, 340e-6])
+    curve = BandImage(deviation=20e-6, bend=1e-3, shift=shift).curve(along)
+    profile = band_profile(frame, TOOL, curve=curve, width=0.0, position=error)
+    off = error * np.random.default_rng(5).standard_normal((2000, 1, 2))
+    away = image.at(profile.points[0] + off) - image.at(profile.points[0])
+    spread = np.sqrt((away**2).mean(axis=0))
+    # 2000 draws are good to 2 %; slope and bend are taken over two pixels, which takes up to 10 %
+    # of those of a Gaussian 3.3 pixels wide, and up to 0.1 K of what vanishes.
+    middle = slice(5, -5)
+    mean = np.sqrt((spread[middle] ** 2).mean())
+    stated = np.sqrt((profile.uncertainty[0][middle] ** 2).mean())
+    assert stated == pytest.approx(mean, rel=0.15, abs=0.1)
+
+
+# The stage
+
+
+def test_the_stage_follows_from_the_place_beside_the_reference():
+    shifts = [-18e-6, 0.0, 3e-6, 30e-6]
+    frames = measured([BandImage(shift=shift, bend=1e-3).temperature() for shift in shifts])
+    profile = band_profile(frames, TOOL, reference=1)
+    assert profile.stage == (
+        Stage.DEVELOPING,
+        Stage.DEVELOPED,
+        Stage.DEVELOPED,
+        Stage.MOVED,
+    )
+    # Either of the two curves is within a tenth of a pixel.
+    np.testing.assert_allclose(profile.offset, shifts, atol=0.2 * PITCH)
+    np.testing.assert_array_equal(profile.in_place, [True, True, True, False])
+
+
+def test_without_a_reference_the_hottest_band_at_the_edge_is_it():
+    frames = [BandImage(bend=1e-3).temperature() + rise for rise in (0.0, 20.0, 10.0)]
+    profile = band_profile(measured(frames), TOOL)
+    assert any("at 10 µs is fully developed" in note for note in profile.notes)
+    chosen = band_profile(measured(frames), TOOL, frames=[0, 2])
+    assert any("at 20 µs is fully developed" in note for note in chosen.notes)
+    assert chosen.times.tolist() == [0.0, 2e-5]
+
+
+def test_a_given_curve_is_the_place_of_the_reference():
+    image = BandImage(bend=1e-3)
+    frames = [BandImage(bend=1e-3, shift=shift).temperature() for shift in (0.0, 24e-6)]
+    curve = image.curve(np.array([30e-6, 300e-6]))
+    profile = band_profile(measured(frames), TOOL, curve=curve)
+    assert profile.stage == (Stage.DEVELOPED, Stage.MOVED)
+    np.testing.assert_array_equal(profile.points[0], profile.points[1])
+
+
+def test_a_single_band_has_a_doubtful_stage():
+    profile = band_profile(measured([BandImage().temperature(), NO_BANDS["uniform"]]), TOOL)
+    assert profile.notes == (
+        "Doubtful: one frame has a band; without another its stage says nothing.",
+    )
+
+
+def test_without_a_band_near_the_edge_the_stages_are_doubtful():
+    image = BandImage()
+    along, _ = image.place(np.stack([X, Y], axis=-1))
+    temperature = np.where(along > 150e-6, image.temperature(), 600.0)
+    profile = band_profile(measured([temperature, temperature + 5.0]), TOOL)
+    assert profile.stage == (Stage.DEVELOPED, Stage.DEVELOPED)
+    assert any(note.startswith("Doubtful: no band begins near") for note in profile.notes)
+
+
+def test_a_tool_far_outside_the_image_is_one_error():
+    with pytest.raises(ValueError, match=r"^tool: its edge at x 1e\+06 µm, .* outside the image"):
+        band_profile(measured([BandImage().temperature()]), PlacedTool(TOOL, (1.0, 0.0)))
+
+
+def test_a_coarse_image_of_a_wide_band_is_searched_as_well():
+    raster = replace(RASTER, spacing=30e-6, left=-2.1e-3, top=1.8e-3)
+    x, y = np.meshgrid(raster.x, raster.y)
+    across = ((x - TOOL.edge_point[0]) + (y - TOOL.edge_point[1])) / np.sqrt(2)
+    image = np.where(y > 0, 600.0 + 150.0 * np.exp(-0.5 * (across / 60e-6) ** 2), 500.0)
+    line = find_band(ThermalImage.of(measured([image], raster=raster), 0), TOOL)
+    off = np.abs((line.points - TOOL.edge_point).sum(axis=1)) / np.sqrt(2)
+    middle = (line.distance > 300e-6) & (line.distance < 1.5e-3)
+    assert off[middle].max() < 0.1 * 30e-6
+
+
+# Bad input
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"width": -1e-6}, "width is -1e-06 m, expected 0 m or more"),
+        ({"position": np.nan}, "position is nan m"),
+        ({"frames": [3]}, r"frames are \[3\], expected of 0 to 0"),
+        ({"reference": -1}, r"frames are \[-1\]"),
+        ({"curve": STRAIGHT[::-1]}, "expected from the edge outward"),
+        ({"curve": STRAIGHT[:1]}, "expected 2 or more"),
+        ({"curve": STRAIGHT[[0, 0, 1]]}, "two points are the same"),
+        ({"curve": STRAIGHT * np.nan}, "all finite"),
+        ({"curve": STRAIGHT - np.array([2e-3, 0.0])}, "expected a curve in the image"),
+    ],
+)
+def test_what_cannot_be_is_one_error(wrong, message):
+    with pytest.raises(ValueError, match=message):
+        band_profile(measured([BandImage().temperature()]), TOOL, **wrong)
+
+
+def test_a_profile_s_shapes_must_fit():
+    line = Line(np.arange(3.0), np.zeros((3, 2)))
+    three, ok = np.zeros((1, 3)), np.zeros(1)
+    parts = {"temperature": three, "calibration": three, "position": three, "offset": ok}
+    common = {"reference": line, "distance": np.arange(3.0), "times": ok, "width": 0.0}
+    with pytest.raises(ValueError, match=r"points has shape \(1, 3\)"):
+        BandProfile(**common, **parts, points=three, stage=(Stage.NONE,))
+    with pytest.raises(ValueError, match="0 stages for 1 frames"):
+        BandProfile(**common, **parts, points=np.zeros((1, 3, 2)), stage=())
+
+
+# The command
+
+
+@pytest.fixture
+def file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    frames = [BandImage(shift=shift, bend=1e-3).temperature() for shift in (-18e-6, 0.0)]
+    write_measurement(measured(frames, relative_uncertainty=0.01), tmp_path / "measured.nc")
+    return "measured.nc"
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["shearband", *map(str, arguments)])
+
+
+def test_the_command_writes_what_it_shows(file, tmp_path):
+    result = run(file, "--reference", "10 us", "--out", "band.csv", "--plot", "band.png")
+    assert result.exit_code == 0, result.output
+    assert "developing" in result.output
+    assert "fully developed" in result.output
+    assert "Doubtful" not in result.output
+    with (tmp_path / "band.csv").open(encoding="utf-8") as table:
+        rows = list(csv.DictReader(table))
+    profile = band_profile(
+        measured(
+            [BandImage(shift=shift, bend=1e-3).temperature() for shift in (-18e-6, 0.0)],
+            relative_uncertainty=0.01,
+        ),
+        TOOL,
+        reference=1,
+    )
+    values = [float(row["radiance_temperature_degC"] or "nan") for row in rows]
+    there = np.isfinite(profile.points[..., 0])
+    np.testing.assert_allclose(values, profile.temperature[there] - 273.15, atol=1e-3)
+    assert [row["stage"] for row in rows].count("developing") == there[0].sum()
+    with Image.open(tmp_path / "band.png") as picture:
+        assert picture.width > 800
+
+
+def test_an_unknown_calibration_is_doubtful(tmp_path):
+    write_measurement(measured([BandImage().temperature()]), tmp_path / "m.nc")
+    assert "Doubtful: the measurement does not tell" in run(tmp_path / "m.nc").output
+
+
+def test_the_netcdf_file_holds_si_units(file, tmp_path):
+    (tmp_path / "curve.csv").write_text("x_um,y_um\n-30,40\n-230,240\n", encoding="utf-8")
+    options = ("--at", "10 us", "--curve", "curve.csv", "--width", "12 um")
+    result = run(file, *options, "--position", "2 um", "--out", "band.nc")
+    assert result.exit_code == 0, result.output
+    data = xr.load_dataset(tmp_path / "band.nc", engine="h5netcdf", decode_times=False)
+    assert data["temperature"].attrs["units"] == "K"
+    assert data.sizes["time"] == 1
+    assert data.attrs["width"] == pytest.approx(12e-6)
+    assert 600 < float(data["temperature"].mean()) < 800
+    both = np.hypot(data["uncertainty_calibration"], data["uncertainty_position"])
+    np.testing.assert_allclose(data["uncertainty"], both)
+
+
+@pytest.mark.parametrize(("count", "names"), [(2, 2), (13, 1)])
+def test_many_frames_are_named_by_their_stage_only(count, names):
+    frames = measured([BandImage(bend=1e-3).temperature()] * count)
+    figure = draw_band_profile(frames, TOOL, band_profile(frames, TOOL, reference=0))
+    assert len(figure.legends[0].get_texts()) == names
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--at", "3 s"), "--at: 3 s, expected 0 us to 10 us"),
+        (("--at", "3"), "--at: 3 has no unit"),
+        (("--reference", "1 ms"), "--reference: 1 ms, expected"),
+        (("--width", "-3 um"), "--width: -3 um is not over 0"),
+        (("--position", "3 s"), "--position: '3 s' is not a length"),
+        (("--out", "band.txt"), "band.txt: expected a file that ends in .csv or .nc"),
+        (("--plot", "band.txt"), "band.txt, expected a file that ends in .png"),
+        (("--curve", "none.csv"), "none.csv: No such file"),
+        (("--tool", "none.yaml"), "none.yaml: No such file"),
+    ],
+)
+def test_what_the_command_cannot_do_is_one_line(file, tmp_path, options, message):
+    result = run(file, *options)
+    assert result.exit_code == 2
+    assert message in result.output
+    assert len(result.output.strip().splitlines()) == 1
+    assert not list(tmp_path.glob("band.*"))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x,y\n1,2\n", "line 1: 'x,y', expected 'x_um,y_um'"),
+        ("x_um,y_um\n1,2\n", "1 points, expected 2 or more"),
+        ("x_um,y_um\n1,2\n3\n", "line 3: '3', expected two numbers"),
+        ("x_um,y_um\n1,2\nnan,3\n", "line 3: expected finite numbers"),
+        ("", "line 1: '', expected 'x_um,y_um'"),
+    ],
+)
+def test_a_file_that_is_no_curve_is_one_error(tmp_path, text, message):
+    path = tmp_path / "curve.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=message):
+        read_curve(path)

@@ -1,0 +1,390 @@
+"""A measurement beside simulations: differences, E_n, and which set fits where."""
+
+import csv
+import json
+from dataclasses import replace
+from math import erf, hypot, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from measured_band import BAND, RASTER, TOOL, BandImage, measured
+from PIL import Image
+from typer.testing import CliRunner
+
+from chipglow.analysis import Doubts, Reading, compare, normalised_error
+from chipglow.camera import Flag, Measurement
+from chipglow.cli import app
+from chipglow.io import write_measurement
+from chipglow.scene import PlacedTool, ToolGeometry
+
+X, Y = np.meshgrid(RASTER.x, RASTER.y)
+CURVE = TOOL.edge_point + np.array([[-30e-6, 30e-6], [-230e-6, 230e-6]])
+FINE = replace(RASTER, spacing=5e-6, rows=79, columns=96)
+STATED = Doubts(stated=5.0)
+
+
+def field(x, y):
+    """Radiance temperature of a chip that is linear in x and y."""
+    return 700.0 + 2e5 * x + 1e5 * y
+
+
+def frames(temperature, count=3, **options):
+    return measured([temperature] * count, **options)
+
+
+def slope_of(temperature):
+    """Kelvins for a radiance that is off by its own amount, by a difference of 1 in 10 000."""
+    radiance = float(BAND.radiance(temperature))
+    return (float(BAND.temperature(1.0001 * radiance)) - temperature) / 1e-4
+
+
+# E_n
+
+
+@given(
+    away=st.floats(-300, 300),
+    first=st.tuples(st.floats(0.1, 50), st.floats(0.1, 50)),
+    second=st.tuples(st.floats(0.1, 50), st.floats(0.1, 50)),
+)
+def test_e_n_is_the_difference_over_its_expanded_uncertainty(away, first, second):
+    one, other = (
+        Reading(np.array([700.0 + shift]), *(np.array([part]) for part in parts))
+        for shift, parts in ((0.0, first), (away, second))
+    )
+    expected = abs(700.0 + away - 700.0) / (2 * hypot(*first, *second))
+    assert normalised_error(one, other)[0] == pytest.approx(expected, abs=1e-12)
+    np.testing.assert_array_equal(normalised_error(one, other), normalised_error(other, one))
+
+
+def test_e_n_holds_as_often_as_it_says():
+    """Noise between 12 frames: |t| of 11 degrees of freedom is up to 2 in 93 % of cases."""
+    truth = np.full(RASTER.shape, 700.0)
+    generator = np.random.default_rng(8)
+    noisy = measured([truth + 6.0 * generator.standard_normal(truth.shape) for _ in range(12)])
+    result = compare(noisy, {"true": frames(truth)}, TOOL, CURVE, Doubts(position=0.0))
+    assert result.grid is not None
+    e_n = normalised_error(result.grid.measured, result.grid.simulated[0])
+    known = e_n[np.isfinite(e_n)]
+    # The standard deviation of the share of 80 squares is 3 %.
+    assert known.size > 70
+    assert (known <= 1).mean() == pytest.approx(0.93, abs=0.08)
+
+
+# The difference
+
+
+def test_pixels_and_places_may_differ():
+    """The same linear field in images of 6 and 5 µm, where the tips are at different places."""
+    tip = (33e-6, -21e-6)
+    x, y = np.meshgrid(FINE.x, FINE.y)
+    simulated = frames(field(x - tip[0], y - tip[1]), raster=FINE).with_tool(PlacedTool(TOOL, tip))
+    result = compare(frames(field(X, Y)), {"same": simulated}, TOOL, CURVE, STATED)
+    assert result.grid is not None
+    assert result.band is not None
+    for part in (result.grid, result.band):
+        away = part.simulated[0].temperature - part.measured.temperature
+        assert np.isfinite(away).sum() > 30
+        # A ten-thousandth of a kelvin for the way through radiance.
+        assert np.nanmax(np.abs(away)) < 1e-3
+    assert [fit.agreeing for place in result.places for fit in place.fits] == [
+        fit.count for place in result.places for fit in place.fits
+    ]
+    assert len(result.places) == 4
+
+
+def test_bias_and_rms_by_hand():
+    hotter = field(X, Y) + np.where(Y > 60e-6, 20.0, 0.0)
+    result = compare(frames(field(X, Y)), {"hotter": frames(hotter)}, TOOL, CURVE, STATED)
+    assert result.band is not None
+    away = result.band.simulated[0].temperature - result.band.measured.temperature
+    near, far = result.places[2:]
+    # The curve rises at 45 degrees, so 100 µm from the edge it is 71 µm up.
+    assert far.fits[0].bias == pytest.approx(20.0, abs=1e-6)
+    assert far.fits[0].rms == pytest.approx(20.0, abs=1e-6)
+    values = away[np.isfinite(away) & (result.band.distance < 100e-6)]
+    assert near.fits[0].bias == pytest.approx(values.mean())
+    assert near.fits[0].rms == pytest.approx(np.sqrt((values**2).mean()))
+    assert near.fits[0].rms > near.fits[0].bias > 0
+
+
+# Uncertainty
+
+
+def test_the_uncertainty_is_made_of_its_parts():
+    temperature = np.full(RASTER.shape, 750.0)
+    result = compare(
+        frames(temperature, relative_uncertainty=0.03),
+        {"chip": frames(temperature)},
+        TOOL,
+        CURVE,
+        Doubts(emissivity=0.1),
+    )
+    kelvin = slope_of(750.0)
+    for part in (result.grid, result.band):
+        assert part is not None
+        known = np.isfinite(part.measured.temperature)
+        # Where nothing varies only the calibration and the emissivity are left.
+        np.testing.assert_allclose(part.measured.uncertainty[known], 0.03 * kelvin, rtol=1e-3)
+        known = np.isfinite(part.simulated[0].temperature)
+        np.testing.assert_allclose(part.simulated[0].uncertainty[known], 0.1 * kelvin, rtol=1e-3)
+        np.testing.assert_allclose(part.measured.expanded, 2 * part.measured.uncertainty)
+    expected = kelvin * hypot(0.03, 0.1)
+    assert result.places[0].fits[0].bias_uncertainty == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_position_counts_where_the_temperature_rises():
+    result = compare(
+        frames(field(X, Y)), {"same": frames(field(X, Y))}, TOOL, CURVE, Doubts(1.0, 0.0, 4e-6)
+    )
+    expected = 4e-6 * hypot(2e5, 1e5)
+    for part in (result.grid, result.band):
+        assert part is not None
+        known = np.isfinite(part.measured.temperature)
+        # The bend of a straight slope is 0; the way through radiance leaves a thousandth.
+        np.testing.assert_allclose(part.measured.random[known], expected, rtol=1e-3)
+
+
+def test_frames_that_differ_make_the_mean_uncertain():
+    base = field(X, Y)
+    three = measured([base - 9.0, base, base + 9.0])
+    result = compare(three, {"same": frames(base)}, TOOL, CURVE, Doubts(5.0, 0.0, 0.0))
+    for part in (result.grid, result.band):
+        assert part is not None
+        known = np.isfinite(part.measured.temperature)
+        np.testing.assert_allclose(part.measured.random[known], 9.0 / sqrt(3.0), rtol=1e-3)
+
+
+def test_a_pixel_without_light_does_not_take_the_uncertainty_away():
+    clean = frames(field(X, Y), relative_uncertainty=0.02)
+    radiance, flags = clean.radiance.copy(), clean.flags.copy()
+    radiance[0, 20:30, 40:60], flags[0, 20:30, 40:60] = 0.0, Flag.DEAD
+    damaged = Measurement.from_radiance(
+        radiance, BAND, clean.times, RASTER, 573.15, flags, 0.02 * radiance
+    )
+    result = compare(damaged, {"same": frames(field(X, Y))}, TOOL, CURVE)
+    for part in (result.grid, result.band):
+        assert part is not None
+        known = np.isfinite(part.measured.temperature)
+        assert np.isfinite(part.measured.uncertainty[known]).all()
+        assert known.sum() > 30
+
+
+def test_few_frames_and_an_unknown_calibration_are_doubtful():
+    one = measured([field(X, Y)])
+    notes = compare(one, {"same": frames(field(X, Y))}, TOOL, CURVE).notes
+    assert any("1 frame only" in note for note in notes)
+    assert any("does not tell the uncertainty of its calibration" in note for note in notes)
+    assert not any(
+        "calibration" in note for note in compare(one, {"a": one}, TOOL, CURVE, STATED).notes
+    )
+
+
+# Which fits
+
+
+def test_the_best_set_is_told_for_each_place():
+    """Set a is right at the face, set b where the curve runs."""
+    base = field(X, Y)
+    on_face = TOOL.signed_distance(X, Y) < 26e-6
+    sets = {
+        "a": frames(base - np.where(on_face, 0.0, 60.0)),
+        "b": frames(base - np.where(on_face, 60.0, 0.0)),
+    }
+    result = compare(frames(base), sets, TOOL, CURVE, STATED)
+    assert [place.fits[place.best].label for place in result.places] == ["a", "b", "b", "b"]
+    assert all(place.is_sure for place in result.places)
+    assert result.places[0].sentence.startswith(
+        "At the rake face, up to 18 µm deep, a fits best (in 100 % of the draws"
+    )
+    assert "b is 60 K too cold" in result.places[0].sentence
+    assert result.statement == (
+        "a fits best at the rake face, up to 18 µm deep. b fits best in the chip, over 18 µm from "
+        "the face; in the shear band, under 100 µm from the edge; in the shear band, 100 µm and "
+        "farther."
+    )
+
+
+@pytest.mark.parametrize(("cold", "hot", "stated"), [(10.0, 30.0, 15.0), (20.0, 24.0, 10.0)])
+def test_how_sure_the_best_is(cold, hot, stated):
+    """Sets a too cold and b too hot, a < b: with a common error of the measurement the first stays
+    nearer while that error is up to (b - a) / 2, whose probability is the normal distribution's.
+    """
+    base = np.full(RASTER.shape, 700.0)
+    sets = {"cold": frames(base - cold), "hot": frames(base + hot)}
+    result = compare(frames(base), sets, TOOL, CURVE, Doubts(stated=stated))
+    expected = 0.5 * (1 + erf((hot - cold) / 2 / stated / sqrt(2)))
+    for place in result.places:
+        assert place.best == 0
+        # 4000 draws: 0.8 %.
+        assert place.confidence == pytest.approx(expected, abs=0.025)
+        assert not place.is_sure
+        assert "cannot be told apart (cold is nearest" in place.sentence
+    assert result.statement.startswith("The sets cannot be told apart")
+
+
+def test_a_single_simulation_has_a_statement_too():
+    result = compare(frames(field(X, Y)), {"chip": frames(field(X, Y))}, TOOL, CURVE, STATED)
+    count = sum(place.fits[0].count for place in result.places)
+    assert result.statement == f"chip: {count} of {count} values agree (E_n up to 1)."
+    assert "chip is 0 K too" in result.places[0].sentence
+
+
+def test_a_simulation_may_be_called_measured():
+    base = frames(field(X, Y))
+    result = compare(base, {"measured": base, "other": base}, TOOL, CURVE, STATED)
+    assert result.band is not None
+    assert len(result.band.simulated) == 2
+
+
+def test_found_bands_are_compared_at_the_same_distance():
+    """The band of the simulation is turned: its ridge is elsewhere, its temperature the same."""
+    images = [BandImage(angle=angle, bend=1e-3, deviation=20e-6) for angle in (0.7, 0.8)]
+    one, other = (frames(image.temperature()) for image in images)
+    result = compare(one, {"turned": other}, TOOL, doubts=STATED)
+    assert result.band is not None
+    away = result.band.simulated[0].temperature - result.band.measured.temperature
+    inside = (result.band.distance > 70e-6) & (result.band.distance < 350e-6)
+    # Reading between four pixels of a Gaussian of 200 K, 3.3 pixels wide: up to 4.6 K.
+    assert np.abs(away[inside]).max() < 4.6
+    assert any("is fully developed" in note and "(turned)" in note for note in result.notes)
+
+
+def test_frames_that_have_moved_are_left_out():
+    images = [BandImage(bend=1e-3, shift=shift).temperature() for shift in (0.0, 0.0, 0.0, 40e-6)]
+    images[3] = images[3] - 30.0
+    result = compare(measured(images), {"a": frames(images[0])}, TOOL, doubts=Doubts(5, 0, 0))
+    assert result.band is not None
+    known = np.isfinite(result.band.measured.temperature)
+    np.testing.assert_allclose(result.band.measured.random[known], 0.0, atol=1e-6)
+
+
+def test_the_reference_says_which_frames_are_compared():
+    """Two places of the band; the later one is 40 µm on and hotter."""
+    images = [BandImage(bend=1e-3, shift=shift).temperature() for shift in (0.0, 40e-6)]
+    images[1] = images[1] + 30.0
+    one, other = measured([images[0], images[1]]), frames(images[0])
+    early, late = (
+        compare(one, {"a": other}, TOOL, doubts=STATED, reference=number).places[-1].fits[0]
+        for number in (0, 1)
+    )
+    assert early.bias == pytest.approx(0.0, abs=1e-6)
+    assert late.bias < -10.0
+
+
+# What cannot be compared
+
+
+def test_without_a_band_the_rake_face_is_left():
+    base = np.where(TOOL.signed_distance(X, Y) < 100e-6, 650.0, 500.0)
+    result = compare(frames(base), {"same": frames(base)}, TOOL, doubts=STATED)
+    assert result.band is None
+    assert any("the shear band is left out: measured:" in note for note in result.notes)
+    assert all("rake face" in place.place or "chip" in place.place for place in result.places)
+
+
+def test_nothing_in_common_is_one_error():
+    cold = frames(np.full(RASTER.shape, 500.0))
+    with pytest.raises(ValueError, match=r"^comparison: there is nothing[^\n]+$"):
+        compare(cold, {"same": cold}, TOOL, doubts=STATED)
+    with pytest.raises(ValueError, match="no simulation, expected 1 or more"):
+        compare(cold, {}, TOOL)
+
+
+def test_another_rake_angle_and_no_tool_are_said():
+    base = frames(field(X, Y))
+    other = base.with_tool(ToolGeometry(rake_angle=0.0))
+    data = base.data.copy()
+    data.attrs = {k: v for k, v in data.attrs.items() if not k.startswith("tool_")}
+    result = compare(base, {"other": other, "none": Measurement(data)}, TOOL, CURVE, STATED)
+    assert "Doubtful: the rake angle of other differs by 7 degrees." in result.notes
+    assert any("none tells no tool" in note for note in result.notes)
+
+
+@pytest.mark.parametrize("wrong", [{"stated": -1.0}, {"emissivity": np.nan}, {"position": -1e-6}])
+def test_impossible_uncertainties_are_refused(wrong):
+    with pytest.raises(ValueError, match=f"uncertainty: {next(iter(wrong))} is"):
+        Doubts(**wrong)
+
+
+def test_a_reading_s_shapes_must_fit():
+    with pytest.raises(ValueError, match=r"random has shape \(2,\), expected \(3,\)"):
+        Reading(np.zeros(3), np.zeros(3), np.zeros(2))
+
+
+# The command
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    base = field(X, Y)
+    write_measurement(frames(base), tmp_path / "measured.nc")
+    write_measurement(frames(base - 40.0, surface="chip 1"), tmp_path / "one.nc")
+    write_measurement(frames(base + 4.0), tmp_path / "two.nc")
+    rows = "\n".join(f"{1e6 * x},{1e6 * y}" for x, y in CURVE)
+    (tmp_path / "curve.csv").write_text(f"x_um,y_um\n{rows}\n", encoding="utf-8")
+    return tmp_path
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["compare", *map(str, arguments)])
+
+
+FILES = ("measured.nc", "one.nc", "two.nc")
+USUAL = ("--curve", "curve.csv", "--uncertainty", "5 K")
+
+
+def test_the_command_writes_what_it_says(folder):
+    result = run(*FILES, *USUAL, "--out", "result", "--plot", "picture.png")
+    assert result.exit_code == 0, result.output
+    assert "two fits best" in result.output
+    summary = json.loads((folder / "result" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["simulations"] == ["chip 1", "two"]
+    assert [place["best"] for place in summary["places"]] == ["two"] * 4
+    fit = summary["places"][0]["fits"][0]
+    assert fit["bias_K"] == pytest.approx(-40.0, abs=1e-3)
+    assert fit["bias_standard_uncertainty_K"] >= 5.0
+    with (folder / "result" / "comparison.csv").open(encoding="utf-8") as table:
+        rows = [row for row in csv.DictReader(table) if row["E_n"]]
+    for row in rows:
+        expanded = hypot(float(row["measured_expanded_K"]), float(row["simulated_expanded_K"]))
+        expected = abs(float(row["difference_K"])) / expanded
+        assert float(row["E_n"]) == pytest.approx(expected, abs=1e-3)
+    assert {row["place"] for row in rows} == {"rake face", "shear band"}
+    for name in ("result/comparison.png", "picture.png"):
+        with Image.open(folder / name) as picture:
+            assert picture.width > 800
+    assert (folder / "result" / "comparison.svg").is_file()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ((*FILES, "one.nc", "one.nc", *USUAL), "one.nc: is there twice"),
+        ((*FILES, "--uncertainty", "5"), "--uncertainty: 5 has no unit"),
+        ((*FILES, "--uncertainty", "-5 K"), "--uncertainty: -5 K, expected over 0 K"),
+        ((*FILES, "--emissivity-uncertainty", "2"), "--emissivity-uncertainty: 2, expected 0"),
+        ((*FILES, "--position", "1 s"), "--position: '1 s' is not a length"),
+        ((*FILES, "--curve", "one.nc"), "one.nc: expected"),
+        ((*FILES, "--reference", "1 s"), "--reference: 1 s, expected 0 us to 20 us"),
+        ((*FILES, "--plot", "a.txt"), "a.txt, expected a file that ends in .png"),
+        (("measured.nc", "curve.csv"), "curve.csv: not a measurement"),
+        ((*FILES, *USUAL, "--out", "."), "holds something that is not a result"),
+    ],
+)
+def test_what_the_command_cannot_do_is_one_line(folder, options, message):
+    result = run(*options)
+    assert result.exit_code == 2
+    last = result.output.strip().splitlines()[-1]
+    assert message in last
+    assert last.startswith("chipglow: ")
+    assert not (folder / "a.txt").exists()
+
+
+def test_two_uncertainties_of_one_measurement_are_refused(folder):
+    write_measurement(frames(field(X, Y), relative_uncertainty=0.01), folder / "own.nc")
+    result = run("own.nc", "one.nc", *USUAL)
+    assert result.exit_code == 2
+    assert "--uncertainty: 5 K beside the uncertainty that own.nc tells" in result.output

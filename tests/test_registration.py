@@ -1,0 +1,447 @@
+"""Infrared on visible: maps from points and from the images, and the clocks of both cameras."""
+
+from dataclasses import replace
+from math import cos, radians, sin
+
+import numpy as np
+import pytest
+from dual_spectrum import DualSpectrum
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+from scipy.stats import chi2, f, t
+from typer.testing import CliRunner
+
+from chipglow.analysis import (
+    Registration,
+    align_times,
+    fit_images,
+    fit_points,
+    simultaneous_frames,
+)
+from chipglow.camera import Measurement
+from chipglow.cli import app
+from chipglow.io import read_pictures, read_points, write_measurement
+from chipglow.radiometry import Band
+from chipglow.scene import Raster
+from chipglow.study import load_registration, write_registration
+
+RASTER = Raster(left=-620e-6, top=520e-6, spacing=6e-6, rows=120, columns=160)
+SHAPE = (480, 640)
+CORNERS = np.array([[-600e-6, -180e-6], [320e-6, 500e-6], [-600e-6, 500e-6], [0.0, 0.0]])
+
+
+def a_matrix(model, seed=1, mirrored=False):
+    generator = np.random.default_rng(seed)
+    turn, scale = radians(generator.uniform(-20, 20)), 1 / 1.5e-6
+    linear = np.array([[cos(turn), -sin(turn)], [sin(turn), cos(turn)]]) @ np.diag([1, -1])
+    if mirrored:
+        linear = linear @ np.diag([-1, 1])
+    if model != "similarity":
+        linear = linear @ (np.eye(2) + generator.uniform(-0.1, 0.1, (2, 2)))
+    matrix = np.eye(3)
+    matrix[:2, :2], matrix[:2, 2] = scale * linear, generator.uniform(100, 400, 2)
+    if model == "homography":
+        matrix[2, :2] = generator.uniform(-200, 200, 2)
+    return matrix
+
+
+def mapped(matrix, places):
+    whole = np.concatenate([places, np.ones((len(places), 1))], axis=1) @ matrix.T
+    return whole[:, :2] / whole[:, 2:]
+
+
+def picked(count, seed):
+    generator = np.random.default_rng(seed)
+    return np.stack(
+        [generator.uniform(-600e-6, 320e-6, count), generator.uniform(-180e-6, 500e-6, count)], 1
+    )
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("model", ["similarity", "affine", "homography"])
+@given(seed=st.integers(0, 2**32))
+@settings(max_examples=15, deadline=None)
+def test_exact_points_give_the_exact_map(model, mirrored, seed):
+    matrix, places = a_matrix(model, seed, mirrored), picked(9, seed)
+    fit = fit_points(places, mapped(matrix, places), model)
+    assert fit.registration.pixels(CORNERS) == pytest.approx(mapped(matrix, CORNERS), abs=1e-5)
+    assert fit.registration.positions(mapped(matrix, CORNERS)) == pytest.approx(CORNERS, abs=1e-10)
+    assert fit.registration.doubts == ()
+
+
+@pytest.mark.parametrize("model", ["similarity", "affine", "homography"])
+def test_the_covariance_of_a_mapped_position_is_that_of_many_repeats(model):
+    """Hotelling: the mean of T^2 / 2 over F's 95 % point is passed in 5 % of repeats."""
+    matrix, places = a_matrix(model), picked(10, 4)
+    exact, corner = mapped(matrix, places), CORNERS[:1]
+    generator = np.random.default_rng(8)
+    inside, errors, stated = 0, [], []
+    for _ in range(300):
+        fit = fit_points(places, exact + generator.normal(0.0, 1.3, exact.shape), model)
+        error = (fit.registration.pixels(corner) - mapped(matrix, corner))[0]
+        covariance = fit.registration.pixel_covariance(corner)[0]
+        limit = 2 * f.ppf(0.95, 2, fit.registration.degrees_of_freedom)
+        inside += error @ np.linalg.solve(covariance, error) < limit
+        errors.append(error)
+        stated.append(covariance)
+    # 300 trials at 0.95: four standard deviations are 15.
+    assert 270 <= inside <= 299
+    assert np.mean(stated, axis=0) == pytest.approx(np.cov(np.transpose(errors)), rel=0.35, abs=0.1)
+
+
+def test_the_covariance_of_the_position_is_that_of_the_pixel_through_the_map():
+    places = picked(8, 2)
+    pixels = mapped(a_matrix("homography"), places)
+    noise = np.random.default_rng(1).normal(0, 0.5, pixels.shape)
+    found = fit_points(places, pixels + noise, "homography").registration
+    at, step = CORNERS[1], 1e-8
+    slope = np.stack(
+        [(found.pixels(at + step * e) - found.pixels(at - step * e)) for e in np.eye(2)]
+    )
+    slope = slope.T / (2 * step)
+    assert found.jacobian(at) == pytest.approx(slope, rel=1e-5)
+    there = slope @ found.position_covariance(at) @ slope.T
+    assert there == pytest.approx(found.pixel_covariance(at), rel=1e-4)
+
+
+def test_a_point_picked_wrong_is_named():
+    places = picked(9, 3)
+    pixels = mapped(a_matrix("affine"), places)
+    pixels += np.random.default_rng(5).normal(0.0, 0.5, pixels.shape)
+    assert not fit_points(places, pixels).misplaced.any()
+    pixels[4] += [12.0, -5.0]
+    fit = fit_points(places, pixels)
+    assert np.flatnonzero(fit.misplaced).tolist() == [4]
+    assert "point 5 is" in fit.registration.doubts[0]
+
+
+def test_points_that_say_too_little_are_refused():
+    places = picked(8, 1)
+    pixels = mapped(a_matrix("affine"), places)
+    for model, least in (("similarity", 3), ("affine", 4), ("homography", 5)):
+        fit_points(places[:least], pixels[:least], model)
+        with pytest.raises(ValueError, match=rf"{least - 1} for .*expected {least} or more"):
+            fit_points(places[: least - 1], pixels[: least - 1], model)
+    line = np.stack([np.linspace(0, 1e-4, 8), np.linspace(0, 2e-4, 8)], axis=1)
+    with pytest.raises(ValueError, match="infrared image they lie on a line"):
+        fit_points(line, pixels)
+    with pytest.raises(ValueError, match="visible picture they lie on a line"):
+        fit_points(places, 1e6 * line)
+    with pytest.raises(ValueError, match="not finite"):
+        fit_points(np.where(places == places[0], np.nan, places), pixels)
+    three = np.concatenate([line[:4], places[:1]])
+    with pytest.raises(ValueError, match="leave the homography open"):
+        fit_points(three, mapped(a_matrix("affine"), three), "homography")
+
+
+def test_the_warped_image_has_each_sensor_where_the_map_says():
+    found = fit_points(picked(9, 1), mapped(a_matrix("affine"), picked(9, 1))).registration
+    image = np.arange(RASTER.rows * RASTER.columns, dtype=float).reshape(RASTER.shape)
+    warped = found.warp(image, RASTER, SHAPE)
+    rows, columns = (axis.ravel() for axis in np.indices(RASTER.shape))
+    places = np.stack([RASTER.x[columns], RASTER.y[rows]], axis=1)
+    column, row = np.rint(found.pixels(places)).astype(int).T
+    here = (column >= 0) & (row >= 0) & (column < SHAPE[1]) & (row < SHAPE[0])
+    assert here.mean() > 0.2
+    assert (warped[row[here], column[here]] == image.ravel()[here]).all()
+
+
+def test_a_registration_refuses_what_is_none():
+    good = Registration(np.eye(3), np.zeros((9, 9)), "affine", "points")
+    with pytest.raises(ValueError, match=r"its last element is 2, expected 1"):
+        replace(good, matrix=2 * np.eye(3))
+    with pytest.raises(ValueError, match="is singular"):
+        replace(good, matrix=np.diag([1.0, 0.0, 1.0]))
+    with pytest.raises(ValueError, match="model is 'rigid', expected similarity or"):
+        replace(good, model="rigid")
+    with pytest.raises(ValueError, match="covariance: expected finite"):
+        replace(good, covariance=np.zeros((3, 3)))
+
+
+# Images
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return DualSpectrum(stretch=1.0)
+
+
+@pytest.fixture(scope="module")
+def by_images(pair):
+    measured = pair.infrared
+    return fit_images(measured.radiance[0], measured.raster, pair.visible, "similarity")
+
+
+def error_in_sensors(found, pair):
+    raster = pair.infrared.raster
+    places = np.stack(np.meshgrid(raster.x, raster.y), axis=-1).reshape(-1, 2)
+    off = found.pixels(places) - pair.pixels(places)
+    return np.hypot(*np.linalg.solve(pair.matrix[:2, :2], off.T)) / raster.spacing
+
+
+def test_images_of_unlike_contrast_come_within_a_fraction_of_a_pixel(pair, by_images):
+    found = by_images.registration
+    assert found.doubts == ()
+    error = error_in_sensors(found, pair)
+    assert np.sqrt((error**2).mean()) < 0.8
+    assert by_images.placement > 2 * by_images.by_chance.max()
+    typical, worst = found.uncertainty(pair.infrared.raster)
+    assert error.max() < 2.5 * worst / pair.infrared.raster.spacing
+    assert 0.3 < typical / pair.infrared.raster.spacing < 1.0
+
+
+def test_images_of_other_things_are_doubtful(pair):
+    radiance = pair.infrared.radiance[0].reshape(60, 2, 80, 2).mean(axis=(1, 3))
+    other = np.random.default_rng(4).normal(100.0, 10.0, (120, 160))
+    coarse = Raster(RASTER.left, RASTER.top, 12e-6, 60, 80)
+    found = fit_images(radiance, coarse, other, "similarity").registration
+    assert any("no better than that of images" in doubt for doubt in found.doubts)
+
+
+def test_images_without_contrast_are_refused(pair):
+    radiance, raster = pair.infrared.radiance[0], pair.infrared.raster
+    with pytest.raises(ValueError, match="visible picture: has no contrast"):
+        fit_images(radiance, raster, np.full(SHAPE, 7))
+    with pytest.raises(ValueError, match="infrared image: has no contrast"):
+        fit_images(np.ones(raster.shape), raster, pair.visible)
+    with pytest.raises(ValueError, match="infrared image: has no contrast"):
+        fit_images(np.full(raster.shape, np.nan), raster, pair.visible)
+
+
+# Clocks
+
+
+def event(time):
+    """An entry into the cut and segments that are not even: seen by both cameras."""
+    entry = 1 / (1 + np.exp(-(time - 21.3e-3) / 0.4e-3))
+    return entry * (1 + 0.3 * np.sin(2 * np.pi * 133 * time + 40 * time**2))
+
+
+def clocks(generator, offset, drift=0.0, noise=0.02):
+    infrared = np.arange(30) / 600.0
+    visible = np.arange(2400) / 30000.0
+    seen = event((visible - offset + drift * infrared.mean()) / (1 + drift))
+    hot = event(infrared) + generator.normal(0.0, noise, infrared.size)
+    return infrared, hot, visible, 7.0 - 3.0 * seen + generator.normal(0.0, noise, visible.size)
+
+
+def test_the_offset_of_the_clocks_is_within_its_interval():
+    """Visible brightness falls where the infrared rises; both have noise."""
+    generator = np.random.default_rng(11)
+    inside = 0
+    for _ in range(15):
+        offset = generator.uniform(5e-3, 25e-3)
+        found = align_times(*clocks(generator, offset))
+        limit = t.ppf(0.975, found.degrees_of_freedom) * np.sqrt(found.covariance[0, 0])
+        inside += abs(found.offset - offset) < limit
+        assert found.doubts == ()
+        assert found.correlation < -0.99
+        assert abs(found.offset - offset) < 200e-6
+    # 15 trials at 0.95: less than 12 has a chance of 0.5 %.
+    assert inside >= 12
+
+
+def test_a_clock_that_is_faster_is_found():
+    generator = np.random.default_rng(12)
+    inside = 0
+    for _ in range(6):
+        infrared, hot, visible, bright = clocks(generator, 20e-3, drift=2e-3)
+        found = align_times(infrared, hot, visible, bright, drift=True)
+        error = np.array([found.offset - 20e-3, found.drift - 2e-3])
+        inside += error @ np.linalg.solve(found.covariance, error) < chi2.ppf(0.99, 2)
+        late = infrared[-1:]
+        true = late + 20e-3 + 2e-3 * (late - infrared.mean())
+        assert abs(found.visible_time(late) - true) < 5 * found.uncertainty(late)
+    assert inside >= 4
+
+
+def test_periodic_and_unrelated_signals_are_doubtful():
+    generator = np.random.default_rng(13)
+    infrared, visible = np.arange(60) / 600.0, np.arange(4500) / 30000.0
+    found = align_times(
+        infrared,
+        np.sin(2 * np.pi * 77 * infrared) + generator.normal(0, 0.02, 60),
+        visible,
+        np.sin(2 * np.pi * 77 * visible),
+    )
+    assert any("fits nearly as well" in doubt for doubt in found.doubts)
+    found = align_times(infrared, generator.normal(size=60), visible, generator.normal(size=4500))
+    assert any("nothing to do with each other" in doubt for doubt in found.doubts)
+
+
+def test_visible_frames_within_an_integration():
+    infrared, visible = np.array([0.0, 1.0 / 600]), np.arange(200) / 30000.0
+    signal = np.linspace(0.0, 1.0, 200) ** 2
+    times = np.linspace(0.0, 4e-3, 30)
+    found = align_times(times, np.interp(times + 1e-3, visible, signal), visible, signal)
+    assert found.offset == pytest.approx(1e-3, abs=1e-6)
+    # 1 ms is frame 30; integrations of 70 us reach into frames 30 to 32.
+    first, second = simultaneous_frames(found, infrared, 70e-6, visible + 1e-6, 33e-6)
+    assert first.tolist() == [30, 31, 32] or first.tolist() == [29, 30, 31, 32]
+    assert second.tolist() in ([80, 81, 82], [79, 80, 81, 82])
+    (none,) = simultaneous_frames(found, np.array([1.0]), 10e-6, visible, 33e-6)
+    assert none.size == 0
+
+
+def test_signals_that_say_nothing_are_refused():
+    infrared, hot, visible, bright = clocks(np.random.default_rng(1), 10e-3)
+    with pytest.raises(ValueError, match="visible signal: does not change"):
+        align_times(infrared, hot, visible, np.ones(visible.size))
+    with pytest.raises(ValueError, match="infrared signal: 3 frames, expected 6"):
+        align_times(infrared[:3], hot[:3], visible, bright)
+    with pytest.raises(ValueError, match="ascending times"):
+        align_times(infrared[::-1], hot, visible, bright)
+    with pytest.raises(ValueError, match="29 values for 30 times"):
+        align_times(infrared, hot[1:], visible, bright)
+
+
+# Files and the command
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    small = Raster(0.0, 120e-6, 6e-6, 20, 30)
+    x, y = np.meshgrid(small.x, small.y)
+    spot = 5 * np.exp(-(((x - 90e-6) ** 2 + (y - 60e-6) ** 2) / (30e-6) ** 2))
+    rise = 1 + event(np.arange(40) / 600.0)[:, None, None] * spot
+    attributes = {"integration_time": 10e-6}
+    band = Band(3.8e-6, 5.1e-6)
+    times = np.arange(40) / 600.0
+    measured = Measurement.from_radiance(50 * rise, band, times, small, attributes=attributes)
+    write_measurement(measured, "infrared.nc")
+    rows = ["infrared_column,infrared_row,visible_column,visible_row"]
+    rows += [
+        f"{c},{r},{4 * c + 1.5},{4 * r + 1.5}" for c, r in ((2, 3), (25, 2), (3, 17), (26, 18))
+    ]
+    (tmp_path / "points.csv").write_text("\n".join(rows) + "\n")
+    bright = np.arange(30, 50).repeat(4)[:, None] + np.arange(120)
+    Image.fromarray(bright.astype(np.uint8)).save("visible.png")
+    return tmp_path
+
+
+def register(*arguments):
+    result = CliRunner().invoke(app, ["register", *map(str, arguments)], env={"COLUMNS": "120"})
+    return result.exit_code, " ".join(result.output.split())
+
+
+def test_the_command_writes_map_pictures_and_numbers(folder):
+    (folder / "tool.yaml").write_text("tip: [100 um, 30 um]\n")
+    code, output = register(
+        *("infrared.nc", "visible.png", "--points", "points.csv", "--tool", "tool.yaml"),
+        *("--out", "map.yaml", "--overlay", "over.png", "--blink", "blink.gif"),
+    )
+    assert code == 0, output
+    assert "A visible pixel is 1.5 um" in output
+    assert "2 degrees of freedom" in output
+    found = load_registration("map.yaml")
+    assert found.pixels([3e-6, 117e-6]) == pytest.approx([1.5, 1.5], abs=1e-6)
+    assert found.model == "affine"
+    with Image.open("blink.gif") as blink:
+        assert blink.n_frames == 2
+        assert blink.size[0] == 640
+    with Image.open("over.png") as picture:
+        assert picture.size[0] > 900
+
+
+def test_the_command_aligns_the_clocks(folder):
+    times = np.arange(0.0, 90e-3, 1 / 5000)
+    values = 100 + 60 * event(times - 7e-3)[:, None, None] * np.ones((1, 20, 30))
+    pages = [Image.fromarray(page.astype(np.uint8)).resize((120, 80)) for page in values]
+    pages[0].save("visible.tif", save_all=True, append_images=pages[1:])
+    arguments = ("infrared.nc", "visible.tif", "--points", "points.csv")
+    region = ("--align", "60 um, 30 um, 120 um, 90 um")
+    code, output = register(*arguments, *region)
+    assert (code, "--visible-interval" in output) == (2, True)
+    code, output = register(
+        *arguments, *region, "--visible-interval", "200 us", "--pairs", "pairs.csv"
+    )
+    assert code == 0, output
+    offset = float(output.split("infrared clock + ")[1].split(" us")[0])
+    # The visible frames are exposed for 200 us, whose middle is 100 us after their times.
+    assert offset == pytest.approx(7000 + 100 - 5, abs=20)
+    lines = (folder / "pairs.csv").read_text().splitlines()
+    assert lines[0] == "infrared_frame,infrared_time_us,visible_frames"
+    assert lines[1].split(",")[2] == "35"
+
+
+def test_what_is_written_is_read_again(tmp_path):
+    places = picked(8, 2)
+    noise = np.random.default_rng(1).normal(0, 0.5, places.shape)
+    found = fit_points(places, mapped(a_matrix("affine"), places) + noise).registration
+    write_registration(found, tmp_path / "map.yaml")
+    again = load_registration(tmp_path / "map.yaml")
+    assert (again.matrix == found.matrix).all()
+    assert (again.covariance == found.covariance).all()
+    assert again.degrees_of_freedom == found.degrees_of_freedom
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("x,y,u,v\n", "points.csv, line 1: 'x,y,u,v', expected 'x_um,y_um,visible_column"),
+        ("x_um,y_um,visible_column,visible_row\n1,2,3\n", "line 2: '1,2,3', expected four numbers"),
+        ("x_um,y_um,visible_column,visible_row\n1,2,3,nan\n", "line 2: '1,2,3,nan', expected"),
+        ("x_um,y_um,visible_column,visible_row\n900,2,3,4\n", "outside the infrared image"),
+        ("x_um,y_um,visible_column,visible_row\n9,20,3,400\n", "outside the visible picture"),
+        ("x_um,y_um,visible_column,visible_row\n9,20,3,4\n", "points: 1 for the model 'affine'"),
+        ("", "line 1: ''"),
+    ],
+)
+def test_a_table_of_points_that_is_none_is_refused(folder, text, expected):
+    (folder / "points.csv").write_text(text)
+    code, output = register("infrared.nc", "visible.png", "--points", "points.csv")
+    assert code == 2
+    assert expected in output
+
+
+def test_pictures_of_another_kind_are_refused(folder):
+    whole = (folder / "visible.png").read_bytes()
+    for name, content, expected in (
+        ("empty.png", b"", "empty.png: is empty, expected a picture"),
+        ("text.png", b"no picture", "text.png: expected a picture"),
+        ("cut.png", whole[: len(whole) // 2], "cut.png: is damaged or cut short"),
+        ("notes.txt", b"no camera", "notes.txt"),
+    ):
+        (folder / name).write_bytes(content)
+        code, output = register("infrared.nc", name, "--points", "points.csv")
+        assert (code, output.count("chipglow: ")) == (2, 1)
+        assert expected in output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--frame", "40"], "--frame: 40, expected 0 to 39"),
+        (["--visible-frame", "1"], "--visible-frame: 1, expected 0 to 0"),
+        (["--method", "points"], "--method: points without --points"),
+        (["--out", "map.txt"], "--out: map.txt, expected a file that ends in .yaml"),
+        (["--overlay", "map.txt"], "--overlay: map.txt, expected a file that ends in .png"),
+        (["--blink", "map.png"], "--blink: map.png, expected a file that ends in .gif"),
+        (["--align", "1 um, 2 um"], "--align: '1 um, 2 um', expected left, bottom, right, top"),
+        (["--align", "9 um, 0 um, 1 um, 5 um"], "expected left under right"),
+        (["--pairs", "p.csv"], "--pairs: p.csv without --align"),
+        (["--visible-interval", "3"], "--visible-interval: 3 has no unit"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(folder, arguments, expected):
+    code, output = register("infrared.nc", "visible.png", *arguments)
+    assert (code, output.count("chipglow: ")) == (2, 1)
+    assert expected in output
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_pictures_keep_their_values(tmp_path, dtype):
+    values = np.arange(60, dtype=dtype).reshape(6, 10) * (1000 if dtype == np.uint16 else 1)
+    Image.fromarray(values).save(tmp_path / "a.tiff")
+    found = read_pictures(tmp_path / "a.tiff")
+    assert (found.signal[0] == values).all()
+
+
+def test_points_are_the_middles_of_sensors(tmp_path):
+    path = tmp_path / "points.csv"
+    path.write_text("infrared_column,infrared_row,visible_column,visible_row\n3,5,1,2\n")
+    places, pixels = read_points(path, RASTER, SHAPE)
+    assert places[0] == pytest.approx([RASTER.x[3], RASTER.y[5]], abs=1e-12)
+    assert pixels[0].tolist() == [1.0, 2.0]
