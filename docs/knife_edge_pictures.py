@@ -14,7 +14,7 @@ from chipglow.analysis import KnifeEdge, aperture_image, edge_image, knife_edge
 from chipglow.camera import AnnularAperturePSF, GaussianPSF, Measurement, PointSpreadFunction
 from chipglow.camera.convolution import blur
 from chipglow.radiometry import Band
-from chipglow.report.knife_edge_figure import draw_knife_edge
+from chipglow.report import draw_knife_edge
 from chipglow.report.knife_edge_summary import sentences, with_uncertainty
 from chipglow.scene import Raster
 

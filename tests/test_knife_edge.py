@@ -281,6 +281,16 @@ def test_apertures_tell_of_tails_that_an_edge_does_not():
     assert share.uncertainties[1] < 0.3 * unsure
 
 
+def test_apertures_that_contradict_the_edge_are_doubtful():
+    sizes = (60e-6, 120e-6, 240e-6, 300e-6)
+    holes = [gaussian_aperture(FWHM, size, noise=0.01, seed=5) for size in sizes]
+    assert knife_edge([an_image()], holes).doubts == ()
+    # A tail that the edge does not have, in the apertures alone.
+    holes = [gaussian_aperture(FWHM, size, 0.2, 40e-6, noise=0.01, seed=5) for size in sizes]
+    doubts = knife_edge([an_image(noise=0.01, side=64)], holes).doubts
+    assert any("contradict each other" in doubt for doubt in doubts)
+
+
 def test_the_system_holds_the_sensor_once(clean):
     system, optics = clean.psf("system").kernel(1e-6), clean.psf().kernel(1e-6)
 
@@ -368,6 +378,23 @@ def test_a_clean_edge_is_not_doubtful(clean):
     assert clean.doubts == ()
 
 
+def test_without_noise_the_truth_is_returned_and_nothing_is_doubtful():
+    found = knife_edge([an_image(noise=0.0)])
+    assert found.fwhm == pytest.approx(FWHM, rel=1e-4)
+    assert found.doubts == ()
+
+
+def test_noise_that_grows_with_the_light_is_weighed():
+    """Of a dark side with a tenth of the noise, the width is known better than from the other."""
+    radiance = edge_radiance(GAUSSIAN, 5.0)
+    share = (radiance - 2.0) / 5.0
+    found = knife_edge([image_of(radiance, 0.02 + 0.18 * share, 3)])
+    assert found.edges[0].noise < 0.06
+    assert abs(found.fwhm - FWHM) < 3 * found.fwhm_uncertainty
+    even = knife_edge([image_of(radiance, 0.2, 3)])
+    assert found.fwhm_uncertainty < 0.8 * even.fwhm_uncertainty
+
+
 def test_bent_and_short_and_unresolved_edges_are_doubtful():
     rows = np.arange(60.0)
     angle = radians(5.0)
@@ -435,9 +462,12 @@ def test_a_measurement_becomes_an_image():
     assert image.footprint == pytest.approx(PITCH)
     assert any("fill factor 1" in note for note in image.notes)
     measurement.data.attrs |= {"fill_factor": 0.81, "psf_order": "sensor"}
+    measurement.data.attrs |= {"assumed": "No pixel is saturated.", "doubtful": "A few are old."}
     told = edge_image(measurement, "m")
+    assert told.doubts == ("A few are old.",)
     assert told.footprint == pytest.approx(0.9 * PITCH)
-    assert "acts twice" in told.notes[0]
+    assert told.notes[0] == "No pixel is saturated."
+    assert "acts twice" in told.notes[1]
     with pytest.raises(ValueError, match=r"m: the region has 0 x 40 pixels, expected 8 x 8"):
         edge_image(measurement, "m", (slice(50, 60), slice(None)))
 

@@ -42,6 +42,8 @@ class EdgeImage:
         What it is called in messages.
     notes : tuple of str
         What is assumed of it, a sentence each.
+    doubts : tuple of str
+        Why it may not be trusted, a sentence each.
     """
 
     radiance: NDArray[np.float64]
@@ -54,6 +56,7 @@ class EdgeImage:
     wavelength: float | None
     name: str
     notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     @property
     def pitch(self) -> float:
@@ -106,11 +109,12 @@ def edge_image(
         (band.lower + band.upper) / 2 if band else None,
         name,
         _notes(measurement),
+        tuple(str(attributes.get("doubtful", "")).splitlines()),
     )
 
 
 def _notes(measurement: Measurement) -> tuple[str, ...]:
-    notes = []
+    notes = str(measurement.data.attrs.get("assumed", "")).splitlines()
     if "fill_factor" not in measurement.data.attrs:
         notes.append("the whole square of a sensor takes light (fill factor 1).")
     if measurement.data.attrs.get("psf_order") == "sensor":
@@ -164,7 +168,9 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
         _check_single(pixels, quick)
     except NoEdgeError as error:
         raise NoEdgeError(f"{image.name}: {error}") from None
-    said = [f"{image.name}: {doubt}" for doubt in doubts]
+    said = [f"{image.name}: {doubt}" for doubt in (*image.doubts, *doubts)]
+    noise = float(np.std(pixels.radiance - quick.predicted(0, pixels)))
+    pixels = replace(pixels, sigma=np.full(pixels.x.size, max(noise, 1e-300)))
     # A Gaussian with a free step can put the edge of a clipped image far away.
     return (pixels if clipped else replace(pixels, line=quick.edges[0].line)), said
 

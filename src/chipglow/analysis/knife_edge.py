@@ -49,6 +49,8 @@ RADIAL: Final = "radial"
 _ROUGHLY: Final = 1e-6
 _MISFIT: Final = 1.6
 _TRIES: Final = 6
+_APERTURE_MISFIT: Final = 4.0
+_NOTHING: Final = 5e-4
 _PLATEAU: Final = 3.0
 _UNRESOLVED: Final = 0.3
 _ALIGNED: Final = np.pi / 9
@@ -241,7 +243,8 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     )
     for k, result in enumerate(results):
         doubts += _edge_doubts(best, k, result)
-    doubts += _fit_doubts(best, edges)
+    doubts += _fit_doubts(best, results)
+    doubts += _aperture_doubts(best, signals) if signals is not None else []
     return KnifeEdge(results, tuple(fits), signals, tuple(doubts), tuple(assumptions))
 
 
@@ -330,22 +333,45 @@ def _edge_doubts(best: ModelFit, k: int, result: EdgeResult) -> list[str]:
     return doubts
 
 
-def _fit_doubts(best: ModelFit, edges: Sequence[EdgePixels]) -> list[str]:
+def _fit_doubts(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
     """What of the best fit may make the results wrong."""
     doubts = []
-    footprint = max(edge.footprint for edge in edges)
+    footprint = max(edge.image.footprint for edge in edges)
     if best.fwhm < _UNRESOLVED * footprint or best.fwhm_uncertainty > 0.5 * best.fwhm:
         doubts.append(
             f"the optics' width of {best.fwhm * 1e6:.2g} um is hardly seen beside the sensor's "
             f"{footprint * 1e6:.3g} um: take it for an upper limit."
         )
-    if best.misfit > _MISFIT:
+    left = max(_left(edge) for edge in edges)
+    if best.misfit > _MISFIT and left > _NOTHING:
         doubts.append(
             f"no model fits: the best, {best.model.name}, leaves {sqrt(best.misfit):.2g} times the "
-            "noise in the means at a distance; uncertainties are enlarged by it, and the point "
-            "spread function without a model (radial) may be nearer."
+            f"noise in the means at a distance, {100 * left:.2g} % of the step near the edge; "
+            "uncertainties are enlarged by it, and the point spread function without a model "
+            "(radial) may be nearer."
         )
     return doubts
+
+
+def _aperture_doubts(best: ModelFit, signals: ApertureSignals) -> list[str]:
+    """Whether apertures say something else than the edges."""
+    shares = signals.weights @ best.model.mean_transfer(best.values, signals.frequency)
+    left = (signals.radiance - best.aperture_background) / best.source - shares
+    square = float(np.sum((left * best.source / signals.sigma) ** 2))
+    greatest = int(np.argmax(np.abs(left)))
+    if square < _APERTURE_MISFIT * left.size or abs(left[greatest]) < _NOTHING:
+        return []
+    return [
+        f"the apertures and the edges contradict each other: the signal of "
+        f"{signals.diameters[greatest] * 1e6:.4g} um is {100 * abs(left[greatest]):.2g} % of the "
+        "source away from the fit; check the diameters and that the source is even."
+    ]
+
+
+def _left(edge: EdgeResult) -> float:
+    """Root of the mean square of what the model leaves near the edge, as a share of the step."""
+    near = np.abs(edge.spread.distance) < 2 * edge.line_fwhm
+    return float(np.sqrt(np.mean(edge.spread.residual[near] ** 2)))
 
 
 def _with_sensor(optics: PointSpreadFunction, footprint: float) -> MeasuredPSF:

@@ -71,6 +71,8 @@ class ApertureSignals:
         Distances of those pixels from the aperture's middle in m.
     footprint : float
         Side of a sensor's sensitive square in m.
+    outside : float
+        Radiance beside the apertures in W/(m² sr): the background, and what tails add to it.
     """
 
     diameters: NDArray[np.float64]
@@ -78,6 +80,7 @@ class ApertureSignals:
     sigma: NDArray[np.float64]
     radii: tuple[NDArray[np.float64], ...]
     footprint: float
+    outside: float
 
     @cached_property
     def frequency(self) -> NDArray[np.float64]:
@@ -280,8 +283,15 @@ class _Problem:
         low, high = self.model.bounds(
             min(edge.pitch for edge in self.edges), max(edge.reach for edge in self.edges)
         )
-        free = self.scales.size - self.shapes
-        return np.array(low + [-inf] * free), np.array(high + [inf] * free)
+        free = _EDGE_PARAMETERS * len(self.edges)
+        low, high = low + [-inf] * free, high + [inf] * free
+        if self.apertures is not None:
+            outside = self.apertures.outside
+            contrast = float(self.apertures.radiance.max()) - outside
+            # Else a small change between large apertures could be that of a huge source.
+            low += [outside - 0.5 * contrast, 0.5 * contrast]
+            high += [outside + 0.1 * contrast, 2.0 * contrast]
+        return np.array(low), np.array(high)
 
     def residual(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
         """Measured less model, over the noise."""
@@ -428,7 +438,8 @@ class _Problem:
         if self.apertures is not None:
             signals = self.apertures
             line = _straight_line(self._shares(values), signals.radiance, signals.sigma)
-            parts.append(np.array(line))
+            low, high = (limit[-_SOURCE_PARAMETERS:] for limit in self.bounds())
+            parts.append(np.clip(line, low, high))
         return np.concatenate(parts)
 
     def _scales(self) -> NDArray[np.float64]:

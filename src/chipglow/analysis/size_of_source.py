@@ -95,15 +95,26 @@ def aperture_signals(images: Sequence[ApertureImage], footprint: float) -> Apert
     read = [_middle(image) for image in images]
     return ApertureSignals(
         np.array([image.diameter for image in images]),
-        np.array([signal for signal, _, _ in read]),
-        np.array([sigma for _, sigma, _ in read]),
-        tuple(radii for _, _, radii in read),
+        np.array([middle.signal for middle in read]),
+        np.array([middle.sigma for middle in read]),
+        tuple(middle.radii for middle in read),
         footprint,
+        min(middle.outside for middle in read),
     )
 
 
-def _middle(image: ApertureImage) -> tuple[float, float, NDArray[np.float64]]:
-    """Mean of the middle pixels, its standard uncertainty, and their distances from the middle."""
+@dataclass(frozen=True, eq=False)
+class _Middle:
+    """What the middle pixels read, its uncertainty, their distances, and what is beside."""
+
+    signal: float
+    sigma: float
+    radii: NDArray[np.float64]
+    outside: float
+
+
+def _middle(image: ApertureImage) -> _Middle:
+    """Find the middle of an aperture and read it."""
     known = np.isfinite(image.radiance)
     if not known.any():
         raise ValueError(f"{image.name}: no usable pixel, expected an aperture")
@@ -132,11 +143,13 @@ def _middle(image: ApertureImage) -> tuple[float, float, NDArray[np.float64]]:
     inner = known & (away <= pitch)
     if not inner.any():
         raise ValueError(f"{image.name}: no usable pixel in the middle of the aperture")
-    sigma = _noise(image.radiance, known & (away > radius + 3 * pitch))
+    beside = known & (away > radius + 3 * pitch)
+    sigma = _noise(image.radiance, beside)
+    outside = float(np.median(image.radiance[beside])) if beside.any() else float(low)
     number = int(inner.sum())
     signal = float(image.radiance[inner].mean())
     least = 1e-7 * float(high - low)
-    return signal, max(sigma / number**0.5, least), away[inner]
+    return _Middle(signal, max(sigma / number**0.5, least), away[inner], outside)
 
 
 def _noise(radiance: NDArray[np.float64], outside: NDArray[np.bool_]) -> float:

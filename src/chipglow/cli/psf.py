@@ -59,13 +59,16 @@ def psf(
     """Determine a camera's point spread function and MTF from images of an edge."""
     from chipglow.analysis import aperture_image, edge_image, knife_edge
     from chipglow.cli.pictures import check_picture_path, write_picture
-    from chipglow.study import load_apertures
-    from chipglow.study.measured import load_measurement
+    from chipglow.io.atomic import check_folder
+    from chipglow.study import load_apertures, load_measurement
 
     if plot is not None:
         check_picture_path(plot)
     if out is not None and out.suffix.lower() != ".nc":
         raise ValueError(f"--out: {out}, expected a file that ends in .nc")
+    for path in (out, plot):
+        if path is not None:
+            check_folder(path)
     part = None if region is None else _region(region)
     given = settings or ()
     images = [edge_image(load_measurement(path, given), path.name, part) for path in edges]
@@ -82,7 +85,7 @@ def psf(
         write_psf(found, out, chosen)
         print(out)
     if plot is not None:
-        from chipglow.report.knife_edge_figure import draw_knife_edge
+        from chipglow.report import draw_knife_edge
 
         write_picture(draw_knife_edge(found), plot)
         print(plot)
@@ -105,6 +108,7 @@ def _region(text: str) -> tuple[slice, slice]:
 def _print(found: "KnifeEdge") -> None:
     from rich.console import Console
 
+    from chipglow.cli.assumed import say_assumed, say_doubtful
     from chipglow.report.knife_edge_summary import edge_table, model_table, sentences
 
     console = Console(highlight=False, markup=False)
@@ -113,4 +117,6 @@ def _print(found: "KnifeEdge") -> None:
     console.print(edge_table(found))
     console.print()
     for sentence in sentences(found):
-        console.print(sentence)
+        console.print(sentence, soft_wrap=True)
+    say_assumed(found.assumptions)
+    say_doubtful(found.doubts)

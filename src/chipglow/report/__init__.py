@@ -5,6 +5,7 @@ from chipglow.report.calibration_figure import draw_calibrations
 from chipglow.report.compare_figure import draw_comparison
 from chipglow.report.comparison import Row, comparison_rows
 from chipglow.report.emissivity_figure import draw_emissivity
+from chipglow.report.knife_edge_figure import draw_knife_edge
 from chipglow.report.measurement_figure import draw_measurement
 from chipglow.report.measurement_summary import MeasurementSummary, measurement_summary
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
@@ -36,6 +37,7 @@ __all__ = [
     "draw_calibrations",
     "draw_comparison",
     "draw_emissivity",
+    "draw_knife_edge",
     "draw_measurement",
     "draw_rake_grid",
     "draw_registration",

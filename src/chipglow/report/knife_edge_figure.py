@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from chipglow.analysis.knife_edge import EdgeResult, KnifeEdge
 from chipglow.analysis.psf_fit import FittedEdge
 from chipglow.report import drawing
-from chipglow.report.drawing import BLUE, GREY, VERMILLION, WIDTH
+from chipglow.report.drawing import BLUE, GREY, VERMILLION, VOID, WIDTH
 from chipglow.report.knife_edge_summary import with_uncertainty
 from chipglow.scene import Raster
 
@@ -116,11 +116,11 @@ def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
     axes.plot(frequency, transfer.model, color=VERMILLION, label="fit: optics and sensor")
     axes.plot(frequency, transfer.optics, color=BLUE, linestyle="--", label="fit: optics alone")
     nyquist = 0.5e-3 / edge.image.pitch
-    axes.axvline(nyquist, color="black", linewidth=0.8, linestyle=":", label="Nyquist")
+    axes.axvline(nyquist, color=VOID, linewidth=1.2, label="Nyquist", zorder=0)
     axes.set_ylim(-0.05, 1.05)
     axes.set_title("modulation transfer function")
     axes.set_xlabel("frequency / (1/mm)")
-    axes.legend(loc="upper right", frameon=True, edgecolor="none")
+    axes.legend(loc="upper right")
 
 
 def _draw_apertures(axes: Axes, found: KnifeEdge) -> None:

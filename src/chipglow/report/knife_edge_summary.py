@@ -45,7 +45,7 @@ def edge_table(found: KnifeEdge) -> Table:
 
 
 def sentences(found: KnifeEdge) -> list[str]:
-    """The result, how to use it, what is assumed and what is doubtful."""
+    """The result, and how to use it."""
     width = with_uncertainty(found.fwhm * 1e6, found.fwhm_uncertainty * 1e6)
     lines = [
         f"The optics' point spread function is {width} um wide (full width at half maximum, with "
@@ -54,8 +54,6 @@ def sentences(found: KnifeEdge) -> list[str]:
     lines += _directions(found)
     if (text := study_text(found)) is not None:
         lines.append(f"For a study's camera: psf_order: optics, psf: {text}")
-    lines += [f"Assumed: {text}" for text in found.assumptions]
-    lines += [f"Doubtful: {text}" for text in found.doubts]
     return lines
 
 
