@@ -25,6 +25,7 @@ from chipglow.radiometry import Band
 _COVERAGE: Final = 0.975
 _DOUBTFUL_SHARE: Final = 0.05
 _UNEVEN: Final = 0.5
+_NO_MATTER: Final = 0.01
 
 
 class DeterminedEmissivity(Protocol):
@@ -186,7 +187,7 @@ class TrueTemperature:
                 f"({flag_text(self.flagged)})"
             )
         uneven = abs(self.value - self.mean_of_pixels)
-        if uneven > _UNEVEN * self.standard_uncertainty:
+        if uneven > max(_UNEVEN * self.standard_uncertainty, _NO_MATTER):
             doubts.append(
                 f"{self.name}: is uneven, the mean of its pixels' temperatures is "
                 f"{uneven:.3g} K from the temperature of its mean radiance"

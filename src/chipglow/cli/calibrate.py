@@ -94,10 +94,17 @@ def calibrate(
         if path is not None:
             check_folder(path)
 
+    recordings = []
+
     def counts_of(file: str) -> float:
+        recordings.append(file)
         return uniform_counts(points.parent / file, settings or ())
 
     table = read_points(points, counts_of)
+    if settings and not recordings:
+        raise ValueError(
+            f"--set: {settings[0]!r} describes nothing, as {points} names no recordings (file)"
+        )
     known: dict[str, Any] = {
         "count_uncertainty": table.get("count_uncertainty"),
         "temperature_uncertainty": table.get("temperature_uncertainty"),
