@@ -1,6 +1,7 @@
 """Whether the laboratory's procedures find a hidden truth, and as often as they say.
 
     python benchmarks/synthetic_laboratory.py [--first 0] [--repeats 100] [--markdown]
+    python benchmarks/synthetic_laboratory.py --first 0 --write FOLDER
 
 Of each seed a laboratory with hidden optics, emissivities and detector writes the files of an
 experiment: black bodies, uniform frames, a heated chip, knife edges, a hot chip. The procedures see
@@ -477,7 +478,12 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--repeats", type=int, default=100, help="how many seeds")
     parser.add_argument("--markdown", action="store_true", help="print a table for a page")
+    parser.add_argument("--write", type=Path, metavar="FOLDER", help="only write a seed's files")
     options = parser.parse_args()
+    if options.write is not None:
+        options.write.mkdir(parents=True, exist_ok=True)
+        Laboratory(options.first).perform(options.write)
+        return
     rows = [kept(seed) for seed in range(options.first, options.first + options.repeats)]
     for number, line in enumerate(table(rows)):
         if options.markdown:
