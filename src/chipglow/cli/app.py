@@ -273,13 +273,10 @@ def materials(
         print(plot)
 
 
-app.command("shearband")(shearband)
-app.command("calibrate")(calibrate)
-app.command("convert")(convert)
-app.command("emissivity")(emissivity)
-app.command("rake")(rake)
-app.command("compare")(compare)
-app.command("register")(register)
+for command in (
+    calibrate, convert, emissivity, temperature, psf, register, rake, shearband, compare,
+):  # fmt: skip
+    app.command(rich_help_panel="The laboratory")(command)
 
 
 @cache_app.command("list")
@@ -303,10 +300,6 @@ def clear() -> None:
     from chipglow.study.cache import cache_folder, clear_cache
 
     print(f"{_megabytes(clear_cache())} freed in {cache_folder()}")
-
-
-app.command("psf")(psf)
-app.command("temperature")(temperature)
 
 
 def _megabytes(size: int) -> str:

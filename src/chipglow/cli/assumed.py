@@ -1,4 +1,4 @@
-"""What had to be assumed, on the terminal."""
+"""What had to be assumed, and what is doubtful, on the terminal."""
 
 from collections.abc import Iterable
 
@@ -13,7 +13,7 @@ def say_assumed(sentences: Iterable[str]) -> None:
 
 
 def say_doubtful(sentences: Iterable[str]) -> None:
-    """Say on stderr what cannot be relied on, a sentence each."""
-    console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+    """Say beside the results what cannot be relied on, a sentence each."""
+    console = Console(highlight=False, markup=False, soft_wrap=True)
     for sentence in sentences:
         console.print(f"Doubtful: {sentence}")

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
 
     from chipglow.camera import CalibrationFit, FittedCalibration
     from chipglow.radiometry import Band
-    from chipglow.study.units import Quantity
 
     Fits = Mapping[str, CalibrationFit[FittedCalibration]]
 
@@ -83,6 +82,7 @@ def calibrate(
     from chipglow.camera import fit_linear, fit_sakuma_hattori
     from chipglow.cli.assumed import say_doubtful
     from chipglow.cli.pictures import check_picture_path
+    from chipglow.cli.quantities import parse
     from chipglow.io.atomic import check_folder
     from chipglow.io.column_file import read_points
     from chipglow.study.measured import uniform_counts
@@ -108,11 +108,11 @@ def calibrate(
     known: dict[str, Any] = {
         "count_uncertainty": table.get("count_uncertainty"),
         "temperature_uncertainty": table.get("temperature_uncertainty"),
-        "common_uncertainty": _parsed(
+        "common_uncertainty": parse(
             "--common-uncertainty", TEMPERATURE_DIFFERENCE, common_uncertainty
         )
         or 0.0,
-        "integration_time": _parsed("--integration-time", TIME, integration_time),
+        "integration_time": parse("--integration-time", TIME, integration_time),
         "range_name": range_name,
     }
     kinds: dict[Model, Callable[..., CalibrationFit[Any]]] = {
@@ -159,13 +159,6 @@ def _band(text: str) -> "Band":
         return Band(*WAVELENGTHS.parse_range(text))
     except ValueError as error:
         raise ValueError(f"--band: {error}") from None
-
-
-def _parsed(option: str, quantity: "Quantity", text: str | None) -> float | None:
-    try:
-        return None if text is None else quantity.parse(text)
-    except ValueError as error:
-        raise ValueError(f"{option}: {error}") from None
 
 
 def _write(fit: "CalibrationFit[FittedCalibration]", out: Path) -> None:

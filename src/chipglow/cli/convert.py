@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chipglow.cli.options import Settings
+
 if TYPE_CHECKING:
     from chipglow.camera import Recording
 
@@ -24,14 +26,7 @@ def convert(
             help="The measurement to write, NetCDF; without it, only say what is there.",
         ),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="FIELD=VALUE",
-            help="Set a field of the description, such as 'pitch=6 um'; may be repeated.",
-        ),
-    ] = None,
+    settings: Settings = None,
 ) -> None:
     """Make a measurement of a camera's file."""
     from rich.console import Console

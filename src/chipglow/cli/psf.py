@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chipglow.cli.options import Settings
+
 if TYPE_CHECKING:
     from chipglow.analysis import KnifeEdge
 
@@ -47,14 +49,7 @@ def psf(
         Path | None,
         typer.Option(metavar="FILE", help="Draw edges, spread and MTF, PNG, PDF or SVG."),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="FIELD=VALUE",
-            help="Set a field of the description of the images' files; may be repeated.",
-        ),
-    ] = None,
+    settings: Settings = None,
 ) -> None:
     """Determine a camera's point spread function and MTF from images of an edge."""
     from chipglow.analysis import aperture_image, edge_image, knife_edge
