@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from chipglow.cli.options import Settings
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -63,15 +65,7 @@ def calibrate(
     range_name: Annotated[
         str | None, typer.Option("--range", metavar="NAME", help="The camera's measuring range.")
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="FIELD=VALUE",
-            help="Set a field of the description of the recordings, such as bad_pixels=find; may "
-            "be repeated.",
-        ),
-    ] = None,
+    settings: Settings = None,
 ) -> None:
     """Fit a calibration of a camera's counts to black bodies.
 

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chipglow.cli.options import Settings
+
 if TYPE_CHECKING:
     from rich.console import Console
 
     from chipglow.analysis import KnownEmissivity, Surroundings, TrueTemperature
     from chipglow.analysis.temperature import DeterminedEmissivity
-    from chipglow.study.units import Quantity
 
     Emissivities = Mapping[str, DeterminedEmissivity | KnownEmissivity]
 
@@ -60,14 +61,7 @@ def temperature(
     table: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the table of regions, CSV.")
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="FIELD=VALUE",
-            help="Set a field of the description of a camera's file; may be repeated.",
-        ),
-    ] = None,
+    settings: Settings = None,
 ) -> None:
     """Determine the true temperature of regions whose emissivity is known."""
     from rich.console import Console
@@ -127,21 +121,15 @@ def _emissivities(text: str, spread: float | None, names: Sequence[str]) -> "Emi
 def _room(environment: str | None, spread: str | None) -> "Surroundings | None":
     """What the object reflects, if that is said."""
     from chipglow.analysis import Surroundings
+    from chipglow.cli.quantities import parse
     from chipglow.study.units import TEMPERATURE, TEMPERATURE_DIFFERENCE
 
     if environment is None and spread is None:
         return None
     return Surroundings(
-        _parsed("--environment", TEMPERATURE, environment or "293 K"),
-        _parsed("--environment-uncertainty", TEMPERATURE_DIFFERENCE, spread or "0 K"),
+        parse("--environment", TEMPERATURE, environment or "293 K"),
+        parse("--environment-uncertainty", TEMPERATURE_DIFFERENCE, spread or "0 K"),
     )
-
-
-def _parsed(option: str, quantity: "Quantity", text: str) -> float:
-    try:
-        return quantity.parse(text)
-    except ValueError as error:
-        raise ValueError(f"{option}: {error}") from None
 
 
 def _print(console: "Console", rows: "list[TrueTemperature]") -> None:
