@@ -123,6 +123,17 @@ def test_stated_intervals_hold_the_truth():
     assert 0.85 < np.std(scores) < 1.15
 
 
+def test_cold_surroundings_are_part_of_the_uncertainty():
+    """Below 200 K a band has no table; what is reflected there counts as elsewhere."""
+    cold = Surroundings(190.0, 1.0)
+    seen = [image(0.05, 330.0, environment=190.0)]
+    found = true_temperature(seen, WHOLE, KnownEmissivity(0.05), cold)
+    warmer = true_temperature(seen, WHOLE, KnownEmissivity(0.05), Surroundings(191.0))
+    assert found.value == pytest.approx(330.0, abs=1e-3)
+    assert found.budget["environment"] == pytest.approx(found.value - warmer.value, rel=0.1)
+    assert found.standard_uncertainty == pytest.approx(found.budget["environment"])
+
+
 def test_few_images_widen_the_interval():
     emissivity = KnownEmissivity(0.42)
     images = [image(drift=2.0, seed=seed) for seed in range(3)]

@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from chipglow.analysis.emissivity import LABORATORY, Heating
@@ -26,6 +27,7 @@ _COVERAGE: Final = 0.975
 _DOUBTFUL_SHARE: Final = 0.05
 _UNEVEN: Final = 0.5
 _NO_MATTER: Final = 0.01
+_STEP: Final = 0.5
 
 
 class DeterminedEmissivity(Protocol):
@@ -245,21 +247,19 @@ def true_temperature(
             f"({flag_text(flagged)}), expected 2 or more"
         )
     values = radiance[:, usable]
-    reflecting = _surroundings(emissivity, surroundings)
     mean = float(values.mean())
-    sensitivity = _Sensitivity.at(area.name, mean, emissivity.mean, reflecting, band)
+    reflecting = _surroundings(emissivity, surroundings)
+    equation = _Equation(emissivity.mean, reflecting.temperature, band)
+    sensitivity = equation.sensitivity(area.name, mean)
     told = told_calibration(measurements)
     error = 0.0 if told is None else float(told[usable].mean())
     correlation = _correlation(emissivity, mean, calibration, band)
     budget, chance = _budget(
         sensitivity, emissivity, reflecting, surroundings is None, error, correlation or 0.0
     )
-    scatter = Scatter.of(values)
-    seen = sensitivity.radiance
-    reflected = float(band.radiance(np.array(reflecting.temperature)))
-    own = (values.mean(axis=0) - (1 - emissivity.mean) * reflected) / emissivity.mean
-    pixels = np.asarray(band.temperature(own), np.float64)
+    scatter, seen = Scatter.of(values), sensitivity.radiance
     budget |= {"repeatability": seen * scatter.repeatability, "noise": seen * scatter.noise}
+    pixels = equation.temperature(values.mean(axis=0))
     return TrueTemperature(
         name=area.name,
         pixels=count,
@@ -269,7 +269,7 @@ def true_temperature(
         deviation=float(pixels.std(ddof=1)),
         mean_of_pixels=float(pixels.mean()),
         emissivity=emissivity.mean,
-        value=sensitivity.value,
+        value=float(equation.temperature(np.array(mean))),
         budget=budget,
         chance=(*chance, (seen * scatter.standard_uncertainty, scatter.degrees_of_freedom)),
         correlation=correlation,
@@ -278,36 +278,55 @@ def true_temperature(
 
 @dataclass(frozen=True)
 class _Sensitivity:
-    """True temperature in K, and how it changes with what it is computed of.
+    """Change of the true temperature with what it is computed of.
 
-    With the radiance in K m² sr/W, the emissivity in K, and the surroundings' temperature.
+    With the radiance in K m² sr/W, with the emissivity in K, and with the surroundings'
+    temperature.
     """
 
-    value: float
     radiance: float
     emissivity: float
     environment: float
 
-    @classmethod
-    def at(
-        cls, name: str, radiance: float, emissivity: float, reflecting: Surroundings, band: Band
-    ) -> "_Sensitivity":
-        reflected = float(band.radiance(np.array(reflecting.temperature)))
-        own = (radiance - (1 - emissivity) * reflected) / emissivity
-        if not own > reflected:
+
+@dataclass(frozen=True)
+class _Equation:
+    """Equation 2 for an emissivity and the temperature in K of what is reflected."""
+
+    emissivity: float
+    environment: float
+    band: Band
+
+    @property
+    def reflected(self) -> float:
+        """Radiance of a black body at the surroundings' temperature in W/(m² sr)."""
+        return float(self.band.radiance(np.array(self.environment)))
+
+    def own(self, radiance: Any) -> Any:
+        """Radiance in W/(m² sr) of a black body at the object's temperature."""
+        return (radiance - (1 - self.emissivity) * self.reflected) / self.emissivity
+
+    def temperature(self, radiance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """True temperature in K of apparent radiance in W/(m² sr), of the same shape."""
+        return np.asarray(self.band.temperature(self.own(radiance)), np.float64)
+
+    def sensitivity(self, name: str, radiance: float) -> _Sensitivity:
+        """How the temperature of a radiance in W/(m² sr) of an area depends on all that."""
+        own = float(self.own(radiance))
+        if not own > self.reflected:
             raise ValueError(
                 f"region {name}: is darker than what it reflects at "
-                f"{reflecting.temperature - 273.15:.6g} °C, expected a hotter object"
+                f"{self.environment - 273.15:.6g} °C, expected a hotter object"
             )
-        value = float(band.temperature(np.array(own)))
-        slopes = band.slope([value, reflecting.temperature])
-        by_radiance = 1 / (emissivity * float(slopes[0]))
-        return cls(
-            value,
-            by_radiance,
-            -(own - reflected) * by_radiance,
-            -(1 - emissivity) * float(slopes[1]) * by_radiance,
-        )
+        value = float(self.band.temperature(np.array(own)))
+        by_radiance = 1 / (self.emissivity * self._slope(value))
+        by_environment = -(1 - self.emissivity) * self._slope(self.environment) * by_radiance
+        return _Sensitivity(by_radiance, -(own - self.reflected) * by_radiance, by_environment)
+
+    def _slope(self, temperature: float) -> float:
+        """dL/dT in W/(m² sr K), at any temperature: `Band.slope` ends with its table."""
+        ends = self.band.radiance(np.array([temperature - _STEP, temperature + _STEP]))
+        return float(ends[1] - ends[0]) / (2 * _STEP)
 
 
 def _surroundings(
