@@ -82,7 +82,7 @@ def test_a_model_with_the_sensor_is_the_mean_over_its_square(name, normal):
     distance = x * cos(angle) + y * np.sin(angle) - 1e-6
     response = edge_response(lambda f: model.transfer(values, f, angle), angle, PITCH, 250e-6)
     # Tails of diffraction that wrap around the table are the greatest of the errors.
-    np.testing.assert_allclose(response(distance), measured, atol=1e-4)
+    np.testing.assert_allclose(response(distance), measured, atol=1e-5)
 
 
 def test_the_annular_transfer_function_is_the_transform_of_the_closed_form():

@@ -1,14 +1,17 @@
 """From a camera's file to a measurement's: descriptions, calibration files, commands."""
 
+import re
+from dataclasses import replace
+
 import camera_files
 import numpy as np
 import pytest
 import yaml
 from typer.testing import CliRunner
 
-from chipglow.camera import Detector, Flag, fit_linear, fit_sakuma_hattori
+from chipglow.camera import Detector, Flag, Recording, fit_linear, fit_sakuma_hattori
 from chipglow.cli import app
-from chipglow.io import is_measurement, read_measurement, write_measurement
+from chipglow.io import is_measurement, read_measurement, write_hcc, write_measurement
 from chipglow.io.column_file import POINT_COLUMNS, read_bad_pixels, read_columns, read_response
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import ToolGeometry
@@ -21,6 +24,7 @@ from chipglow.study import (
     load_description,
     load_measurement,
     measurement_text,
+    uniform_counts,
 )
 
 BAND = Band(3.8e-6, 5.1e-6)
@@ -455,3 +459,85 @@ def test_init_writes_the_description(tmp_path):
     assert load_description(path) == MeasurementDescription()
     assert "# The tip of the tool" in path.read_text()
     assert run("init", path, "--measurement", "--import", "--force")[0] == 2
+
+
+# Recordings of black bodies
+
+
+def seen_bodies(folder):
+    """Recordings of black bodies of exactly known temperature, and a table of them."""
+    rng = np.random.default_rng(3)
+    lines = ["temperature_degC,file"]
+    for celsius in CELSIUS[:4]:
+        name = f"body {celsius:g}.npy"
+        np.save(folder / name, seen(celsius + 273.15, 12, rng))
+        lines.append(f"{celsius:g}, {name}")
+    (folder / "bodies.csv").write_text("\n".join(lines) + "\n")
+
+
+CAMERA = ["unit=counts", "interval=2 ms", "saturation=16382"]
+CORRECTED = [*CAMERA, "uniform.frames=cold.npy", "uniform.brighter=hot.npy", "bad_pixels=find"]
+
+
+def test_counts_of_a_black_body_are_those_of_corrected_sensors(laboratory):
+    seen_bodies(laboratory)
+    cold, hot = (np.load(laboratory / name).mean(axis=0) for name in ("cold.npy", "hot.npy"))
+    # Corrected sensors have the median sensor's offset and gain, here without any noise.
+    expected = [np.median(cold), np.median(cold) + np.median(hot - cold)]
+    for name, mean, level in (("cold.npy", cold, expected[0]), ("hot.npy", hot, expected[1])):
+        assert uniform_counts(name, CORRECTED) == pytest.approx(level, abs=1e-6)
+        assert uniform_counts(name, CAMERA) == pytest.approx(mean.mean(), rel=1e-12)
+    # Straight between both: counts are linear in light.
+    radiance = BAND.radiance(np.array([623.15, 873.15, 1123.15]))
+    share = (radiance[1] - radiance[0]) / (radiance[2] - radiance[0])
+    body = uniform_counts("body 600.npy", CORRECTED)
+    assert body == pytest.approx(expected[0] + share * (expected[1] - expected[0]), abs=0.5)
+
+
+def test_calibrate_takes_recordings_in_the_place_of_counts(laboratory):
+    seen_bodies(laboratory)
+    settings = [part for setting in CORRECTED for part in ("--set", setting)]
+    code, output = run(
+        "calibrate", "bodies.csv", "--band", "3.8-5.1 um", *settings, "--out", "of files.yaml"
+    )
+    assert code == 0, output
+    counts = [uniform_counts(f"body {celsius:g}.npy", CORRECTED) for celsius in CELSIUS[:4]]
+    expected = fit_linear(CELSIUS[:4] + 273.15, counts, BAND).calibration
+    found = load_calibration("of files.yaml")
+    np.testing.assert_allclose(found.parameters, expected.parameters, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("table", "settings", "message"),
+    [
+        ("temperature_degC,file\n300,none.npy\n", CAMERA, "none.npy"),
+        ("temperature_degC,file\n300,hot.npy\n", [*CAMERA[:2], "saturation=2000"], "saturated"),
+        ("temperature_degC,file\n300,hot.npy\n", ["unit=K", "interval=1 ms"], "expected counts"),
+        ("temperature_degC,file\nhot,hot.npy\n", CAMERA, "line 2: 'hot,hot.npy', expected 2"),
+        ("temperature_degC,file,counts\n300,hot.npy,3\n", CAMERA, "unknown column 'counts'"),
+        ("temperature_degC,counts\n300,3\n400,5\n500,9\n", CAMERA, "--set: .* names no recordings"),
+    ],
+)
+def test_recordings_that_are_no_black_bodies_are_one_clear_error(
+    laboratory, tmp_path, table, settings, message
+):
+    path = laboratory / "wrong.csv"
+    path.write_text(table)
+    arguments = [part for setting in settings for part in ("--set", setting)]
+    code, output = run("calibrate", path.name, "--band", "3.8-5.1 um", *arguments)
+    assert code != 0
+    assert re.search(message, " ".join(output.split())), output
+
+
+def test_uniform_frames_of_another_format_say_themselves_what_they_are(tmp_path):
+    """A recording without words of its own, and uniform frames of a camera that has them."""
+    rng = np.random.default_rng(4)
+    detector = replace(DETECTOR, gain_pattern=None, offset_pattern=None, dead=None)
+    counts = detector.counts(np.full((10, 8, 64), 500.0), rng)
+    np.save(tmp_path / "chip.npy", counts.astype(np.uint16))
+    write_hcc(
+        tmp_path / "even.hcc",
+        Recording(counts, "counts", np.arange(10) / 600.0, "camera", 1e-5, 16382.0),
+    )
+    fields = [*CAMERA, "uniform.frames=even.hcc"]
+    assert uniform_counts(tmp_path / "chip.npy", fields) == pytest.approx(np.median(counts), abs=1)

@@ -49,6 +49,12 @@ from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
 from chipglow.analysis.shear_band import ShearBand, find_shear_band
 from chipglow.analysis.size_of_source import ApertureImage, aperture_image
+from chipglow.analysis.temperature import (
+    KnownEmissivity,
+    Surroundings,
+    TrueTemperature,
+    true_temperature,
+)
 from chipglow.analysis.time_alignment import TimeAlignment, align_times, simultaneous_frames
 
 __all__ = [
@@ -75,6 +81,7 @@ __all__ = [
     "ImageFit",
     "Inertia",
     "KnifeEdge",
+    "KnownEmissivity",
     "Line",
     "ModelFit",
     "NoEdgeError",
@@ -98,8 +105,10 @@ __all__ = [
     "Stage",
     "StatedUncertainties",
     "StudyResult",
+    "Surroundings",
     "ThermalImage",
     "TimeAlignment",
+    "TrueTemperature",
     "align_times",
     "analyse",
     "aperture_image",
@@ -132,4 +141,5 @@ __all__ = [
     "shared_pixels",
     "simultaneous_frames",
     "straight_line",
+    "true_temperature",
 ]

@@ -145,14 +145,24 @@ class FittedCalibration(Calibration):
         Propagated from the covariance of the parameters (JCGM 100, Equation 13): at given counts S
         a change of the parameters moves the radiance by dL = −(∂S/∂p) dp (dL/dT) / (∂S/∂T).
         """
-        temperature = self.temperature(counts)
-        gradient = self.gradient(temperature)
-        variance = np.einsum("i...,ij,j...->...", gradient, self.covariance, gradient)
-        deviation = np.sqrt(np.maximum(variance, 0.0))
+        sensitivity = self._sensitivity(self.temperature(counts))
+        variance = np.einsum("i...,ij,j...->...", sensitivity, self.covariance, sensitivity)
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+    def radiance_covariance(self, temperatures: ArrayLike) -> NDArray[np.float64]:
+        """Covariance of the radiance at several radiance temperatures in K of shape (n,).
+
+        In (W/(m² sr))², shape (n, n). What the calibration makes wrong at one radiance it makes
+        wrong at others, too: ratios and differences are known better, or worse, than that.
+        """
+        sensitivity = self._sensitivity(_floats(temperatures))
+        return np.asarray(sensitivity.T @ self.covariance @ sensitivity)
+
+    def _sensitivity(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Change of the radiance with each parameter at given counts, shape (n, ...)."""
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray(
-                deviation * np.abs(self.band.slope(temperature) / self.slope(temperature))
-            )
+            slope = self.band.slope(temperature) / self.slope(temperature)
+            return np.asarray(-self.gradient(temperature) * slope)
 
 
 @final

@@ -17,6 +17,7 @@ from chipglow.cli.psf import psf
 from chipglow.cli.rake import rake
 from chipglow.cli.register import register
 from chipglow.cli.shearband import shearband
+from chipglow.cli.temperature import temperature
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 
@@ -272,7 +273,9 @@ def materials(
         print(plot)
 
 
-for command in (calibrate, convert, emissivity, psf, register, rake, shearband, compare):
+for command in (
+    calibrate, convert, emissivity, temperature, psf, register, rake, shearband, compare,
+):  # fmt: skip
     app.command(rich_help_panel="The laboratory")(command)
 
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from chipglow.cli.options import Settings
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -30,8 +32,9 @@ def calibrate(
         Path,
         typer.Argument(
             metavar="POINTS.csv",
-            help="Black bodies: columns temperature_degC (or _K), counts and, if known, their "
-            "standard uncertainties count_uncertainty and temperature_uncertainty_K.",
+            help="Black bodies: columns temperature_degC (or _K), counts (or file, a recording of "
+            "each) and, if known, their standard uncertainties count_uncertainty and "
+            "temperature_uncertainty_K.",
         ),
     ],
     band: Annotated[
@@ -61,6 +64,7 @@ def calibrate(
     range_name: Annotated[
         str | None, typer.Option("--range", metavar="NAME", help="The camera's measuring range.")
     ] = None,
+    settings: Settings = None,
 ) -> None:
     """Fit a calibration of a camera's counts to black bodies.
 
@@ -73,7 +77,8 @@ def calibrate(
     from chipglow.cli.pictures import check_picture_path
     from chipglow.cli.quantities import parse
     from chipglow.io.atomic import check_folder
-    from chipglow.io.column_file import POINT_COLUMNS, read_columns
+    from chipglow.io.column_file import read_calibration_points
+    from chipglow.study.measured import uniform_counts
     from chipglow.study.measurement_schema import band_of
     from chipglow.study.units import TEMPERATURE_DIFFERENCE, TIME
 
@@ -82,7 +87,18 @@ def calibrate(
     for path in (out, plot):
         if path is not None:
             check_folder(path)
-    table = read_columns(points, POINT_COLUMNS)
+
+    recordings = []
+
+    def counts_of(file: str) -> float:
+        recordings.append(file)
+        return uniform_counts(points.parent / file, settings or ())
+
+    table = read_calibration_points(points, counts_of)
+    if settings and not recordings:
+        raise ValueError(
+            f"--set: {settings[0]!r} describes nothing, as {points} names no recordings (file)"
+        )
     known: dict[str, Any] = {
         "count_uncertainty": table.get("count_uncertainty"),
         "temperature_uncertainty": table.get("temperature_uncertainty"),

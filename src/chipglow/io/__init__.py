@@ -5,9 +5,12 @@ from chipglow.io.band_file import read_curve, write_band_profile
 from chipglow.io.cameras import CAMERA_FORMATS, CameraFormat, read_recording, write_hcc
 from chipglow.io.comparison_file import write_comparison
 from chipglow.io.emissivity_file import (
+    StoredEmissivity,
     read_emissivity_map,
+    read_region_emissivity,
     write_emissivity,
     write_emissivity_table,
+    write_temperature_table,
 )
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import (
@@ -38,6 +41,7 @@ __all__ = [
     "CameraFormat",
     "Import",
     "SceneWriter",
+    "StoredEmissivity",
     "StoredScene",
     "UnfinishedScene",
     "View",
@@ -56,6 +60,7 @@ __all__ = [
     "read_pictures",
     "read_points",
     "read_recording",
+    "read_region_emissivity",
     "read_scene",
     "read_tool_outline",
     "unfinished_scenes",
@@ -69,4 +74,5 @@ __all__ = [
     "write_psf",
     "write_rake_grid",
     "write_scene",
+    "write_temperature_table",
 ]

@@ -2,8 +2,9 @@
 
 import csv
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Final
 
@@ -32,6 +33,8 @@ class Column:
         Whether it is a difference, of which the zero of the unit does not count.
     required : bool
         Whether it must be there.
+    number_of : callable, optional
+        What makes a number of a cell's text, if the text is none, such as a file's name.
     """
 
     name: str
@@ -39,6 +42,7 @@ class Column:
     quantity: str = ""
     difference: bool = False
     required: bool = True
+    number_of: Callable[[str], float] | None = None
 
     @property
     def title(self) -> str:
@@ -47,12 +51,11 @@ class Column:
 
 
 TEMPERATURE: Final = Column("temperature", "degC", "temperature")
-POINT_COLUMNS: Final = (
-    TEMPERATURE,
-    Column("counts"),
+_POINT_UNCERTAINTIES: Final = (
     Column("count_uncertainty", required=False),
     Column("temperature_uncertainty", "K", "temperature", difference=True, required=False),
 )
+POINT_COLUMNS: Final = (TEMPERATURE, Column("counts"), *_POINT_UNCERTAINTIES)
 """Points of a calibration."""
 
 _RESPONSE_COLUMNS: Final = (Column("wavelength", "um", "x"), Column("response"))
@@ -97,11 +100,44 @@ def read_columns(
     for column in columns:
         if names.count(column.name) > 1 or (column.required and column.name not in names):
             raise ValueError(f"{path}, line 1: expected a column {column.title!r}, once")
-    numbers = np.array([_numbers(path, number, row, len(found)) for number, row in rows[1:]])
+    numbers = np.array([_numbers(path, number, row, found) for number, row in rows[1:]])
     return {
         column.name: unit.scale * values + (0.0 if column.difference else unit.offset)
         for (column, unit), values in zip(found, numbers.T, strict=True)
     }
+
+
+def read_calibration_points(
+    path: str | os.PathLike[str], counts_of: Callable[[str], float]
+) -> dict[str, NDArray[np.float64]]:
+    """Read points of a calibration from a CSV file.
+
+    Parameters
+    ----------
+    path : path-like
+        A table of `POINT_COLUMNS`; the column ``file`` may take the place of ``counts``.
+    counts_of : callable
+        Counts of a recording by its name in that column.
+
+    Returns
+    -------
+    dict
+        As `read_columns`.
+
+    Raises
+    ------
+    ValueError
+        If it is no such table; the message names the file and the line.
+    OSError
+        If it, or a recording, cannot be read.
+    """
+    first = read_small_text(Path(path)).partition("\n")[0]
+    if "file" not in (cell.strip() for cell in first.split(",")):
+        return read_columns(path, POINT_COLUMNS)
+    file_column = Column("file", number_of=counts_of)
+    table = read_columns(path, (TEMPERATURE, file_column, *_POINT_UNCERTAINTIES))
+    table["counts"] = table.pop("file")
+    return table
 
 
 def _column(path: Path, cell: str, columns: Sequence[Column]) -> tuple[Column, Unit]:
@@ -122,17 +158,26 @@ def _column(path: Path, cell: str, columns: Sequence[Column]) -> tuple[Column, U
     raise ValueError(f"{path}, line 1: unknown column {cell[:60]!r}, expected {expected}")
 
 
-def _numbers(path: Path, number: int, row: list[str], count: int) -> list[float]:
+def _numbers(
+    path: Path, number: int, row: list[str], columns: Sequence[tuple[Column, Unit]]
+) -> list[float]:
+    if len(row) == len(columns):
+        cells = list(zip(row, columns, strict=True))
+        plain = [cell for cell, (column, _) in cells if column.number_of is None]
+        if all(map(_is_number, plain)):
+            return [(column.number_of or float)(cell.strip()) for cell, (column, _) in cells]
+    what = "numbers" if all(column.number_of is None for column, _ in columns) else "values"
+    raise ValueError(
+        f"{path}, line {number}: {','.join(row)[:80]!r}, expected {len(columns)} {what} separated "
+        "by commas"
+    )
+
+
+def _is_number(text: str) -> bool:
     try:
-        values = [float(cell) for cell in row]
+        return isfinite(float(text))
     except ValueError:
-        values = []
-    if len(values) != count or not np.isfinite(values).all():
-        raise ValueError(
-            f"{path}, line {number}: {','.join(row)[:80]!r}, expected {count} numbers separated by "
-            "commas"
-        )
-    return values
+        return False
 
 
 def read_response(path: str | os.PathLike[str]) -> TabulatedResponse:

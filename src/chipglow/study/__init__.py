@@ -14,7 +14,7 @@ from chipglow.study.files import (
 )
 from chipglow.study.fitting import Fitted, fit
 from chipglow.study.import_schema import ImportDescription
-from chipglow.study.measured import load_measurement, load_recording, measurement_of
+from chipglow.study.measured import load_measurement, load_recording, measurement_of, uniform_counts
 from chipglow.study.measurement_schema import MeasurementDescription
 from chipglow.study.preview import preview_raster
 from chipglow.study.reference import FieldEntry, field_entries, field_tables
@@ -63,5 +63,6 @@ __all__ = [
     "study_text",
     "surface_text",
     "tool_of",
+    "uniform_counts",
     "write_registration",
 ]

@@ -17,7 +17,8 @@ from chipglow.camera import (
     develop_recording,
     find_bad_pixels,
 )
-from chipglow.io import is_measurement, read_measurement, read_recording
+from chipglow.io import CAMERA_FORMATS, is_measurement, read_measurement, read_recording
+from chipglow.io.cameras.recordings import find_format
 from chipglow.study.files import StudyError, load_calibration, load_description
 from chipglow.study.measurement_schema import MeasurementDescription
 
@@ -117,6 +118,53 @@ def measurement_of(
         raise StudyError(f"{name}: {error}") from error
 
 
+def uniform_counts(source: str | Path, settings: Iterable[str] = ()) -> float:
+    """Mean counts of a recording of a uniform object, such as a black body.
+
+    Its sensors are corrected as those of a measurement with the same description: the counts are
+    those that a calibration for such measurements needs.
+
+    Parameters
+    ----------
+    source : str or Path
+        A camera's file, or a YAML file (.yaml, .yml) that describes one.
+    settings : iterable of str
+        Fields of the description.
+
+    Returns
+    -------
+    float
+        Mean over all frames and all pixels that are not bad.
+
+    Raises
+    ------
+    ValueError
+        If it holds no counts, is saturated, or something does not fit; the message names the file.
+    OSError
+        If a file cannot be read.
+    """
+    description = load_description(source, settings)
+    recording = load_recording(description)
+    try:
+        if recording.quantity != "counts":
+            raise ValueError(f"holds {recording.quantity}, expected counts")
+        uniform = _uniform_frames(description, recording)
+        bad = _bad_pixels(description, recording, uniform)
+        signal = recording.signal.astype(np.float64)
+        if uniform is not None and description.uniform.correct:
+            signal = uniform.correction.apply(signal)
+        good = np.isfinite(signal).all(axis=0) & (True if bad is None else ~bad)
+        if not good.any():
+            raise ValueError("all pixels are bad, expected some that are not")
+        if recording.saturation is not None:
+            share = float(np.mean(recording.signal[:, good] > recording.saturation))
+            if share > 0:
+                raise ValueError(f"{share:.2%} of it is saturated, expected a darker object")
+    except ValueError as error:
+        raise StudyError(f"{Path(source).name}: {error}") from error
+    return float(signal[:, good].mean())
+
+
 @dataclass(frozen=True, eq=False)
 class _Uniform:
     """Frames of one or two uniform objects."""
@@ -151,7 +199,12 @@ def _uniform_frames(description: MeasurementDescription, recording: Recording) -
 
 
 def _uniform(description: MeasurementDescription, recording: Recording, name: str) -> NDArray[Any]:
-    found = _read(description, getattr(description.uniform, name), every=True)
+    file = getattr(description.uniform, name)
+    if CAMERA_FORMATS[find_format(Path(file))].tells_quantity:
+        # What the description says of the recording's file, this file says itself.
+        found = read_recording(file)
+    else:
+        found = _read(description, file, every=True)
     problem = _misfit(found, recording)
     if problem is not None:
         raise ValueError(f"uniform.{name}: {problem}")
