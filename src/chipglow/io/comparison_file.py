@@ -9,7 +9,7 @@ import numpy as np
 
 from chipglow.analysis import Comparison, PlaceResult, Reading, normalised_error
 from chipglow.io.atomic import RESULT_MARK
-from chipglow.io.table_file import celsius_text, number_text, write_rows
+from chipglow.io.table_file import celsius_text, number_text, write_table
 
 _TABLE: Final = "comparison.csv"
 _COLUMNS: Final = (
@@ -39,7 +39,7 @@ def write_comparison(comparison: Comparison, folder: Path) -> None:
         uncertainty (k = 2), and ``summary.json``, the fits, sentences and what is
         assumed or doubtful; both with units in the names of the columns and keys.
     """
-    write_rows(folder / _TABLE, _COLUMNS, _rows(comparison))
+    write_table(folder / _TABLE, _COLUMNS, _rows(comparison))
     summary = {
         "statement": comparison.statement,
         "simulations": list(comparison.labels),

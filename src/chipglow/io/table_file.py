@@ -60,13 +60,12 @@ def write_table_or_dataset(
     if path.suffix.lower() == ".nc":
         write_dataset(dataset(), path)
         return
-    with atomic_path(path) as temporary:
-        write_rows(temporary, columns, rows)
+    write_table(path, columns, rows)
 
 
-def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Write a table as CSV, its first line the names of the columns."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a table as CSV, its first line the names of the columns; it is whole or not there."""
+    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         table.writerow(columns)
         table.writerows(rows)
