@@ -11,7 +11,6 @@ itself, and how many are wrong beyond that without a doubt being raised.
 
 import argparse
 import time
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import cos, pi, radians, sin

@@ -15,6 +15,7 @@ from chipglow.analysis.comparison import (
     compare,
     normalised_error,
 )
+from chipglow.analysis.dots import DotFit, Dots, find_dots, fit_dots
 from chipglow.analysis.emissivity import (
     EmissivityLine,
     EmissivityMap,
@@ -55,6 +56,8 @@ __all__ = [
     "ChipScan",
     "Circle",
     "Comparison",
+    "DotFit",
+    "Dots",
     "Doubts",
     "EmissivityLine",
     "EmissivityMap",
@@ -99,8 +102,10 @@ __all__ = [
     "emissivity_line",
     "error_images",
     "find_band",
+    "find_dots",
     "find_shear_band",
     "find_tool",
+    "fit_dots",
     "fit_images",
     "fit_points",
     "inertia",
