@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter, gaussian_laplace, maximum_filter
+from scipy.ndimage import convolve, gaussian_filter, gaussian_laplace, maximum_filter
 from scipy.optimize import least_squares
 from scipy.special import erfc
 
@@ -28,6 +28,9 @@ _FEWEST_PIXELS: Final = 16
 _WORST: Final = 0.2
 _SCATTER: Final = 3.0
 _ROOM: Final = 2.0
+_AGAIN: Final = 4
+_ENOUGH: Final = 1e-6
+_ALIKE_PIXELS: Final = 4
 
 
 @dataclass(frozen=True)
@@ -149,7 +152,8 @@ def find_dots(image: NDArray[np.generic], name: str = "image") -> Dots:
     Extrema of the normalised Laplacian of Gaussians over place and size (Lindeberg, Int. J. Comput.
     Vision 30 (1998) 79) that are round: of these the group of like size, contrast and sign that
     stands out most. The middle is that of a disc with a soft edge, in light that falls off
-    to one side, by least squares; its uncertainty follows from the residuals.
+    to one side, by least squares, after the others are taken away; its uncertainty follows from
+    the residuals and their correlation.
     """
     known = np.isfinite(np.asarray(image, np.float64))
     values = np.asarray(image, np.float64)
@@ -159,16 +163,17 @@ def find_dots(image: NDArray[np.generic], name: str = "image") -> Dots:
     sizes, strength = _strengths(filled)
     groups = [_alike(_blobs(filled, sizes, sign * strength)) for sign in (-1.0, 1.0)]
     bright = _weight(groups[0]) >= _weight(groups[1])
-    fits = [_disc(filled, known, *blob[:3]) for blob in groups[0 if bright else 1]]
-    kept = np.array([fit for fit in fits if fit is not None and (fit[4] > 0) == bright])
-    if kept.size:
-        likely = np.median(kept[:, 3])
-        kept = kept[(kept[:, 3] < _ALIKE_SIZE * likely) & (kept[:, 3] > likely / _ALIKE_SIZE)]
-    if len(kept) < FEWEST_DOTS:
+    discs = _discs(filled, known, groups[0 if bright else 1], bool(bright))
+    if len(discs) < FEWEST_DOTS:
         raise ValueError(
-            f"{name}: {len(kept)} dots are found, expected a target with {FEWEST_DOTS} or more"
+            f"{name}: {len(discs)} dots are found, expected a target with {FEWEST_DOTS} or more"
         )
-    return Dots(kept[:, :2], kept[:, 2], float(np.median(kept[:, 3])), bool(bright))
+    return Dots(
+        np.array([(disc.column, disc.row) for disc in discs]),
+        np.array([disc.unsure for disc in discs]) * _correlation(discs),
+        float(np.median([disc.radius for disc in discs])),
+        bool(bright),
+    )
 
 
 def _strengths(image: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -191,7 +196,16 @@ def _blobs(
     strongest = np.flatnonzero((room > _WINDOW * size) & (level > 0) & (level < len(sizes) - 1))
     strongest = strongest[np.argsort(found[strongest])[::-1][:_MOST]]
     blobs = np.stack([column, row, size, found], axis=1)[strongest]
-    return blobs[_roundness(image, blobs) > _ROUND]
+    return _apart(blobs[_roundness(image, blobs) > _ROUND])
+
+
+def _apart(blobs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Blobs in order of strength, without those that lie on a stronger one."""
+    left, kept = blobs, []
+    while len(left):
+        kept.append(left[0])
+        left = left[np.hypot(*(left[:, :2] - left[0, :2]).T) > left[0, 2]]
+    return np.array(kept).reshape(-1, 4)
 
 
 def _roundness(image: NDArray[np.float64], blobs: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -223,20 +237,91 @@ def _alike(blobs: NDArray[np.float64]) -> NDArray[np.float64]:
     return best
 
 
+@dataclass(frozen=True)
+class _Disc:
+    """A disc with a soft edge, and what of the image is not as it says."""
+
+    column: float
+    row: float
+    unsure: float
+    radius: float
+    softness: float
+    contrast: float
+    size: float
+    residual: NDArray[np.float64]
+
+    def brightness(
+        self, columns: NDArray[np.float64], rows: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Over that of the ground."""
+        distance = np.hypot(columns - self.column, rows - self.row)
+        return np.asarray(self.contrast * erfc((distance - self.radius) / self.softness) / 2)
+
+
+def _discs(
+    image: NDArray[np.float64],
+    known: NDArray[np.bool_],
+    blobs: NDArray[np.float64],
+    bright: bool,
+) -> list[_Disc]:
+    """Discs of like radius at blobs, fitted again without the skirts of their neighbours."""
+    first = [_disc(image, known, *blob[:3]) for blob in blobs.tolist()]
+    discs = _like(first, bright)
+    for _ in range(_AGAIN):
+        rest = _without(image, discs)
+        again = [_disc(rest, known, d.column, d.row, d.size, d) for d in discs]
+        discs = _like(again, bright)
+    return discs
+
+
+def _without(image: NDArray[np.float64], discs: list[_Disc]) -> NDArray[np.float64]:
+    """An image without the discs."""
+    rest = image.copy()
+    for disc in discs:
+        reach = disc.radius + 3 * disc.softness
+        part, columns, rows = _window(image.shape, disc.column, disc.row, reach)
+        rest[part] -= disc.brightness(columns, rows)
+    return rest
+
+
+def _window(
+    shape: tuple[int, ...], column: float, row: float, reach: float
+) -> tuple[tuple[slice, slice], NDArray[np.float64], NDArray[np.float64]]:
+    """The part of an image round a place, and its columns and rows."""
+    part = (
+        slice(max(round(row - reach), 0), min(round(row + reach) + 1, shape[0])),
+        slice(max(round(column - reach), 0), min(round(column + reach) + 1, shape[1])),
+    )
+    rows, columns = np.mgrid[part].astype(np.float64)
+    return part, columns, rows
+
+
+def _like(found: list[_Disc | None], bright: bool) -> list[_Disc]:
+    """Those whose radius is like the others', and which are bright or dark as they should be."""
+    discs = [disc for disc in found if disc is not None and (disc.contrast > 0) == bright]
+    likely = float(np.median([disc.radius for disc in discs])) if discs else 0.0
+    return [d for d in discs if likely / _ALIKE_SIZE < d.radius < _ALIKE_SIZE * likely]
+
+
 def _disc(
     image: NDArray[np.float64],
     known: NDArray[np.bool_],
     column: float,
     row: float,
     size: float,
-) -> tuple[float, float, float, float, float] | None:
-    """Column, row, uncertainty, radius and contrast of a disc; None if it is none."""
+    own: _Disc | None = None,
+) -> _Disc | None:
+    """The disc near a place in an image from which its own brightness was taken, if given."""
     reach = max(_WINDOW * size, _LEAST_WINDOW)
-    x, y, values = _around(image, known, column, row, reach)
-    scale = float(np.ptp(values)) if values.size else 0.0
-    if values.size < _FEWEST_PIXELS or not scale > 0:
+    part, columns, rows = _window(image.shape, column, row, reach)
+    used = (np.hypot(columns - column, rows - row) <= reach) & known[part]
+    values = image[part] if own is None else image[part] + own.brightness(columns, rows)
+    x, y = columns[used] - column, rows[used] - row
+    middle = np.hypot(x, y) < size
+    if used.sum() < _FEWEST_PIXELS or not middle.any() or not np.ptp(values[used]) > 0:
         return None
-    target, middle = values / scale, np.hypot(x, y) < size
+    scale = float(np.ptp(values[used]))
+    target = values[used] / scale
 
     def residual(p: NDArray[np.float64]) -> NDArray[np.float64]:
         edge = (np.hypot(x - p[0], y - p[1]) - p[2]) / p[3]
@@ -246,32 +331,36 @@ def _disc(
     ground = float(target[~middle].mean())
     contrast = float(target[middle].mean()) - ground
     begin = [0.0, 0.0, 1.4 * size, 0.7 * size, contrast, ground, 0.0, 0.0]
+    if own is not None:
+        begin[2:5] = own.radius, own.softness, own.contrast / scale
     upper = [reach / 2, reach / 2, 2 * reach, 2 * reach, 20.0, np.inf, 1 / reach, 1 / reach]
     lower = [-b for b in upper]
     lower[2] = lower[3] = 0.05 * size
-    fit = least_squares(residual, begin, bounds=(lower, upper), x_scale="jac")
-    variance = float(fit.fun @ fit.fun) / (values.size - len(begin))
+    begin = np.clip(begin, lower, upper).tolist()
+    fit = least_squares(residual, begin, bounds=(lower, upper), x_scale="jac", ftol=_ENOUGH)
+    variance = float(fit.fun @ fit.fun) / (target.size - len(begin))
     spread = np.linalg.pinv(fit.jac.T @ fit.jac)[:2, :2]
     unsure = float(np.sqrt(variance * np.trace(spread) / 2))
     if not 0 < unsure < _WORST * size:
         return None
-    return column + fit.x[0], row + fit.x[1], unsure, float(fit.x[2]), float(fit.x[4])
+    rest = np.zeros(used.shape)
+    rest[used] = fit.fun
+    right, down, radius, softness, height = fit.x[:5].tolist()
+    return _Disc(column + right, row + down, unsure, radius, softness, scale * height, size, rest)
 
 
-def _around(
-    image: NDArray[np.float64],
-    known: NDArray[np.bool_],
-    column: float,
-    row: float,
-    reach: float,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Distances along columns and rows from a place, and the values there."""
-    top, left = (max(round(v - reach), 0) for v in (row, column))
-    part = np.s_[top : round(row + reach) + 1, left : round(column + reach) + 1]
-    rows, columns = np.indices(image[part].shape)
-    x, y = columns + left - column, rows + top - row
-    used = (np.hypot(x, y) <= reach) & known[part]
-    return x[used], y[used], image[part][used]
+def _correlation(discs: list[_Disc]) -> float:
+    """How much more uncertain a middle is as the residuals of neighbours are alike, 1 or more.
+
+    Newey and West's sum of their correlations up to four pixels away, over all discs.
+    """
+    weights = np.bartlett(2 * _ALIKE_PIXELS + 1)
+    kernel = np.outer(weights, weights)
+    sums = sum(
+        float((d.residual * convolve(d.residual, kernel, mode="constant")).sum()) for d in discs
+    )
+    squares = sum(float((d.residual**2).sum()) for d in discs)
+    return float(np.sqrt(max(sums / max(squares, 1e-300), 1.0)))
 
 
 def _scattered(scatter: float, expected: float) -> tuple[str, ...]:
