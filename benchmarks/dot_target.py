@@ -3,8 +3,8 @@
 A heated plate: its holes radiate more than its surface, so they are bright in the infrared; in the
 visible picture they are dark.
 
-``python benchmarks/dot_target.py 300 20`` registers 20 targets, of seeds 300 and up, with the settings
-of `DotTarget.drawn`, and prints how far off each map is and what it says of itself.
+``python benchmarks/dot_target.py 300 20`` registers 20 targets, of seeds 300 and up, with settings
+from `DotTarget.drawn`, and prints how far off each map is and what it says of itself.
 """
 
 import argparse

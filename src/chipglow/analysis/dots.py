@@ -27,10 +27,12 @@ _LEAST_WINDOW: Final = 3.0
 _FEWEST_PIXELS: Final = 16
 _WORST: Final = 0.2
 _SCATTER: Final = 3.0
+_SYSTEMATIC: Final = 0.02
 _ROOM: Final = 2.0
-_AGAIN: Final = 4
+_AGAIN: Final = 12
+_SETTLED: Final = 0.2
 _ENOUGH: Final = 1e-6
-_ALIKE_PIXELS: Final = 4
+_ALIKE_PIXELS: Final = 8
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,9 @@ def fit_dots(
     -----
     The dots of both images are put to each other by their arrangement (`match_dots`), their middles
     are the points of `fit_points`. It is a doubt if they scatter more than three times what the
-    uncertainty of the middles explains: then the map is of another kind than the model.
+    uncertainty of the middles explains: then the map is of another kind than the model. A fiftieth
+    of a sensor is added for the shift, and for each slope at the image's corner, for what all dots
+    have in common: light and blurred skirts that are not quite as the fit takes them.
     """
     dots = find_dots(infrared, "infrared image"), find_dots(visible, "visible picture")
     match = match_dots(
@@ -128,7 +132,8 @@ def fit_dots(
     variance = (scale * dots[0].uncertainty[match.first]) ** 2
     expected = float(np.sqrt((variance + dots[1].uncertainty[match.second] ** 2).mean()))
     doubts = (*fit.registration.doubts, *match.doubts, *_scattered(fit.scatter, expected))
-    found = replace(fit.registration, method="dots", doubts=doubts)
+    covariance = fit.registration.covariance + _systematic(fit.registration, raster)
+    found = replace(fit.registration, covariance=covariance, method="dots", doubts=doubts)
     return DotFit(replace(fit, registration=found), positions, pixels, *dots)
 
 
@@ -270,8 +275,19 @@ def _discs(
     for _ in range(_AGAIN):
         rest = _without(image, discs)
         again = [_disc(rest, known, d.column, d.row, d.size, d) for d in discs]
-        discs = _like(again, bright)
+        before, discs = discs, _like(again, bright)
+        if _settled(before, discs):
+            break
     return discs
+
+
+def _settled(before: list[_Disc], discs: list[_Disc]) -> bool:
+    """Whether no middle moved by much of its uncertainty."""
+    moves = [
+        max(abs(new.column - old.column), abs(new.row - old.row)) / new.unsure
+        for old, new in zip(before, discs, strict=False)
+    ]
+    return len(before) == len(discs) and max(moves, default=0.0) < _SETTLED
 
 
 def _without(image: NDArray[np.float64], discs: list[_Disc]) -> NDArray[np.float64]:
@@ -352,7 +368,7 @@ def _disc(
 def _correlation(discs: list[_Disc]) -> float:
     """How much more uncertain a middle is as the residuals of neighbours are alike, 1 or more.
 
-    Newey and West's sum of their correlations up to four pixels away, over all discs.
+    Newey and West's sum of their correlations up to eight pixels away, over all discs.
     """
     weights = np.bartlett(2 * _ALIKE_PIXELS + 1)
     kernel = np.outer(weights, weights)
@@ -361,6 +377,20 @@ def _correlation(discs: list[_Disc]) -> float:
     )
     squares = sum(float((d.residual**2).sum()) for d in discs)
     return float(np.sqrt(max(sums / max(squares, 1e-300), 1.0)))
+
+
+def _systematic(found: Registration, raster: Raster) -> NDArray[np.float64]:
+    """Covariance of shift, turn and scale that are a little wrong in the same way for all dots."""
+    left, right, bottom, top = raster.extent
+    middle = np.array([(left + right) / 2, (bottom + top) / 2])
+    pixels = _SYSTEMATIC * raster.spacing * np.sqrt(abs(np.linalg.det(found.jacobian(middle))))
+    elements = np.eye(3)
+    elements[:2] /= np.hypot(right - left, top - bottom) / 2
+    elements[2, :2] = -elements[[0, 1], [0, 1]] * middle
+    covariance = np.zeros((9, 9))
+    for row in (slice(0, 3), slice(3, 6)):
+        covariance[row, row] = pixels**2 * elements @ elements.T
+    return covariance
 
 
 def _scattered(scatter: float, expected: float) -> tuple[str, ...]:
