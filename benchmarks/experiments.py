@@ -13,6 +13,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from hashlib import sha256
+from inspect import getmodule, getsource
 from math import isfinite
 from pathlib import Path
 from time import perf_counter
@@ -21,7 +22,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from chipglow.analysis import ChipMetrics, chip_metrics
+from chipglow.analysis import ChipMetrics, chip_metrics, contact_length, segmentation
 from chipglow.cutting import (
     SOLVER_VERSION,
     CuttingConditions,
@@ -62,6 +63,7 @@ STEPS_A_FRAME = 2
 BUILD_UP = 0.4  # share of the cut before the frames
 SAMPLE = 4e-6
 NOT_READ = "†"
+METRICS = (chip_metrics, contact_length, segmentation)
 
 
 @dataclass(frozen=True)
@@ -223,8 +225,9 @@ def drift(history: ForceHistory) -> float:
 
 
 def result_path(simulation: CuttingSimulation, name: str, folder: Path = RESULTS) -> Path:
-    """Where the means of a cut are kept; another solver, cell or condition is another file."""
-    state = repr((SOLVER_VERSION, STEP, STEPS_A_FRAME, BUILD_UP, SAMPLE, simulation))
+    """Where the means of a cut are kept; another solver, metric or condition is another file."""
+    metrics = [getsource(getmodule(metric)) for metric in METRICS]
+    state = repr((SOLVER_VERSION, metrics, STEP, STEPS_A_FRAME, BUILD_UP, SAMPLE, simulation))
     return folder / f"{name}-{sha256(state.encode()).hexdigest()[:16]}.json"
 
 

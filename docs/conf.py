@@ -3,7 +3,13 @@
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
-from chipglow.study import ImportDescription, Study, field_tables, study_text
+from chipglow.study import (
+    ImportDescription,
+    MeasurementDescription,
+    Study,
+    field_tables,
+    study_text,
+)
 
 HERE = Path(__file__).parent
 GENERATED = HERE / "generated"
@@ -25,6 +31,7 @@ exclude_patterns = [
     "generated/*.yaml",
     "generated/fields.md",
     "generated/import-fields.md",
+    "generated/measurement-fields.md",
     "verification/*",
 ]
 default_role = "py:obj"
@@ -62,4 +69,9 @@ GENERATED.mkdir(exist_ok=True)
 # So does the page on imports.
 (GENERATED / "import-fields.md").write_text(
     field_tables(ImportDescription(), "import"), encoding="utf-8"
+)
+
+# And the page on measurements.
+(GENERATED / "measurement-fields.md").write_text(
+    field_tables(MeasurementDescription(), "measurement"), encoding="utf-8"
 )

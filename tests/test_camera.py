@@ -23,6 +23,7 @@ from chipglow.camera import (
 )
 from chipglow.camera.exposure import expose, frame_weights
 from chipglow.camera.sampling import integrate, overlap_lengths, sensor_raster
+from chipglow.io import read_measurement, write_measurement
 from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Raster, Scene
 from chipglow.surface import EmissivityField, Surface, UniformSurface
@@ -385,11 +386,27 @@ def test_without_a_floor_only_darkness_is_flagged():
 
 def test_flagged_temperatures_need_the_band():
     measured = Camera().measure(make_scene(np.full((1, 9, 9), 500.0)), BLACK, 0.0)
-    # A response curve does not fit an attribute.
-    camera = Camera(band=Band(3e-6, 5e-6, response=np.ones_like))
-    measured.data.attrs = camera._attributes()
-    with pytest.raises(ValueError, match="band_lower"):
+    del measured.data.attrs["band_upper"]
+    with pytest.raises(ValueError, match="band_upper"):
         measured.radiance_temperature(flagged=True)
+
+
+def test_a_measurement_keeps_a_response_that_is_no_box(tmp_path):
+    def hill(wavelength):
+        return np.exp(-(((wavelength - 4.2e-6) / 0.3e-6) ** 2))
+
+    band = Band(3e-6, 5e-6, response=hill)
+    measured = Camera(band=band, floor=600.0).measure(
+        make_scene(np.full((1, 9, 9), 500.0)), BLACK, 0.0
+    )
+    write_measurement(measured, tmp_path / "measured.nc")
+    again = read_measurement(tmp_path / "measured.nc")
+    # The response is kept at the nodes of the integral: nothing is lost but rounding.
+    np.testing.assert_allclose(again.band.radiance(800.0), band.radiance(800.0), rtol=1e-12)
+    again.data = again.data.drop_vars("wavelength")
+    del again.__dict__["band"]
+    with pytest.raises(ValueError, match="'response' over 'wavelength'"):
+        again.band.radiance(800.0)
 
 
 def test_measurement_tells_camera_place_and_units():

@@ -534,7 +534,7 @@ def test_the_command_fits_over_the_temperature(folder):
         (["a.nc", "--truth", "391degC", "--environment", "3 um"], "--environment: '3 um'"),
         (["a.nc", "--truth", "391degC", "--truth-uncertainty", "2"], "--truth-uncertainty: 2 has"),
         (["a.nc", "--truth", "1 K", "--truth", "2 K"], "--truth: 2 temperatures for 1 images"),
-        (["none.nc", "--truth", "391degC"], "none.nc: there is no such file"),
+        (["none.nc", "--truth", "391degC"], "none.nc: No such file"),
         (["a.nc", "--truth", "391degC", "--plot", "p.doc"], "--plot: p.doc"),
         (["a.nc", "--truth", "391degC", "--out", "no/e.nc"], "there is no folder no"),
         (["a.nc", "--truth", "391degC", "--set", "band=1"], "--set"),

@@ -16,6 +16,8 @@ from chipglow.analysis.comparison import (
     normalised_error,
 )
 from chipglow.analysis.dots import DotFit, Dots, find_dots, fit_dots
+from chipglow.analysis.edge_image import EdgeImage, edge_image
+from chipglow.analysis.edge_line import EdgeLine, NoEdgeError, find_edge
 from chipglow.analysis.emissivity import (
     EmissivityLine,
     EmissivityMap,
@@ -33,9 +35,12 @@ from chipglow.analysis.error import (
 )
 from chipglow.analysis.find_tool import FoundTool, find_tool
 from chipglow.analysis.inertia import Inertia, inertia
+from chipglow.analysis.knife_edge import EdgeResult, KnifeEdge, knife_edge
 from chipglow.analysis.lines import Line, sample, straight_line
 from chipglow.analysis.mutual_information import ImageFit, fit_images
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
+from chipglow.analysis.psf_fit import ModelFit
+from chipglow.analysis.radial_psf import RadialPSF
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
 from chipglow.analysis.rake_grid import RakeGrid, rake_grid
 from chipglow.analysis.regions import Area, Circle, Polygon, Region, areas, shared_pixels
@@ -44,10 +49,18 @@ from chipglow.analysis.ridge import NoShearBandError
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
 from chipglow.analysis.shear_band import ShearBand, find_shear_band
+from chipglow.analysis.size_of_source import ApertureImage, aperture_image
+from chipglow.analysis.temperature import (
+    KnownEmissivity,
+    Surroundings,
+    TrueTemperature,
+    true_temperature,
+)
 from chipglow.analysis.time_alignment import TimeAlignment, align_times, simultaneous_frames
 
 __all__ = [
     "PAPER",
+    "ApertureImage",
     "Area",
     "BandComparison",
     "BandErrors",
@@ -59,6 +72,9 @@ __all__ = [
     "DotFit",
     "Dots",
     "Doubts",
+    "EdgeImage",
+    "EdgeLine",
+    "EdgeResult",
     "EmissivityLine",
     "EmissivityMap",
     "ErrorImages",
@@ -68,12 +84,17 @@ __all__ = [
     "Heating",
     "ImageFit",
     "Inertia",
+    "KnifeEdge",
+    "KnownEmissivity",
     "Line",
+    "ModelFit",
+    "NoEdgeError",
     "NoShearBandError",
     "PlaceResult",
     "Plan",
     "PointFit",
     "Polygon",
+    "RadialPSF",
     "RakeErrors",
     "RakeGrid",
     "Reading",
@@ -87,10 +108,13 @@ __all__ = [
     "ShearBand",
     "Stage",
     "StudyResult",
+    "Surroundings",
     "ThermalImage",
     "TimeAlignment",
+    "TrueTemperature",
     "align_times",
     "analyse",
+    "aperture_image",
     "areas",
     "band_errors",
     "band_profile",
@@ -98,17 +122,20 @@ __all__ = [
     "compare",
     "contact_length",
     "determine_emissivity",
+    "edge_image",
     "emissivity_covariance",
     "emissivity_line",
     "error_images",
     "find_band",
     "find_dots",
+    "find_edge",
     "find_shear_band",
     "find_tool",
     "fit_dots",
     "fit_images",
     "fit_points",
     "inertia",
+    "knife_edge",
     "normalised_error",
     "rake_errors",
     "rake_grid",
@@ -119,4 +146,5 @@ __all__ = [
     "shared_pixels",
     "simultaneous_frames",
     "straight_line",
+    "true_temperature",
 ]

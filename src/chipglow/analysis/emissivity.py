@@ -10,8 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from chipglow.analysis.observations import (
+    Scatter,
+    check_same_pixels,
+    count_flags,
+    flag_text,
+    observed_flags,
+    observed_radiance,
+    told_calibration,
+)
 from chipglow.analysis.regions import Area
-from chipglow.camera import UNUSABLE, Flag, Measurement
+from chipglow.camera import Flag, Measurement
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 
@@ -165,15 +174,12 @@ class EmissivityMap:
             If fewer than two of its pixels can be used.
         """
         usable = area.mask & np.isfinite(self.mean_radiance)
-        flagged = {
-            flag: int((self.flags[area.mask] & flag != 0).sum())
-            for flag in (Flag.BELOW_FLOOR, Flag.SATURATED, Flag.DEAD)
-        }
+        flagged = count_flags(self.flags[area.mask])
         count = int(usable.sum())
         if count < 2:
             raise ValueError(
                 f"region {area.name}: {count} of its {int(area.mask.sum())} pixels can be used "
-                f"({_flag_text(flagged)}), expected 2 or more"
+                f"({flag_text(flagged)}), expected 2 or more"
             )
         values = emissivity_of_radiance(self.radiance[:, usable], self.heating, self.band)
         mean_radiance = self.mean_radiance[usable].mean()
@@ -196,7 +202,7 @@ class EmissivityMap:
                 for cause in COMMON
             },
             observed=values.mean(axis=1),
-            scatter=_scatter(values),
+            scatter=Scatter.of(values),
         )
 
     @property
@@ -217,33 +223,6 @@ class EmissivityMap:
             environment = shifted if cause == "environment" else heating.environment
             ends.append(_emissivity(radiance, *band.radiance(np.array([truth, environment]))))
         return (ends[1] - ends[0]) / 2
-
-
-@dataclass(frozen=True)
-class Scatter:
-    """What the observations of an area tell of chance; standard uncertainties of its mean.
-
-    Parameters
-    ----------
-    repeatability : float
-        Of what changes from one observation to the next in the whole area, over what noise
-        explains; NaN of one observation.
-    noise : float
-        Of the pixels' noise. Of one observation, an upper limit: the spread over the pixels, of
-        which noise is a part, divided by the root of their number.
-    degrees_of_freedom : float
-        Of both together.
-    """
-
-    repeatability: float
-    noise: float
-    degrees_of_freedom: float
-
-    @property
-    def standard_uncertainty(self) -> float:
-        """Of both together."""
-        repeatability = self.repeatability if isfinite(self.repeatability) else 0.0
-        return float(np.hypot(repeatability, self.noise))
 
 
 @dataclass(frozen=True, eq=False)
@@ -338,7 +317,7 @@ class RegionEmissivity:
         if self.left_out > _DOUBTFUL_SHARE * total:
             text = (
                 f"{self.name}: {self.left_out} of {total} pixels are left out "
-                f"({_flag_text(self.flagged)})"
+                f"({flag_text(self.flagged)})"
             )
             if self.flagged[Flag.BELOW_FLOOR]:
                 text += (
@@ -444,15 +423,7 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
         If there is no image, the images are of different pixels or bands, or the true temperature
         is under the camera's floor.
     """
-    if not measurements:
-        raise ValueError("emissivity: there is no image, expected 1 or more")
-    first = measurements[0]
-    for number, other in enumerate(measurements[1:], 2):
-        if other.raster != first.raster or other.band != first.band:
-            raise ValueError(
-                f"image {number}: has other pixels, or another band, than image 1, "
-                "expected images of one camera that see the same place"
-            )
+    check_same_pixels(measurements, "emissivity")
     for measurement in measurements:
         floor = _floor(measurement)
         if heating.truth < floor:
@@ -460,16 +431,13 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
                 f"truth: {_celsius(heating.truth)} is under the camera's floor of "
                 f"{_celsius(floor)}, expected a hotter object"
             )
-    frames = [_usable_radiance(measurement) for measurement in measurements]
-    several = len(frames) > 1
-    radiance = np.stack([image.mean(axis=0) for image in frames]) if several else frames[0]
-    flags = [np.bitwise_or.reduce(image.flags, axis=0) for image in measurements]
+    first, radiance = measurements[0], observed_radiance(measurements)
     return EmissivityMap(
         heating=heating,
         band=first.band,
         raster=first.raster,
         radiance=radiance,
-        flags=np.bitwise_or.reduce(flags, axis=0),
+        flags=observed_flags(measurements),
         calibration=_calibration(measurements, radiance.mean(axis=0), heating),
         floor=max(map(_floor, measurements)),
     )
@@ -562,11 +530,6 @@ def _floor(measurement: Measurement) -> float:
     return float(measurement.data.attrs.get("floor", 0.0))
 
 
-def _usable_radiance(measurement: Measurement) -> NDArray[np.float64]:
-    flagged = np.bitwise_or.reduce(measurement.flags, axis=0) & UNUSABLE != 0
-    return np.where(flagged, np.nan, measurement.radiance)
-
-
 def _calibration(
     measurements: Sequence[Measurement], radiance: NDArray[np.float64], heating: Heating
 ) -> NDArray[np.float64] | None:
@@ -576,26 +539,7 @@ def _calibration(
         temperature = np.asarray(band.temperature(radiance), np.float64)
         ends = [band.radiance(temperature + sign * spread) for sign in (-1.0, 1.0)]
         return np.asarray((ends[1] - ends[0]) / 2, np.float64)
-    known = [measurement.calibration_uncertainty for measurement in measurements]
-    told = [image.mean(axis=0) for image in known if image is not None]
-    if len(told) < len(known):
-        return None
-    return np.asarray(np.mean(told, axis=0), np.float64)
-
-
-def _scatter(values: NDArray[np.float64]) -> Scatter:
-    """What emissivities of shape (observation, pixel) tell of chance: an analysis of variance."""
-    observations, pixels = values.shape
-    if observations == 1:
-        return Scatter(nan, float(values[0].std(ddof=1)) / sqrt(pixels), pixels - 1.0)
-    means = values.mean(axis=1)
-    total = float(means.var(ddof=1)) / observations
-    residual = values - means[:, None] - values.mean(axis=0) + means.mean()
-    freedom = (observations - 1.0) * (pixels - 1.0)
-    noise = float((residual**2).sum()) / freedom / values.size
-    if total > noise:
-        return Scatter(sqrt(total - noise), sqrt(noise), observations - 1.0)
-    return Scatter(0.0, sqrt(noise), freedom)
+    return told_calibration(measurements)
 
 
 def _residual(about_line: NDArray[np.float64]) -> float:
@@ -605,12 +549,6 @@ def _residual(about_line: NDArray[np.float64]) -> float:
 
 def _root_sum(parts: dict[str, float]) -> float:
     return float(np.linalg.norm(list(parts.values())))
-
-
-def _flag_text(flagged: dict[Flag, int]) -> str:
-    words = {Flag.BELOW_FLOOR: "under the floor", Flag.SATURATED: "saturated", Flag.DEAD: "dead"}
-    told = [f"{count} {words[flag]}" for flag, count in flagged.items() if count]
-    return ", ".join(told) or "none flagged"
 
 
 def _celsius(temperature: float) -> str:

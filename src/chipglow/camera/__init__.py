@@ -1,23 +1,50 @@
-"""The virtual camera: optics, sampling, exposure, and the measurement that comes out."""
+"""Cameras, virtual and real: optics, exposure, calibration, and the measurement that comes out."""
 
+from chipglow.camera.bad_pixels import LEAST_FRAMES, BadPixels, find_bad_pixels, replace_bad_pixels
+from chipglow.camera.calibration import (
+    Calibration,
+    FittedCalibration,
+    LinearCalibration,
+    MakersCalibration,
+    SakumaHattori,
+)
+from chipglow.camera.calibration_fit import CalibrationFit, fit_linear, fit_sakuma_hattori
 from chipglow.camera.camera import Camera
 from chipglow.camera.detector import Detector
+from chipglow.camera.developing import ImagePosition, develop_recording, flag_shares
 from chipglow.camera.exposure import Exposure
 from chipglow.camera.measurement import UNUSABLE, Flag, Measurement
+from chipglow.camera.nonuniformity import NonUniformity
 from chipglow.camera.psf import AnnularAperturePSF, GaussianPSF, MeasuredPSF, PointSpreadFunction
 from chipglow.camera.recording import PlanckConversion, Recording
 
 __all__ = [
+    "LEAST_FRAMES",
     "UNUSABLE",
     "AnnularAperturePSF",
+    "BadPixels",
+    "Calibration",
+    "CalibrationFit",
     "Camera",
     "Detector",
     "Exposure",
+    "FittedCalibration",
     "Flag",
     "GaussianPSF",
+    "ImagePosition",
+    "LinearCalibration",
+    "MakersCalibration",
     "MeasuredPSF",
     "Measurement",
+    "NonUniformity",
     "PlanckConversion",
     "PointSpreadFunction",
     "Recording",
+    "SakumaHattori",
+    "develop_recording",
+    "find_bad_pixels",
+    "fit_linear",
+    "fit_sakuma_hattori",
+    "flag_shares",
+    "replace_bad_pixels",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chipglow.radiometry import Band
+from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import Raster, Tool
 from chipglow.scene.scene import raster_coordinates
 from chipglow.scene.tool_attributes import stored_tool, tool_attributes
@@ -46,10 +46,10 @@ class Measurement:
         `Flag`, uint8. Coordinates as a scene's: ``time`` in s, when each integration began;
         ``x`` ascending and ``y`` descending in m, the middles of the sensors. Attributes tell the
         camera; ``pitch`` is the distance between sensors in m, ``band_lower`` and ``band_upper``
-        in m limit a band that is shaped like a box. A tool may be told as in a scene.
-        ``calibration_uncertainty``, of the shape and
-        unit of ``radiance``, may be there: its standard uncertainty from the calibration, which
-        is common to all pixels and frames.
+        in m limit the band. Of a band that is not shaped like a box, ``response`` over
+        ``wavelength`` in m is the relative spectral response. A tool may be told as in a scene.
+        ``calibration_uncertainty``, of the shape and unit of ``radiance``, may be there: its
+        standard uncertainty from the calibration, which is common to all pixels and frames.
 
     Raises
     ------
@@ -121,18 +121,16 @@ class Measurement:
         known: dict[str, float | str] = {**(attributes or {}), "pitch": raster.spacing}
         if floor is not None:
             known["floor"] = floor
-        if band.response is None:
-            known |= {"band_lower": band.lower, "band_upper": band.upper}
-        return cls(
-            xr.Dataset(
-                {
-                    name: (("time", "y", "x"), values[name], {"units": unit})
-                    for name, unit in units.items()
-                },
-                coords=raster_coordinates(raster, times),
-                attrs=known,
-            )
+        known |= {"band_lower": band.lower, "band_upper": band.upper}
+        data = xr.Dataset(
+            {
+                name: (("time", "y", "x"), values[name], {"units": unit})
+                for name, unit in units.items()
+            },
+            coords=raster_coordinates(raster, times),
+            attrs=known,
         )
+        return cls(data if band.response is None else data.assign(_response(band)))
 
     @cached_property
     def band(self) -> Band:
@@ -141,14 +139,23 @@ class Measurement:
         Raises
         ------
         ValueError
-            If the attributes do not tell it: its response is not a box.
+            If the attributes do not tell it, or it is not possible.
         """
-        if "band_lower" not in self.data.attrs:
-            raise ValueError(
-                "measurement: the limits of a box-shaped band are needed, and the attribute "
-                "'band_lower' is missing"
-            )
-        return Band(float(self.data.attrs["band_lower"]), float(self.data.attrs["band_upper"]))
+        for name in ("band_lower", "band_upper"):
+            if name not in self.data.attrs:
+                raise ValueError(
+                    f"measurement: the camera's band is needed, and the attribute {name!r} is "
+                    "missing"
+                )
+        limits = float(self.data.attrs["band_lower"]), float(self.data.attrs["band_upper"])
+        if "response" not in self.data:
+            return Band(*limits)
+        table = self.data["response"]
+        if table.dims != ("wavelength",) or "wavelength" not in self.data.coords:
+            raise ValueError("measurement: 'response' over 'wavelength' is missing")
+        wavelengths = tuple(np.asarray(table["wavelength"].values, np.float64).tolist())
+        values = tuple(np.asarray(table.values, np.float64).tolist())
+        return Band(*limits, TabulatedResponse(wavelengths, values))
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -228,3 +235,12 @@ class Measurement:
         if "calibration_uncertainty" not in self.data:
             return None
         return np.asarray(self.data["calibration_uncertainty"].values, dtype=np.float64)
+
+
+def _response(band: Band) -> dict[str, xr.DataArray]:
+    """A band's response where it counts, so that a file tells the same integral."""
+    assert band.response is not None
+    wavelength = ("wavelength", band.wavelengths, {"units": "m"})
+    values = np.asarray(band.response(band.wavelengths), np.float64)
+    coords = {"wavelength": wavelength}
+    return {"response": xr.DataArray(values, coords, ("wavelength",), attrs={"units": "1"})}

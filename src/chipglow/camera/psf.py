@@ -2,11 +2,13 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from errno import ENOENT
 from math import ceil, inf, isfinite, log, pi, sqrt
 from pathlib import Path
 from typing import Any, Final, final
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import cumulative_simpson
 from scipy.optimize import brentq
@@ -219,15 +221,16 @@ class MeasuredPSF(PointSpreadFunction):
         object.__setattr__(self, "fwhm", float(np.mean(widths)) * self.spacing)
 
     @classmethod
-    def from_file(cls, path: str | Path, spacing: float) -> "MeasuredPSF":
+    def from_file(cls, path: str | Path, spacing: float | None = None) -> "MeasuredPSF":
         """Read a kernel.
 
         Parameters
         ----------
         path : str or Path
-            A NumPy array (``.npy``) or a table of numbers, separated by commas (``.csv``).
-        spacing : float
-            Side of the kernel's squares in m, on the scene.
+            A NumPy array (``.npy``), a table of numbers, separated by commas (``.csv``), or what
+            ``chipglow psf`` writes (``.nc``).
+        spacing : float, optional
+            Side of the kernel's squares in m, on the scene; None for a ``.nc``, which tells it.
 
         Raises
         ------
@@ -238,11 +241,19 @@ class MeasuredPSF(PointSpreadFunction):
         """
         path = Path(path)
         readers = {".npy": _read_npy, ".csv": _read_csv}
-        if path.suffix.lower() not in readers:
-            raise ValueError(f"psf: {path} is of kind {path.suffix!r}, expected .npy or .csv")
+        kind = path.suffix.lower()
+        if kind not in (*readers, ".nc"):
+            raise ValueError(f"psf: {path} is of kind {path.suffix!r}, expected .npy, .csv or .nc")
+        if (spacing is None) != (kind == ".nc"):
+            raise ValueError(
+                f"psf: spacing is {spacing!r} for {path}, expected "
+                + ("none: the file tells it" if kind == ".nc" else "a length such as 1e-6 m")
+            )
         try:
-            return cls(readers[path.suffix.lower()](path), spacing)
-        except (ValueError, EOFError, MemoryError) as error:
+            if spacing is None:
+                return cls(*_read_netcdf(path))
+            return cls(readers[kind](path), spacing)
+        except (ValueError, EOFError, MemoryError, KeyError, RuntimeError) as error:
             raise ValueError(f"psf: {path} is not a kernel: {error}") from error
 
     def kernel(self, spacing: float) -> NDArray[np.float64]:
@@ -312,3 +323,15 @@ def _read_csv(path: Path) -> NDArray[np.float64]:
     lines = path.read_text(encoding="utf-8-sig").splitlines()
     rows = [[float(cell) for cell in line.split(",")] for line in lines if line.strip()]
     return np.array(rows, dtype=np.float64)
+
+
+def _read_netcdf(path: Path) -> tuple[NDArray[np.float64], float]:
+    """Kernel and its spacing."""
+    if not path.is_file():
+        raise FileNotFoundError(ENOENT, "there is no such file", str(path))
+    try:
+        with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as data:
+            kernel = data["kernel"]
+            return np.asarray(kernel.values, np.float64), float(kernel.attrs["spacing"])
+    except OSError as error:
+        raise ValueError(f"cut short, or no NetCDF-4 file: {error}") from error

@@ -80,6 +80,8 @@ class Recording:
         depend on them.
     notes : tuple of str
         What else the file says and what had to be assumed, a sentence each.
+    range_name : str, optional
+        The measuring range that was chosen, as the maker calls it.
 
     Raises
     ------
@@ -98,6 +100,7 @@ class Recording:
     conversion: PlanckConversion | None = None
     object_parameters: ObjectParameters | None = None
     notes: tuple[str, ...] = ()
+    range_name: str | None = None
 
     def __post_init__(self) -> None:
         if self.signal.ndim != 3 or 0 in self.signal.shape:

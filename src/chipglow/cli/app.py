@@ -9,11 +9,15 @@ from typing import Annotated, Final
 import typer
 
 from chipglow.cli.boundary import Boundary
+from chipglow.cli.calibrate import calibrate
 from chipglow.cli.compare import compare
+from chipglow.cli.convert import convert
 from chipglow.cli.emissivity import emissivity
+from chipglow.cli.psf import psf
 from chipglow.cli.rake import rake
 from chipglow.cli.register import register
 from chipglow.cli.shearband import shearband
+from chipglow.cli.temperature import temperature
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 
@@ -89,15 +93,33 @@ def init(
     of_import: Annotated[
         bool, typer.Option("--import", help="Write the description of an import instead.")
     ] = False,
+    of_measurement: Annotated[
+        bool,
+        typer.Option("--measurement", help="Write the description of a camera's file instead."),
+    ] = False,
 ) -> None:
     """Write the paper's study as a commented YAML file."""
     from chipglow.io import atomic_path
-    from chipglow.study import ImportDescription, Study, import_text, study_text
+    from chipglow.study import (
+        ImportDescription,
+        MeasurementDescription,
+        Study,
+        import_text,
+        measurement_text,
+        study_text,
+    )
 
+    if of_import and of_measurement:
+        raise ValueError("--measurement: expected only one of --import and --measurement")
     if path.exists() and not force:
         raise FileExistsError(f"{path}: is there already, expected a new name or --force")
     with atomic_path(path) as temporary:
-        text = import_text(ImportDescription()) if of_import else study_text(Study())
+        if of_import:
+            text = import_text(ImportDescription())
+        elif of_measurement:
+            text = measurement_text(MeasurementDescription())
+        else:
+            text = study_text(Study())
         temporary.write_text(text, encoding="utf-8")
     print(path)
 
@@ -199,7 +221,9 @@ def measure(
 
 @app.command()
 def show(
-    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a NetCDF file.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A scene or a measurement, a NetCDF file.")
+    ],
     at: Annotated[
         str | None,
         typer.Option(metavar="TIME", help="When, such as '400 us'; by default in the middle."),
@@ -209,10 +233,17 @@ def show(
         typer.Option(metavar="FILE", help="Draw the fields at that time, PNG, PDF or SVG."),
     ] = None,
 ) -> None:
-    """Show what is in a scene: samples, times, values, where it comes from."""
-    from chipglow.cli.showing import show_scene
+    """Show what is in a scene or a measurement: samples, times, values, where it comes from."""
+    from chipglow.io import is_measurement
 
-    show_scene(scene, at, plot)
+    if is_measurement(file):
+        from chipglow.cli.showing_measurement import show_measurement
+
+        show_measurement(file, at, plot)
+    else:
+        from chipglow.cli.showing import show_scene
+
+        show_scene(file, at, plot)
     if plot is not None:
         print(plot)
 
@@ -242,11 +273,10 @@ def materials(
         print(plot)
 
 
-app.command("shearband")(shearband)
-app.command("emissivity")(emissivity)
-app.command("rake")(rake)
-app.command("compare")(compare)
-app.command("register")(register)
+for command in (
+    calibrate, convert, emissivity, temperature, psf, register, rake, shearband, compare,
+):  # fmt: skip
+    app.command(rich_help_panel="The laboratory")(command)
 
 
 @cache_app.command("list")

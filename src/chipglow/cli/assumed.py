@@ -1,4 +1,4 @@
-"""What had to be assumed, on the terminal."""
+"""What had to be assumed, and what is doubtful, on the terminal."""
 
 from collections.abc import Iterable
 
@@ -10,3 +10,10 @@ def say_assumed(sentences: Iterable[str]) -> None:
     console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
     for sentence in sentences:
         console.print(f"Assumed: {sentence}")
+
+
+def say_doubtful(sentences: Iterable[str]) -> None:
+    """Say beside the results what cannot be relied on, a sentence each."""
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    for sentence in sentences:
+        console.print(f"Doubtful: {sentence}")

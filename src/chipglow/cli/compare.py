@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chipglow.cli.options import Settings, ToolChoice
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -22,15 +24,7 @@ def compare(
             "by its attribute 'surface' or its file's name.",
         ),
     ],
-    tool: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE|found",
-            help="The tool, a YAML file with the keys of a study's cutting.tool and tip; or "
-            "'found', to look for the rake face in the image; by default what the measurement "
-            "tells, as a simulated one does.",
-        ),
-    ] = None,
+    tool: ToolChoice = None,
     curve: Annotated[
         Path | None,
         typer.Option(
@@ -81,14 +75,7 @@ def compare(
         Path | None,
         typer.Option(metavar="FILE", help="Draw the comparison, PNG, PDF or SVG."),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="FIELD=VALUE",
-            help="Set a field of the description of the measurement's file; may be repeated.",
-        ),
-    ] = None,
+    settings: Settings = None,
 ) -> None:
     """Lay a measurement and simulations over each other and tell which fits where."""
     from rich.console import Console
@@ -134,21 +121,15 @@ def compare(
 
 def _doubts(uncertainty: str | None, emissivity: float, position: str | None) -> "Doubts":
     from chipglow.analysis import Doubts
-    from chipglow.cli.lengths import parse_length
-    from chipglow.study.units import TEMPERATURE_DIFFERENCE
+    from chipglow.cli.quantities import parse
+    from chipglow.study.units import LENGTH, TEMPERATURE_DIFFERENCE
 
     if not 0.0 <= emissivity < 1.0:
         raise ValueError(f"--emissivity-uncertainty: {emissivity:g}, expected 0 to under 1")
-    stated = 0.0
-    if uncertainty is not None:
-        try:
-            stated = TEMPERATURE_DIFFERENCE.parse(uncertainty)
-        except ValueError as error:
-            raise ValueError(f"--uncertainty: {error}") from None
-        if not stated > 0.0:
-            raise ValueError(f"--uncertainty: {uncertainty}, expected over 0 K")
-    known = None if position is None else parse_length("--position", position)
-    return Doubts(stated, emissivity, known)
+    stated = parse("--uncertainty", TEMPERATURE_DIFFERENCE, uncertainty)
+    if stated is not None and not stated > 0.0:
+        raise ValueError(f"--uncertainty: {uncertainty}, expected over 0 K")
+    return Doubts(stated or 0.0, emissivity, parse("--position", LENGTH, position))
 
 
 def _labelled(paths: list[Path]) -> "dict[str, Measurement]":

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chipglow.cli.options import Settings
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -12,7 +14,6 @@ if TYPE_CHECKING:
 
     from chipglow.analysis import EmissivityLine, EmissivityMap, Heating, RegionEmissivity
     from chipglow.camera import Measurement
-    from chipglow.study.units import Quantity
 
 
 def emissivity(
@@ -64,20 +65,13 @@ def emissivity(
         Path | None,
         typer.Option(metavar="FILE", help="Draw image, regions and map, PNG, PDF or SVG."),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="FIELD=VALUE",
-            help="Set a field of the description of a camera's file; may be repeated.",
-        ),
-    ] = None,
+    settings: Settings = None,
 ) -> None:
     """Determine emissivity from images of an object of known temperature."""
     from rich.console import Console
 
     from chipglow.analysis import areas, determine_emissivity, emissivity_line, shared_pixels
-    from chipglow.cli.assumed import say_assumed
+    from chipglow.cli.assumed import say_assumed, say_doubtful
     from chipglow.cli.pictures import check_picture_path
     from chipglow.io.atomic import check_folder
     from chipglow.study.files import load_regions
@@ -109,8 +103,7 @@ def emissivity(
         f"{one} and {other} share {count} pixels, which count in both."
         for (one, other), count in shared_pixels(named, maps[0].raster).items()
     )
-    for doubt in _doubts(rows):
-        console.print(doubt, soft_wrap=True)
+    say_doubtful(_doubts(rows))
     _print_study(console, rows)
     _write(maps, rows, out, table)
     if plot is not None:
@@ -134,6 +127,7 @@ def _heatings(
 ) -> "list[Heating]":
     """How the object was heated for each image."""
     from chipglow.analysis import Heating
+    from chipglow.cli.quantities import parse
     from chipglow.study.units import TEMPERATURE, TEMPERATURE_DIFFERENCE
 
     if len(truths) not in (1, len(images)):
@@ -143,25 +137,18 @@ def _heatings(
         )
 
     def spread(option: str, text: str | None) -> float | None:
-        return None if text is None else _parsed(option, TEMPERATURE_DIFFERENCE, text)
+        return parse(option, TEMPERATURE_DIFFERENCE, text)
 
     return [
         Heating(
-            _parsed("--truth", TEMPERATURE, text),
-            _parsed("--environment", TEMPERATURE, environment),
+            parse("--truth", TEMPERATURE, text),
+            parse("--environment", TEMPERATURE, environment),
             spread("--truth-uncertainty", truth_uncertainty) or 0.0,
             spread("--environment-uncertainty", environment_uncertainty) or 0.0,
             spread("--camera-uncertainty", camera_uncertainty),
         )
         for text in (truths if len(truths) > 1 else truths * len(images))
     ]
-
-
-def _parsed(option: str, quantity: "Quantity", text: str) -> float:
-    try:
-        return quantity.parse(text)
-    except ValueError as error:
-        raise ValueError(f"{option}: {error}") from None
 
 
 def _check_same_pixels(images: list[Path], measurements: "list[Measurement]") -> None:
@@ -241,7 +228,7 @@ def _doubts(rows: "list[list[RegionEmissivity]]") -> "Iterator[str]":
     for of in rows:
         at = f" (object at {of[0].heating.truth - 273.15:.6g} °C)" if len(rows) > 1 else ""
         for doubt in (doubt for row in of for doubt in row.doubts):
-            yield f"Doubtful: {doubt}{at}."
+            yield f"{doubt}{at}."
 
 
 def _print_study(console: "Console", rows: "list[list[RegionEmissivity]]") -> None:

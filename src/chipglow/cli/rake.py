@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chipglow.cli.options import MeasurementFile, Settings, ToolChoice
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -13,18 +15,8 @@ if TYPE_CHECKING:
 
 
 def rake(
-    measurement: Annotated[
-        Path, typer.Argument(metavar="MEASUREMENT", help="A measurement's file.")
-    ],
-    tool: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE|found",
-            help="The tool, a YAML file with the keys of a study's cutting.tool and tip; or "
-            "'found', to look for the rake face in the image; by default what the measurement "
-            "tells, as a simulated one does.",
-        ),
-    ] = None,
+    measurement: MeasurementFile,
+    tool: ToolChoice = None,
     frame: Annotated[
         str, typer.Option(metavar="N|all", help="Number of the frame, from 0, or all.")
     ] = "all",
@@ -48,31 +40,25 @@ def rake(
             metavar="FILE", help="Draw the grid on the image and its profiles, PNG, PDF or SVG."
         ),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="FIELD=VALUE",
-            help="Set a field of the description of a camera's file; may be repeated.",
-        ),
-    ] = None,
+    settings: Settings = None,
 ) -> None:
     """Average radiance temperature in squares along the rake face, as the paper's Figure 7."""
     from rich.console import Console
 
     from chipglow.analysis import rake_grid
-    from chipglow.cli.lengths import parse_length
     from chipglow.cli.pictures import check_picture_path, write_picture
+    from chipglow.cli.quantities import parse
     from chipglow.cli.tools import chosen_tool
     from chipglow.io import check_rake_grid_path, write_rake_grid
     from chipglow.report import draw_rake_grid
     from chipglow.study.measured import load_measurement
+    from chipglow.study.units import LENGTH
 
     if plot is not None:
         check_picture_path(plot)
     if out is not None:
         check_rake_grid_path(out)
-    reach = parse_length("--depth", depth)
+    reach = parse("--depth", LENGTH, depth)
     measured = load_measurement(measurement, settings or ())
     frames = _frames(measured, frame, at)
     console = Console(highlight=False, markup=False)
@@ -91,17 +77,13 @@ def rake(
 
 def _frames(measurement: "Measurement", frame: str, at: str | None) -> list[int] | None:
     """Numbers of the chosen frames; None for all."""
-    from chipglow.cli.times import parse_instant
+    from chipglow.cli.times import frame_at
 
     times = measurement.times
     if at is not None:
         if frame != "all":
             raise ValueError(f"--frame: {frame!r} beside --at, expected one or the other")
-        instant = parse_instant("--at", at)
-        if not times[0] <= instant <= times[-1]:
-            first, last = (f"{1e6 * time:.7g} us" for time in (times[0], times[-1]))
-            raise ValueError(f"--at: {at}, expected {first} to {last}, when frames began")
-        return [int(abs(times - instant).argmin())]
+        return [frame_at("--at", at, times)]
     if frame == "all":
         return None
     if not (frame.isdecimal() and int(frame) < times.size):

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from chipglow.cli.options import Settings
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -109,25 +111,20 @@ def register(
     blink: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Show both images in turns, .gif.")
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="FIELD=VALUE",
-            help="Set a field of the description of the infrared camera's file; may be repeated.",
-        ),
-    ] = None,
+    settings: Settings = None,
 ) -> None:
     """Find where each point of an infrared image is in a visible picture."""
     from rich.console import Console
 
+    from chipglow.cli.quantities import parse
     from chipglow.io import read_pictures, read_points
     from chipglow.study import load_registration, tool_of, write_registration
     from chipglow.study.measured import load_measurement
+    from chipglow.study.units import TIME
 
     _check_names(out, pairs, overlay, blink, align)
     _check_method(method, points, known)
-    interval = None if visible_interval is None else _interval(visible_interval)
+    interval = parse("--visible-interval", TIME, visible_interval)
     region = None if align is None else _region(align)
     measured, seen = load_measurement(infrared, settings or ()), read_pictures(visible, interval)
     if region is not None:
@@ -186,15 +183,6 @@ def _check_method(method: MethodName | None, points: Path | None, known: Path | 
         raise ValueError("--method: points without --points, expected a file of points")
     if method not in (None, MethodName.POINTS) and points is not None:
         raise ValueError(f"--method: {method} with --points, expected one or the other")
-
-
-def _interval(text: str) -> float:
-    from chipglow.study.units import TIME
-
-    try:
-        return TIME.parse(text)
-    except ValueError as error:
-        raise ValueError(f"--visible-interval: {error}") from None
 
 
 def _region(text: str) -> tuple[float, float, float, float]:

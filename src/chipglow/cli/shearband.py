@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from chipglow.cli.options import MeasurementFile, Settings, ToolChoice
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -12,9 +14,7 @@ if TYPE_CHECKING:
 
 
 def shearband(
-    measurement: Annotated[
-        Path, typer.Argument(metavar="MEASUREMENT", help="A measurement's file.")
-    ],
+    measurement: MeasurementFile,
     curve: Annotated[
         str,
         typer.Option(
@@ -31,15 +31,7 @@ def shearband(
             "all frames.",
         ),
     ] = None,
-    tool: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE|found",
-            help="The tool, a YAML file with the keys of a study's cutting.tool and tip; or "
-            "'found', to look for the rake face in the image; by default what the measurement "
-            "tells, as a simulated one does.",
-        ),
-    ] = None,
+    tool: ToolChoice = None,
     reference: Annotated[
         str | None,
         typer.Option(
@@ -72,26 +64,20 @@ def shearband(
             metavar="FILE", help="Draw the curves on the image and the profiles, PNG, PDF or SVG."
         ),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="FIELD=VALUE",
-            help="Set a field of the description of a camera's file; may be repeated.",
-        ),
-    ] = None,
+    settings: Settings = None,
 ) -> None:
     """Read the radiance temperature along the shear band, as the paper's Figure 9."""
     from rich.console import Console
 
     from chipglow.analysis import band_profile
-    from chipglow.cli.lengths import parse_length
     from chipglow.cli.pictures import check_picture_path, write_picture
+    from chipglow.cli.quantities import parse
     from chipglow.cli.times import frame_at
     from chipglow.cli.tools import chosen_tool
     from chipglow.io import check_band_profile_path, read_curve, write_band_profile
     from chipglow.report import draw_band_profile
     from chipglow.study.measured import load_measurement
+    from chipglow.study.units import LENGTH
 
     if plot is not None:
         check_picture_path(plot)
@@ -106,8 +92,8 @@ def shearband(
         frames=sorted({frame_at("--at", text, times) for text in at}) if at else None,
         curve=None if curve == "found" else read_curve(curve),
         reference=None if reference is None else frame_at("--reference", reference, times),
-        width=None if width is None else parse_length("--width", width),
-        position=None if position is None else parse_length("--position", position),
+        width=parse("--width", LENGTH, width),
+        position=parse("--position", LENGTH, position),
     )
     console = Console(highlight=False, markup=False)
     console.print(_table(profile))

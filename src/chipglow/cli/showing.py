@@ -1,7 +1,7 @@
 """The command ``chipglow show``: what is in a scene, as text and as a picture."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import degrees
 from pathlib import Path
 from typing import Any, Final, TypeAlias
@@ -42,12 +42,12 @@ def show_scene(path: Path, at: str | None, plot: Path | None) -> None:
     time = None if at is None else _time_in(scene, at)
     summary = scene_summary(scene, time)
     console = Console(highlight=False, markup=False)
-    console.print(_listed(_facts(scene, summary, path)))
-    console.print(f"\nAt {_microseconds(summary.times[summary.index])}:")
-    console.print(_listed(_state(summary)))
+    console.print(listed(_facts(scene, summary, path)))
+    console.print(f"\nAt {microseconds(summary.times[summary.index])}:")
+    console.print(listed(_state(summary)))
     console.print()
     console.print(_field_table(summary))
-    attributes = _listed(_attributes(scene))
+    attributes = listed(attribute_rows(_other_attributes(scene)))
     if attributes.row_count:
         console.print("\nAttributes:")
         console.print(attributes)
@@ -65,7 +65,8 @@ def _time_in(scene: Scene, at: str) -> float:
     return time
 
 
-def _listed(rows: _Rows) -> Table:
+def listed(rows: _Rows) -> Table:
+    """Names and what they are, side by side."""
     table = Table(box=None, show_header=False)
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
@@ -80,9 +81,9 @@ def _facts(scene: StoredScene, summary: SceneSummary, path: Path) -> _Rows:
     yield "samples", f"{raster.columns} x {raster.rows} of {1e6 * raster.spacing:.6g} µm"
     yield "x", f"{left} to {right}"
     yield "y", f"{bottom} to {top}"
-    yield "frames", f"{len(times)}, {_microseconds(times[0])} to {_microseconds(times[-1])}"
+    yield "frames", f"{len(times)}, {microseconds(times[0])} to {microseconds(times[-1])}"
     if len(times) > 1:
-        yield "interval", _interval(np.diff(times))
+        yield "interval", interval_text(np.diff(times))
     yield "tool", _tool_text(scene.tool) if scene.tool else "not given"
     yield "material coordinates", "yes" if scene.has_material_coordinates else "no"
     if "force_time" in data:
@@ -94,11 +95,12 @@ def _facts(scene: StoredScene, summary: SceneSummary, path: Path) -> _Rows:
     yield "file", f"{size / 1e6:,.1f} MB, {each:.2g} bytes a sample ({scene.compression})"
 
 
-def _interval(steps: Any) -> str:
+def interval_text(steps: Any) -> str:
+    """Time between frames, or between which times it is."""
     least, mean, greatest = (float(f(steps)) for f in (np.min, np.mean, np.max))
     if greatest - least < 1e-3 * mean:
-        return _microseconds(mean)
-    return f"{_microseconds(least)} to {_microseconds(greatest)}"
+        return microseconds(mean)
+    return f"{microseconds(least)} to {microseconds(greatest)}"
 
 
 def _tool_text(tool: Tool) -> str:
@@ -135,11 +137,16 @@ def _field_table(summary: SceneSummary) -> Table:
     return table
 
 
-def _attributes(scene: Scene) -> _Rows:
+def _other_attributes(scene: Scene) -> dict[str, Any]:
     """All that the file says of itself but the tool, which is shown above."""
-    for name, value in scene.data.attrs.items():
-        if not name.startswith("tool_"):
-            yield name, _shortened(_attribute_text(value))
+    attributes = scene.data.attrs.items()
+    return {str(name): value for name, value in attributes if not str(name).startswith("tool_")}
+
+
+def attribute_rows(attributes: Mapping[str, Any]) -> _Rows:
+    """Attributes of a file as text that is not too long."""
+    for name, value in attributes.items():
+        yield name, _shortened(_attribute_text(value))
 
 
 def _attribute_text(value: Any) -> str:
@@ -172,5 +179,6 @@ def _printable(text: str) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
-def _microseconds(time: float) -> str:
+def microseconds(time: float) -> str:
+    """A time in s as text."""
     return f"{time * 1e6:.7g} µs"

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.cli.quantities import parse
 from chipglow.study.units import INSTANT
 
 
@@ -14,10 +15,7 @@ def parse_instant(option: str, text: str) -> float:
     ValueError
         If it is none; the message names the option.
     """
-    try:
-        return INSTANT.parse(text)
-    except ValueError as error:
-        raise ValueError(f"{option}: {error}") from None
+    return parse(option, INSTANT, text)
 
 
 def frame_at(option: str, text: str, times: NDArray[np.float64]) -> int:

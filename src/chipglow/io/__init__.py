@@ -5,15 +5,24 @@ from chipglow.io.band_file import check_band_profile_path, read_curve, write_ban
 from chipglow.io.cameras import CAMERA_FORMATS, CameraFormat, read_recording, write_hcc
 from chipglow.io.comparison_file import write_comparison
 from chipglow.io.emissivity_file import (
+    StoredEmissivity,
     read_emissivity_map,
+    read_region_emissivity,
     write_emissivity,
     write_emissivity_table,
+    write_temperature_table,
 )
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
-from chipglow.io.measurement_file import read_measurement, write_dataset, write_measurement
+from chipglow.io.measurement_file import (
+    is_measurement,
+    read_measurement,
+    write_dataset,
+    write_measurement,
+)
 from chipglow.io.movie_file import check_movie_path, movie_writer
 from chipglow.io.picture_file import read_pictures
 from chipglow.io.points_file import read_points
+from chipglow.io.psf_file import write_psf
 from chipglow.io.rake_grid_file import check_rake_grid_path, write_rake_grid
 from chipglow.io.scene_file import (
     FORMAT_VERSION,
@@ -31,6 +40,7 @@ __all__ = [
     "CameraFormat",
     "Import",
     "SceneWriter",
+    "StoredEmissivity",
     "StoredScene",
     "UnfinishedScene",
     "View",
@@ -40,6 +50,7 @@ __all__ = [
     "check_movie_path",
     "check_rake_grid_path",
     "import_scene",
+    "is_measurement",
     "movie_writer",
     "open_scene",
     "prospect",
@@ -49,6 +60,7 @@ __all__ = [
     "read_pictures",
     "read_points",
     "read_recording",
+    "read_region_emissivity",
     "read_scene",
     "read_tool_outline",
     "unfinished_scenes",
@@ -59,6 +71,8 @@ __all__ = [
     "write_emissivity_table",
     "write_hcc",
     "write_measurement",
+    "write_psf",
     "write_rake_grid",
     "write_scene",
+    "write_temperature_table",
 ]

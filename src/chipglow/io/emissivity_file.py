@@ -2,9 +2,10 @@
 
 import csv
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -12,9 +13,12 @@ import xarray as xr
 from chipglow.analysis.emissivity import (
     COMMON,
     EmissivityMap,
+    Heating,
     RegionEmissivity,
     emissivity_covariance,
 )
+from chipglow.analysis.observations import Scatter
+from chipglow.analysis.temperature import TrueTemperature
 from chipglow.camera import Flag
 from chipglow.io.atomic import atomic_path
 from chipglow.io.measurement_file import write_dataset
@@ -22,7 +26,10 @@ from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
 from chipglow.surface import MapSurface
 
+Made = TypeVar("Made")
+
 _KIND: Final = "emissivity map"
+_HEATING: Final = ("environment", "truth_uncertainty", "environment_uncertainty")
 _BUDGET: Final = (*COMMON, "repeatability", "noise")
 
 
@@ -60,7 +67,10 @@ def write_emissivity(
                 ("truth", "region", "other_region"),
                 np.stack([emissivity_covariance(of) for of in rows]),
             ),
-            "environment": ("truth", [one.heating.environment for one in maps], {"units": "K"}),
+            **{
+                name: ("truth", [getattr(one.heating, name) for one in maps], {"units": "K"})
+                for name in _HEATING
+            },
             "feature": ("region", np.array([row.feature for row in rows[0]], dtype=object)),
         },
         coords={
@@ -74,6 +84,67 @@ def write_emissivity(
     for variable in data.data_vars.values():
         variable.attrs.setdefault("units", "1")
     write_dataset(data, path)
+
+
+@dataclass(frozen=True)
+class StoredEmissivity:
+    """An area's emissivity as a file keeps it; fields as `RegionEmissivity` has them."""
+
+    mean: float
+    heating: Heating
+    common: dict[str, float]
+    scatter: Scatter
+
+
+def read_region_emissivity(path: str | os.PathLike[str]) -> dict[str, StoredEmissivity]:
+    """Read the emissivity of areas.
+
+    Parameters
+    ----------
+    path : path-like
+        A file of `write_emissivity`, of one true temperature.
+
+    Returns
+    -------
+    dict
+        By the areas' names.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If the file is cut short, no emissivity map, or of several true temperatures; the message
+        names the file.
+    """
+    return _read(Path(path), _regions)
+
+
+def _regions(data: xr.Dataset) -> dict[str, StoredEmissivity]:
+    if data.sizes["truth"] != 1:
+        raise ValueError(f"it has {data.sizes['truth']} true temperatures, expected 1")
+    one = data.isel(truth=0)
+    environment, *spreads = (float(one[name]) for name in _HEATING)
+    heating = Heating(float(one["truth"]), environment, *spreads)
+    return {
+        str(name): _stored(one.isel(region=index), heating)
+        for index, name in enumerate(one["region"].values)
+    }
+
+
+def _stored(row: xr.Dataset, heating: Heating) -> StoredEmissivity:
+    parts = {cause: float(row[f"region_{cause}_uncertainty"]) for cause in _BUDGET}
+    mean = float(row["region_mean"])
+    # A hotter object or room than thought makes the emissivity smaller: Equation 2.
+    signs = {"truth": -1.0, "environment": -1.0 if mean < 1 else 1.0, "calibration": 1.0}
+    scatter = Scatter(parts["repeatability"], parts["noise"], np.inf)
+    share = scatter.standard_uncertainty / max(float(row["region_standard_uncertainty"]), 1e-300)
+    freedom = float(row["region_degrees_of_freedom"])
+    if share > 0 and np.isfinite(freedom):
+        scatter = replace(scatter, degrees_of_freedom=freedom * share**4)
+    return StoredEmissivity(
+        mean, heating, {cause: signs[cause] * parts[cause] for cause in COMMON}, scatter
+    )
 
 
 def read_emissivity_map(
@@ -102,18 +173,26 @@ def read_emissivity_map(
     ValueError
         If the file is cut short or no emissivity map; the message names the file.
     """
-    path = Path(path)
+
+    def surface(data: xr.Dataset) -> MapSurface:
+        index = 0 if truth is None else int(np.abs(data["truth"].values - truth).argmin())
+        values = np.clip(data["emissivity"].values[index].astype(np.float64), 0.0, 1.0)
+        x, y, pitch = data["x"].values, data["y"].values, float(data.attrs["pitch"])
+        raster = Raster(float(x[0]) - pitch / 2, float(y[0]) + pitch / 2, pitch, len(y), len(x))
+        return MapSurface(values, raster, elsewhere)
+
+    return _read(Path(path), surface)
+
+
+def _read(path: Path, made_of: Callable[[xr.Dataset], Made]) -> Made:
+    """What is made of a file, which is no map if that fails."""
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such file, expected an emissivity map")
     try:
         data = xr.load_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
         if data.attrs.get("kind") != _KIND:
             raise ValueError("it does not say that it is an emissivity map")
-        index = 0 if truth is None else int(np.abs(data["truth"].values - truth).argmin())
-        values = np.clip(data["emissivity"].values[index].astype(np.float64), 0.0, 1.0)
-        x, y, pitch = data["x"].values, data["y"].values, float(data.attrs["pitch"])
-        raster = Raster(float(x[0]) - pitch / 2, float(y[0]) + pitch / 2, pitch, len(y), len(x))
-        return MapSurface(values, raster, elsewhere)
+        return made_of(data)
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         reason = str(error).split("\n", 1)[0]
         raise ValueError(
@@ -143,6 +222,34 @@ def write_emissivity_table(rows: Sequence[RegionEmissivity], path: str | os.Path
             numbers = [_value(row, name) for name in _COLUMNS]
             numbers += [row.budget[cause] for cause in _BUDGET]
             writer.writerow([*words, *(f"{number:.9g}" for number in numbers)])
+
+
+def write_temperature_table(rows: Sequence[TrueTemperature], path: str | os.PathLike[str]) -> None:
+    """Write true temperatures of regions as CSV, a line each, in K.
+
+    Parameters
+    ----------
+    rows : sequence of TrueTemperature
+        The regions.
+    path : path-like
+        The file to write; one that is there is replaced at the end.
+    """
+    numbers = (
+        "emissivity", "radiance_temperature", "value", "deviation", "standard_uncertainty",
+        "degrees_of_freedom", "coverage_factor", "expanded_uncertainty",
+    )  # fmt: skip
+    head = ["region", "pixels", "left_out", *numbers]
+    head[head.index("value")] = "true_temperature"
+    head += [f"{cause}_uncertainty" for cause in (*_BUDGET[:3], "emissivity", *_BUDGET[3:])]
+    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(head)
+        for row in rows:
+            values = [getattr(row, name) for name in numbers]
+            values += [row.budget[name.removesuffix("_uncertainty")] for name in head[-6:]]
+            writer.writerow(
+                [row.name, row.pixels, row.left_out, *(f"{value:.9g}" for value in values)]
+            )
 
 
 _COLUMNS: Final = (

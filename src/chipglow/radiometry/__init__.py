@@ -3,5 +3,6 @@
 from chipglow.radiometry.band import Band
 from chipglow.radiometry.object_parameters import ObjectParameters
 from chipglow.radiometry.planck import spectral_radiance
+from chipglow.radiometry.response import TabulatedResponse
 
-__all__ = ["Band", "ObjectParameters", "spectral_radiance"]
+__all__ = ["Band", "ObjectParameters", "TabulatedResponse", "spectral_radiance"]

@@ -9,7 +9,11 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from chipglow.analysis.regions import Region
+from chipglow.camera import FittedCalibration
+from chipglow.study.apertures import ApertureList
+from chipglow.study.calibration_schema import CalibrationDescription
 from chipglow.study.import_schema import ImportDescription
+from chipglow.study.measurement_schema import MeasurementDescription
 from chipglow.study.regions import RegionsDescription
 from chipglow.study.schema import Study
 
@@ -58,12 +62,50 @@ def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescr
     OSError
         If the file cannot be read.
     """
-    path = Path(source)
+    return _described(ImportDescription, Path(source), "source", settings)
+
+
+def load_description(source: str | Path, settings: Iterable[str] = ()) -> MeasurementDescription:
+    """Read the description of a camera's file from a YAML file, or make one of the file.
+
+    Parameters
+    ----------
+    source : str or Path
+        A YAML file (.yaml, .yml) that describes a camera's file, or the camera's file itself.
+    settings : iterable of str
+        Fields that come before those of the YAML file: ``band=3.8-5.1 um``.
+
+    Raises
+    ------
+    StudyError
+        If the file is no YAML or the description is not possible.
+    OSError
+        If the file cannot be read.
+    """
+    return _described(MeasurementDescription, Path(source), "file", settings)
+
+
+def load_calibration(path: str | Path) -> FittedCalibration:
+    """Read a calibration from a YAML file, as ``chipglow calibrate`` writes it.
+
+    Raises
+    ------
+    StudyError
+        If the file is no YAML or no calibration; the message names the file.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    return validated(CalibrationDescription, read_yaml(path), path.name, path.parent).build()
+
+
+def _described(kind: type[Kind], path: Path, field: str, settings: Iterable[str]) -> Kind:
+    """What a YAML file describes, or what another file alone, named by a field, means."""
     described = path.suffix.lower() in (".yaml", ".yml")
-    data = read_yaml(path) if described else {"source": path.name}
+    data = read_yaml(path) if described else {field: path.name}
     for setting in settings:
         data = _with(data, setting)
-    return validated(ImportDescription, data, path.name, path.parent)
+    return validated(kind, data, path.name, path.parent)
 
 
 def load_regions(path: str | Path) -> tuple[Region, ...]:
@@ -83,6 +125,32 @@ def load_regions(path: str | Path) -> tuple[Region, ...]:
     """
     path = Path(path)
     return validated(RegionsDescription, read_yaml(path), path.name, path.parent).build()
+
+
+def load_apertures(path: str | Path) -> list[tuple[Path, float]]:
+    """Read a list of images of apertures from a YAML file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file: ``apertures: [{file: small.nc, diameter: 50 um}, ...]``. Images are looked up
+        beside it.
+
+    Returns
+    -------
+    list of tuple
+        Each image's file and the aperture's diameter in m.
+
+    Raises
+    ------
+    StudyError
+        If the file is no YAML or no such list.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    found = validated(ApertureList, read_yaml(path), path.name, path.parent)
+    return [(Path(aperture.file), aperture.diameter) for aperture in found.apertures]
 
 
 def read_yaml(path: Path) -> Any:

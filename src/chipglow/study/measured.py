@@ -1,29 +1,237 @@
 """Measurements as the laboratory's commands take them."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Final
 
-from chipglow.camera import Measurement
-from chipglow.io import read_measurement
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.camera import (
+    LEAST_FRAMES,
+    BadPixels,
+    Measurement,
+    NonUniformity,
+    Recording,
+    develop_recording,
+    find_bad_pixels,
+)
+from chipglow.io import CAMERA_FORMATS, is_measurement, read_measurement, read_recording
+from chipglow.io.cameras.recordings import find_format
+from chipglow.study.files import StudyError, load_calibration, load_description
+from chipglow.study.measurement_schema import MeasurementDescription
+
+_MOST_SATURATED: Final = 0.05
+"""Share of frames of a uniform object that may be saturated, as bad pixels are."""
 
 
 def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measurement:
-    """Read a measurement.
+    """Read a measurement, or make one of a camera's file.
 
     Parameters
     ----------
     source : str or Path
-        A measurement's NetCDF file.
+        A measurement's NetCDF file; a camera's file; or a YAML file (.yaml, .yml) that describes a
+        camera's file.
     settings : iterable of str
-        Fields of the description of a camera's file: ``band=3.8-5.1 um``.
+        Fields of the description of a camera's file: ``band=3.8-5.1 um``. They come before those
+        of a YAML file.
 
     Raises
     ------
     ValueError
-        If it is not a measurement; the message names the file.
+        If it is not a measurement, or cannot become one; the message names the file.
+    OSError
+        If a file cannot be read.
+    """
+    settings = list(settings)
+    if is_measurement(source):
+        for setting in settings:
+            raise ValueError(f"--set: {setting!r} describes nothing of a measurement's own file")
+        return read_measurement(source)
+    described = load_description(source, settings)
+    return measurement_of(described, load_recording(described), Path(source).name)
+
+
+def load_recording(description: MeasurementDescription) -> Recording:
+    """Read what a camera wrote, with what a description says of it.
+
+    Raises
+    ------
+    ValueError
+        If the file is damaged, or what is said does not fit; the message names the file.
     OSError
         If the file cannot be read.
     """
-    for setting in settings:
-        raise ValueError(f"--set: {setting!r} describes nothing of a measurement's own file")
-    return read_measurement(source)
+    if description.file is None:
+        raise StudyError("file: is missing, expected a camera's file")
+    return description.applied_to(_read(description, description.file))
+
+
+def _read(description: MeasurementDescription, file: str, every: bool = False) -> Recording:
+    return read_recording(
+        file,
+        None if every else description.chosen_frames(),
+        description.format,
+        quantity=description.quantity,
+        unit=description.unit,
+        interval=description.interval,
+        dataset=description.dataset,
+        axes=description.axes,
+    )
+
+
+def measurement_of(
+    description: MeasurementDescription, recording: Recording, name: str
+) -> Measurement:
+    """Make a measurement of a recording as its description says.
+
+    Parameters
+    ----------
+    description : MeasurementDescription
+        What is done with it.
+    recording : Recording
+        As `load_recording` gives it for this description.
+    name : str
+        Name of the file, for errors.
+
+    Raises
+    ------
+    ValueError
+        If something is missing or does not fit; the message names the file.
+    OSError
+        If a file that the description names cannot be read.
+    """
+    try:
+        uniform = _uniform_frames(description, recording)
+        calibration = description.calibration
+        return develop_recording(
+            recording,
+            None if calibration is None else load_calibration(calibration),
+            uniform.correction if uniform and description.uniform.correct else None,
+            _bad_pixels(description, recording, uniform),
+            description.floor,
+            description.position(),
+        )
+    except ValueError as error:
+        raise StudyError(f"{name}: {error}") from error
+
+
+def uniform_counts(source: str | Path, settings: Iterable[str] = ()) -> float:
+    """Mean counts of a recording of a uniform object, such as a black body.
+
+    Its sensors are corrected as those of a measurement with the same description: the counts are
+    those that a calibration for such measurements needs.
+
+    Parameters
+    ----------
+    source : str or Path
+        A camera's file, or a YAML file (.yaml, .yml) that describes one.
+    settings : iterable of str
+        Fields of the description.
+
+    Returns
+    -------
+    float
+        Mean over all frames and all pixels that are not bad.
+
+    Raises
+    ------
+    ValueError
+        If it holds no counts, is saturated, or something does not fit; the message names the file.
+    OSError
+        If a file cannot be read.
+    """
+    description = load_description(source, settings)
+    recording = load_recording(description)
+    try:
+        if recording.quantity != "counts":
+            raise ValueError(f"holds {recording.quantity}, expected counts")
+        uniform = _uniform_frames(description, recording)
+        bad = _bad_pixels(description, recording, uniform)
+        signal = recording.signal.astype(np.float64)
+        if uniform is not None and description.uniform.correct:
+            signal = uniform.correction.apply(signal)
+        good = np.isfinite(signal).all(axis=0) & (True if bad is None else ~bad)
+        if not good.any():
+            raise ValueError("all pixels are bad, expected some that are not")
+        if recording.saturation is not None:
+            share = float(np.mean(recording.signal[:, good] > recording.saturation))
+            if share > 0:
+                raise ValueError(f"{share:.2%} of it is saturated, expected a darker object")
+    except ValueError as error:
+        raise StudyError(f"{Path(source).name}: {error}") from error
+    return float(signal[:, good].mean())
+
+
+@dataclass(frozen=True, eq=False)
+class _Uniform:
+    """Frames of one or two uniform objects."""
+
+    frames: NDArray[Any]
+    brighter: NDArray[Any] | None
+
+    @property
+    def correction(self) -> NonUniformity:
+        if self.brighter is None:
+            return NonUniformity.one_point(self.frames)
+        return NonUniformity.two_point(self.frames, self.brighter)
+
+    @property
+    def bad_pixels(self) -> BadPixels:
+        if len(self.frames) < LEAST_FRAMES:
+            raise ValueError(
+                f"uniform.frames: {len(self.frames)} frames, expected {LEAST_FRAMES} or more to "
+                "find bad pixels in"
+            )
+        return find_bad_pixels(self.frames, self.brighter)
+
+
+def _uniform_frames(description: MeasurementDescription, recording: Recording) -> _Uniform | None:
+    section = description.uniform
+    if section.frames is None:
+        if section.brighter is not None or description.bad_pixels == "find":
+            raise ValueError("uniform.frames: is missing, expected frames of a uniform object")
+        return None
+    brighter = None if section.brighter is None else _uniform(description, recording, "brighter")
+    return _Uniform(_uniform(description, recording, "frames"), brighter)
+
+
+def _uniform(description: MeasurementDescription, recording: Recording, name: str) -> NDArray[Any]:
+    file = getattr(description.uniform, name)
+    if CAMERA_FORMATS[find_format(Path(file))].tells_quantity:
+        # What the description says of the recording's file, this file says itself.
+        found = read_recording(file)
+    else:
+        found = _read(description, file, every=True)
+    problem = _misfit(found, recording)
+    if problem is not None:
+        raise ValueError(f"uniform.{name}: {problem}")
+    return found.signal
+
+
+def _misfit(uniform: Recording, recording: Recording) -> str | None:
+    """Why frames of a uniform object are of no use for a recording."""
+    if uniform.quantity != recording.quantity:
+        return f"holds {uniform.quantity}, expected {recording.quantity} as the recording"
+    theirs, ours = uniform.integration_time, recording.integration_time
+    if theirs is not None and ours is not None and not np.isclose(theirs, ours, rtol=0.01):
+        return (
+            f"has an integration time of {1e6 * theirs:g} us, the recording {1e6 * ours:g} us, "
+            "expected the same"
+        )
+    if recording.saturation is not None:
+        share = float(np.mean(uniform.signal > recording.saturation))
+        if share > _MOST_SATURATED:
+            return f"{share:.0%} of it is saturated, expected a darker uniform object"
+    return None
+
+
+def _bad_pixels(
+    description: MeasurementDescription, recording: Recording, uniform: _Uniform | None
+) -> NDArray[np.bool_] | None:
+    if description.bad_pixels == "find" and uniform is not None:
+        return uniform.bad_pixels.mask
+    rows, columns = recording.signal.shape[1:]
+    return description.listed_bad_pixels((rows, columns))

@@ -454,7 +454,8 @@ class AnnularApertureSection(Part):
         "annular-aperture",
         "Diffraction of a reflecting microscope objective. Other kinds:\n"
         "  {kind: gaussian, fwhm: 12 um}  full width at half maximum\n"
-        "  {kind: measured, file: psf.npy, spacing: 1 um}  .npy or .csv, side of its samples",
+        "  {kind: measured, file: psf.npy, spacing: 1 um}  .npy or .csv, side of its samples\n"
+        "  {kind: measured, file: psf.nc}  what chipglow psf writes",
     )
     wavelength: Wavelength = described("4.5 um", "Wavelength of the diffraction.")
     numerical_aperture: float = described(0.28, "Numerical aperture of the objective.")
@@ -480,8 +481,12 @@ class MeasuredSection(Part):
     """A kernel from a file."""
 
     kind: Literal["measured"] = described("measured", "A kernel from a file.")
-    file: FileBeside = Field(description="File of the kernel, .npy or .csv.")
-    spacing: Length = Field(description="Side of the kernel's samples.")
+    file: FileBeside = Field(description="File of the kernel, .npy, .csv or .nc.")
+    spacing: Annotated[Length | None, *OR_NONE] = described(
+        "none",
+        "Side of the kernel's samples; none for a .nc, which tells it.",
+        "none, or over 0 um",
+    )
 
     def build(self) -> PointSpreadFunction:
         """The point spread function."""

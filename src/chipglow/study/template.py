@@ -6,7 +6,9 @@ from typing import Any, Final
 import yaml
 from pydantic import BaseModel
 
+from chipglow.study.calibration_schema import CalibrationDescription
 from chipglow.study.import_schema import ImportDescription
+from chipglow.study.measurement_schema import MeasurementDescription
 from chipglow.study.schema import Study
 from chipglow.study.section import Section, allowed
 
@@ -28,6 +30,31 @@ def import_text(description: ImportDescription) -> str:
     """A description of an import as YAML, every field with a comment."""
     values = description.model_dump(mode="json")
     return "\n".join([_IMPORT_HEADER, *_section_lines(description, values, "")]) + "\n"
+
+
+_MEASUREMENT_HEADER: Final = """\
+# A measurement of a camera's file. Make it with: chipglow convert FILE --out measurement.nc
+# Quantities carry their unit, in any unit of their kind: 10 us, 6 um, 391 degC.
+# What is none is as the camera's file says.
+"""
+
+
+_CALIBRATION_HEADER: Final = """\
+# A calibration of a camera, written by chipglow calibrate.
+# It holds from the coldest to the hottest black body, for one integration time and range.
+"""
+
+
+def measurement_text(description: MeasurementDescription) -> str:
+    """A description of a camera's file as YAML, every field with a comment."""
+    values = description.model_dump(mode="json")
+    return "\n".join([_MEASUREMENT_HEADER, *_section_lines(description, values, "")]) + "\n"
+
+
+def calibration_text(description: CalibrationDescription) -> str:
+    """A calibration as YAML, every field with a comment; `load_calibration` reads it."""
+    values = description.model_dump(mode="json")
+    return "\n".join([_CALIBRATION_HEADER, *_section_lines(description, values, "")]) + "\n"
 
 
 def study_text(study: Study) -> str:

@@ -166,9 +166,8 @@ LENGTH: Final = Quantity("a length", "m", "um", "6 um")
 Length = Annotated[float, LENGTH]
 CutLength = Annotated[float, Quantity("a length", "m", "mm", "0.3 mm")]
 Wavelength = Annotated[float, Quantity("a wavelength", "m", "um", "4.5 um")]
-WavelengthRange = Annotated[
-    tuple[float, float], Quantity("a band of wavelengths", "m", "um", "3.8-5.1 um")
-]
+WAVELENGTHS: Final = Quantity("a band of wavelengths", "m", "um", "3.8-5.1 um")
+WavelengthRange = Annotated[tuple[float, float], WAVELENGTHS]
 TIME: Final = Quantity("a time", "s", "us", "10 us")
 Time = Annotated[float, TIME]
 INSTANT: Final = Quantity("a time", "s", "us", "10 us", positive=False)

@@ -1,0 +1,498 @@
+"""Whether the laboratory's procedures find a hidden truth, and as often as they say.
+
+    python benchmarks/synthetic_laboratory.py [--first 0] [--repeats 100] [--markdown]
+    python benchmarks/synthetic_laboratory.py --first 0 --write FOLDER
+
+Of each seed a laboratory with hidden optics, emissivities and detector writes the files of an
+experiment: black bodies, uniform frames, a heated chip, knife edges, a hot chip. The procedures see
+only the files, and what a person would have noted. What they recover is set beside the truth: it
+shall be in their own 95 % interval in 95 of 100 repeats, and must be in 90. A repeat takes
+seconds; its results are kept in build/synthetic-laboratory, so that an interrupted run goes on.
+"""
+
+import argparse
+import json
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import cos, pi, radians, sin, sqrt
+from pathlib import Path
+from statistics import NormalDist, median
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+import numpy as np
+import tifffile
+import yaml
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_simpson, trapezoid
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter
+from scipy.optimize import brentq
+from scipy.special import j1, k1, ndtr
+
+from chipglow.analysis import (
+    KnownEmissivity,
+    Surroundings,
+    areas,
+    determine_emissivity,
+    edge_image,
+    knife_edge,
+    true_temperature,
+)
+from chipglow.analysis.emissivity import Heating
+from chipglow.camera import (
+    AnnularAperturePSF,
+    Camera,
+    Detector,
+    FittedCalibration,
+    GaussianPSF,
+    MeasuredPSF,
+    Measurement,
+    PointSpreadFunction,
+    Recording,
+    fit_linear,
+)
+from chipglow.camera.exposure import Exposure
+from chipglow.io import write_hcc
+from chipglow.io.column_file import read_points
+from chipglow.radiometry import Band
+from chipglow.scene import Raster
+from chipglow.study import (
+    CalibrationDescription,
+    calibration_text,
+    load_calibration,
+    load_measurement,
+    uniform_counts,
+)
+from chipglow.study.files import load_regions
+
+RESULTS: Final = Path("build/synthetic-laboratory")
+BAND: Final = Band(3.8e-6, 5.1e-6)
+WAVELENGTH: Final = 4.45e-6
+PITCH: Final = 6e-6
+INTEGRATION_TIME: Final = 10e-6
+SHAPE: Final = (48, 64)
+SAMPLES: Final = 3  # of a scene along a sensor's side
+CELSIUS: Final = 273.15
+FWHM_PER_SIGMA: Final = 2 * sqrt(2 * np.log(2))
+IMAGES: Final = 4  # of each object: repetitions
+FRAMES: Final = 8
+EDGE_FRAMES: Final = 16
+UNIFORM_FRAMES: Final = 20
+BLACK_BODIES: Final = (200, 260, 320, 390, 460, 540, 620, 700)  # degC
+
+# What the people of the laboratory know of their instruments: standard uncertainties in K.
+THERMOCOUPLE, ROOM, CERTIFICATE, SETTING = 2.0, 2.0, 0.4, 0.3
+DRIFT = 0.3  # counts from one recording to the next
+
+REGIONS = """regions:
+  body left: {rectangle: [[1, 4], [9, 44]], feature: body}
+  body right: {rectangle: [[55, 4], [63, 44]], feature: body}
+  fissure: {rectangle: [[28, 16], [36, 32]]}
+"""
+FISSURE = slice(18, 46)  # columns
+PLATEAU = 105e-6  # radius in m of the even middle of the hot chip
+FREQUENCY = 12 / 64 / PITCH  # of the MTF in 1/m
+
+QUANTITIES = {
+    "black body": "K",
+    "emissivity of the body": "",
+    "emissivity of the fissure": "",
+    "PSF, full width": "um",
+    "MTF at 31 /mm": "",
+    "temperature of the fissure": "K",
+}
+"""What is recovered, and the unit in which it is told."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A result of a procedure, with half the width of its own 95 % interval."""
+
+    value: float
+    expanded: float
+
+
+@dataclass(frozen=True)
+class Optics:
+    """Hidden optics: the point spread function, and in closed form what it makes of an edge."""
+
+    kind: str
+    psf: PointSpreadFunction
+    fwhm: float
+    edge: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    transfer: Callable[[float], float]
+
+
+def gaussian_optics(fwhm: float) -> Optics:
+    """A round Gaussian."""
+    sigma = fwhm / FWHM_PER_SIGMA
+    return Optics(
+        "gaussian",
+        GaussianPSF(fwhm),
+        fwhm,
+        lambda u: ndtr(u / sigma),
+        lambda f: float(np.exp(-2 * (pi * sigma * f) ** 2)),
+    )
+
+
+def tailed_optics(core: float, share: float, length: float) -> Optics:
+    """A Gaussian with a tail exp(-r/L)/(2 pi L^2), whose line spread is a Bessel function."""
+    sigma = core / FWHM_PER_SIGMA
+
+    def density(r: Any) -> Any:
+        gauss = np.exp(-(r**2) / (2 * sigma**2)) / (2 * pi * sigma**2)
+        return (1 - share) * gauss + share * np.exp(-r / length) / (2 * pi * length**2)
+
+    x = np.concatenate([np.linspace(0, 2, 2001), np.linspace(2, 60, 4000)[1:]])
+    line = np.where(x == 0, 1.0, x * k1(np.where(x == 0, 1.0, x))) / pi
+    half = CubicSpline(x * length, cumulative_simpson(line, x=x, initial=0.0))
+
+    def edge(u: NDArray[np.float64]) -> NDArray[np.float64]:
+        tail = 0.5 + np.sign(u) * half(np.minimum(np.abs(u), 60 * length))
+        return np.asarray((1 - share) * ndtr(u / sigma) + share * tail)
+
+    def transfer(f: float) -> float:
+        tail = (1 + (2 * pi * length * f) ** 2) ** -1.5
+        return float((1 - share) * np.exp(-2 * (pi * sigma * f) ** 2) + share * tail)
+
+    spacing, reach = 1e-6, 8 * length
+    line_of = spacing * np.arange(-round(reach / spacing), round(reach / spacing) + 1)
+    kernel = density(np.hypot(line_of, line_of[:, None]))
+    top = float(density(0.0))
+    width = 2 * brentq(lambda r: float(density(r)) - top / 2, 0.0, 2 * core)
+    return Optics("tail", MeasuredPSF(kernel, spacing), width, edge, transfer)
+
+
+def mirror_optics(aperture: float, obscuration: float) -> Optics:
+    """Diffraction of an annular pupil; the edge by Abel's integral of the closed form."""
+    psf = AnnularAperturePSF(WAVELENGTH, aperture, obscuration)
+    unit = WAVELENGTH / (2 * pi * aperture)
+    energy = 4 * pi / (1 - obscuration**2)
+
+    def jinc(t: Any) -> Any:
+        return 2 * j1(np.maximum(t, 1e-9)) / np.maximum(t, 1e-9)
+
+    def density(v: Any) -> Any:
+        inner = obscuration**2 * jinc(obscuration * v)
+        return ((jinc(v) - inner) / (1 - obscuration**2)) ** 2
+
+    far = np.concatenate([np.arange(0, 100, 0.15), np.geomspace(100, 4000, 400)])
+    along = np.concatenate([np.arange(0, 200, 0.2), np.geomspace(200, 40000, 1500)])
+    line = np.array([2 * trapezoid(density(np.hypot(x, along)), along) for x in far])
+    half = CubicSpline(far * unit, cumulative_simpson(line, x=far, initial=0.0) / energy)
+
+    def edge(u: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(0.5 + np.sign(u) * half(np.abs(u)))
+
+    def transfer(f: float) -> float:
+        spectrum = np.cos(2 * pi * f * unit * far) * line
+        return 2 * float(trapezoid(spectrum, far)) / energy
+
+    return Optics("mirror", psf, psf.fwhm, edge, transfer)
+
+
+def hidden_optics(generator: np.random.Generator) -> Optics:
+    """One of the kinds, of any width."""
+    kind = generator.choice(["gaussian", "tail", "mirror"])
+    if kind == "gaussian":
+        return gaussian_optics(generator.uniform(7e-6, 14e-6))
+    if kind == "tail":
+        core = generator.uniform(7e-6, 11e-6)
+        share, ratio = generator.uniform(0.1, 0.25), generator.uniform(1.8, 3.0)
+        return tailed_optics(core, share, ratio * core)
+    return mirror_optics(generator.uniform(0.2, 0.32), generator.uniform(0.2, 0.45))
+
+
+class Laboratory:
+    """A laboratory of which everything is known; `perform` writes what others may see.
+
+    Parameters
+    ----------
+    seed : int
+        The same seed makes the same files.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._generator = generator = np.random.default_rng(seed)
+        # TIFF is read in a process of its own, whose start takes longer than all the rest.
+        self.edge_format = ".tif" if seed % 10 == 0 else ".npy"
+        self.optics = hidden_optics(generator)
+        self.detector = Detector(
+            gain=generator.uniform(0.85, 1.0),
+            offset=generator.uniform(200.0, 400.0),
+            bits=12,
+            read_noise=generator.uniform(1.5, 2.5),
+            counts_per_electron=4e-3,
+        ).with_pattern(SHAPE, 0.02, 12.0, 0.003, generator)
+        self.room = 293.0 + ROOM * generator.standard_normal()
+        self.certificate = CERTIFICATE * generator.standard_normal()
+        self.oven = CELSIUS + generator.uniform(360.0, 420.0)  # of the heated chip
+        self.reading = self.oven + THERMOCOUPLE * generator.standard_normal()
+        self.hot = CELSIUS + generator.uniform(450.0, 650.0)
+        self.unknown = CELSIUS + generator.uniform(300.0, 600.0)  # a black body
+        self.emissivity = self._surface(generator.uniform(0.35, 0.5), generator.uniform(0.5, 0.7))
+        tilts = generator.uniform(2.0, 9.0, 2) * generator.choice([-1, 1], 2)
+        self.normals = tilts + [0.0, 90.0] + 180.0 * generator.integers(0, 2, 2)
+
+    def _surface(self, body: float, fissure: float) -> NDArray[np.float64]:
+        """Emissivity of every sample, which varies from place to place."""
+        shape = tuple(SAMPLES * count for count in SHAPE)
+        texture = gaussian_filter(self._generator.standard_normal(shape), 4.0, mode="reflect")
+        emissivity = np.full(shape, body)
+        emissivity[:, SAMPLES * FISSURE.start : SAMPLES * FISSURE.stop] = fissure
+        return np.asarray(emissivity + 0.015 * texture / texture.std())
+
+    def truth(self) -> dict[str, float]:
+        """What the procedures shall find, by `QUANTITIES`."""
+        shape = (SHAPE[0], SAMPLES, SHAPE[1], SAMPLES)
+        pixels = self.emissivity.reshape(shape).mean(axis=(1, 3))
+        body = np.concatenate([pixels[4:44, 1:9], pixels[4:44, 55:63]])
+        return {
+            "black body": self.unknown,
+            "emissivity of the body": float(body.mean()),
+            "emissivity of the fissure": float(pixels[16:32, 28:36].mean()),
+            "PSF, full width": self.optics.fwhm,
+            "MTF at 31 /mm": self._transfer(),
+            "temperature of the fissure": self.hot,
+        }
+
+    def _transfer(self) -> float:
+        """Of optics and sensor, across the first edge."""
+        angle = radians(float(self.normals[0]))
+        across, down = FREQUENCY * PITCH * cos(angle), FREQUENCY * PITCH * sin(angle)
+        return self.optics.transfer(FREQUENCY) * float(np.sinc(across) * np.sinc(down))
+
+    def perform(self, folder: Path) -> None:
+        """Do the experiment, and write its files and notes."""
+        self._calibrate(folder)
+        for name, celsius in (("cold", 240.0), ("hot", 640.0)):
+            self._record(folder / f"{name}.hcc", _even(celsius + CELSIUS), UNIFORM_FRAMES)
+        for number in range(1, IMAGES + 1):
+            self._record(folder / f"unknown-{number}.hcc", _even(self.unknown), FRAMES)
+            self._record(folder / f"heated-{number}.hcc", self._seen(self.oven), FRAMES)
+            self._record(folder / f"chip-{number}.npy", self._seen(self._field()), FRAMES)
+        for number, normal in enumerate(self.normals, 1):
+            self._record(
+                folder / f"edge-{number}{self.edge_format}", self._edge(normal), EDGE_FRAMES
+            )
+        (folder / "regions.yaml").write_text(REGIONS)
+        notes = {"thermocouple_degC": round(self.reading - CELSIUS, 2)}
+        (folder / "notes.yaml").write_text(yaml.safe_dump(notes))
+
+    def _calibrate(self, folder: Path) -> None:
+        lines = ["temperature_degC,file,count_uncertainty,temperature_uncertainty_K"]
+        for celsius in BLACK_BODIES:
+            error = self.certificate + SETTING * self._generator.standard_normal()
+            name = f"black-body-{celsius}.hcc"
+            self._record(folder / name, _even(celsius + CELSIUS + error), FRAMES)
+            lines.append(f"{celsius},{name},{DRIFT},{SETTING}")
+        (folder / "points.csv").write_text("\n".join(lines) + "\n")
+
+    def _record(self, path: Path, radiance: NDArray[np.float64], count: int) -> None:
+        """Counts of an image of radiance, in the format that the name tells."""
+        drift = DRIFT / self.detector.gain * self._generator.standard_normal()
+        frames = np.broadcast_to(radiance + drift, (count, *SHAPE))
+        counts = self.detector.counts(frames, self._generator).astype(np.uint16)
+        if path.suffix == ".npy":
+            np.save(path, counts)
+        elif path.suffix == ".tif":
+            tifffile.imwrite(path, counts)
+        else:
+            times = np.arange(count) / 600.0
+            saturation = float(self.detector.saturation)
+            write_hcc(
+                path,
+                Recording(counts, "counts", times, "laboratory", INTEGRATION_TIME, saturation),
+            )
+
+    def _field(self) -> NDArray[np.float64]:
+        """True temperature of the hot chip: even in the middle, colder about it."""
+        rows, columns = self.emissivity.shape
+        x = PITCH / SAMPLES * (np.arange(columns) - (columns - 1) / 2)
+        y = PITCH / SAMPLES * (np.arange(rows) - (rows - 1) / 2)
+        beyond = np.maximum(np.hypot(x, y[:, None]) - PLATEAU, 0.0)
+        return np.asarray(self.hot - 60.0 * (1 - np.exp(-((beyond / 60e-6) ** 2))))
+
+    def _seen(self, kelvins: float | NDArray[np.float64]) -> NDArray[np.float64]:
+        """Radiance of the chip at every sensor."""
+        reflected = float(BAND.radiance(np.array(self.room)))
+        own = BAND.radiance(np.broadcast_to(kelvins, self.emissivity.shape))
+        radiance = self.emissivity * own + (1 - self.emissivity) * reflected
+        raster = Raster(0.0, 0.0, PITCH / SAMPLES, *radiance.shape)
+        single = radiance.astype(np.float32)
+        exposure = Exposure(0.0, INTEGRATION_TIME, raster, radiance, single, single, radiance)
+        camera = Camera(BAND, PITCH, psf=self.optics.psf, floor=None)
+        return camera.develop(exposure).radiance[0]
+
+    def _edge(self, normal: float) -> NDArray[np.float64]:
+        """Radiance of a hot plate half behind a warm blade, at every sensor's square."""
+        node, weight = np.polynomial.legendre.leggauss(6)
+        inside = node * PITCH / 2
+        rows, columns = SHAPE
+        x = (PITCH * (np.arange(columns) - (columns - 1) / 2)[:, None] + inside).ravel()
+        y = (PITCH * ((rows - 1) / 2 - np.arange(rows))[:, None] + inside).ravel()
+        angle = radians(normal)
+        distance = x * cos(angle) + y[:, None] * sin(angle) - self._generator.uniform(-6e-6, 6e-6)
+        shares = self.optics.edge(distance).reshape(rows, 6, columns, 6)
+        share = np.einsum("iajb,a,b->ij", shares, weight / 2, weight / 2)
+        blade, plate = self._generator.uniform(230.0, 280.0), self._generator.uniform(520.0, 600.0)
+        dark, bright = BAND.radiance(np.array([blade, plate]) + CELSIUS)
+        return np.asarray(dark + (bright - dark) * share)
+
+
+def _even(kelvins: float) -> NDArray[np.float64]:
+    """Radiance of a black body."""
+    return np.full(SHAPE, float(BAND.radiance(np.array(kelvins))))
+
+
+CAMERA_FIELDS = (
+    "uniform.frames=cold.hcc",
+    "uniform.brighter=hot.hcc",
+    "bad_pixels=find",
+    "pitch=6 um",
+)
+STACK_FIELDS = ("unit=counts", "interval=2 ms", "saturation=4094")
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What the procedures find in a folder; it knows nothing of `Laboratory`."""
+
+    folder: Path
+
+    @cached_property
+    def calibration(self) -> FittedCalibration:
+        """Of the black bodies; ``chipglow calibrate``."""
+        points = read_points(
+            self.folder / "points.csv",
+            lambda file: uniform_counts(self.folder / file, CAMERA_FIELDS),
+        )
+        fit = fit_linear(
+            points["temperature"],
+            points["counts"],
+            BAND,
+            points["count_uncertainty"],
+            points["temperature_uncertainty"],
+            CERTIFICATE,
+            INTEGRATION_TIME,
+        )
+        path = self.folder / "calibration.yaml"
+        path.write_text(calibration_text(CalibrationDescription.of(fit)))
+        return load_calibration(path)
+
+    def images(self, pattern: str) -> list[Measurement]:
+        """Recordings as measurements; ``chipglow convert``."""
+        fields = [*CAMERA_FIELDS, "calibration=calibration.yaml"]
+        paths = sorted(self.folder.glob(pattern))
+        if not pattern.endswith("hcc"):
+            fields += STACK_FIELDS
+        return [load_measurement(path, fields) for path in paths]
+
+    def results(self) -> dict[str, Found]:
+        """What is found, by `QUANTITIES`."""
+        calibration = self.calibration
+        heated, chip = self.images("heated-*.hcc"), self.images("chip-*.npy")
+        notes = yaml.safe_load((self.folder / "notes.yaml").read_text())
+        heating = Heating(
+            notes["thermocouple_degC"] + CELSIUS,
+            truth_uncertainty=THERMOCOUPLE,
+            environment_uncertainty=ROOM,
+        )
+        regions = load_regions(self.folder / "regions.yaml")
+        found = {area.name: area for area in areas(regions, heated[0].raster)}
+        emissivity = determine_emissivity(heated, heating)
+        body, fissure = emissivity.of(found["body"]), emissivity.of(found["fissure"])
+        hot = true_temperature(chip, found["fissure"], fissure, calibration=calibration)
+        unknown = true_temperature(
+            self.images("unknown-*.hcc"),
+            found["fissure"],
+            KnownEmissivity(1.0),
+            Surroundings(293.0, ROOM),
+        )
+        return {
+            "black body": Found(unknown.value, unknown.expanded_uncertainty),
+            "emissivity of the body": Found(body.mean, body.expanded_uncertainty),
+            "emissivity of the fissure": Found(fissure.mean, fissure.expanded_uncertainty),
+            **self._spread(),
+            "temperature of the fissure": Found(hot.value, hot.expanded_uncertainty),
+        }
+
+    def _spread(self) -> dict[str, Found]:
+        """Point spread function; ``chipglow psf``."""
+        factor = NormalDist().inv_cdf(0.975)
+        images = self.images("edge-*")
+        result = knife_edge([edge_image(image, f"edge {k}") for k, image in enumerate(images, 1)])
+        transfer = result.edges[0].transfer
+        at = int(np.argmin(np.abs(transfer.frequency - FREQUENCY)))
+        return {
+            "PSF, full width": Found(result.fwhm, factor * result.fwhm_uncertainty),
+            "MTF at 31 /mm": Found(
+                float(transfer.value[at]), factor * float(transfer.uncertainty[at])
+            ),
+        }
+
+
+def repeat(seed: int) -> dict[str, tuple[float, float, float]]:
+    """Truth, value and expanded uncertainty of each quantity in a laboratory of this seed."""
+    laboratory = Laboratory(seed)
+    truth = laboratory.truth()
+    with TemporaryDirectory() as name:
+        laboratory.perform(Path(name))
+        found = Evaluation(Path(name)).results()
+    return {name: (truth[name], found[name].value, found[name].expanded) for name in QUANTITIES}
+
+
+Row = dict[str, tuple[float, float, float]]
+
+
+def kept(seed: int) -> Row:
+    """Result of a repeat, computed or as it was kept."""
+    path = RESULTS / f"{seed}.json"
+    if not path.is_file():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(repeat(seed)))
+    return {name: tuple(values) for name, values in json.loads(path.read_text()).items()}
+
+
+def hits(rows: Sequence[Row], name: str) -> int:
+    """How often the truth is in the stated interval."""
+    return sum(abs(row[name][1] - row[name][0]) <= row[name][2] for row in rows)
+
+
+def table(rows: Sequence[Row]) -> Iterable[tuple[str, ...]]:
+    """Quantity, hits, and medians of the error and of the half width of the interval."""
+    yield "quantity", "within", "median |error|", "median U (95 %)"
+    for name, unit in QUANTITIES.items():
+        scale = 1e6 if unit == "um" else 1.0
+        error = scale * median(abs(row[name][1] - row[name][0]) for row in rows)
+        expanded = scale * median(row[name][2] for row in rows)
+        told = [f"{value:#.2g} {unit}".strip() for value in (error, expanded)]
+        yield name, f"{hits(rows, name)} of {len(rows)}", *told
+
+
+def main() -> None:
+    """Repeat, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--repeats", type=int, default=100, help="how many seeds")
+    parser.add_argument("--markdown", action="store_true", help="print a table for a page")
+    parser.add_argument("--write", type=Path, metavar="FOLDER", help="only write a seed's files")
+    options = parser.parse_args()
+    if options.write is not None:
+        options.write.mkdir(parents=True, exist_ok=True)
+        Laboratory(options.first).perform(options.write)
+        return
+    rows = [kept(seed) for seed in range(options.first, options.first + options.repeats)]
+    for number, line in enumerate(table(rows)):
+        if options.markdown:
+            print("|", " | ".join(line), "|")
+            if number == 0:
+                print("|---|---|---|---|")
+        else:
+            print(f"{line[0]:28}", *(f"{cell:>16}" for cell in line[1:]))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,324 @@
+"""Images of edges, and which of their pixels can be used."""
+
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
+
+from chipglow.analysis.edge_line import EdgeLine, NoEdgeError, Straightness, find_edge
+from chipglow.analysis.psf_fit import EdgePixels, ModelFit, fit_model
+from chipglow.analysis.psf_models import GaussianModel
+from chipglow.camera import Flag, Measurement
+
+_LEAST_STEP: Final = 7.0
+_OUTLIER: Final = 7.0
+_SECOND_EDGE: Final = 0.12
+_BLOCK: Final = 5
+_ROUGHLY: Final = 1e-5
+_LEAST_PILE: Final = 10
+_CLIPPED_SHARE: Final = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeImage:
+    """An image of an edge.
+
+    Parameters
+    ----------
+    radiance : ndarray
+        In W/(m² sr), shape (y, x).
+    x, y : ndarray
+        Positions of columns and rows in m; x ascends, y descends.
+    dead, saturated, below : ndarray
+        Which pixels have no value, are too bright or are too dark for the camera, shape (y, x).
+    footprint : float
+        Side of a sensor's sensitive square in m.
+    wavelength : float, optional
+        Middle of the camera's band in m.
+    name : str
+        What it is called in messages.
+    notes : tuple of str
+        What is assumed of it, a sentence each.
+    doubts : tuple of str
+        Why it may not be trusted, a sentence each.
+    """
+
+    radiance: NDArray[np.float64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    dead: NDArray[np.bool_]
+    saturated: NDArray[np.bool_]
+    below: NDArray[np.bool_]
+    footprint: float
+    wavelength: float | None
+    name: str
+    notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def pitch(self) -> float:
+        """Distance between sensors in m."""
+        return float(self.x[1] - self.x[0])
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """Which pixels can be trusted, shape (y, x)."""
+        return ~(self.dead | self.saturated | self.below)
+
+
+def edge_image(
+    measurement: Measurement, name: str, region: tuple[slice, slice] | None = None
+) -> EdgeImage:
+    """The mean of a measurement's frames as an image of an edge.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        One frame or several of the same edge.
+    name : str
+        What it is called in messages.
+    region : tuple of slice, optional
+        Rows and columns that show the edge; all by default.
+
+    Raises
+    ------
+    ValueError
+        If the region is not within the image.
+    """
+    part = region or np.s_[:, :]
+    raster, flags = measurement.raster, np.bitwise_or.reduce(measurement.flags, axis=0)[part]
+    radiance = measurement.radiance.mean(axis=0)[part]
+    if min(radiance.shape) < 8:
+        raise ValueError(
+            f"{name}: the region has {radiance.shape[0]} x {radiance.shape[1]} pixels, expected "
+            f"8 x 8 or more of the image's {raster.rows} x {raster.columns}"
+        )
+    attributes = measurement.data.attrs
+    band = measurement.band if "band_lower" in attributes else None
+    return EdgeImage(
+        radiance,
+        raster.x[part[1]],
+        raster.y[part[0]],
+        ((flags & (Flag.DEAD | Flag.REPLACED)) != 0) | ~np.isfinite(radiance),
+        (flags & Flag.SATURATED) != 0,
+        (flags & Flag.BELOW_FLOOR) != 0,
+        raster.spacing * sqrt(float(attributes.get("fill_factor", 1.0))),
+        (band.lower + band.upper) / 2 if band else None,
+        name,
+        _notes(measurement),
+        tuple(str(attributes.get("doubtful", "")).splitlines()),
+    )
+
+
+def _notes(measurement: Measurement) -> tuple[str, ...]:
+    notes = str(measurement.data.attrs.get("assumed", "")).splitlines()
+    if "fill_factor" not in measurement.data.attrs:
+        notes.append("the whole square of a sensor takes light (fill factor 1).")
+    if measurement.data.attrs.get("psf_order") == "sensor":
+        notes.append(
+            "each sensor's square acts once; this camera was simulated with psf_order sensor, "
+            "where it acts twice, and the second time is counted as optics."
+        )
+    return tuple(notes)
+
+
+def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
+    """Find the edge in an image, and the pixels that tell of it.
+
+    Where pixels are saturated or below the floor, all pixels from there on outward are left out:
+    to leave out only those whose noise goes over the limit would shift the mean of the others.
+
+    Parameters
+    ----------
+    image : EdgeImage
+        The image.
+
+    Returns
+    -------
+    EdgePixels
+        The pixels, x and y from the image's middle, with even noise.
+    list of str
+        What may make them doubtful.
+
+    Raises
+    ------
+    NoEdgeError
+        If there is no straight edge, or more than one.
+    """
+    image = replace(image, saturated=image.saturated | _piled_up(image))
+    x, y = image.x - image.x.mean(), image.y - image.y.mean()
+    try:
+        # Where an edge is can be seen on clipped pixels too.
+        line, straightness = find_edge(np.where(image.dead, np.nan, image.radiance), x, y)
+        pixels = _pixels_of(image, x, y, line)
+        quick = _quick_fit(pixels)
+        doubts = _bent(straightness, image)
+        limits, clipped = _limits(image, x, y, line)
+        doubts += clipped
+        if clipped:
+            pixels = _within_limits(pixels, line, limits)
+            quick = _quick_fit(pixels)
+        else:
+            _check_edge(pixels, quick)
+        pixels, outliers = _without_outliers(pixels, quick)
+        doubts += outliers
+        _check_single(pixels, quick)
+    except NoEdgeError as error:
+        raise NoEdgeError(f"{image.name}: {error}") from None
+    said = [f"{image.name}: {doubt}" for doubt in (*image.doubts, *doubts)]
+    noise = float(np.std(pixels.radiance - quick.predicted(0, pixels)))
+    pixels = replace(pixels, sigma=np.full(pixels.x.size, max(noise, 1e-300)))
+    # A Gaussian with a free step can put the edge of a clipped image far away.
+    return (pixels if clipped else replace(pixels, line=quick.edges[0].line)), said
+
+
+def _pixels_of(
+    image: EdgeImage, x: NDArray[np.float64], y: NDArray[np.float64], line: EdgeLine
+) -> EdgePixels:
+    across, down = np.meshgrid(x, y)
+    usable = image.usable
+    if np.count_nonzero(usable) < 40:
+        raise NoEdgeError(f"{np.count_nonzero(usable)} usable pixels, expected 40 or more")
+    radiance = image.radiance[usable]
+    sigma = np.full(radiance.size, max(float(radiance.std()), 1e-300))
+    return EdgePixels(
+        across[usable], down[usable], radiance, sigma, image.pitch, image.footprint, line
+    )
+
+
+def _quick_fit(pixels: EdgePixels) -> ModelFit:
+    """A Gaussian fitted to the pixels."""
+    return fit_model(GaussianModel(), [pixels], tolerance=_ROUGHLY)
+
+
+def _check_edge(pixels: EdgePixels, quick: ModelFit) -> None:
+    """Raise unless the step is significant and enough of both sides is seen."""
+    edge = quick.edges[0]
+    distance = edge.line.distance(pixels.x, pixels.y)
+    dark, bright = -float(distance.min()), float(distance.max())
+    if edge.step < _LEAST_STEP * edge.step_uncertainty:
+        raise NoEdgeError(
+            f"the step is {edge.step:.3g} W/m^2/sr with a standard uncertainty of "
+            f"{edge.step_uncertainty:.2g}, expected {_LEAST_STEP:g} times as much or more"
+        )
+    if min(dark, bright) < max(quick.fwhm, 2 * pixels.pitch):
+        raise NoEdgeError(
+            f"the image reaches {dark * 1e6:.3g} um to the dark and {bright * 1e6:.3g} um to the "
+            f"bright side of the edge, which is {quick.fwhm * 1e6:.3g} um wide, "
+            "expected more of both"
+        )
+
+
+def _piled_up(image: EdgeImage) -> NDArray[np.bool_]:
+    """Pixels at a limit that no flag tells: many of just the greatest value, among noisy ones."""
+    values, counts = np.unique(image.radiance[image.usable], return_counts=True)
+    if values.size < 3:
+        return np.zeros_like(image.dead)
+    piled = counts[-1] >= _LEAST_PILE and counts[-1] > 3 * counts[-2] and counts[-1] > 3 * counts[0]
+    return np.asarray((image.radiance == values[-1]) & piled)
+
+
+def _limits(
+    image: EdgeImage, x: NDArray[np.float64], y: NDArray[np.float64], line: EdgeLine
+) -> tuple[tuple[float, float], list[str]]:
+    """Distances between which nothing is clipped, and what is to be said of it."""
+    across, down = np.meshgrid(x, y)
+    distance = line.distance(across, down)
+    low, high, said = -np.inf, np.inf, []
+    if image.saturated.any():
+        high = _first_clipped(distance, image.saturated & ~image.dead, image.pitch)
+        said.append(_clipped_text(image.saturated, "saturated", "bright", high))
+    if image.below.any():
+        low = -_first_clipped(-distance, image.below & ~image.dead, image.pitch)
+        said.append(_clipped_text(image.below, "below the camera's floor", "dark", -low))
+    return (low, high), said
+
+
+def _first_clipped(
+    distance: NDArray[np.float64], clipped: NDArray[np.bool_], pitch: float
+) -> float:
+    """Distance from which on more than single pixels are clipped, less a pitch."""
+    first = float(distance.min())
+    index = ((distance - first) / (pitch / 2)).astype(np.int64).ravel()
+    count = np.bincount(index)
+    share = np.bincount(index, clipped.ravel()) / np.maximum(count, 1)
+    found = np.flatnonzero((share > _CLIPPED_SHARE) & (share * count >= 2))
+    return first + float(found[0]) * pitch / 2 if found.size else np.inf
+
+
+def _clipped_text(clipped: NDArray[np.bool_], how: str, side: str, limit: float) -> str:
+    share = 100 * np.count_nonzero(clipped) / clipped.size
+    beyond = (
+        f"; nothing is used beyond {limit * 1e6:.3g} um on the {side} side, so that the step and "
+        "the tails are known less well"
+        if np.isfinite(limit)
+        else " and left out"
+    )
+    return f"{share:.2g} % of the pixels are {how}{beyond}."
+
+
+def _within_limits(pixels: EdgePixels, line: EdgeLine, limits: tuple[float, float]) -> EdgePixels:
+    distance = line.distance(pixels.x, pixels.y)
+    return _chosen(pixels, (distance > limits[0]) & (distance < limits[1]))
+
+
+def _chosen(pixels: EdgePixels, kept: NDArray[np.bool_]) -> EdgePixels:
+    if kept.sum() < 40:
+        raise NoEdgeError(f"{kept.sum()} pixels are not clipped, expected 40 or more")
+    return replace(
+        pixels,
+        x=pixels.x[kept],
+        y=pixels.y[kept],
+        radiance=pixels.radiance[kept],
+        sigma=pixels.sigma[kept],
+    )
+
+
+def _without_outliers(pixels: EdgePixels, quick: ModelFit) -> tuple[EdgePixels, list[str]]:
+    """The pixels without those that lie far from all others as near to the edge."""
+    left = pixels.radiance - quick.predicted(0, pixels)
+    spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
+    limit = max(_OUTLIER * spread, 0.2 * quick.edges[0].step)
+    kept = np.abs(left) <= limit
+    lost = int(np.count_nonzero(~kept))
+    # More than a few are no dead pixels but something that is not an edge.
+    if lost == 0 or lost > 0.01 * kept.size:
+        return pixels, []
+    text = f"{lost} pixels far from the others are left out; if they are dead, flag them."
+    return _chosen(pixels, kept), [text]
+
+
+def _check_single(pixels: EdgePixels, quick: ModelFit) -> None:
+    """Raise unless the two sides of the edge are all there is."""
+    left = pixels.radiance - quick.predicted(0, pixels)
+    column = np.round((pixels.x - pixels.x.min()) / pixels.pitch).astype(np.int64)
+    row = np.round((pixels.y - pixels.y.min()) / pixels.pitch).astype(np.int64)
+    total, count = np.zeros((2, row.max() + 1, column.max() + 1))
+    total[row, column], count[row, column] = left, 1.0
+    weight = uniform_filter(count, _BLOCK, mode="constant")
+    mean = uniform_filter(total, _BLOCK, mode="constant") / np.maximum(weight, 1e-9)
+    share = np.abs(np.where(weight > 0.5, mean, 0.0)) / quick.edges[0].step
+    change = np.diff(total, axis=1)[(count[:, 1:] * count[:, :-1]) > 0]
+    noise = float(np.median(np.abs(change))) / (_BLOCK * quick.edges[0].step)
+    if share.max() > max(_SECOND_EDGE, 7 * noise):
+        where = np.unravel_index(int(np.argmax(share)), share.shape)
+        raise NoEdgeError(
+            f"more than one straight edge: near row {where[0]}, column {where[1]} the image is "
+            f"{100 * share.max():.0f} % of the step away from a single edge's, expected a region "
+            "with one edge and even sides"
+        )
+
+
+def _bent(straightness: Straightness | None, image: EdgeImage) -> list[str]:
+    if straightness is None:
+        return ["the edge was found by its step only; that it is straight could not be checked."]
+    bent, unsure = straightness.sagitta, straightness.uncertainty
+    if bent < 4 * unsure or bent < 0.05 * image.pitch:
+        return []
+    return [
+        f"the edge is bent by {bent * 1e6:.2g} um over its length (standard uncertainty "
+        f"{unsure * 1e6:.1g} um), which makes the point spread function too wide."
+    ]

@@ -1,0 +1,311 @@
+"""From a camera's counts to radiance: calibrations, and how far they can be trusted."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from math import inf
+from typing import Any, ClassVar, Final, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chipglow.camera.recording import PlanckConversion
+from chipglow.radiometry import Band
+from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
+from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT
+
+_CHECKED: Final = 101
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Calibration(ABC):
+    """What a camera's counts mean.
+
+    Parameters
+    ----------
+    band : Band
+        The camera's band.
+    lowest, highest : float
+        Radiance temperatures in K between which it holds; unlimited by default.
+    integration_time : float, optional
+        Integration time in s for which it holds.
+    range_name : str, optional
+        The camera's measuring range for which it holds, as its maker calls it.
+
+    Raises
+    ------
+    ValueError
+        If a value is impossible.
+    """
+
+    band: Band
+    lowest: float = 0.0
+    highest: float = inf
+    integration_time: float | None = None
+    range_name: str | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.lowest < self.highest:
+            raise ValueError(
+                f"calibration: lowest is {self.lowest!r} K and highest {self.highest!r} K, "
+                "expected 0 K or more, in order"
+            )
+        if self.integration_time is not None and not 0 < self.integration_time < inf:
+            raise ValueError(
+                f"calibration: integration_time is {self.integration_time!r}, expected over 0 s"
+            )
+
+    @abstractmethod
+    def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
+        """In-band radiance in W/(m² sr) of counts, of the same shape; NaN where there is none."""
+
+    @abstractmethod
+    def uncertainty(self, counts: ArrayLike) -> NDArray[np.float64] | None:
+        """Standard uncertainty of `radiance` from the calibration; None if it is not known."""
+
+    @property
+    @abstractmethod
+    def description(self) -> str:
+        """What it is, for people."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FittedCalibration(Calibration):
+    """A calibration whose parameters were fitted to black bodies.
+
+    Parameters
+    ----------
+    parameters : ndarray
+        As `NAMES` says, shape (n,).
+    covariance : ndarray
+        Their covariance, shape (n, n): of the fit, and of what the black bodies have in common.
+    **others
+        As `Calibration` has them.
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit or a value is impossible.
+    """
+
+    NAMES: ClassVar[tuple[str, ...]] = ()
+    UNITS: ClassVar[tuple[str, ...]] = ()
+
+    parameters: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not (self.lowest >= TABLE_COLDEST and self.highest <= TABLE_HOTTEST):
+            raise ValueError(
+                f"calibration: lowest is {self.lowest:g} K and highest {self.highest:g} K, "
+                f"expected the temperatures of black bodies, {TABLE_COLDEST:g} to "
+                f"{TABLE_HOTTEST:g} K"
+            )
+        count = len(self.NAMES)
+        if self.parameters.shape != (count,) or self.covariance.shape != (count, count):
+            raise ValueError(
+                f"calibration: shapes {self.parameters.shape} and {self.covariance.shape} of "
+                f"parameters and covariance, expected those of {', '.join(self.NAMES)}"
+            )
+        if not (np.isfinite(self.parameters).all() and np.isfinite(self.covariance).all()):
+            raise ValueError("calibration: a parameter or covariance is not finite")
+        if (np.diag(self.covariance) < 0).any():
+            raise ValueError("calibration: a variance is negative, expected 0 or more")
+
+    @abstractmethod
+    def counts(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Counts of a black body of this temperature in K."""
+
+    @abstractmethod
+    def slope(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Change of the counts with the temperature, in 1/K."""
+
+    @abstractmethod
+    def gradient(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Change of the counts with each parameter, shape (n, ...) for temperatures (...)."""
+
+    @abstractmethod
+    def temperature(self, counts: ArrayLike) -> NDArray[np.float64]:
+        """Temperature in K of the black body that gives these counts; NaN where there is none."""
+
+    @property
+    def rises(self) -> bool:
+        """Whether the counts rise with the temperature wherever it holds."""
+        kelvins = np.linspace(self.lowest, self.highest, _CHECKED)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            return bool((self.slope(kelvins) > 0).all())
+
+    def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
+        """In-band radiance in W/(m² sr) of counts, of the same shape; NaN where there is none."""
+        return np.asarray(self.band.radiance(self.temperature(counts)), np.float64)
+
+    def uncertainty(self, counts: ArrayLike) -> NDArray[np.float64]:
+        """Standard uncertainty of `radiance` in W/(m² sr), of the same shape.
+
+        Propagated from the covariance of the parameters (JCGM 100, Equation 13): at given counts S
+        a change of the parameters moves the radiance by dL = −(∂S/∂p) dp (dL/dT) / (∂S/∂T).
+        """
+        sensitivity = self._sensitivity(self.temperature(counts))
+        variance = np.einsum("i...,ij,j...->...", sensitivity, self.covariance, sensitivity)
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
+    def radiance_covariance(self, temperatures: ArrayLike) -> NDArray[np.float64]:
+        """Covariance of the radiance at several radiance temperatures in K of shape (n,).
+
+        In (W/(m² sr))², shape (n, n). What the calibration makes wrong at one radiance it makes
+        wrong at others, too: ratios and differences are known better, or worse, than that.
+        """
+        sensitivity = self._sensitivity(_floats(temperatures))
+        return np.asarray(sensitivity.T @ self.covariance @ sensitivity)
+
+    def _sensitivity(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Change of the radiance with each parameter at given counts, shape (n, ...)."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            slope = self.band.slope(temperature) / self.slope(temperature)
+            return np.asarray(-self.gradient(temperature) * slope)
+
+
+@final
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearCalibration(FittedCalibration):
+    """Counts that are a straight line over the in-band radiance: S = offset + gain L(T).
+
+    Parameters
+    ----------
+    **all
+        As `FittedCalibration` has them; offset in counts, gain in counts per W/(m² sr).
+    """
+
+    NAMES: ClassVar[tuple[str, ...]] = ("offset", "gain")
+    UNITS: ClassVar[tuple[str, ...]] = ("counts", "counts m² sr/W")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.parameters[1] > 0:
+            raise ValueError(f"calibration: gain is {self.parameters[1]:g}, expected over 0")
+
+    @property
+    def description(self) -> str:
+        """What it is, for people."""
+        return "straight line over the in-band radiance"
+
+    def counts(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Counts of a black body of this temperature in K."""
+        offset, gain = self.parameters
+        return np.asarray(offset + gain * self.band.radiance(_floats(temperature)))
+
+    def slope(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Change of the counts with the temperature, in 1/K."""
+        return np.asarray(self.parameters[1] * self.band.slope(temperature))
+
+    def gradient(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Change of the counts with offset and gain, shape (2, ...)."""
+        radiance = self.band.radiance(_floats(temperature))
+        return np.stack([np.ones_like(radiance), radiance])
+
+    def temperature(self, counts: ArrayLike) -> NDArray[np.float64]:
+        """Temperature in K of the black body that gives these counts; NaN where there is none."""
+        return np.asarray(self.band.temperature(self.radiance(counts)), np.float64)
+
+    def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
+        """In-band radiance in W/(m² sr) of counts, of the same shape."""
+        offset, gain = self.parameters
+        return np.asarray((_floats(counts) - offset) / gain)
+
+
+@final
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SakumaHattori(FittedCalibration):
+    """Counts by the Planckian form of Sakuma and Hattori: S = offset + C / (exp(c2/(A T + B)) − 1).
+
+    Parameters
+    ----------
+    **all
+        As `FittedCalibration` has them; offset and C in counts, A in m, B in m K.
+
+    Notes
+    -----
+    F. Sakuma and S. Hattori, Temperature: Its Measurement and Control in Science and Industry 5
+    (1982) 421; recommended by the CIPM's consultative committee for thermometry (CCT-WG5, 2008).
+    Their signal has no offset; the counts of a camera have one.
+    """
+
+    NAMES: ClassVar[tuple[str, ...]] = ("offset", "A", "B", "C")
+    UNITS: ClassVar[tuple[str, ...]] = ("counts", "m", "m K", "counts")
+
+    @property
+    def description(self) -> str:
+        """What it is, for people."""
+        return "Planckian form of Sakuma and Hattori"
+
+    def counts(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Counts of a black body of this temperature in K."""
+        offset, _, _, scale = self.parameters
+        return np.asarray(offset + scale * _occupation(self._exponent(temperature)))
+
+    def slope(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Change of the counts with the temperature, in 1/K."""
+        return np.asarray(self.parameters[1] * self._by_stretched(temperature))
+
+    def gradient(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Change of the counts with offset, A, B and C, shape (4, ...)."""
+        kelvins, stretched = _floats(temperature), self._by_stretched(temperature)
+        occupation = _occupation(self._exponent(temperature))
+        return np.stack([np.ones_like(kelvins), kelvins * stretched, stretched, occupation])
+
+    def temperature(self, counts: ArrayLike) -> NDArray[np.float64]:
+        """Temperature in K of the black body that gives these counts; NaN where there is none."""
+        offset, a, b, scale = self.parameters
+        with np.errstate(divide="ignore", invalid="ignore"):
+            logarithm = np.log1p(scale / (_floats(counts) - offset))
+            kelvins = (SECOND_RADIATION_CONSTANT / logarithm - b) / a
+        return np.where(kelvins > 0, kelvins, np.nan)
+
+    def _exponent(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        _, a, b, _ = self.parameters
+        return np.asarray(SECOND_RADIATION_CONSTANT / (a * _floats(temperature) + b))
+
+    def _by_stretched(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Change of the counts with A T + B."""
+        exponent = self._exponent(temperature)
+        occupation = _occupation(exponent)
+        growth = occupation * (1 + occupation) * exponent**2 / SECOND_RADIATION_CONSTANT
+        return np.asarray(self.parameters[3] * growth)
+
+
+@final
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MakersCalibration(Calibration):
+    """The conversion that a camera's maker stored in the file; its uncertainty is not known.
+
+    Parameters
+    ----------
+    conversion : PlanckConversion
+        From counts to the temperature of a black body.
+    **others
+        As `Calibration` has them.
+    """
+
+    conversion: PlanckConversion
+
+    @property
+    def description(self) -> str:
+        """What it is, for people."""
+        return "the maker's, from the file; its uncertainty is not known"
+
+    def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
+        """In-band radiance in W/(m² sr) of counts, of the same shape; NaN where there is none."""
+        kelvins = self.conversion.temperature(np.asarray(counts))
+        return np.asarray(self.band.radiance(kelvins), np.float64)
+
+    def uncertainty(self, counts: ArrayLike) -> None:
+        """None: makers do not store it."""
+
+
+def _floats(values: ArrayLike) -> NDArray[Any]:
+    return np.asarray(values, np.float64)
+
+
+def _occupation(exponent: NDArray[np.float64]) -> NDArray[np.float64]:
+    """1 / (exp(x) − 1), without overflow at large x."""
+    return np.asarray(np.exp(-exponent) / -np.expm1(-exponent))

@@ -1,0 +1,242 @@
+"""The command ``chipglow calibrate``: counts of black bodies to a calibration."""
+
+from collections.abc import Callable, Iterator, Mapping
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from chipglow.cli.options import Settings
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from chipglow.camera import CalibrationFit, FittedCalibration
+    from chipglow.radiometry import Band
+
+    Fits = Mapping[str, CalibrationFit[FittedCalibration]]
+
+_UNLIKELY: Final = 0.01
+
+
+class Model(StrEnum):
+    """Forms of a calibration."""
+
+    LINEAR = "linear"
+    SAKUMA_HATTORI = "sakuma-hattori"
+    BOTH = "both"
+
+
+def calibrate(
+    points: Annotated[
+        Path,
+        typer.Argument(
+            metavar="POINTS.csv",
+            help="Black bodies: columns temperature_degC (or _K), counts (or file, a recording of "
+            "each) and, if known, their standard uncertainties count_uncertainty and "
+            "temperature_uncertainty_K.",
+        ),
+    ],
+    band: Annotated[
+        str,
+        typer.Option(
+            metavar="BAND", help="The camera's band, such as '3.8-5.1 um', or its response, a .csv."
+        ),
+    ],
+    model: Annotated[Model, typer.Option(help="Which form to fit.")] = Model.LINEAR,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The calibration to write, YAML.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw fits and residuals, PNG, PDF or SVG.")
+    ] = None,
+    common_uncertainty: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KELVINS",
+            help="Standard uncertainty of the black body's temperature that all points have in "
+            "common, such as '0.5 K': that of its certificate.",
+        ),
+    ] = None,
+    integration_time: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Integration time, such as '10 us'.")
+    ] = None,
+    range_name: Annotated[
+        str | None, typer.Option("--range", metavar="NAME", help="The camera's measuring range.")
+    ] = None,
+    settings: Settings = None,
+) -> None:
+    """Fit a calibration of a camera's counts to black bodies.
+
+    It holds between the coldest and the hottest black body: what is outside is flagged later.
+    """
+    from rich.console import Console
+
+    from chipglow.camera import fit_linear, fit_sakuma_hattori
+    from chipglow.cli.assumed import say_doubtful
+    from chipglow.cli.pictures import check_picture_path
+    from chipglow.cli.quantities import parse
+    from chipglow.io.atomic import check_folder
+    from chipglow.io.column_file import read_points
+    from chipglow.study.measured import uniform_counts
+    from chipglow.study.units import TEMPERATURE_DIFFERENCE, TIME
+
+    if plot is not None:
+        check_picture_path(plot)
+    for path in (out, plot):
+        if path is not None:
+            check_folder(path)
+
+    recordings = []
+
+    def counts_of(file: str) -> float:
+        recordings.append(file)
+        return uniform_counts(points.parent / file, settings or ())
+
+    table = read_points(points, counts_of)
+    if settings and not recordings:
+        raise ValueError(
+            f"--set: {settings[0]!r} describes nothing, as {points} names no recordings (file)"
+        )
+    known: dict[str, Any] = {
+        "count_uncertainty": table.get("count_uncertainty"),
+        "temperature_uncertainty": table.get("temperature_uncertainty"),
+        "common_uncertainty": parse(
+            "--common-uncertainty", TEMPERATURE_DIFFERENCE, common_uncertainty
+        )
+        or 0.0,
+        "integration_time": parse("--integration-time", TIME, integration_time),
+        "range_name": range_name,
+    }
+    kinds: dict[Model, Callable[..., CalibrationFit[Any]]] = {
+        Model.LINEAR: fit_linear,
+        Model.SAKUMA_HATTORI: fit_sakuma_hattori,
+    }
+    wanted: list[Model] = list(kinds) if model is Model.BOTH else [model]
+    seen = _band(band)
+    try:
+        fits: Fits = {
+            name.value: kinds[name](table["temperature"], table["counts"], seen, **known)
+            for name in wanted
+        }
+    except ValueError as error:
+        raise ValueError(f"{points}: {error}") from None
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    for name, fit in fits.items():
+        _print_fit(console, name, fit)
+    chosen = min(fits, key=lambda name: fits[name].information_criterion)
+    if len(fits) > 1:
+        _print_comparison(console, fits, chosen)
+    say_doubtful(_doubtful(chosen, fits[chosen], common_uncertainty is not None))
+    if out is not None:
+        _write(fits[chosen], out)
+    if plot is not None:
+        from chipglow.cli.pictures import write_picture
+        from chipglow.report import draw_calibrations
+
+        write_picture(draw_calibrations(fits), plot)
+    for path in (out, plot):
+        if path is not None:
+            print(path)
+
+
+def _band(text: str) -> "Band":
+    from chipglow.io.column_file import read_response
+    from chipglow.radiometry import Band
+    from chipglow.study.units import WAVELENGTHS
+
+    if text.lower().endswith(".csv"):
+        response = read_response(text)
+        return Band(*response.limits, response)
+    try:
+        return Band(*WAVELENGTHS.parse_range(text))
+    except ValueError as error:
+        raise ValueError(f"--band: {error}") from None
+
+
+def _write(fit: "CalibrationFit[FittedCalibration]", out: Path) -> None:
+    from chipglow.io import atomic_path
+    from chipglow.study import CalibrationDescription, calibration_text
+
+    with atomic_path(out) as temporary:
+        text = calibration_text(CalibrationDescription.of(fit))
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _print_fit(console: "Console", name: str, fit: "CalibrationFit[FittedCalibration]") -> None:
+    import numpy as np
+    from rich.table import Table
+
+    calibration = fit.calibration
+    console.print(
+        f"\n{name}: {calibration.description}, {calibration.lowest - 273.15:.5g} °C to "
+        f"{calibration.highest - 273.15:.5g} °C"
+    )
+    parameters = Table("parameter", "value", "standard uncertainty", "unit", box=None)
+    deviations = np.sqrt(np.diag(calibration.covariance))
+    for label, value, deviation, unit in zip(
+        calibration.NAMES, calibration.parameters, deviations, calibration.UNITS, strict=True
+    ):
+        parameters.add_row(label, f"{value:.7g}", f"{deviation:.2g}", unit)
+    console.print(parameters)
+    table = Table(
+        "black body / °C", "counts", "residual / counts", "residual / K", "uncertainty / K",
+        box=None,
+    )  # fmt: skip
+    for column in table.columns:
+        column.justify = "right"
+    uncertainty = calibration.uncertainty(calibration.counts(fit.temperatures))
+    uncertainty = uncertainty / calibration.band.slope(fit.temperatures)
+    rows = zip(
+        fit.temperatures, fit.counts, fit.residuals, fit.residuals_temperature, uncertainty,
+        strict=True,
+    )  # fmt: skip
+    for kelvins, counts, residual, error, deviation in rows:
+        table.add_row(
+            f"{kelvins - 273.15:.2f}", f"{counts:.6g}", f"{residual:.3g}", f"{error:.3g}",
+            f"{deviation:.2g}",
+        )  # fmt: skip
+    console.print(table)
+    console.print(_quality(fit))
+
+
+def _quality(fit: "CalibrationFit[FittedCalibration]") -> str:
+    import numpy as np
+
+    scatter = float(np.sqrt(np.mean(fit.residuals_temperature**2)))
+    text = f"Residuals: {scatter:.3g} K (root mean square)"
+    if not fit.stated:
+        return f"{text}; the uncertainties are from their scatter, as none are stated."
+    if fit.probability is None:
+        return f"{text}; as many points as parameters, which prove nothing."
+    return (
+        f"{text}, chi² {fit.chi_squared:.3g} with {fit.degrees_of_freedom} degrees of freedom "
+        f"(as large by chance in {100 * fit.probability:.2g} %)."
+    )
+
+
+def _print_comparison(console: "Console", fits: "Fits", chosen: str) -> None:
+    criteria = ", ".join(f"{name} {fit.information_criterion:.4g}" for name, fit in fits.items())
+    console.print(f"\nInformation criterion (Akaike's, corrected): {criteria}.")
+    console.print(f"Preferred: {chosen}, which has the least.")
+
+
+def _doubtful(
+    name: str, fit: "CalibrationFit[FittedCalibration]", common_known: bool
+) -> Iterator[str]:
+    if fit.probability is not None and fit.probability < _UNLIKELY:
+        yield (
+            f"The residuals of {name} are larger than the stated uncertainties explain: the form, "
+            "the band or the uncertainties are wrong, and the radiance is less certain than stated."
+        )
+    if not fit.stated:
+        yield (
+            "The uncertainty is from the scatter of the points, as if all counts were equally "
+            "uncertain: count_uncertainty and temperature_uncertainty_K would tell it."
+        )
+    if not common_known:
+        yield (
+            "The uncertainty holds no error that all temperatures of the black body have in common "
+            "(--common-uncertainty)."
+        )

@@ -1,0 +1,91 @@
+"""The command ``chipglow convert``: a camera's file to a measurement."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from chipglow.cli.options import Settings
+
+if TYPE_CHECKING:
+    from chipglow.camera import Recording
+
+
+def convert(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SOURCE", help="A camera's file, or a YAML file that describes one."
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="The measurement to write, NetCDF; without it, only say what is there.",
+        ),
+    ] = None,
+    settings: Settings = None,
+) -> None:
+    """Make a measurement of a camera's file."""
+    from rich.console import Console
+
+    from chipglow.cli.showing import listed
+    from chipglow.cli.showing_measurement import say_measurement
+    from chipglow.io import is_measurement, write_measurement
+    from chipglow.io.atomic import check_folder
+    from chipglow.study import load_description
+    from chipglow.study.measured import load_recording, measurement_of
+
+    if out is not None:
+        check_folder(out)
+    if is_measurement(source):
+        raise ValueError(f"{source}: is a measurement already, expected a camera's file")
+    description = load_description(source, settings or ())
+    recording = load_recording(description)
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    console.print("The file says:")
+    console.print(listed(_facts(recording)))
+    try:
+        measurement = measurement_of(description, recording, source.name)
+    except ValueError as error:
+        if out is not None:
+            raise
+        console.print(f"\nIt is no measurement yet. {error}")
+        return
+    console.print("\nThe measurement:")
+    say_measurement(measurement)
+    if out is not None:
+        write_measurement(measurement, out)
+        print(out)
+
+
+def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:
+    from chipglow.cli.showing import microseconds
+
+    frames, rows, columns = recording.signal.shape
+    yield "camera", recording.camera
+    yield "holds", f"{recording.quantity} as {recording.signal.dtype.name}"
+    yield "frames", f"{frames} of {columns} x {rows} pixels"
+    yield "times", f"{microseconds(recording.times[0])} to {microseconds(recording.times[-1])}"
+    if recording.integration_time is not None:
+        yield "integration time", microseconds(recording.integration_time)
+    if recording.range_name is not None:
+        yield "range", recording.range_name
+    if recording.saturation is not None:
+        yield "saturated", f"over {recording.saturation:g}"
+    if recording.band is not None:
+        yield "band", f"{1e6 * recording.band.lower:.4g} µm to {1e6 * recording.band.upper:.4g} µm"
+    if recording.pitch is not None:
+        yield "pitch", f"{1e6 * recording.pitch:.6g} µm"
+    if recording.conversion is not None:
+        yield "conversion", "the maker's, of unknown uncertainty"
+    told = recording.object_parameters
+    if told is not None:
+        yield "emissivity", f"{told.emissivity:g}"
+        yield "reflected", f"{told.reflected - 273.15:.2f} °C"
+        yield "transmission", f"{told.transmission:g}"
+        yield "atmosphere", f"{told.atmosphere - 273.15:.2f} °C"
+    for note in recording.notes:
+        yield "note", note

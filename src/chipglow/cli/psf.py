@@ -1,0 +1,117 @@
+"""The command ``chipglow psf``: point spread function by the knife edge."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from chipglow.cli.options import Settings
+
+if TYPE_CHECKING:
+    from chipglow.analysis import KnifeEdge
+
+
+def psf(
+    edges: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="EDGE...", help="Images of a straight edge, best of several orientations."
+        ),
+    ],
+    apertures: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="A YAML file that lists images of round apertures with their diameters; they tell "
+            "of the tails.",
+        ),
+    ] = None,
+    region: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ROWS,COLUMNS",
+            help="Part of the images that shows only the edge, such as 10:70,20:90.",
+        ),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="What to write: gaussian, 'gaussian with tail', 'annular aperture', 'elliptical "
+            "gaussian' or radial; by default the model that fits best.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The point spread function to write, NetCDF (.nc)."),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw edges, spread and MTF, PNG, PDF or SVG."),
+    ] = None,
+    settings: Settings = None,
+) -> None:
+    """Determine a camera's point spread function and MTF from images of an edge."""
+    from chipglow.analysis import aperture_image, edge_image, knife_edge
+    from chipglow.cli.pictures import check_picture_path, write_picture
+    from chipglow.io.atomic import check_folder
+    from chipglow.study import load_apertures, load_measurement
+
+    if plot is not None:
+        check_picture_path(plot)
+    if out is not None and out.suffix.lower() != ".nc":
+        raise ValueError(f"--out: {out}, expected a file that ends in .nc")
+    for path in (out, plot):
+        if path is not None:
+            check_folder(path)
+    part = None if region is None else _region(region)
+    given = settings or ()
+    images = [edge_image(load_measurement(path, given), path.name, part) for path in edges]
+    holes = [
+        aperture_image(load_measurement(path, given), diameter, path.name)
+        for path, diameter in (load_apertures(apertures) if apertures else ())
+    ]
+    found = knife_edge(images, holes)
+    chosen = found.psf(model=model)
+    _print(found)
+    if out is not None:
+        from chipglow.io import write_psf
+
+        write_psf(found, out, chosen)
+        print(out)
+    if plot is not None:
+        from chipglow.report import draw_knife_edge
+
+        write_picture(draw_knife_edge(found), plot)
+        print(plot)
+
+
+def _region(text: str) -> tuple[slice, slice]:
+    """Rows and columns of a text such as 10:70,20:90."""
+    try:
+        rows, columns = (
+            slice(*(int(number) if number.strip() else None for number in part.split(":")))
+            for part in text.split(",")
+        )
+    except (ValueError, TypeError):
+        raise ValueError(
+            f"--region: {text!r}, expected rows and columns such as 10:70,20:90"
+        ) from None
+    return rows, columns
+
+
+def _print(found: "KnifeEdge") -> None:
+    from rich.console import Console
+
+    from chipglow.cli.assumed import say_assumed, say_doubtful
+    from chipglow.report.knife_edge_summary import edge_table, model_table, sentences
+
+    console = Console(highlight=False, markup=False)
+    console.print(model_table(found))
+    console.print()
+    console.print(edge_table(found))
+    console.print()
+    for sentence in sentences(found):
+        console.print(sentence, soft_wrap=True)
+    say_assumed(found.assumptions)
+    say_doubtful(found.doubts)

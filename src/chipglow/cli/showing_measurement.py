@@ -1,0 +1,116 @@
+"""What is in a measurement, as text and as a picture."""
+
+from collections.abc import Iterator
+from math import degrees
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from rich.console import Console
+
+from chipglow.camera import Flag, Measurement
+from chipglow.cli.assumed import say_assumed, say_doubtful
+from chipglow.cli.pictures import check_picture_path, write_picture
+from chipglow.cli.showing import attribute_rows, interval_text, listed, microseconds
+from chipglow.cli.times import parse_instant
+from chipglow.io import read_measurement
+from chipglow.report import MeasurementSummary, draw_measurement, measurement_summary
+
+_FLAG_NAMES: Final = {
+    Flag.BELOW_FLOOR: "below the floor or the calibration",
+    Flag.SATURATED: "saturated or above the calibration",
+    Flag.DEAD: "dead",
+    Flag.REPLACED: "replaced by neighbours",
+}
+_SAID_APART: Final = ("assumed", "doubtful", "band_lower", "band_upper", "pitch", "tool_")
+
+
+def show_measurement(path: Path, at: str | None, plot: Path | None) -> None:
+    """Print what is in a measurement, and draw it if a picture is wanted.
+
+    Parameters
+    ----------
+    path : Path
+        The measurement's file.
+    at : str, optional
+        Time of the frame to look at, with its unit; the middle one by default.
+    plot : Path, optional
+        The picture to write, .png, .pdf or .svg.
+    """
+    if plot is not None:
+        check_picture_path(plot)
+    measurement = read_measurement(path)
+    time = None if at is None else parse_instant("--at", at)
+    say_measurement(measurement, time)
+    if plot is not None:
+        write_picture(draw_measurement(measurement, time), plot)
+
+
+def say_measurement(measurement: Measurement, time: float | None = None) -> None:
+    """Print what is in a measurement.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Any measurement.
+    time : float, optional
+        Time in s of the frame whose temperatures are printed; the middle one by default.
+
+    Raises
+    ------
+    ValueError
+        If the time is not in the measurement.
+    """
+    try:
+        summary = measurement_summary(measurement, time)
+    except ValueError as error:
+        raise ValueError(f"--at: {error}") from None
+    console = Console(highlight=False, markup=False)
+    console.print(listed(_facts(measurement, summary)))
+    attributes = {
+        str(name): value
+        for name, value in measurement.data.attrs.items()
+        if not str(name).startswith(_SAID_APART)
+    }
+    if attributes:
+        console.print("\nAttributes:")
+        console.print(listed(attribute_rows(attributes)))
+    say_assumed(str(measurement.data.attrs.get("assumed", "")).splitlines())
+    say_doubtful(str(measurement.data.attrs.get("doubtful", "")).splitlines())
+
+
+def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tuple[str, str]]:
+    raster, times, data = measurement.raster, measurement.times, measurement.data
+    left, right, bottom, top = (f"{1e6 * edge:.6g} µm" for edge in raster.extent)
+    yield "pixels", f"{raster.columns} x {raster.rows} of {1e6 * raster.spacing:.6g} µm"
+    yield "x", f"{left} to {right}"
+    yield "y", f"{bottom} to {top}"
+    yield "frames", f"{len(times)}, {microseconds(times[0])} to {microseconds(times[-1])}"
+    if len(times) > 1:
+        yield "interval", interval_text(np.diff(times))
+    if {"band_lower", "band_upper"} <= set(data.attrs):
+        band = measurement.band
+        shape = "" if band.response is None else ", with a response curve"
+        yield "band", f"{1e6 * band.lower:.4g} µm to {1e6 * band.upper:.4g} µm{shape}"
+    if measurement.tool is not None:
+        angles = measurement.tool.rake_angle, measurement.tool.clearance_angle
+        rake, clearance = (f"{degrees(angle):.4g}°" for angle in angles)
+        yield "tool", f"rake {rake}, clearance {clearance}"
+    yield "radiance temperature", _celsius(summary.overall)
+    yield f"at {microseconds(times[summary.index])}", _celsius(summary.now)
+    if summary.uncertainty is None:
+        yield "its calibration", "uncertainty not known"
+    else:
+        least, greatest = summary.uncertainty
+        yield "its calibration", f"standard uncertainty {least:.2g} K to {greatest:.2g} K"
+    yield "usable pixels", f"{100 * summary.usable:.4g} %"
+    for flag, name in _FLAG_NAMES.items():
+        if summary.shares[flag]:
+            yield name, f"{100 * summary.shares[flag]:.3g} %"
+
+
+def _celsius(kelvins: tuple[float, float, float] | None) -> str:
+    if kelvins is None:
+        return "none: no pixel is usable"
+    least, median, greatest = (f"{value - 273.15:.1f} °C" for value in kelvins)
+    return f"{least} to {greatest}, median {median}"

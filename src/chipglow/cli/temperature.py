@@ -1,0 +1,191 @@
+"""The command ``chipglow temperature``: true temperature of regions of known emissivity."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import isnan
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from chipglow.cli.options import Settings
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from chipglow.analysis import KnownEmissivity, Surroundings, TrueTemperature
+    from chipglow.analysis.temperature import DeterminedEmissivity
+
+    Emissivities = Mapping[str, DeterminedEmissivity | KnownEmissivity]
+
+
+def temperature(
+    images: Annotated[
+        list[Path],
+        typer.Argument(metavar="IMAGE...", help="Measurements of the object; repetitions."),
+    ],
+    regions: Annotated[
+        Path, typer.Option(metavar="FILE", help="The regions of the image, a YAML file.")
+    ],
+    emissivity: Annotated[
+        str,
+        typer.Option(
+            metavar="FILE|NUMBER",
+            help="What chipglow emissivity wrote of regions of the same names, NetCDF; or one "
+            "emissivity of all regions, such as 0.42.",
+        ),
+    ],
+    emissivity_uncertainty: Annotated[
+        float | None,
+        typer.Option(metavar="NUMBER", help="Its standard uncertainty, if it is a number."),
+    ] = None,
+    calibration: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="The camera's calibration, YAML: tells how far its errors are the same in the "
+            "emissivity and here.",
+        ),
+    ] = None,
+    environment: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TEMPERATURE",
+            help="Temperature of the surroundings that the object reflects; by default those in "
+            "which the emissivity was determined, with the same error, or 293 K.",
+        ),
+    ] = None,
+    environment_uncertainty: Annotated[
+        str | None,
+        typer.Option(metavar="KELVINS", help="Its standard uncertainty, such as '2 K'."),
+    ] = None,
+    table: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the table of regions, CSV.")
+    ] = None,
+    settings: Settings = None,
+) -> None:
+    """Determine the true temperature of regions whose emissivity is known."""
+    from rich.console import Console
+
+    from chipglow.analysis import areas, true_temperature
+    from chipglow.cli.assumed import say_assumed, say_doubtful
+    from chipglow.io import write_temperature_table
+    from chipglow.io.atomic import check_folder
+    from chipglow.study import load_calibration
+    from chipglow.study.files import load_regions
+    from chipglow.study.measured import load_measurement
+
+    if table is not None:
+        check_folder(table)
+    named = load_regions(regions)
+    room = _room(environment, environment_uncertainty)
+    known = None if calibration is None else load_calibration(calibration)
+    measurements = [load_measurement(image, settings or ()) for image in images]
+    found = areas(named, measurements[0].raster)
+    names = [area.name for area in found]
+    emissivities = _emissivities(emissivity, emissivity_uncertainty, names)
+    rows = [
+        true_temperature(measurements, area, emissivities[area.name], room, known)
+        for area in found
+        if area.name in emissivities
+    ]
+    _print(Console(highlight=False, markup=False), rows)
+    say_assumed(_assumptions(rows, emissivities, room))
+    say_doubtful(f"{doubt}." for row in rows for doubt in row.doubts)
+    if table is not None:
+        write_temperature_table(rows, table)
+        print(table)
+
+
+def _emissivities(text: str, spread: float | None, names: Sequence[str]) -> "Emissivities":
+    """Emissivities by the names of regions."""
+    from chipglow.analysis import KnownEmissivity
+    from chipglow.io import read_region_emissivity
+
+    try:
+        number = float(text)
+    except ValueError:
+        if spread is not None:
+            raise ValueError(
+                "--emissivity-uncertainty: the file tells it, expected none with a file"
+            ) from None
+        stored = read_region_emissivity(Path(text))
+        if not stored.keys() & set(names):
+            raise ValueError(
+                f"{text}: tells of {', '.join(stored)}, expected one of the regions "
+                f"{', '.join(names)}"
+            ) from None
+        return stored
+    return dict.fromkeys(names, KnownEmissivity(number, spread or 0.0))
+
+
+def _room(environment: str | None, spread: str | None) -> "Surroundings | None":
+    """What the object reflects, if that is said."""
+    from chipglow.analysis import Surroundings
+    from chipglow.cli.quantities import parse
+    from chipglow.study.units import TEMPERATURE, TEMPERATURE_DIFFERENCE
+
+    if environment is None and spread is None:
+        return None
+    return Surroundings(
+        parse("--environment", TEMPERATURE, environment or "293 K"),
+        parse("--environment-uncertainty", TEMPERATURE_DIFFERENCE, spread or "0 K"),
+    )
+
+
+def _print(console: "Console", rows: "list[TrueTemperature]") -> None:
+    from rich.table import Table
+
+    result = Table(
+        "region", "pixels", "radiance temperature", "emissivity", "true temperature", "u", "U 95 %",
+        "k", box=None,
+    )  # fmt: skip
+    causes = list(rows[0].budget)
+    budget = Table("parts of u / K", *causes, box=None)
+    for column in (*result.columns[1:], *budget.columns[1:]):
+        column.justify = "right"
+    for row in rows:
+        result.add_row(
+            row.name,
+            str(row.pixels),
+            f"{row.radiance_temperature - 273.15:.2f} °C",
+            f"{row.emissivity:.4f}",
+            f"{row.value - 273.15:.2f} °C",
+            f"{row.standard_uncertainty:#.2g} K",
+            f"{row.expanded_uncertainty:#.2g} K",
+            f"{row.coverage_factor:.2f}",
+        )
+        budget.add_row(row.name, *map(_spread, row.budget.values()))
+    console.print(result)
+    console.print()
+    console.print(budget)
+
+
+def _spread(value: float) -> str:
+    """Two digits that count, or a dash where nothing is known."""
+    return "–" if isnan(value) else f"{value:#.2g}"
+
+
+def _assumptions(
+    rows: "list[TrueTemperature]",
+    emissivities: "Emissivities",
+    room: "Surroundings | None",
+) -> Iterator[str]:
+    from chipglow.analysis import KnownEmissivity
+
+    known = any(isinstance(one, KnownEmissivity) for one in emissivities.values())
+    yield "every region is of even temperature and emissivity."
+    if known and not any(row.budget["emissivity"] for row in rows):
+        yield "the emissivity is exact (--emissivity-uncertainty)."
+    if known and room is None:
+        yield "the object reflects 293 K exactly (--environment, --environment-uncertainty)."
+    if not known and room is None:
+        yield "the object reflects what it did when its emissivity was determined."
+    if not any(row.budget["calibration"] for row in rows):
+        yield "the camera's calibration is exact, as the measurement tells no uncertainty of it."
+    elif not known and rows[0].correlation is None:
+        yield (
+            "the calibration's errors in the emissivity and here are independent, which makes u "
+            "too large rather than too small (--calibration)."
+        )
+    if any(isnan(row.budget["repeatability"]) for row in rows):
+        yield "nothing changes from frame to frame, as there is one only."

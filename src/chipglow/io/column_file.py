@@ -1,0 +1,241 @@
+"""Small tables in text: columns by name, each with its unit."""
+
+import csv
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.io.sources.conventions import Unit
+from chipglow.io.sources.unit_text import parse_unit
+from chipglow.radiometry import TabulatedResponse
+
+_LARGEST_FILE: Final = 1_000_000
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Parameters
+    ----------
+    name : str
+        Its name; in the table's first line the unit follows: ``temperature_degC``.
+    example : str
+        A unit that it may have; empty for a plain number.
+    quantity : str
+        What kind of unit that is, as `parse_unit` has it: ``temperature``, ``x`` for lengths.
+    difference : bool
+        Whether it is a difference, of which the zero of the unit does not count.
+    required : bool
+        Whether it must be there.
+    number_of : callable, optional
+        What makes a number of a cell's text, if the text is none, such as a file's name.
+    """
+
+    name: str
+    example: str = ""
+    quantity: str = ""
+    difference: bool = False
+    required: bool = True
+    number_of: Callable[[str], float] | None = None
+
+    @property
+    def title(self) -> str:
+        """Name as a first line has it."""
+        return f"{self.name}_{self.example}" if self.example else self.name
+
+
+TEMPERATURE: Final = Column("temperature", "degC", "temperature")
+_POINT_UNCERTAINTIES: Final = (
+    Column("count_uncertainty", required=False),
+    Column("temperature_uncertainty", "K", "temperature", difference=True, required=False),
+)
+POINT_COLUMNS: Final = (TEMPERATURE, Column("counts"), *_POINT_UNCERTAINTIES)
+"""Points of a calibration."""
+
+_RESPONSE_COLUMNS: Final = (Column("wavelength", "um", "x"), Column("response"))
+_PIXEL_COLUMNS: Final = (Column("column"), Column("row"))
+
+
+def read_columns(
+    path: str | os.PathLike[str], columns: Sequence[Column]
+) -> dict[str, NDArray[np.float64]]:
+    """Read a table of numbers from a CSV file.
+
+    Parameters
+    ----------
+    path : path-like
+        First line the names of the columns with their units, such as ``temperature_degC,counts``;
+        then a line for each row, its numbers separated by commas.
+    columns : sequence of Column
+        What there may be.
+
+    Returns
+    -------
+    dict
+        Numbers in SI by the names of the columns that are there, each of shape (rows,).
+
+    Raises
+    ------
+    ValueError
+        If it is no such table; the message names the file and the line.
+    OSError
+        If it cannot be read.
+    """
+    path = Path(path)
+    if path.stat().st_size > _LARGEST_FILE:
+        raise ValueError(f"{path}: expected a file of up to {_LARGEST_FILE // 1000} kB")
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise ValueError(f"{path}: expected text in UTF-8") from None
+    rows = [(number, row) for number, row in enumerate(csv.reader(lines), 1) if any(row)]
+    if len(rows) < 2:
+        raise ValueError(
+            f"{path}: there is no number in it, expected a first line such as "
+            f"{','.join(column.title for column in columns)} and lines of numbers"
+        )
+    found = [_column(path, cell.strip(), columns) for cell in rows[0][1]]
+    names = [column.name for column, _ in found]
+    for column in columns:
+        if names.count(column.name) > 1 or (column.required and column.name not in names):
+            raise ValueError(f"{path}, line 1: expected a column {column.title!r}, once")
+    numbers = np.array([_numbers(path, number, row, found) for number, row in rows[1:]])
+    return {
+        column.name: unit.scale * values + (0.0 if column.difference else unit.offset)
+        for (column, unit), values in zip(found, numbers.T, strict=True)
+    }
+
+
+def read_points(
+    path: str | os.PathLike[str], counts_of: Callable[[str], float]
+) -> dict[str, NDArray[np.float64]]:
+    """Read points of a calibration from a CSV file.
+
+    Parameters
+    ----------
+    path : path-like
+        A table of `POINT_COLUMNS`; the column ``file`` may take the place of ``counts``.
+    counts_of : callable
+        Counts of a recording by its name in that column.
+
+    Returns
+    -------
+    dict
+        As `read_columns`.
+
+    Raises
+    ------
+    ValueError
+        If it is no such table; the message names the file and the line.
+    OSError
+        If it, or a recording, cannot be read.
+    """
+    with Path(path).open(encoding="utf-8-sig", errors="replace") as file:
+        titles = [cell.strip() for cell in file.readline(_LARGEST_FILE).split(",")]
+    if "file" not in titles:
+        return read_columns(path, POINT_COLUMNS)
+    file_column = Column("file", number_of=counts_of)
+    table = read_columns(path, (TEMPERATURE, file_column, *_POINT_UNCERTAINTIES))
+    table["counts"] = table.pop("file")
+    return table
+
+
+def _column(path: Path, cell: str, columns: Sequence[Column]) -> tuple[Column, Unit]:
+    """The column that a cell of the first line names, and its unit."""
+    for column in sorted(columns, key=lambda one: -len(one.name)):
+        if cell == column.name and not column.quantity:
+            return column, Unit(1.0)
+        if cell == column.name:
+            raise ValueError(
+                f"{path}, line 1: {cell!r} has no unit, expected one such as {column.title}"
+            )
+        if cell.startswith(f"{column.name}_") and column.quantity:
+            try:
+                return column, parse_unit(column.quantity, cell[len(column.name) + 1 :])
+            except ValueError as error:
+                raise ValueError(f"{path}, line 1: {error}") from None
+    expected = ", ".join(column.title for column in columns)
+    raise ValueError(f"{path}, line 1: unknown column {cell[:60]!r}, expected {expected}")
+
+
+def _numbers(
+    path: Path, number: int, row: list[str], columns: Sequence[tuple[Column, Unit]]
+) -> list[float]:
+    if len(row) == len(columns):
+        cells = list(zip(row, columns, strict=True))
+        plain = [cell for cell, (column, _) in cells if column.number_of is None]
+        if all(map(_is_number, plain)):
+            return [(column.number_of or float)(cell.strip()) for cell, (column, _) in cells]
+    what = "numbers" if all(column.number_of is None for column, _ in columns) else "values"
+    raise ValueError(
+        f"{path}, line {number}: {','.join(row)[:80]!r}, expected {len(columns)} {what} separated "
+        "by commas"
+    )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def read_response(path: str | os.PathLike[str]) -> TabulatedResponse:
+    """Read a camera's spectral response from a CSV file: ``wavelength_um,response``.
+
+    Raises
+    ------
+    ValueError
+        If it is no such table; the message names the file.
+    OSError
+        If it cannot be read.
+    """
+    table = read_columns(path, _RESPONSE_COLUMNS)
+    order = np.argsort(table["wavelength"])
+    try:
+        return TabulatedResponse(
+            tuple(table["wavelength"][order].tolist()), tuple(table["response"][order].tolist())
+        )
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def read_bad_pixels(path: str | os.PathLike[str], shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """Read which pixels are bad from a CSV file: ``column,row``, counted from 0 at the upper left.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    shape : tuple of int
+        Rows and columns of the image as the camera wrote it.
+
+    Returns
+    -------
+    ndarray
+        Which are bad, of this shape.
+
+    Raises
+    ------
+    ValueError
+        If it is no such table or a pixel is not in the image; the message names the file.
+    OSError
+        If it cannot be read.
+    """
+    table = read_columns(path, _PIXEL_COLUMNS)
+    mask = np.zeros(shape, np.bool_)
+    for column, row in zip(table["column"], table["row"], strict=True):
+        if not (column in range(shape[1]) and row in range(shape[0])):
+            raise ValueError(
+                f"{path}: pixel {column:g},{row:g} is not in the image, expected column and row "
+                f"of {shape[1]} x {shape[0]}, counted from 0"
+            )
+        mask[int(row), int(column)] = True
+    return mask

@@ -1,0 +1,230 @@
+"""Calibrations: parameters found again, uncertainties that cover, what is refused."""
+
+import numpy as np
+import pytest
+
+from chipglow.camera import (
+    LinearCalibration,
+    MakersCalibration,
+    PlanckConversion,
+    fit_linear,
+    fit_sakuma_hattori,
+)
+from chipglow.radiometry import Band, TabulatedResponse
+
+BAND = Band(3.8e-6, 5.1e-6)
+KELVINS = np.linspace(573.15, 1273.15, 10)
+BETWEEN = np.array([600.0, 800.0, 1000.0, 1250.0])
+OFFSET, GAIN = 1000.0, 1.7
+FITS = {"linear": fit_linear, "sakuma-hattori": fit_sakuma_hattori}
+
+# The nearest Sakuma-Hattori signal to that of the band, for counts of known truth.
+SAKUMA_HATTORI = fit_sakuma_hattori(KELVINS, OFFSET + GAIN * BAND.radiance(KELVINS), BAND)
+
+
+def counts_of(model, kelvins):
+    if model == "linear":
+        return OFFSET + GAIN * BAND.radiance(kelvins)
+    return SAKUMA_HATTORI.calibration.counts(kelvins)
+
+
+def test_exact_points_give_their_line_back():
+    fit = fit_linear(KELVINS, counts_of("linear", KELVINS), BAND, integration_time=1e-5)
+    assert fit.calibration.parameters == pytest.approx([OFFSET, GAIN], rel=1e-9)
+    assert fit.degrees_of_freedom == 8
+    assert (fit.calibration.lowest, fit.calibration.highest) == (573.15, 1273.15)
+    assert fit.calibration.integration_time == 1e-5
+    counts = counts_of("linear", BETWEEN)
+    np.testing.assert_allclose(fit.calibration.radiance(counts), BAND.radiance(BETWEEN), rtol=1e-9)
+
+
+def test_exact_points_give_their_sakuma_hattori_back():
+    truth = SAKUMA_HATTORI.calibration
+    fit = fit_sakuma_hattori(KELVINS, truth.counts(KELVINS), BAND)
+    # The four parameters stand in for each other; what they say of a temperature does not.
+    np.testing.assert_allclose(fit.calibration.parameters, truth.parameters, rtol=1e-4)
+    counts = truth.counts(BETWEEN)
+    np.testing.assert_allclose(fit.calibration.temperature(counts), BETWEEN, atol=1e-5)
+
+
+def test_the_slopes_are_those_of_the_counts():
+    for fit in (SAKUMA_HATTORI, fit_linear(KELVINS, counts_of("linear", KELVINS), BAND)):
+        calibration = fit.calibration
+        rise = calibration.counts(BETWEEN + 0.05) - calibration.counts(BETWEEN - 0.05)
+        # The table of slopes has steps of 0.25 K, between which it is straight.
+        np.testing.assert_allclose(calibration.slope(BETWEEN), rise / 0.1, rtol=1e-5)
+
+
+def test_the_planckian_form_follows_the_band_within_millikelvins():
+    """From 300 to 1000 degC, 3.8 to 5.1 um: docs/measurements.md states these figures."""
+    kelvins = np.linspace(573.15, 1273.15, 141)
+    fit = fit_sakuma_hattori(
+        kelvins, counts_of("linear", kelvins), BAND, temperature_uncertainty=1.0
+    )
+    residuals = fit.residuals_temperature
+    assert np.abs(residuals).max() == pytest.approx(1.9e-3, abs=0.1e-3)
+    assert np.sqrt(np.mean(residuals**2)) < 1e-3
+
+
+@pytest.mark.parametrize("model", FITS)
+@pytest.mark.parametrize("case", ["stated", "scatter", "common"])
+def test_the_interval_covers_as_often_as_it_says(model, case):
+    """95 % intervals hold the truth in 95 % of 200 repeats, within three standard deviations."""
+    fit, signal = FITS[model], counts_of(model, BETWEEN)
+    # With few degrees of freedom Student's factor is far from that of the normal distribution.
+    kelvins = KELVINS[[0, 2, 4, 5, 7, 9]] if case == "scatter" else KELVINS
+    repeats, covered, scores = 200, np.zeros(BETWEEN.size), []
+    for seed in range(repeats):
+        rng = np.random.default_rng(seed)
+        black_body = kelvins + rng.normal(0, 1.0) * (case == "common")
+        if case != "scatter":
+            black_body = black_body + rng.normal(0, 0.5, kelvins.size)
+        counts = counts_of(model, black_body) + rng.normal(0, 3.0, kelvins.size)
+        said = {"count_uncertainty": 3.0, "temperature_uncertainty": 0.5}
+        if case == "common":
+            said["common_uncertainty"] = 1.0
+        found = fit(kelvins, counts, BAND, **({} if case == "scatter" else said))
+        error = found.calibration.radiance(signal) - BAND.radiance(BETWEEN)
+        scores.append(error / found.calibration.uncertainty(signal))
+        covered += np.abs(scores[-1]) < found.coverage_factor()
+    # Binomial: 0.95 of 200 is 190 with a standard deviation of 3.1.
+    assert (covered >= 0.95 * repeats - 10).all()
+    if case != "scatter":
+        np.testing.assert_allclose(np.std(scores, axis=0), 1.0, atol=3 / np.sqrt(2 * repeats))
+
+
+def test_the_temperature_uncertainty_counts_where_the_counts_are_steep():
+    """A wrong hot point, whose temperature is poorly known, moves the line less."""
+    counts = counts_of("linear", KELVINS)
+    counts[-1] += 300.0
+    poorly = np.where(np.arange(10) == 9, 20.0, 0.1)
+    heavy = fit_linear(KELVINS, counts, BAND, count_uncertainty=3.0)
+    light = fit_linear(KELVINS, counts, BAND, 3.0, temperature_uncertainty=poorly)
+    gains = [fit.calibration.parameters[1] - GAIN for fit in (heavy, light)]
+    assert abs(gains[1]) < 0.05 * abs(gains[0])
+    assert heavy.probability < 1e-6
+    assert light.probability > 0.01
+
+
+@pytest.mark.parametrize("fitted", FITS.values())
+def test_errors_at_two_radiances_are_of_one_kind(fitted):
+    """Their covariance is that of fits to black bodies which are as far off as they are said."""
+    generator = np.random.default_rng(2)
+    truth = counts_of("linear", KELVINS)
+    counts = counts_of("linear", BETWEEN)
+    found = []
+    for _ in range(400):
+        wrong = generator.normal(0.0, 0.5) + generator.normal(0.0, 0.3, KELVINS.size)
+        fit = fitted(KELVINS - wrong, truth, BAND, 0.01, 0.3, 0.5)
+        found.append(fit.calibration.radiance(counts))
+    calibration = fitted(KELVINS, truth, BAND, 0.01, 0.3, 0.5).calibration
+    stated = calibration.radiance_covariance(BETWEEN)
+    scale = np.sqrt(np.diag(stated))
+    np.testing.assert_allclose(scale, calibration.uncertainty(counts), rtol=1e-3)
+    # Correlations of 400 repeats are known to 0.05 or better, deviations to 4 %: three times that.
+    np.testing.assert_allclose(np.corrcoef(np.transpose(found)), stated / scale / scale[:, None],
+                               atol=0.15)  # fmt: skip
+    np.testing.assert_allclose(np.std(found, axis=0), scale, rtol=0.12)
+
+
+def test_a_wrong_band_shows_in_the_residuals_and_the_criterion():
+    """Counts of another band: the straight line fails, Sakuma-Hattori finds its wavelength."""
+    other = Band(3.0e-6, 3.6e-6)
+    rng = np.random.default_rng(4)
+    counts = OFFSET + 3.0 * other.radiance(KELVINS) + rng.normal(0, 3.0, KELVINS.size)
+    straight = fit_linear(KELVINS, counts, BAND, count_uncertainty=3.0)
+    planckian = fit_sakuma_hattori(KELVINS, counts, BAND, count_uncertainty=3.0)
+    assert straight.probability < 1e-6
+    assert planckian.probability > 0.01
+    assert planckian.information_criterion < straight.information_criterion
+    assert 3.0e-6 < planckian.calibration.parameters[1] < 3.6e-6
+    right = fit_linear(KELVINS, counts, other, count_uncertainty=3.0)
+    assert right.information_criterion < planckian.information_criterion
+
+
+def test_residuals_in_kelvins_are_those_in_counts_over_the_slope():
+    counts = counts_of("linear", KELVINS)
+    counts[4] += 10.0
+    fit = fit_linear(KELVINS, counts, BAND, count_uncertainty=1.0)
+    expected = BAND.temperature(BAND.radiance(KELVINS[4]) + fit.residuals[4] / GAIN) - KELVINS[4]
+    assert fit.residuals_temperature[4] == pytest.approx(expected, rel=0.02)
+
+
+def test_counts_without_radiance_have_none():
+    line = fit_linear(KELVINS, counts_of("linear", KELVINS), BAND).calibration
+    assert np.isnan(line.temperature([OFFSET - 1.0, np.nan])).all()
+    assert np.isnan(SAKUMA_HATTORI.calibration.radiance([-1e9, np.nan])).all()
+
+
+def test_the_makers_conversion_is_of_unknown_uncertainty():
+    conversion = PlanckConversion(r1=1e5, r2=1.0, b=3000.0, f=1.0, o=0.0)
+    calibration = MakersCalibration(band=BAND, conversion=conversion)
+    counts = np.array([3000.0, 6000.0])
+    kelvins = 3000.0 / np.log(1e5 / counts + 1.0)
+    np.testing.assert_allclose(BAND.temperature(calibration.radiance(counts)), kelvins, rtol=1e-9)
+    assert calibration.uncertainty(counts) is None
+    assert "not known" in calibration.description
+
+
+def test_a_tabulated_response_is_the_band_that_it_samples():
+    table = TabulatedResponse((3.8e-6, 4.4e-6, 5.1e-6), (1.0, 1.0, 1.0))
+    # A table of ones is the box, up to the quadrature's rounding.
+    np.testing.assert_allclose(
+        Band(*table.limits, table).radiance(KELVINS), BAND.radiance(KELVINS), rtol=1e-10
+    )
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"temperatures": [600.0, 700.0]}, "2 temperatures and 3 counts"),
+        ({"counts": [3.0, 2.0, 1.0]}, "do not rise"),
+        ({"counts": [1.0, np.nan, 3.0]}, "not finite"),
+        ({"temperatures": [600.0, 600.0, 600.0]}, "at 1 temperatures, expected 3 points"),
+        ({"temperatures": [20.0, 30.0, 40.0]}, "200 to 4000 K"),
+        ({"count_uncertainty": [1.0, 2.0]}, "not of as many points"),
+        ({"count_uncertainty": -1.0}, "finite, 0 or more"),
+        ({"count_uncertainty": [1.0, 0.0, 1.0]}, "both 0"),
+        ({"integration_time": -1.0}, "integration_time is -1.0"),
+    ],
+)
+def test_impossible_points_are_refused(changed, message):
+    arguments = {"temperatures": [600.0, 700.0, 800.0], "counts": [1.0, 2.0, 3.0], "band": BAND}
+    with pytest.raises(ValueError, match=message):
+        fit_linear(**(arguments | changed))
+
+
+def test_sakuma_hattori_needs_more_points():
+    with pytest.raises(ValueError, match="expected 5 points or more at 4 temperatures"):
+        fit_sakuma_hattori(KELVINS[:4], counts_of("linear", KELVINS[:4]), BAND)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"parameters": np.array([0.0, -1.0])}, "gain is -1"),
+        ({"parameters": np.array([0.0])}, "shapes"),
+        ({"covariance": -np.eye(2)}, "variance is negative"),
+        ({"covariance": np.full((2, 2), np.nan)}, "not finite"),
+        ({"lowest": 900.0, "highest": 800.0}, "lowest is 900.0 K and highest 800.0 K"),
+        ({"highest": np.inf}, "temperatures of black bodies"),
+    ],
+)
+def test_impossible_calibrations_are_refused(changed, message):
+    right = {"band": BAND, "parameters": np.array([0.0, 1.0]), "covariance": np.eye(2)}
+    right |= {"lowest": 600.0, "highest": 900.0}
+    with pytest.raises(ValueError, match=message):
+        LinearCalibration(**(right | changed))
+
+
+@pytest.mark.parametrize(
+    ("wavelengths", "values", "message"),
+    [
+        ((3e-6,), (1.0,), "2 or more"),
+        ((3e-6, 2e-6), (1.0, 1.0), "ascend"),
+        ((3e-6, 4e-6), (1.0, -1.0), "0 or more"),
+    ],
+)
+def test_impossible_responses_are_refused(wavelengths, values, message):
+    with pytest.raises(ValueError, match=message):
+        TabulatedResponse(wavelengths, values)

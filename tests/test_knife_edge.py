@@ -1,0 +1,486 @@
+"""The knife edge: what made a synthetic edge is returned within its stated uncertainty."""
+
+from dataclasses import replace
+from math import cos, degrees, exp, pi, radians, sqrt
+
+import numpy as np
+import pytest
+from scipy.special import j0
+from synthetic_edge import (
+    FWHM_PER_SIGMA,
+    PITCH,
+    WAVELENGTH,
+    annular_density,
+    annular_edge,
+    disc_edge,
+    edge_radiance,
+    gaussian_aperture,
+    gaussian_edge,
+    gaussian_transfer,
+    image_of,
+    measurement_of,
+    tailed_edge,
+)
+
+from chipglow.analysis import NoEdgeError, aperture_image, edge_image, find_edge, knife_edge
+from chipglow.analysis.psf_models import (
+    AnnularModel,
+    GaussianModel,
+    GaussianTailModel,
+    PSFModel,
+    disc_response,
+    edge_response,
+)
+from chipglow.camera import AnnularAperturePSF, Flag, GaussianPSF, MeasuredPSF
+from chipglow.camera.convolution import blur
+
+FWHM = 10e-6
+GAUSSIAN = gaussian_edge(FWHM)
+MIRROR = (0.28, 0.35)
+CASES = {
+    "gaussian": (GaussianModel(), [FWHM], GAUSSIAN),
+    "tail": (GaussianTailModel(), [8e-6, 0.2, 2.5], tailed_edge(8e-6, 0.2, 20e-6)),
+    "annular": (AnnularModel(WAVELENGTH), [MIRROR[0], MIRROR[1] ** 2], None),
+}
+
+
+def truth_of(name):
+    """Model, parameters and edge-spread function."""
+    model, values, edge = CASES[name]
+    return model, np.array(values), edge or annular_edge(WAVELENGTH, *MIRROR)
+
+
+def an_image(normal=5.0, edge=GAUSSIAN, noise=0.05, seed=0, saturation=None, name="edge", **more):
+    return image_of(edge_radiance(edge, normal, **more), noise, seed, saturation, name)
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return knife_edge([an_image()])
+
+
+@pytest.mark.parametrize("normal", [0.0, 5.0, 44.0, 45.0, 88.0, 90.0, 137.0, -130.0, -3.0, 180.0])
+def test_an_edge_is_found_at_any_orientation_and_points_to_the_bright_side(normal):
+    image = an_image(normal)
+    line, straightness = find_edge(
+        image.radiance, image.x - image.x.mean(), image.y - image.y.mean()
+    )
+    # Noise of 1 % of the step: the line through 40 centroids is known to about 0.03 deg.
+    assert abs((degrees(line.normal) - normal + 180) % 360 - 180) < 0.2
+    assert line.position == pytest.approx(1e-6, abs=0.2e-6)
+    assert straightness.sagitta < 5 * straightness.uncertainty
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("normal", [0.0, 5.0, 33.0, 45.0])
+def test_a_model_with_the_sensor_is_the_mean_over_its_square(name, normal):
+    model, values, edge = truth_of(name)
+    measured = edge_radiance(edge, normal, 24, background=0.0, step=1.0)
+    image = image_of(measured)
+    x, y = np.meshgrid(image.x - image.x.mean(), image.y - image.y.mean())
+    angle = radians(normal)
+    distance = x * cos(angle) + y * np.sin(angle) - 1e-6
+    response = edge_response(lambda f: model.transfer(values, f, angle), angle, PITCH, 250e-6)
+    # Tails of diffraction that wrap around the table are the greatest of the errors.
+    np.testing.assert_allclose(response(distance), measured, atol=1e-5)
+
+
+def test_the_annular_transfer_function_is_the_transform_of_the_closed_form():
+    model, values, _ = truth_of("annular")
+    unit = WAVELENGTH / (2 * pi * MIRROR[0])
+    v = np.linspace(1e-6, 3000.0, 300001)
+    light = annular_density(v, MIRROR[1]) * v
+    for frequency in (0.2e5, 0.6e5, 1.1e5):
+        transform = np.trapezoid(light * j0(2 * pi * frequency * unit * v), v)
+        expected = transform * (1 - MIRROR[1] ** 2) / 2
+        found = model.transfer(values, np.array([frequency]), 0.0)
+        assert found[0] == pytest.approx(expected, abs=1e-4)
+
+
+def test_the_signal_in_an_aperture_is_the_encircled_light():
+    frequency = np.arange(0.0, 3e6, 500.0)
+    transfer = GaussianModel().transfer(np.array([FWHM]), frequency, 0.0)
+    for diameter in (8e-6, 20e-6, 60e-6):
+        weight = disc_response(frequency, diameter, np.zeros(1), 0.0)
+        encircled = 1 - exp(-((diameter / 2 * FWHM_PER_SIGMA / FWHM) ** 2) / 2)
+        assert weight @ transfer == pytest.approx(encircled, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        {"normal": 2.0},
+        {"normal": 187.0},
+        {"normal": 95.0},
+        {"normal": -130.0, "noise": 0.5},
+        {"noise": 0.005},
+        {"background": 500.0},
+        {"background": 0.0, "step": 500.0},
+        {"saturation": 6.0},
+        {"edge": gaussian_edge(5e-6), "fwhm": 5e-6},
+        {"edge": gaussian_edge(25e-6), "fwhm": 25e-6, "side": 60},
+    ],
+    ids=str,
+)
+def test_a_gaussian_is_returned_within_its_uncertainty(made):
+    made = dict(made)
+    fwhm = made.pop("fwhm", FWHM)
+    found = knife_edge([an_image(**made)])
+    assert found.best.model.name == "gaussian"
+    assert abs(found.fwhm - fwhm) < 3 * found.fwhm_uncertainty
+    # Noise of 10 % of the step is known to be the worst of these: 0.6 um.
+    assert found.fwhm_uncertainty < 0.08 * fwhm
+    assert found.psf() == GaussianPSF(found.fwhm)
+
+
+@pytest.mark.parametrize("saturation", [None, 6.6])
+@pytest.mark.parametrize("normal", [5.0, -140.0])
+def test_diffraction_is_returned_within_its_uncertainty(normal, saturation):
+    edge = truth_of("annular")[2]
+    found = knife_edge([an_image(normal, edge, 0.02, 3, saturation)])
+    assert found.best.model.name == "annular aperture"
+    psf = found.psf()
+    assert isinstance(psf, AnnularAperturePSF)
+    aperture, area = found.best.uncertainties
+    assert abs(psf.numerical_aperture - MIRROR[0]) < 3 * aperture < 0.012
+    assert abs(psf.obscuration**2 - MIRROR[1] ** 2) < 3 * area < 0.02
+    true = AnnularAperturePSF(WAVELENGTH, *MIRROR).fwhm
+    assert abs(found.fwhm - true) < 3 * found.fwhm_uncertainty < 0.05 * true
+    assert bool(saturation) == any("saturated" in doubt for doubt in found.doubts)
+
+
+def test_a_tail_is_told_from_a_wider_core():
+    model, values, edge = truth_of("tail")
+    found = knife_edge([an_image(edge=edge, side=64)])
+    assert found.best.model.name == "gaussian with tail"
+    apart = np.abs(found.best.values - values) / found.best.uncertainties
+    assert (apart < 3).all()
+    assert found.fit("gaussian").bic - found.best.bic > 100
+    assert abs(found.fwhm - model.fwhm(values)) < 3 * found.fwhm_uncertainty
+    psf = found.psf()
+    assert isinstance(psf, MeasuredPSF)
+    # Straight lines between samples an eighth of the width apart.
+    assert psf.fwhm == pytest.approx(found.fwhm, rel=0.01)
+
+
+def test_stated_intervals_hold_the_truth():
+    """Of 95 % intervals at least 90 % hold the width and the MTF that made the edge."""
+    generator = np.random.default_rng(95)
+    repeats, within, covered = 60, 0, []
+    for seed in range(repeats):
+        normal = float(generator.uniform(2.0, 12.0) + generator.choice([0, 90, 180, 270]))
+        place = float(generator.uniform(-6e-6, 6e-6))
+        found = knife_edge([an_image(normal, noise=0.1, seed=seed, side=32, position=place)])
+        within += abs(found.fwhm - FWHM) < 1.96 * found.fwhm_uncertainty
+        transfer = found.edges[0].transfer
+        some = np.array([4, 10, 16, 24, 32])
+        true = gaussian_transfer(transfer.frequency[some], FWHM, normal)
+        covered.append(np.abs(transfer.value[some] - true) < 1.96 * transfer.uncertainty[some])
+    assert within >= 0.9 * repeats
+    assert np.mean(covered) >= 0.9
+    # An uncertainty that is much too large would hold the truth as well.
+    assert found.fwhm_uncertainty < 0.02 * FWHM
+
+
+def test_edge_line_and_mtf_of_the_bins_are_those_that_made_the_edge(clean):
+    edge = clean.edges[0]
+    spread = edge.spread
+    assert spread.width == pytest.approx(PITCH / 4)
+    assert spread.count.sum() == 40 * 40
+    assert np.mean(np.abs(spread.residual) < 2 * spread.uncertainty) > 0.9
+    frequency = edge.transfer.frequency
+    true = gaussian_transfer(frequency, FWHM, 5.0)
+    assert edge.transfer.value[0] == pytest.approx(1.0)
+    assert (np.abs(edge.transfer.value - true) < 4 * edge.transfer.uncertainty + 1e-9)[1:33].all()
+    sigma = sqrt((FWHM / FWHM_PER_SIGMA) ** 2 + PITCH**2 / 12)
+    # Of a Gaussian and a square, nearly a Gaussian; the square alone would have 6 um.
+    assert edge.line_fwhm == pytest.approx(sigma * FWHM_PER_SIGMA, rel=0.02)
+    light = np.sum(edge.line.value * np.diff(spread.distance))
+    assert light == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_round_spread_is_found_from_edges_of_several_orientations(clean):
+    found = knife_edge([an_image(5.0), an_image(97.0, seed=1), an_image(-130.0, seed=2)])
+    assert found.best.model.name == "gaussian"
+    assert abs(found.fwhm - FWHM) < 3 * found.fwhm_uncertainty
+    # Three images: 1/√3 of the uncertainty of one.
+    ratio = found.fwhm_uncertainty / clean.fwhm_uncertainty
+    assert ratio == pytest.approx(1 / sqrt(3), rel=0.25)
+    assert not any("one orientation" in text for text in found.assumptions)
+    assert any("one orientation" in text for text in clean.assumptions)
+
+
+def test_an_elliptical_spread_is_told_from_a_round_one():
+    # 14 um along 30 deg, 8 um across it.
+    greatest, least, direction = 14e-6, 8e-6, radians(30.0)
+
+    def width(normal):
+        turned = radians(normal) - direction
+        return sqrt((greatest * cos(turned)) ** 2 + (least * np.sin(turned)) ** 2)
+
+    normals = (4.0, 64.0, 126.0)
+    images = [an_image(n, gaussian_edge(width(n)), seed=k) for k, n in enumerate(normals)]
+    found = knife_edge(images)
+    assert found.best.model.name == "elliptical gaussian"
+    axes = found.best.model.axes(found.best.values)
+    assert axes[:2] == pytest.approx((greatest, least), rel=0.03)
+    assert degrees(axes[2]) == pytest.approx(30.0, abs=1.5)
+    for edge, normal in zip(found.edges, normals, strict=True):
+        assert abs(edge.fwhm - width(normal)) < 3 * edge.fwhm_uncertainty
+    kernel = found.psf().kernel(1e-6)
+    x = np.arange(len(kernel)) - len(kernel) // 2
+    # First row on top: y goes up as the row number goes down.
+    across = np.sum(kernel * x * -x[:, None]) * 1e-12
+    expected = (greatest**2 - least**2) / 2 * np.sin(2 * direction) / FWHM_PER_SIGMA**2
+    assert across == pytest.approx(expected, rel=0.1)
+    flat = knife_edge([an_image(4.0, gaussian_edge(12e-6)), an_image(94.0, gaussian_edge(9e-6))])
+    assert flat.best.model.name == "elliptical gaussian"
+    assert flat.best.values == pytest.approx([12e-6, 9e-6], rel=0.03)
+
+
+def test_light_around_a_point_is_returned_without_a_model():
+    found = knife_edge([an_image(5.0, truth_of("annular")[2], 0.05, side=64)])
+    radial = found.radial
+    assert (radial.shares >= 0).all()
+    unit = WAVELENGTH / (2 * pi * MIRROR[0])
+    v = np.linspace(0.0, float(radial.edges[-1]) / unit, 20001)
+    light = annular_density(v, MIRROR[1]) * v * (1 - MIRROR[1] ** 2) / 2
+    true = np.interp(radial.edges / unit, v, np.concatenate([[0], np.cumsum(light[1:] * v[1])]))
+    # The sums that stand for the truth are good to a thousandth.
+    assert (np.abs(radial.encircled - true) < 3 * radial.encircled_uncertainty + 1e-3).all()
+
+
+def test_what_no_model_fits_is_said_and_the_radial_one_is_nearer():
+    radius = 12e-6
+    found = knife_edge([an_image(5.0, disc_edge(radius), 0.02, side=64)])
+    assert any("no model fits" in doubt for doubt in found.doubts)
+    true = np.minimum(found.radial.edges / radius, 1.0) ** 2
+    sizes = [2 * r for r in found.radial.edges]
+    frequency = np.arange(0.0, 6e5, 200.0)
+    transfer = found.best.model.mean_transfer(found.best.values, frequency)
+    fitted = [disc_response(frequency, size, np.zeros(1), 0.0) @ transfer for size in sizes]
+    wrong = np.abs(np.array(fitted) - true).max()
+    assert np.abs(found.radial.encircled - true).max() < 0.5 * wrong
+
+
+def test_apertures_tell_of_tails_that_an_edge_does_not():
+    # A tail as long as half of the image: alone it is taken for background.
+    edge = tailed_edge(8e-6, 0.1, 60e-6)
+    images = [an_image(edge=edge, noise=0.2)]
+    holes = [
+        gaussian_aperture(8e-6, size, 0.1, 60e-6, noise=0.01, seed=k, side=161)
+        for k, size in enumerate((40e-6, 80e-6, 160e-6, 320e-6, 800e-6))
+    ]
+    alone, together = knife_edge(images), knife_edge(images, holes)
+    share = together.fit("gaussian with tail")
+    assert together.best is share
+    # The images of apertures have no footprint, which adds under 1 % at the smallest.
+    assert share.values[1] == pytest.approx(0.1, abs=0.01)
+    assert share.values[2] * share.values[0] == pytest.approx(60e-6, rel=0.1)
+    unsure = alone.fit("gaussian with tail").uncertainties[1]
+    assert share.uncertainties[1] < 0.3 * unsure
+
+
+def test_apertures_that_contradict_the_edge_are_doubtful():
+    sizes = (60e-6, 120e-6, 240e-6, 300e-6)
+    holes = [gaussian_aperture(FWHM, size, noise=0.01, seed=5) for size in sizes]
+    assert knife_edge([an_image()], holes).doubts == ()
+    # A tail that the edge does not have, in the apertures alone.
+    holes = [gaussian_aperture(FWHM, size, 0.2, 40e-6, noise=0.01, seed=5) for size in sizes]
+    doubts = knife_edge([an_image(noise=0.01, side=64)], holes).doubts
+    assert any("contradict each other" in doubt for doubt in doubts)
+
+
+def test_the_system_holds_the_sensor_once(clean):
+    system, optics = clean.psf("system").kernel(1e-6), clean.psf().kernel(1e-6)
+
+    def variance(kernel):
+        x = np.arange(len(kernel)) - len(kernel) // 2
+        return float(kernel.sum(axis=0) @ x**2) * 1e-12
+
+    assert variance(system) - variance(optics) == pytest.approx(PITCH**2 / 12, rel=0.1)
+
+
+def test_the_cameras_own_blur_is_returned():
+    """A fine image of a sharp edge, blurred and integrated as the virtual camera does it."""
+    fine = 1e-6
+    count = 240
+    x = fine * (np.arange(count) - (count - 1) / 2)
+    angle = radians(6.0)
+    distance = x * cos(angle) - x[:, None] * np.sin(angle)
+    sharp = np.clip(distance / fine + 0.5, 0.0, 1.0)
+    blurred = blur(1.0 + sharp, GaussianPSF(9e-6), fine)
+    sensors = blurred.reshape(40, 6, 40, 6).mean(axis=(1, 3))
+    found = knife_edge([image_of(sensors, 0.002)])
+    # The samples of 1 um add their own squares to the width: 0.02 um.
+    assert found.fwhm == pytest.approx(9e-6, abs=0.03e-6 + 3 * found.fwhm_uncertainty)
+
+
+def test_temperature_in_place_of_radiance_gives_another_width():
+    low, high = 573.15, 1073.15
+    from synthetic_edge import BAND
+
+    dark, bright = BAND.radiance(np.array([low, high]))
+    radiance = edge_radiance(GAUSSIAN, 5.0, background=dark, step=bright - dark)
+    right = knife_edge([image_of(radiance, 1e-3 * (bright - dark))])
+    wrong = knife_edge([image_of(BAND.temperature(radiance), 0.5)])
+    assert right.fwhm == pytest.approx(FWHM, rel=0.01)
+    assert abs(wrong.fit("gaussian").fwhm / FWHM - 1) > 0.05
+    assert any("no model fits" in doubt for doubt in wrong.doubts)
+
+
+def bar():
+    return edge_radiance(GAUSSIAN, 5.0, position=-60e-6) - edge_radiance(
+        GAUSSIAN, 5.0, position=50e-6, background=0.0
+    )
+
+
+@pytest.mark.parametrize(
+    ("radiance", "noise", "text"),
+    [
+        (np.full((40, 40), 3.0), 0.0, "all pixels have the same radiance"),
+        (np.full((40, 40), 3.0), 0.1, "no edge stands out of the noise"),
+        (edge_radiance(GAUSSIAN, 5.0, position=1e-3), 0.05, "no edge stands out of the noise"),
+        (edge_radiance(GAUSSIAN, 5.0, position=118e-6), 0.05, "the image reaches"),
+        (edge_radiance(gaussian_edge(600e-6), 5.0), 0.05, "the image reaches"),
+        (bar(), 0.05, "more than one straight edge"),
+        (
+            edge_radiance(GAUSSIAN, 5.0) + edge_radiance(GAUSSIAN, 95.0, step=2.0),
+            0.05,
+            "more than one straight edge",
+        ),
+        (np.full((40, 40), np.nan), 0.0, "0 usable pixels"),
+    ],
+    ids=["flat", "noise", "outside", "border", "ramp", "bar", "corner", "dead"],
+)
+def test_without_one_edge_there_is_one_error(radiance, noise, text):
+    image = image_of(radiance, noise, name="edge.nc")
+    with pytest.raises(NoEdgeError, match=r"^edge\.nc: ") as caught:
+        knife_edge([replace(image, dead=~np.isfinite(radiance))])
+    assert text in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_no_image_is_an_error():
+    with pytest.raises(ValueError, match="none is given"):
+        knife_edge([])
+
+
+@pytest.mark.parametrize(
+    ("normal", "aliased"), [(0.0, True), (45.0, True), (90.0, True), (5.0, False)]
+)
+def test_tilts_that_sample_the_edge_too_coarsely_are_doubtful(normal, aliased):
+    found = knife_edge([an_image(normal)])
+    assert any("aliased" in doubt for doubt in found.doubts) is aliased
+
+
+def test_a_clean_edge_is_not_doubtful(clean):
+    assert clean.doubts == ()
+
+
+def test_without_noise_the_truth_is_returned_and_nothing_is_doubtful():
+    found = knife_edge([an_image(noise=0.0)])
+    assert found.fwhm == pytest.approx(FWHM, rel=1e-4)
+    assert found.doubts == ()
+
+
+def test_noise_that_grows_with_the_light_is_weighed():
+    """Of a dark side with a tenth of the noise, the width is known better than from the other."""
+    radiance = edge_radiance(GAUSSIAN, 5.0)
+    share = (radiance - 2.0) / 5.0
+    found = knife_edge([image_of(radiance, 0.02 + 0.18 * share, 3)])
+    assert found.edges[0].noise < 0.06
+    assert abs(found.fwhm - FWHM) < 3 * found.fwhm_uncertainty
+    even = knife_edge([image_of(radiance, 0.2, 3)])
+    assert found.fwhm_uncertainty < 0.8 * even.fwhm_uncertainty
+
+
+def test_bent_and_short_and_unresolved_edges_are_doubtful():
+    rows = np.arange(60.0)
+    angle = radians(5.0)
+    x = PITCH * (np.arange(60) - 29.5)
+    bow = 4e-6 * ((rows - 29.5) / 30) ** 2
+    distance = x * cos(angle) + (x[::-1, None]) * np.sin(angle) - bow[:, None]
+    bent = image_of(2.0 + 5.0 * gaussian_edge(12e-6)(distance), 0.05)
+    assert any("bent" in doubt for doubt in knife_edge([bent]).doubts)
+    short = an_image(5.0, position=100e-6)
+    assert any("only" in doubt for doubt in knife_edge([short]).doubts)
+    sharp = an_image(5.0, gaussian_edge(0.5e-6))
+    assert any("hardly seen" in doubt for doubt in knife_edge([sharp]).doubts)
+
+
+def test_clipping_that_no_flag_tells_is_seen():
+    image = an_image(saturation=6.0)
+    hidden = replace(image, saturated=np.zeros_like(image.saturated))
+    found = knife_edge([hidden])
+    assert any("saturated" in doubt for doubt in found.doubts)
+    assert abs(found.fwhm - FWHM) < 3 * found.fwhm_uncertainty
+
+
+def test_a_dark_side_below_the_floor_is_left_out():
+    image = an_image()
+    found = knife_edge([replace(image, below=image.radiance < 2.5)])
+    assert any("below the camera's floor" in doubt for doubt in found.doubts)
+    assert abs(found.fwhm - FWHM) < 3 * found.fwhm_uncertainty
+
+
+def test_dead_pixels_change_nothing_flagged_or_not(clean):
+    image = an_image()
+    radiance = image.radiance.copy()
+    radiance[[3, 17, 30], [8, 20, 35]] = 60.0, 0.0, -40.0
+    found = knife_edge([replace(image, radiance=radiance)])
+    assert any("3 pixels far from the others" in doubt for doubt in found.doubts)
+    assert found.fwhm == pytest.approx(clean.fwhm, abs=clean.fwhm_uncertainty / 2)
+    dead = np.zeros_like(image.dead)
+    dead[[3, 17, 30], [8, 20, 35]] = True
+    flagged = knife_edge([replace(image, radiance=radiance, dead=dead)])
+    assert flagged.doubts == ()
+
+
+def test_models_are_weighed_and_named(clean):
+    assert sum(clean.weights) == pytest.approx(1.0)
+    assert clean.weights[0] > 0.9
+    assert [fit.bic for fit in clean.fits] == sorted(fit.bic for fit in clean.fits)
+    assert clean.fwhm_uncertainty >= clean.best.fwhm_uncertainty
+    assert clean.psf(model="gaussian with tail").fwhm == pytest.approx(FWHM, rel=0.1)
+    with pytest.raises(ValueError, match="'lorentz' was not fitted, expected one of gaussian"):
+        clean.psf(model="lorentz")
+    with pytest.raises(ValueError, match="expected optics or system"):
+        clean.psf("lens")
+    assert all(isinstance(fit.model, PSFModel) for fit in clean.fits)
+
+
+def test_a_measurement_becomes_an_image():
+    radiance = edge_radiance(GAUSSIAN, 5.0, background=500.0, step=2000.0)
+    flags = np.zeros((1, *radiance.shape), np.uint8)
+    flags[0, 0, :3] = Flag.DEAD, Flag.SATURATED, Flag.REPLACED
+    measurement = measurement_of(radiance, flags)
+    image = edge_image(measurement, "m", (slice(0, 20), slice(0, 30)))
+    assert image.radiance.shape == (20, 30)
+    assert np.flatnonzero(~image.usable.ravel()).tolist() == [0, 1, 2]
+    assert image.wavelength == pytest.approx(WAVELENGTH)
+    assert image.footprint == pytest.approx(PITCH)
+    assert any("fill factor 1" in note for note in image.notes)
+    measurement.data.attrs |= {"fill_factor": 0.81, "psf_order": "sensor"}
+    measurement.data.attrs |= {"assumed": "No pixel is saturated.", "doubtful": "A few are old."}
+    told = edge_image(measurement, "m")
+    assert told.doubts == ("A few are old.",)
+    assert told.footprint == pytest.approx(0.9 * PITCH)
+    assert told.notes[0] == "No pixel is saturated."
+    assert "acts twice" in told.notes[1]
+    with pytest.raises(ValueError, match=r"m: the region has 0 x 40 pixels, expected 8 x 8"):
+        edge_image(measurement, "m", (slice(50, 60), slice(None)))
+
+
+def test_apertures_that_are_not_there_are_errors():
+    edge, hole = an_image(), gaussian_aperture(FWHM, 100e-6)
+    with pytest.raises(ValueError, match="expected 3 diameters or more"):
+        knife_edge([edge], [hole, hole, gaussian_aperture(FWHM, 60e-6)])
+    others = [gaussian_aperture(FWHM, 60e-6), gaussian_aperture(FWHM, 80e-6)]
+    flat = replace(hole, radiance=np.full_like(hole.radiance, 2.0))
+    with pytest.raises(ValueError, match="100 um: all pixels are as bright"):
+        knife_edge([edge], [flat, *others])
+    with pytest.raises(ValueError, match="no aperture of 20 um within the image"):
+        knife_edge([edge], [replace(hole, diameter=20e-6, name="hole"), *others])
+    with pytest.raises(ValueError, match=r"hole: diameter is -1\.0 m, expected over 0"):
+        aperture_image(measurement_of(hole.radiance * 100), -1.0, "hole")

@@ -1,0 +1,543 @@
+"""From a camera's file to a measurement's: descriptions, calibration files, commands."""
+
+import re
+from dataclasses import replace
+
+import camera_files
+import numpy as np
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from chipglow.camera import Detector, Flag, Recording, fit_linear, fit_sakuma_hattori
+from chipglow.cli import app
+from chipglow.io import is_measurement, read_measurement, write_hcc, write_measurement
+from chipglow.io.column_file import POINT_COLUMNS, read_bad_pixels, read_columns, read_response
+from chipglow.radiometry import Band, TabulatedResponse
+from chipglow.scene import ToolGeometry
+from chipglow.study import (
+    CalibrationDescription,
+    MeasurementDescription,
+    StudyError,
+    calibration_text,
+    load_calibration,
+    load_description,
+    load_measurement,
+    measurement_text,
+    uniform_counts,
+)
+
+BAND = Band(3.8e-6, 5.1e-6)
+SHAPE = (30, 40)
+CELSIUS = np.arange(300.0, 1001.0, 100.0)
+TEMPERATURE_UNCERTAINTY, COUNT_UNCERTAINTY = 0.3, 1.0
+DETECTOR = Detector(gain=1.8, offset=400.0, bits=14, read_noise=3.0).with_pattern(
+    SHAPE, 0.03, 20.0, 0.003, np.random.default_rng(5)
+)
+Y, X = np.mgrid[: SHAPE[0], : SHAPE[1]]
+TRUTH = 700.0 + 450.0 * np.exp(-((X - 20) ** 2 + (Y - 15) ** 2) / 100.0)
+FIELDS = {
+    "file": "chip.npy",
+    "unit": "counts",
+    "interval": "2 ms",
+    "pitch": "6 um",
+    "tip": [20.0, 30.0],
+    "calibration": "calibration.yaml",
+    "saturation": 16382.0,
+    "bad_pixels": "find",
+    "uniform": {"frames": "cold.npy", "brighter": "hot.npy"},
+}
+
+
+def seen(kelvins, count, rng):
+    frames = np.broadcast_to(BAND.radiance(np.asarray(kelvins, np.float64)), (count, *SHAPE))
+    return DETECTOR.counts(frames, rng).astype(np.uint16)
+
+
+def points_text(rng):
+    """Black bodies whose true temperature differs from the noted one; the image's median."""
+    lines = ["temperature_degC,counts,count_uncertainty,temperature_uncertainty_K"]
+    for celsius in CELSIUS:
+        true = celsius + 273.15 + rng.normal(0.0, TEMPERATURE_UNCERTAINTY)
+        counts = np.median(seen(true, 4, rng))
+        lines.append(f"{celsius:g},{counts:.3f},{COUNT_UNCERTAINTY},{TEMPERATURE_UNCERTAINTY}")
+    return "\n".join(lines) + "\n"
+
+
+def fill(folder, seed=1):
+    """Files of a laboratory: black bodies, uniform frames, a chip, a description of it all."""
+    rng = np.random.default_rng(seed)
+    (folder / "points.csv").write_text(points_text(rng))
+    np.save(folder / "cold.npy", seen(623.15, 20, rng))
+    np.save(folder / "hot.npy", seen(1123.15, 20, rng))
+    np.save(folder / "chip.npy", seen(TRUTH, 5, rng))
+    (folder / "chip.yaml").write_text(yaml.safe_dump(FIELDS))
+
+
+def calibrate_points(folder):
+    table = read_columns(folder / "points.csv", POINT_COLUMNS)
+    fit = fit_linear(
+        table["temperature"], table["counts"], BAND,
+        table["count_uncertainty"], table["temperature_uncertainty"], integration_time=1e-5,
+    )  # fmt: skip
+    (folder / "calibration.yaml").write_text(calibration_text(CalibrationDescription.of(fit)))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("laboratory")
+    fill(folder)
+    calibrate_points(folder)
+    return folder
+
+
+@pytest.fixture
+def laboratory(made, monkeypatch):
+    """The folder with the files; tests write elsewhere."""
+    monkeypatch.chdir(made)
+    return made
+
+
+def run(*arguments):
+    result = CliRunner().invoke(app, list(map(str, arguments)), env={"COLUMNS": "160"})
+    return result.exit_code, result.output
+
+
+# Files
+
+
+def test_a_calibration_comes_back_from_its_file(tmp_path):
+    kelvins = CELSIUS + 273.15
+    response = TabulatedResponse((3.8e-6, 4.4e-6, 5.1e-6), (0.5, 1.0, 0.7))
+    band = Band(*response.limits, response)
+    for fitted in (fit_linear, fit_sakuma_hattori):
+        fit = fitted(kelvins, 400.0 + 2.0 * band.radiance(kelvins), band, 1.0, 0.3, 0.5, 1e-5, "A")
+        text = calibration_text(CalibrationDescription.of(fit))
+        (tmp_path / "calibration.yaml").write_text(text)
+        again, first = load_calibration(tmp_path / "calibration.yaml"), fit.calibration
+        assert type(again) is type(first)
+        np.testing.assert_array_equal(again.parameters, first.parameters)
+        np.testing.assert_array_equal(again.covariance, first.covariance)
+        limits = (first.lowest, first.highest, 1e-5, "A")
+        assert (again.lowest, again.highest, again.integration_time, again.range_name) == limits
+        np.testing.assert_allclose(again.band.response.wavelengths, response.wavelengths)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("model", "cubic", "model: 'cubic', expected"),
+        ("parameters", {"offset": 1.0}, "parameters: offset, expected offset, gain"),
+        ("parameters", {"offset": 1.0, "gain": -2.0}, "gain is -2"),
+        ("parameters", {"offset": 1.0, "gain": 0.0}, "gain is 0"),
+        ("covariance", [[1.0, 0.0], [0.0]], "covariance: rows are of different lengths"),
+        ("lowest", "2000 degC", "lowest is 2273.15 K and highest"),
+        ("response", [[3.8, 1.0, 2.0]], "response: expected pairs"),
+        ("band", "5.1-3.8 um", "reversed"),
+        ("colour", 1, "unknown key 'colour'"),
+    ],
+)
+def test_an_impossible_calibration_file_is_one_clear_error(
+    laboratory, tmp_path, field, value, message
+):
+    described = yaml.safe_load((laboratory / "calibration.yaml").read_text())
+    (tmp_path / "bad.yaml").write_text(yaml.safe_dump({**described, field: value}))
+    with pytest.raises(StudyError, match=message) as caught:
+        load_calibration(tmp_path / "bad.yaml")
+    assert str(caught.value).startswith("bad.yaml: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_counts_that_fall_are_no_calibration(tmp_path):
+    described = {
+        "model": "sakuma-hattori", "band": "3.8-5.1 um", "lowest": "300 degC",
+        "highest": "900 degC", "parameters": {"offset": 0.0, "A": -4e-6, "B": 1e-2, "C": 1e5},
+        "covariance": np.eye(4).tolist(),
+    }  # fmt: skip
+    (tmp_path / "falls.yaml").write_text(yaml.safe_dump(described))
+    with pytest.raises(StudyError, match="counts fall with the temperature"):
+        load_calibration(tmp_path / "falls.yaml")
+
+
+def test_tables_are_read_with_their_units(tmp_path):
+    table = tmp_path / "table.csv"
+    table.write_text(
+        "counts,temperature_degF,temperature_uncertainty_degF\n10,1112,1.8\n\n20,212,9\n"
+    )
+    read = read_columns(table, POINT_COLUMNS)
+    assert read["temperature"] == pytest.approx([873.15, 373.15])
+    assert read["temperature_uncertainty"] == pytest.approx([1.0, 5.0])
+    assert read["counts"].tolist() == [10.0, 20.0]
+    table.write_text("wavelength_nm,response\n5000,0.5\n4000,1\n")
+    assert read_response(table).wavelengths == pytest.approx((4e-6, 5e-6))
+    table.write_text("column,row\n3,0\n")
+    assert np.argwhere(read_bad_pixels(table, (2, 4))).tolist() == [[0, 3]]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "no number in it"),
+        ("temperature_degC,counts\n", "no number in it"),
+        ("temperature,counts\n1,2\n", "line 1: 'temperature' has no unit, expected .*_degC"),
+        ("temperature_um,counts\n1,2\n", "line 1: unknown unit 'um'"),
+        ("temperature_K,colour\n1,2\n", "line 1: unknown column 'colour'"),
+        ("temperature_K\n1\n", "expected a column 'counts', once"),
+        ("temperature_K,counts,counts\n1,2,3\n", "expected a column 'counts', once"),
+        ("temperature_K,counts\n1,2\n3\n", "line 3: '3', expected 2 numbers"),
+        ("temperature_K,counts\n1,nan\n", "line 2: '1,nan', expected 2 numbers"),
+        ("temperature_K,counts\n1,two\n", "line 2"),
+    ],
+)
+def test_a_table_that_is_none_is_one_clear_error(tmp_path, text, message):
+    table = tmp_path / "table.csv"
+    table.write_text(text)
+    with pytest.raises(ValueError, match=message) as caught:
+        read_columns(table, POINT_COLUMNS)
+    assert str(caught.value).startswith(str(table))
+
+
+def test_bad_pixels_must_be_in_the_image(tmp_path):
+    (tmp_path / "bad.csv").write_text("column,row\n3,0\n40,2\n")
+    with pytest.raises(ValueError, match=r"pixel 40,2 is not in the image, expected .* 4 x 2"):
+        read_bad_pixels(tmp_path / "bad.csv", (2, 4))
+
+
+# Descriptions
+
+
+def test_a_description_is_read_back_from_its_text(tmp_path):
+    described = MeasurementDescription.model_validate({**FIELDS, "band": "3.8-5.1 um"})
+    (tmp_path / "chip.yaml").write_text(measurement_text(described))
+    assert load_description(tmp_path / "chip.yaml") == described
+    assert MeasurementDescription() == MeasurementDescription.model_validate(
+        yaml.safe_load(measurement_text(MeasurementDescription()))
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "chosen"),
+    [(None, None), ("3:7", slice(3, 7)), ("::10", slice(None, None, 10)), ("5:", slice(5, None))],
+)
+def test_frames_are_chosen_as_in_python(text, chosen):
+    assert MeasurementDescription(frames=text).chosen_frames() == chosen
+
+
+def test_the_measurement_holds_the_truth_within_its_uncertainty(laboratory):
+    measured = load_measurement("chip.yaml")
+    assert measured.times == pytest.approx(2e-3 * np.arange(5))
+    assert measured.raster.extent == pytest.approx((-120e-6, 120e-6, 0.0, 180e-6), abs=1e-12)
+    dead = DETECTOR.dead
+    assert dead.any()
+    np.testing.assert_array_equal((measured.flags[0] & Flag.REPLACED) != 0, dead)
+
+
+def test_the_truth_is_within_the_stated_interval(tmp_path, monkeypatch):
+    """95 % intervals of the calibration hold the truth of ten hidden cameras nine times or more.
+
+    The noise of single pixels is left out by the median over the image.
+    """
+    monkeypatch.chdir(tmp_path)
+    inside = []
+    for seed in range(10):
+        fill(tmp_path, seed)
+        calibrate_points(tmp_path)
+        measured = load_measurement("chip.yaml")
+        error = np.median(measured.radiance_temperature() - TRUTH, axis=0)
+        deviation = measured.calibration_uncertainty[0] / BAND.slope(TRUTH)
+        inside.append(abs(np.median(error / deviation)) < 1.96)
+    assert sum(inside) >= 9
+
+
+def test_the_calibrated_range_is_kept(laboratory):
+    cut = ["uniform={}", "bad_pixels=none"]
+    described = yaml.safe_load((laboratory / "calibration.yaml").read_text())
+    (laboratory / "narrow.yaml").write_text(
+        yaml.safe_dump({**described, "lowest": "500 degC", "highest": "700 degC"})
+    )
+    measured = load_measurement("chip.yaml", [*cut, "calibration=narrow.yaml"])
+    kelvins = BAND.temperature(measured.radiance)
+    np.testing.assert_array_equal(measured.flags == Flag.BELOW_FLOOR, ~(kelvins >= 773.15))
+    np.testing.assert_array_equal(measured.flags == Flag.SATURATED, kelvins > 973.15)
+
+
+def test_a_camera_file_alone_with_settings(laboratory):
+    settings = [f"{name}={yaml.safe_dump(value, default_flow_style=True, width=999).strip()}"
+                for name, value in FIELDS.items() if name not in ("file", "tip")]  # fmt: skip
+    settings = [setting.removesuffix("\n...") for setting in settings]
+    direct, described = load_measurement("chip.npy", settings), load_measurement("chip.yaml")
+    np.testing.assert_array_equal(direct.radiance, described.radiance)
+    assert direct.raster.left == 0.0
+    assert "lower left corner" in direct.data.attrs["assumed"]
+
+
+def test_object_parameters_are_said_or_as_recorded(laboratory, tmp_path):
+    shown = np.full((1, 4, 5), 900.0)
+    np.save(tmp_path / "shown.npy", shown)
+    settings = ["unit=K", "interval=1 ms", "pitch=6 um", "band=3.8-5.1 um"]
+    plain = load_measurement(tmp_path / "shown.npy", settings)
+    np.testing.assert_allclose(plain.radiance_temperature(), 900.0, atol=1e-3)
+    told = load_measurement(tmp_path / "shown.npy", [*settings, "object_parameters.emissivity=0.5"])
+    expected = 0.5 * BAND.radiance(900.0) + 0.5 * BAND.radiance(293.15)
+    np.testing.assert_allclose(told.radiance, expected, rtol=1e-6)
+    assert "emissivity 0.5" in told.data.attrs["object_parameters"]
+
+
+def test_a_flir_sequence_by_its_makers_conversion(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    counts = camera_files.pictures()
+    (tmp_path / "chip.seq").write_bytes(camera_files.seq(counts))
+    measured = load_measurement("chip.seq", ["pitch=50 um", "band=7.5-13 um"])
+    told = camera_files.PLANCK
+    usable = measured.flags == 0
+    assert usable.any()
+    signal = counts[usable] + float(told["o"])
+    expected = told["b"] / np.log(told["r1"] / (told["r2"] * signal) + told["f"])
+    # Radiance is kept in 32 bits.
+    np.testing.assert_allclose(measured.radiance_temperature()[usable], expected, rtol=1e-6)
+    assert "emissivity 0.95" in measured.data.attrs["object_parameters"]
+    assert "not known" in measured.data.attrs["doubtful"]
+
+
+def test_a_response_takes_the_place_of_limits(tmp_path):
+    np.save(tmp_path / "shown.npy", np.full((1, 4, 5), 900.0))
+    (tmp_path / "response.csv").write_text("wavelength_um,response\n3,0\n4,1\n5,0\n")
+    settings = ["unit=K", "interval=1 ms", "pitch=6 um", "band=response.csv"]
+    measured = load_measurement(tmp_path / "shown.npy", settings)
+    assert (measured.band.lower, measured.band.upper) == pytest.approx((3e-6, 5e-6))
+    assert measured.radiance[0, 0, 0] < 0.6 * Band(3e-6, 5e-6).radiance(900.0)
+
+
+def test_a_measurement_is_read_as_it_is(laboratory, tmp_path):
+    measured = load_measurement("chip.yaml")
+    write_measurement(measured, tmp_path / "measured.nc")
+    assert is_measurement(tmp_path / "measured.nc")
+    assert not is_measurement(laboratory / "chip.npy")
+    again = load_measurement(tmp_path / "measured.nc")
+    np.testing.assert_array_equal(again.radiance, measured.radiance)
+    with pytest.raises(ValueError, match="--set: 'pitch=6 um' describes nothing"):
+        load_measurement(tmp_path / "measured.nc", ["pitch=6 um"])
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (["pitch=none"], "chip.yaml: pitch: is missing"),
+        (["calibration=none"], "chip.yaml: calibration: is missing"),
+        (["integration_time=20 us"], "integration time of 10 us, the recording has 20 us"),
+        (["band=3-5 um"], "band 3.8-5.1 um, the recording has 3-5 um"),
+        (["band=3 to 5"], "band: '3 to 5' is not a band"),
+        (["frames=one"], "frames: 'one', expected first:end"),
+        (["uniform.frames=none"], "uniform.frames: is missing"),
+        (["uniform.brighter=cold.npy", "uniform.frames=hot.npy"], "second brighter"),
+        (["uniform.frames=small.npy", "uniform.brighter=none"], "of 4 x 3 sensors"),
+        (["uniform.frames=few.npy"], "2 frames, expected 8 or more"),
+        (["saturation=5000"], "uniform.brighter: .* saturated"),
+        (["mirror=left"], "mirror: 'left', expected"),
+        (["quarter_turns=5"], "quarter_turns: is 5"),
+        (["tip=[1, 2, 3]"], "tip"),
+        (["object_parameters.emissivity=2"], "emissivity is 2"),
+        (["colour=red"], "unknown key 'colour'"),
+        (["file=none"], "file: is missing"),
+        (["unit=K", "calibration=none", "band=3-5 um"], "not linear in light"),
+        (["unit=K", "uniform={}", "bad_pixels=none"], "holds temperature, expected counts"),
+    ],
+)
+def test_what_cannot_be_is_one_clear_error(laboratory, settings, message):
+    np.save(laboratory / "small.npy", np.ones((20, 3, 4)))
+    np.save(laboratory / "few.npy", np.load(laboratory / "cold.npy")[:2])
+    with pytest.raises(ValueError, match=message) as caught:
+        load_measurement("chip.yaml", settings)
+    assert "\n" not in str(caught.value)
+
+
+# Commands
+
+
+def test_calibrate_prints_fits_and_writes_the_preferred(laboratory, tmp_path):
+    out, plot = tmp_path / "calibration.yaml", tmp_path / "calibration.png"
+    code, said = run(
+        "calibrate", "points.csv", "--band", "3.8-5.1 um", "--model", "both", "--out", out,
+        "--plot", plot, "--integration-time", "10 us", "--range", "A",
+        "--common-uncertainty", "0.5 K",
+    )  # fmt: skip
+    assert code == 0, said
+    assert "Preferred: linear" in said
+    assert "degrees of freedom" in said
+    assert "Doubtful" not in said
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    calibration = load_calibration(out)
+    assert (calibration.integration_time, calibration.range_name) == (1e-5, "A")
+    assert (calibration.lowest, calibration.highest) == pytest.approx((573.15, 1273.15))
+    # Half a kelvin that all points have in common is there at every temperature.
+    kelvins = np.array([700.0, 900.0, 1100.0])
+    uncertainty = calibration.uncertainty(calibration.counts(kelvins)) / BAND.slope(kelvins)
+    assert (uncertainty > 0.35).all()
+
+
+def test_calibrate_says_what_is_doubtful(laboratory):
+    code, said = run("calibrate", "points.csv", "--band", "2-2.5 um")
+    assert code == 0, said
+    assert "Doubtful: The residuals of linear are larger" in said
+    assert "--common-uncertainty" in said
+    (laboratory / "bare.csv").write_text("temperature_K,counts\n600,1000\n800,2500\n1000,5000\n")
+    code, said = run("calibrate", "bare.csv", "--band", "3.8-5.1 um")
+    assert code == 0, said
+    assert "Doubtful: The uncertainty is from the scatter" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["points.csv", "--band", "3.8-5.1"], "--band: 3.8-5.1 has no unit"),
+        (["nothing.csv", "--band", "3.8-5.1 um"], "nothing.csv"),
+        (["chip.npy", "--band", "3.8-5.1 um"], "chip.npy: expected text"),
+        (["few.csv", "--band", "3.8-5.1 um"], "few.csv: calibration: 1 points"),
+        (["points.csv", "--band", "3.8-5.1 um", "--plot", "a.txt"], "--plot"),
+        (["points.csv", "--band", "3.8-5.1 um", "--out", "no/where.yaml"], "no folder"),
+        (
+            ["points.csv", "--band", "3.8-5.1 um", "--common-uncertainty", "2"],
+            "--common-uncertainty: 2 has no unit",
+        ),
+    ],
+)
+def test_calibrate_refuses_in_one_line(laboratory, arguments, message):
+    (laboratory / "few.csv").write_text("temperature_degC,counts\n300,1000\n")
+    code, said = run("calibrate", *arguments)
+    assert code == 2
+    assert message in " ".join(said.split())
+
+
+def test_convert_makes_a_measurement_and_says_what_it_assumed(laboratory, tmp_path):
+    out = tmp_path / "measured.nc"
+    code, said = run("convert", "chip.yaml", "--out", out, "--set", "tip=none")
+    assert code == 0, said
+    for words in ("counts as uint16", "5 of 40 x 30 pixels", "replaced by neighbours",
+                  "standard uncertainty", "Assumed: The origin of coordinates"):  # fmt: skip
+        assert words in said
+    assert read_measurement(out).data.attrs["calibration"].startswith("straight line")
+    code, said = run("convert", out)
+    assert code == 2
+    assert "is a measurement already" in said
+
+
+def test_convert_only_looks_without_out(laboratory):
+    before = sorted(path.name for path in laboratory.iterdir())
+    settings = ["--set", "unit=counts", "--set", "interval=1 ms"]
+    code, said = run("convert", "chip.npy", *settings)
+    assert code == 0, said
+    assert "It is no measurement yet. chip.npy: calibration: is missing" in said
+    code, said = run("convert", "chip.npy", *settings, "--out", "never.nc")
+    assert code == 2
+    assert said.count("calibration: is missing") == 1
+    assert sorted(path.name for path in laboratory.iterdir()) == before
+
+
+def test_show_shows_a_measurement(laboratory, tmp_path):
+    out, plot = tmp_path / "measured.nc", tmp_path / "measured.svg"
+    measured = load_measurement("chip.yaml", ["floor=450 degC"])
+    write_measurement(measured.with_tool(ToolGeometry()), out)
+    code, said = run("show", out, "--at", "4 ms", "--plot", plot)
+    assert code == 0, said
+    for words in (
+        "40 x 30 of 6 µm",
+        "at 4000 µs",
+        "below the floor",
+        "3.8 µm to 5.1 µm",
+        "rake -7°",
+    ):
+        assert words in said
+    assert plot.read_text().startswith("<?xml")
+    code, said = run("show", out, "--at", "1 s")
+    assert code == 2
+    assert "--at: 1e+06 us is not in the measurement, expected 0 us to 8000 us" in said
+
+
+def test_init_writes_the_description(tmp_path):
+    path = tmp_path / "chip.yaml"
+    assert run("init", path, "--measurement")[0] == 0
+    assert load_description(path) == MeasurementDescription()
+    assert "# The tip of the tool" in path.read_text()
+    assert run("init", path, "--measurement", "--import", "--force")[0] == 2
+
+
+# Recordings of black bodies
+
+
+def seen_bodies(folder):
+    """Recordings of black bodies of exactly known temperature, and a table of them."""
+    rng = np.random.default_rng(3)
+    lines = ["temperature_degC,file"]
+    for celsius in CELSIUS[:4]:
+        name = f"body {celsius:g}.npy"
+        np.save(folder / name, seen(celsius + 273.15, 12, rng))
+        lines.append(f"{celsius:g}, {name}")
+    (folder / "bodies.csv").write_text("\n".join(lines) + "\n")
+
+
+CAMERA = ["unit=counts", "interval=2 ms", "saturation=16382"]
+CORRECTED = [*CAMERA, "uniform.frames=cold.npy", "uniform.brighter=hot.npy", "bad_pixels=find"]
+
+
+def test_counts_of_a_black_body_are_those_of_corrected_sensors(laboratory):
+    seen_bodies(laboratory)
+    cold, hot = (np.load(laboratory / name).mean(axis=0) for name in ("cold.npy", "hot.npy"))
+    # Corrected sensors have the median sensor's offset and gain, here without any noise.
+    expected = [np.median(cold), np.median(cold) + np.median(hot - cold)]
+    for name, mean, level in (("cold.npy", cold, expected[0]), ("hot.npy", hot, expected[1])):
+        assert uniform_counts(name, CORRECTED) == pytest.approx(level, abs=1e-6)
+        assert uniform_counts(name, CAMERA) == pytest.approx(mean.mean(), rel=1e-12)
+    # Straight between both: counts are linear in light.
+    radiance = BAND.radiance(np.array([623.15, 873.15, 1123.15]))
+    share = (radiance[1] - radiance[0]) / (radiance[2] - radiance[0])
+    body = uniform_counts("body 600.npy", CORRECTED)
+    assert body == pytest.approx(expected[0] + share * (expected[1] - expected[0]), abs=0.5)
+
+
+def test_calibrate_takes_recordings_in_the_place_of_counts(laboratory):
+    seen_bodies(laboratory)
+    settings = [part for setting in CORRECTED for part in ("--set", setting)]
+    code, output = run(
+        "calibrate", "bodies.csv", "--band", "3.8-5.1 um", *settings, "--out", "of files.yaml"
+    )
+    assert code == 0, output
+    counts = [uniform_counts(f"body {celsius:g}.npy", CORRECTED) for celsius in CELSIUS[:4]]
+    expected = fit_linear(CELSIUS[:4] + 273.15, counts, BAND).calibration
+    found = load_calibration("of files.yaml")
+    np.testing.assert_allclose(found.parameters, expected.parameters, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("table", "settings", "message"),
+    [
+        ("temperature_degC,file\n300,none.npy\n", CAMERA, "none.npy"),
+        ("temperature_degC,file\n300,hot.npy\n", [*CAMERA[:2], "saturation=2000"], "saturated"),
+        ("temperature_degC,file\n300,hot.npy\n", ["unit=K", "interval=1 ms"], "expected counts"),
+        ("temperature_degC,file\nhot,hot.npy\n", CAMERA, "line 2: 'hot,hot.npy', expected 2"),
+        ("temperature_degC,file,counts\n300,hot.npy,3\n", CAMERA, "unknown column 'counts'"),
+        ("temperature_degC,counts\n300,3\n400,5\n500,9\n", CAMERA, "--set: .* names no recordings"),
+    ],
+)
+def test_recordings_that_are_no_black_bodies_are_one_clear_error(
+    laboratory, tmp_path, table, settings, message
+):
+    path = laboratory / "wrong.csv"
+    path.write_text(table)
+    arguments = [part for setting in settings for part in ("--set", setting)]
+    code, output = run("calibrate", path.name, "--band", "3.8-5.1 um", *arguments)
+    assert code != 0
+    assert re.search(message, " ".join(output.split())), output
+
+
+def test_uniform_frames_of_another_format_say_themselves_what_they_are(tmp_path):
+    """A recording without words of its own, and uniform frames of a camera that has them."""
+    rng = np.random.default_rng(4)
+    detector = replace(DETECTOR, gain_pattern=None, offset_pattern=None, dead=None)
+    counts = detector.counts(np.full((10, 8, 64), 500.0), rng)
+    np.save(tmp_path / "chip.npy", counts.astype(np.uint16))
+    write_hcc(
+        tmp_path / "even.hcc",
+        Recording(counts, "counts", np.arange(10) / 600.0, "camera", 1e-5, 16382.0),
+    )
+    fields = [*CAMERA, "uniform.frames=even.hcc"]
+    assert uniform_counts(tmp_path / "chip.npy", fields) == pytest.approx(np.median(counts), abs=1)

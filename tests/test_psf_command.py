@@ -1,0 +1,169 @@
+"""`chipglow psf`: from measurements to a point spread function that a study's camera takes."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from synthetic_edge import (
+    BAND,
+    annular_edge,
+    edge_radiance,
+    gaussian_aperture,
+    gaussian_edge,
+    measurement_of,
+    tailed_edge,
+)
+from typer.testing import CliRunner
+
+from chipglow.camera import Flag, MeasuredPSF
+from chipglow.cli import app
+from chipglow.io import write_measurement
+from chipglow.study import Study, StudyError, load_apertures
+
+COLD, HOT = BAND.radiance(np.array([600.0, 900.0]))
+STEP = HOT - COLD
+
+
+def write_edge(path, normal=5.0, edge=None, flags=None, noise=0.005, side=40):
+    edge = edge or gaussian_edge(10e-6)
+    radiance = edge_radiance(edge, normal, side, background=COLD, step=STEP)
+    radiance += np.random.default_rng(int(normal)).normal(0.0, noise * STEP, radiance.shape)
+    write_measurement(measurement_of(radiance, flags), path)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_edge(tmp_path / "edge.nc")
+    return tmp_path
+
+
+def psf(*arguments):
+    result = CliRunner().invoke(app, ["psf", *map(str, arguments)], env={"COLUMNS": "160"})
+    return result.exit_code, result.output
+
+
+def test_the_command_says_what_was_found(folder):
+    write_edge(folder / "other.nc", 95.0)
+    code, output = psf("edge.nc", "other.nc")
+    assert code == 0
+    width = output.split("spread function is ")[1].split(" um")[0].split(" ± ")
+    assert abs(float(width[0]) - 10.0) < 3 * float(width[1]) < 0.3
+    assert "kind: gaussian, fwhm: " in output
+    assert "they agree" in output
+    assert "Assumed: the whole square of a sensor takes light" in output
+    assert "Doubtful" not in output
+
+
+def test_doubts_are_printed(folder):
+    write_edge(folder / "straight.nc", 0.0)
+    code, output = psf("straight.nc")
+    assert code == 0
+    assert "Doubtful: straight.nc: with a tilt of" in output
+
+
+@pytest.mark.parametrize("model", [None, "radial"])
+def test_a_studys_camera_takes_the_file(folder, model):
+    code, output = psf("edge.nc", "--out", "psf.nc", *(["--model", model] if model else []))
+    assert code == 0
+    assert output.rstrip().endswith("psf.nc")
+    camera = Study(camera={"psf": {"kind": "measured", "file": "psf.nc"}}).camera.build()
+    assert isinstance(camera.psf, MeasuredPSF)
+    assert camera.psf.fwhm == pytest.approx(10e-6, rel=0.03)
+    data = xr.load_dataset(folder / "psf.nc", engine="h5netcdf")
+    assert data.attrs["model"] == "gaussian"
+    assert data["edge1_esf"].size == data["edge1_distance"].size
+    assert data["edge1_mtf"].attrs["units"] == "1"
+    assert data["gaussian"].values == pytest.approx([10e-6], rel=0.03)
+    assert data["gaussian_covariance"].shape == (1, 1)
+
+
+def test_a_tail_is_kept_in_the_file(folder):
+    write_edge(folder / "tail.nc", edge=tailed_edge(8e-6, 0.2, 20e-6), side=64)
+    code, output = psf("tail.nc", "--out", "psf.nc")
+    assert code == 0
+    assert "tail share" in output
+    read = MeasuredPSF.from_file("psf.nc")
+    half = len(read.weights) // 2
+    x = (np.arange(len(read.weights)) - half) * read.spacing
+    beyond = read.weights[np.hypot(x, x[:, None]) > 30e-6].sum()
+    # (1 + r / L) exp(−r / L) of the tail's 20 % is beyond r = 30 um.
+    assert beyond == pytest.approx(0.2 * 2.5 * np.exp(-1.5), rel=0.15)
+
+
+def test_apertures_come_from_a_list(folder):
+    for size in (40, 80, 160):
+        image = gaussian_aperture(10e-6, size * 1e-6)
+        write_measurement(measurement_of(COLD + image.radiance / 5 * STEP), f"d{size}.nc")
+    lines = [f"  - {{file: d{size}.nc, diameter: {size} um}}" for size in (40, 80, 160)]
+    (folder / "apertures.yaml").write_text("\n".join(["apertures:", *lines]))
+    code, _ = psf("edge.nc", "--apertures", "apertures.yaml", "--plot", "psf.png")
+    assert code == 0
+    assert (folder / "psf.png").read_bytes().startswith(b"\x89PNG")
+    assert load_apertures("apertures.yaml")[1][1] == pytest.approx(80e-6)
+    (folder / "apertures.yaml").write_text("apertures: [{file: d40.nc, diameter: 40}]")
+    with pytest.raises(StudyError, match=r"apertures\.0\.diameter: 40 has no unit"):
+        load_apertures("apertures.yaml")
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_the_picture_shows_clipped_pixels_too(folder, suffix):
+    flags = np.zeros((1, 40, 40), np.uint8)
+    flags[0, 5, 5] = Flag.DEAD
+    write_edge(folder / "dead.nc", edge=annular_edge(4.45e-6, 0.28, 0.35), flags=flags)
+    code, output = psf("dead.nc", "--plot", f"psf.{suffix}")
+    assert code == 0
+    assert "kind: annular-aperture, wavelength: 4.45 um" in output
+    assert (folder / f"psf.{suffix}").stat().st_size > 1000
+
+
+def test_a_region_is_cut_out(folder):
+    code, output = psf("edge.nc", "--region", "5:35,:")
+    assert code == 0
+    for text in ("5:35", "a:b,c:d", "1:2:3:4,0:5"):
+        code, output = psf("edge.nc", "--region", text)
+        assert code == 2
+        assert "expected rows and columns such as 10:70,20:90" in output
+    code, output = psf("edge.nc", "--region", "0:4,0:4")
+    assert code == 2
+    assert "edge.nc: the region has 4 x 4 pixels" in output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("missing.nc",), "missing.nc: No such file"),
+        (("edge.nc", "--out", "psf.csv"), "--out: psf.csv, expected a file that ends in .nc"),
+        (("edge.nc", "--plot", "psf.bmp"), "--plot: psf.bmp"),
+        (("edge.nc", "--model", "lorentz"), "'lorentz' was not fitted"),
+        (("edge.nc", "--set", "band=3-5 um"), "--set"),
+        (("flat.nc",), "flat.nc: no edge stands out of the noise"),
+        (("empty.nc",), "empty.nc: is empty"),
+    ],
+)
+def test_bad_input_is_one_line(folder, arguments, text):
+    radiance = COLD + np.random.default_rng(0).normal(0.0, 0.01 * COLD, (40, 40))
+    write_measurement(measurement_of(radiance), folder / "flat.nc")
+    (folder / "empty.nc").touch()
+    code, output = psf(*arguments)
+    assert code == 2
+    assert text in output
+    assert output.count("\n") == 1
+    assert not (folder / "psf.nc").exists()
+
+
+@pytest.mark.parametrize(
+    ("section", "text"),
+    [
+        ({"file": "psf.nc", "spacing": "1 um"}, "expected none: the file tells it"),
+        ({"file": "psf.npy"}, "expected a length such as 1e-6 m"),
+        ({"file": "edge.nc"}, "edge.nc is not a kernel"),
+        ({"file": "cut.nc"}, "cut.nc is not a kernel: cut short"),
+        ({"file": "missing.nc"}, "missing.nc: there is no such file"),
+    ],
+)
+def test_a_file_that_is_no_kernel_is_one_error(folder, section, text):
+    np.save(folder / "psf.npy", np.ones((3, 3)))
+    (folder / "cut.nc").write_bytes((folder / "edge.nc").read_bytes()[:3000])
+    with pytest.raises(ValueError, match="camera") as caught:
+        Study(camera={"psf": {"kind": "measured", **section}})
+    assert text in str(caught.value)

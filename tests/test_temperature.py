@@ -1,0 +1,257 @@
+"""True temperature from radiance and emissivity: Equation 2 solved, and how sure that is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
+from typer.testing import CliRunner
+
+from chipglow.analysis import (
+    Area,
+    Heating,
+    KnownEmissivity,
+    Surroundings,
+    determine_emissivity,
+    true_temperature,
+)
+from chipglow.camera import Flag, Measurement, fit_linear
+from chipglow.cli import app
+from chipglow.io import read_region_emissivity, write_emissivity, write_measurement
+
+ROOM = 293.0
+WHOLE = Area("chip", "chip", np.ones(RASTER.shape, dtype=bool), True)
+HOT = 600.0 + CELSIUS
+HEATING = Heating(391.0 + CELSIUS, ROOM, 2.0, 5.0)
+BODIES = np.arange(200.0, 701.0, 100.0) + CELSIUS
+OFFSET, GAIN = 400.0, 1.8
+
+
+def image(emissivity=0.42, kelvins=HOT, environment=ROOM, **more):
+    values = np.full(RASTER.shape, emissivity)
+    return measured(values, truth=kelvins, environment=environment, **more)
+
+
+def fitted(generator=None, common=0.0, spread=0.3):
+    """A calibration whose black bodies are as far off as they are said to be."""
+    shift = np.zeros(BODIES.size)
+    if generator is not None:
+        shift = generator.normal(0.0, common) + generator.normal(0.0, spread, BODIES.size)
+    counts = OFFSET + GAIN * BAND.radiance(BODIES + shift)
+    return fit_linear(BODIES, counts, BAND, 0.01, spread, common).calibration
+
+
+def developed(calibration, kelvins, emissivity, frames=1, noise=0.0, seed=0, room=ROOM):
+    """A measurement of an even object by a calibration, from the counts of the true camera."""
+    true = image(emissivity, kelvins, room, frames=frames, noise=noise, seed=seed).radiance
+    counts = OFFSET + GAIN * true
+    found = Measurement.from_radiance(
+        calibration.radiance(counts), BAND, np.arange(frames) / 600.0, RASTER,
+        calibration_uncertainty=calibration.uncertainty(counts),
+    )  # fmt: skip
+    vars(found)["band"] = BAND
+    return found
+
+
+@pytest.mark.parametrize("emissivity", [0.05, 0.42, 1.0])
+@pytest.mark.parametrize("celsius", [60.0, 391.0, 1200.0])
+def test_an_object_of_known_emissivity_shows_its_temperature(emissivity, celsius):
+    found = true_temperature(
+        [image(emissivity, celsius + CELSIUS)], WHOLE, KnownEmissivity(emissivity)
+    )
+    assert found.value == pytest.approx(celsius + CELSIUS, abs=1e-3)
+    assert found.mean_of_pixels == pytest.approx(found.value, abs=1e-6)
+    assert found.standard_uncertainty == pytest.approx(0.0, abs=1e-9)
+
+
+def test_parts_of_the_uncertainty_are_those_of_small_changes():
+    """Each part is the change of the result when its cause changes by its uncertainty."""
+    seen, known = [image()], KnownEmissivity(0.42, 1e-4)
+    found = true_temperature(seen, WHOLE, known, Surroundings(ROOM, 0.01))
+    more = true_temperature(seen, WHOLE, KnownEmissivity(0.4201), Surroundings(ROOM))
+    warmer = true_temperature(seen, WHOLE, KnownEmissivity(0.42), Surroundings(ROOM + 0.01))
+    assert found.budget["emissivity"] == pytest.approx(found.value - more.value, rel=1e-2)
+    assert found.budget["environment"] == pytest.approx(found.value - warmer.value, rel=1e-2)
+    radiance = seen[0].radiance
+    seen[0].data["calibration_uncertainty"] = (("time", "y", "x"), 1e-4 * radiance)
+    brighter = image(gain=1.0001)
+    found = true_temperature(seen, WHOLE, KnownEmissivity(0.42))
+    shifted = true_temperature([brighter], WHOLE, KnownEmissivity(0.42))
+    expected = shifted.value - found.value
+    assert found.budget["calibration"] == pytest.approx(expected, rel=1e-2)
+
+
+def test_errors_that_emissivity_and_image_share_cancel():
+    """At the temperature of the heating itself, only the thermocouple's error is left."""
+    calibration = fitted(common=1.0)
+    heated = developed(calibration, HEATING.truth, 0.42)
+    emissivity = determine_emissivity([heated], HEATING).of(WHOLE)
+    found = true_temperature([heated], WHOLE, emissivity, calibration=calibration)
+    assert found.value == pytest.approx(HEATING.truth, abs=1e-4)
+    assert found.correlation == pytest.approx(1.0)
+    assert found.budget["calibration"] == pytest.approx(0.0, abs=1e-3)
+    assert found.budget["environment"] == pytest.approx(0.0, abs=1e-3)
+    assert found.budget["truth"] == pytest.approx(HEATING.truth_uncertainty, rel=1e-3)
+    apart = true_temperature([heated], WHOLE, emissivity)
+    assert apart.correlation is None
+    assert apart.budget["calibration"] > 0.5
+    elsewhere = true_temperature([heated], WHOLE, emissivity, Surroundings(ROOM, 5.0), calibration)
+    assert elsewhere.budget["environment"] > 0.01
+
+
+def test_stated_intervals_hold_the_truth():
+    """Of 200 laboratories with all errors drawn, 95 % of the intervals hold the truth.
+
+    Between 181 and 199 of 200 are within with a probability of 0.998.
+    """
+    generator = np.random.default_rng(7)
+    within = 0
+    scores = []
+    for _ in range(200):
+        calibration = fitted(generator, common=0.5)
+        room = ROOM + generator.normal(0.0, HEATING.environment_uncertainty)
+        oven = HEATING.truth + generator.normal(0.0, HEATING.truth_uncertainty)
+        seed = int(generator.integers(1 << 30))
+        heated = developed(calibration, oven, 0.42, 4, 5.0, seed, room)
+        hot = developed(calibration, HOT, 0.42, 4, 5.0, seed + 1, room)
+        emissivity = determine_emissivity([heated], HEATING).of(WHOLE)
+        found = true_temperature([hot], WHOLE, emissivity, calibration=calibration)
+        within += abs(found.value - HOT) <= found.expanded_uncertainty
+        scores.append((found.value - HOT) / found.standard_uncertainty)
+    assert 181 <= within <= 199
+    # The standard deviation of 200 standard normal numbers is within 0.85 to 1.15 (3 sigma).
+    assert 0.85 < np.std(scores) < 1.15
+
+
+def test_cold_surroundings_are_part_of_the_uncertainty():
+    """Below 200 K a band has no table; what is reflected there counts as elsewhere."""
+    cold = Surroundings(190.0, 1.0)
+    seen = [image(0.05, 330.0, environment=190.0)]
+    found = true_temperature(seen, WHOLE, KnownEmissivity(0.05), cold)
+    warmer = true_temperature(seen, WHOLE, KnownEmissivity(0.05), Surroundings(191.0))
+    assert found.value == pytest.approx(330.0, abs=1e-3)
+    assert found.budget["environment"] == pytest.approx(found.value - warmer.value, rel=0.1)
+    assert found.standard_uncertainty == pytest.approx(found.budget["environment"])
+
+
+def test_few_images_widen_the_interval():
+    emissivity = KnownEmissivity(0.42)
+    images = [image(drift=2.0, seed=seed) for seed in range(3)]
+    found = true_temperature(images, WHOLE, emissivity)
+    # Three repetitions, two degrees of freedom: Student's 4.3.
+    assert found.degrees_of_freedom == pytest.approx(2.0)
+    assert found.coverage_factor == pytest.approx(4.303, abs=0.01)
+    alone = true_temperature(images[:1], WHOLE, emissivity)
+    assert np.isnan(alone.budget["repeatability"])
+
+
+def test_the_emissivity_of_a_file_is_the_one_that_was_written(tmp_path):
+    calibration = fitted(common=0.5)
+    heated = developed(calibration, HEATING.truth, 0.42, 5, 20.0)
+    hot = developed(calibration, HOT, 0.42, 5, 20.0, seed=9)
+    found = determine_emissivity([heated], HEATING)
+    row = found.of(WHOLE)
+    write_emissivity([found], [[row]], tmp_path / "emissivity.nc")
+    stored = read_region_emissivity(tmp_path / "emissivity.nc")["chip"]
+    assert stored.heating == replace(HEATING, camera_uncertainty=None)
+    assert stored.common == pytest.approx(row.common)
+    first, second = (
+        true_temperature([hot], WHOLE, one, calibration=calibration) for one in (row, stored)
+    )
+    assert second.value == pytest.approx(first.value, abs=1e-9)
+    assert second.budget == pytest.approx(first.budget)
+    write_emissivity([found, found], [[row], [row]], tmp_path / "two.nc")
+    with pytest.raises(ValueError, match=r"two.nc: .*2 true temperatures, expected 1"):
+        read_region_emissivity(tmp_path / "two.nc")
+    (tmp_path / "none.nc").write_bytes(b"")
+    with pytest.raises(ValueError, match=r"none.nc: not an emissivity map"):
+        read_region_emissivity(tmp_path / "none.nc")
+
+
+def test_what_cannot_be_trusted_is_said():
+    half = np.where(np.arange(RASTER.columns) < 20, HOT, HOT + 300.0)
+    uneven = measured(np.full(RASTER.shape, 0.42), truth=HOT)
+    uneven.data["radiance"].values[:] = 0.42 * BAND.radiance(half) + 0.58 * BAND.radiance(ROOM)
+    found = true_temperature([uneven], WHOLE, KnownEmissivity(0.42, 0.01))
+    assert any("is uneven" in doubt for doubt in found.doubts)
+    flags = np.zeros((1, *RASTER.shape), np.uint8)
+    flags[:, :, :10] = Flag.SATURATED
+    found = true_temperature([image(flags=flags)], WHOLE, KnownEmissivity(0.42))
+    assert found.left_out == 300
+    assert any("300 of 1200 pixels are left out (300 saturated)" in one for one in found.doubts)
+    assert true_temperature([image()], WHOLE, KnownEmissivity(0.42)).doubts == ()
+
+
+def test_impossible_input_is_one_clear_error():
+    known = KnownEmissivity(0.42)
+    with pytest.raises(ValueError, match="temperature: there is no image"):
+        true_temperature([], WHOLE, known)
+    with pytest.raises(ValueError, match=r"darker than what it reflects at 626\.85 °C"):
+        true_temperature([image()], WHOLE, known, Surroundings(900.0))
+    flags = np.full((1, *RASTER.shape), Flag.DEAD, np.uint8)
+    with pytest.raises(ValueError, match="0 of its 1200 pixels can be used"):
+        true_temperature([image(flags=flags)], WHOLE, known)
+    for value in (0.0, 1.2, float("nan")):
+        with pytest.raises(ValueError, match=r"emissivity: is .*, expected over 0 to 1"):
+            KnownEmissivity(value)
+    with pytest.raises(ValueError, match="standard uncertainty is -1"):
+        KnownEmissivity(0.5, -1.0)
+    with pytest.raises(ValueError, match="environment: is 0"):
+        Surroundings(0.0)
+    with pytest.raises(ValueError, match="environment: standard uncertainty"):
+        Surroundings(293.0, -1.0)
+
+
+# The command
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "regions.yaml").write_text(REGIONS)
+    write_measurement(measured(table_1(), truth=HOT), tmp_path / "hot.nc")
+    return tmp_path
+
+
+def run(*arguments):
+    result = CliRunner().invoke(app, ["temperature", *arguments], env={"COLUMNS": "140"})
+    return result.exit_code, " ".join(result.output.split())
+
+
+def test_the_command_prints_what_it_found_and_assumed(folder):
+    code, output = run("hot.nc", "--regions", "regions.yaml", "--emissivity", "0.42")
+    assert code == 0, output
+    assert "body left" in output
+    assert "Assumed: the emissivity is exact" in output
+    assert "Assumed: the object reflects 293 K exactly" in output
+    code, output = run(
+        "hot.nc", "--regions", "regions.yaml", "--emissivity", "0.42",
+        "--emissivity-uncertainty", "0.01", "--environment", "20 degC",
+        "--environment-uncertainty", "1 K", "--table", "table.csv",
+    )  # fmt: skip
+    assert code == 0, output
+    assert "exact (--emissivity" not in output
+    assert "reflects" not in output
+    assert (folder / "table.csv").read_text().count("\n") == 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--emissivity", "none.nc"], "none.nc: there is no such file"),
+        (["--emissivity", "1.5"], "emissivity: is 1.5, expected over 0 to 1"),
+        (["--emissivity", "0.4", "--environment", "warm"], "--environment: 'warm'"),
+        (["--emissivity", "e.nc", "--emissivity-uncertainty", "1"], "expected none with a file"),
+        (["--emissivity", "e.nc"], "tells of other, expected one of the regions"),
+        (["--emissivity", "0.4", "--set", "pitch=6 um"], "describes nothing"),
+        (["--emissivity", "0.4", "--table", "no/t.csv"], "no"),
+    ],
+)
+def test_bad_input_is_one_line(folder, arguments, message):
+    found = determine_emissivity([image(kelvins=HEATING.truth)], HEATING)
+    row = replace(found.of(WHOLE), name="other")
+    write_emissivity([found], [[row]], folder / "e.nc")
+    code, output = run("hot.nc", "--regions", "regions.yaml", *arguments)
+    assert code != 0
+    assert message in output
+    assert not (folder / "t.csv").exists()
