@@ -3,16 +3,24 @@
 The geometry is NIST's: infrared 160 x 120 sensors of 6 um, and a visible camera with finer pixels
 that looks through the same optics (Heigel and Whitenton, 2010). What is bright differs: infrared
 by temperature and emissivity, visible by reflection and texture.
+
+``python benchmarks/dual_spectrum.py 9000 16`` registers 16 pairs by the images alone, of seeds 9000
+and up, with the settings of `DualSpectrum.drawn`, and prints how far off each is, what it says of
+itself, and how many are wrong beyond that without a doubt being raised.
 """
 
+import argparse
+import time
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import cos, pi, radians, sin
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
+from chipglow.analysis import Registration, fit_images
 from chipglow.camera import Camera, GaussianPSF, Measurement
 from chipglow.scene import Material, Raster, Scene, Tool, ToolGeometry
 from chipglow.surface import CHIP_1
@@ -20,7 +28,7 @@ from chipglow.surface import CHIP_1
 ROWS, COLUMNS, PITCH = 120, 160, 6e-6
 VISIBLE_SHAPE = (480, 640)
 FINE = Raster(left=-620e-6, top=520e-6, spacing=2e-6, rows=360, columns=480)
-SHEAR_ANGLE, FEED, BAND_SPACING, CHIP_ANGLE = radians(32.0), 300e-6, 130e-6, radians(14.0)
+SHEAR_ANGLE, FEED, CHIP_ANGLE = radians(32.0), 300e-6, radians(14.0)
 
 
 TOOL = ToolGeometry()
@@ -41,7 +49,30 @@ class DualSpectrum:
     stretch: float = 1.02
     shift: tuple[float, float] = (11.3, -7.6)
     chip_brightness: float = 0.75
+    grain: float = 0.15
+    band_spacing: float = 130e-6
     tool: Tool = TOOL
+
+    @classmethod
+    def drawn(cls, seed: int) -> Self:
+        """An experiment whose settings are drawn, too.
+
+        The chip's brightness is 0.4 to 1 beside the workpiece's 0.45 and the tool's 0.30.
+        """
+        draw = np.random.default_rng([seed, 3]).uniform
+        return cls(
+            seed,
+            noise=10 ** draw(-3.0, -1.7),
+            visible_noise=draw(1.0, 12.0),
+            pitch=1.5e-6 * draw(0.88, 1.15),
+            turn=radians(draw(-3.5, 3.5)),
+            stretch=draw(0.97, 1.03),
+            shift=(draw(-80.0, 80.0), draw(-60.0, 60.0)),
+            chip_brightness=draw(0.4, 1.0),
+            grain=draw(0.05, 0.25),
+            band_spacing=draw(90e-6, 180e-6),
+            tool=ToolGeometry(rake_angle=radians(draw(-12.0, 6.0))),
+        )
 
     @cached_property
     def matrix(self) -> NDArray[np.float64]:
@@ -78,14 +109,14 @@ class DualSpectrum:
         pixels = np.stack([columns, rows], axis=-1)
         back = np.linalg.inv(self.matrix[:2, :2])
         place = (pixels - self.matrix[:2, 2]) @ back.T
-        chip, work, tool, phase = shapes(place, self.tool)
+        chip, work, tool, phase = shapes(place, self.tool, self.band_spacing)
         generator = np.random.default_rng([self.seed, 2])
         lamella = self.chip_brightness * (1.0 - 0.55 * np.exp(-((phase / 0.09) ** 2)))
         grain = texture(generator, place, 9e-6)
         scratch = texture(generator, place * [0.1, 1.0], 4e-6)
         bright = np.full(VISIBLE_SHAPE, 0.08)
         bright = np.where(work, 0.45 + 0.10 * grain, bright)
-        bright = np.where(chip, lamella * (1.0 + 0.15 * grain), bright)
+        bright = np.where(chip, lamella * (1.0 + self.grain * grain), bright)
         bright = np.where(tool, 0.30 + 0.06 * scratch, bright)
         light = 1.0 - 0.25 * ((columns / VISIBLE_SHAPE[1]) - 0.4) ** 2
         seen = gaussian_filter(bright * light, 1.2) * 220.0
@@ -96,7 +127,7 @@ class DualSpectrum:
     def scene(self) -> Scene:
         """One frame of the chip as it truly is."""
         place = np.stack(np.meshgrid(FINE.x, FINE.y), axis=-1)
-        chip, work, tool, phase = shapes(place, self.tool)
+        chip, work, tool, phase = shapes(place, self.tool, self.band_spacing)
         depth = self.tool.signed_distance(place[..., 0], place[..., 1])
         along = (place - self.tool.rake_point(0.0)) @ np.array(self.tool.rake_direction)
         contact = np.exp(-np.maximum(along - 180e-6, 0.0) / 60e-6) * (along > -40e-6)
@@ -128,7 +159,7 @@ CAMERA = {"integration_time": 10e-6, "frame_rate": 600.0}
 
 
 def shapes(
-    place: NDArray[np.float64], tool: Tool
+    place: NDArray[np.float64], tool: Tool, band_spacing: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.float64]]:
     """Chip, workpiece and tool, and how far a point of the chip is between two shear bands."""
     x, y = place[..., 0], place[..., 1]
@@ -136,7 +167,7 @@ def shapes(
     inside = depth < 0
     shear = x * sin(SHEAR_ANGLE) + y * cos(SHEAR_ANGLE)
     along = (place - tool.rake_point(0.0)) @ np.array(tool.rake_direction)
-    turns = (along + 0.55 * depth) / BAND_SPACING
+    turns = (along + 0.55 * depth) / band_spacing
     phase = turns - np.rint(turns)
     thickness = 330e-6 - 60e-6 * np.abs(2 * phase) - 20e-6 * np.cos(2 * pi * turns / 3)
     lift = np.maximum(along - 260e-6, 0.0) * np.tan(CHIP_ANGLE)
@@ -157,3 +188,45 @@ def texture(
     step = size / 3
     where = np.moveaxis((place + 1e-3) / step, -1, 0)
     return np.asarray(map_coordinates(field, where % side, order=1, mode="grid-wrap"))
+
+
+def errors(found: Registration, pair: DualSpectrum) -> tuple[float, float]:
+    """Root of the mean square over the sensors of the error, and of its uncertainty, in sensors."""
+    raster = pair.infrared.raster
+    places = np.stack(np.meshgrid(raster.x, raster.y), axis=-1).reshape(-1, 2)
+    off = found.pixels(places) - pair.pixels(places)
+    error = np.linalg.solve(pair.matrix[:2, :2], off.T) / PITCH
+    stated = np.trace(found.position_covariance(places), axis1=-2, axis2=-1) / PITCH**2
+    return float(np.sqrt((error**2).sum(axis=0).mean())), float(np.sqrt(stated.mean()))
+
+
+def main() -> None:
+    """Register pairs of fresh seeds and print a table."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("first", type=int, help="the first seed")
+    parser.add_argument("count", type=int, help="number of pairs")
+    parser.add_argument("--model", default="affine")
+    options = parser.parse_args()
+    print("seed bright  noise  v.noise  error  stated  ratio  seconds  doubts", flush=True)
+    wrong = missed = 0
+    for seed in range(options.first, options.first + options.count):
+        pair = DualSpectrum.drawn(seed)
+        begin = time.process_time()
+        measured = pair.infrared
+        fit = fit_images(measured.radiance[0], measured.raster, pair.visible, options.model)
+        error, stated = errors(fit.registration, pair)
+        seconds = time.process_time() - begin
+        beyond = error > 2 * stated
+        wrong += beyond
+        missed += beyond and not fit.registration.doubts
+        print(
+            f"{seed:4d} {pair.chip_brightness:6.2f} {pair.noise:6.4f} {pair.visible_noise:8.1f} "
+            f"{error:6.2f} {stated:7.2f} {error / stated:6.2f} {seconds:8.1f}  "
+            f"{'; '.join(fit.registration.doubts) or '-'}",
+            flush=True,
+        )
+    print(f"{wrong} of {options.count} wrong by over twice what they state, {missed} undoubted")
+
+
+if __name__ == "__main__":
+    main()

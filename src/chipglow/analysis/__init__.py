@@ -15,6 +15,7 @@ from chipglow.analysis.comparison import (
     compare,
     normalised_error,
 )
+from chipglow.analysis.dots import DotFit, Dots, find_dots, fit_dots
 from chipglow.analysis.edge_image import EdgeImage, edge_image
 from chipglow.analysis.edge_line import EdgeLine, NoEdgeError, find_edge
 from chipglow.analysis.emissivity import (
@@ -68,6 +69,8 @@ __all__ = [
     "ChipScan",
     "Circle",
     "Comparison",
+    "DotFit",
+    "Dots",
     "EdgeImage",
     "EdgeLine",
     "EdgeResult",
@@ -124,9 +127,11 @@ __all__ = [
     "emissivity_line",
     "error_images",
     "find_band",
+    "find_dots",
     "find_edge",
     "find_shear_band",
     "find_tool",
+    "fit_dots",
     "fit_images",
     "fit_points",
     "inertia",

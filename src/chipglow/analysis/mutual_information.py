@@ -1,7 +1,7 @@
 """Registration of an infrared image and a visible picture by what they have in common."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from math import cos, hypot, log, radians, sin
@@ -84,7 +84,6 @@ def fit_images(
     raster: Raster,
     visible: NDArray[np.generic],
     model: Model = "affine",
-    start: Registration | None = None,
 ) -> ImageFit:
     """Register two images by mutual information and common edges.
 
@@ -98,9 +97,6 @@ def fit_images(
         Brightness, shape (rows, columns).
     model : {"similarity", "affine", "homography"}
         As in `fit_points`.
-    start : Registration, optional
-        Where to begin; by default a search of placements round that in which both images have the
-        same middle and the same width, not mirrored.
 
     Raises
     ------
@@ -110,8 +106,9 @@ def fit_images(
     Notes
     -----
     Mutual information (Viola and Wells, Int. J. Comput. Vision 24 (1997) 137) times common edges
-    (Pluim et al., IEEE Trans. Med. Imaging 19 (2000) 809) choose among placements: shifts of up to
-    a quarter of the width, turns of up to 4 degrees, scales of 0.8 to 1.25. From there the sum of
+    (Pluim et al., IEEE Trans. Med. Imaging 19 (2000) 809) choose among placements round that in
+    which both images have the same middle and the same width, not mirrored: shifts of up to a
+    quarter of the width, turns of up to 4 degrees, scales of 0.8 to 1.25. From there the sum of
     (g_i . g_v)^2 climbs, from coarse to fine: the products of both images' gradients, each over
     the contrast of its surroundings, so that it does not matter which side of an edge is the
     brighter (after Haber and Modersitzki, Methods Inf. Med. 46 (2007) 292). Mutual information
@@ -125,11 +122,10 @@ def fit_images(
     """
     levels = _levels(infrared, raster, visible)
     coarse, middle, fine = levels
-    frame = _frame(raster, visible.shape, start)
-    candidates = _placements(coarse, frame) if start is None else [frame.done(start.matrix)]
-    score, chance = _against_chance(coarse, frame, candidates[0])
-    if start is None:
-        candidates = _narrowed(coarse, middle, frame, candidates)
+    frame = _frame(raster, visible.shape)
+    placements = _placements(coarse, frame)
+    score, chance = _against_chance(coarse, frame, placements[0])
+    candidates = _narrowed(coarse, middle, frame, placements)
     starts = _surveyed(fine, frame, candidates[0])
     starts += [other for other in candidates[1:] if _apart(other, starts[0], fine, frame) > _FAR]
     fits = sorted((_settled(fine, frame, matrix) for matrix in starts), key=_last)
@@ -144,7 +140,7 @@ def fit_images(
         *((_NO_OPTIMUM,) if flat else _unsure(found, raster)),
     )
     return ImageFit(
-        Registration(full, covariance, model, "mutual-information", doubts=doubts),
+        replace(found, doubts=doubts),
         _information(fine, frame, matrix),
         _common_edges(fine, frame, matrix, basis)[0],
         score,
@@ -266,15 +262,12 @@ def _binned(image: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.asarray(np.clip(share * _BINS, 0, _BINS - 1), np.int64)
 
 
-def _frame(raster: Raster, shape: tuple[int, ...], start: Registration | None) -> Frame:
+def _frame(raster: Raster, shape: tuple[int, ...]) -> Frame:
     left, right, bottom, top = raster.extent
     centre = np.array([(left + right) / 2, (bottom + top) / 2])
     radius = hypot(right - left, top - bottom) / 2
-    if start is None:
-        middle = np.array([shape[1] - 1, shape[0] - 1]) / 2
-        return Frame(centre, radius, middle, radius * shape[1] / (right - left))
-    scale = float(np.sqrt(abs(np.linalg.det(start.jacobian(centre)))))
-    return Frame(centre, radius, start.pixels(centre), radius * scale)
+    middle = np.array([shape[1] - 1, shape[0] - 1]) / 2
+    return Frame(centre, radius, middle, radius * shape[1] / (right - left))
 
 
 def _pixels(level: _Level, frame: Frame, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -526,7 +519,7 @@ def _rivals(
         if distance > _FAR and common > _RIVAL * most:
             return (
                 f"another placement, {distance:.0f} infrared pixels away, fits nearly as well, "
-                "points to begin from would decide",
+                "points or dots would decide",
             )
     return ()
 

@@ -12,9 +12,9 @@ from scipy.stats import f as f_distribution
 from chipglow.scene import Raster
 
 Model: TypeAlias = Literal["similarity", "affine", "homography"]
-Method: TypeAlias = Literal["points", "mutual-information"]
+Method: TypeAlias = Literal["points", "dots", "mutual-information"]
 MODELS: Final = ("similarity", "affine", "homography")
-METHODS: Final = ("points", "mutual-information")
+METHODS: Final = ("points", "dots", "mutual-information")
 
 _PARAMETERS: Final = {"similarity": 4, "affine": 6, "homography": 8}
 _FLATTEST: Final = 0.01
@@ -39,7 +39,7 @@ class Registration:
         Covariance of the elements of the matrix, row by row, shape (9, 9).
     model : {"similarity", "affine", "homography"}
         What the matrix may be.
-    method : {"points", "mutual-information"}
+    method : {"points", "dots", "mutual-information"}
         How it was found.
     degrees_of_freedom : float
         Of the covariance: Student's t with so many gives the intervals; infinite for mutual
@@ -275,12 +275,6 @@ class Frame:
     def unit_pixels(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
         """Columns and rows in these coordinates."""
         return np.asarray((pixels - self.pixel_centre) / self.pixel_scale)
-
-    def done(self, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A matrix for m and pixels as one for these coordinates, its last element 1."""
-        before, after = self._sides()
-        inside = np.linalg.inv(after) @ matrix @ np.linalg.inv(before)
-        return np.asarray(inside / inside[2, 2])
 
     def undone(
         self, matrix: NDArray[np.float64], covariance: NDArray[np.float64]

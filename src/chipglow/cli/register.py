@@ -13,9 +13,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from rich.console import Console
 
-    from chipglow.analysis import ImageFit, PointFit, Registration
+    from chipglow.analysis import DotFit, ImageFit, PointFit, Registration
     from chipglow.camera import Measurement, Recording
     from chipglow.scene import Tool
+
+    Points = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 class ModelName(StrEnum):
@@ -30,6 +32,7 @@ class MethodName(StrEnum):
     """How the map is found."""
 
     POINTS = "points"
+    DOTS = "dots"
     MUTUAL_INFORMATION = "mutual-information"
 
 
@@ -53,8 +56,16 @@ def register(
     method: Annotated[
         MethodName | None,
         typer.Option(
-            help="By default points if there are some; mutual-information begins from points if "
-            "there are some."
+            help="By default points if there are some, else mutual-information; dots are those of "
+            "a target, such as a heated plate with holes."
+        ),
+    ] = None,
+    known: Annotated[
+        Path | None,
+        typer.Option(
+            "--map",
+            metavar="FILE",
+            help="Take the map that was written by --out, of a target for instance.",
         ),
     ] = None,
     tool: Annotated[
@@ -107,11 +118,12 @@ def register(
 
     from chipglow.cli.quantities import parse
     from chipglow.io import read_pictures, read_points
-    from chipglow.study import tool_of, write_registration
+    from chipglow.study import load_registration, tool_of, write_registration
     from chipglow.study.measured import load_measurement
     from chipglow.study.units import TIME
 
     _check_names(out, pairs, overlay, blink, align)
+    _check_method(method, points, known)
     interval = parse("--visible-interval", TIME, visible_interval)
     region = None if align is None else _region(align)
     measured, seen = load_measurement(infrared, settings or ()), read_pictures(visible, interval)
@@ -121,9 +133,14 @@ def register(
     _check_frame("--visible-frame", visible_frame, seen.times.size)
     picture = seen.signal[visible_frame]
     outline = measured.tool if tool is None else tool_of(measured, tool)
-    given = None if points is None else read_points(points, measured.raster, picture.shape)
     console = Console(highlight=False, markup=False)
-    found = _found(console, measured, frame, picture, given, model, method)
+    if known is not None:
+        found, marked = load_registration(known), None
+    elif points is not None:
+        marked = read_points(points, measured.raster, picture.shape)
+        found = _by_points(console, marked, model)
+    else:
+        found, marked = _by_images(console, measured, frame, picture, model, method)
     _say(console, found, measured)
     if align is not None and region is not None:
         _align(console, found, measured, seen, region, pairs)
@@ -132,7 +149,7 @@ def register(
         print(out)
     temperature = measured.radiance_temperature()[frame]
     if overlay is not None:
-        _write_overlay(overlay, found, temperature, measured, picture, outline, given)
+        _write_overlay(overlay, found, temperature, measured, picture, outline, marked)
     if blink is not None:
         _write_blink(blink, found, temperature, measured, picture, outline)
 
@@ -157,6 +174,15 @@ def _check_names(
             raise ValueError(f"{option}: {path}, expected a file that ends in {suffixes[0]}")
     if pairs is not None and align is None:
         raise ValueError(f"--pairs: {pairs} without --align, expected both")
+
+
+def _check_method(method: MethodName | None, points: Path | None, known: Path | None) -> None:
+    if known is not None and (points is not None or method is not None):
+        raise ValueError(f"--map: {known} beside --points or --method, expected one way")
+    if method == MethodName.POINTS and points is None:
+        raise ValueError("--method: points without --points, expected a file of points")
+    if method not in (None, MethodName.POINTS) and points is not None:
+        raise ValueError(f"--method: {method} with --points, expected one or the other")
 
 
 def _region(text: str) -> tuple[float, float, float, float]:
@@ -190,41 +216,40 @@ def _check_times(
         raise ValueError("--align: the measurement does not tell its integration_time")
 
 
-def _found(
+def _by_points(console: "Console", given: "Points", model: ModelName) -> "Registration":
+    from chipglow.analysis import fit_points
+
+    fit = fit_points(*given, model.value)
+    _print_points(console, fit, given)
+    return fit.registration
+
+
+def _by_images(
     console: "Console",
     measured: "Measurement",
     frame: int,
     picture: "NDArray[Any]",
-    given: "tuple[NDArray[np.float64], NDArray[np.float64]] | None",
     model: ModelName,
     method: MethodName | None,
-) -> "Registration":
-    """The registration, its numbers printed."""
+) -> "tuple[Registration, Points | None]":
+    """The registration, its numbers printed, and the dots that gave it."""
     import numpy as np
 
-    from chipglow.analysis import fit_images, fit_points
+    from chipglow.analysis import fit_dots, fit_images
     from chipglow.camera import Flag
 
-    if given is None and method == MethodName.POINTS:
-        raise ValueError("--method: points without --points, expected a file of points")
-    by_points = None if given is None else fit_points(*given, model.value)
-    if by_points is not None and given is not None:
-        _print_points(console, by_points, given)
-        if method != MethodName.MUTUAL_INFORMATION:
-            return by_points.registration
-    start = None if by_points is None else by_points.registration
     dead = measured.flags[frame] & Flag.DEAD > 0
     radiance = np.where(dead, np.nan, measured.radiance[frame])
-    fit = fit_images(radiance, measured.raster, picture, model.value, start)
-    _print_images(console, fit, start is not None)
-    return fit.registration
+    if method == MethodName.DOTS:
+        dots = fit_dots(radiance, measured.raster, picture, model.value)
+        _print_dots(console, dots)
+        return dots.registration, (dots.positions, dots.pixels)
+    fit = fit_images(radiance, measured.raster, picture, model.value)
+    _print_images(console, fit)
+    return fit.registration, None
 
 
-def _print_points(
-    console: "Console",
-    fit: "PointFit",
-    given: "tuple[NDArray[np.float64], NDArray[np.float64]]",
-) -> None:
+def _print_points(console: "Console", fit: "PointFit", given: "Points") -> None:
     from rich.table import Table
 
     table = Table("point", "x / um", "y / um", "column", "row", "off by / pixel", box=None)
@@ -238,17 +263,32 @@ def _print_points(
     )
 
 
-def _print_images(console: "Console", fit: "ImageFit", started: bool) -> None:
+def _print_dots(console: "Console", fit: "DotFit") -> None:
+    _print_points(console, fit.points, (fit.positions, fit.pixels))
+    for name, dots, pixel in (
+        ("Infrared", fit.infrared, "infrared"),
+        ("Visible", fit.visible, "visible"),
+    ):
+        console.print(
+            f"{name}: {len(dots.pixels)} {'bright' if dots.bright else 'dark'} dots of a radius of "
+            f"{dots.radius:.1f} {pixel} pixels; {len(fit.pixels)} match."
+        )
+    console.print(
+        "Assumed: the visible picture is not mirrored, is turned by up to 30 degrees, and shows "
+        "half to twice the infrared image's width; else give --points."
+    )
+
+
+def _print_images(console: "Console", fit: "ImageFit") -> None:
     console.print(
         f"Mutual information: {fit.information:.3f} bits a sensor; score of the placement "
         f"{fit.placement:.3g}, of {fit.by_chance.size} unrelated images at most "
         f"{fit.by_chance.max():.3g}."
     )
-    if not started:
-        console.print(
-            "Assumed: the visible picture is not mirrored, and shows the infrared image's width "
-            "within 25 % and its middle within a quarter of the width; else give --points."
-        )
+    console.print(
+        "Assumed: the visible picture is not mirrored, and shows the infrared image's width "
+        "within 25 % and its middle within a quarter of the width; else give --points."
+    )
 
 
 def _say(console: "Console", found: "Registration", measured: "Measurement") -> None:
@@ -334,12 +374,12 @@ def _write_overlay(
     measured: "Measurement",
     picture: "NDArray[Any]",
     outline: "Tool | None",
-    given: "tuple[NDArray[np.float64], NDArray[np.float64]] | None",
+    marked: "Points | None",
 ) -> None:
     from chipglow.cli.pictures import write_picture
     from chipglow.report import draw_registration
 
-    figure = draw_registration(found, temperature, measured.raster, picture, outline, given)
+    figure = draw_registration(found, temperature, measured.raster, picture, outline, marked)
     write_picture(figure, path)
     print(path)
 

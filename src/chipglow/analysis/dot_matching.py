@@ -1,0 +1,231 @@
+"""Which dot of one image is which of another: by their arrangement."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+_BASES: Final = 4
+_NEAREST: Final = 3
+_NEIGHBOURS: Final = 8
+_SCALES: Final = (0.5, 2.0)
+_TURN: Final = np.pi / 6
+_NEAR: Final = 0.3
+_ROUNDS: Final = 6
+_DISTINCT: Final = 16
+_TRIED: Final = 400
+_FEWEST: Final = 6
+_PRICE: Final = 3
+_CONTRADICTED: Final = 2
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """Where the dots of an image are.
+
+    Parameters
+    ----------
+    pixels : ndarray
+        Columns and rows, shape (n, 2).
+    shape : tuple of int
+        Rows and columns of the image.
+    margin : float
+        How far from the image's border, in pixels, a dot is surely found.
+    """
+
+    pixels: NDArray[np.float64]
+    shape: tuple[int, ...]
+    margin: float
+
+    def shows(self, pixels: NDArray[np.float64]) -> int:
+        """How many of these places are within the image's margin."""
+        last = np.array([self.shape[1] - 1.0, self.shape[0] - 1.0]) - self.margin
+        return int(((pixels > self.margin) & (pixels < last)).all(axis=1).sum())
+
+
+@dataclass(frozen=True)
+class DotMatch:
+    """Which dots are the same.
+
+    Parameters
+    ----------
+    first, second : ndarray
+        Numbers of the dots in both images that belong together, shape (n,).
+    doubts : tuple of str
+        Why it cannot be trusted, a sentence each.
+    """
+
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
+    doubts: tuple[str, ...]
+
+
+def match_dots(first: Arrangement, second: Arrangement) -> DotMatch:
+    """Match dots by their arrangement.
+
+    Parameters
+    ----------
+    first, second : Arrangement
+        The dots of both images.
+
+    Raises
+    ------
+    ValueError
+        If the arrangements do not match: fewer than six dots, or less than half of those that
+        both images should show.
+
+    Notes
+    -----
+    Each pair of neighbours in the one is put on each in the other, not mirrored, turned by up to
+    30 degrees, the image's width half to twice as wide; the best of these placements are fitted by
+    an affine map. A dot that the other image should show, and does not, speaks against a placement
+    as three that match speak for it. A regular grid matches itself one column further as well
+    where nothing beyond its border is seen: then there is another placement that is contradicted
+    by no more than one dot more, and that is a doubt.
+    """
+    tree = KDTree(second.pixels)
+    spacing = float(np.median(tree.query(second.pixels, 2)[0][:, 1]))
+    nominal = second.shape[1] / first.shape[1]
+    starts = _hypotheses(first.pixels, second.pixels, nominal, tree, spacing)
+    fits = [
+        _fitted(start, first.pixels, tree, spacing)
+        for start in _distinct(starts, first.pixels, spacing)
+    ]
+    judged = [
+        _Placement(matrix, pairs, _contradictions(matrix, first, second, pairs))
+        for matrix, pairs in (fit for fit in fits if fit is not None)
+    ]
+    best = max(judged, key=_Placement.worth, default=None)
+    if best is None or best.count < max(_FEWEST, best.contradictions):
+        raise ValueError(
+            f"dots: {0 if best is None else best.count} of {len(first.pixels)} in the infrared "
+            f"image and {len(second.pixels)} in the visible picture match, expected one target in "
+            "both, not mirrored, turned by up to 30 degrees"
+        )
+    return DotMatch(best.pairs[0], best.pairs[1], _rivals(best, judged, first.pixels, spacing))
+
+
+@dataclass(frozen=True)
+class _Placement:
+    """An affine map (2, 3), the pairs that match, and the dots that speak against it."""
+
+    matrix: NDArray[np.float64]
+    pairs: NDArray[np.int64]
+    contradictions: int
+
+    @property
+    def count(self) -> int:
+        return int(self.pairs.shape[1])
+
+    def worth(self) -> int:
+        return self.count - _PRICE * self.contradictions
+
+
+def _rivals(
+    best: _Placement, judged: list[_Placement], first: NDArray[np.float64], spacing: float
+) -> tuple[str, ...]:
+    """A doubt for the best other placement that hardly more speaks against."""
+    others = [
+        other
+        for other in judged
+        if _distance(other.matrix, best.matrix, first) > spacing / 2
+        and 2 * other.count >= best.count
+        and other.contradictions < best.contradictions + _CONTRADICTED
+    ]
+    if not others:
+        return ()
+    away = _distance(max(others, key=_Placement.worth).matrix, best.matrix, first)
+    return (
+        f"the dots match {away:.0f} visible pixels further on as well; a target that both cameras "
+        "see whole, or whose grid has a gap, would decide",
+    )
+
+
+def _hypotheses(
+    first: NDArray[np.float64],
+    second: NDArray[np.float64],
+    nominal: float,
+    tree: KDTree,
+    spacing: float,
+) -> list[NDArray[np.float64]]:
+    """Similarities that put a pair of neighbours on another, most matches first: (2, 3) each."""
+    middle = np.argsort(np.hypot(*(first - np.median(first, axis=0)).T))[:_BASES]
+    near = KDTree(first).query(first[middle], min(_NEAREST + 1, len(first)))[1][:, 1:]
+    a = np.repeat(middle, near.shape[1])
+    b = near.ravel()
+    around = tree.query(second, min(_NEIGHBOURS + 1, len(second)))[1][:, 1:]
+    c = np.repeat(np.arange(len(second)), around.shape[1])
+    d = around.ravel()
+    z, w = first @ [1, 1j], second @ [1, 1j]
+    ratio = ((w[d] - w[c]) / (z[b] - z[a])[:, None]).ravel()
+    shift = (w[c] - ratio.reshape(len(a), -1) * z[a][:, None]).ravel()
+    likely = np.abs(np.angle(ratio)) < _TURN
+    likely &= (np.abs(ratio) > _SCALES[0] * nominal) & (np.abs(ratio) < _SCALES[1] * nominal)
+    found = []
+    for turned, moved in zip(ratio[likely], shift[likely], strict=True):
+        placed = turned * z + moved
+        distance, which = tree.query(np.stack([placed.real, placed.imag], axis=1))
+        count = np.unique(which[distance < _NEAR * spacing]).size
+        linear = np.array([[turned.real, -turned.imag], [turned.imag, turned.real]])
+        found.append((count, np.column_stack([linear, [moved.real, moved.imag]])))
+    found.sort(key=lambda entry: entry[0], reverse=True)
+    return [matrix for _, matrix in found[:_TRIED]]
+
+
+def _distinct(
+    matrices: list[NDArray[np.float64]], first: NDArray[np.float64], spacing: float
+) -> list[NDArray[np.float64]]:
+    kept: list[NDArray[np.float64]] = []
+    for matrix in matrices:
+        if all(_distance(matrix, other, first) > spacing / 2 for other in kept):
+            kept.append(matrix)
+        if len(kept) == _DISTINCT:
+            break
+    return kept
+
+
+def _fitted(
+    matrix: NDArray[np.float64], first: NDArray[np.float64], tree: KDTree, spacing: float
+) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
+    """Affine map of the matches near a placement, and these: (2, n)."""
+    whole = np.column_stack([first, np.ones(len(first))])
+    pairs = _pairs(whole @ matrix.T, tree, spacing)
+    for _ in range(_ROUNDS):
+        if pairs.shape[1] < _FEWEST:
+            return None
+        matrix = np.linalg.lstsq(whole[pairs[0]], tree.data[pairs[1]])[0].T
+        before, pairs = pairs, _pairs(whole @ matrix.T, tree, spacing)
+        if np.array_equal(before, pairs):
+            break
+    return matrix, pairs
+
+
+def _pairs(placed: NDArray[np.float64], tree: KDTree, spacing: float) -> NDArray[np.int64]:
+    """Dots that are each other's nearest and near, shape (2, n)."""
+    distance, which = tree.query(placed)
+    back = KDTree(placed).query(tree.data)[1]
+    mutual = (distance < _NEAR * spacing) & (back[which] == np.arange(len(placed)))
+    return np.stack([np.flatnonzero(mutual), which[mutual]])
+
+
+def _contradictions(
+    matrix: NDArray[np.float64],
+    first: Arrangement,
+    second: Arrangement,
+    pairs: NDArray[np.int64],
+) -> int:
+    """Number of dots that the other image should show and does not."""
+    linear, shift = matrix[:, :2], matrix[:, 2]
+    there = np.delete(first.pixels, pairs[0], axis=0) @ linear.T + shift
+    back = np.linalg.solve(linear, (np.delete(second.pixels, pairs[1], axis=0) - shift).T).T
+    return second.shows(np.asarray(there)) + first.shows(np.asarray(back))
+
+
+def _distance(
+    one: NDArray[np.float64], other: NDArray[np.float64], places: NDArray[np.float64]
+) -> float:
+    """Median distance of where two maps put places."""
+    apart = places @ (one - other)[:, :2].T + (one - other)[:, 2]
+    return float(np.median(np.hypot(apart[:, 0], apart[:, 1])))
