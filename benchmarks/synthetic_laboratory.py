@@ -55,7 +55,7 @@ from chipglow.camera import (
 )
 from chipglow.camera.exposure import Exposure
 from chipglow.io import write_hcc
-from chipglow.io.column_file import read_points
+from chipglow.io.column_file import read_calibration_points
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 from chipglow.study import (
@@ -365,7 +365,7 @@ class Evaluation:
     @cached_property
     def calibration(self) -> FittedCalibration:
         """Of the black bodies; ``chipglow calibrate``."""
-        points = read_points(
+        points = read_calibration_points(
             self.folder / "points.csv",
             lambda file: uniform_counts(self.folder / file, CAMERA_FIELDS),
         )

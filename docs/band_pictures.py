@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import chipglow
-from chipglow.analysis import Comparison, Doubts, band_profile, compare
+from chipglow.analysis import Comparison, StatedUncertainties, band_profile, compare
 from chipglow.camera import Camera, Measurement
 from chipglow.report import draw_band_profile, draw_comparison
 from chipglow.scene import Scene
@@ -37,7 +37,8 @@ def main() -> None:
         "chip 1": camera.measure(scene, chipglow.CHIP_1, starts),
         "chip 2": camera.measure(scene, chipglow.CHIP_2, starts),
     }
-    result = compare(measured, simulated, measured.tool, doubts=Doubts(emissivity=0.05))
+    stated = StatedUncertainties(emissivity=0.05)
+    result = compare(measured, simulated, measured.tool, stated=stated)
     draw_comparison(result).savefig(HERE / "compare.png", dpi=150)
     tell(result)
 
@@ -61,7 +62,8 @@ def experiment(camera: Camera, scene: Scene, starts: np.ndarray) -> Measurement:
 
 def tell(result: Comparison) -> None:
     """Print the sentences."""
-    for text in (*result.notes, *(place.sentence for place in result.places), result.statement):
+    places = (place.sentence for place in result.places)
+    for text in (*result.assumptions, *result.doubts, *places, result.statement):
         print(text)
 
 

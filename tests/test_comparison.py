@@ -13,7 +13,7 @@ from measured_band import BAND, RASTER, TOOL, BandImage, measured
 from PIL import Image
 from typer.testing import CliRunner
 
-from chipglow.analysis import Doubts, Reading, compare, normalised_error
+from chipglow.analysis import Reading, StatedUncertainties, compare, normalised_error
 from chipglow.camera import Flag, Measurement
 from chipglow.cli import app
 from chipglow.io import write_measurement
@@ -22,7 +22,7 @@ from chipglow.scene import PlacedTool, ToolGeometry
 X, Y = np.meshgrid(RASTER.x, RASTER.y)
 CURVE = TOOL.edge_point + np.array([[-30e-6, 30e-6], [-230e-6, 230e-6]])
 FINE = replace(RASTER, spacing=5e-6, rows=79, columns=96)
-STATED = Doubts(stated=5.0)
+STATED = StatedUncertainties(temperature=5.0)
 
 
 def field(x, y):
@@ -63,7 +63,7 @@ def test_e_n_holds_as_often_as_it_says():
     truth = np.full(RASTER.shape, 700.0)
     generator = np.random.default_rng(8)
     noisy = measured([truth + 6.0 * generator.standard_normal(truth.shape) for _ in range(12)])
-    result = compare(noisy, {"true": frames(truth)}, TOOL, CURVE, Doubts(position=0.0))
+    result = compare(noisy, {"true": frames(truth)}, TOOL, CURVE, StatedUncertainties(position=0.0))
     assert result.grid is not None
     e_n = normalised_error(result.grid.measured, result.grid.simulated[0])
     known = e_n[np.isfinite(e_n)]
@@ -119,7 +119,7 @@ def test_the_uncertainty_is_made_of_its_parts():
         {"chip": frames(temperature)},
         TOOL,
         CURVE,
-        Doubts(emissivity=0.1),
+        StatedUncertainties(emissivity=0.1),
     )
     kelvin = slope_of(750.0)
     for part in (result.grid, result.band):
@@ -136,7 +136,11 @@ def test_the_uncertainty_is_made_of_its_parts():
 
 def test_the_position_counts_where_the_temperature_rises():
     result = compare(
-        frames(field(X, Y)), {"same": frames(field(X, Y))}, TOOL, CURVE, Doubts(1.0, 0.0, 4e-6)
+        frames(field(X, Y)),
+        {"same": frames(field(X, Y))},
+        TOOL,
+        CURVE,
+        StatedUncertainties(1.0, 0.0, 4e-6),
     )
     expected = 4e-6 * hypot(2e5, 1e5)
     for part in (result.grid, result.band):
@@ -149,7 +153,7 @@ def test_the_position_counts_where_the_temperature_rises():
 def test_frames_that_differ_make_the_mean_uncertain():
     base = field(X, Y)
     three = measured([base - 9.0, base, base + 9.0])
-    result = compare(three, {"same": frames(base)}, TOOL, CURVE, Doubts(5.0, 0.0, 0.0))
+    result = compare(three, {"same": frames(base)}, TOOL, CURVE, StatedUncertainties(5.0, 0.0, 0.0))
     for part in (result.grid, result.band):
         assert part is not None
         known = np.isfinite(part.measured.temperature)
@@ -173,11 +177,11 @@ def test_a_pixel_without_light_does_not_take_the_uncertainty_away():
 
 def test_few_frames_and_an_unknown_calibration_are_doubtful():
     one = measured([field(X, Y)])
-    notes = compare(one, {"same": frames(field(X, Y))}, TOOL, CURVE).notes
-    assert any("1 frame only" in note for note in notes)
-    assert any("does not tell the uncertainty of its calibration" in note for note in notes)
+    doubts = compare(one, {"same": frames(field(X, Y))}, TOOL, CURVE).doubts
+    assert any("1 frame only" in doubt for doubt in doubts)
+    assert any("does not tell the uncertainty of its calibration" in doubt for doubt in doubts)
     assert not any(
-        "calibration" in note for note in compare(one, {"a": one}, TOOL, CURVE, STATED).notes
+        "calibration" in doubt for doubt in compare(one, {"a": one}, TOOL, CURVE, STATED).doubts
     )
 
 
@@ -213,7 +217,7 @@ def test_how_sure_the_best_is(cold, hot, stated):
     """
     base = np.full(RASTER.shape, 700.0)
     sets = {"cold": frames(base - cold), "hot": frames(base + hot)}
-    result = compare(frames(base), sets, TOOL, CURVE, Doubts(stated=stated))
+    result = compare(frames(base), sets, TOOL, CURVE, StatedUncertainties(temperature=stated))
     expected = 0.5 * (1 + erf((hot - cold) / 2 / stated / sqrt(2)))
     for place in result.places:
         assert place.best == 0
@@ -242,19 +246,21 @@ def test_found_bands_are_compared_at_the_same_distance():
     """The band of the simulation is turned: its ridge is elsewhere, its temperature the same."""
     images = [BandImage(angle=angle, bend=1e-3, deviation=20e-6) for angle in (0.7, 0.8)]
     one, other = (frames(image.temperature()) for image in images)
-    result = compare(one, {"turned": other}, TOOL, doubts=STATED)
+    result = compare(one, {"turned": other}, TOOL, stated=STATED)
     assert result.band is not None
     away = result.band.simulated[0].temperature - result.band.measured.temperature
     inside = (result.band.distance > 70e-6) & (result.band.distance < 350e-6)
     # Reading between four pixels of a Gaussian of 200 K, 3.3 pixels wide: up to 4.6 K.
     assert np.abs(away[inside]).max() < 4.6
-    assert any("is fully developed" in note and "(turned)" in note for note in result.notes)
+    assert any("is fully developed" in text and "(turned)" in text for text in result.assumptions)
 
 
 def test_frames_that_have_moved_are_left_out():
     images = [BandImage(bend=1e-3, shift=shift).temperature() for shift in (0.0, 0.0, 0.0, 40e-6)]
     images[3] = images[3] - 30.0
-    result = compare(measured(images), {"a": frames(images[0])}, TOOL, doubts=Doubts(5, 0, 0))
+    result = compare(
+        measured(images), {"a": frames(images[0])}, TOOL, stated=StatedUncertainties(5, 0, 0)
+    )
     assert result.band is not None
     known = np.isfinite(result.band.measured.temperature)
     np.testing.assert_allclose(result.band.measured.random[known], 0.0, atol=1e-6)
@@ -266,7 +272,7 @@ def test_the_reference_says_which_frames_are_compared():
     images[1] = images[1] + 30.0
     one, other = measured([images[0], images[1]]), frames(images[0])
     early, late = (
-        compare(one, {"a": other}, TOOL, doubts=STATED, reference=number).places[-1].fits[0]
+        compare(one, {"a": other}, TOOL, stated=STATED, reference=number).places[-1].fits[0]
         for number in (0, 1)
     )
     assert early.bias == pytest.approx(0.0, abs=1e-6)
@@ -278,16 +284,16 @@ def test_the_reference_says_which_frames_are_compared():
 
 def test_without_a_band_the_rake_face_is_left():
     base = np.where(TOOL.signed_distance(X, Y) < 100e-6, 650.0, 500.0)
-    result = compare(frames(base), {"same": frames(base)}, TOOL, doubts=STATED)
+    result = compare(frames(base), {"same": frames(base)}, TOOL, stated=STATED)
     assert result.band is None
-    assert any("the shear band is left out: measured:" in note for note in result.notes)
+    assert any("the shear band is left out: measured:" in doubt for doubt in result.doubts)
     assert all("rake face" in place.place or "chip" in place.place for place in result.places)
 
 
 def test_nothing_in_common_is_one_error():
     cold = frames(np.full(RASTER.shape, 500.0))
     with pytest.raises(ValueError, match=r"^comparison: there is nothing[^\n]+$"):
-        compare(cold, {"same": cold}, TOOL, doubts=STATED)
+        compare(cold, {"same": cold}, TOOL, stated=STATED)
     with pytest.raises(ValueError, match="no simulation, expected 1 or more"):
         compare(cold, {}, TOOL)
 
@@ -298,14 +304,16 @@ def test_another_rake_angle_and_no_tool_are_said():
     data = base.data.copy()
     data.attrs = {k: v for k, v in data.attrs.items() if not k.startswith("tool_")}
     result = compare(base, {"other": other, "none": Measurement(data)}, TOOL, CURVE, STATED)
-    assert "Doubtful: the rake angle of other differs by 7 degrees." in result.notes
-    assert any("none tells no tool" in note for note in result.notes)
+    assert "the rake angle of other differs by 7 degrees." in result.doubts
+    assert any("none tells no tool" in text for text in result.assumptions)
 
 
-@pytest.mark.parametrize("wrong", [{"stated": -1.0}, {"emissivity": np.nan}, {"position": -1e-6}])
+@pytest.mark.parametrize(
+    "wrong", [{"temperature": -1.0}, {"emissivity": np.nan}, {"position": -1e-6}]
+)
 def test_impossible_uncertainties_are_refused(wrong):
     with pytest.raises(ValueError, match=f"uncertainty: {next(iter(wrong))} is"):
-        Doubts(**wrong)
+        StatedUncertainties(**wrong)
 
 
 def test_a_reading_s_shapes_must_fit():

@@ -70,6 +70,16 @@ def test_the_face_is_within_its_stated_uncertainty(seen):
     assert min(within_angle, within_place, within_tip) >= 21
 
 
+def test_the_shape_says_where_to_look_and_what_the_edge_is(seen):
+    """A rake face that is out of the 20 degrees around the shape's is not found without a doubt."""
+    measurement = noisy(seen[-7.0, "chip 2"], 1)
+    found = find_tool(measurement, ToolGeometry(radians(0.0), radians(10.0), 8e-6)).tool.tool
+    assert degrees(found.rake_angle) == pytest.approx(-7.0, abs=4.0)  # as stated above
+    assert (found.clearance_angle, found.edge_radius) == (radians(10.0), 8e-6)
+    elsewhere = find_tool(measurement, ToolGeometry(radians(30.0)))
+    assert any("at the end of what was looked for" in doubt for doubt in elsewhere.doubts)
+
+
 def test_a_found_tool_moves_with_the_image(seen):
     measurement = noisy(seen[-7.0, "chip 2"], 1)
     raster = measurement.raster
@@ -159,11 +169,11 @@ def test_a_given_and_a_found_tool(folder):
     (folder / "tool.yaml").write_text("rake_angle: -7 deg\ntip: [0 um, 0 um]\n")
     code, given, _ = command("real.nc", "--tool", "tool.yaml", "--at", "9 us")
     assert code == 0 and "over a square's pixels" in given
-    code, found, _ = command("real.nc", "--tool", "found", "--frame", "0")
+    code, found, assumed = command("real.nc", "--tool", "found", "--frame", "0")
     assert code == 0
     angle = degrees(find_tool(read_measurement(folder / "real.nc")).tool.rake_angle)
     assert f"Found: rake angle {angle:.1f} ± " in found
-    assert "Assumed: clearance angle 7 deg, edge radius 20 um." in found
+    assert "Assumed: clearance angle 7 deg, edge radius 20 um." in assumed
 
 
 @pytest.mark.parametrize(

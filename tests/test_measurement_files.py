@@ -450,7 +450,7 @@ def test_show_shows_a_measurement(laboratory, tmp_path):
     assert plot.read_text().startswith("<?xml")
     code, said = run("show", out, "--at", "1 s")
     assert code == 2
-    assert "--at: 1e+06 us is not in the measurement, expected 0 us to 8000 us" in said
+    assert "--at: 1000000 us is not in the measurement, expected 0 us to 8000 us" in said
 
 
 def test_init_writes_the_description(tmp_path):

@@ -7,11 +7,11 @@ from chipglow.analysis.chip import ChipMetrics, ChipScan, chip_metrics
 from chipglow.analysis.comparison import (
     BandComparison,
     Comparison,
-    Doubts,
     Fit,
     GridComparison,
     PlaceResult,
     Reading,
+    StatedUncertainties,
     compare,
     normalised_error,
 )
@@ -71,7 +71,6 @@ __all__ = [
     "Comparison",
     "DotFit",
     "Dots",
-    "Doubts",
     "EdgeImage",
     "EdgeLine",
     "EdgeResult",
@@ -107,6 +106,7 @@ __all__ = [
     "Setting",
     "ShearBand",
     "Stage",
+    "StatedUncertainties",
     "StudyResult",
     "Surroundings",
     "ThermalImage",

@@ -12,7 +12,9 @@ from scipy.integrate import trapezoid
 from scipy.ndimage import map_coordinates
 
 from chipglow.analysis.band_ridge import ThermalImage, find_band
+from chipglow.analysis.frames import frame_numbers
 from chipglow.analysis.lines import Line, sample
+from chipglow.analysis.remarks import Remarks
 from chipglow.analysis.ridge import NoShearBandError, arc_length, normals_of
 from chipglow.camera import Measurement
 from chipglow.scene import Tool
@@ -25,7 +27,6 @@ MOVED: Final = 1.0
 
 _STEP: Final = 0.5
 _FINE: Final = 4
-_DIFFERENCE: Final = 1e-3
 
 
 class Stage(StrEnum):
@@ -72,8 +73,10 @@ class BandProfile:
         When each frame's integration began in s, shape (frames,).
     width : float
         Width of the mean across the curve in m.
-    notes : tuple of str
-        What is assumed or doubtful, a sentence each.
+    assumptions : tuple of str
+        What had to be assumed, a sentence each.
+    doubts : tuple of str
+        Why it may not be relied on, a sentence each.
 
     Raises
     ------
@@ -91,7 +94,8 @@ class BandProfile:
     stage: tuple[Stage, ...]
     times: NDArray[np.float64]
     width: float
-    notes: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         shape = (self.times.size, self.distance.size)
@@ -175,14 +179,14 @@ def band_profile(
     for name, value in (("width", width), ("position", position)):
         if not (isfinite(value) and value >= 0):
             raise ValueError(f"band profile: {name} is {value!r} m, expected 0 m or more")
-    numbers = _numbers(measurement, frames)
+    numbers = frame_numbers(frames, measurement.times.size)
     images = _Images(measurement)
     given = None if curve is None else _given(curve, tool, pitch)
     found, reason = _found(images, tool, numbers)
-    notes: list[str] = []
+    remarks = Remarks()
     if given is None and not any(found):
         raise NoShearBandError(reason if numbers.size == 1 else _none(numbers.size, reason))
-    base = _reference(measurement, images, tool, found, numbers, given, reference, notes)
+    base = _reference(measurement, images, tool, found, numbers, given, reference, remarks)
     lines = found if given is None else [given] * numbers.size
     distance = _common(lines, pitch) if given is None else given.distance
     points = np.stack([_laid(line, distance) for line in lines])
@@ -206,7 +210,8 @@ def band_profile(
         stage=tuple(_stage(value, pitch) for value in offset),
         times=measurement.times[numbers],
         width=width,
-        notes=tuple(notes),
+        assumptions=tuple(remarks.assumptions),
+        doubts=tuple(remarks.doubts),
     )
 
 
@@ -221,16 +226,6 @@ class _Images:
         if frame not in self._made:
             self._made[frame] = ThermalImage.of(self._measurement, frame)
         return self._made[frame]
-
-
-def _numbers(measurement: Measurement, frames: Sequence[int] | None) -> NDArray[np.int64]:
-    count = measurement.times.size
-    if frames is None:
-        return np.arange(count)
-    numbers = np.asarray(frames, dtype=np.int64)
-    if numbers.size == 0 or numbers.min() < 0 or numbers.max() >= count:
-        raise ValueError(f"band profile: frames are {list(frames)}, expected of 0 to {count - 1}")
-    return numbers
 
 
 def _given(curve: NDArray[np.float64], tool: Tool, pitch: float) -> Line:
@@ -281,29 +276,29 @@ def _reference(
     numbers: NDArray[np.int64],
     given: Line | None,
     reference: int | None,
-    notes: list[str],
+    remarks: Remarks,
 ) -> Line:
     """The curve of the fully developed band."""
     if reference is not None:
-        _numbers(measurement, [reference])
+        frame_numbers([reference], measurement.times.size)
         return find_band(images[reference], tool)
     if given is not None:
-        notes.append("Assumed: the given curve is the place of the fully developed band.")
+        remarks.assumptions.append("the given curve is the place of the fully developed band.")
         return given
     pitch = measurement.raster.spacing
     bands = [(line, k) for line, k in zip(found, numbers.tolist(), strict=True) if line]
     near = [(line, k) for line, k in bands if line.distance[0] < NEAR_THE_EDGE * pitch]
     if not near:
-        notes.append(
-            "Doubtful: no band begins near the cutting edge, so that all may have moved; the "
+        remarks.doubts.append(
+            "no band begins near the cutting edge, so that all may have moved; the "
             "stages are judged against the hottest and longest one."
         )
     line, number = max(near or bands, key=lambda band: _heat(measurement, *band))
     if len(bands) == 1:
-        notes.append("Doubtful: one frame has a band; without another its stage says nothing.")
+        remarks.doubts.append("one frame has a band; without another its stage says nothing.")
     elif near:
-        notes.append(
-            f"Assumed: the band at {measurement.times[number] * 1e6:.6g} µs is fully developed: "
+        remarks.assumptions.append(
+            f"the band at {measurement.times[number] * 1e6:.6g} µs is fully developed: "
             "it is the hottest and longest of those that begin near the cutting edge."
         )
     return line
@@ -381,7 +376,7 @@ class _Reader:
             return np.zeros(len(places))
         temperature = self._mean("radiance_temperature", number, places)
         radiance = self._mean("calibration_uncertainty", number, places)
-        return radiance / radiance_slope(self.measurement, temperature)
+        return radiance / self.measurement.band.slope(temperature)
 
     def _position(self, number: int, curve: NDArray[np.float64]) -> NDArray[np.float64]:
         image = self.images[number]
@@ -397,24 +392,6 @@ class _Reader:
         bend = (ahead - 2 * here + behind) / self.pitch**2
         u = self.position
         return np.asarray(np.sqrt(squared * u**2 + 0.75 * bend**2 * u**4))
-
-
-def radiance_slope(
-    measurement: Measurement, temperature: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Derivative of the in-band radiance by the temperature in W/(m² sr K).
-
-    Parameters
-    ----------
-    measurement : Measurement
-        Tells the camera's band.
-    temperature : ndarray
-        Radiance temperature in K, of any shape.
-    """
-    step = _DIFFERENCE * temperature
-    band = measurement.band
-    rise = band.radiance(temperature + step) - band.radiance(temperature - step)
-    return np.asarray(rise / (2 * step))
 
 
 def _offset(line: Line | None, reference: Line) -> float:

@@ -8,12 +8,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis.band_profile import BandProfile, band_profile, radiance_slope
+from chipglow.analysis.band_profile import BandProfile, band_profile
 from chipglow.analysis.band_ridge import ThermalImage
 from chipglow.analysis.lines import sample
 from chipglow.analysis.rake_grid import DEPTH, PIXELS, RakeGrid, rake_grid
+from chipglow.analysis.remarks import Remarks
 from chipglow.analysis.ridge import NoShearBandError
-from chipglow.camera import UNUSABLE, Measurement
+from chipglow.camera import Measurement
 from chipglow.scene import Tool
 
 COVERAGE: Final = 2.0
@@ -231,15 +232,18 @@ class Comparison:
         Along the shear band; None if there is nothing to compare.
     places : tuple of PlaceResult
         Which simulation fits where.
-    notes : tuple of str
-        What is assumed or doubtful, a sentence each.
+    assumptions : tuple of str
+        What had to be assumed, a sentence each.
+    doubts : tuple of str
+        Why it may not be relied on, a sentence each.
     """
 
     labels: tuple[str, ...]
     grid: GridComparison | None
     band: BandComparison | None
     places: tuple[PlaceResult, ...]
-    notes: tuple[str, ...]
+    assumptions: tuple[str, ...]
+    doubts: tuple[str, ...]
 
     @property
     def statement(self) -> str:
@@ -260,12 +264,12 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Doubts:
+class StatedUncertainties:
     """Uncertainties that the files do not tell.
 
     Parameters
     ----------
-    stated : float
+    temperature : float
         Standard uncertainty of the measured radiance temperature in K, common to all values, for a
         measurement without its own.
     emissivity : float
@@ -279,7 +283,7 @@ class Doubts:
         If one is negative or not finite.
     """
 
-    stated: float = 0.0
+    temperature: float = 0.0
     emissivity: float = 0.0
     position: float | None = None
 
@@ -294,7 +298,7 @@ def compare(
     simulated: Mapping[str, Measurement],
     tool: Tool,
     curve: NDArray[np.float64] | None = None,
-    doubts: Doubts | None = None,
+    stated: StatedUncertainties | None = None,
     reference: int | None = None,
 ) -> Comparison:
     """Lay a measurement and simulations over each other.
@@ -312,7 +316,7 @@ def compare(
     curve : ndarray, optional
         Polyline along which to read the shear band in all files, from the cutting edge outward, in
         the measurement's coordinates in m, shape (k, 2). By default the ridge of each frame.
-    doubts : Doubts, optional
+    stated : StatedUncertainties, optional
         Uncertainties that the files do not tell.
     reference : int, optional
         Number of the measured frame whose band is fully developed; see `band_profile`.
@@ -336,33 +340,40 @@ def compare(
     """
     if not simulated:
         raise ValueError("comparison: no simulation, expected 1 or more")
-    doubts = doubts or Doubts()
-    notes: list[str] = []
-    if measured.calibration_uncertainty is None and doubts.stated == 0.0:
-        notes.append(
-            "Doubtful: the measurement does not tell the uncertainty of its calibration and none "
-            "is stated, so that the E_n are too great."
+    stated = stated or StatedUncertainties()
+    remarks = Remarks()
+    if measured.calibration_uncertainty is None and stated.temperature == 0.0:
+        remarks.doubts.append(
+            "the measurement does not tell the uncertainty of its calibration and none is stated, "
+            "so that the E_n are too great."
         )
-    tools = {label: _tool_of(label, item, tool, notes) for label, item in simulated.items()}
-    grid = _compare_grid(measured, simulated, tool, tools, doubts, notes)
+    tools = {label: _tool_of(label, item, tool, remarks) for label, item in simulated.items()}
+    grid = _compare_grid(measured, simulated, tool, tools, stated, remarks)
     files = [("measured", measured, tool, reference)]
     files += [(label, item, tools[label], None) for label, item in simulated.items()]
-    band = _compare_band(files, curve, doubts, notes)
+    band = _compare_band(files, curve, stated, remarks)
     places = _places(tuple(simulated), grid, band)
     if not places:
-        reasons = " ".join(notes)
+        reasons = " ".join(remarks.doubts)
         raise ValueError(f"comparison: there is nothing that can be compared: {reasons}")
-    return Comparison(tuple(simulated), grid, band, places, tuple(notes))
+    return Comparison(
+        tuple(simulated),
+        grid,
+        band,
+        places,
+        tuple(remarks.assumptions),
+        tuple(remarks.doubts),
+    )
 
 
-def _tool_of(label: str, simulated: Measurement, tool: Tool, notes: list[str]) -> Tool:
+def _tool_of(label: str, simulated: Measurement, tool: Tool, remarks: Remarks) -> Tool:
     own = simulated.tool
     if own is None:
-        notes.append(f"Assumed: {label} tells no tool; it is where the measurement has it.")
+        remarks.assumptions.append(f"{label} tells no tool; it is where the measurement has it.")
         return tool
     turn = degrees(abs(own.rake_angle - tool.rake_angle))
     if turn > _SAME_ANGLE:
-        notes.append(f"Doubtful: the rake angle of {label} differs by {turn:.2g} degrees.")
+        remarks.doubts.append(f"the rake angle of {label} differs by {turn:.2g} degrees.")
     return own
 
 
@@ -371,8 +382,8 @@ def _compare_grid(
     simulated: Mapping[str, Measurement],
     tool: Tool,
     tools: Mapping[str, Tool],
-    doubts: Doubts,
-    notes: list[str],
+    stated: StatedUncertainties,
+    remarks: Remarks,
 ) -> GridComparison | None:
     size = PIXELS * measured.raster.spacing
     try:
@@ -382,27 +393,27 @@ def _compare_grid(
             for label, item in simulated.items()
         }
     except ValueError as error:
-        notes.append(f"Doubtful: the rake face is left out: {error}.")
+        remarks.doubts.append(f"the rake face is left out: {error}.")
         return None
     if base.times.size < _FEW:
-        notes.append(_few_frames("measured", base.times.size))
+        remarks.doubts.append(_few_frames("measured", base.times.size))
     columns = min(grid.along.size for grid in (base, *grids.values()))
-    readings = [_measured_squares(measured, base, columns, doubts)]
+    readings = [_measured_squares(measured, base, columns, stated)]
     for label, item in simulated.items():
         grid = grids[label]
         mean = grid.frame_mean[:, :columns]
-        emissivity = _of_the_emissivity(item, mean, doubts)
+        emissivity = _of_the_emissivity(item, mean, stated)
         readings.append(Reading(mean, emissivity, _of_the_mean(grid)[:, :columns]))
     return GridComparison(base.along[:columns], base.depth, readings[0], tuple(readings[1:]))
 
 
 def _measured_squares(
-    measured: Measurement, grid: RakeGrid, columns: int, doubts: Doubts
+    measured: Measurement, grid: RakeGrid, columns: int, stated: StatedUncertainties
 ) -> Reading:
     mean = grid.frame_mean[:, :columns]
     corners = grid.corners()[:, : columns + 1]
     middles = (corners[1:, 1:] + corners[:-1, :-1]) / 2
-    systematic = np.full(mean.shape, doubts.stated)
+    systematic = np.full(mean.shape, stated.temperature)
     if measured.calibration_uncertainty is not None:
         share = sample(_relative_calibration(measured), measured.raster, middles)
         systematic = np.hypot(systematic, share * _relative_to_kelvin(measured, mean))
@@ -410,7 +421,7 @@ def _measured_squares(
     image = np.mean([item.temperature for item in images if item is not None], axis=0)
     pitch = measured.raster.spacing
     slopes = [sample(slope, measured.raster, middles) for slope in np.gradient(image, pitch)]
-    position = np.hypot(*slopes) * _position(measured, doubts)
+    position = np.hypot(*slopes) * _position(measured, stated)
     random = np.hypot(position, _of_the_mean(grid)[:, :columns])
     return Reading(mean, systematic, random)
 
@@ -419,7 +430,7 @@ def _relative_calibration(measured: Measurement) -> NDArray[np.float64]:
     """Uncertainty of the calibration over the radiance, mean over the frames, shape (y, x)."""
     absolute = measured.calibration_uncertainty
     assert absolute is not None
-    usable = (measured.flags & UNUSABLE == 0) & (measured.radiance > 0)
+    usable = measured.usable & (measured.radiance > 0)
     share = np.divide(absolute, measured.radiance, out=np.zeros(absolute.shape), where=usable)
     return _mean(share, usable)
 
@@ -431,8 +442,8 @@ def _image(measured: Measurement, frame: int) -> ThermalImage | None:
         return None
 
 
-def _position(measured: Measurement, doubts: Doubts) -> float:
-    return measured.raster.spacing / sqrt(12.0) if doubts.position is None else doubts.position
+def _position(measured: Measurement, stated: StatedUncertainties) -> float:
+    return measured.raster.spacing / sqrt(12.0) if stated.position is None else stated.position
 
 
 def _of_the_mean(grid: RakeGrid) -> NDArray[np.float64]:
@@ -443,8 +454,8 @@ def _of_the_mean(grid: RakeGrid) -> NDArray[np.float64]:
 def _few_frames(name: str, count: int) -> str:
     frames = "frame" if count == 1 else "frames"
     return (
-        f"Doubtful: {name}: {count} {frames} only, which do not tell how the temperature varies "
-        "between frames."
+        f"{name}: {count} {frames} only, which do not tell how the temperature varies between "
+        "frames."
     )
 
 
@@ -453,27 +464,27 @@ def _relative_to_kelvin(
 ) -> NDArray[np.float64]:
     """Kelvins of radiance temperature for a radiance that is off by its own amount."""
     radiance = np.asarray(measurement.band.radiance(temperature), np.float64)
-    return radiance / radiance_slope(measurement, temperature)
+    return radiance / measurement.band.slope(temperature)
 
 
 def _of_the_emissivity(
-    simulated: Measurement, temperature: NDArray[np.float64], doubts: Doubts
+    simulated: Measurement, temperature: NDArray[np.float64], stated: StatedUncertainties
 ) -> NDArray[np.float64]:
     """Standard uncertainty in K that the assumed emissivity makes."""
-    if doubts.emissivity == 0.0:
+    if stated.emissivity == 0.0:
         return np.zeros(temperature.shape)
-    return doubts.emissivity * _relative_to_kelvin(simulated, temperature)
+    return stated.emissivity * _relative_to_kelvin(simulated, temperature)
 
 
 def _compare_band(
     files: Sequence[tuple[str, Measurement, Tool, int | None]],
     curve: NDArray[np.float64] | None,
-    doubts: Doubts,
-    notes: list[str],
+    stated: StatedUncertainties,
+    remarks: Remarks,
 ) -> BandComparison | None:
     """The band of the measurement, which comes first, and of the simulations."""
     _, measured, tool, _ = files[0]
-    position = _position(measured, doubts)
+    position = _position(measured, stated)
     profiles = []
     for name, item, placed, reference in files:
         moved = None if curve is None else curve + (placed.edge_point - tool.edge_point)
@@ -482,38 +493,37 @@ def _compare_band(
                 band_profile(item, placed, curve=moved, reference=reference, position=position)
             )
         except NoShearBandError as error:
-            notes.append(f"Doubtful: the shear band is left out: {name}: {error}.")
+            remarks.doubts.append(f"the shear band is left out: {name}: {error}.")
             return None
     step = measured.raster.spacing
     last = max(float(profile.distance[-1]) for profile in profiles)
     distance = step * np.arange(1, int(last / step) + 1, dtype=np.float64)
     names = [name for name, *_ in files]
-    parts = [_along(name, p, distance, notes) for name, p in zip(names, profiles, strict=True)]
+    parts = [_along(name, p, distance, remarks) for name, p in zip(names, profiles, strict=True)]
     mean, calibration, off, between = parts[0]
-    own = Reading(mean, np.hypot(calibration, doubts.stated), np.hypot(off, between))
+    own = Reading(mean, np.hypot(calibration, stated.temperature), np.hypot(off, between))
     readings = []
     for (_, item, *_), (mean, _, _, between) in zip(files[1:], parts[1:], strict=True):
-        emissivity = _of_the_emissivity(item, mean, doubts)
+        emissivity = _of_the_emissivity(item, mean, stated)
         readings.append(Reading(mean, emissivity, between))
     return BandComparison(distance, own, tuple(readings))
 
 
 def _along(
-    name: str, profile: BandProfile, distance: NDArray[np.float64], notes: list[str]
+    name: str, profile: BandProfile, distance: NDArray[np.float64], remarks: Remarks
 ) -> tuple[NDArray[np.float64], ...]:
     """Means over the frames: temperature, calibration, position; and that of the mean itself.
 
     Where a single frame reaches, the variance between frames is the mean of it where several do.
     """
     used = profile.in_place
-    notes.extend(f"{note} ({name})" for note in profile.notes)
+    remarks.assumptions.extend(f"{sentence} ({name})" for sentence in profile.assumptions)
+    remarks.doubts.extend(f"{sentence} ({name})" for sentence in profile.doubts)
     if not used.any():
-        notes.append(
-            f"Doubtful: {name}: no frame has a band that is in place; all frames are used."
-        )
+        remarks.doubts.append(f"{name}: no frame has a band that is in place; all frames are used.")
         used = np.ones(used.size, np.bool_)
     elif used.sum() < _FEW:
-        notes.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
+        remarks.doubts.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
     fields = (profile.temperature, profile.calibration, profile.position)
     read = [
         np.stack([_at(distance, profile.distance, row) for row in field[used]]) for field in fields

@@ -7,7 +7,7 @@ from math import isfinite, nan, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera import UNUSABLE, Flag, Measurement
+from chipglow.camera import Flag, Measurement
 
 
 @dataclass(frozen=True)
@@ -106,5 +106,4 @@ def flag_text(flagged: dict[Flag, int]) -> str:
 
 
 def _usable_radiance(measurement: Measurement) -> NDArray[np.float64]:
-    flagged = np.bitwise_or.reduce(measurement.flags, axis=0) & UNUSABLE != 0
-    return np.where(flagged, np.nan, measurement.radiance)
+    return np.where(measurement.usable.all(axis=0), measurement.radiance, np.nan)

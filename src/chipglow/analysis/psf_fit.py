@@ -19,6 +19,7 @@ from chipglow.analysis.edge_line import EdgeLine
 from chipglow.analysis.psf_models import EdgeResponse, PSFModel, disc_response, edge_response
 from chipglow.camera import PointSpreadFunction
 
+_APART: Final = pi / 18
 _START_WIDTHS: Final = (0.5, 1.0, 1.7, 3.0, 5.0, 9.0)
 _DIFFERENCE: Final = 1e-5
 _EDGE_PARAMETERS: Final = 4
@@ -507,12 +508,12 @@ def _straight_line(
     return middle[1] - slope * middle[0], slope
 
 
-def orientations(edges: Sequence[EdgePixels], least: float = pi / 18) -> list[float]:
-    """Directions of the edges' normals, 0 to π, of which none is within `least` of another."""
+def orientations(edges: Sequence[EdgePixels]) -> list[float]:
+    """Directions of the edges' normals, 0 to π, of which none is within 10 degrees of another."""
     found: list[float] = []
     for edge in edges:
         direction = edge.line.normal % pi
         apart = [abs((direction - other + pi / 2) % pi - pi / 2) for other in found]
-        if min(apart, default=pi) >= least:
+        if min(apart, default=pi) >= _APART:
             found.append(direction)
     return found

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis.frames import frame_numbers
 from chipglow.camera import UNUSABLE, Measurement
 from chipglow.scene import Raster, Tool
 
@@ -153,7 +154,7 @@ def rake_grid(
     """
     raster = measurement.raster
     size = _checked_size(pixels, depth, raster)
-    numbers = _checked_frames(frames, measurement.times.size)
+    numbers = frame_numbers(frames, measurement.times.size)
     rows = int(depth / size + _ROUNDING)
     columns = _columns(raster, tool, size, rows)
     squares = _Squares.of(raster, tool, size, rows, columns)
@@ -249,15 +250,6 @@ def _checked_size(pixels: float, depth: float, raster: Raster) -> float:
             f"rake grid: depth is {depth!r} m, expected a square's {size:.4g} m or more"
         )
     return size
-
-
-def _checked_frames(frames: Sequence[int] | None, count: int) -> NDArray[np.int64]:
-    numbers = np.arange(count) if frames is None else np.asarray(frames, dtype=np.int64)
-    wrong = numbers[(numbers < 0) | (numbers >= count)]
-    if wrong.size or numbers.size == 0:
-        shown = int(wrong[0]) if wrong.size else "none"
-        raise ValueError(f"rake grid: frame {shown}, expected 0 to {count - 1}")
-    return numbers
 
 
 def _middles(raster: Raster) -> NDArray[np.float64]:

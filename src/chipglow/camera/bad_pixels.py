@@ -12,6 +12,19 @@ from chipglow.camera.nonuniformity import mean_frame, response, size_text
 LEAST_FRAMES: Final = 8
 """Frames from which the noise of a sensor can be told."""
 
+NOISE_LIMIT: Final = 5.0
+"""Multiple of the median standard deviation over time from which on a sensor is noisy."""
+
+GAIN_LIMITS: Final = (0.5, 1.5)
+"""Gains relative to the median gain that are still good."""
+
+LEVEL_LIMIT: Final = 8.0
+"""Multiple of the sensors' spread (1.4826 times the median absolute deviation) by which the mean of
+a good sensor is from the median at most, of one uniform object."""
+
+LARGEST_CLUSTER: Final = 4
+"""Sensors of the largest cluster, neighbours over corner included, that is replaced."""
+
 _FEWEST_NEIGHBOURS: Final = 3
 
 
@@ -39,14 +52,11 @@ class BadPixels:
         return self.stuck | self.noisy | self.unresponsive
 
 
-def find_bad_pixels(
-    frames: NDArray[Any],
-    hot: NDArray[Any] | None = None,
-    noise_limit: float = 5.0,
-    gain_limits: tuple[float, float] = (0.5, 1.5),
-    level_limit: float = 8.0,
-) -> BadPixels:
+def find_bad_pixels(frames: NDArray[Any], hot: NDArray[Any] | None = None) -> BadPixels:
     """Find sensors that do not answer to light as others do.
+
+    Noise is judged by `NOISE_LIMIT`, from `LEAST_FRAMES` frames on; of two objects the gain by
+    `GAIN_LIMITS`, of one the level by `LEVEL_LIMIT`.
 
     Parameters
     ----------
@@ -54,14 +64,6 @@ def find_bad_pixels(
         Signal of a uniform object, shape (time, y, x).
     hot : ndarray, optional
         Signal of a brighter uniform object: tells the gain of every sensor.
-    noise_limit : float
-        A sensor is noisy from this multiple of the median standard deviation over time on. Noise is
-        judged from `LEAST_FRAMES` frames on.
-    gain_limits : tuple of float
-        Gains relative to the median gain that are still good.
-    level_limit : float
-        Without `hot`: a sensor is bad whose mean is further from the median than this multiple of
-        the sensors' spread (1.4826 times the median absolute deviation).
 
     Raises
     ------
@@ -69,17 +71,17 @@ def find_bad_pixels(
         If frames are of different sizes, or the second are not brighter.
     """
     level = mean_frame(frames)
-    stuck, noisy = _by_noise(frames, noise_limit)
+    stuck, noisy = _by_noise(frames)
     if hot is None:
-        return BadPixels(stuck, noisy, _far_off(level, level_limit))
-    stuck_hot, noisy_hot = _by_noise(hot, noise_limit)
+        return BadPixels(stuck, noisy, _far_off(level))
+    stuck_hot, noisy_hot = _by_noise(hot)
     rise = response(level, mean_frame(hot))
     gain = rise / np.median(rise)
-    unresponsive = ~((gain >= gain_limits[0]) & (gain <= gain_limits[1]))
+    unresponsive = ~((gain >= GAIN_LIMITS[0]) & (gain <= GAIN_LIMITS[1]))
     return BadPixels(stuck | stuck_hot, noisy | noisy_hot, unresponsive)
 
 
-def _by_noise(frames: NDArray[Any], limit: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _by_noise(frames: NDArray[Any]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Sensors without any noise, and with too much."""
     none = np.zeros(frames.shape[1:], np.bool_)
     if len(frames) < LEAST_FRAMES:
@@ -88,17 +90,17 @@ def _by_noise(frames: NDArray[Any], limit: float) -> tuple[NDArray[np.bool_], ND
     usual = float(np.median(noise))
     if not usual > 0:
         return none, none
-    return noise == 0, noise > limit * usual
+    return noise == 0, noise > NOISE_LIMIT * usual
 
 
-def _far_off(level: NDArray[np.float64], limit: float) -> NDArray[np.bool_]:
+def _far_off(level: NDArray[np.float64]) -> NDArray[np.bool_]:
     distance = np.abs(level - np.median(level))
     spread = 1.4826 * float(np.median(distance))
-    return ~(distance <= limit * spread) if spread > 0 else distance > 0
+    return ~(distance <= LEVEL_LIMIT * spread) if spread > 0 else distance > 0
 
 
 def replace_bad_pixels(
-    signal: NDArray[np.float64], bad: NDArray[np.bool_], largest: int = 4
+    signal: NDArray[np.float64], bad: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Put the median of the good neighbours in the place of bad sensors.
 
@@ -108,14 +110,12 @@ def replace_bad_pixels(
         Frames, shape (time, y, x).
     bad : ndarray
         Which sensors are bad, shape (y, x).
-    largest : int
-        Sensors of the largest cluster, neighbours over corner included, that is replaced.
 
     Returns
     -------
     signal : ndarray
-        The frames; NaN where a sensor is bad and not replaced: in larger clusters, and where less
-        than three of the eight neighbours are good.
+        The frames; NaN where a sensor is bad and not replaced: in clusters of more than
+        `LARGEST_CLUSTER`, and where less than three of the eight neighbours are good.
     replaced : ndarray
         Which sensors were replaced, shape (y, x).
 
@@ -132,7 +132,7 @@ def replace_bad_pixels(
     result = np.array(signal, np.float64)
     result[:, bad] = np.nan
     clusters, _ = label(bad, np.ones((3, 3)))
-    small = bad & (np.bincount(clusters.ravel())[clusters] <= largest)
+    small = bad & (np.bincount(clusters.ravel())[clusters] <= LARGEST_CLUSTER)
     replaced = np.zeros_like(bad)
     for y, x in np.argwhere(small):
         around = np.s_[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]

@@ -16,6 +16,7 @@ from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT
 
 Kind = TypeVar("Kind", bound=FittedCalibration)
 
+_PROBABILITY: Final = 0.95
 _MOST_ROUNDS: Final = 50
 _SETTLED: Final = 1e-9
 
@@ -86,13 +87,13 @@ class CalibrationFit(Generic[Kind]):
         misfit = self.chi_squared if self.stated else points * np.log(max(scatter, 1e-300))
         return misfit + 2 * estimated * points / (points - estimated - 1)
 
-    def coverage_factor(self, probability: float = 0.95) -> float:
-        """Factor on the standard uncertainty that gives an interval of this probability.
+    def coverage_factor(self) -> float:
+        """Factor on the standard uncertainty that gives an interval of 95 %.
 
         Student's, with the degrees of freedom of the fit, if the scatter of the residuals is all
         that is known of the uncertainty (JCGM 100, G.3); else that of the normal distribution.
         """
-        share = 0.5 + probability / 2
+        share = 0.5 + _PROBABILITY / 2
         return float(norm.ppf(share) if self.stated else t.ppf(share, self.degrees_of_freedom))
 
 
@@ -148,17 +149,7 @@ def fit_linear(
     gain, offset = np.polyfit(radiance, points.counts, 1)
     _expect_rising(gain > 0)
 
-    def build(parameters: NDArray[np.float64], covariance: NDArray[Any]) -> LinearCalibration:
-        return LinearCalibration(
-            band=band,
-            lowest=float(points.temperatures.min()),
-            highest=float(points.temperatures.max()),
-            integration_time=integration_time,
-            range_name=range_name,
-            parameters=parameters,
-            covariance=covariance,
-        )
-
+    build = points.builder(LinearCalibration, band, integration_time, range_name)
     return _fit(points, np.array([offset, gain]), build)
 
 
@@ -187,17 +178,7 @@ def fit_sakuma_hattori(
         temperatures, counts, count_uncertainty, temperature_uncertainty, common_uncertainty, 4
     )
 
-    def build(parameters: NDArray[np.float64], covariance: NDArray[Any]) -> SakumaHattori:
-        return SakumaHattori(
-            band=band,
-            lowest=float(points.temperatures.min()),
-            highest=float(points.temperatures.max()),
-            integration_time=integration_time,
-            range_name=range_name,
-            parameters=parameters,
-            covariance=covariance,
-        )
-
+    build = points.builder(SakumaHattori, band, integration_time, range_name)
     return _fit(points, _first_guess(points, band, build), build)
 
 
@@ -262,6 +243,24 @@ class _Points:
                 f"{needed} points or more at {parameters} temperatures or more"
             )
         return points
+
+    def builder(
+        self, kind: type[Kind], band: Band, integration_time: float | None, range_name: str | None
+    ) -> Callable[[NDArray[np.float64], NDArray[Any]], Kind]:
+        """What makes a calibration that holds over the points, of parameters and covariance."""
+
+        def build(parameters: NDArray[np.float64], covariance: NDArray[Any]) -> Kind:
+            return kind(
+                band=band,
+                lowest=float(self.temperatures.min()),
+                highest=float(self.temperatures.max()),
+                integration_time=integration_time,
+                range_name=range_name,
+                parameters=parameters,
+                covariance=covariance,
+            )
+
+        return build
 
     @property
     def stated(self) -> bool:

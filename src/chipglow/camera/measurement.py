@@ -198,6 +198,11 @@ class Measurement:
         return np.asarray(self.data["flags"].values, dtype=np.uint8)
 
     @property
+    def usable(self) -> NDArray[np.bool_]:
+        """Which pixels have a radiance temperature, by their flags, shape (time, y, x)."""
+        return np.asarray(self.flags & UNUSABLE == 0, np.bool_)
+
+    @property
     def radiance(self) -> NDArray[np.float64]:
         """Radiance in W/(m² sr), shape (time, y, x)."""
         return np.asarray(self.data["radiance"].values, dtype=np.float64)
@@ -223,8 +228,7 @@ class Measurement:
         stored = np.asarray(self.data["radiance_temperature"].values, dtype=np.float64)
         if not flagged:
             return stored
-        usable = self.flags & UNUSABLE == 0
-        return np.where(usable, stored, self.band.temperature(self.radiance))
+        return np.where(self.usable, stored, self.band.temperature(self.radiance))
 
     @property
     def calibration_uncertainty(self) -> NDArray[np.float64] | None:

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from chipglow.camera import CalibrationFit, FittedCalibration
-    from chipglow.radiometry import Band
 
     Fits = Mapping[str, CalibrationFit[FittedCalibration]]
 
@@ -78,8 +77,9 @@ def calibrate(
     from chipglow.cli.pictures import check_picture_path
     from chipglow.cli.quantities import parse
     from chipglow.io.atomic import check_folder
-    from chipglow.io.column_file import read_points
+    from chipglow.io.column_file import read_calibration_points
     from chipglow.study.measured import uniform_counts
+    from chipglow.study.measurement_schema import band_of
     from chipglow.study.units import TEMPERATURE_DIFFERENCE, TIME
 
     if plot is not None:
@@ -94,7 +94,7 @@ def calibrate(
         recordings.append(file)
         return uniform_counts(points.parent / file, settings or ())
 
-    table = read_points(points, counts_of)
+    table = read_calibration_points(points, counts_of)
     if settings and not recordings:
         raise ValueError(
             f"--set: {settings[0]!r} describes nothing, as {points} names no recordings (file)"
@@ -114,7 +114,10 @@ def calibrate(
         Model.SAKUMA_HATTORI: fit_sakuma_hattori,
     }
     wanted: list[Model] = list(kinds) if model is Model.BOTH else [model]
-    seen = _band(band)
+    try:
+        seen = band_of(band)
+    except ValueError as error:
+        raise ValueError(f"--band: {error}") from None
     try:
         fits: Fits = {
             name.value: kinds[name](table["temperature"], table["counts"], seen, **known)
@@ -139,20 +142,6 @@ def calibrate(
     for path in (out, plot):
         if path is not None:
             print(path)
-
-
-def _band(text: str) -> "Band":
-    from chipglow.io.column_file import read_response
-    from chipglow.radiometry import Band
-    from chipglow.study.units import WAVELENGTHS
-
-    if text.lower().endswith(".csv"):
-        response = read_response(text)
-        return Band(*response.limits, response)
-    try:
-        return Band(*WAVELENGTHS.parse_range(text))
-    except ValueError as error:
-        raise ValueError(f"--band: {error}") from None
 
 
 def _write(fit: "CalibrationFit[FittedCalibration]", out: Path) -> None:
@@ -181,7 +170,7 @@ def _print_fit(console: "Console", name: str, fit: "CalibrationFit[FittedCalibra
         parameters.add_row(label, f"{value:.7g}", f"{deviation:.2g}", unit)
     console.print(parameters)
     table = Table(
-        "black body / °C", "counts", "residual / counts", "residual / K", "uncertainty / K",
+        "black body / °C", "counts", "residual / counts", "residual / K", "u / K",
         box=None,
     )  # fmt: skip
     for column in table.columns:

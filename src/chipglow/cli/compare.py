@@ -10,7 +10,7 @@ from chipglow.cli.options import Settings, ToolChoice
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from chipglow.analysis import Comparison, Doubts
+    from chipglow.analysis import Comparison, StatedUncertainties
     from chipglow.camera import Measurement
 
 
@@ -44,7 +44,7 @@ def compare(
     uncertainty: Annotated[
         str | None,
         typer.Option(
-            metavar="DIFFERENCE",
+            metavar="KELVINS",
             help="Standard uncertainty of the measured radiance temperatures, such as '10 K', for "
             "a measurement that does not tell its own.",
         ),
@@ -81,6 +81,7 @@ def compare(
     from rich.console import Console
 
     from chipglow.analysis import compare as compare_all
+    from chipglow.cli.assumed import say_assumed, say_doubtful
     from chipglow.cli.pictures import check_picture_path, write_picture
     from chipglow.cli.times import frame_at
     from chipglow.cli.tools import chosen_tool
@@ -90,26 +91,31 @@ def compare(
 
     if plot is not None:
         check_picture_path(plot)
-    doubts = _doubts(uncertainty, emissivity_uncertainty, position)
+    stated = _stated(uncertainty, emissivity_uncertainty, position)
     whole = load_measurement(measured, settings or ())
     if uncertainty is not None and whole.calibration_uncertainty is not None:
         raise ValueError(
             f"--uncertainty: {uncertainty} beside the uncertainty that {measured} tells, "
             "expected one or the other"
         )
-    placed, remarks = chosen_tool(whole, tool)
+    chosen = chosen_tool(whole, tool)
     result = compare_all(
         whole,
         _labelled(simulated),
-        placed,
+        chosen.tool,
         None if curve is None else read_curve(curve),
-        doubts,
+        stated,
         None if reference is None else frame_at("--reference", reference, whole.times),
     )
     console = Console(highlight=False, markup=False)
     console.print(_table(result))
-    for text in (*remarks, *result.notes, "", *(place.sentence for place in result.places)):
-        console.print(text)
+    for sentence in chosen.found:
+        console.print(sentence)
+    say_assumed((*chosen.assumptions, *result.assumptions))
+    say_doubtful((*chosen.doubts, *result.doubts))
+    console.print()
+    for place in result.places:
+        console.print(place.sentence)
     console.print(f"\n{result.statement}")
     if out is not None:
         _write(result, out)
@@ -119,17 +125,19 @@ def compare(
         print(plot)
 
 
-def _doubts(uncertainty: str | None, emissivity: float, position: str | None) -> "Doubts":
-    from chipglow.analysis import Doubts
+def _stated(
+    uncertainty: str | None, emissivity: float, position: str | None
+) -> "StatedUncertainties":
+    from chipglow.analysis import StatedUncertainties
     from chipglow.cli.quantities import parse
     from chipglow.study.units import LENGTH, TEMPERATURE_DIFFERENCE
 
     if not 0.0 <= emissivity < 1.0:
         raise ValueError(f"--emissivity-uncertainty: {emissivity:g}, expected 0 to under 1")
-    stated = parse("--uncertainty", TEMPERATURE_DIFFERENCE, uncertainty)
-    if stated is not None and not stated > 0.0:
+    kelvins = parse("--uncertainty", TEMPERATURE_DIFFERENCE, uncertainty)
+    if kelvins is not None and not kelvins > 0.0:
         raise ValueError(f"--uncertainty: {uncertainty}, expected over 0 K")
-    return Doubts(stated or 0.0, emissivity, parse("--position", LENGTH, position))
+    return StatedUncertainties(kelvins or 0.0, emissivity, parse("--position", LENGTH, position))
 
 
 def _labelled(paths: list[Path]) -> "dict[str, Measurement]":
@@ -150,6 +158,8 @@ def _labelled(paths: list[Path]) -> "dict[str, Measurement]":
 def _table(result: "Comparison") -> "Table":
     from rich.table import Table
 
+    from chipglow.analysis.comparison import COVERAGE
+
     table = Table(
         "place",
         "simulation",
@@ -157,7 +167,8 @@ def _table(result: "Comparison") -> "Table":
         "RMS / K",
         "E_n up to 1",
         box=None,
-        title="simulated less measured radiance temperature, ± expanded uncertainty (k = 2)",
+        title="simulated less measured radiance temperature, ± expanded uncertainty "
+        f"(k = {COVERAGE:g})",
         title_justify="left",
     )
     for place in result.places:
@@ -165,7 +176,7 @@ def _table(result: "Comparison") -> "Table":
             table.add_row(
                 "" if i else place.place.rstrip(","),
                 fit.label,
-                f"{fit.bias:+.1f} ± {2 * fit.bias_uncertainty:.1f}",
+                f"{fit.bias:+.1f} ± {COVERAGE * fit.bias_uncertainty:.1f}",
                 f"{fit.rms:.1f}",
                 f"{fit.agreeing} of {fit.count}",
             )

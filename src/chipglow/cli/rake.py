@@ -8,6 +8,8 @@ import typer
 from chipglow.cli.options import MeasurementFile, Settings, ToolChoice
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from rich.table import Table
 
     from chipglow.analysis import RakeGrid
@@ -46,10 +48,11 @@ def rake(
     from rich.console import Console
 
     from chipglow.analysis import rake_grid
+    from chipglow.cli.assumed import say_assumed, say_doubtful
     from chipglow.cli.pictures import check_picture_path, write_picture
     from chipglow.cli.quantities import parse
     from chipglow.cli.tools import chosen_tool
-    from chipglow.io import check_rake_grid_path, write_rake_grid
+    from chipglow.io import check_table_path, write_rake_grid
     from chipglow.report import draw_rake_grid
     from chipglow.study.measured import load_measurement
     from chipglow.study.units import LENGTH
@@ -57,16 +60,18 @@ def rake(
     if plot is not None:
         check_picture_path(plot)
     if out is not None:
-        check_rake_grid_path(out)
+        check_table_path(out)
     reach = parse("--depth", LENGTH, depth)
     measured = load_measurement(measurement, settings or ())
     frames = _frames(measured, frame, at)
     console = Console(highlight=False, markup=False)
-    placed, remarks = chosen_tool(measured, tool)
-    grid = rake_grid(measured, placed, pixels, reach, frames)
+    chosen = chosen_tool(measured, tool)
+    grid = rake_grid(measured, chosen.tool, pixels, reach, frames)
     console.print(_table(grid))
-    for remark in (*remarks, *_remarks(measured, grid)):
-        console.print(remark)
+    for sentence in (*chosen.found, *_left_out(measured, grid)):
+        console.print(sentence)
+    say_assumed(chosen.assumptions)
+    say_doubtful((*chosen.doubts, *_doubts(grid)))
     if out is not None:
         write_rake_grid(grid, out)
         print(out)
@@ -122,23 +127,25 @@ def _cell(mean: float, deviation: float) -> str:
     return f"{mean:.1f}" if isnan(deviation) else f"{mean:.1f} ± {deviation:.1f}"
 
 
-def _remarks(measurement: "Measurement", grid: "RakeGrid") -> list[str]:
-    """What is left out, and what is doubtful."""
-    seen, frames = grid.frame_count, grid.times.size
-    remarks = []
+def _left_out(measurement: "Measurement", grid: "RakeGrid") -> "Iterator[str]":
+    """What is not in the table."""
+    seen = grid.frame_count
     if (seen == 0).any():
-        remarks.append(
+        yield (
             f"{int((seen == 0).sum())} of {seen.size} squares are left out (–): a pixel of theirs "
             "is under the camera's floor, saturated or dead, or outside the image."
         )
-    partly = int(((seen > 0) & (seen < frames)).sum())
-    if partly:
-        remarks.append(
-            f"Doubtful: {partly} squares are usable in some of the {frames} frames only; their "
-            "means are of those frames, which are the hotter ones where the floor is the reason."
-        )
     if measurement.calibration_uncertainty is not None:
-        remarks.append(
+        yield (
             "The uncertainty of the calibration is common to all squares and not in the deviations."
         )
-    return remarks
+
+
+def _doubts(grid: "RakeGrid") -> "Iterator[str]":
+    seen, frames = grid.frame_count, grid.times.size
+    partly = int(((seen > 0) & (seen < frames)).sum())
+    if partly:
+        yield (
+            f"{partly} squares are usable in some of the {frames} frames only; their means are of "
+            "those frames, which are the hotter ones where the floor is the reason."
+        )

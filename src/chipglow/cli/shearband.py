@@ -70,11 +70,12 @@ def shearband(
     from rich.console import Console
 
     from chipglow.analysis import band_profile
+    from chipglow.cli.assumed import say_assumed, say_doubtful
     from chipglow.cli.pictures import check_picture_path, write_picture
     from chipglow.cli.quantities import parse
     from chipglow.cli.times import frame_at
     from chipglow.cli.tools import chosen_tool
-    from chipglow.io import check_band_profile_path, read_curve, write_band_profile
+    from chipglow.io import check_table_path, read_curve, write_band_profile
     from chipglow.report import draw_band_profile
     from chipglow.study.measured import load_measurement
     from chipglow.study.units import LENGTH
@@ -82,13 +83,13 @@ def shearband(
     if plot is not None:
         check_picture_path(plot)
     if out is not None:
-        check_band_profile_path(out)
+        check_table_path(out)
     measured = load_measurement(measurement, settings or ())
     times = measured.times
-    placed, remarks = chosen_tool(measured, tool)
+    chosen = chosen_tool(measured, tool)
     profile = band_profile(
         measured,
-        placed,
+        chosen.tool,
         frames=sorted({frame_at("--at", text, times) for text in at}) if at else None,
         curve=None if curve == "found" else read_curve(curve),
         reference=None if reference is None else frame_at("--reference", reference, times),
@@ -97,18 +98,22 @@ def shearband(
     )
     console = Console(highlight=False, markup=False)
     console.print(_table(profile))
-    for note in (*remarks, *profile.notes):
-        console.print(note)
+    for sentence in chosen.found:
+        console.print(sentence)
+    say_assumed((*chosen.assumptions, *profile.assumptions))
+    say_doubtful((*chosen.doubts, *profile.doubts))
     if measured.calibration_uncertainty is None:
-        console.print(
-            "Doubtful: the measurement does not tell the uncertainty of its calibration; the "
-            "uncertainty is that of the position only."
+        say_doubtful(
+            [
+                "the measurement does not tell the uncertainty of its calibration; the uncertainty "
+                "is that of the position only."
+            ]
         )
     if out is not None:
         write_band_profile(profile, out)
         print(out)
     if plot is not None:
-        write_picture(draw_band_profile(measured, placed, profile), plot)
+        write_picture(draw_band_profile(measured, chosen.tool, profile), plot)
         print(plot)
 
 

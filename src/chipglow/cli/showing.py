@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
@@ -14,9 +15,9 @@ from chipglow.cli.pictures import check_picture_path, write_picture
 from chipglow.cli.times import parse_instant
 from chipglow.io import StoredScene, open_scene
 from chipglow.report import SceneSummary, draw_scene, scene_summary
+from chipglow.report.frames import shown_frame
 from chipglow.report.quantity import rounded_text
-from chipglow.report.scene_summary import frame_index
-from chipglow.scene import ENERGY_UNITS, Scene, Tool, ToolGeometry
+from chipglow.scene import ENERGY_UNITS, Raster, Scene, Tool, ToolGeometry
 
 _LONGEST: Final = 800
 _MOST_NUMBERS: Final = 8
@@ -59,7 +60,7 @@ def show_scene(path: Path, at: str | None, plot: Path | None) -> None:
 def _time_in(scene: Scene, at: str) -> float:
     time = parse_instant("--at", at)
     try:
-        frame_index(scene, time)
+        shown_frame(scene.times, time, "scene")
     except ValueError as error:
         raise ValueError(f"--at: {error}") from None
     return time
@@ -77,13 +78,7 @@ def listed(rows: _Rows) -> Table:
 
 def _facts(scene: StoredScene, summary: SceneSummary, path: Path) -> _Rows:
     raster, times, data = summary.raster, summary.times, scene.data
-    left, right, bottom, top = (f"{1e6 * edge:.6g} µm" for edge in raster.extent)
-    yield "samples", f"{raster.columns} x {raster.rows} of {1e6 * raster.spacing:.6g} µm"
-    yield "x", f"{left} to {right}"
-    yield "y", f"{bottom} to {top}"
-    yield "frames", f"{len(times)}, {microseconds(times[0])} to {microseconds(times[-1])}"
-    if len(times) > 1:
-        yield "interval", interval_text(np.diff(times))
+    yield from where_and_when("samples", raster, times)
     yield "tool", _tool_text(scene.tool) if scene.tool else "not given"
     yield "material coordinates", "yes" if scene.has_material_coordinates else "no"
     if "force_time" in data:
@@ -95,7 +90,18 @@ def _facts(scene: StoredScene, summary: SceneSummary, path: Path) -> _Rows:
     yield "file", f"{size / 1e6:,.1f} MB, {each:.2g} bytes a sample ({scene.compression})"
 
 
-def interval_text(steps: Any) -> str:
+def where_and_when(name: str, raster: Raster, times: NDArray[np.float64]) -> _Rows:
+    """Where samples or pixels are, and when the frames."""
+    left, right, bottom, top = (f"{1e6 * edge:.6g} µm" for edge in raster.extent)
+    yield name, f"{raster.columns} x {raster.rows} of {1e6 * raster.spacing:.6g} µm"
+    yield "x", f"{left} to {right}"
+    yield "y", f"{bottom} to {top}"
+    yield "frames", f"{len(times)}, {microseconds(times[0])} to {microseconds(times[-1])}"
+    if len(times) > 1:
+        yield "interval", _interval_text(np.diff(times))
+
+
+def _interval_text(steps: NDArray[np.float64]) -> str:
     """Time between frames, or between which times it is."""
     least, mean, greatest = (float(f(steps)) for f in (np.min, np.mean, np.max))
     if greatest - least < 1e-3 * mean:

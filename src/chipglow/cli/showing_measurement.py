@@ -5,13 +5,12 @@ from math import degrees
 from pathlib import Path
 from typing import Final
 
-import numpy as np
 from rich.console import Console
 
 from chipglow.camera import Flag, Measurement
 from chipglow.cli.assumed import say_assumed, say_doubtful
 from chipglow.cli.pictures import check_picture_path, write_picture
-from chipglow.cli.showing import attribute_rows, interval_text, listed, microseconds
+from chipglow.cli.showing import attribute_rows, listed, microseconds, where_and_when
 from chipglow.cli.times import parse_instant
 from chipglow.io import read_measurement
 from chipglow.report import MeasurementSummary, draw_measurement, measurement_summary
@@ -80,15 +79,9 @@ def say_measurement(measurement: Measurement, time: float | None = None) -> None
 
 
 def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tuple[str, str]]:
-    raster, times, data = measurement.raster, measurement.times, measurement.data
-    left, right, bottom, top = (f"{1e6 * edge:.6g} µm" for edge in raster.extent)
-    yield "pixels", f"{raster.columns} x {raster.rows} of {1e6 * raster.spacing:.6g} µm"
-    yield "x", f"{left} to {right}"
-    yield "y", f"{bottom} to {top}"
-    yield "frames", f"{len(times)}, {microseconds(times[0])} to {microseconds(times[-1])}"
-    if len(times) > 1:
-        yield "interval", interval_text(np.diff(times))
-    if {"band_lower", "band_upper"} <= set(data.attrs):
+    times = measurement.times
+    yield from where_and_when("pixels", measurement.raster, times)
+    if {"band_lower", "band_upper"} <= set(measurement.data.attrs):
         band = measurement.band
         shape = "" if band.response is None else ", with a response curve"
         yield "band", f"{1e6 * band.lower:.4g} µm to {1e6 * band.upper:.4g} µm{shape}"

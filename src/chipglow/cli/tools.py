@@ -1,5 +1,6 @@
 """Tools on the command line: told, described in a file, or found in the image."""
 
+from dataclasses import dataclass
 from math import degrees
 
 from chipglow.analysis import FoundTool, find_tool
@@ -8,8 +9,26 @@ from chipglow.scene import Tool
 from chipglow.study import tool_of
 
 
-def chosen_tool(measurement: Measurement, tool: str | None) -> tuple[Tool, list[str]]:
-    """The tool that an option ``--tool`` chooses, and what is to be said of it.
+@dataclass(frozen=True)
+class ChosenTool:
+    """A tool, and what is to be said of it, sentences each.
+
+    Parameters
+    ----------
+    tool : Tool
+        The tool in the measurement's coordinates.
+    found, assumptions, doubts : tuple of str
+        What was found, what was assumed, and why it may not be relied on.
+    """
+
+    tool: Tool
+    found: tuple[str, ...] = ()
+    assumptions: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+
+def chosen_tool(measurement: Measurement, tool: str | None) -> ChosenTool:
+    """The tool that an option ``--tool`` chooses.
 
     Parameters
     ----------
@@ -27,20 +46,23 @@ def chosen_tool(measurement: Measurement, tool: str | None) -> tuple[Tool, list[
         If the file cannot be read.
     """
     if tool != "found":
-        return tool_of(measurement, tool), []
+        return ChosenTool(tool_of(measurement, tool))
     found = find_tool(measurement)
-    return found.tool, [*_found(found), *(f"Doubtful: {doubt}" for doubt in found.doubts)]
+    shape = found.tool.tool
+    assumed = (
+        f"clearance angle {degrees(shape.clearance_angle):.3g} deg, edge radius "
+        f"{1e6 * shape.corner_radius:.3g} um."
+    )
+    return ChosenTool(found.tool, (_found(found),), (assumed,), found.doubts)
 
 
-def _found(found: FoundTool) -> list[str]:
-    """What was found, with standard uncertainties, and what was assumed."""
-    shape, (x, y) = found.tool.tool, (1e6 * part for part in found.tool.tip)
-    return [
+def _found(found: FoundTool) -> str:
+    """What was found, with standard uncertainties."""
+    x, y = (1e6 * part for part in found.tool.tip)
+    return (
         f"Found: rake angle {degrees(found.tool.rake_angle):.1f} ± "
         f"{degrees(found.angle_uncertainty):.1f} deg; the rake face to "
         f"± {1e6 * found.position_uncertainty:.1f} um across itself; tip at x {x:.1f} um, "
         f"y {y:.1f} um, to ± {1e6 * found.tip_uncertainty:.0f} um along the face (standard "
-        "uncertainties).",
-        f"Assumed: clearance angle {degrees(shape.clearance_angle):.3g} deg, edge radius "
-        f"{1e6 * shape.corner_radius:.3g} um.",
-    ]
+        "uncertainties)."
+    )

@@ -1,7 +1,7 @@
 """Readers and writers: scenes, measurements, and output that is whole or not there."""
 
 from chipglow.io.atomic import atomic_folder, atomic_path
-from chipglow.io.band_file import check_band_profile_path, read_curve, write_band_profile
+from chipglow.io.band_file import read_curve, write_band_profile
 from chipglow.io.cameras import CAMERA_FORMATS, CameraFormat, read_recording, write_hcc
 from chipglow.io.comparison_file import write_comparison
 from chipglow.io.emissivity_file import (
@@ -23,7 +23,7 @@ from chipglow.io.movie_file import check_movie_path, movie_writer
 from chipglow.io.picture_file import read_pictures
 from chipglow.io.points_file import read_points
 from chipglow.io.psf_file import write_psf
-from chipglow.io.rake_grid_file import check_rake_grid_path, write_rake_grid
+from chipglow.io.rake_grid_file import write_rake_grid
 from chipglow.io.scene_file import (
     FORMAT_VERSION,
     SceneWriter,
@@ -31,6 +31,7 @@ from chipglow.io.scene_file import (
     open_scene,
     write_scene,
 )
+from chipglow.io.table_file import check_table_path
 from chipglow.io.tool_file import read_tool_outline
 from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 
@@ -46,9 +47,8 @@ __all__ = [
     "View",
     "atomic_folder",
     "atomic_path",
-    "check_band_profile_path",
     "check_movie_path",
-    "check_rake_grid_path",
+    "check_table_path",
     "import_scene",
     "is_measurement",
     "movie_writer",

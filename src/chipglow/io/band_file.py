@@ -1,9 +1,7 @@
 """Curves through a shear band, and the temperature along them, in files."""
 
-import csv
 import os
 from collections.abc import Iterator
-from math import isnan
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,12 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis import BandProfile
-from chipglow.io.atomic import atomic_path
-from chipglow.io.measurement_file import write_dataset
-from chipglow.io.point_table import read_points
-
-BAND_PROFILE_KINDS: Final = (".csv", ".nc")
-"""Endings of the files that `write_band_profile` can write."""
+from chipglow.io.polyline_file import read_polyline
+from chipglow.io.table_file import celsius_text, number_text, write_table_or_dataset
 
 _COLUMNS: Final = (
     "time_us",
@@ -28,7 +22,6 @@ _COLUMNS: Final = (
     "radiance_temperature_degC",
     "standard_uncertainty_K",
 )
-_FREEZING: Final = 273.15
 
 
 def read_curve(path: str | os.PathLike[str]) -> NDArray[np.float64]:
@@ -53,7 +46,7 @@ def read_curve(path: str | os.PathLike[str]) -> NDArray[np.float64]:
         If it cannot be read.
     """
     path = Path(path)
-    points = read_points(path)
+    points = read_polyline(path)
     if len(points) < 2:
         raise ValueError(f"{path}: {len(points)} points, expected 2 or more")
     curve = np.array(points)
@@ -61,18 +54,6 @@ def read_curve(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     if not finite.all():
         raise ValueError(f"{path}, line {int(finite.argmin()) + 2}: expected finite numbers")
     return curve
-
-
-def check_band_profile_path(path: Path) -> None:
-    """Check the name of a profile's file before anything is computed.
-
-    Raises
-    ------
-    ValueError
-        If it ends in something else than `BAND_PROFILE_KINDS`.
-    """
-    if path.suffix.lower() not in BAND_PROFILE_KINDS:
-        raise ValueError(f"{path}: expected a file that ends in {' or '.join(BAND_PROFILE_KINDS)}")
 
 
 def write_band_profile(profile: BandProfile, path: Path) -> None:
@@ -94,14 +75,7 @@ def write_band_profile(profile: BandProfile, path: Path) -> None:
     OSError
         If the file cannot be written.
     """
-    check_band_profile_path(path)
-    if path.suffix.lower() == ".nc":
-        write_dataset(_dataset(profile), path)
-        return
-    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(_COLUMNS)
-        table.writerows(_rows(profile))
+    write_table_or_dataset(path, _COLUMNS, _rows(profile), lambda: _dataset(profile))
 
 
 def _rows(profile: BandProfile) -> Iterator[tuple[Any, ...]]:
@@ -110,12 +84,11 @@ def _rows(profile: BandProfile) -> Iterator[tuple[Any, ...]]:
         for n in np.flatnonzero(np.isfinite(profile.points[frame, :, 0])):
             x, y = profile.points[frame, n]
             places = [f"{1e6 * value:.6g}" for value in (profile.distance[n], x, y)]
-            values = (profile.temperature[frame, n] - _FREEZING, uncertainty[frame, n])
-            yield (f"{1e6 * time:.10g}", stage.value, *places, *map(_number, values))
-
-
-def _number(value: float) -> str:
-    return "" if isnan(value) else f"{value:.4f}"
+            values = (
+                celsius_text(profile.temperature[frame, n]),
+                number_text(uncertainty[frame, n]),
+            )
+            yield (f"{1e6 * time:.10g}", stage.value, *places, *values)
 
 
 def _dataset(profile: BandProfile) -> xr.Dataset:
@@ -143,5 +116,9 @@ def _dataset(profile: BandProfile) -> xr.Dataset:
                 {"units": "m"},
             ),
         },
-        attrs={"width": profile.width, "notes": " ".join(profile.notes)},
+        attrs={
+            "width": profile.width,
+            "assumed": "\n".join(profile.assumptions),
+            "doubtful": "\n".join(profile.doubts),
+        },
     )

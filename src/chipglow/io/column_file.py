@@ -11,11 +11,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.io.small_text import read_small_text
 from chipglow.io.sources.conventions import Unit
 from chipglow.io.sources.unit_text import parse_unit
 from chipglow.radiometry import TabulatedResponse
-
-_LARGEST_FILE: Final = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -89,12 +88,7 @@ def read_columns(
         If it cannot be read.
     """
     path = Path(path)
-    if path.stat().st_size > _LARGEST_FILE:
-        raise ValueError(f"{path}: expected a file of up to {_LARGEST_FILE // 1000} kB")
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        raise ValueError(f"{path}: expected text in UTF-8") from None
+    lines = read_small_text(path).splitlines()
     rows = [(number, row) for number, row in enumerate(csv.reader(lines), 1) if any(row)]
     if len(rows) < 2:
         raise ValueError(
@@ -113,7 +107,7 @@ def read_columns(
     }
 
 
-def read_points(
+def read_calibration_points(
     path: str | os.PathLike[str], counts_of: Callable[[str], float]
 ) -> dict[str, NDArray[np.float64]]:
     """Read points of a calibration from a CSV file.
@@ -137,9 +131,8 @@ def read_points(
     OSError
         If it, or a recording, cannot be read.
     """
-    with Path(path).open(encoding="utf-8-sig", errors="replace") as file:
-        titles = [cell.strip() for cell in file.readline(_LARGEST_FILE).split(",")]
-    if "file" not in titles:
+    first = read_small_text(Path(path)).partition("\n")[0]
+    if "file" not in (cell.strip() for cell in first.split(",")):
         return read_columns(path, POINT_COLUMNS)
     file_column = Column("file", number_of=counts_of)
     table = read_columns(path, (TEMPERATURE, file_column, *_POINT_UNCERTAINTIES))

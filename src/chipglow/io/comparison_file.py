@@ -1,9 +1,7 @@
 """A comparison of measured and simulated in files."""
 
-import csv
 import json
 from collections.abc import Iterator
-from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,6 +9,7 @@ import numpy as np
 
 from chipglow.analysis import Comparison, PlaceResult, Reading, normalised_error
 from chipglow.io.atomic import RESULT_MARK
+from chipglow.io.table_file import celsius_text, number_text, write_table
 
 _TABLE: Final = "comparison.csv"
 _COLUMNS: Final = (
@@ -26,7 +25,6 @@ _COLUMNS: Final = (
     "difference_K",
     "E_n",
 )
-_FREEZING: Final = 273.15
 
 
 def write_comparison(comparison: Comparison, folder: Path) -> None:
@@ -38,18 +36,16 @@ def write_comparison(comparison: Comparison, folder: Path) -> None:
         What to write.
     folder : Path
         Gets ``comparison.csv``, a line for each value of each simulation with its expanded
-        uncertainty (k = 2), and ``summary.json``, the fits, sentences and notes; both with units
-        in the names of the columns and keys.
+        uncertainty (k = 2), and ``summary.json``, the fits, sentences and what is
+        assumed or doubtful; both with units in the names of the columns and keys.
     """
-    with (folder / _TABLE).open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(_COLUMNS)
-        table.writerows(_rows(comparison))
+    write_table(folder / _TABLE, _COLUMNS, _rows(comparison))
     summary = {
         "statement": comparison.statement,
         "simulations": list(comparison.labels),
         "places": [_place(result) for result in comparison.places],
-        "notes": list(comparison.notes),
+        "assumed": list(comparison.assumptions),
+        "doubtful": list(comparison.doubts),
     }
     text = json.dumps(summary, indent=1, ensure_ascii=False)
     (folder / RESULT_MARK).write_text(f"{text}\n", encoding="utf-8")
@@ -79,18 +75,14 @@ def _values(
 ) -> tuple[str, ...]:
     own, other = measured.temperature[at], simulated.temperature[at]
     return (
-        _number(own - _FREEZING),
-        _number(measured.expanded[at]),
+        celsius_text(own),
+        number_text(measured.expanded[at]),
         label,
-        _number(other - _FREEZING),
-        _number(simulated.expanded[at]),
-        _number(other - own),
-        _number(normalised_error(measured, simulated)[at]),
+        celsius_text(other),
+        number_text(simulated.expanded[at]),
+        number_text(other - own),
+        number_text(normalised_error(measured, simulated)[at]),
     )
-
-
-def _number(value: float) -> str:
-    return f"{value:.4f}" if isfinite(value) else ""
 
 
 def _place(result: PlaceResult) -> dict[str, Any]:

@@ -1,11 +1,10 @@
 """Determined emissivities in files: maps and regions as NetCDF-4, the table of regions as CSV."""
 
-import csv
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 import numpy as np
 import xarray as xr
@@ -20,13 +19,11 @@ from chipglow.analysis.emissivity import (
 from chipglow.analysis.observations import Scatter
 from chipglow.analysis.temperature import TrueTemperature
 from chipglow.camera import Flag
-from chipglow.io.atomic import atomic_path
-from chipglow.io.measurement_file import write_dataset
+from chipglow.io.measurement_file import Made, read_dataset, write_dataset
+from chipglow.io.table_file import write_table
 from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
 from chipglow.surface import MapSurface
-
-Made = TypeVar("Made")
 
 _KIND: Final = "emissivity map"
 _HEATING: Final = ("environment", "truth_uncertainty", "environment_uncertainty")
@@ -185,20 +182,12 @@ def read_emissivity_map(
 
 
 def _read(path: Path, made_of: Callable[[xr.Dataset], Made]) -> Made:
-    """What is made of a file, which is no map if that fails."""
-    if not path.is_file():
-        raise FileNotFoundError(f"{path}: there is no such file, expected an emissivity map")
-    try:
-        data = xr.load_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
+    def checked(data: xr.Dataset) -> Made:
         if data.attrs.get("kind") != _KIND:
             raise ValueError("it does not say that it is an emissivity map")
         return made_of(data)
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
-        reason = str(error).split("\n", 1)[0]
-        raise ValueError(
-            f"{path}: not an emissivity map, or cut short, expected a file of chipglow emissivity: "
-            f"{reason}"
-        ) from error
+
+    return read_dataset(path, checked, "an emissivity map", "a file of chipglow emissivity")
 
 
 def write_emissivity_table(rows: Sequence[RegionEmissivity], path: str | os.PathLike[str]) -> None:
@@ -213,15 +202,14 @@ def write_emissivity_table(rows: Sequence[RegionEmissivity], path: str | os.Path
     """
     head = ["region", "feature", "truth_K", "environment_K", *_COLUMNS]
     head += [f"{cause}_uncertainty" for cause in _BUDGET]
-    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(head)
-        for row in rows:
-            heating = row.heating
-            words = [row.name, row.feature, f"{heating.truth:.9g}", f"{heating.environment:.9g}"]
-            numbers = [_value(row, name) for name in _COLUMNS]
-            numbers += [row.budget[cause] for cause in _BUDGET]
-            writer.writerow([*words, *(f"{number:.9g}" for number in numbers)])
+    write_table(Path(path), head, map(_line, rows))
+
+
+def _line(row: RegionEmissivity) -> list[str]:
+    numbers = [row.heating.truth, row.heating.environment]
+    numbers += [_value(row, name) for name in _COLUMNS]
+    numbers += [row.budget[cause] for cause in _BUDGET]
+    return [row.name, row.feature, *(f"{number:.9g}" for number in numbers)]
 
 
 def write_temperature_table(rows: Sequence[TrueTemperature], path: str | os.PathLike[str]) -> None:
@@ -241,15 +229,13 @@ def write_temperature_table(rows: Sequence[TrueTemperature], path: str | os.Path
     head = ["region", "pixels", "left_out", *numbers]
     head[head.index("value")] = "true_temperature"
     head += [f"{cause}_uncertainty" for cause in (*_BUDGET[:3], "emissivity", *_BUDGET[3:])]
-    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(head)
-        for row in rows:
-            values = [getattr(row, name) for name in numbers]
-            values += [row.budget[name.removesuffix("_uncertainty")] for name in head[-6:]]
-            writer.writerow(
-                [row.name, row.pixels, row.left_out, *(f"{value:.9g}" for value in values)]
-            )
+
+    def line(row: TrueTemperature) -> list[Any]:
+        values = [getattr(row, name) for name in numbers]
+        values += [row.budget[name.removesuffix("_uncertainty")] for name in head[-6:]]
+        return [row.name, row.pixels, row.left_out, *(f"{value:.9g}" for value in values)]
+
+    write_table(Path(path), head, map(line, rows))
 
 
 _COLUMNS: Final = (

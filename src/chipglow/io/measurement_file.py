@@ -1,7 +1,9 @@
 """Measurements in NetCDF-4 files."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import h5py
 import numpy as np
@@ -9,6 +11,8 @@ import xarray as xr
 
 from chipglow.camera.measurement import MEASUREMENT_UNITS, Measurement
 from chipglow.io.atomic import KeptErrorFile, atomic_path
+
+Made = TypeVar("Made")
 
 
 def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) -> None:
@@ -73,14 +77,33 @@ def read_measurement(path: str | os.PathLike[str]) -> Measurement:
     ValueError
         If the file is cut short or not a measurement; the message names the file.
     """
-    path = Path(path)
+    return read_dataset(Path(path), Measurement, "a measurement", "a NetCDF-4 file")
+
+
+def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, kind: str) -> Made:
+    """What is made of a NetCDF-4 file, which is no such thing if that fails.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    made_of : callable
+        Makes it of the file's data; may raise ValueError or KeyError.
+    what, kind : str
+        What it should be, and of what kind the file, for errors.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If it is cut short or something else; the message names the file.
+    """
     if not path.is_file():
-        raise FileNotFoundError(f"{path}: there is no such file, expected a measurement")
+        raise FileNotFoundError(f"{path}: there is no such file, expected {what}")
     try:
         data = xr.load_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
-        return Measurement(data)
+        return made_of(data)
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         reason = str(error).split("\n", 1)[0]
-        raise ValueError(
-            f"{path}: not a measurement, or cut short, expected a NetCDF-4 file: {reason}"
-        ) from error
+        raise ValueError(f"{path}: not {what}, or cut short, expected {kind}: {reason}") from error

@@ -8,12 +8,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.io.small_text import read_small_text
 from chipglow.scene import Raster
 
 _VISIBLE: Final = ["visible_column", "visible_row"]
 _BY_LENGTH: Final = ["x_um", "y_um", *_VISIBLE]
 _BY_PIXEL: Final = ["infrared_column", "infrared_row", *_VISIBLE]
-_LARGEST_FILE: Final = 1_000_000
 _HALF: Final = 0.5
 
 
@@ -47,12 +47,7 @@ def read_points(
         If it cannot be read.
     """
     path = Path(path)
-    if path.stat().st_size > _LARGEST_FILE:
-        raise ValueError(f"{path}: expected a file of up to {_LARGEST_FILE // 1000} kB")
-    try:
-        lines = path.read_text(encoding="utf-8-sig").rstrip().splitlines()
-    except UnicodeDecodeError:
-        raise ValueError(f"{path}: expected text in UTF-8") from None
+    lines = read_small_text(path).rstrip().splitlines()
     rows = [[cell.strip() for cell in row] for row in csv.reader(lines)] or [[]]
     if rows[0] not in (_BY_LENGTH, _BY_PIXEL):
         raise ValueError(

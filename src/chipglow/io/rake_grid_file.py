@@ -1,20 +1,14 @@
 """Analysis grids on the rake face in files."""
 
-import csv
 from collections.abc import Iterator
-from math import isnan
 from pathlib import Path
 from typing import Any, Final
 
 import xarray as xr
 
 from chipglow.analysis import RakeGrid
-from chipglow.io.atomic import atomic_path
-from chipglow.io.measurement_file import write_dataset
+from chipglow.io.table_file import celsius_text, number_text, write_table_or_dataset
 from chipglow.scene.tool_attributes import tool_attributes
-
-RAKE_GRID_KINDS: Final = (".csv", ".nc")
-"""Endings of the files that `write_rake_grid` can write."""
 
 _COLUMNS: Final = (
     "time_us",
@@ -24,19 +18,6 @@ _COLUMNS: Final = (
     "deviation_K",
     "usable_pixels",
 )
-_FREEZING: Final = 273.15
-
-
-def check_rake_grid_path(path: Path) -> None:
-    """Check the name of a grid's file before anything is computed.
-
-    Raises
-    ------
-    ValueError
-        If it ends in something else than `RAKE_GRID_KINDS`.
-    """
-    if path.suffix.lower() not in RAKE_GRID_KINDS:
-        raise ValueError(f"{path}: expected a file that ends in {' or '.join(RAKE_GRID_KINDS)}")
 
 
 def write_rake_grid(grid: RakeGrid, path: Path) -> None:
@@ -59,14 +40,7 @@ def write_rake_grid(grid: RakeGrid, path: Path) -> None:
     OSError
         If the file cannot be written.
     """
-    check_rake_grid_path(path)
-    if path.suffix.lower() == ".nc":
-        write_dataset(_dataset(grid), path)
-        return
-    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file)
-        table.writerow(_COLUMNS)
-        table.writerows(_rows(grid))
+    write_table_or_dataset(path, _COLUMNS, _rows(grid), lambda: _dataset(grid))
 
 
 def _rows(grid: RakeGrid) -> Iterator[tuple[Any, ...]]:
@@ -75,12 +49,8 @@ def _rows(grid: RakeGrid) -> Iterator[tuple[Any, ...]]:
             for n, along in enumerate(grid.along):
                 place = (f"{1e6 * time:.10g}", f"{1e6 * depth:.10g}", f"{1e6 * along:.10g}")
                 mean, deviation = grid.mean[frame, m, n], grid.deviation[frame, m, n]
-                values = (_number(mean - _FREEZING), _number(deviation))
+                values = (celsius_text(mean), number_text(deviation))
                 yield (*place, *values, int(grid.count[frame, m, n]))
-
-
-def _number(value: float) -> str:
-    return "" if isnan(value) else f"{value:.4f}"
 
 
 def _dataset(grid: RakeGrid) -> xr.Dataset:

@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from chipglow.io.point_table import read_points
+from chipglow.io.polyline_file import read_polyline
 from chipglow.scene import ToolOutline, ToolOutlineError
 
 
@@ -26,7 +26,7 @@ def read_tool_outline(path: str | os.PathLike[str]) -> ToolOutline:
         If it cannot be read.
     """
     path = Path(path)
-    points = read_points(path)
+    points = read_polyline(path)
     try:
         return ToolOutline.placed(points)
     except ToolOutlineError as error:

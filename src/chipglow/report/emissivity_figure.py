@@ -6,7 +6,6 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from chipglow.analysis.emissivity import EmissivityLine, EmissivityMap
 from chipglow.analysis.regions import Region
 from chipglow.report import drawing
-from chipglow.report.drawing import BLUE, GREEN, KELVIN, VERMILLION, WIDTH, ImagePanel
+from chipglow.report.drawing import BLUE, GREEN, KELVIN, VERMILLION, ImagePanel
 from chipglow.scene import Raster
 
 _COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
@@ -58,8 +57,7 @@ def draw_emissivity(
     height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, 1.0), 5.0) + _AROUND
     with drawing.style():
         total = height + (_LINES if lines else 0.0)
-        figure = Figure(figsize=(WIDTH, total), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = drawing.new_figure(total)
         parts: Any = figure.subfigures(2, 1, height_ratios=(height, _LINES)) if lines else (figure,)
         for axes, panel in zip(parts[0].subplots(1, 2, sharey=True), panels, strict=True):
             panel.draw(parts[0], axes, raster, None)

@@ -5,13 +5,12 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from chipglow.analysis.knife_edge import EdgeResult, KnifeEdge
 from chipglow.analysis.psf_fit import FittedEdge
 from chipglow.report import drawing
-from chipglow.report.drawing import BLUE, GREY, VERMILLION, VOID, WIDTH
+from chipglow.report.drawing import BLUE, GREY, VERMILLION, VOID
 from chipglow.report.knife_edge_summary import with_uncertainty
 from chipglow.scene import Raster
 
@@ -30,8 +29,7 @@ def draw_knife_edge(found: KnifeEdge) -> Figure:
     """
     heights = [_HEIGHT] * len(found.edges) + ([_APERTURES] if found.apertures else [])
     with drawing.style():
-        figure = Figure(figsize=(WIDTH, sum(heights) + 0.4), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = drawing.new_figure(sum(heights) + 0.4)
         width = with_uncertainty(found.fwhm * 1e6, found.fwhm_uncertainty * 1e6)
         figure.suptitle(f"{found.best.model.name}: optics {width} µm wide (FWHM)")
         parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)

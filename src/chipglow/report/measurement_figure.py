@@ -4,15 +4,14 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
 from chipglow.report import drawing
-from chipglow.report.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, VOID, WIDTH, ImagePanel
-from chipglow.report.measurement_summary import measured_frame
+from chipglow.report.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, VOID, ImagePanel
+from chipglow.report.frames import shown_frame
 
 _FLAGS: Final = {
     Flag.BELOW_FLOOR: ("below the floor", VOID),
@@ -40,14 +39,13 @@ def draw_measurement(measurement: Measurement, time: float | None = None) -> Fig
     ValueError
         If the time is not within the measurement.
     """
-    index = measured_frame(measurement, time)
+    index = shown_frame(measurement.times, time, "measurement")
     celsius = measurement.radiance_temperature()[index] - KELVIN
     flags, raster = measurement.flags[index], measurement.raster
     least, most = _IMAGE_HEIGHTS
     height = min(max(5.6 * raster.rows / raster.columns, least), most)
     with drawing.style():
-        figure = Figure(figsize=(WIDTH, height + _HISTOGRAM + 0.9), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = drawing.new_figure(height + _HISTOGRAM + 0.9)
         upper, lower = figure.subplots(2, 1, height_ratios=(height, _HISTOGRAM))
         title = f"{measurement.times[index] * 1e6:.6g} µs"
         panel = ImagePanel(

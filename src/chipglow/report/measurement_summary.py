@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera import UNUSABLE, Flag, Measurement, flag_shares
+from chipglow.camera import Flag, Measurement, flag_shares
+from chipglow.report.frames import shown_frame
 
 
 @dataclass(frozen=True)
@@ -52,36 +53,16 @@ def measurement_summary(measurement: Measurement, time: float | None = None) -> 
     ValueError
         If the time is not within the measurement.
     """
-    index = measured_frame(measurement, time)
+    index = shown_frame(measurement.times, time, "measurement")
     kelvins = measurement.radiance_temperature()
     return MeasurementSummary(
         index,
-        float(np.mean(measurement.flags & UNUSABLE == 0)),
+        float(np.mean(measurement.usable)),
         flag_shares(measurement),
         _spread(kelvins[index]),
         _spread(kelvins),
         _uncertainty(measurement, kelvins),
     )
-
-
-def measured_frame(measurement: Measurement, time: float | None) -> int:
-    """Number of the frame nearest to a time in s; of the middle one by default.
-
-    Raises
-    ------
-    ValueError
-        If the time is not within the measurement.
-    """
-    times = measurement.times
-    if time is None:
-        return len(times) // 2
-    margin = 1e-9 + (np.diff(times).min() / 2 if len(times) > 1 else 0.0)
-    if not times[0] - margin <= time <= times[-1] + margin:
-        raise ValueError(
-            f"{time * 1e6:g} us is not in the measurement, expected {times[0] * 1e6:g} us to "
-            f"{times[-1] * 1e6:g} us"
-        )
-    return int(np.argmin(np.abs(times - time)))
 
 
 def _spread(kelvins: NDArray[np.float64]) -> tuple[float, float, float] | None:

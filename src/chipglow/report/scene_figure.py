@@ -5,14 +5,14 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.report import drawing
-from chipglow.report.drawing import BLUE, GREY, VERMILLION, VOID, WIDTH, ImagePanel
-from chipglow.report.scene_summary import RATE, STRAIN, TEMPERATURE, frame_index
+from chipglow.report.drawing import BLUE, GREY, VERMILLION, VOID, ImagePanel
+from chipglow.report.frames import shown_frame
+from chipglow.report.scene_summary import RATE, STRAIN, TEMPERATURE
 from chipglow.scene import FILLED, Frame, Material, Raster, Scene, Tool
 
 _COLOURS: Final = {Material.VOID: VOID, Material.WORKPIECE: BLUE, Material.TOOL: GREY}
@@ -41,12 +41,11 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
     ValueError
         If the time is not within the scene.
     """
-    frame = scene.frame(frame_index(scene, time))
+    frame = scene.frame(shown_frame(scene.times, time, "scene"))
     raster, tool, panels = scene.raster, scene.tool, _panels(frame)
     with drawing.style():
         images = _ROWS * (_panel_height(raster) + _AROUND) + _AROUND
-        figure = Figure(figsize=(WIDTH, images + _HISTOGRAMS), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = drawing.new_figure(images + _HISTOGRAMS)
         figure.suptitle(f"{frame.time * 1e6:.6g} µs")
         parts: Any = figure.subfigures(2, 1, height_ratios=(images, _HISTOGRAMS))
         top, bottom = parts

@@ -7,6 +7,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.report.frames import shown_frame
 from chipglow.scene import FILLED, Frame, Material, Raster, Scene
 
 _SAMPLED: Final = 5
@@ -144,7 +145,7 @@ def scene_summary(scene: Scene, time: float | None = None) -> SceneSummary:
     ValueError
         If the time is not within the scene.
     """
-    index = frame_index(scene, time)
+    index = shown_frame(scene.times, time, "scene")
     last = len(scene.times) - 1
     sampled = tuple(sorted({index, *np.linspace(0, last, _SAMPLED).astype(int).tolist()}))
     frame = scene.frame(index)
@@ -158,31 +159,6 @@ def scene_summary(scene: Scene, time: float | None = None) -> SceneSummary:
         shares={kind: float(np.mean(frame.material == kind)) for kind in Material},
         quality=quality_of(frame),
     )
-
-
-def frame_index(scene: Scene, time: float | None) -> int:
-    """Number of the frame nearest to a time in s; the middle one for None.
-
-    Raises
-    ------
-    ValueError
-        If the time is not within the scene: half a frame before its first to half a frame after
-        its last.
-    """
-    times = scene.times
-    if time is None:
-        return (len(times) - 1) // 2
-    first, last, slack = times[0], times[-1], scene.frame_spacing / 2 + 1e-12
-    if not first - slack <= time <= last + slack:
-        raise ValueError(
-            f"{_microseconds(time)} is not in the scene, expected {_microseconds(first)} to "
-            f"{_microseconds(last)}"
-        )
-    return int(np.abs(times - time).argmin())
-
-
-def _microseconds(time: float) -> str:
-    return f"{time * 1e6:.7g} us"
 
 
 _Limits: TypeAlias = dict[str, tuple[float, float]]

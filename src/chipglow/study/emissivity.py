@@ -17,11 +17,12 @@ _FIELDS: Final[Mapping[str, str]] = {
     "workpiece": "workpiece",
     "tool": "tool",
 }
+_CHIP: Final = "measured chip"
 _DIGITS: Final = 4
 _GREATEST_DEVIATION: Final = 0.5
 
 
-def surface_text(rows: Iterable[RegionEmissivity], chip: str = "measured chip") -> str:
+def surface_text(rows: Iterable[RegionEmissivity]) -> str:
     """Sections of a study with the emissivities of its features, as YAML.
 
     Parameters
@@ -29,8 +30,6 @@ def surface_text(rows: Iterable[RegionEmissivity], chip: str = "measured chip") 
     rows : iterable of RegionEmissivity
         Determined emissivities. What they are of is known by the name of their feature: chip body,
         fissure or shear band, workpiece, tool.
-    chip : str
-        Name of the chip in the study.
 
     Returns
     -------
@@ -49,8 +48,8 @@ def surface_text(rows: Iterable[RegionEmissivity], chip: str = "measured chip") 
     surface: dict[str, Any] = {}
     sections: dict[str, Any] = {"surface": surface}
     if {"body", "shear_band"} <= set(found):
-        surface["chips"] = {chip: {name: found[name] for name in ("body", "shear_band")}}
-        sections["analysis"] = {"rake_chip": chip, "band_chip": chip}
+        surface["chips"] = {_CHIP: {name: found[name] for name in ("body", "shear_band")}}
+        sections["analysis"] = {"rake_chip": _CHIP, "band_chip": _CHIP}
     surface |= {name: found[name] for name in ("workpiece", "tool") if name in found}
     if not surface:
         return ""

@@ -36,6 +36,22 @@ BandText = Annotated[str, AfterValidator(_limits_or_file)]
 MaskText = Annotated[str, AfterValidator(_mask_or_file)]
 
 
+def band_of(text: str) -> Band:
+    """A camera's band, by its limits such as ``3.8-5.1 um`` or by the .csv file of its response.
+
+    Raises
+    ------
+    ValueError
+        If the limits are none, or the file is no table of a response.
+    OSError
+        If the file cannot be read.
+    """
+    if text.lower().endswith(".csv"):
+        response = read_response(text)
+        return Band(*response.limits, response)
+    return Band(*WAVELENGTHS.parse_range(text))
+
+
 class ObjectSection(Section):
     """What the camera was told of the object, where the file does not say it or says it wrong."""
 
@@ -173,12 +189,7 @@ class MeasurementDescription(Section):
 
     def known_band(self) -> Band | None:
         """The band, if it is said."""
-        if self.band is None:
-            return None
-        if self.band.lower().endswith(".csv"):
-            response = read_response(self.band)
-            return Band(*response.limits, response)
-        return Band(*WAVELENGTHS.parse_range(self.band))
+        return None if self.band is None else band_of(self.band)
 
     def applied_to(self, recording: Recording) -> Recording:
         """What the file says, but for what is said here."""

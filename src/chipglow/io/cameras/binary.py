@@ -72,6 +72,23 @@ class Binary:
         return {name: row[name].item() for name in row.dtype.names}
 
 
+def layout(size: int, **fields: tuple[str, int]) -> np.dtype[Any]:
+    """Structured type of a header.
+
+    Parameters
+    ----------
+    size : int
+        Bytes of the header.
+    **fields
+        Kind, as numpy writes it, and first byte of each field.
+    """
+    kinds, places = zip(*fields.values(), strict=True)
+    names = list(fields)
+    return np.dtype(
+        {"names": names, "formats": list(kinds), "offsets": list(places), "itemsize": size}
+    )
+
+
 @contextmanager
 def opened(path: Path) -> Iterator[Binary]:
     """Open a file.
@@ -186,6 +203,25 @@ def stamped_times(
         "that ascend."
     )
     return even_times(frames, 1 / rate)
+
+
+def common_exposure(exposures: NDArray[np.float64], notes: list[str]) -> float | None:
+    """The integration time in s that all frames have; None if they differ or it is not told.
+
+    Parameters
+    ----------
+    exposures : ndarray
+        Integration time of each frame in s, shape (frames,); 0 where it is not told.
+    notes : list of str
+        Takes between which times they are, if they differ.
+    """
+    least, greatest = float(exposures.min()), float(exposures.max())
+    if least == greatest:
+        return least or None
+    notes.append(
+        f"Doubtful: the integration time goes from {least * 1e6:g} us to {greatest * 1e6:g} us."
+    )
+    return None
 
 
 def object_parameters(notes: list[str], **given: float | None) -> ObjectParameters:

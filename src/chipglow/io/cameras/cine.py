@@ -14,26 +14,16 @@ from chipglow.io.cameras.binary import (
     Binary,
     check_picture,
     chosen_frames,
+    common_exposure,
     even_times,
     first_moment,
+    layout,
     opened,
     stamped_times,
 )
 from chipglow.io.sources.source import SourceError
 
-
-def _layout(itemsize: int, **fields: tuple[str, int]) -> np.dtype[Any]:
-    return np.dtype(
-        {
-            "names": list(fields),
-            "formats": [kind for kind, _ in fields.values()],
-            "offsets": [offset for _, offset in fields.values()],
-            "itemsize": itemsize,
-        }
-    )
-
-
-_FILE: Final = _layout(
+_FILE: Final = layout(
     44,
     mark=("S2", 0),
     compression=("<u2", 4),
@@ -44,10 +34,10 @@ _FILE: Final = _layout(
     places=("<u4", 32),
     trigger=("<u8", 36),
 )
-_PICTURE: Final = _layout(
+_PICTURE: Final = layout(
     40, width=("<i4", 4), height=("<i4", 8), bits=("<u2", 14), packing=("<u4", 16)
 )
-_SETUP: Final = _layout(
+_SETUP: Final = layout(
     1600,
     mark=("S2", 140),
     length=("<u2", 142),
@@ -280,10 +270,4 @@ def _integration_time(
     exposures = _of_frames(binary, blocks, _EXPOSURES, header["count"], "<u4")
     if exposures is None:
         return setup["shutter"] * 1e-9 or None
-    some = np.unique(exposures[list(chosen)]) * _TICK
-    if len(some) > 1:
-        notes.append(
-            f"Doubtful: the integration time goes from {some[0] * 1e6:g} us to "
-            f"{some[-1] * 1e6:g} us."
-        )
-    return float(some[0]) if len(some) == 1 and some[0] > 0 else None
+    return common_exposure(exposures[list(chosen)] * _TICK, notes)

@@ -14,39 +14,34 @@ from chipglow.io.cameras.binary import (
     Binary,
     check_picture,
     chosen_frames,
+    common_exposure,
     even_times,
     first_moment,
+    layout,
     opened,
     stamped_times,
 )
 from chipglow.io.sources.source import SourceError
 
-_FIELDS: Final = {
-    "signature": ("S2", 0),
-    "minor": ("u1", 2),
-    "major": ("u1", 3),
-    "header_length": ("<u2", 4),
-    "frame": ("<u4", 8),
-    "data_offset": ("<f4", 12),
-    "data_exponent": ("i1", 16),
-    "exposure": ("<u4", 24),
-    "mode": ("u1", 28),
-    "width": ("<u2", 32),
-    "height": ("<u2", 34),
-    "rate": ("<u4", 44),
-    "seconds": ("<u4", 100),
-    "subseconds": ("<u4", 104),
-    "filter_position": ("u1", 128),
-    "resolution": ("u1", 225),
-    "serial": ("<u4", 248),
-}
-_HEADER: Final = np.dtype(
-    {
-        "names": list(_FIELDS),
-        "formats": [kind for kind, _ in _FIELDS.values()],
-        "offsets": [offset for _, offset in _FIELDS.values()],
-        "itemsize": 256,
-    }
+_HEADER: Final = layout(
+    256,
+    signature=("S2", 0),
+    minor=("u1", 2),
+    major=("u1", 3),
+    header_length=("<u2", 4),
+    frame=("<u4", 8),
+    data_offset=("<f4", 12),
+    data_exponent=("i1", 16),
+    exposure=("<u4", 24),
+    mode=("u1", 28),
+    width=("<u2", 32),
+    height=("<u2", 34),
+    rate=("<u4", 44),
+    seconds=("<u4", 100),
+    subseconds=("<u4", 104),
+    filter_position=("u1", 128),
+    resolution=("u1", 225),
+    serial=("<u4", 248),
 )
 _EXPOSURE: Final = 1e-8
 _RATE: Final = 1e-3
@@ -196,15 +191,9 @@ def _times(
 
 
 def _integration_time(headers: NDArray[Any], notes: list[str]) -> float | None:
-    times = np.unique(headers["exposure"]) * _EXPOSURE
-    if len(times) > 1:
-        notes.append(
-            f"Doubtful: the integration time goes from {times[0] * 1e6:g} us to "
-            f"{times[-1] * 1e6:g} us."
-        )
     if len(np.unique(headers["filter_position"])) > 1:
         notes.append("Doubtful: the filter wheel turned between frames.")
-    return float(times[0]) if len(times) == 1 and times[0] > 0 else None
+    return common_exposure(headers["exposure"] * _EXPOSURE, notes)
 
 
 def _saturation(first: dict[str, Any]) -> float | None:

@@ -13,6 +13,7 @@ from chipglow.io.cameras.binary import (
     check_picture,
     chosen_frames,
     even_times,
+    layout,
     object_parameters,
     opened,
     stamped_times,
@@ -21,52 +22,45 @@ from chipglow.io.cameras.binary import (
 from chipglow.io.sources.source import SourceError
 
 # Places as in the Altair Reference Guide DL002U-D, after pyradi's ryptw.
-_FIELDS: Final = {
-    "signature": ("S5", 0),
-    "header_size": ("<u4", 11),
-    "frame_header_size": ("<u4", 15),
-    "frame_size": ("<u4", 19),
-    "frames": ("<u4", 27),
-    "year": ("<u2", 35),
-    "day": ("u1", 37),
-    "month": ("u1", 38),
-    "minute": ("u1", 39),
-    "hour": ("u1", 40),
-    "camera": ("S20", 44),
-    "lens": ("S20", 64),
-    "filter": ("S20", 84),
-    "emissivity": ("<f4", 141),
-    "ambient": ("<f4", 145),
-    "distance": ("<f4", 149),
-    "transmission": ("<f4", 170),
-    "atmosphere": ("<f4", 184),
-    "cut_on": ("<f4", 188),
-    "cut_off": ("<f4", 192),
-    "serial": ("S11", 220),
-    "scale": ("<u2", 277),
-    "scale_unit": ("S10", 279),
-    "columns": ("<u2", 377),
-    "rows": ("<u2", 379),
-    "bits": ("<u2", 381),
-    "period": ("<f4", 403),
-    "integration_time": ("<f4", 407),
-    "comment": ("S1000", 563),
-}
-_HEADER: Final = np.dtype(
-    {
-        "names": list(_FIELDS),
-        "formats": [kind for kind, _ in _FIELDS.values()],
-        "offsets": [offset for _, offset in _FIELDS.values()],
-        "itemsize": 1563,
-    }
+_HEADER: Final = layout(
+    1563,
+    signature=("S5", 0),
+    header_size=("<u4", 11),
+    frame_header_size=("<u4", 15),
+    frame_size=("<u4", 19),
+    frames=("<u4", 27),
+    year=("<u2", 35),
+    day=("u1", 37),
+    month=("u1", 38),
+    minute=("u1", 39),
+    hour=("u1", 40),
+    camera=("S20", 44),
+    lens=("S20", 64),
+    filter=("S20", 84),
+    emissivity=("<f4", 141),
+    ambient=("<f4", 145),
+    distance=("<f4", 149),
+    transmission=("<f4", 170),
+    atmosphere=("<f4", 184),
+    cut_on=("<f4", 188),
+    cut_off=("<f4", 192),
+    serial=("S11", 220),
+    scale=("<u2", 277),
+    scale_unit=("S10", 279),
+    columns=("<u2", 377),
+    rows=("<u2", 379),
+    bits=("<u2", 381),
+    period=("<f4", 403),
+    integration_time=("<f4", 407),
+    comment=("S1000", 563),
 )
-_STAMP: Final = np.dtype(
-    {
-        "names": ["minute", "hour", "hundredths", "second", "thousandths"],
-        "formats": ["u1"] * 5,
-        "offsets": [80, 81, 82, 83, 160],
-        "itemsize": 161,
-    }
+_STAMP: Final = layout(
+    161,
+    minute=("u1", 80),
+    hour=("u1", 81),
+    hundredths=("u1", 82),
+    second=("u1", 83),
+    thousandths=("u1", 160),
 )
 _LOCK_IN: Final = (1220, 3907, 1204, 2382)
 _DAY: Final = 86_400.0

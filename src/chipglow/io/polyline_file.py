@@ -1,15 +1,16 @@
-"""Rows of points from CSV files: outlines of tools, curves."""
+"""Polylines from CSV files: outlines of tools, curves."""
 
 import csv
 from pathlib import Path
 from typing import Final
 
+from chipglow.io.small_text import read_small_text
+
 _HEADER: Final = ["x_um", "y_um"]
-_LARGEST_FILE: Final = 1_000_000
 
 
-def read_points(path: Path) -> list[tuple[float, float]]:
-    """Read points from a CSV file.
+def read_polyline(path: Path) -> list[tuple[float, float]]:
+    """Read the corners of a polyline from a CSV file.
 
     Parameters
     ----------
@@ -28,12 +29,7 @@ def read_points(path: Path) -> list[tuple[float, float]]:
     OSError
         If it cannot be read.
     """
-    if path.stat().st_size > _LARGEST_FILE:
-        raise ValueError(f"{path}: expected a file of up to {_LARGEST_FILE // 1000} kB")
-    try:
-        lines = path.read_text(encoding="utf-8-sig").rstrip().splitlines()
-    except UnicodeDecodeError:
-        raise ValueError(f"{path}: expected text in UTF-8") from None
+    lines = read_small_text(path).rstrip().splitlines()
     rows = [[cell.strip() for cell in row] for row in csv.reader(lines)] or [[]]
     if rows[0] != _HEADER:
         raise ValueError(

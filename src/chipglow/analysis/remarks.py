@@ -1,0 +1,19 @@
+"""What an analysis has to assume and what is doubtful in it, collected on the way."""
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Remarks:
+    """Sentences, each without a word such as "Doubtful" before it.
+
+    Parameters
+    ----------
+    assumptions : list of str
+        What had to be assumed.
+    doubts : list of str
+        Why the result may not be relied on.
+    """
+
+    assumptions: list[str] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
