@@ -1,11 +1,20 @@
 """Tools on the command line: told, described in a file, or found in the image."""
 
-from math import degrees
+from math import degrees, hypot
+from typing import Final
+
+import numpy as np
 
 from chipglow.analysis import FoundTool, find_tool
 from chipglow.camera import Measurement
 from chipglow.scene import Tool
 from chipglow.study import tool_of
+
+_FACE: Final = 200e-6
+"""Length of the face in m on which a tool that was told is compared with one that is seen."""
+
+_CLEARLY: Final = 4.0
+"""Two places of the face differ if they are this many standard uncertainties apart, or more."""
 
 
 def chosen_tool(measurement: Measurement, tool: str | None) -> tuple[Tool, list[str]]:
@@ -26,10 +35,33 @@ def chosen_tool(measurement: Measurement, tool: str | None) -> tuple[Tool, list[
     OSError
         If the file cannot be read.
     """
+    if tool is None:
+        return tool_of(measurement, None), []
     if tool != "found":
-        return tool_of(measurement, tool), []
+        told = tool_of(measurement, tool)
+        return told, _contradicted(measurement, told)
     found = find_tool(measurement)
     return found.tool, [*_found(found), *(f"Doubtful: {doubt}" for doubt in found.doubts)]
+
+
+def _contradicted(measurement: Measurement, told: Tool) -> list[str]:
+    """A doubt, if the image clearly shows a rake face elsewhere than where the tool's is said."""
+    try:
+        found = find_tool(measurement)
+    except ValueError:
+        return []
+    seen = found.tool.rake_point(np.array([0.0, _FACE]))
+    offsets = (seen - told.rake_point(np.array([0.0, _FACE]))) @ np.array(told.rake_normal)
+    allowed = hypot(found.position_uncertainty, _FACE / 2.0 * found.angle_uncertainty)
+    offset = float(np.abs(offsets).max())
+    if offset <= _CLEARLY * allowed:
+        return []
+    return [
+        f"Doubtful: the rake face that shows in the image is {1e6 * offset:.0f} um from that "
+        f"of the tool's file (the file's rake angle is {degrees(told.rake_angle):.1f} deg, the "
+        f"image's {degrees(found.tool.rake_angle):.1f} ± {degrees(found.angle_uncertainty):.1f} "
+        "deg): the tip, the origin of coordinates, or which way the image is up may be wrong."
+    ]
 
 
 def _found(found: FoundTool) -> list[str]:
