@@ -81,6 +81,7 @@ def compare(
     from rich.console import Console
 
     from chipglow.analysis import compare as compare_all
+    from chipglow.cli.assumed import say_of_measurements
     from chipglow.cli.pictures import check_picture_path, write_picture
     from chipglow.cli.times import frame_at
     from chipglow.cli.tools import chosen_tool
@@ -108,6 +109,7 @@ def compare(
     )
     console = Console(highlight=False, markup=False)
     console.print(_table(result))
+    say_of_measurements(whole)
     for text in (*remarks, *result.notes, "", *(place.sentence for place in result.places)):
         console.print(text)
     console.print(f"\n{result.statement}")

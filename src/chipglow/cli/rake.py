@@ -46,6 +46,7 @@ def rake(
     from rich.console import Console
 
     from chipglow.analysis import rake_grid
+    from chipglow.cli.assumed import say_of_measurements
     from chipglow.cli.pictures import check_picture_path, write_picture
     from chipglow.cli.quantities import parse
     from chipglow.cli.tools import chosen_tool
@@ -65,6 +66,7 @@ def rake(
     placed, remarks = chosen_tool(measured, tool)
     grid = rake_grid(measured, placed, pixels, reach, frames)
     console.print(_table(grid))
+    say_of_measurements(measured)
     for remark in (*remarks, *_remarks(measured, grid)):
         console.print(remark)
     if out is not None:
@@ -134,8 +136,9 @@ def _remarks(measurement: "Measurement", grid: "RakeGrid") -> list[str]:
     partly = int(((seen > 0) & (seen < frames)).sum())
     if partly:
         remarks.append(
-            f"Doubtful: {partly} squares are usable in some of the {frames} frames only; their "
-            "means are of those frames, which are the hotter ones where the floor is the reason."
+            f"Doubtful: {partly} of the squares are usable in some of the {frames} frames only; "
+            "their means are of those frames, which are the hotter ones where the floor is the "
+            "reason."
         )
     if measurement.calibration_uncertainty is not None:
         remarks.append(

@@ -70,6 +70,7 @@ def shearband(
     from rich.console import Console
 
     from chipglow.analysis import band_profile
+    from chipglow.cli.assumed import say_of_measurements
     from chipglow.cli.pictures import check_picture_path, write_picture
     from chipglow.cli.quantities import parse
     from chipglow.cli.times import frame_at
@@ -97,6 +98,7 @@ def shearband(
     )
     console = Console(highlight=False, markup=False)
     console.print(_table(profile))
+    say_of_measurements(measured)
     for note in (*remarks, *profile.notes):
         console.print(note)
     if measured.calibration_uncertainty is None:

@@ -9,7 +9,7 @@ import numpy as np
 from rich.console import Console
 
 from chipglow.camera import Flag, Measurement
-from chipglow.cli.assumed import say_assumed, say_doubtful
+from chipglow.cli.assumed import say_of_measurements
 from chipglow.cli.pictures import check_picture_path, write_picture
 from chipglow.cli.showing import attribute_rows, interval_text, listed, microseconds
 from chipglow.cli.times import parse_instant
@@ -75,8 +75,7 @@ def say_measurement(measurement: Measurement, time: float | None = None) -> None
     if attributes:
         console.print("\nAttributes:")
         console.print(listed(attribute_rows(attributes)))
-    say_assumed(str(measurement.data.attrs.get("assumed", "")).splitlines())
-    say_doubtful(str(measurement.data.attrs.get("doubtful", "")).splitlines())
+    say_of_measurements(measurement)
 
 
 def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tuple[str, str]]:
