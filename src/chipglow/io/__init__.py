@@ -25,6 +25,7 @@ from chipglow.io.scene_file import (
     FORMAT_VERSION,
     SceneWriter,
     StoredScene,
+    is_scene,
     open_scene,
     write_scene,
 )
@@ -47,6 +48,7 @@ __all__ = [
     "check_rake_grid_path",
     "import_scene",
     "is_measurement",
+    "is_scene",
     "movie_writer",
     "open_scene",
     "prospect",
