@@ -410,6 +410,7 @@ def test_convert_makes_a_measurement_and_says_what_it_assumed(laboratory, tmp_pa
     out = tmp_path / "measured.nc"
     code, said = run("convert", "chip.yaml", "--out", out, "--set", "tip=none")
     assert code == 0, said
+    assert said.startswith("The file, and what you said of it:")
     for words in ("counts as uint16", "5 of 40 x 30 pixels", "replaced by neighbours",
                   "standard uncertainty", "Assumed: The origin of coordinates"):  # fmt: skip
         assert words in said
@@ -466,6 +467,8 @@ def test_show_shows_a_measurement(laboratory, tmp_path):
         "40 x 30 of 6 µm",
         "at 4000 µs",
         "below the floor",
+        "450 °C",
+        "10 µs",
         "3.8 µm to 5.1 µm",
         "rake -7°",
     ):

@@ -23,6 +23,7 @@ _FLAG_NAMES: Final = {
     Flag.REPLACED: "replaced by neighbours",
 }
 _SAID_APART: Final = ("assumed", "doubtful", "band_lower", "band_upper", "pitch", "tool_")
+_IN_FACTS: Final = ("integration_time", "floor")
 
 
 def show_measurement(path: Path, at: str | None, plot: Path | None) -> None:
@@ -70,7 +71,7 @@ def say_measurement(measurement: Measurement, time: float | None = None) -> None
     attributes = {
         str(name): value
         for name, value in measurement.data.attrs.items()
-        if not str(name).startswith(_SAID_APART)
+        if not str(name).startswith(_SAID_APART) and name not in _IN_FACTS
     }
     if attributes:
         console.print("\nAttributes:")
@@ -87,6 +88,10 @@ def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tu
     yield "frames", f"{len(times)}, {microseconds(times[0])} to {microseconds(times[-1])}"
     if len(times) > 1:
         yield "interval", interval_text(np.diff(times))
+    if "integration_time" in data.attrs:
+        yield "integration time", microseconds(float(data.attrs["integration_time"]))
+    if "floor" in data.attrs:
+        yield "floor", f"{float(data.attrs['floor']) - 273.15:.4g} °C"
     if {"band_lower", "band_upper"} <= set(data.attrs):
         band = measurement.band
         shape = "" if band.response is None else ", with a response curve"
