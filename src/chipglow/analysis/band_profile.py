@@ -329,8 +329,8 @@ def _joined(temperature: NDArray[np.float64], times: NDArray[np.float64]) -> tup
         return ()
     when = ", ".join(f"{time * 1e6:.6g}" for _, time in doubted)
     return (
-        f"Doubtful: the curve at {when} µs crosses a valley, up to {max(doubted)[0]:.0f} K deep: it "
-        "may join two bands, or a band that has moved and the heat at the edge.",
+        f"Doubtful: the curve at {when} µs crosses a valley, up to {max(doubted)[0]:.0f} K deep: "
+        "it may join two bands, or a band that has moved and the heat at the edge.",
     )
 
 
