@@ -251,6 +251,18 @@ def test_a_single_band_has_a_doubtful_stage():
     assert profile.doubts == ("one frame has a band; without another its stage says nothing.",)
 
 
+@pytest.mark.parametrize(("left", "doubted"), [(0.3, True), (0.95, False)])
+def test_a_curve_over_a_deep_valley_is_doubtful(left, doubted):
+    # The band's height over the chip is 140 to 200 K; 70 % of it is gone in the valley, or 5 %.
+    image = BandImage()
+    along, _ = image.place(np.stack([X, Y], axis=-1))
+    valley = (1.0 - left) * np.exp(-(((along - 150e-6) / 30e-6) ** 2))
+    temperature = 600.0 + (image.temperature() - 600.0) * (1.0 - valley)
+    profile = band_profile(measured([temperature, temperature]), TOOL)
+    said = "the curve at 0, 10 µs crosses a valley"
+    assert any(doubt.startswith(said) for doubt in profile.doubts) is doubted
+
+
 def test_without_a_band_near_the_edge_the_stages_are_doubtful():
     image = BandImage()
     along, _ = image.place(np.stack([X, Y], axis=-1))

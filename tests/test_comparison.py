@@ -378,7 +378,7 @@ def test_the_command_writes_what_it_says(folder):
         ((*FILES, "--curve", "one.nc"), "one.nc: expected"),
         ((*FILES, "--reference", "1 s"), "--reference: 1 s, expected 0 us to 20 us"),
         ((*FILES, "--plot", "a.txt"), "a.txt, expected a file that ends in .png"),
-        (("measured.nc", "curve.csv"), "curve.csv: curve: give the unit of the samples"),
+        (("measured.nc", "curve.csv"), "curve.csv: curve: unit: is missing"),
         ((*FILES, *USUAL, "--out", "."), "holds something that is not a result"),
     ],
 )

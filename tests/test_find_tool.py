@@ -176,6 +176,19 @@ def test_a_given_and_a_found_tool(folder):
     assert "Assumed: clearance angle 7 deg, edge radius 20 um." in assumed
 
 
+def test_a_tool_that_the_image_shows_elsewhere_is_doubted(folder):
+    # The face's place is known to some 3 um, the angle to 1 or 2 deg.
+    for text, doubted in (
+        ("rake_angle: -7 deg\ntip: [0 um, 0 um]\n", False),
+        ("rake_angle: -7 deg\ntip: [-20 um, 0 um]\n", True),
+        ("rake_angle: 7 deg\ntip: [0 um, 0 um]\n", True),
+    ):
+        (folder / "tool.yaml").write_text(text)
+        code, said, _ = command("real.nc", "--tool", "tool.yaml")
+        assert code == 0
+        assert ("Doubtful: the rake face that shows in the image is" in said) is doubted
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

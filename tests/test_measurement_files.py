@@ -7,11 +7,18 @@ import camera_files
 import numpy as np
 import pytest
 import yaml
+from analytic_chip import AnalyticChip
 from typer.testing import CliRunner
 
 from chipglow.camera import Detector, Flag, Recording, fit_linear, fit_sakuma_hattori
 from chipglow.cli import app
-from chipglow.io import is_measurement, read_measurement, write_hcc, write_measurement
+from chipglow.io import (
+    is_measurement,
+    read_measurement,
+    write_hcc,
+    write_measurement,
+    write_scene,
+)
 from chipglow.io.column_file import POINT_COLUMNS, read_bad_pixels, read_columns, read_response
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import ToolGeometry
@@ -180,6 +187,7 @@ def test_tables_are_read_with_their_units(tmp_path):
         ("", "no number in it"),
         ("temperature_degC,counts\n", "no number in it"),
         ("temperature,counts\n1,2\n", "line 1: 'temperature' has no unit, expected .*_degC"),
+        ("temperature_K;counts\n1;2\n", "line 1: .* is separated by ';', expected commas"),
         ("temperature_um,counts\n1,2\n", "line 1: unknown unit 'um'"),
         ("temperature_K,colour\n1,2\n", "line 1: unknown column 'colour'"),
         ("temperature_K\n1\n", "expected a column 'counts', once"),
@@ -412,6 +420,7 @@ def test_convert_makes_a_measurement_and_says_what_it_assumed(laboratory, tmp_pa
     out = tmp_path / "measured.nc"
     code, said = run("convert", "chip.yaml", "--out", out, "--set", "tip=none")
     assert code == 0, said
+    assert said.startswith("The file, and what you said of it:")
     for words in ("counts as uint16", "5 of 40 x 30 pixels", "replaced by neighbours",
                   "standard uncertainty", "Assumed: The origin of coordinates"):  # fmt: skip
         assert words in said
@@ -419,6 +428,31 @@ def test_convert_makes_a_measurement_and_says_what_it_assumed(laboratory, tmp_pa
     code, said = run("convert", out)
     assert code == 2
     assert "is a measurement already" in said
+
+
+def test_what_is_assumed_and_doubtful_of_a_camera_s_file_is_said_by_who_takes_it(laboratory):
+    counts = np.load("chip.npy")
+    counts[:, 0, 0] = 65535
+    np.save("clipped.npy", counts)
+    settings = [f"--set={field}" for field in ("file=clipped.npy", "saturation=none")]
+    (laboratory / "all.yaml").write_text(
+        "regions: {all: {rectangle: [[10, 10], [30, 20]], feature: chip body}}"
+    )
+    (laboratory / "tool.yaml").write_text("{rake_angle: 0 deg, tip: [0 um, 0 um]}")
+    for command in (
+        ["emissivity", "chip.yaml", "--truth", "900 degC", "--regions", "all.yaml"],
+        ["rake", "chip.yaml", "--tool", "tool.yaml"],
+    ):
+        code, said = run(*command, *settings)
+        assert code == 0, said
+        assert said.count("Assumed: No pixel is saturated") == 1
+        assert "Doubtful: 5 values are 65535" in said
+
+
+def test_a_scene_is_no_measurement(tmp_path):
+    write_scene(AnalyticChip(frames=2).scene(), tmp_path / "scene.nc")
+    with pytest.raises(StudyError, match=r"scene\.nc: is a scene, .* chipglow measure makes one"):
+        load_measurement(tmp_path / "scene.nc")
 
 
 def test_convert_only_looks_without_out(laboratory):
@@ -443,6 +477,8 @@ def test_show_shows_a_measurement(laboratory, tmp_path):
         "40 x 30 of 6 µm",
         "at 4000 µs",
         "below the floor",
+        "450 °C",
+        "10 µs",
         "3.8 µm to 5.1 µm",
         "rake -7°",
     ):

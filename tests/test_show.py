@@ -205,18 +205,20 @@ def test_the_picture_is_of_a_scene_of_any_shape(tmp_path):
 
 def test_what_is_wrong_is_one_line(path):
     (path.parent / "cut.nc").write_bytes(path.read_bytes()[:20_000])
+    (path.parent / "camera.fff").write_bytes(b"FFF\0" + bytes(5000))
     for arguments, parts in (
         (["scene.nc", "--at", "2 ms"], ("--at: 2000 us is not in the scene", "0 us to 100 us")),
         (["scene.nc", "--at", "20"], ("--at: 20 has no unit", "10 us")),
         (["scene.nc", "--plot", "scene.jpg"], ("--plot: scene.jpg", ".png, .pdf or .svg")),
+        (["camera.fff"], ("camera.fff: is no NetCDF-4 file", "chipglow convert looks into")),
         (["none.nc"], ("none.nc: there is no such file",)),
-        (["cut.nc"], ("cut.nc: not a scene, or cut short",)),
+        (["cut.nc"], ("cut.nc: is no NetCDF-4 file, or cut short",)),
     ):
         code, text = show(*arguments)
         assert code == 2
         assert len(text.splitlines()) == 1
         assert all(part in text for part in ("chipglow: ", *parts))
-    assert {file.name for file in path.parent.iterdir()} == {"scene.nc", "cut.nc"}
+    assert {file.name for file in path.parent.iterdir()} == {"scene.nc", "cut.nc", "camera.fff"}
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from chipglow.cutting import (
 )
 from chipglow.io import open_scene, read_tool_outline
 from chipglow.io.atomic import KeptErrorFile
-from chipglow.scene import FIELD_UNITS, Chamfer, Hone, Material, Scene, ToolGeometry
+from chipglow.scene import FIELD_UNITS, Chamfer, Hone, Material, Raster, Scene, ToolGeometry
 from chipglow.study import (
     Study,
     StudyError,
@@ -35,8 +35,9 @@ from chipglow.study import (
     study_text,
     units,
 )
+from chipglow.study.fitting import uncovered
 from chipglow.study.section import Section
-from chipglow.surface import CHIP_1, CHIP_2
+from chipglow.surface import CHIP_1, CHIP_2, MapSurface
 
 
 def quantity(annotation):
@@ -610,3 +611,23 @@ def test_a_scene_without_tool_and_coordinates_is_fitted_and_says_so():
         "The scene shows no tool",
         "The scene does not say ",
     ]
+
+
+def test_what_an_emissivity_map_leaves_of_the_scene_is_said():
+    scene = AnalyticChip(frames=2).scene()
+    raster = scene.raster
+    half = Raster(raster.left, raster.top, raster.spacing, raster.rows, raster.columns // 2)
+    away = replace(raster, left=raster.left + 1e-3)
+    maps = {
+        name: MapSurface(np.full(of.shape, 0.5), of)
+        for name, of in (("whole", raster), ("half", half), ("away", away))
+    }
+    assert maps["whole"].known_share(raster) == 1.0
+    # Beside its last pixel a map is interpolated, at most one sample far.
+    assert maps["half"].known_share(raster) == pytest.approx(0.5, abs=1.5 / raster.columns)
+    assert list(uncovered({"whole": maps["whole"]}, raster)) == []
+    (sentence,) = uncovered({"half": maps["half"]}, raster)
+    assert sentence.startswith("The emissivity map 'half' tells 50")
+    assert "elsewhere its emissivity is 0" in sentence
+    with pytest.raises(ValueError, match=r"surface.maps: away: lies at x .* expected the scene's"):
+        list(uncovered({"away": maps["away"]}, raster))

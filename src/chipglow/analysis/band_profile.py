@@ -25,6 +25,12 @@ NEAR_THE_EDGE: Final = 15.0
 MOVED: Final = 1.0
 """Offset in pixels beyond which a band is not where the reference is."""
 
+_DEEP: Final = 40.0
+"""A valley along one band is less deep in K: on bands of a simulated chip it was under 30 K."""
+
+_DEEP_SHARE: Final = 1.0 / 3.0
+"""Nor is it as large a share of the range of the temperature along the band."""
+
 _STEP: Final = 0.5
 _FINE: Final = 4
 
@@ -198,6 +204,8 @@ def band_profile(
             "shear band: no point of the curve is on usable pixels in any frame, expected a curve "
             "in the image where the chip is hotter than the camera's floor"
         )
+    if given is None:
+        remarks.doubts.extend(_joined(temperature, measurement.times[numbers]))
     offset = np.array([_offset(line, base) for line in found])
     return BandProfile(
         reference=base,
@@ -302,6 +310,33 @@ def _reference(
             "it is the hottest and longest of those that begin near the cutting edge."
         )
     return line
+
+
+def _joined(temperature: NDArray[np.float64], times: NDArray[np.float64]) -> tuple[str, ...]:
+    """A doubt of found curves that cross a deep valley between two hot places."""
+    valleys = [_valley(values[np.isfinite(values)]) for values in temperature]
+    doubted = [
+        (depth, time)
+        for (depth, share), time in zip(valleys, times, strict=True)
+        if depth > _DEEP and share > _DEEP_SHARE
+    ]
+    if not doubted:
+        return ()
+    when = ", ".join(f"{time * 1e6:.6g}" for _, time in doubted)
+    return (
+        f"the curve at {when} µs crosses a valley, up to {max(doubted)[0]:.0f} K deep: "
+        "it may join two bands, or a band that has moved and the heat at the edge.",
+    )
+
+
+def _valley(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Depth of the deepest valley along a curve in K, and its share of the curve's range."""
+    if values.size == 0:
+        return 0.0, 0.0
+    before = np.maximum.accumulate(values)
+    after = np.maximum.accumulate(values[::-1])[::-1]
+    depth = float((np.minimum(before, after) - values).max())
+    return depth, depth / max(float(np.ptp(values)), 1e-9)
 
 
 def _heat(measurement: Measurement, line: Line, number: int) -> float:

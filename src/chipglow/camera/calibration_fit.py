@@ -224,10 +224,14 @@ class _Points:
             )
         if not np.isfinite(signal).all():
             raise ValueError("calibration: counts are not finite")
-        if not ((kelvins >= TABLE_COLDEST) & (kelvins <= TABLE_HOTTEST)).all():
+        impossible = kelvins[~((kelvins >= TABLE_COLDEST) & (kelvins <= TABLE_HOTTEST))]
+        if impossible.size:
             raise ValueError(
-                f"calibration: temperatures must be {TABLE_COLDEST:g} to {TABLE_HOTTEST:g} K"
+                f"calibration: a black body is at {impossible[0]:g} K "
+                f"({impossible[0] - 273.15:g} °C), expected {TABLE_COLDEST:g} to "
+                f"{TABLE_HOTTEST:g} K"
             )
+        _expect_unsaturated(kelvins, signal)
         points = cls(
             kelvins,
             signal,
@@ -282,6 +286,17 @@ def _uncertainty(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> 
     if not (np.isfinite(values) & (values >= 0)).all():
         raise ValueError(f"calibration: {name} must be finite, 0 or more")
     return values
+
+
+def _expect_unsaturated(kelvins: NDArray[np.float64], counts: NDArray[np.float64]) -> None:
+    """Refuse points whose greatest counts are the same at several temperatures."""
+    greatest = np.unique(kelvins[counts == counts.max(initial=-np.inf)])
+    if greatest.size > 1 and np.unique(counts).size > 1:
+        places = ", ".join(f"{kelvin - 273.15:.5g}" for kelvin in greatest)
+        raise ValueError(
+            f"calibration: the counts are {counts.max():.7g} at each of {places} °C and nowhere "
+            "greater: the camera is saturated there, expected points without saturation"
+        )
 
 
 def _expect_rising(rises: bool) -> None:

@@ -241,8 +241,9 @@ def show(
 
         show_measurement(file, at, plot)
     else:
-        from chipglow.cli.showing import show_scene
+        from chipglow.cli.showing import check_shown, show_scene
 
+        check_shown(file)
         show_scene(file, at, plot)
     if plot is not None:
         print(plot)

@@ -4,6 +4,8 @@ from collections.abc import Iterable
 
 from rich.console import Console
 
+from chipglow.camera import Measurement
+
 
 def say_assumed(sentences: Iterable[str]) -> None:
     """Say on stderr what had to be assumed, a sentence each."""
@@ -17,3 +19,17 @@ def say_doubtful(sentences: Iterable[str]) -> None:
     console = Console(highlight=False, markup=False, soft_wrap=True)
     for sentence in sentences:
         console.print(f"Doubtful: {sentence}")
+
+
+def say_of_measurements(*measurements: Measurement) -> None:
+    """Say what was assumed of measurements and what is doubtful of them, each sentence once.
+
+    Measurements of a camera's file keep both as attributes, a sentence a line.
+    """
+    say_assumed(_sentences(measurements, "assumed"))
+    say_doubtful(_sentences(measurements, "doubtful"))
+
+
+def _sentences(measurements: Iterable[Measurement], kind: str) -> list[str]:
+    lines = (str(one.data.attrs.get(kind, "")).splitlines() for one in measurements)
+    return list(dict.fromkeys(line for of in lines for line in of))

@@ -81,7 +81,7 @@ def compare(
     from rich.console import Console
 
     from chipglow.analysis import compare as compare_all
-    from chipglow.cli.assumed import say_assumed, say_doubtful
+    from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.cli.pictures import check_picture_path, write_picture
     from chipglow.cli.times import frame_at
     from chipglow.cli.tools import chosen_tool
@@ -111,6 +111,7 @@ def compare(
     console.print(_table(result))
     for sentence in chosen.found:
         console.print(sentence)
+    say_of_measurements(whole)
     say_assumed((*chosen.assumptions, *result.assumptions))
     say_doubtful((*chosen.doubts, *result.doubts))
     console.print()

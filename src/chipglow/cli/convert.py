@@ -45,7 +45,8 @@ def convert(
     description = load_description(source, settings or ())
     recording = load_recording(description)
     console = Console(highlight=False, markup=False, soft_wrap=True)
-    console.print("The file says:")
+    told = bool(settings) or source.suffix.lower() in (".yaml", ".yml")
+    console.print("The file, and what you said of it:" if told else "The file says:")
     console.print(listed(_facts(recording)))
     try:
         measurement = measurement_of(description, recording, source.name)

@@ -71,7 +71,7 @@ def emissivity(
     from rich.console import Console
 
     from chipglow.analysis import areas, determine_emissivity, emissivity_line, shared_pixels
-    from chipglow.cli.assumed import say_assumed, say_doubtful
+    from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.cli.pictures import check_picture_path
     from chipglow.io.atomic import check_folder
     from chipglow.study.files import load_regions
@@ -98,6 +98,7 @@ def emissivity(
     console = Console(highlight=False, markup=False)
     _print_tables(console, rows, lines)
     console.print()
+    say_of_measurements(*measurements)
     say_assumed(_assumptions(maps))
     say_assumed(
         f"{one} and {other} share {count} pixels, which count in both."

@@ -68,7 +68,7 @@ def _say(looked: Prospect) -> None:
     console.print(table)
     if survey.unused:
         console.print(f"Not used: {', '.join(survey.unused)}")
-    left, right, bottom, top = (edge * 1e6 for edge in raster.extent)
+    left, right, bottom, top = (round(edge * 1e6, 6) + 0.0 for edge in raster.extent)
     console.print(
         f"Sampled every {raster.spacing * 1e6:.4g} um: {raster.columns} x {raster.rows} samples, "
         f"x {left:.4g} um to {right:.4g} um, y {bottom:.4g} um to {top:.4g} um"

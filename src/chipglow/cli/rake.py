@@ -48,7 +48,7 @@ def rake(
     from rich.console import Console
 
     from chipglow.analysis import rake_grid
-    from chipglow.cli.assumed import say_assumed, say_doubtful
+    from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.cli.pictures import check_picture_path, write_picture
     from chipglow.cli.quantities import parse
     from chipglow.cli.tools import chosen_tool
@@ -70,6 +70,7 @@ def rake(
     console.print(_table(grid))
     for sentence in (*chosen.found, *_left_out(measured, grid)):
         console.print(sentence)
+    say_of_measurements(measured)
     say_assumed(chosen.assumptions)
     say_doubtful((*chosen.doubts, *_doubts(grid)))
     if out is not None:

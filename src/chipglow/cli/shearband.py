@@ -70,7 +70,7 @@ def shearband(
     from rich.console import Console
 
     from chipglow.analysis import band_profile
-    from chipglow.cli.assumed import say_assumed, say_doubtful
+    from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.cli.pictures import check_picture_path, write_picture
     from chipglow.cli.quantities import parse
     from chipglow.cli.times import frame_at
@@ -100,6 +100,7 @@ def shearband(
     console.print(_table(profile))
     for sentence in chosen.found:
         console.print(sentence)
+    say_of_measurements(measured)
     say_assumed((*chosen.assumptions, *profile.assumptions))
     say_doubtful((*chosen.doubts, *profile.doubts))
     if measured.calibration_uncertainty is None:

@@ -14,6 +14,7 @@ from rich.table import Table
 from chipglow.cli.pictures import check_picture_path, write_picture
 from chipglow.cli.times import parse_instant
 from chipglow.io import StoredScene, open_scene
+from chipglow.io.contents import holds
 from chipglow.report import SceneSummary, draw_scene, scene_summary
 from chipglow.report.frames import shown_frame
 from chipglow.report.quantity import rounded_text
@@ -55,6 +56,25 @@ def show_scene(path: Path, at: str | None, plot: Path | None) -> None:
     if plot is not None:
         write_picture(draw_scene(scene, time), plot)
     scene.data.close()
+
+
+def check_shown(path: Path) -> None:
+    """Refuse files of other kinds than those that can be shown.
+
+    Raises
+    ------
+    ValueError
+        If it is no scene, nor like one.
+    """
+    if path.is_file() and not holds(path, ()):
+        raise ValueError(
+            f"{path}: is no NetCDF-4 file, or cut short, expected a scene or a measurement "
+            "(chipglow convert looks into a camera's file)"
+        )
+    if path.is_file() and not holds(path, ("temperature",)):
+        raise ValueError(
+            f"{path}: has neither temperature nor radiance, expected a scene or a measurement"
+        )
 
 
 def _time_in(scene: Scene, at: str) -> float:

@@ -8,7 +8,7 @@ from typing import Final
 from rich.console import Console
 
 from chipglow.camera import Flag, Measurement
-from chipglow.cli.assumed import say_assumed, say_doubtful
+from chipglow.cli.assumed import say_of_measurements
 from chipglow.cli.pictures import check_picture_path, write_picture
 from chipglow.cli.showing import attribute_rows, listed, microseconds, where_and_when
 from chipglow.cli.times import parse_instant
@@ -22,6 +22,7 @@ _FLAG_NAMES: Final = {
     Flag.REPLACED: "replaced by neighbours",
 }
 _SAID_APART: Final = ("assumed", "doubtful", "band_lower", "band_upper", "pitch", "tool_")
+_IN_FACTS: Final = ("integration_time", "floor")
 
 
 def show_measurement(path: Path, at: str | None, plot: Path | None) -> None:
@@ -69,19 +70,22 @@ def say_measurement(measurement: Measurement, time: float | None = None) -> None
     attributes = {
         str(name): value
         for name, value in measurement.data.attrs.items()
-        if not str(name).startswith(_SAID_APART)
+        if not str(name).startswith(_SAID_APART) and name not in _IN_FACTS
     }
     if attributes:
         console.print("\nAttributes:")
         console.print(listed(attribute_rows(attributes)))
-    say_assumed(str(measurement.data.attrs.get("assumed", "")).splitlines())
-    say_doubtful(str(measurement.data.attrs.get("doubtful", "")).splitlines())
+    say_of_measurements(measurement)
 
 
 def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tuple[str, str]]:
-    times = measurement.times
-    yield from where_and_when("pixels", measurement.raster, times)
-    if {"band_lower", "band_upper"} <= set(measurement.data.attrs):
+    data = measurement.data
+    yield from where_and_when("pixels", measurement.raster, measurement.times)
+    if "integration_time" in data.attrs:
+        yield "integration time", microseconds(float(data.attrs["integration_time"]))
+    if "floor" in data.attrs:
+        yield "floor", f"{float(data.attrs['floor']) - 273.15:.4g} °C"
+    if {"band_lower", "band_upper"} <= set(data.attrs):
         band = measurement.band
         shape = "" if band.response is None else ", with a response curve"
         yield "band", f"{1e6 * band.lower:.4g} µm to {1e6 * band.upper:.4g} µm{shape}"
@@ -90,7 +94,7 @@ def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tu
         rake, clearance = (f"{degrees(angle):.4g}°" for angle in angles)
         yield "tool", f"rake {rake}, clearance {clearance}"
     yield "radiance temperature", _celsius(summary.overall)
-    yield f"at {microseconds(times[summary.index])}", _celsius(summary.now)
+    yield f"at {microseconds(measurement.times[summary.index])}", _celsius(summary.now)
     if summary.uncertainty is None:
         yield "its calibration", "uncertainty not known"
     else:

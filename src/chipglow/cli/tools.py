@@ -1,12 +1,21 @@
 """Tools on the command line: told, described in a file, or found in the image."""
 
 from dataclasses import dataclass
-from math import degrees
+from math import degrees, hypot
+from typing import Final
+
+import numpy as np
 
 from chipglow.analysis import FoundTool, find_tool
 from chipglow.camera import Measurement
 from chipglow.scene import Tool
 from chipglow.study import tool_of
+
+_FACE: Final = 200e-6
+"""Length of the face in m on which a tool that was told is compared with one that is seen."""
+
+_CLEARLY: Final = 4.0
+"""Two places of the face differ if they are this many standard uncertainties apart, or more."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +54,11 @@ def chosen_tool(measurement: Measurement, tool: str | None) -> ChosenTool:
     OSError
         If the file cannot be read.
     """
+    if tool is None:
+        return ChosenTool(tool_of(measurement, None))
     if tool != "found":
-        return ChosenTool(tool_of(measurement, tool))
+        told = tool_of(measurement, tool)
+        return ChosenTool(told, doubts=_contradictions(measurement, told))
     found = find_tool(measurement)
     shape = found.tool.tool
     assumed = (
@@ -54,6 +66,26 @@ def chosen_tool(measurement: Measurement, tool: str | None) -> ChosenTool:
         f"{1e6 * shape.corner_radius:.3g} um."
     )
     return ChosenTool(found.tool, (_found(found),), (assumed,), found.doubts)
+
+
+def _contradictions(measurement: Measurement, told: Tool) -> tuple[str, ...]:
+    """A doubt, if the image clearly shows a rake face elsewhere than where the tool's is said."""
+    try:
+        found = find_tool(measurement)
+    except ValueError:
+        return ()
+    seen = found.tool.rake_point(np.array([0.0, _FACE]))
+    offsets = (seen - told.rake_point(np.array([0.0, _FACE]))) @ np.array(told.rake_normal)
+    allowed = hypot(found.position_uncertainty, _FACE / 2.0 * found.angle_uncertainty)
+    offset = float(np.abs(offsets).max())
+    if offset <= _CLEARLY * allowed:
+        return ()
+    return (
+        f"the rake face that shows in the image is {1e6 * offset:.0f} um from that "
+        f"of the tool's file (the file's rake angle is {degrees(told.rake_angle):.1f} deg, the "
+        f"image's {degrees(found.tool.rake_angle):.1f} ± {degrees(found.angle_uncertainty):.1f} "
+        "deg): the tip, the origin of coordinates, or which way the image is up may be wrong.",
+    )
 
 
 def _found(found: FoundTool) -> str:

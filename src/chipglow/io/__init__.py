@@ -28,6 +28,7 @@ from chipglow.io.scene_file import (
     FORMAT_VERSION,
     SceneWriter,
     StoredScene,
+    is_scene,
     open_scene,
     write_scene,
 )
@@ -51,6 +52,7 @@ __all__ = [
     "check_table_path",
     "import_scene",
     "is_measurement",
+    "is_scene",
     "movie_writer",
     "open_scene",
     "prospect",

@@ -95,7 +95,12 @@ def read_columns(
             f"{path}: there is no number in it, expected a first line such as "
             f"{','.join(column.title for column in columns)} and lines of numbers"
         )
-    found = [_column(path, cell.strip(), columns) for cell in rows[0][1]]
+    first = rows[0][1]
+    if len(first) == 1 and len(columns) > 1 and (mark := next(filter(first[0].count, ";\t"), "")):
+        raise ValueError(
+            f"{path}, line 1: {first[0][:60]!r} is separated by {mark!r}, expected commas"
+        )
+    found = [_column(path, cell.strip(), columns) for cell in first]
     names = [column.name for column, _ in found]
     for column in columns:
         if names.count(column.name) > 1 or (column.required and column.name not in names):

@@ -5,12 +5,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-import h5py
 import numpy as np
 import xarray as xr
 
 from chipglow.camera.measurement import MEASUREMENT_UNITS, Measurement
 from chipglow.io.atomic import KeptErrorFile, atomic_path
+from chipglow.io.contents import holds
 
 Made = TypeVar("Made")
 
@@ -57,14 +57,7 @@ def write_dataset(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
 
 def is_measurement(path: str | os.PathLike[str]) -> bool:
     """Whether a file is a measurement that `write_measurement` wrote, and not a camera's."""
-    path = Path(path)
-    if not path.is_file() or not h5py.is_hdf5(path):
-        return False
-    try:
-        with h5py.File(path, "r") as file:
-            return all(name in file for name in MEASUREMENT_UNITS)
-    except OSError:
-        return False
+    return holds(path, MEASUREMENT_UNITS)
 
 
 def read_measurement(path: str | os.PathLike[str]) -> Measurement:

@@ -16,6 +16,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.io.atomic import KeptErrorFile, atomic_path
+from chipglow.io.contents import holds
 from chipglow.io.interrupts import uninterrupted
 from chipglow.io.packing import HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
 from chipglow.io.unfinished import (
@@ -420,6 +421,11 @@ def open_scene(path: str | os.PathLike[str]) -> StoredScene:
         raise SceneError(
             f"{path}: not a scene, or cut short, expected a NetCDF-4 file: {_first_line(error)}"
         ) from error
+
+
+def is_scene(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is one that `SceneWriter` or `write_scene` wrote, or like it."""
+    return holds(path, FIELD_UNITS)
 
 
 def write_scene(scene: Scene, path: str | os.PathLike[str], *, portable: bool = False) -> None:

@@ -1,11 +1,11 @@
 """A study's surfaces and tool on a scene that someone else may have made."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from chipglow.scene import Material, Scene
+from chipglow.scene import Material, Raster, Scene
 from chipglow.study.schema import Study
-from chipglow.surface import FeatureSurface, Surface
+from chipglow.surface import FeatureSurface, MapSurface, Surface
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,11 @@ def fit(study: Study, scene: Scene) -> Fitted:
         Says surfaces and tool.
     scene : Scene
         The scene.
+
+    Raises
+    ------
+    ValueError
+        If an emissivity map lies beside the scene.
     """
     surfaces = study.surface.build(study.seed)
     assumed = []
@@ -63,4 +68,35 @@ def fit(study: Study, scene: Scene) -> Fitted:
             "The scene does not say where each point was before the cut: textures move with the "
             "mean velocity of their feature (surface.follow: mean)."
         )
+    assumed.extend(uncovered(surfaces, scene.raster))
     return Fitted(scene, surfaces, tuple(assumed))
+
+
+def uncovered(surfaces: Mapping[str, Surface], scene: Raster) -> Iterator[str]:
+    """What emissivity maps leave of the scene, a sentence each.
+
+    Raises
+    ------
+    ValueError
+        If a map lies beside the scene.
+    """
+    for name, surface in surfaces.items():
+        if not isinstance(surface, MapSurface):
+            continue
+        share = surface.known_share(scene)
+        if share == 0.0:
+            raise ValueError(
+                f"surface.maps: {name}: lies at {_place(surface.raster)}, expected the scene's "
+                f"place, {_place(scene)} (the tip of the emissivity's measurement puts it there)"
+            )
+        if share < 1.0:
+            yield (
+                f"The emissivity map {name!r} tells {100 * share:.3g} % of the scene; elsewhere "
+                f"its emissivity is {surface.elsewhere:g}. It lies at {_place(surface.raster)}, "
+                f"the scene at {_place(scene)}."
+            )
+
+
+def _place(raster: Raster) -> str:
+    left, right, bottom, top = (f"{1e6 * edge:.4g}" for edge in raster.extent)
+    return f"x {left} to {right} um, y {bottom} to {top} um"

@@ -17,7 +17,7 @@ from chipglow.camera import (
     develop_recording,
     find_bad_pixels,
 )
-from chipglow.io import CAMERA_FORMATS, is_measurement, read_measurement, read_recording
+from chipglow.io import CAMERA_FORMATS, is_measurement, is_scene, read_measurement, read_recording
 from chipglow.io.cameras.recordings import find_format
 from chipglow.study.files import StudyError, load_calibration, load_description
 from chipglow.study.measurement_schema import MeasurementDescription
@@ -50,6 +50,10 @@ def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measur
         for setting in settings:
             raise ValueError(f"--set: {setting!r} describes nothing of a measurement's own file")
         return read_measurement(source)
+    if is_scene(source):
+        raise StudyError(
+            f"{source}: is a scene, expected a measurement; chipglow measure makes one of it"
+        )
     described = load_description(source, settings)
     return measurement_of(described, load_recording(described), Path(source).name)
 

@@ -1,5 +1,6 @@
 """What a section of a YAML file is: known keys only, each described, built into one object."""
 
+import reprlib
 from abc import abstractmethod
 from collections.abc import Mapping
 from difflib import get_close_matches
@@ -67,7 +68,7 @@ class Section(BaseModel):
             return data
         known = ", ".join(cls.model_fields)
         if not isinstance(data, Mapping):
-            raise ValueError(f"{data!r} is no section, expected keys of {known}")
+            raise ValueError(f"{reprlib.repr(data)} is no section, expected keys of {known}")
         for key in data:
             if key not in cls.model_fields:
                 close = get_close_matches(str(key), list(cls.model_fields), n=1)

@@ -77,5 +77,8 @@ def tool_of(measurement: Measurement, path: str | Path | None) -> Tool:
         return load_tool(path)
     tool = measurement.tool
     if tool is None:
-        raise ValueError("--tool: the measurement tells no tool, expected a tool's YAML file")
+        raise ValueError(
+            "--tool: the measurement tells no tool, expected a tool's YAML file, or 'found' to "
+            "look for the rake face in the image"
+        )
     return tool

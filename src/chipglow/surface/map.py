@@ -1,6 +1,7 @@
 """A surface whose emissivity was measured, as a fixed image."""
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +9,9 @@ from numpy.typing import NDArray
 from chipglow.scene import Frame, Material, Raster, Scene
 from chipglow.scene.regrid import Taps, taps
 from chipglow.surface.surface import EmissivityField, Surface
+
+_KNOWN: Final = 1e-9
+"""Least weight of known pixels with which a sample is known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,16 +68,24 @@ class MapSurface(Surface):
         """Resample the image to a scene's samples."""
         return MapField(self.at(scene.raster))
 
+    def known_share(self, raster: Raster) -> float:
+        """Share of other samples, 0 to 1, at which the image tells the emissivity."""
+        return float(np.mean(self._on(raster)[1] > _KNOWN))
+
     def at(self, raster: Raster) -> NDArray[np.float32]:
         """Emissivity on other samples, float32 of shape `raster.shape`."""
+        total, weight = self._on(raster)
+        result = np.full(raster.shape, self.elsewhere)
+        np.divide(total, weight, out=result, where=weight > _KNOWN)
+        return np.asarray(np.clip(result, 0.0, 1.0), np.float32)
+
+    def _on(self, raster: Raster) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Weighted sum of the known pixels about each sample, and their weight."""
         across = taps(self.raster.x, raster.spacing, raster.x)
         down = taps(-self.raster.y, raster.spacing, -raster.y)
         known = np.isfinite(self.values)
-        weight = _resampled(known.astype(np.float64), across, down)
         total = _resampled(np.where(known, self.values, 0.0), across, down)
-        result = np.full(raster.shape, self.elsewhere)
-        np.divide(total, weight, out=result, where=weight > 1e-9)
-        return np.asarray(np.clip(result, 0.0, 1.0), np.float32)
+        return total, _resampled(known.astype(np.float64), across, down)
 
 
 @dataclass(frozen=True, eq=False)

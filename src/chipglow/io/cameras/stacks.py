@@ -170,7 +170,7 @@ def _unit(one: Chosen, told: Told) -> str:
         unit = "counts" if told.quantity == "counts" else "W/m2/sr"
     if unit is None:
         raise SourceError(
-            f"{one}: give the unit of the samples, the file says {said or 'none'}: expected one of "
+            f"{one}: unit: is missing, the file says {said or 'none'}, expected one of "
             f"{', '.join(RECORDING_UNITS)}"
         )
     if told.quantity is not None and RECORDING_UNITS[unit][0] != told.quantity:
