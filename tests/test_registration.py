@@ -353,6 +353,8 @@ def test_the_command_writes_map_pictures_and_numbers(folder):
     assert code == 0, output
     assert "A visible pixel is 1.5 um" in output
     assert "2 degrees of freedom" in output
+    # The folder's points are computed, not picked.
+    assert "Doubtful: the points agree to" in output
     found = load_registration("map.yaml")
     assert found.pixels([3e-6, 117e-6]) == pytest.approx([1.5, 1.5], abs=1e-6)
     assert found.model == "affine"
@@ -361,6 +363,14 @@ def test_the_command_writes_map_pictures_and_numbers(folder):
         assert blink.size[0] == 640
     with Image.open("over.png") as picture:
         assert picture.size[0] > 900
+
+
+def test_points_that_scatter_as_picked_ones_do_are_not_doubted(folder):
+    text = (folder / "points.csv").read_text()
+    (folder / "points.csv").write_text(text.replace("9.5,13.5", "9.9,13.2"))
+    code, output = register("infrared.nc", "visible.png", "--points", "points.csv")
+    assert code == 0, output
+    assert "Doubtful" not in output
 
 
 def test_the_command_aligns_the_clocks(folder):

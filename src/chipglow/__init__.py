@@ -4,8 +4,25 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from chipglow.analysis import StudyResult, analyse, determine_emissivity, error_images
-    from chipglow.camera import AnnularAperturePSF, Camera, GaussianPSF, MeasuredPSF, Measurement
+    from chipglow.analysis import (
+        StudyResult,
+        analyse,
+        band_profile,
+        compare,
+        determine_emissivity,
+        error_images,
+        knife_edge,
+        rake_grid,
+        true_temperature,
+    )
+    from chipglow.camera import (
+        AnnularAperturePSF,
+        Camera,
+        Detector,
+        GaussianPSF,
+        MeasuredPSF,
+        Measurement,
+    )
     from chipglow.cutting import CuttingSimulation
     from chipglow.io import (
         import_scene,
@@ -19,7 +36,7 @@ if TYPE_CHECKING:
     from chipglow.radiometry import Band
     from chipglow.report import write_report
     from chipglow.scene import Raster, Scene, ToolGeometry
-    from chipglow.study import Study, cut, load_import, load_study, run
+    from chipglow.study import Study, cut, load_import, load_measurement, load_study, run
     from chipglow.surface import (
         CHIP_1,
         CHIP_2,
@@ -36,6 +53,7 @@ __all__ = [
     "Band",
     "Camera",
     "CuttingSimulation",
+    "Detector",
     "Emissivity",
     "FeatureSurface",
     "GaussianPSF",
@@ -49,17 +67,23 @@ __all__ = [
     "ToolGeometry",
     "UniformSurface",
     "analyse",
+    "band_profile",
+    "compare",
     "cut",
     "determine_emissivity",
     "error_images",
     "import_scene",
+    "knife_edge",
     "load_import",
+    "load_measurement",
     "load_study",
     "open_scene",
+    "rake_grid",
     "read_emissivity_map",
     "read_measurement",
     "read_scene",
     "run",
+    "true_temperature",
     "write_measurement",
     "write_report",
     "write_scene",
@@ -67,8 +91,25 @@ __all__ = [
 __version__ = "0.1.0"
 
 _ROOMS: Final = {
-    "analysis": ("StudyResult", "analyse", "determine_emissivity", "error_images"),
-    "camera": ("AnnularAperturePSF", "Camera", "GaussianPSF", "MeasuredPSF", "Measurement"),
+    "analysis": (
+        "band_profile",
+        "compare",
+        "knife_edge",
+        "rake_grid",
+        "true_temperature",
+        "StudyResult",
+        "analyse",
+        "determine_emissivity",
+        "error_images",
+    ),
+    "camera": (
+        "Detector",
+        "AnnularAperturePSF",
+        "Camera",
+        "GaussianPSF",
+        "MeasuredPSF",
+        "Measurement",
+    ),
     "cutting": ("CuttingSimulation",),
     "io": (
         "import_scene",
@@ -82,7 +123,7 @@ _ROOMS: Final = {
     "radiometry": ("Band",),
     "report": ("write_report",),
     "scene": ("Raster", "Scene", "ToolGeometry"),
-    "study": ("Study", "cut", "load_import", "load_study", "run"),
+    "study": ("load_measurement", "Study", "cut", "load_import", "load_study", "run"),
     "surface": ("CHIP_1", "CHIP_2", "Emissivity", "FeatureSurface", "MapSurface", "UniformSurface"),
 }
 _ROOM_OF: Final = {name: room for room, names in _ROOMS.items() for name in names}

@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from chipglow.scene import Tool
 
     Points = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+_BEST_PICKED: Final = 0.02
+"""Scatter in visible pixels under which points are not picked: that of dots' middles."""
 
 
 class ModelName(StrEnum):
@@ -221,6 +224,12 @@ def _by_points(console: "Console", given: "Points", model: ModelName) -> "Regist
 
     fit = fit_points(*given, model.value)
     _print_points(console, fit, given)
+    if fit.scatter < _BEST_PICKED:
+        console.print(
+            f"Doubtful: the points agree to {fit.scatter:.1g} visible pixels, better than anyone "
+            "picks them: they may be computed from each other, and the uncertainty that follows "
+            "is too small."
+        )
     return fit.registration
 
 

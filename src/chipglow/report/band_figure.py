@@ -18,6 +18,9 @@ _HEIGHT: Final = 4.2
 _AROUND: Final = 60.0
 _LEGEND_COLUMNS: Final = 3
 _MOST_NAMES: Final = 12
+_COLOURS: Final = matplotlib.colors.ListedColormap(
+    matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, 256))
+)
 _LINES: Final = {
     Stage.DEVELOPING: (0, (4, 2)),
     Stage.DEVELOPED: "solid",
@@ -39,7 +42,8 @@ def draw_band_profile(measurement: Measurement, tool: Tool, profile: BandProfile
         The profile. The image is that of the frame nearest to the reference, and of the first one
         if no frame has a band.
     """
-    colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, profile.times.size))
+    first, last = profile.times[[0, -1]]
+    colours = _COLOURS((profile.times - first) / max(last - first, 1e-12))
     with drawing.style():
         figure = drawing.new_figure(_HEIGHT)
         left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
@@ -53,12 +57,20 @@ def draw_band_profile(measurement: Measurement, tool: Tool, profile: BandProfile
             handles = [
                 right.plot([], [], color="black", linestyle=_LINES[s], label=s)[0]
                 for s in Stage
-                if s in profile.stage
+                if s in profile.stage and s is not Stage.NONE
             ]
+            _draw_times(figure, right, profile.times)
         else:
             handles = right.get_legend_handles_labels()[0]
         figure.legend(handles=handles, loc="outside lower center", ncols=_LEGEND_COLUMNS)
     return figure
+
+
+def _draw_times(figure: Figure, axes: Axes, times: NDArray[np.float64]) -> None:
+    """Which colour is which time, where there are too many curves to name each."""
+    span = matplotlib.colors.Normalize(1e6 * times[0], 1e6 * times[-1])
+    key = matplotlib.cm.ScalarMappable(span, _COLOURS)
+    figure.colorbar(key, ax=axes, label="time / µs", aspect=25)
 
 
 def _draw_image(
