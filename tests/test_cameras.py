@@ -20,7 +20,7 @@ from chipglow.camera import PlanckConversion, Recording
 from chipglow.io import CAMERA_FORMATS, read_recording, write_hcc
 from chipglow.io.cameras import apart
 from chipglow.io.cameras.cine import _CURVE
-from chipglow.io.cameras.recordings import find_format, read_here
+from chipglow.io.cameras.formats import find_format, read_here
 from chipglow.io.cameras.stacks import Told
 from chipglow.io.sources import SourceError
 

@@ -2,13 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from chipglow.cutting.simulation import _State
 
 _ARRAYS: Final = (
     "velocity",
@@ -19,6 +16,16 @@ _ARRAYS: Final = (
     "held_at_start",
 )
 _NUMBERS: Final = ("count", "columns", "time", "carried", "lost_heat")
+
+
+class State(Protocol):
+    """What a running simulation has: the arrays and numbers above as attributes, and points."""
+
+    count: int
+    points: NDArray[Any]
+
+    def choose_steps(self) -> None:
+        """Choose the time steps that follow from the state."""
 
 
 @dataclass(frozen=True)
@@ -43,14 +50,14 @@ class Checkpoint:
         return float(self.arrays["time"])
 
 
-def capture(state: "_State", records: NDArray[np.float64], progress: float) -> Checkpoint:
+def capture(state: State, records: NDArray[np.float64], progress: float) -> Checkpoint:
     """State as it is; the arrays are the state's own, so they change when it goes on."""
     arrays = {name: np.asarray(getattr(state, name)) for name in (*_ARRAYS, *_NUMBERS)}
     arrays |= {"points": state.points[: state.count], "records": records}
     return Checkpoint(arrays, progress)
 
 
-def restore(state: "_State", checkpoint: Checkpoint, records: NDArray[np.float64]) -> int:
+def restore(state: State, checkpoint: Checkpoint, records: NDArray[np.float64]) -> int:
     """Set a fresh state, and the records, to a checkpoint; return how many intervals are done.
 
     Raises

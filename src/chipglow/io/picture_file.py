@@ -10,7 +10,7 @@ from PIL import Image, ImageSequence, UnidentifiedImageError
 from chipglow.camera import Recording
 from chipglow.io.atomic import atomic_path
 from chipglow.io.cameras import CAMERA_FORMATS, read_recording
-from chipglow.io.cameras.recordings import find_format
+from chipglow.io.cameras.formats import find_format
 
 PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".gif")
 

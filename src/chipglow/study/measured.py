@@ -18,7 +18,7 @@ from chipglow.camera import (
     find_bad_pixels,
 )
 from chipglow.io import CAMERA_FORMATS, is_measurement, is_scene, read_measurement, read_recording
-from chipglow.io.cameras.recordings import find_format
+from chipglow.io.cameras.formats import find_format
 from chipglow.study.files import StudyError, load_calibration, load_description
 from chipglow.study.measurement_schema import MeasurementDescription
 

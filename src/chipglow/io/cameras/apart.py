@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from chipglow.camera.recording import PlanckConversion, Recording
+from chipglow.io.cameras.formats import read_here
 from chipglow.io.cameras.stacks import Told
 from chipglow.io.sources.arrays import MOST_SAMPLES
 from chipglow.io.sources.isolated import MEMORY, patience_for
@@ -112,8 +113,6 @@ def main() -> None:
 
 
 def _read(request: dict[str, Any]) -> Recording:
-    from chipglow.io.cameras.recordings import read_here
-
     frames = slice(*request["frames"]) if request["frames"] else None
     return read_here(Path(request["path"]), request["kind"], frames, Told(**request["told"]))
 
