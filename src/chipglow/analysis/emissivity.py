@@ -8,12 +8,13 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from chipglow.analysis.observations import (
+    DOUBTFUL_SHARE,
     Scatter,
     check_same_pixels,
     count_flags,
+    coverage_factor,
     flag_text,
     observed_flags,
     observed_radiance,
@@ -30,8 +31,6 @@ COMMON: Final = ("truth", "environment", "calibration")
 LABORATORY: Final = 293.0
 """Temperature in K of the paper's laboratory, which surfaces reflect."""
 
-_COVERAGE: Final = 0.975
-_DOUBTFUL_SHARE: Final = 0.05
 _CLEARLY: Final = 5.0
 _ZERO_CELSIUS: Final = 273.15
 
@@ -299,7 +298,7 @@ class RegionEmissivity:
     @property
     def coverage_factor(self) -> float:
         """Student's t for 95 %: 1.96 where chance plays no part."""
-        return float(stdtrit(self.degrees_of_freedom, _COVERAGE))
+        return coverage_factor(self.degrees_of_freedom)
 
     @property
     def expanded_uncertainty(self) -> float:
@@ -314,7 +313,7 @@ class RegionEmissivity:
     def _doubts(self) -> list[str]:
         doubts = []
         total = self.pixels + self.left_out
-        if self.left_out > _DOUBTFUL_SHARE * total:
+        if self.left_out > DOUBTFUL_SHARE * total:
             text = (
                 f"{self.name}: {self.left_out} of {total} pixels are left out "
                 f"({flag_text(self.flagged)})"

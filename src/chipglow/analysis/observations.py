@@ -3,11 +3,23 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite, nan, sqrt
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from chipglow.camera import Flag, Measurement
+
+DOUBTFUL_SHARE: Final = 0.05
+"""Share of an area's pixels that may be left out before its result is doubtful."""
+
+_COVERAGE: Final = 0.975
+
+
+def coverage_factor(degrees_of_freedom: float) -> float:
+    """Student's t for an interval of 95 %: 1.96 where chance plays no part."""
+    return float(stdtrit(degrees_of_freedom, _COVERAGE))
 
 
 @dataclass(frozen=True)

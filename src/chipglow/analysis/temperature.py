@@ -7,13 +7,14 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from chipglow.analysis.emissivity import LABORATORY, Heating
 from chipglow.analysis.observations import (
+    DOUBTFUL_SHARE,
     Scatter,
     check_same_pixels,
     count_flags,
+    coverage_factor,
     flag_text,
     observed_flags,
     observed_radiance,
@@ -23,8 +24,6 @@ from chipglow.analysis.regions import Area
 from chipglow.camera import FittedCalibration, Flag, Measurement
 from chipglow.radiometry import Band
 
-_COVERAGE: Final = 0.975
-_DOUBTFUL_SHARE: Final = 0.05
 _UNEVEN: Final = 0.5
 _NO_MATTER: Final = 0.01
 _STEP: Final = 0.5
@@ -171,7 +170,7 @@ class TrueTemperature:
     @property
     def coverage_factor(self) -> float:
         """Student's t for 95 %: 1.96 where chance plays no part."""
-        return float(stdtrit(self.degrees_of_freedom, _COVERAGE))
+        return coverage_factor(self.degrees_of_freedom)
 
     @property
     def expanded_uncertainty(self) -> float:
@@ -183,7 +182,7 @@ class TrueTemperature:
         """Why the result may be wrong beyond its uncertainty, a sentence each."""
         doubts = []
         total = self.pixels + self.left_out
-        if self.left_out > _DOUBTFUL_SHARE * total:
+        if self.left_out > DOUBTFUL_SHARE * total:
             doubts.append(
                 f"{self.name}: {self.left_out} of {total} pixels are left out "
                 f"({flag_text(self.flagged)})"

@@ -1,5 +1,6 @@
 """The command ``chipglow register``: infrared images on visible pictures."""
 
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -224,13 +225,13 @@ def _by_points(console: "Console", given: "Points", model: ModelName) -> "Regist
 
     fit = fit_points(*given, model.value)
     _print_points(console, fit, given)
-    if fit.scatter < _BEST_PICKED:
-        console.print(
-            f"Doubtful: the points agree to {fit.scatter:.1g} visible pixels, better than anyone "
-            "picks them: they may be computed from each other, and the uncertainty that follows "
-            "is too small."
-        )
-    return fit.registration
+    if fit.scatter >= _BEST_PICKED:
+        return fit.registration
+    doubt = (
+        f"the points agree to {fit.scatter:.1g} visible pixels, better than anyone picks them: "
+        "they may be computed from each other, and the uncertainty that follows is too small"
+    )
+    return replace(fit.registration, doubts=(*fit.registration.doubts, doubt))
 
 
 def _by_images(
@@ -303,6 +304,8 @@ def _print_images(console: "Console", fit: "ImageFit") -> None:
 def _say(console: "Console", found: "Registration", measured: "Measurement") -> None:
     import numpy as np
 
+    from chipglow.cli.assumed import say_doubtful
+
     raster = measured.raster
     left, right, bottom, top = raster.extent
     slope = found.jacobian(np.array([(left + right) / 2, (bottom + top) / 2]))
@@ -319,8 +322,7 @@ def _say(console: "Console", found: "Registration", measured: "Measurement") -> 
         f"({typical / raster.spacing:.2g} infrared pixels) in the median, {1e6 * worst:.2g} um "
         "at most."
     )
-    for doubt in found.doubts:
-        console.print(f"Doubtful: {doubt}.")
+    say_doubtful(f"{doubt}." for doubt in found.doubts)
 
 
 def _align(
@@ -335,6 +337,7 @@ def _align(
 
     from chipglow.analysis import align_times, simultaneous_frames
     from chipglow.analysis.time_alignment import region_signals
+    from chipglow.cli.assumed import say_doubtful
 
     integration = float(measured.data.attrs["integration_time"])
     frames, pictures = region_signals(
@@ -353,8 +356,7 @@ def _align(
         f"Visible clock = infrared clock + {1e6 * alignment.offset:.2f} us, standard uncertainty "
         f"{1e6 * unsure:.2g} us, correlation {alignment.correlation:.3f}."
     )
-    for doubt in alignment.doubts:
-        console.print(f"Doubtful: {doubt}.")
+    say_doubtful(f"{doubt}." for doubt in alignment.doubts)
     within = simultaneous_frames(alignment, measured.times, integration, seen.times, exposure)
     empty = sum(1 for numbers in within if numbers.size == 0)
     if empty:
