@@ -17,6 +17,7 @@ from chipglow.cutting.damage import weakening
 from chipglow.cutting.flow_stress import comes_with_chipglow, flow_stress
 from chipglow.cutting.friction import friction_coefficient
 from chipglow.cutting.lanes import FAST, INLINE
+from chipglow.cutting.stencil import ADDED, SUMMED, add_to_nodes, sum_nodes
 from chipglow.cutting.stress import (
     BUFFER,
     LANES,
@@ -36,12 +37,12 @@ sorting: blocks two apart must not share a node."""
 BATCH_CELLS = 16
 """Cells whose points are gathered before their stress is computed."""
 
-NODE_VALUES = 6
+NODE_VALUES = ADDED
 MASS, MOMENTUM_X, MOMENTUM_Y, IMPULSE_X, IMPULSE_Y, FRICTION_LIMIT = range(6)
 """What the points gather on a node: in kg/m; momentum and impulse of stress and contact in kg/s
-twice; limit of the friction impulse in N s/m."""
+twice; limit of the friction impulse in N s/m. The last two values stay nought."""
 
-VELOCITY_VALUES = 4
+VELOCITY_VALUES = SUMMED
 VELOCITY_X, VELOCITY_Y, CHANGE_X, CHANGE_Y = range(VELOCITY_VALUES)
 """A node's velocity after a step and its change in the step, in m/s."""
 
@@ -101,6 +102,12 @@ def spline_weights(offset):  # type: ignore[no-untyped-def]
 
 
 @njit(**INLINE)
+def _distances(offset):  # type: ignore[no-untyped-def]
+    """Of the three nodes from the position, in cells."""
+    return -offset, 1.0 - offset, 2.0 - offset
+
+
+@njit(**INLINE)
 def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
     """Velocity and its gradient from the grid; the point moves. True if it is on the grid."""
     inverse = 1.0 / grid.cell
@@ -109,27 +116,9 @@ def _gather(p, velocity, grid, step):  # type: ignore[no-untyped-def]
     if not (0 <= i < grid.columns - 2 and 0 <= j < grid.rows - 2):
         return False
     wx, wy = spline_weights(ax), spline_weights(ay)
-    vx = vy = dx = dy = cxx = cxy = cyx = cyy = 0.0
-    for a in range(3):
-        sx = sy = tx = ty = ex = ey = 0.0
-        for b in range(3):
-            ux, uy = velocity[i + a, j + b, VELOCITY_X], velocity[i + a, j + b, VELOCITY_Y]
-            w = wy[b]
-            sx += w * ux
-            sy += w * uy
-            ex += w * velocity[i + a, j + b, CHANGE_X]
-            ey += w * velocity[i + a, j + b, CHANGE_Y]
-            tx += w * (b - ay) * ux
-            ty += w * (b - ay) * uy
-        w = wx[a]
-        vx += w * sx
-        vy += w * sy
-        dx += w * ex
-        dy += w * ey
-        cxx += w * (a - ax) * sx
-        cyx += w * (a - ax) * sy
-        cxy += w * tx
-        cyy += w * ty
+    (vx, vy, dx, dy), (cxx, cyx, _, _), (cxy, cyy, _, _) = sum_nodes(
+        velocity, i, j, wx, wy, _distances(ax), _distances(ay)
+    )
     scale = 4.0 * inverse
     p.vx, p.vy = vx, vy
     p.own_vx = vx + step.kept * (p.own_vx + dx - vx)
@@ -157,17 +146,18 @@ def _scatter(p, soft, tension, fx, fy, limit, nodes, grid, step):  # type: ignor
     txy = force * soft * p.dxy
     mx, my = mass * p.own_vx, mass * p.own_vy
     hx, hy = step.time_step * fx, step.time_step * fy
-    for a in range(3):
-        ux, uy = mx + qxx * (a - ax), my + qyx * (a - ax)
-        gx, gy = hx - txx * (a - ax), hy - txy * (a - ax)
-        for b in range(3):
-            w = wx[a] * wy[b]
-            nodes[i + a, j + b, MASS] += w * mass
-            nodes[i + a, j + b, MOMENTUM_X] += w * (ux + qxy * (b - ay))
-            nodes[i + a, j + b, MOMENTUM_Y] += w * (uy + qyy * (b - ay))
-            nodes[i + a, j + b, IMPULSE_X] += w * (gx - txy * (b - ay))
-            nodes[i + a, j + b, IMPULSE_Y] += w * (gy - tyy * (b - ay))
-            nodes[i + a, j + b, FRICTION_LIMIT] += w * limit
+    add_to_nodes(
+        nodes,
+        i,
+        j,
+        wx,
+        wy,
+        _distances(ax),
+        _distances(ay),
+        (mass, mx, my, hx, hy, limit),
+        (0.0, qxx, qyx, -txx, -txy),
+        (0.0, qxy, qyy, -txy, -tyy),
+    )
     return True
 
 
@@ -293,7 +283,7 @@ def _advance(  # type: ignore[no-untyped-def]
     """Advance all points by some steps, shared out among some threads.
 
     `velocity` (columns, rows, 4) is the grid's velocity after the last step and its change in that
-    step, kept for the next; `nodes` (columns, rows, 6) is zero before and after; `heat` (columns,
+    step, kept for the next; `nodes` (columns, rows, 8) is zero before and after; `heat` (columns,
     rows) gathers friction work (J/m); `sums` gathers over the steps what `FORCE_X` and so on name.
     `elastic` is `WorkpieceMaterial.elastic_ratios`, `heat_shares` that of `heat_share`. Returns
     False if a point left the grid.

@@ -55,7 +55,7 @@ from chipglow.cutting.watch import Trouble, fastest_point, find_lost, find_off_g
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.surface import Surface, surface_distance
 
-SOLVER_VERSION: Final = "7"
+SOLVER_VERSION: Final = "8"
 """Changes whenever the same input gives another result."""
 
 _MARGIN: Final = 4
