@@ -16,10 +16,11 @@ from chipglow.cutting.points import POINT, Grid, block_of_points, sort_by_cell
 from chipglow.scene import ToolGeometry
 
 FAR = 1.0
-UNBROKEN = replace(AISI_1045, damage=None)
-"""AISI 1045 that does not fail."""
+DENSITY = float(AISI_1045.density_at(ROOM_TEMPERATURE))
+UNBROKEN = replace(AISI_1045, damage=None, density=DENSITY)
+"""AISI 1045 that does not fail and does not expand."""
 ELASTIC = replace(
-    AISI_1045,
+    UNBROKEN,
     young_modulus=205e9,
     poisson_ratio=0.29,
     flow_stress=replace(AISI_1045.flow_stress, yield_stress=1e15),
@@ -41,7 +42,7 @@ class Block:
         self.points = block_of_points(*centres, self.spacing, 293.0, 0.0)
         self.count = self.points.size
         self.sound = material.sound_speed()
-        mass = material.density * self.spacing**2
+        mass = float(material.density_at(ROOM_TEMPERATURE)) * self.spacing**2
         self.step = Step(
             mass=mass,
             heat_mass=mass,

@@ -21,15 +21,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, prange, set_num_threads
-from solver import FAR, Block
+from solver import DENSITY, FAR, Block
 
 from chipglow.cutting import AISI_1045
 from chipglow.cutting.damage import Damage
 from chipglow.cutting.momentum import NODE_VALUES, SUMS, VELOCITY_VALUES, Step, advance_with
 from chipglow.cutting.points import POINT, Grid, Points, sort_by_cell
 
-STEEL = replace(AISI_1045, young_modulus=205e9, poisson_ratio=0.29)
-"""Elastic constants of AISI 1045 at room temperature: peers know no others."""
+STEEL = replace(AISI_1045, young_modulus=205e9, poisson_ratio=0.29, density=DENSITY)
+"""Elastic constants and density of AISI 1045 at room temperature: peers know no others."""
 STEPS = 20
 WARM_UP = 20
 MASS_SCALING = 400.0

@@ -98,7 +98,7 @@ class AnalyticChip:
         work = np.cumsum(np.maximum(cutting, 0.0)) * 0.5e-6 * 250.0 / 60.0 + 1e-3
         nothing = np.zeros(time.size)
         energy = EnergyHistory(
-            work, nothing, nothing, nothing, 0.9 * work, 0.08 * work, nothing, nothing
+            work, nothing, nothing, nothing, 0.9 * work, 0.08 * work, nothing, nothing, nothing
         )
         return ForceHistory(time, cutting, thrust, energy)
 

@@ -7,12 +7,16 @@ import pytest
 from solver import Block
 
 from chipglow.cutting import TemperatureTable, workpiece
+from chipglow.cutting.stress import BULK
 
 STRAIN = 1e-4
 RATE = 1e3
 TITANIUM = workpiece("ti-6al-4v")
 UNYIELDING = replace(
-    TITANIUM, damage=None, flow_stress=replace(TITANIUM.flow_stress, yield_stress=1e15)
+    TITANIUM,
+    density=4430.0,
+    damage=None,
+    flow_stress=replace(TITANIUM.flow_stress, yield_stress=1e15),
 )
 # Rows of the library's tables: E in Pa and nu by the temperature in K.
 ROWS = {300.0: (105.0e9, 0.338), 900.0: (75.1e9, 0.366)}
@@ -32,7 +36,7 @@ def stresses(block):
     """Mean xx, yy and xy of the Cauchy stress in Pa, and its scatter."""
     p, step = block.points, block.step
     row = int(p["temperature"][0] - 200.0)
-    tension = block.elastic[row, 1] * step.bulk_modulus * (p["volume"] / step.volume - 1.0)
+    tension = block.elastic[row, BULK] * step.bulk_modulus * (p["volume"] / p["free_volume"] - 1.0)
     xx, yy, xy = block.deviator()
     each = np.array([xx + tension, yy + tension, xy])
     return each.mean(axis=1), each.std(axis=1).max()

@@ -5,7 +5,7 @@ from math import exp, radians
 import numpy as np
 import pytest
 from scipy.constants import Stefan_Boltzmann
-from solver import Block
+from solver import DENSITY, Block
 
 from chipglow.cutting import (
     CuttingConditions,
@@ -23,7 +23,7 @@ from chipglow.study import Study
 EVERYWHERE = HeatLoss(0.0, 0.0, 293.15, -1.0, 1.0, -1.0, 1.0)
 TOOL_HEAT = ToolHeat(CARBIDE.density * CARBIDE.heat_capacity, CARBIDE.conductivity, 0.5, 0.0, 1.0)
 CAPACITY = 520.0
-STORE = AISI_1045.density * CAPACITY
+STORE = DENSITY * CAPACITY
 
 
 class WarmBlock:

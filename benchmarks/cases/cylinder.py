@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from solver import Block
+from solver import DENSITY, Block
 
 from cases import Case, Check
 from cases.motion import MICRO, convergence
@@ -35,7 +35,7 @@ def rigid_plastic(duration=2e-6):
         inner, flux = state
         outer = outer_radius(inner)
         spread = flux**2 * (inner**-2 - outer**-2) / (2 * log(outer / inner))
-        return [flux / inner, spread - 2 * SHEAR_STRENGTH / STEEL.density]
+        return [flux / inner, spread - 2 * SHEAR_STRENGTH / DENSITY]
 
     stop = lambda _, state: state[1]  # noqa: E731
     stop.terminal = True

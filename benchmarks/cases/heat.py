@@ -4,7 +4,7 @@ from math import sqrt
 
 import numpy as np
 from scipy.special import erfc
-from solver import Block
+from solver import DENSITY, Block
 
 from cases import Case, Check, order
 from cases.motion import MICRO, convergence
@@ -12,7 +12,7 @@ from chipglow.cutting import AISI_1045
 from chipglow.report.drawing import BLUE, GREY
 
 CONDUCTIVITY, CAPACITY = 45.0, 520.0
-DIFFUSIVITY = CONDUCTIVITY / (AISI_1045.density * CAPACITY)
+DIFFUSIVITY = CONDUCTIVITY / (DENSITY * CAPACITY)
 START, DURATION = 40e-6, 60e-6
 
 

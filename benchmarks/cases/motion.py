@@ -4,7 +4,7 @@ from math import pi, sqrt
 
 import numpy as np
 from matplotlib.ticker import FormatStrFormatter, LogLocator
-from solver import ELASTIC, Block
+from solver import DENSITY, ELASTIC, Block
 
 from cases import Case, Check, order
 from chipglow.report.drawing import BLUE, GREEN, GREY, VERMILLION
@@ -124,7 +124,7 @@ def middle(block, component):
 def exact_speed(kind):
     """Speed of pressure (0) and shear (1) waves in m/s."""
     shear, bulk = ELASTIC.shear_modulus_at(293.0), ELASTIC.bulk_modulus_at(293.0)
-    return sqrt((shear if kind else bulk + shear * 4 / 3) / ELASTIC.density)
+    return sqrt((shear if kind else bulk + shear * 4 / 3) / DENSITY)
 
 
 def waves(cells=(20e-6, 14e-6, 10e-6, 7e-6)):
@@ -207,7 +207,7 @@ def exact_period():
     modulus = ELASTIC.young_modulus / (1 - ELASTIC.poisson_ratio**2)
     across = ELASTIC.poisson_ratio / (1 - ELASTIC.poisson_ratio)
     correction = 1 + (across * pi * WIDTH / BAR) ** 2 / 24
-    return 2 * BAR / sqrt(modulus / ELASTIC.density) * correction
+    return 2 * BAR / sqrt(modulus / DENSITY) * correction
 
 
 def vibrations(cells=(20e-6, 40e-6 / 3, 10e-6, 40e-6 / 6)):

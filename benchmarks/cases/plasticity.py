@@ -5,7 +5,7 @@ from math import sqrt
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from solver import ELASTIC, UNBROKEN, Block
+from solver import DENSITY, ELASTIC, UNBROKEN, Block
 
 from cases import Case, Check
 from chipglow.report.drawing import BLUE, GREEN, GREY, VERMILLION
@@ -42,7 +42,7 @@ def integrated_shear():
     rate, law = RATE / sqrt(3), UNBROKEN.flow_stress
 
     def heating(strain, state):
-        capacity = UNBROKEN.density * UNBROKEN.heat_capacity.at(state[0])
+        capacity = DENSITY * UNBROKEN.heat_capacity.at(state[0])
         stress = johnson_cook(law, strain, rate, state[0])
         return [UNBROKEN.taylor_quinney * stress / capacity]
 

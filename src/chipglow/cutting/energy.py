@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from chipglow.cutting.stress import kelvin_index
+from chipglow.cutting.stress import BULK, SHEAR, kelvin_index
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,10 @@ class EnergyHistory:
     friction_work : ndarray
         Friction work, all of it heat, shape (n,).
     sharing_loss : ndarray
-        Elastic energy lost because the points of a cell share one density, shape (n,).
+        Elastic energy lost because the points of a cell share one dilation, shape (n,).
+    expansion_work : ndarray
+        Elastic energy that material got from heat when it was warmed under pressure (or cooled
+        under tension), shape (n,): no drive did that work.
     lost_heat : ndarray
         Heat that free surfaces lost to the surroundings, shape (n,). It was plastic or friction
         work before, so it is no entry of the mechanical account.
@@ -41,6 +44,7 @@ class EnergyHistory:
     plastic_work: NDArray[np.float64]
     friction_work: NDArray[np.float64]
     sharing_loss: NDArray[np.float64]
+    expansion_work: NDArray[np.float64]
     lost_heat: NDArray[np.float64]
 
     @property
@@ -48,7 +52,8 @@ class EnergyHistory:
         """Share of the work that the account does not find again: what the grid dissipates."""
         held = self.kinetic_energy + self.elastic_energy
         used = self.plastic_work + self.friction_work + self.sharing_loss
-        return (self.drive_work + self.contact_work - held - used) / self.drive_work
+        done = self.drive_work + self.contact_work + self.expansion_work
+        return (done - held - used) / self.drive_work
 
 
 ENERGIES: Final = len(fields(EnergyHistory))
@@ -68,8 +73,9 @@ def held_energy(points, count, step, elastic, cell):  # type: ignore[no-untyped-
         spread = p.cxx * p.cxx + p.cxy * p.cxy + p.cyx * p.cyx + p.cyy * p.cyy
         kinetic += p.own_vx * p.own_vx + p.own_vy * p.own_vy + 0.25 * cell * cell * spread
         warm = kelvin_index(p.temperature, elastic.shape[0])
-        dilation = p.volume / step.volume - 1.0
+        dilation = p.volume / p.free_volume - 1.0
         square = p.dxx * p.dxx + p.dyy * p.dyy + p.dxx * p.dyy + p.dxy * p.dxy
-        strained += 0.5 * elastic[warm, 0] * square / step.shear_modulus * p.volume
-        strained += 0.5 * elastic[warm, 1] * step.bulk_modulus * dilation * dilation * step.volume
+        strained += 0.5 * elastic[warm, SHEAR] * square / step.shear_modulus * p.volume
+        bulk = elastic[warm, BULK] * step.bulk_modulus
+        strained += 0.5 * bulk * dilation * dilation * p.free_volume
     return 0.5 * step.mass * kinetic, strained

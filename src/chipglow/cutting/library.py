@@ -114,20 +114,19 @@ _DAMAGE: Final = {
     "reference_temperature": _TEMPERATURE,
     "reference_rate": _RATE,
 }
-_SCALARS: Final = {
-    "workpiece": {
-        "density": _DENSITY,
-    },
-    "tool": {
-        "density": _DENSITY,
-        "conductivity": _CONDUCTIVITY,
-        "heat_capacity": _HEAT_CAPACITY,
-    },
+_TOOL: Final = {
+    "density": _DENSITY,
+    "conductivity": _CONDUCTIVITY,
+    "heat_capacity": _HEAT_CAPACITY,
 }
 _TABLES: Final = {"conductivity": _CONDUCTIVITY, "heat_capacity": _HEAT_CAPACITY}
-_ELASTIC: Final = {"young_modulus": _STRESS, "poisson_ratio": _NUMBER}
+_CONSTANT_OR_TABLE: Final = {
+    "density": _DENSITY,
+    "young_modulus": _STRESS,
+    "poisson_ratio": _NUMBER,
+}
 _HEADER: Final = ("kind", "name", "description")
-_WORKPIECE_PARTS: Final = (*_ELASTIC, "taylor_quinney", *_TABLES, "flow_stress", "damage")
+_WORKPIECE_PARTS: Final = (*_CONSTANT_OR_TABLE, "taylor_quinney", *_TABLES, "flow_stress", "damage")
 _VALUE: Final = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?:\s+(\S.*))?")
 _OWN_FILE: Final = re.compile(r"(.+\.ya?ml)(?:/([^/]+))?")
 
@@ -280,27 +279,24 @@ class _Reader:
         kind = data.get("kind") if isinstance(data, Mapping) else None
         if kind not in ("workpiece", "tool"):
             raise self._wrong("kind", kind, "workpiece or tool")
-        scalars = _SCALARS[kind]
-        parts = () if kind == "tool" else _WORKPIECE_PARTS
-        data = self._mapping("", data, (*_HEADER, *scalars, *parts))
+        parts = tuple(_TOOL) if kind == "tool" else _WORKPIECE_PARTS
+        data = self._mapping("", data, (*_HEADER, *parts))
         name, description = self._text("name", data), self._text("description", data)
-        numbers = {
-            key: self._sourced(key, data[key], quantity) for key, quantity in scalars.items()
-        }
         sets: dict[str, WorkpieceMaterial] = {}
         tool: ToolMaterial | None = None
         if kind == "workpiece":
-            sets = self._workpieces(name, data, numbers)
+            sets = self._workpieces(name, data)
         else:
+            numbers = {
+                key: self._sourced(key, data[key], quantity) for key, quantity in _TOOL.items()
+            }
             tool = self._build("tool", ToolMaterial, {"name": name, **numbers})
         return MaterialFile(name, description, tuple(self._properties), sets, tool)
 
-    def _workpieces(
-        self, name: str, data: Mapping[str, Any], numbers: Mapping[str, float]
-    ) -> dict[str, WorkpieceMaterial]:
-        elastic = {
+    def _workpieces(self, name: str, data: Mapping[str, Any]) -> dict[str, WorkpieceMaterial]:
+        constant_or_table = {
             key: self._constant_or_table(key, data[key], quantity)
-            for key, quantity in _ELASTIC.items()
+            for key, quantity in _CONSTANT_OR_TABLE.items()
         }
         share = self._share("taylor_quinney", data["taylor_quinney"])
         tables = {key: self._table(key, data[key], quantity) for key, quantity in _TABLES.items()}
@@ -317,8 +313,7 @@ class _Reader:
                 "flow_stress": flow_stress,
                 "damage": damage if fails else None,
                 "taylor_quinney": share,
-                **numbers,
-                **elastic,
+                **constant_or_table,
                 **tables,
             }
             sets[str(chosen)] = self._build("workpiece", WorkpieceMaterial, values)

@@ -57,6 +57,12 @@ def _values(quantity: float | TemperatureTable) -> tuple[float, ...]:
     return quantity.values if isinstance(quantity, TemperatureTable) else (quantity,)
 
 
+def _at(quantity: float | TemperatureTable, temperature: ArrayLike) -> NDArray[np.float64]:
+    if isinstance(quantity, TemperatureTable):
+        return quantity.at(temperature)
+    return np.full(np.shape(temperature), quantity, dtype=np.float64)
+
+
 @dataclass(frozen=True)
 class RateTable:
     """A share that depends on the plastic strain rate.
@@ -94,8 +100,8 @@ class WorkpieceMaterial:
     ----------
     name : str
         Name with the source of the numbers.
-    density : float
-        In kg/m³.
+    density : float or TemperatureTable
+        In kg/m³: constant, or over the temperature, which is thermal expansion.
     young_modulus : float or TemperatureTable
         In Pa: constant, or over the temperature.
     poisson_ratio : float or TemperatureTable
@@ -111,7 +117,7 @@ class WorkpieceMaterial:
     """
 
     name: str
-    density: float
+    density: float | TemperatureTable
     young_modulus: float | TemperatureTable
     poisson_ratio: float | TemperatureTable
     flow_stress: FlowStress
@@ -121,7 +127,8 @@ class WorkpieceMaterial:
     taylor_quinney: float | RateTable = 0.9
 
     def __post_init__(self) -> None:
-        check_positive("workpiece density", self.density)
+        for value in _values(self.density):
+            check_positive("workpiece density", value)
         for value in _values(self.young_modulus):
             check_positive("workpiece young_modulus", value)
         for value in _values(self.poisson_ratio):
@@ -130,6 +137,10 @@ class WorkpieceMaterial:
         share = self.taylor_quinney
         if not isinstance(share, RateTable) and not 0 <= share <= 1:
             raise ValueError(f"taylor_quinney: expected 0 to 1, got {share!r}")
+
+    def density_at(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Densities without stress in kg/m³ at temperatures in K, of the same shape."""
+        return _at(self.density, temperature)
 
     def shear_modulus_at(self, temperature: ArrayLike) -> NDArray[np.float64]:
         """Shear moduli in Pa at temperatures in K, of the same shape."""
@@ -142,32 +153,31 @@ class WorkpieceMaterial:
         return np.asarray(young / (3 * (1 - 2 * poisson)))
 
     def elastic_ratios(self) -> NDArray[np.float64]:
-        """Moduli over those at room temperature, for kernels.
+        """Moduli and volume without stress over those at room temperature, for kernels.
 
         Returns
         -------
         ndarray
-            Shear and bulk modulus as shares of their values at `ROOM_TEMPERATURE`, at every kelvin
-            as `TemperatureTable.sampled` has it, shape (n, 2); one row if both are constant.
+            Shear modulus, bulk modulus and volume without stress as shares of their values at
+            `ROOM_TEMPERATURE`, and the rise of the last to the next row, at every kelvin as
+            `TemperatureTable.sampled` has it, shape (n, 4); one row if all are constant.
         """
-        tables = (self.young_modulus, self.poisson_ratio)
+        tables = (self.young_modulus, self.poisson_ratio, self.density)
         vary = any(isinstance(each, TemperatureTable) for each in tables)
         kelvins = _KELVINS if vary else _KELVINS[:1]
         moduli = (self.shear_modulus_at, self.bulk_modulus_at)
-        return np.stack([each(kelvins) / each(ROOM_TEMPERATURE) for each in moduli], axis=-1)
+        ratios = [each(kelvins) / each(ROOM_TEMPERATURE) for each in moduli]
+        volume = self.density_at(ROOM_TEMPERATURE) / self.density_at(kelvins)
+        rise = np.diff(volume, append=volume[-1])
+        return np.stack([*ratios, volume, rise], axis=-1)
 
     def sound_speed(self) -> float:
-        """Speed of longitudinal waves in m/s where the material is stiffest."""
+        """Speed of longitudinal waves in m/s at the temperature where it is highest."""
         stiffness = self.bulk_modulus_at(_KELVINS) + 4 / 3 * self.shear_modulus_at(_KELVINS)
-        return float(np.sqrt(stiffness.max() / self.density))
+        return float(np.sqrt((stiffness / self.density_at(_KELVINS)).max()))
 
     def _elastic_at(self, temperature: ArrayLike) -> tuple[NDArray[np.float64], ...]:
-        return tuple(
-            each.at(temperature)
-            if isinstance(each, TemperatureTable)
-            else np.full(np.shape(temperature), each)
-            for each in (self.young_modulus, self.poisson_ratio)
-        )
+        return tuple(_at(each, temperature) for each in (self.young_modulus, self.poisson_ratio))
 
     @property
     def melting_temperature(self) -> float:

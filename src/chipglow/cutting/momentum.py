@@ -20,6 +20,8 @@ from chipglow.cutting.lanes import FAST, INLINE
 from chipglow.cutting.stencil import ADDED, SUMMED, add_to_nodes, sum_nodes
 from chipglow.cutting.stress import (
     BUFFER,
+    BULK,
+    EXPANSION,
     LANES,
     SOFT,
     STRESS,
@@ -46,12 +48,14 @@ VELOCITY_VALUES = SUMMED
 VELOCITY_X, VELOCITY_Y, CHANGE_X, CHANGE_Y = range(VELOCITY_VALUES)
 """A node's velocity after a step and its change in the step, in m/s."""
 
-SUMS = 7
-FORCE_X, FORCE_Y, BOUNDARY_WORK, CONTACT_WORK, PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS = range(
-    SUMS
-)
-"""What a step adds up: forces on the chip (N/m), and work per width of cut (J/m); the last is the
-elastic energy that goes when the points of a cell share one density."""
+SUMS = 8
+(
+    FORCE_X, FORCE_Y, BOUNDARY_WORK, CONTACT_WORK, PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS,
+    EXPANSION_WORK,
+) = range(SUMS)  # fmt: skip
+"""What a step adds up: forces on the chip (N/m), and work per width of cut (J/m); the last two are
+the elastic energy that goes when the points of a cell share one dilation, and that which comes when
+their volume without stress changes with the temperature."""
 
 _RATE_OF_SLIDING = 1e4
 
@@ -59,7 +63,8 @@ _RATE_OF_SLIDING = 1e4
 class Step(NamedTuple):
     """Numbers of a step.
 
-    Point mass (kg/m, scaled), heat mass (kg/m, true), volume free of stress (m²), time step (s),
+    Point mass (kg/m, scaled), heat mass (kg/m, true), volume without stress at room temperature
+    (m²), time step (s),
     share of a point's own velocity that it keeps (AFLIP 1, APIC 0), moduli at room temperature
     (Pa); contact: stiffness (Pa), damping (N s/m²), distance at which a point touches (m), area of
     a point (m²/m), friction; boundary: nodes under `floor`, and those left of `inflow` and under
@@ -191,21 +196,22 @@ def _gather_cells(points, starts, first, last, velocity, grid, step, elastic, su
         begin, end = starts[cell], starts[cell + 1]
         if begin == end:
             continue
-        total = squares = 0.0
+        total = free = squares = 0.0
         for k in range(begin, end):
             p = points[k]
             on_grid &= _gather(p, velocity, grid, step)
             volume = p.volume * (1.0 + step.time_step * (p.cxx + p.cyy))
             total += volume
-            squares += volume * volume
-        # One density for the points that share a cell: plastic flow, which keeps its volume, does
+            free += p.free_volume
+            squares += volume * volume / p.free_volume
+        # One dilation for the points that share a cell: plastic flow, which keeps its volume, does
         # not lock, and pressure does not alternate from point to point.
-        mean = total / (end - begin)
-        bulk = elastic[kelvin_index(points[begin].temperature, elastic.shape[0]), 1]
-        lost += bulk * (squares - mean * total)
+        dilated = total / free
+        bulk = elastic[kelvin_index(points[begin].temperature, elastic.shape[0]), BULK]
+        lost += bulk * (squares - dilated * total)
         for k in range(begin, end):
-            points[k].volume = mean
-    sums[SHARING_LOSS] += 0.5 * step.bulk_modulus / step.volume * lost
+            points[k].volume = dilated * points[k].free_volume
+    sums[SHARING_LOSS] += 0.5 * step.bulk_modulus * lost
     return on_grid
 
 
@@ -231,6 +237,7 @@ def _work_block(  # type: ignore[no-untyped-def]
             for k in range(begin, end):
                 p = points[k]
                 sums[block, PLASTIC_WORK] += buffer[WORK + k - begin]
+                sums[block, EXPANSION_WORK] += buffer[EXPANSION + k - begin]
                 fx = fy = limit = 0.0
                 if surface_bound(p.x, p.y, tool) < step.reach:
                     fx, fy, limit = _contact(p, buffer[STRESS + k - begin], tool, step, law, damage)

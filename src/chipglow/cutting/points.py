@@ -13,7 +13,8 @@ POINT: Final = np.dtype(
             "x", "y", "vx", "vy", "own_vx", "own_vy",
             "cxx", "cxy", "cyx", "cyy",
             "dxx", "dyy", "dxy",
-            "strain", "increment", "strain_before", "damage", "temperature", "volume",
+            "strain", "increment", "strain_before", "damage", "temperature",
+            "volume", "free_volume",
             "material_x", "material_y", "contact_time",
         )
     ]
@@ -21,7 +22,8 @@ POINT: Final = np.dtype(
 """Position, velocity of the grid there, velocity that the point carries, velocity gradient,
 deviator of the Cauchy stress that the elastic strain makes at room temperature; plastic strain,
 what the last step added to it and what it was at the last record; damage, temperature, volume per
-width, position before the cut, time in contact since the last exchange of heat; SI units."""
+width and what it would be without stress (at the temperature of the last step), position before the
+cut, time in contact since the last exchange of heat; SI units."""
 
 Points: TypeAlias = NDArray[np.void]
 
@@ -44,7 +46,7 @@ def block_of_points(
     points["x"] = np.repeat(x, y.size)
     points["y"] = np.tile(y, x.size)
     points["vx"] = points["own_vx"] = speed
-    points["volume"] = spacing**2
+    points["volume"] = points["free_volume"] = spacing**2
     points["temperature"] = temperature
     points["material_x"], points["material_y"] = points["x"], points["y"]
     return points

@@ -34,6 +34,7 @@ from chipglow.cutting.material import ROOM_TEMPERATURE, ToolMaterial, WorkpieceM
 from chipglow.cutting.momentum import (
     BOUNDARY_WORK,
     CONTACT_WORK,
+    EXPANSION_WORK,
     FORCE_X,
     FORCE_Y,
     FRICTION_WORK,
@@ -55,7 +56,7 @@ from chipglow.cutting.watch import Trouble, fastest_point, find_lost, find_off_g
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.surface import Surface, surface_distance
 
-SOLVER_VERSION: Final = "8"
+SOLVER_VERSION: Final = "9"
 """Changes whenever the same input gives another result."""
 
 _MARGIN: Final = 4
@@ -198,7 +199,8 @@ class CuttingSimulation:
 
         ρV² times the uncut chip thickness: inertia can matter that much beside the cutting force.
         """
-        density = self.workpiece.density * self.numerics.mass_scaling
+        cold = float(self.workpiece.density_at(self.conditions.initial_temperature))
+        density = cold * self.numerics.mass_scaling
         return density * self.conditions.speed**2 * self.conditions.feed
 
     def frame_range(self, window: OutputWindow) -> tuple[int, int]:
@@ -257,12 +259,12 @@ class _State:
         self.tool = simulation.tool.surface
         self.speed, self.spacing = conditions.speed, spacing
         self.simulation, self.interval = simulation, interval
-        heat_mass = material.density * spacing**2
+        heat_mass = float(material.density_at(conditions.initial_temperature)) * spacing**2
         mass = heat_mass * numerics.mass_scaling
         self.step = Step(
             mass=mass,
             heat_mass=heat_mass,
-            volume=spacing**2,
+            volume=heat_mass / float(material.density_at(ROOM_TEMPERATURE)),
             time_step=0.0,
             kept=_KEPT,
             shear_modulus=float(material.shear_modulus_at(ROOM_TEMPERATURE)),
@@ -393,7 +395,7 @@ class _State:
         self.choose_steps(self.grid.cell / self.cycle)
         drive = self.work[BOUNDARY_WORK] + self.carried
         held = self._held() - self.held_at_start
-        used = self.work[[PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS]]
+        used = self.work[[PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS, EXPANSION_WORK]]
         return np.concatenate(
             [forces, [drive, self.work[CONTACT_WORK]], held, used, [self.lost_heat]]
         )
@@ -548,10 +550,11 @@ def _time_steps(
         _LARGEST_DRIFT * numerics.cell / simulation.conditions.speed,
         _FASTEST_DRIFT * numerics.cell / max(fastest, 1e-9),
     )
-    tool = simulation.tool_material
+    tool, temperature = simulation.tool_material, simulation.conditions.initial_temperature
     diffusivity = max(
         tool.conductivity / (tool.density * tool.heat_capacity),
-        max(material.conductivity.values) / (material.density * min(material.heat_capacity.values)),
+        max(material.conductivity.values)
+        / (float(material.density_at(temperature)) * min(material.heat_capacity.values)),
     )
     heat = _HEAT_STABILITY * numerics.cell**2 / diffusivity
     cycles = ceil(interval / min(drift, heat))
@@ -561,7 +564,7 @@ def _time_steps(
 
 
 def _diffusivity(material: WorkpieceMaterial, temperature: float) -> float:
-    capacity = material.density * material.heat_capacity.at(temperature)
+    capacity = material.density_at(temperature) * material.heat_capacity.at(temperature)
     return float(material.conductivity.at(temperature) / capacity)
 
 
@@ -579,7 +582,7 @@ def _tool_heat(simulation: CuttingSimulation, spacing: float) -> ToolHeat:
     temperature = simulation.conditions.initial_temperature
     chip = np.sqrt(
         material.conductivity.at(temperature)
-        * material.density
+        * material.density_at(temperature)
         * material.heat_capacity.at(temperature)
     )
     return ToolHeat(

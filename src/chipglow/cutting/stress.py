@@ -13,6 +13,7 @@ from numba import njit
 from chipglow.cutting.damage import damage_growth, weakening
 from chipglow.cutting.flow_stress import stress_and_slopes
 from chipglow.cutting.lanes import FAST, INLINE, exponential
+from chipglow.cutting.material import TABLE_COLDEST
 from chipglow.cutting.plastic_heat import heat_share
 
 LANES = 128
@@ -27,12 +28,16 @@ _SMALL_CHANGE = 0.02
 _SMALL_STRAIN = 0.01
 (
     DXX, DYY, DXY, STRAIN, DAMAGE, TEMPERATURE, INCREMENT, VOLUME,
-    CXX, CXY, CYX, CYY, TRIAL, WEAK, BOUND, WORK, SOFT, TENSION,
-) = range(0, 18 * _ROW, _ROW)  # fmt: skip
-BUFFER = 18 * _ROW
+    CXX, CXY, CYX, CYY, TRIAL, WEAK, BOUND, WORK, SOFT, TENSION, FREE, EXPANSION,
+) = range(0, 20 * _ROW, _ROW)  # fmt: skip
+BUFFER = 20 * _ROW
 STRESS = TRIAL
 """Rows of the buffer; in the end the trial stress has become the equivalent stress (Pa). `SOFT` is
-the shear modulus over that at room temperature; the deviator is that at room temperature."""
+the shear modulus over that at room temperature; the deviator is that at room temperature. `FREE` is
+the volume without stress (m²), `EXPANSION` the elastic energy (J/m) that its change has given."""
+
+SHEAR, BULK, VOLUME_FREE, VOLUME_RISE = range(4)
+"""Columns of `WorkpieceMaterial.elastic_ratios`."""
 
 
 @njit(**FAST)
@@ -98,7 +103,6 @@ def _try(b, count, step):  # type: ignore[no-untyped-def]
     """Trial deviator (Jaumann rate), its equivalent stress, and mean stress."""
     time_step = step.time_step
     two_g = 2.0 * step.shear_modulus * time_step
-    per_volume = 1.0 / step.volume
     for k in range(count):
         cxx, cxy, cyx, cyy = b[CXX + k], b[CXY + k], b[CYX + k], b[CYY + k]
         xx, yy, xy = b[DXX + k], b[DYY + k], b[DXY + k]
@@ -110,8 +114,12 @@ def _try(b, count, step):  # type: ignore[no-untyped-def]
         b[DXX + k], b[DYY + k], b[DXY + k] = dxx, dyy, shear
         square = dxx * dxx + dyy * dyy + dxx * dyy + shear * shear
         b[TRIAL + k] = b[SOFT + k] * np.sqrt(3.0 * square)
-        # Till here the row holds the share of the bulk modulus at room temperature.
-        b[TENSION + k] *= step.bulk_modulus * (b[VOLUME + k] * per_volume - 1.0)
+        # Till here the rows hold the share of the bulk modulus and the last step's free volume.
+        bulk = step.bulk_modulus * b[TENSION + k]
+        volume, free, before = b[VOLUME + k], b[FREE + k], b[EXPANSION + k]
+        dilated = volume / free
+        b[TENSION + k] = bulk * (dilated - 1.0)
+        b[EXPANSION + k] = 0.5 * bulk * (free - before) * (1.0 - dilated * volume / before)
         b[WORK + k] = 0.0
 
 
@@ -149,8 +157,8 @@ def update_stresses(  # type: ignore[no-untyped-def]
 ):
     """Stress of up to `LANES` points.
 
-    Leaves their equivalent and mean stress, the soft share of the shear modulus and plastic work in
-    `b`. `elastic` is `WorkpieceMaterial.elastic_ratios`.
+    Leaves their equivalent and mean stress, the soft share of the shear modulus, plastic work and
+    that of expansion in `b`. `elastic` is `WorkpieceMaterial.elastic_ratios`.
     """
     count = end - begin
     for k in range(count):
@@ -160,7 +168,12 @@ def update_stresses(  # type: ignore[no-untyped-def]
         b[STRAIN + k], b[DAMAGE + k], b[TEMPERATURE + k] = p.strain, p.damage, p.temperature
         b[INCREMENT + k], b[VOLUME + k] = p.increment, p.volume
         warm = kelvin_index(p.temperature, elastic.shape[0])
-        b[SOFT + k], b[TENSION + k] = elastic[warm, 0], elastic[warm, 1]
+        b[SOFT + k], b[TENSION + k] = elastic[warm, SHEAR], elastic[warm, BULK]
+        # A kelvin of expansion is some megapascals of pressure: rows alone would be too coarse.
+        share = min(max(0.0, p.temperature - TABLE_COLDEST - warm), 1.0)
+        free = elastic[warm, VOLUME_FREE] + share * elastic[warm, VOLUME_RISE]
+        b[EXPANSION + k], b[FREE + k] = p.free_volume, step.volume * free
+        p.free_volume = b[FREE + k]
     _try(b, count, step)
     plastic = plastic_increments(b, count, step.shear_modulus, step.time_step, law, damage)
     if plastic:
@@ -187,4 +200,4 @@ def property_at(table, temperature):  # type: ignore[no-untyped-def]
 @njit(**INLINE)
 def kelvin_index(temperature, size):  # type: ignore[no-untyped-def]
     """Row of a temperature in a table of `size` rows, one for each kelvin from 200 K."""
-    return min(max(int(temperature - 200.0), 0), size - 1)
+    return min(max(int(temperature - TABLE_COLDEST), 0), size - 1)

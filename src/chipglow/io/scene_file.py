@@ -65,7 +65,8 @@ _LONG_NAMES: Final[Mapping[str, str]] = {
     "elastic_energy": "change of the elastic energy",
     "plastic_work": "plastic work since the start",
     "friction_work": "friction work since the start",
-    "sharing_loss": "elastic energy lost by sharing density since the start",
+    "sharing_loss": "elastic energy lost by sharing dilation since the start",
+    "expansion_work": "elastic energy got from heat by thermal expansion since the start",
     "lost_heat": "heat lost to the surroundings since the start",
 }
 _FAST: Final[Mapping[str, Any]] = dict(

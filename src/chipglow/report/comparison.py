@@ -177,7 +177,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             result.forces.unaccounted * 100,
             1,
             "Work of the drive less kinetic and elastic energy, plastic and friction work, and the "
-            "elastic energy lost by sharing density: what the solver's grid dissipates.",
+            "elastic energy lost by sharing dilation: what the solver's grid dissipates.",
         ),
         _own(
             "kinetic_share_percent",

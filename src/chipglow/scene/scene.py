@@ -50,6 +50,7 @@ ENERGY_UNITS: Final[Mapping[str, str]] = dict.fromkeys(
         "plastic_work",
         "friction_work",
         "sharing_loss",
+        "expansion_work",
         "lost_heat",
     ),
     "J/m",
