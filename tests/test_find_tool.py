@@ -59,13 +59,13 @@ def test_the_face_is_within_its_stated_uncertainty(seen):
             off = found.tool.rake_point(80e-6) - true.rake_foot
             tip = (found.tool.rake_foot - true.rake_foot) @ true.rake_direction
             away = found.tool.rake_angle - true.rake_angle
-            within_angle += abs(away) < 2 * found.angle_uncertainty
-            within_place += abs(off @ true.rake_normal) < 2 * found.position_uncertainty
-            within_tip += abs(tip) < 2 * found.tip_uncertainty
+            within_angle += abs(away) < 2 * found.uncertainty.angle
+            within_place += abs(off @ true.rake_normal) < 2 * found.uncertainty.across
+            within_tip += abs(tip) < 2 * found.uncertainty.along
             count += 1
             # An uncertainty that covers everything would say nothing.
-            assert found.angle_uncertainty < radians(4.0)
-            assert found.position_uncertainty < 6e-6
+            assert found.uncertainty.angle < radians(4.0)
+            assert found.uncertainty.across < 6e-6
     assert count == 24
     assert min(within_angle, within_place, within_tip) >= 21
 
