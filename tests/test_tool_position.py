@@ -147,7 +147,7 @@ def test_how_sure_the_best_is_knows_of_the_tool():
 
 def test_the_uncertainty_holds_for_tools_that_are_off_at_random():
     """A chip that is hot at the face, where contact ends: neither slope nor bend is even."""
-    along, depth = (X - TOOL.rake_foot[0]) * UP[0] + (Y - TOOL.rake_foot[1]) * UP[1], None
+    along = (X - TOOL.rake_foot[0]) * UP[0] + (Y - TOOL.rake_foot[1]) * UP[1]
     depth = np.abs(TOOL.signed_distance(X, Y))
     contact = 1 / (1 + np.exp((along - 150e-6) / 30e-6))
     chip = measured([600.0 + 300.0 * contact * np.exp(-depth / 50e-6)])

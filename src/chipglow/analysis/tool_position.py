@@ -79,7 +79,8 @@ def contribution(
     """What a displacement by one standard uncertainty changes in what is read.
 
     Half the difference between the temperatures on either side: the uncertainty of the position
-    times the slope, taken over just that length (JCGM 100, 5.1.3, note 2).
+    times the slope, taken over just that length (JCGM 100, 5.1.3, note 2). Where one
+    side is outside the image, the difference from the other.
 
     Parameters
     ----------
@@ -93,11 +94,22 @@ def contribution(
     ndarray
         In K with its sign, shape (...).
     """
-    ahead, behind = (
-        map_coordinates(image.temperature, image.index(place), order=1, mode="nearest")
-        for place in (points + displacement, points - displacement)
+    (behind, no_behind), (here, _), (ahead, no_ahead) = (
+        _read(image, points + side * displacement) for side in (-1, 0, 1)
     )
-    return np.asarray((ahead - behind) / 2)
+    one_side = np.where(no_ahead, here - behind, ahead - here)
+    return np.where(no_ahead ^ no_behind, one_side, (ahead - behind) / 2)
+
+
+def _read(
+    image: ThermalImage, points: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Temperatures in K, of the nearest pixel outside the image, and which are outside."""
+    row, column = image.index(points)
+    rows, columns = image.temperature.shape
+    outside = (row < 0) | (row > rows - 1) | (column < 0) | (column > columns - 1)
+    values = map_coordinates(image.temperature, [row, column], order=1, mode="nearest")
+    return values, outside
 
 
 def combined(

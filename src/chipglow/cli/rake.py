@@ -144,8 +144,9 @@ def _of_the_tool(grid: "RakeGrid") -> "Iterator[str]":
 
     if grid.from_tool:
         kelvins = grid.frame_tool_uncertainty[grid.frame_count > 0]
+        mean = np.sqrt((kelvins**2).mean())
         yield (
-            f"The position of the tool makes a standard uncertainty of {np.sqrt((kelvins**2).mean()):.1f} K (root mean "
+            f"The position of the tool makes a standard uncertainty of {mean:.1f} K (root mean "
             f"square), up to {kelvins.max():.1f} K; it moves all squares together and is not in "
             "the deviations."
         )
