@@ -1,41 +1,19 @@
 """The rake face found in an image, within the uncertainty that is stated; the command `rake`."""
 
-import csv
 from math import degrees, radians
 
 import numpy as np
 import pytest
 import xarray as xr
-from analytic_chip import AnalyticChip
+from seen_chip import BAND, FLOOR, look, noisy
 from typer.testing import CliRunner
 
-from chipglow.analysis import Reading, ToolUncertainty, find_tool, normalised_error, rake_grid
-from chipglow.camera import Camera, GaussianPSF, Measurement
+from chipglow.analysis import Reading, find_tool, normalised_error, rake_grid
+from chipglow.camera import Measurement
 from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
-from chipglow.radiometry import Band
 from chipglow.scene import PlacedTool, Raster, ToolGeometry
 from chipglow.surface import CHIP_1, CHIP_2
-
-BAND = Band(3.8e-6, 5.1e-6)
-FLOOR = 573.15
-STARTS = [0.0, 10e-6]
-
-
-def look(angle, surface):
-    chip = AnalyticChip(tool=ToolGeometry(rake_angle=radians(angle)), frames=31)
-    camera = Camera(integration_time=5e-6, floor=FLOOR, psf=GaussianPSF(8e-6))
-    return camera.measure(chip.scene(), surface, STARTS)
-
-
-def noisy(measurement, seed):
-    """The same with noise of 1 % and of 3 W/(m² sr), and without knowledge of the tool."""
-    rng = np.random.default_rng(seed)
-    clean = measurement.radiance
-    noise = rng.normal(0.0, 0.01 * clean) + rng.normal(0.0, 3.0, clean.shape)
-    return Measurement.from_radiance(
-        clean + noise, BAND, measurement.times, measurement.raster, FLOOR
-    )
 
 
 @pytest.fixture(scope="module")
@@ -205,83 +183,6 @@ def test_a_given_and_a_found_tool(folder):
     angle = degrees(find_tool(read_measurement(folder / "real.nc")).tool.rake_angle)
     assert f"Found: rake angle {angle:.1f} deg, tip at x " in found
     assert "Assumed: clearance angle 7 deg, edge radius 20 um." in assumed
-
-
-def test_the_place_of_a_found_tool_is_uncertain_and_position_wins(folder):
-    (folder / "tool.yaml").write_text("rake_angle: -7 deg\ntip: [0 um, 0 um]\n")
-    measurement = read_measurement(folder / "real.nc")
-    found = find_tool(measurement)
-    stated = ToolUncertainty(along=5e-6, across=5e-6)
-    for options, tool, uncertainty, said in (
-        (["--tool", "found"], found.tool, found.uncertainty, "found, ± 16 um along the face"),
-        (
-            ["--tool", "found", "--position", "5 um"],
-            found.tool,
-            stated,
-            "--position 5 um in the place of what was found, ± 16 um along",
-        ),
-        (["--tool", "tool.yaml", "--position", "5 um"], None, stated, None),
-        (["--tool", "tool.yaml"], None, None, None),
-    ):
-        code, text, _ = command("real.nc", *options, "--out", "grid.nc")
-        assert code == 0
-        with xr.open_dataset(folder / "grid.nc", engine="h5netcdf", decode_times=False) as data:
-            written = data["tool_uncertainty"].values
-        tool = tool or PlacedTool(ToolGeometry(radians(-7.0)), (0.0, 0.0))
-        grid = rake_grid(measurement, tool, uncertainty=uncertainty)
-        expected = grid.tool_uncertainty if uncertainty else np.full(grid.mean.shape, np.nan)
-        np.testing.assert_array_equal(written, expected)
-        assert ("Position of the tool: " in text) is (said is not None)
-        assert said is None or f"Position of the tool: {said}" in text
-        assert ("The position of the tool makes a standard uncertainty of" in text) is (
-            uncertainty is not None
-        )
-        if uncertainty:
-            most = np.nanmax(grid.frame_tool_uncertainty)
-            assert f"up to {most:.1f} K; it moves all squares together" in " ".join(text.split())
-
-
-def test_the_place_of_a_found_tool_goes_into_the_comparison(folder):
-    """The same image on both sides, so that all is equal but the place of the tool."""
-    widths = {}
-    for name, options in (
-        ("found", ["--tool", "found"]),
-        ("stated", ["--tool", "found", "--position", "0.001 um"]),
-    ):
-        arguments = ["compare", "real.nc", "told.nc", "--uncertainty", "1 K", *options]
-        result = CliRunner().invoke(app, [*arguments, "--out", name], env={"COLUMNS": "160"})
-        assert result.exit_code == 0, result.output
-        assert "Position of the tool: " in result.stdout
-        with (folder / name / "comparison.csv").open(encoding="utf-8") as table:
-            rows = [row for row in csv.DictReader(table) if row["place"] == "rake face"]
-        widths[name] = np.array([float(row["measured_expanded_K"] or "nan") for row in rows])
-    measurement = read_measurement(folder / "real.nc")
-    found = find_tool(measurement)
-    grid = rake_grid(measurement, found.tool, uncertainty=found.uncertainty)
-    added = np.sqrt(widths["found"] ** 2 - widths["stated"] ** 2)
-    expected = 2 * grid.frame_tool_uncertainty[:, : added.size // grid.depth.size].ravel()
-    known = np.isfinite(added)
-    assert known.sum() > 5
-    # Four digits after the point are written.
-    np.testing.assert_allclose(added[known], expected[known], rtol=1e-3)
-
-
-def test_the_place_of_a_found_tool_goes_into_the_band(folder):
-    (folder / "curve.csv").write_text("x_um,y_um\n-30,40\n-150,140\n")
-    uncertainty = {}
-    for name, options in (("found", []), ("stated", ["--position", "2 um"])):
-        arguments = ["shearband", "real.nc", "--curve", "curve.csv", "--tool", "found", *options]
-        result = CliRunner().invoke(app, [*arguments, "--out", f"{name}.nc"])
-        assert result.exit_code == 0, result.output
-        assert "Position of the tool: " in result.stdout
-        path = folder / f"{name}.nc"
-        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as data:
-            uncertainty[name] = data["uncertainty_tool"].values
-            whole = np.hypot(data["uncertainty_position"], data["uncertainty_tool"])
-            np.testing.assert_allclose(data["uncertainty"], whole)
-    assert np.nanmin(uncertainty["found"]) >= 0.0
-    assert np.nanmax(uncertainty["found"]) > 1.0
-    assert (uncertainty["stated"] == 0.0).all()
 
 
 def test_a_tool_that_the_image_shows_elsewhere_is_doubted(folder):

@@ -1,13 +1,17 @@
 """How uncertain a tool's place is, in the squares at the rake face and along the shear band."""
 
+import csv
 from dataclasses import replace
 from math import hypot, radians
 
 import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from measured_band import RASTER, TOOL, measured
+from seen_chip import look, noisy
+from typer.testing import CliRunner
 
 from chipglow.analysis import (
     Reading,
@@ -15,10 +19,14 @@ from chipglow.analysis import (
     ToolUncertainty,
     band_profile,
     compare,
+    find_tool,
     normalised_error,
     rake_grid,
 )
+from chipglow.cli import app
+from chipglow.io import read_measurement, write_measurement
 from chipglow.scene import PlacedTool, ToolGeometry
+from chipglow.surface import CHIP_2
 
 X, Y = np.meshgrid(RASTER.x, RASTER.y)
 SLOPE = np.array([2e5, 1e5])
@@ -133,6 +141,13 @@ def test_a_tool_that_is_off_moves_all_squares_together():
         assert apart.fits[0].bias_uncertainty == pytest.approx(single, rel=1e-2)
 
 
+@pytest.mark.parametrize(("turned", "doubted"), [(2.9, False), (3.1, True)])
+def test_a_rake_angle_is_doubted_beyond_its_expanded_uncertainty(turned, doubted):
+    other = linear().with_tool(replace(TOOL, rake_angle=TOOL.rake_angle + radians(turned)))
+    result = compare(linear(), {"other": other}, TOOL, CURVE, StatedUncertainties(1.0, tool=FOUND))
+    assert any("rake angle of other differs" in doubt for doubt in result.doubts) is doubted
+
+
 def test_how_sure_the_best_is_knows_of_the_tool():
     """A slope along the face and two sets, 10 K too cold and 30 K too hot: the first stays nearer
     while the tool's error makes up to 10 K, as for any error that all values have in common.
@@ -165,6 +180,105 @@ def test_the_uncertainty_holds_for_tools_that_are_off_at_random():
         count += int(np.isfinite(e_n).sum())
     # 120 tools whose squares go together: a standard deviation of 2 %.
     assert within / count == pytest.approx(0.954, abs=0.05)
+
+
+# The commands
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch, seen):
+    monkeypatch.chdir(tmp_path)
+    write_measurement(seen, tmp_path / "told.nc")
+    write_measurement(noisy(seen, 0), tmp_path / "real.nc")
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def seen():
+    return look(-7.0, CHIP_2)
+
+
+def command(*arguments):
+    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "160"})
+    return result.exit_code, result.stdout, result.stderr.strip()
+
+
+def test_the_place_of_a_found_tool_is_uncertain_and_position_wins(folder):
+    (folder / "tool.yaml").write_text("rake_angle: -7 deg\ntip: [0 um, 0 um]\n")
+    measurement = read_measurement(folder / "real.nc")
+    found = find_tool(measurement)
+    stated = ToolUncertainty(along=5e-6, across=5e-6)
+    for options, tool, uncertainty, said in (
+        (["--tool", "found"], found.tool, found.uncertainty, "found, ± 16 um along the face"),
+        (
+            ["--tool", "found", "--position", "5 um"],
+            found.tool,
+            stated,
+            "--position 5 um in the place of what was found, ± 16 um along",
+        ),
+        (["--tool", "tool.yaml", "--position", "5 um"], None, stated, None),
+        (["--tool", "tool.yaml"], None, None, None),
+    ):
+        code, text, _ = command("rake", "real.nc", *options, "--out", "grid.nc")
+        assert code == 0
+        with xr.open_dataset(folder / "grid.nc", engine="h5netcdf", decode_times=False) as data:
+            written = data["tool_uncertainty"].values
+        tool = tool or PlacedTool(ToolGeometry(radians(-7.0)), (0.0, 0.0))
+        grid = rake_grid(measurement, tool, uncertainty=uncertainty)
+        expected = grid.tool_uncertainty if uncertainty else np.full(grid.mean.shape, np.nan)
+        np.testing.assert_array_equal(written, expected)
+        assert ("Position of the tool: " in text) is (said is not None)
+        assert said is None or f"Position of the tool: {said}" in text
+        assert ("The position of the tool makes a standard uncertainty of" in text) is (
+            uncertainty is not None
+        )
+        if uncertainty:
+            most = np.nanmax(grid.frame_tool_uncertainty)
+            assert f"up to {most:.1f} K; it moves all squares together" in " ".join(text.split())
+
+
+def test_the_place_of_a_found_tool_goes_into_the_comparison(folder):
+    """The same image on both sides, so that all is equal but the place of the tool."""
+    widths = {}
+    for name, options in (
+        ("found", ["--tool", "found"]),
+        ("stated", ["--tool", "found", "--position", "0.001 um"]),
+    ):
+        files = ("real.nc", "told.nc", "--uncertainty", "1 K", "--out", name)
+        code, text, _ = command("compare", *files, *options)
+        assert code == 0 and "Position of the tool: " in text
+        with (folder / name / "comparison.csv").open(encoding="utf-8") as table:
+            rows = [row for row in csv.DictReader(table) if row["place"] == "rake face"]
+        widths[name] = np.array([float(row["measured_expanded_K"] or "nan") for row in rows])
+    measurement = read_measurement(folder / "real.nc")
+    found = find_tool(measurement)
+    grid = rake_grid(measurement, found.tool, uncertainty=found.uncertainty)
+    added = np.sqrt(widths["found"] ** 2 - widths["stated"] ** 2)
+    expected = 2 * grid.frame_tool_uncertainty[:, : added.size // grid.depth.size].ravel()
+    known = np.isfinite(added)
+    assert known.sum() > 5
+    # Four digits after the point are written.
+    np.testing.assert_allclose(added[known], expected[known], rtol=1e-3)
+
+
+def test_the_place_of_a_found_tool_goes_into_the_band(folder):
+    (folder / "curve.csv").write_text("x_um,y_um\n-30,40\n-150,140\n")
+    uncertainty = {}
+    for name, options in (("found", []), ("stated", ["--position", "2 um"])):
+        usual = ("real.nc", "--curve", "curve.csv", "--tool", "found", "--out", f"{name}.nc")
+        code, text, _ = command("shearband", *usual, *options)
+        assert code == 0 and "Position of the tool: " in text
+        path = folder / f"{name}.nc"
+        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as data:
+            uncertainty[name] = data["uncertainty_tool"].values
+            whole = np.hypot(data["uncertainty_position"], data["uncertainty_tool"])
+            np.testing.assert_allclose(data["uncertainty"], whole)
+    assert np.nanmin(uncertainty["found"]) >= 0.0
+    assert np.nanmax(uncertainty["found"]) > 1.0
+    assert (uncertainty["stated"] == 0.0).all()
+
+
+# What is wrong
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import degrees, hypot, isfinite, sqrt
+from math import degrees, hypot, isfinite, radians, sqrt
 from typing import Final
 
 import numpy as np
@@ -30,7 +30,7 @@ SURE: Final = 0.95
 _DRAWS: Final = 4000
 _SEED: Final = 2010
 _FEW: Final = 3
-_SAME_ANGLE: Final = 0.1
+_SAME_ANGLE: Final = radians(0.1)
 
 
 @dataclass(frozen=True)
@@ -366,7 +366,10 @@ def compare(
             "the measurement does not tell the uncertainty of its calibration and none is stated, "
             "so that the E_n are too great."
         )
-    tools = {label: _tool_of(label, item, tool, remarks) for label, item in simulated.items()}
+    allowed = max(_SAME_ANGLE, COVERAGE * stated.tool.angle if stated.tool else 0.0)
+    tools = {
+        label: _tool_of(label, item, tool, allowed, remarks) for label, item in simulated.items()
+    }
     grid = _compare_grid(measured, simulated, tool, tools, stated, remarks)
     files = [("measured", measured, tool, reference)]
     files += [(label, item, tools[label], None) for label, item in simulated.items()]
@@ -385,14 +388,16 @@ def compare(
     )
 
 
-def _tool_of(label: str, simulated: Measurement, tool: Tool, remarks: Remarks) -> Tool:
+def _tool_of(
+    label: str, simulated: Measurement, tool: Tool, allowed: float, remarks: Remarks
+) -> Tool:
     own = simulated.tool
     if own is None:
         remarks.assumptions.append(f"{label} tells no tool; it is where the measurement has it.")
         return tool
-    turn = degrees(abs(own.rake_angle - tool.rake_angle))
-    if turn > _SAME_ANGLE:
-        remarks.doubts.append(f"the rake angle of {label} differs by {turn:.2g} degrees.")
+    turn = abs(own.rake_angle - tool.rake_angle)
+    if turn > allowed:
+        remarks.doubts.append(f"the rake angle of {label} differs by {degrees(turn):.2g} degrees.")
     return own
 
 
