@@ -79,8 +79,8 @@ def contribution(
     """What a displacement by one standard uncertainty changes in what is read.
 
     Half the difference between the temperatures on either side: the uncertainty of the position
-    times the slope, taken over just that length (JCGM 100, 5.1.3, note 2). Where one
-    side is outside the image, the difference from the other.
+    times the slope, taken over just that length (JCGM 100, 5.1.3, note 2). Where one side is
+    outside the image, the difference from the other.
 
     Parameters
     ----------
