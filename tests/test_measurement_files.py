@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import camera_files
 import numpy as np
@@ -15,6 +16,7 @@ from chipglow.cli import app
 from chipglow.io import (
     is_measurement,
     read_measurement,
+    read_recording,
     write_hcc,
     write_measurement,
     write_scene,
@@ -26,10 +28,12 @@ from chipglow.study import (
     CalibrationDescription,
     MeasurementDescription,
     StudyError,
+    UniformObjects,
     calibration_text,
     load_calibration,
     load_description,
     load_measurement,
+    measured,
     measurement_text,
     uniform_counts,
 )
@@ -541,6 +545,32 @@ def test_calibrate_takes_recordings_in_the_place_of_counts(laboratory):
     expected = fit_linear(CELSIUS[:4] + 273.15, counts, BAND).calibration
     found = load_calibration("of files.yaml")
     np.testing.assert_allclose(found.parameters, expected.parameters, rtol=1e-6)
+
+
+def test_frames_that_correct_all_black_bodies_are_read_once(laboratory, monkeypatch):
+    seen_bodies(laboratory)
+    read = []
+
+    def read_and_told(path, *arguments, **told):
+        read.append(Path(path).name)
+        return read_recording(path, *arguments, **told)
+
+    monkeypatch.setattr(measured, "read_recording", read_and_told)
+    settings = [part for setting in CORRECTED for part in ("--set", setting)]
+    code, output = run("calibrate", "bodies.csv", "--band", "3.8-5.1 um", *settings)
+    assert code == 0, output
+    assert sorted(read) == sorted(
+        ["cold.npy", "hot.npy", *(f"body {celsius:g}.npy" for celsius in CELSIUS[:4])]
+    )
+
+
+def test_frames_of_one_description_do_not_correct_recordings_of_another(laboratory):
+    objects = UniformObjects()
+    by_cold, by_hot = ([*CAMERA, f"uniform.frames={name}.npy"] for name in ("cold", "hot"))
+    several = (by_cold, by_hot, CAMERA, by_cold)
+    found = [uniform_counts("hot.npy", settings, objects) for settings in several]
+    assert found == [uniform_counts("hot.npy", settings) for settings in several]
+    assert len(set(found)) == 3
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,7 @@ def calibrate(
     from chipglow.cli.quantities import parse
     from chipglow.io.atomic import check_folder
     from chipglow.io.column_file import read_calibration_points
-    from chipglow.study.measured import uniform_counts
+    from chipglow.study.measured import UniformObjects, uniform_counts
     from chipglow.study.measurement_schema import band_of
     from chipglow.study.units import TEMPERATURE_DIFFERENCE, TIME
 
@@ -88,11 +88,11 @@ def calibrate(
         if path is not None:
             check_folder(path)
 
-    recordings = []
+    recordings, uniform = [], UniformObjects()
 
     def counts_of(file: str) -> float:
         recordings.append(file)
-        return uniform_counts(points.parent / file, settings or ())
+        return uniform_counts(points.parent / file, settings or (), uniform)
 
     table = read_calibration_points(points, counts_of)
     if settings and not recordings:
