@@ -274,6 +274,8 @@ def _print_points(console: "Console", fit: "PointFit", given: "Points") -> None:
 
 
 def _print_dots(console: "Console", fit: "DotFit") -> None:
+    from chipglow.cli.assumed import say_assumed
+
     _print_points(console, fit.points, (fit.positions, fit.pixels))
     for name, dots, pixel in (
         ("Infrared", fit.infrared, "infrared"),
@@ -283,21 +285,27 @@ def _print_dots(console: "Console", fit: "DotFit") -> None:
             f"{name}: {len(dots.pixels)} {'bright' if dots.bright else 'dark'} dots of a radius of "
             f"{dots.radius:.1f} {pixel} pixels; {len(fit.pixels)} match."
         )
-    console.print(
-        "Assumed: the visible picture is not mirrored, is turned by up to 30 degrees, and shows "
-        "half to twice the infrared image's width; else give --points."
+    say_assumed(
+        [
+            "the visible picture is not mirrored, is turned by up to 30 degrees, and shows half "
+            "to twice the infrared image's width; else give --points."
+        ]
     )
 
 
 def _print_images(console: "Console", fit: "ImageFit") -> None:
+    from chipglow.cli.assumed import say_assumed
+
     console.print(
         f"Mutual information: {fit.information:.3f} bits a sensor; score of the placement "
         f"{fit.placement:.3g}, of {fit.by_chance.size} unrelated images at most "
         f"{fit.by_chance.max():.3g}."
     )
-    console.print(
-        "Assumed: the visible picture is not mirrored, and shows the infrared image's width "
-        "within 25 % and its middle within a quarter of the width; else give --points."
+    say_assumed(
+        [
+            "the visible picture is not mirrored, and shows the infrared image's width within "
+            "25 % and its middle within a quarter of the width; else give --points."
+        ]
     )
 
 
@@ -337,7 +345,7 @@ def _align(
 
     from chipglow.analysis import align_times, simultaneous_frames
     from chipglow.analysis.time_alignment import region_signals
-    from chipglow.cli.assumed import say_doubtful
+    from chipglow.cli.assumed import say_assumed, say_doubtful
 
     integration = float(measured.data.attrs["integration_time"])
     frames, pictures = region_signals(
@@ -345,9 +353,7 @@ def _align(
     )
     exposure = seen.integration_time or float(np.median(np.diff(seen.times)))
     if seen.integration_time is None:
-        console.print(
-            f"Assumed: a visible exposure lasts as long as its frame, {1e6 * exposure:.4g} us."
-        )
+        say_assumed([f"a visible exposure lasts as long as its frame, {1e6 * exposure:.4g} us."])
     alignment = align_times(
         measured.times + integration / 2, frames, seen.times + exposure / 2, pictures
     )
@@ -368,13 +374,13 @@ def _align(
 def _write_pairs(
     path: Path, times: "NDArray[np.float64]", within: "list[NDArray[np.int64]]"
 ) -> None:
-    from chipglow.io import atomic_path
+    from chipglow.io.table_file import write_table
 
-    lines = ["infrared_frame,infrared_time_us,visible_frames"]
-    for number, (time, frames) in enumerate(zip(times, within, strict=True)):
-        lines.append(f"{number},{1e6 * time:.9g},{' '.join(map(str, frames.tolist()))}")
-    with atomic_path(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    rows = (
+        (number, f"{1e6 * time:.9g}", " ".join(map(str, frames.tolist())))
+        for number, (time, frames) in enumerate(zip(times, within, strict=True))
+    )
+    write_table(path, ("infrared_frame", "infrared_time_us", "visible_frames"), rows)
     print(path)
 
 
