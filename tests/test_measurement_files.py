@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from analytic_chip import AnalyticChip
+from PIL import Image
 from typer.testing import CliRunner
 
 from chipglow.camera import Detector, Flag, Recording, fit_linear, fit_sakuma_hattori
@@ -443,9 +444,15 @@ def test_what_is_assumed_and_doubtful_of_a_camera_s_file_is_said_by_who_takes_it
         "regions: {all: {rectangle: [[10, 10], [30, 20]], feature: chip body}}"
     )
     (laboratory / "tool.yaml").write_text("{rake_angle: 0 deg, tip: [0 um, 0 um]}")
+    Image.fromarray(np.zeros((60, 80), np.uint8)).save("visible.png")
+    corners = ["5,5,10,11", "35,5,70,11", "35,25,70,51", "5,25,10,51"]
+    head = "infrared_column,infrared_row,visible_column,visible_row"
+    (laboratory / "corners.csv").write_text("\n".join([head, *corners]) + "\n")
     for command in (
         ["emissivity", "chip.yaml", "--truth", "900 degC", "--regions", "all.yaml"],
         ["rake", "chip.yaml", "--tool", "tool.yaml"],
+        ["temperature", "chip.yaml", "--emissivity", "0.5", "--regions", "all.yaml"],
+        ["register", "chip.yaml", "visible.png", "--points", "corners.csv"],
     ):
         code, said = run(*command, *settings)
         assert code == 0, said

@@ -120,6 +120,7 @@ def register(
     """Find where each point of an infrared image is in a visible picture."""
     from rich.console import Console
 
+    from chipglow.cli.assumed import say_of_measurements
     from chipglow.cli.quantities import parse
     from chipglow.io import read_pictures, read_points
     from chipglow.study import load_registration, tool_of, write_registration
@@ -146,6 +147,7 @@ def register(
     else:
         found, marked = _by_images(console, measured, frame, picture, model, method)
     _say(console, found, measured)
+    say_of_measurements(measured)
     if align is not None and region is not None:
         _align(console, found, measured, seen, region, pairs)
     if out is not None:

@@ -67,7 +67,7 @@ def temperature(
     from rich.console import Console
 
     from chipglow.analysis import areas, true_temperature
-    from chipglow.cli.assumed import say_assumed, say_doubtful
+    from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.io import write_temperature_table
     from chipglow.io.atomic import check_folder
     from chipglow.study import load_calibration
@@ -89,6 +89,7 @@ def temperature(
         if area.name in emissivities
     ]
     _print(Console(highlight=False, markup=False), rows)
+    say_of_measurements(*measurements)
     say_assumed(_assumptions(rows, emissivities, room))
     say_doubtful(f"{doubt}." for row in rows for doubt in row.doubts)
     if table is not None:
