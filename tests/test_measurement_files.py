@@ -460,6 +460,20 @@ def test_what_is_assumed_and_doubtful_of_a_camera_s_file_is_said_by_who_takes_it
         assert "Doubtful: 5 values are 65535" in said
 
 
+def test_what_the_camera_s_file_leaves_in_doubt_is_said_once(laboratory, tmp_path):
+    exposures = [3e-6, 3e-6, 5e-6, 5e-6, 5e-6]
+    written = camera_files.cine(camera_files.pictures(bits=12), "16", exposures=exposures)
+    (tmp_path / "a.cine").write_bytes(written)
+    doubt = "Doubtful: the integration time goes from 3.00002 us to 5.00004 us."
+    code, said = run("convert", tmp_path / "a.cine")
+    assert "It is no measurement yet" in said
+    assert said.count(doubt) == 1
+    settings = ("--set", f"calibration={laboratory / 'calibration.yaml'}", "--set", "pitch=6 um")
+    code, said = run("convert", tmp_path / "a.cine", *settings)
+    assert code == 0, said
+    assert said.count(doubt) == 1
+
+
 def test_a_scene_is_no_measurement(tmp_path):
     write_scene(AnalyticChip(frames=2).scene(), tmp_path / "scene.nc")
     with pytest.raises(StudyError, match=r"scene\.nc: is a scene, .* chipglow measure makes one"):

@@ -31,6 +31,7 @@ def convert(
     """Make a measurement of a camera's file."""
     from rich.console import Console
 
+    from chipglow.cli.assumed import say_assumed, say_doubtful
     from chipglow.cli.showing import listed
     from chipglow.cli.showing_measurement import say_measurement
     from chipglow.io import is_measurement, write_measurement
@@ -54,6 +55,8 @@ def convert(
         if out is not None:
             raise
         console.print(f"\nIt is no measurement yet. {error}")
+        say_assumed(recording.assumptions)
+        say_doubtful(recording.doubts)
         return
     console.print("\nThe measurement:")
     say_measurement(measurement)

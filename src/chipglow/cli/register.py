@@ -120,7 +120,7 @@ def register(
     """Find where each point of an infrared image is in a visible picture."""
     from rich.console import Console
 
-    from chipglow.cli.assumed import say_of_measurements
+    from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.cli.quantities import parse
     from chipglow.io import read_pictures, read_points
     from chipglow.study import load_registration, tool_of, write_registration
@@ -148,6 +148,8 @@ def register(
         found, marked = _by_images(console, measured, frame, picture, model, method)
     _say(console, found, measured)
     say_of_measurements(measured)
+    say_assumed(f"{visible}: {sentence}" for sentence in seen.assumptions)
+    say_doubtful(f"{visible}: {sentence}" for sentence in seen.doubts)
     if align is not None and region is not None:
         _align(console, found, measured, seen, region, pairs)
     if out is not None:
