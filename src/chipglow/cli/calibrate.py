@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from chipglow.cli.options import Settings
+from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -44,12 +44,8 @@ def calibrate(
         ),
     ],
     model: Annotated[Model, typer.Option(help="Which form to fit.")] = Model.LINEAR,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The calibration to write, YAML.")
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw fits and residuals, PNG, PDF or SVG.")
-    ] = None,
+    out: Annotated[Path | None, file_option("The calibration to write, YAML.")] = None,
+    plot: Annotated[Path | None, picture_option("Draw fits and residuals")] = None,
     common_uncertainty: Annotated[
         str | None,
         typer.Option(
@@ -74,19 +70,11 @@ def calibrate(
 
     from chipglow.camera import fit_linear, fit_sakuma_hattori
     from chipglow.cli.assumed import say_doubtful
-    from chipglow.cli.pictures import check_picture_path
     from chipglow.cli.quantities import parse
-    from chipglow.io.atomic import check_folder
     from chipglow.io.column_file import read_calibration_points
     from chipglow.study.measured import UniformObjects, uniform_counts
     from chipglow.study.measurement_schema import band_of
     from chipglow.study.units import TEMPERATURE_DIFFERENCE, TIME
-
-    if plot is not None:
-        check_picture_path(plot)
-    for path in (out, plot):
-        if path is not None:
-            check_folder(path)
 
     recordings, uniform = [], UniformObjects()
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from chipglow.cli.options import Settings
+from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
     import numpy as np
@@ -99,22 +99,14 @@ def register(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the map, .yaml, to be used again.")
+        Path | None, file_option("Write the map, .yaml, to be used again.", ".yaml", ".yml")
     ] = None,
     pairs: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="With --align, write each infrared frame's visible ones, CSV.",
-        ),
+        file_option("With --align, write each infrared frame's visible ones, CSV.", ".csv"),
     ] = None,
-    overlay: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Draw both images on each other, PNG, PDF or SVG."),
-    ] = None,
-    blink: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Show both images in turns, .gif.")
-    ] = None,
+    overlay: Annotated[Path | None, picture_option("Draw both images on each other")] = None,
+    blink: Annotated[Path | None, file_option("Show both images in turns, .gif.", ".gif")] = None,
     settings: Settings = None,
 ) -> None:
     """Find where each point of an infrared image is in a visible picture."""
@@ -127,7 +119,8 @@ def register(
     from chipglow.study.measured import load_measurement
     from chipglow.study.units import TIME
 
-    _check_names(out, pairs, overlay, blink, align)
+    if pairs is not None and align is None:
+        raise ValueError(f"--pairs: {pairs} without --align, expected both")
     _check_method(method, points, known)
     interval = parse("--visible-interval", TIME, visible_interval)
     region = None if align is None else _region(align)
@@ -160,28 +153,6 @@ def register(
         _write_overlay(overlay, found, temperature, measured, picture, outline, marked)
     if blink is not None:
         _write_blink(blink, found, temperature, measured, picture, outline)
-
-
-def _check_names(
-    out: Path | None,
-    pairs: Path | None,
-    overlay: Path | None,
-    blink: Path | None,
-    align: str | None,
-) -> None:
-    from chipglow.cli.pictures import check_picture_path
-
-    if overlay is not None:
-        check_picture_path(overlay, "--overlay")
-    for option, path, suffixes in (
-        ("--out", out, (".yaml", ".yml")),
-        ("--pairs", pairs, (".csv",)),
-        ("--blink", blink, (".gif",)),
-    ):
-        if path is not None and path.suffix.lower() not in suffixes:
-            raise ValueError(f"{option}: {path}, expected a file that ends in {suffixes[0]}")
-    if pairs is not None and align is None:
-        raise ValueError(f"--pairs: {pairs} without --align, expected both")
 
 
 def _check_method(method: MethodName | None, points: Path | None, known: Path | None) -> None:
