@@ -379,6 +379,7 @@ def test_calibrate_prints_fits_and_writes_the_preferred(laboratory, tmp_path):
     assert "degrees of freedom" in said
     assert "Doubtful" not in said
     assert plot.read_bytes().startswith(b"\x89PNG")
+    assert said.splitlines()[-2:] == [str(out), str(plot)]
     calibration = load_calibration(out)
     assert (calibration.integration_time, calibration.range_name) == (1e-5, "A")
     assert (calibration.lowest, calibration.highest) == pytest.approx((573.15, 1273.15))

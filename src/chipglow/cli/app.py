@@ -241,8 +241,6 @@ def show(
 
         check_shown(file)
         show_scene(file, at, plot)
-    if plot is not None:
-        print(plot)
 
 
 @app.command()
@@ -264,7 +262,6 @@ def materials(
     show_material(name)
     if plot is not None:
         plot_material(name, plot)
-        print(plot)
 
 
 for command in (

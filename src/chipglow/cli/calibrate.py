@@ -122,14 +122,12 @@ def calibrate(
     say_doubtful(_doubtful(chosen, fits[chosen], common_uncertainty is not None))
     if out is not None:
         _write(fits[chosen], out)
+        print(out)
     if plot is not None:
         from chipglow.cli.pictures import write_picture
         from chipglow.report import draw_calibrations
 
         write_picture(draw_calibrations(fits), plot)
-    for path in (out, plot):
-        if path is not None:
-            print(path)
 
 
 def _write(fit: "CalibrationFit[FittedCalibration]", out: Path) -> None:

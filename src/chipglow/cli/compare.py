@@ -118,7 +118,6 @@ def compare(
         print(out)
     if plot is not None:
         write_picture(draw_comparison(result), plot)
-        print(plot)
 
 
 def _stated(

@@ -98,9 +98,6 @@ def emissivity(
 
         whole = [line for line, area in zip(lines, found, strict=False) if area.whole]
         write_picture(draw_emissivity(maps[0], named, whole), plot)
-    for path in (out, table, plot):
-        if path is not None:
-            print(path)
 
 
 def _heatings(
@@ -236,5 +233,7 @@ def _write(
 
     if out is not None:
         write_emissivity(maps, rows, out)
+        print(out)
     if table is not None:
         write_emissivity_table([row for of in rows for row in of], table)
+        print(table)

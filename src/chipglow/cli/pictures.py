@@ -8,8 +8,9 @@ if TYPE_CHECKING:
 
 
 def write_picture(figure: "Figure", path: Path) -> None:
-    """Write a figure as the kind of picture that the file's name says."""
+    """Write a figure as the kind of picture that the file's name says, and print that name."""
     from chipglow.io import atomic_path
 
     with atomic_path(path) as temporary:
         figure.savefig(temporary, format=path.suffix[1:].lower(), dpi=150)
+    print(path)

@@ -72,7 +72,6 @@ def psf(
         from chipglow.report import draw_knife_edge
 
         write_picture(draw_knife_edge(found), plot)
-        print(plot)
 
 
 def _region(text: str) -> tuple[slice, slice]:

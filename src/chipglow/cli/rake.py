@@ -68,7 +68,6 @@ def rake(
         print(out)
     if plot is not None:
         write_picture(draw_rake_grid(measured, grid), plot)
-        print(plot)
 
 
 def _frames(measurement: "Measurement", frame: str, at: str | None) -> list[int] | None:

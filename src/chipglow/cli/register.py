@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from chipglow.analysis import DotFit, ImageFit, PointFit, Registration
     from chipglow.camera import Measurement, Recording
-    from chipglow.scene import Tool
 
     Points = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -113,8 +112,11 @@ def register(
     from rich.console import Console
 
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
+    from chipglow.cli.pictures import write_picture
     from chipglow.cli.quantities import parse
     from chipglow.io import read_pictures, read_points
+    from chipglow.io.picture_file import write_blink
+    from chipglow.report import blink_pictures, draw_registration
     from chipglow.study import load_registration, tool_of, write_registration
     from chipglow.study.measured import load_measurement
     from chipglow.study.units import TIME
@@ -149,10 +151,12 @@ def register(
         write_registration(found, out)
         print(out)
     temperature = measured.radiance_temperature()[frame]
+    shown = found, temperature, measured.raster, picture, outline
     if overlay is not None:
-        _write_overlay(overlay, found, temperature, measured, picture, outline, marked)
+        write_picture(draw_registration(*shown, marked), overlay)
     if blink is not None:
-        _write_blink(blink, found, temperature, measured, picture, outline)
+        write_blink(blink_pictures(*shown), blink)
+        print(blink)
 
 
 def _check_method(method: MethodName | None, points: Path | None, known: Path | None) -> None:
@@ -356,37 +360,4 @@ def _write_pairs(
         for number, (time, frames) in enumerate(zip(times, within, strict=True))
     )
     write_table(path, ("infrared_frame", "infrared_time_us", "visible_frames"), rows)
-    print(path)
-
-
-def _write_overlay(
-    path: Path,
-    found: "Registration",
-    temperature: "NDArray[np.float64]",
-    measured: "Measurement",
-    picture: "NDArray[Any]",
-    outline: "Tool | None",
-    marked: "Points | None",
-) -> None:
-    from chipglow.cli.pictures import write_picture
-    from chipglow.report import draw_registration
-
-    figure = draw_registration(found, temperature, measured.raster, picture, outline, marked)
-    write_picture(figure, path)
-    print(path)
-
-
-def _write_blink(
-    path: Path,
-    found: "Registration",
-    temperature: "NDArray[np.float64]",
-    measured: "Measurement",
-    picture: "NDArray[Any]",
-    outline: "Tool | None",
-) -> None:
-    from chipglow.io.picture_file import write_blink
-    from chipglow.report import blink_pictures
-
-    pictures = blink_pictures(found, temperature, measured.raster, picture, outline)
-    write_blink(pictures, path)
     print(path)

@@ -105,7 +105,6 @@ def shearband(
         print(out)
     if plot is not None:
         write_picture(draw_band_profile(measured, chosen.tool, profile), plot)
-        print(plot)
 
 
 def _table(profile: "BandProfile") -> "Table":
