@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
-from cases import cylinder, heat, motion, plasticity, taylor, upsetting
+from cases import cylinder, expansion, heat, motion, plasticity, taylor, upsetting
 
 from chipglow.report.drawing import new_figure, style
 
@@ -20,6 +20,7 @@ CASES = {
     "waves": motion.waves,
     "vibration": motion.vibrations,
     "conduction": heat.conduction,
+    "expansion": expansion.bent,
     "shear": plasticity.adiabatic_shear,
     "friction": plasticity.friction,
     "cylinder": cylinder.thick_cylinder,

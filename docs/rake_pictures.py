@@ -31,13 +31,14 @@ def main() -> None:
 def say_found(name: str, measurement: Measurement) -> None:
     """The found tool beside the true one."""
     true, found = measurement.tool, find_tool(measurement)
+    stated = found.uncertainty
     off = found.tool.rake_point(150e-6) - true.rake_foot
     along = (found.tool.rake_foot - true.rake_foot) @ true.rake_direction
     print(
-        f"{name}: {degrees(found.tool.rake_angle):.1f} ± {degrees(found.angle_uncertainty):.1f} "
+        f"{name}: {degrees(found.tool.rake_angle):.1f} ± {degrees(stated.angle):.1f} "
         f"deg, face off by {1e6 * off @ true.rake_normal:.1f} ± "
-        f"{1e6 * found.position_uncertainty:.1f} um, tip off by {1e6 * along:.0f} ± "
-        f"{1e6 * found.tip_uncertainty:.0f} um; {found.doubts}"
+        f"{1e6 * stated.across:.1f} um, tip off by {1e6 * along:.0f} ± "
+        f"{1e6 * stated.along:.0f} um; {found.doubts}"
     )
 
 

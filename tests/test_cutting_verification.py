@@ -2,7 +2,7 @@
 
 import pytest
 import verification
-from cases import Check, cylinder, heat, motion, plasticity, taylor, upsetting
+from cases import Check, cylinder, expansion, heat, motion, plasticity, taylor, upsetting
 
 
 @pytest.mark.parametrize(
@@ -12,6 +12,7 @@ from cases import Check, cylinder, heat, motion, plasticity, taylor, upsetting
         motion.waves,
         motion.vibrations,
         heat.conduction,
+        expansion.bent,
         plasticity.adiabatic_shear,
         plasticity.friction,
     ],

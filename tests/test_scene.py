@@ -120,7 +120,7 @@ def test_wrong_structure_is_named():
         Scene(data.drop_vars("velocity_x"))
     with pytest.raises(SceneError, match="coordinate 'time' is missing"):
         Scene(data.drop_vars("time"))
-    with pytest.raises(SceneError, match="'material_x' needs the other"):
+    with pytest.raises(SceneError, match="material_y missing, expected with 'material_x'"):
         Scene(data.assign(material_x=data["temperature"].assign_attrs(units="m")))
     with pytest.raises(SceneError, match="'temperature' has units '°C', expected 'K'"):
         Scene(data.assign(temperature=data["temperature"].assign_attrs(units="°C")))

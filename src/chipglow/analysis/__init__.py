@@ -57,6 +57,7 @@ from chipglow.analysis.temperature import (
     true_temperature,
 )
 from chipglow.analysis.time_alignment import TimeAlignment, align_times, simultaneous_frames
+from chipglow.analysis.tool_position import ToolUncertainty
 
 __all__ = [
     "PAPER",
@@ -111,6 +112,7 @@ __all__ = [
     "Surroundings",
     "ThermalImage",
     "TimeAlignment",
+    "ToolUncertainty",
     "TrueTemperature",
     "align_times",
     "analyse",

@@ -16,6 +16,7 @@ from chipglow.analysis.frames import frame_numbers
 from chipglow.analysis.lines import Line, sample
 from chipglow.analysis.remarks import Remarks
 from chipglow.analysis.ridge import NoShearBandError, arc_length, normals_of
+from chipglow.analysis.tool_position import ToolUncertainty, combined, contribution
 from chipglow.camera import Measurement
 from chipglow.scene import Tool
 
@@ -83,6 +84,10 @@ class BandProfile:
         What had to be assumed, a sentence each.
     doubts : tuple of str
         Why it may not be relied on, a sentence each.
+    from_tool : tuple of ndarray
+        What each independent standard uncertainty of the tool's place changes in `temperature` in
+        K, with its sign, each of shape (frames, n): it moves the edge from which the distance
+        counts. None if the place is known.
 
     Raises
     ------
@@ -102,16 +107,17 @@ class BandProfile:
     width: float
     assumptions: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    from_tool: tuple[NDArray[np.float64], ...] = ()
 
     def __post_init__(self) -> None:
         shape = (self.times.size, self.distance.size)
         expected = {"points": (*shape, 2), "offset": shape[:1]} | dict.fromkeys(
             ("temperature", "calibration", "position"), shape
         )
-        for name, size in expected.items():
-            found = getattr(self, name).shape
-            if found != size:
-                raise ValueError(f"band profile: {name} has shape {found}, expected {size}")
+        fields = [(name, getattr(self, name), size) for name, size in expected.items()]
+        for name, values, size in (*fields, *(("from_tool", p, shape) for p in self.from_tool)):
+            if values.shape != size:
+                raise ValueError(f"band profile: {name} has shape {values.shape}, expected {size}")
         if len(self.stage) != self.times.size:
             raise ValueError(
                 f"band profile: {len(self.stage)} stages for {self.times.size} frames, "
@@ -121,7 +127,13 @@ class BandProfile:
     @property
     def uncertainty(self) -> NDArray[np.float64]:
         """Standard uncertainty of `temperature` in K, shape (frames, n)."""
-        return np.hypot(self.calibration, self.position)
+        parts = (self.calibration, self.position, *self.from_tool)
+        return combined(parts, self.temperature.shape)
+
+    @property
+    def tool_uncertainty(self) -> NDArray[np.float64]:
+        """Its part from the tool's place in K, shape (frames, n)."""
+        return combined(self.from_tool, self.temperature.shape)
 
     @property
     def in_place(self) -> NDArray[np.bool_]:
@@ -138,6 +150,7 @@ def band_profile(
     reference: int | None = None,
     width: float | None = None,
     position: float | None = None,
+    uncertainty: ToolUncertainty | None = None,
 ) -> BandProfile:
     """Read the radiance temperature along the shear band.
 
@@ -161,6 +174,8 @@ def band_profile(
     position : float, optional
         Standard uncertainty of the curve's position in m, the same in x and y. By default that of
         one pixel: its side over the root of 12.
+    uncertainty : ToolUncertainty, optional
+        How well the place of the tool is known, such as that of a `FoundTool`.
 
     Raises
     ------
@@ -178,6 +193,11 @@ def band_profile(
     A curve that is off by a small random vector of standard uncertainty u reads a temperature of
     the mean square error (grad T)² u² + 3/4 (d²T/dn²)² u⁴, with n across the curve: on a ridge,
     where the gradient across vanishes, the bend is what counts.
+
+    The curve itself is where the image shows it, or where it was given. The distance along it
+    counts from the edge of the tool: what is uncertain about the edge's place, in the direction to
+    the curve's first point, contributes half the difference of the temperatures so far up and down
+    the curve.
     """
     pitch = measurement.raster.spacing
     width = pitch if width is None else width
@@ -197,8 +217,16 @@ def band_profile(
     distance = _common(lines, pitch) if given is None else given.distance
     points = np.stack([_laid(line, distance) for line in lines])
     reader = _Reader(measurement, images, width, position)
-    read = [reader(int(k), p) for k, p in zip(numbers, points, strict=True)]
-    temperature, calibration, from_position = (np.stack(part) for part in zip(*read, strict=True))
+    moves = np.zeros((0, 2))
+    if uncertainty is not None:
+        moves = uncertainty.displacements(tool, tool.edge_point)
+    read = [
+        reader(int(k), p, _toward(moves, line, tool))
+        for k, p, line in zip(numbers, points, lines, strict=True)
+    ]
+    temperature, calibration, from_position, *from_tool = (
+        np.stack(part) for part in zip(*read, strict=True)
+    )
     if not np.isfinite(temperature).any():
         raise ValueError(
             "shear band: no point of the curve is on usable pixels in any frame, expected a curve "
@@ -220,6 +248,7 @@ def band_profile(
         width=width,
         assumptions=tuple(remarks.assumptions),
         doubts=tuple(remarks.doubts),
+        from_tool=tuple(from_tool),
     )
 
 
@@ -365,6 +394,16 @@ def _laid(line: Line | None, distance: NDArray[np.float64]) -> NDArray[np.float6
     return np.where(beyond[:, None], nan, np.stack(columns, axis=1))
 
 
+def _toward(moves: NDArray[np.float64], line: Line | None, tool: Tool) -> NDArray[np.float64]:
+    """How far the edge moves toward a line's first point in m, shape (k,)."""
+    if line is None:
+        return np.zeros(len(moves))
+    way = line.points[0] - tool.edge_point
+    if not way.any():
+        way = line.points[1] - line.points[0]
+    return np.asarray(moves @ way / np.hypot(*way))
+
+
 class _Reader:
     """Reads means across a curve, and what makes them uncertain, in one frame after another."""
 
@@ -378,13 +417,16 @@ class _Reader:
         self.offsets = width * ((np.arange(count) + 0.5) / count - 0.5)
 
     def __call__(
-        self, number: int, points: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Temperature, its uncertainty from the calibration and from the position, in K."""
+        self, number: int, points: NDArray[np.float64], nearer: NDArray[np.float64]
+    ) -> list[NDArray[np.float64]]:
+        """Temperature, its uncertainty from the calibration, the position and the tool, in K.
+
+        The edge of the tool may be nearer to the curve's first point by each of `nearer` in m.
+        """
         empty = np.full(len(points), nan)
         there = np.isfinite(points[:, 0])
         if there.sum() < 2:
-            return empty, empty.copy(), empty.copy()
+            return [empty.copy() for _ in range(3 + nearer.size)]
         curve = points[there]
         across = self.offsets[:, None] * normals_of(curve)[:, None]
         places = curve[:, None] + across
@@ -393,6 +435,7 @@ class _Reader:
             self._mean("radiance_temperature", number, places),
             self._calibration(number, places),
             self._position(number, curve),
+            *self._tool(number, curve, nearer),
         ):
             whole = empty.copy()
             whole[there] = part
@@ -400,7 +443,7 @@ class _Reader:
         known = np.isfinite(results[0])
         for part in results[1:]:
             part[~known] = nan
-        return results[0], results[1], results[2]
+        return results
 
     def _mean(self, name: str, number: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
         frame = self.measurement.data[name][number].values
@@ -427,6 +470,14 @@ class _Reader:
         bend = (ahead - 2 * here + behind) / self.pitch**2
         u = self.position
         return np.asarray(np.sqrt(squared * u**2 + 0.75 * bend**2 * u**4))
+
+    def _tool(
+        self, number: int, curve: NDArray[np.float64], nearer: NDArray[np.float64]
+    ) -> list[NDArray[np.float64]]:
+        """Changes in K of what is read at a distance from an edge that is nearer to the curve."""
+        normal = normals_of(curve)
+        tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+        return [contribution(self.images[number], curve, step * tangent) for step in nearer]
 
 
 def _offset(line: Line | None, reference: Line) -> float:

@@ -1,8 +1,8 @@
 """Measured beside simulated: at the rake face and in the shear band, for several emissivities."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from math import degrees, hypot, isfinite, sqrt
+from dataclasses import dataclass, replace
+from math import degrees, hypot, isfinite, radians, sqrt
 from typing import Final
 
 import numpy as np
@@ -14,6 +14,7 @@ from chipglow.analysis.lines import sample
 from chipglow.analysis.rake_grid import DEPTH, PIXELS, RakeGrid, rake_grid
 from chipglow.analysis.remarks import Remarks
 from chipglow.analysis.ridge import NoShearBandError
+from chipglow.analysis.tool_position import ToolUncertainty, combined, contribution
 from chipglow.camera import Measurement
 from chipglow.scene import Tool
 
@@ -29,7 +30,7 @@ SURE: Final = 0.95
 _DRAWS: Final = 4000
 _SEED: Final = 2010
 _FEW: Final = 3
-_SAME_ANGLE: Final = 0.1
+_SAME_ANGLE: Final = radians(0.1)
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,9 @@ class Reading:
     random : ndarray
         Standard uncertainty in K of what differs from value to value: position, and the mean over
         the frames.
+    from_tool : tuple of ndarray
+        What each independent standard uncertainty of the tool's place changes in K, with its sign:
+        it changes all values together, up the one slope and down the other.
 
     Raises
     ------
@@ -56,19 +60,20 @@ class Reading:
     temperature: NDArray[np.float64]
     systematic: NDArray[np.float64]
     random: NDArray[np.float64]
+    from_tool: tuple[NDArray[np.float64], ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("systematic", "random"):
-            if getattr(self, name).shape != self.temperature.shape:
+        fields = [("systematic", self.systematic), ("random", self.random)]
+        for name, values in (*fields, *(("from_tool", part) for part in self.from_tool)):
+            if values.shape != self.temperature.shape:
                 raise ValueError(
-                    f"reading: {name} has shape {getattr(self, name).shape}, "
-                    f"expected {self.temperature.shape}"
+                    f"reading: {name} has shape {values.shape}, expected {self.temperature.shape}"
                 )
 
     @property
     def uncertainty(self) -> NDArray[np.float64]:
         """Standard uncertainty in K."""
-        return np.hypot(self.systematic, self.random)
+        return combined((self.systematic, self.random, *self.from_tool), self.temperature.shape)
 
     @property
     def expanded(self) -> NDArray[np.float64]:
@@ -77,7 +82,12 @@ class Reading:
 
     def part(self, where: NDArray[np.bool_]) -> "Reading":
         """The values at some places, flat."""
-        return Reading(self.temperature[where], self.systematic[where], self.random[where])
+        return Reading(
+            self.temperature[where],
+            self.systematic[where],
+            self.random[where],
+            tuple(part[where] for part in self.from_tool),
+        )
 
 
 def normalised_error(measured: Reading, simulated: Reading) -> NDArray[np.float64]:
@@ -275,7 +285,11 @@ class StatedUncertainties:
     emissivity : float
         Relative standard uncertainty of the emissivities that the simulations assume.
     position : float, optional
-        Standard uncertainty of positions in the measured image in m; by default that of a pixel.
+        Standard uncertainty of positions in the measured image in m, of each value by itself. By
+        default that of a pixel; for squares at the rake face only where `tool` is not stated.
+    tool : ToolUncertainty, optional
+        Uncertainty of the tool's place in the measured image, common to all values, such as that
+        of a `FoundTool`.
 
     Raises
     ------
@@ -286,9 +300,11 @@ class StatedUncertainties:
     temperature: float = 0.0
     emissivity: float = 0.0
     position: float | None = None
+    tool: ToolUncertainty | None = None
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
+        for name in ("temperature", "emissivity", "position"):
+            value = getattr(self, name)
             if value is not None and not (isfinite(value) and value >= 0):
                 raise ValueError(f"uncertainty: {name} is {value!r}, expected 0 or more")
 
@@ -332,11 +348,14 @@ def compare(
     values at the same distance from the cutting edge are compared, as means over the frames in
     which the band is developing or fully developed, as in the paper.
 
-    The measured values have the uncertainty of the calibration (or a stated one), of the position
-    and of the mean over the frames, the simulated ones that of the emissivity and of the mean over
-    the frames. Which set fits best is the one with the least root mean square of the differences;
+    The measured values have the uncertainty of the calibration (or a stated one), of the position,
+    of the tool's place and of the mean over the frames, the simulated ones that of the emissivity
+    and of the mean over the frames. A tool that is elsewhere moves the squares, the cutting edge
+    from which the distance along a found ridge counts, and a given curve's place in the
+    simulations. Which set fits best is the one with the least root mean square of the differences;
     how sure that is, is found by drawing all values anew from their uncertainties: what is
-    systematic with one deviate a file, what is random with one a value.
+    systematic, and each part of the tool's place, with one deviate a file, what is random with one
+    a value.
     """
     if not simulated:
         raise ValueError("comparison: no simulation, expected 1 or more")
@@ -347,7 +366,10 @@ def compare(
             "the measurement does not tell the uncertainty of its calibration and none is stated, "
             "so that the E_n are too great."
         )
-    tools = {label: _tool_of(label, item, tool, remarks) for label, item in simulated.items()}
+    allowed = max(_SAME_ANGLE, COVERAGE * stated.tool.angle if stated.tool else 0.0)
+    tools = {
+        label: _tool_of(label, item, tool, allowed, remarks) for label, item in simulated.items()
+    }
     grid = _compare_grid(measured, simulated, tool, tools, stated, remarks)
     files = [("measured", measured, tool, reference)]
     files += [(label, item, tools[label], None) for label, item in simulated.items()]
@@ -366,14 +388,16 @@ def compare(
     )
 
 
-def _tool_of(label: str, simulated: Measurement, tool: Tool, remarks: Remarks) -> Tool:
+def _tool_of(
+    label: str, simulated: Measurement, tool: Tool, allowed: float, remarks: Remarks
+) -> Tool:
     own = simulated.tool
     if own is None:
         remarks.assumptions.append(f"{label} tells no tool; it is where the measurement has it.")
         return tool
-    turn = degrees(abs(own.rake_angle - tool.rake_angle))
-    if turn > _SAME_ANGLE:
-        remarks.doubts.append(f"the rake angle of {label} differs by {turn:.2g} degrees.")
+    turn = abs(own.rake_angle - tool.rake_angle)
+    if turn > allowed:
+        remarks.doubts.append(f"the rake angle of {label} differs by {degrees(turn):.2g} degrees.")
     return own
 
 
@@ -387,7 +411,7 @@ def _compare_grid(
 ) -> GridComparison | None:
     size = PIXELS * measured.raster.spacing
     try:
-        base = rake_grid(measured, tool, PIXELS, max(DEPTH, size))
+        base = rake_grid(measured, tool, PIXELS, max(DEPTH, size), uncertainty=stated.tool)
         grids = {
             label: rake_grid(item, tools[label], size / item.raster.spacing, max(DEPTH, size))
             for label, item in simulated.items()
@@ -417,13 +441,14 @@ def _measured_squares(
     if measured.calibration_uncertainty is not None:
         share = sample(_relative_calibration(measured), measured.raster, middles)
         systematic = np.hypot(systematic, share * _relative_to_kelvin(measured, mean))
-    images = [_image(measured, k) for k in range(measured.times.size)]
-    image = np.mean([item.temperature for item in images if item is not None], axis=0)
-    pitch = measured.raster.spacing
-    slopes = [sample(slope, measured.raster, middles) for slope in np.gradient(image, pitch)]
-    position = np.hypot(*slopes) * _position(measured, stated)
-    random = np.hypot(position, _of_the_mean(grid)[:, :columns])
-    return Reading(mean, systematic, random)
+    random = _of_the_mean(grid)[:, :columns]
+    if stated.tool is None or stated.position is not None:
+        images = [_image(measured, k) for k in range(measured.times.size)]
+        image = np.mean([item.temperature for item in images if item is not None], axis=0)
+        pitch = measured.raster.spacing
+        slopes = [sample(slope, measured.raster, middles) for slope in np.gradient(image, pitch)]
+        random = np.hypot(random, np.hypot(*slopes) * _position(measured, stated))
+    return Reading(mean, systematic, random, tuple(p[:, :columns] for p in grid.frame_from_tool))
 
 
 def _relative_calibration(measured: Measurement) -> NDArray[np.float64]:
@@ -485,34 +510,62 @@ def _compare_band(
     """The band of the measurement, which comes first, and of the simulations."""
     _, measured, tool, _ = files[0]
     position = _position(measured, stated)
-    profiles = []
+    profiles: list[BandProfile] = []
     for name, item, placed, reference in files:
         moved = None if curve is None else curve + (placed.edge_point - tool.edge_point)
         try:
             profiles.append(
-                band_profile(item, placed, curve=moved, reference=reference, position=position)
+                band_profile(
+                    item,
+                    placed,
+                    curve=moved,
+                    reference=reference,
+                    position=position,
+                    # The measurement comes first; a simulation knows its tool.
+                    uncertainty=None if profiles else stated.tool,
+                )
             )
         except NoShearBandError as error:
             remarks.doubts.append(f"the shear band is left out: {name}: {error}.")
             return None
+    if curve is not None and stated.tool is not None:
+        moves = stated.tool.displacements(tool, tool.edge_point)
+        profiles[0] = replace(profiles[0], from_tool=_of_the_curve(measured, profiles[0], moves))
     step = measured.raster.spacing
     last = max(float(profile.distance[-1]) for profile in profiles)
     distance = step * np.arange(1, int(last / step) + 1, dtype=np.float64)
     names = [name for name, *_ in files]
     parts = [_along(name, p, distance, remarks) for name, p in zip(names, profiles, strict=True)]
-    mean, calibration, off, between = parts[0]
-    own = Reading(mean, np.hypot(calibration, stated.temperature), np.hypot(off, between))
+    mean, calibration, off, between, *from_tool = parts[0]
+    systematic = np.hypot(calibration, stated.temperature)
+    own = Reading(mean, systematic, np.hypot(off, between), tuple(from_tool))
     readings = []
-    for (_, item, *_), (mean, _, _, between) in zip(files[1:], parts[1:], strict=True):
+    for (_, item, *_), (mean, _, _, between, *_) in zip(files[1:], parts[1:], strict=True):
         emissivity = _of_the_emissivity(item, mean, stated)
         readings.append(Reading(mean, emissivity, between))
     return BandComparison(distance, own, tuple(readings))
 
 
+def _of_the_curve(
+    measured: Measurement, profile: BandProfile, moves: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], ...]:
+    """What it makes in K that the edge places a given curve on the simulations.
+
+    There the curve is off by as much as the edge is here, across itself too, and the distances
+    that are compared are the same: what it would read here stands for all simulations.
+    """
+    found = np.full((len(moves), *profile.temperature.shape), np.nan)
+    for frame, points in enumerate(profile.points):
+        image = _image(measured, frame)
+        if image is not None:
+            found[:, frame] = [contribution(image, points, move) for move in moves]
+    return tuple(found)
+
+
 def _along(
     name: str, profile: BandProfile, distance: NDArray[np.float64], remarks: Remarks
 ) -> tuple[NDArray[np.float64], ...]:
-    """Means over the frames: temperature, calibration, position; and that of the mean itself.
+    """Means over the frames: temperature, calibration, position; that of the mean; of the tool.
 
     Where a single frame reaches, the variance between frames is the mean of it where several do.
     """
@@ -524,19 +577,19 @@ def _along(
         used = np.ones(used.size, np.bool_)
     elif used.sum() < _FEW:
         remarks.doubts.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
-    fields = (profile.temperature, profile.calibration, profile.position)
+    fields = (profile.temperature, profile.calibration, profile.position, *profile.from_tool)
     read = [
         np.stack([_at(distance, profile.distance, row) for row in field[used]]) for field in fields
     ]
     known = np.isfinite(read[0])
     count = known.sum(axis=0)
-    mean, calibration, position = (_mean(field, known) for field in read)
+    mean, calibration, position, *from_tool = (_mean(field, known) for field in read)
     squares = np.where(known, (read[0] - mean) ** 2, 0.0).sum(axis=0)
     several = count > 1
     variance = np.divide(squares, count - 1, out=np.zeros_like(squares), where=several)
     if several.any():
         variance[count == 1] = variance[several].mean()
-    return mean, calibration, position, np.sqrt(variance / np.maximum(count, 1))
+    return mean, calibration, position, np.sqrt(variance / np.maximum(count, 1)), *from_tool
 
 
 def _at(
@@ -599,11 +652,12 @@ def _judged(
 def _fit(label: str, measured: Reading, simulated: Reading) -> Fit:
     away = simulated.temperature - measured.temperature
     systematic = hypot(float(measured.systematic.mean()), float(simulated.systematic.mean()))
+    from_tool = hypot(*(float(part.mean()) for part in measured.from_tool))
     random = sqrt(float((measured.random**2 + simulated.random**2).sum())) / away.size
     return Fit(
         label=label,
         bias=float(away.mean()),
-        bias_uncertainty=hypot(systematic, random),
+        bias_uncertainty=hypot(systematic, from_tool, random),
         rms=float(np.sqrt((away**2).mean())),
         agreeing=int((normalised_error(measured, simulated) <= 1).sum()),
         count=away.size,
@@ -622,4 +676,5 @@ def _drawn(reading: Reading, generator: np.random.Generator) -> NDArray[np.float
     """Values drawn anew from their uncertainties, shape (draws, n)."""
     common = generator.standard_normal((_DRAWS, 1)) * reading.systematic
     each = generator.standard_normal((_DRAWS, reading.temperature.size)) * reading.random
-    return reading.temperature + common + each
+    parts = [generator.standard_normal((_DRAWS, 1)) * part for part in reading.from_tool]
+    return np.asarray(sum(parts, reading.temperature + common + each))

@@ -10,6 +10,7 @@ from scipy.ndimage import map_coordinates, maximum_filter
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
+from chipglow.analysis.tool_position import ToolUncertainty
 from chipglow.camera import Measurement
 from chipglow.scene import PlacedTool, Raster, ToolGeometry
 
@@ -42,20 +43,14 @@ class FoundTool:
     ----------
     tool : PlacedTool
         The tool in the measurement's coordinates.
-    angle_uncertainty : float
-        Standard uncertainty of the rake angle in rad.
-    position_uncertainty : float
-        Standard uncertainty of the rake face's position across itself in m.
-    tip_uncertainty : float
-        Standard uncertainty of the tip's position along the rake face in m.
+    uncertainty : ToolUncertainty
+        Standard uncertainties of its place and its rake angle.
     doubts : tuple of str
         Why it may not be the rake face, a sentence each.
     """
 
     tool: PlacedTool
-    angle_uncertainty: float
-    position_uncertainty: float
-    tip_uncertainty: float
+    uncertainty: ToolUncertainty
     doubts: tuple[str, ...]
 
 
@@ -110,13 +105,14 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
     tip_row, tip_seen = _tip_row(image, fit, rows)
     doubts = _doubts(angle, angle_error, place_error, angles, coarse.prominence, tip_seen)
     pitch = raster.spacing
-    return FoundTool(
-        tool=_placed(replace(shape, rake_angle=angle), raster, fit, tip_row),
-        angle_uncertainty=sqrt(angle_error**2 + 2 * (2 * _SHIFT / rows.size) ** 2),
-        position_uncertainty=pitch * sqrt(place_error**2 + _SHIFT**2),
-        tip_uncertainty=sqrt((_TIP_PIXELS * pitch) ** 2 + (shape.edge_radius / 2) ** 2),
-        doubts=doubts,
+    tool = _placed(replace(shape, rake_angle=angle), raster, fit, tip_row)
+    uncertainty = ToolUncertainty(
+        along=sqrt((_TIP_PIXELS * pitch) ** 2 + (shape.edge_radius / 2) ** 2),
+        across=pitch * sqrt(place_error**2 + _SHIFT**2),
+        angle=sqrt(angle_error**2 + 2 * (2 * _SHIFT / rows.size) ** 2),
+        pivot=_up_the_face(tool, raster, float(rows.mean())),
     )
+    return FoundTool(tool, uncertainty, doubts)
 
 
 @dataclass(frozen=True)
@@ -360,6 +356,12 @@ def _placed(
     column = line[0] + line[1] * ((raster.rows - 1) / 2 - row)
     on_line = raster.left + raster.spacing * (column + 0.5)
     return PlacedTool(tool, (float(on_line - foot[0]), float(tip_y)))
+
+
+def _up_the_face(tool: PlacedTool, raster: Raster, row: float) -> float:
+    """Distance in m up the straight face from its lower end to where it crosses a row."""
+    y = raster.top - raster.spacing * (row + 0.5)
+    return (y - float(tool.rake_foot[1])) / cos(tool.rake_angle)
 
 
 def _doubts(

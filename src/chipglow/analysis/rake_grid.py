@@ -1,14 +1,16 @@
 """The analysis grid on the rake face: squares of pixels from the face into the chip."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis.band_ridge import ThermalImage
 from chipglow.analysis.frames import frame_numbers
+from chipglow.analysis.tool_position import ToolUncertainty, combined, contribution
 from chipglow.camera import UNUSABLE, Measurement
 from chipglow.scene import Raster, Tool
 
@@ -46,6 +48,9 @@ class RakeGrid:
         The tool, in the measurement's coordinates.
     times : ndarray
         When each frame's integration began in s, shape (frames,).
+    from_tool : tuple of ndarray
+        What each independent standard uncertainty of the tool's place changes in `mean` in K, with
+        its sign, each of that shape: it moves all squares together. None if the place is known.
 
     Raises
     ------
@@ -61,13 +66,14 @@ class RakeGrid:
     size: float
     tool: Tool
     times: NDArray[np.float64]
+    from_tool: tuple[NDArray[np.float64], ...] = ()
 
     def __post_init__(self) -> None:
         shape = (self.times.size, self.depth.size, self.along.size)
-        for name in ("mean", "deviation", "count"):
-            found = getattr(self, name).shape
-            if found != shape:
-                raise ValueError(f"rake grid: {name} has shape {found}, expected {shape}")
+        fields = [(name, getattr(self, name)) for name in ("mean", "deviation", "count")]
+        for name, values in (*fields, *(("from_tool", part) for part in self.from_tool)):
+            if values.shape != shape:
+                raise ValueError(f"rake grid: {name} has shape {values.shape}, expected {shape}")
         if not self.size > 0:
             raise ValueError(f"rake grid: size is {self.size!r}, expected over 0 m")
 
@@ -93,6 +99,24 @@ class RakeGrid:
         away = np.where(self.usable, self.mean - self.frame_mean, 0.0)
         return np.sqrt(_ratio((away**2).sum(axis=0), self.frame_count - 1))
 
+    @property
+    def tool_uncertainty(self) -> NDArray[np.float64]:
+        """Standard uncertainty of `mean` from the tool's place in K, shape (frames, m, n)."""
+        return combined(self.from_tool, self.mean.shape)
+
+    @property
+    def frame_from_tool(self) -> tuple[NDArray[np.float64], ...]:
+        """What `from_tool` makes of `frame_mean` in K, each of shape (m, n)."""
+        return tuple(
+            _ratio(np.where(self.usable, part, 0.0).sum(axis=0), self.frame_count)
+            for part in self.from_tool
+        )
+
+    @property
+    def frame_tool_uncertainty(self) -> NDArray[np.float64]:
+        """Standard uncertainty of `frame_mean` from the tool's place in K, shape (m, n)."""
+        return combined(self.frame_from_tool, self.mean.shape[1:])
+
     def corners(self) -> NDArray[np.float64]:
         """Corners of the squares in the measurement's coordinates.
 
@@ -114,6 +138,7 @@ def rake_grid(
     pixels: float = PIXELS,
     depth: float = DEPTH,
     frames: Sequence[int] | None = None,
+    uncertainty: ToolUncertainty | None = None,
 ) -> RakeGrid:
     """Average a measurement in squares along the rake face.
 
@@ -130,6 +155,8 @@ def rake_grid(
         fit, at least one.
     frames : sequence of int, optional
         Numbers of the frames; all by default.
+    uncertainty : ToolUncertainty, optional
+        How well the place of the tool is known, such as that of a `FoundTool`.
 
     Raises
     ------
@@ -151,6 +178,10 @@ def rake_grid(
     field that is linear in x and y comes out exactly, wherever the pixels lie; the noise of a mean
     of 9 pixels rises by 6 % on average at a rake angle of -7 degrees, by 18 % at most.
     `RakeGrid.deviation` is the plain standard deviation.
+
+    Each uncertainty of the tool's place displaces the squares to either side by one standard
+    uncertainty; half the difference of the temperatures there is what it contributes (JCGM 100,
+    5.1.3). Pixels that are not usable are filled as in `ThermalImage`.
     """
     raster = measurement.raster
     size = _checked_size(pixels, depth, raster)
@@ -172,7 +203,7 @@ def rake_grid(
             f"rake grid: none of the {columns} squares beside the rake face is usable, expected a "
             "chip that touches the tool and is hotter than the camera's floor"
         )
-    return RakeGrid(
+    grid = RakeGrid(
         along=size * (np.arange(columns, dtype=np.float64) + 0.5),
         depth=size * (np.arange(rows, dtype=np.float64) + 0.5),
         mean=mean,
@@ -182,6 +213,36 @@ def rake_grid(
         tool=tool,
         times=measurement.times[numbers],
     )
+    if uncertainty is None:
+        return grid
+    return replace(grid, from_tool=_from_tool(measurement, grid, numbers, uncertainty))
+
+
+def _from_tool(
+    measurement: Measurement,
+    grid: RakeGrid,
+    numbers: NDArray[np.int64],
+    uncertainty: ToolUncertainty,
+) -> tuple[NDArray[np.float64], ...]:
+    """What the uncertainties of the tool's place change in the means; NaN without a mean."""
+    places = _places_in_squares(grid, measurement.raster.spacing)
+    displacements = uncertainty.displacements(grid.tool, places)
+    found = np.full((len(displacements), *grid.mean.shape), np.nan)
+    for index in np.flatnonzero(grid.usable.any(axis=(1, 2))):
+        image = ThermalImage.of(measurement, int(numbers[index]))
+        for kind, displacement in enumerate(displacements):
+            found[kind, index] = contribution(image, places, displacement).mean(axis=-1)
+    return tuple(np.where(grid.usable, part, np.nan) for part in found)
+
+
+def _places_in_squares(grid: RakeGrid, pitch: float) -> NDArray[np.float64]:
+    """Places spread evenly over each square, about one a pixel, in m, shape (m, n, k, 2)."""
+    count = round(grid.size / pitch)
+    steps = grid.size * ((np.arange(count) + 0.5) / count - 0.5)
+    normal, direction = np.array(grid.tool.rake_normal), np.array(grid.tool.rake_direction)
+    within = (steps[:, None, None] * direction + steps[:, None] * normal).reshape(-1, 2)
+    middles = grid.tool.rake_point(grid.along) + grid.depth[:, None, None] * normal
+    return np.asarray(middles[:, :, None] + within)
 
 
 @dataclass(frozen=True)

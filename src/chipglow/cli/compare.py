@@ -60,8 +60,8 @@ def compare(
         str | None,
         typer.Option(
             metavar="LENGTH",
-            help="Standard uncertainty of positions in the measured image; by default that of a "
-            "pixel, its side over the root of 12.",
+            help="Standard uncertainty of positions in the measured image; by default that of the "
+            "tool, where it is found, and of a pixel, its side over the root of 12.",
         ),
     ] = None,
     out: Annotated[
@@ -75,6 +75,8 @@ def compare(
     settings: Settings = None,
 ) -> None:
     """Lay a measurement and simulations over each other and tell which fits where."""
+    from dataclasses import replace
+
     from rich.console import Console
 
     from chipglow.analysis import compare as compare_all
@@ -93,13 +95,13 @@ def compare(
             f"--uncertainty: {uncertainty} beside the uncertainty that {measured} tells, "
             "expected one or the other"
         )
-    chosen = chosen_tool(whole, tool)
+    chosen = chosen_tool(whole, tool, position)
     result = compare_all(
         whole,
         _labelled(simulated),
         chosen.tool,
         None if curve is None else read_curve(curve),
-        stated,
+        replace(stated, tool=chosen.uncertainty),
         None if reference is None else frame_at("--reference", reference, whole.times),
     )
     console = Console(highlight=False, markup=False)

@@ -32,6 +32,14 @@ def rake(
     depth: Annotated[
         str, typer.Option(metavar="LENGTH", help="How far into the chip the grid reaches.")
     ] = "90 um",
+    position: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH",
+            help="Standard uncertainty of the tool's position, along and across its face; by "
+            "default that of a tool that is found, else none.",
+        ),
+    ] = None,
     out: Annotated[Path | None, table_option("Write the squares of every frame")] = None,
     plot: Annotated[
         Path | None, picture_option("Draw the grid on the image and its profiles")
@@ -41,7 +49,7 @@ def rake(
     """Average radiance temperature in squares along the rake face, as the paper's Figure 7."""
     from rich.console import Console
 
-    from chipglow.analysis import rake_grid
+    from chipglow.analysis import ToolUncertainty, rake_grid
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.cli.pictures import write_picture
     from chipglow.cli.quantities import parse
@@ -52,13 +60,15 @@ def rake(
     from chipglow.study.units import LENGTH
 
     reach = parse("--depth", LENGTH, depth)
+    stated = parse("--position", LENGTH, position)
+    given = None if stated is None else ToolUncertainty(stated, stated)
     measured = load_measurement(measurement, settings or ())
     frames = _frames(measured, frame, at)
     console = Console(highlight=False, markup=False)
-    chosen = chosen_tool(measured, tool)
-    grid = rake_grid(measured, chosen.tool, pixels, reach, frames)
+    chosen = chosen_tool(measured, tool, position)
+    grid = rake_grid(measured, chosen.tool, pixels, reach, frames, given or chosen.uncertainty)
     console.print(_table(grid))
-    for sentence in (*chosen.found, *_left_out(measured, grid)):
+    for sentence in (*chosen.found, *_of_the_tool(grid), *_left_out(measured, grid)):
         console.print(sentence)
     say_of_measurements(measured)
     say_assumed(chosen.assumptions)
@@ -115,6 +125,20 @@ def _cell(mean: float, deviation: float) -> str:
     if isnan(mean):
         return "–"
     return f"{mean:.1f}" if isnan(deviation) else f"{mean:.1f} ± {deviation:.1f}"
+
+
+def _of_the_tool(grid: "RakeGrid") -> "Iterator[str]":
+    """What the uncertainty of the tool's position makes."""
+    import numpy as np
+
+    if grid.from_tool:
+        kelvins = grid.frame_tool_uncertainty[grid.frame_count > 0]
+        mean = np.sqrt((kelvins**2).mean())
+        yield (
+            f"The position of the tool makes a standard uncertainty of {mean:.1f} K (root mean "
+            f"square), up to {kelvins.max():.1f} K; it moves all squares together and is not in "
+            "the deviations."
+        )
 
 
 def _left_out(measurement: "Measurement", grid: "RakeGrid") -> "Iterator[str]":

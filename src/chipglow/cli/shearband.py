@@ -51,7 +51,7 @@ def shearband(
         typer.Option(
             metavar="LENGTH",
             help="Standard uncertainty of the curve's position; by default that of a pixel, its "
-            "side over the root of 12.",
+            "side over the root of 12, and that of the edge, where the tool is found.",
         ),
     ] = None,
     out: Annotated[Path | None, table_option("Write the temperatures along the band")] = None,
@@ -76,7 +76,7 @@ def shearband(
 
     measured = load_measurement(measurement, settings or ())
     times = measured.times
-    chosen = chosen_tool(measured, tool)
+    chosen = chosen_tool(measured, tool, position)
     profile = band_profile(
         measured,
         chosen.tool,
@@ -85,6 +85,7 @@ def shearband(
         reference=None if reference is None else frame_at("--reference", reference, times),
         width=parse("--width", LENGTH, width),
         position=parse("--position", LENGTH, position),
+        uncertainty=chosen.uncertainty,
     )
     console = Console(highlight=False, markup=False)
     console.print(_table(profile))

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from chipglow.analysis import FoundTool, find_tool
+from chipglow.analysis import FoundTool, ToolUncertainty, find_tool
 from chipglow.camera import Measurement
 from chipglow.scene import Tool
 from chipglow.study import tool_of
@@ -28,15 +28,20 @@ class ChosenTool:
         The tool in the measurement's coordinates.
     found, assumptions, doubts : tuple of str
         What was found, what was assumed, and why it may not be relied on.
+    uncertainty : ToolUncertainty, optional
+        How well its place is known, if it was found and no option tells an uncertainty.
     """
 
     tool: Tool
     found: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    uncertainty: ToolUncertainty | None = None
 
 
-def chosen_tool(measurement: Measurement, tool: str | None) -> ChosenTool:
+def chosen_tool(
+    measurement: Measurement, tool: str | None, position: str | None = None
+) -> ChosenTool:
     """The tool that an option ``--tool`` chooses.
 
     Parameters
@@ -46,6 +51,9 @@ def chosen_tool(measurement: Measurement, tool: str | None) -> ChosenTool:
     tool : str, optional
         A tool's YAML file; ``found``, to look for the rake face in the image; by default what the
         measurement tells.
+    position : str, optional
+        What an option ``--position`` says, which takes the place of the uncertainty of a tool that
+        is found.
 
     Raises
     ------
@@ -65,7 +73,9 @@ def chosen_tool(measurement: Measurement, tool: str | None) -> ChosenTool:
         f"clearance angle {degrees(shape.clearance_angle):.3g} deg, edge radius "
         f"{1e6 * shape.corner_radius:.3g} um."
     )
-    return ChosenTool(found.tool, (_found(found),), (assumed,), found.doubts)
+    used = found.uncertainty if position is None else None
+    said = (_found(found), _position(found.uncertainty, position))
+    return ChosenTool(found.tool, said, (assumed,), found.doubts, used)
 
 
 def _contradictions(measurement: Measurement, told: Tool) -> tuple[str, ...]:
@@ -76,25 +86,33 @@ def _contradictions(measurement: Measurement, told: Tool) -> tuple[str, ...]:
         return ()
     seen = found.tool.rake_point(np.array([0.0, _FACE]))
     offsets = (seen - told.rake_point(np.array([0.0, _FACE]))) @ np.array(told.rake_normal)
-    allowed = hypot(found.position_uncertainty, _FACE / 2.0 * found.angle_uncertainty)
+    allowed = hypot(found.uncertainty.across, _FACE / 2.0 * found.uncertainty.angle)
     offset = float(np.abs(offsets).max())
     if offset <= _CLEARLY * allowed:
         return ()
     return (
         f"the rake face that shows in the image is {1e6 * offset:.0f} um from that "
         f"of the tool's file (the file's rake angle is {degrees(told.rake_angle):.1f} deg, the "
-        f"image's {degrees(found.tool.rake_angle):.1f} ± {degrees(found.angle_uncertainty):.1f} "
+        f"image's {degrees(found.tool.rake_angle):.1f} ± {degrees(found.uncertainty.angle):.1f} "
         "deg): the tip, the origin of coordinates, or which way the image is up may be wrong.",
     )
 
 
 def _found(found: FoundTool) -> str:
-    """What was found, with standard uncertainties."""
+    """What was found."""
     x, y = (1e6 * part for part in found.tool.tip)
     return (
-        f"Found: rake angle {degrees(found.tool.rake_angle):.1f} ± "
-        f"{degrees(found.angle_uncertainty):.1f} deg; the rake face to "
-        f"± {1e6 * found.position_uncertainty:.1f} um across itself; tip at x {x:.1f} um, "
-        f"y {y:.1f} um, to ± {1e6 * found.tip_uncertainty:.0f} um along the face (standard "
-        "uncertainties)."
+        f"Found: rake angle {degrees(found.tool.rake_angle):.1f} deg, tip at x {x:.1f} um, "
+        f"y {y:.1f} um."
     )
+
+
+def _position(uncertainty: ToolUncertainty, position: str | None) -> str:
+    """Which uncertainty of the place of a found tool is used."""
+    found = (
+        f"± {1e6 * uncertainty.along:.0f} um along the face, ± {1e6 * uncertainty.across:.1f} um "
+        f"across it and ± {degrees(uncertainty.angle):.1f} deg (standard uncertainties)"
+    )
+    if position is None:
+        return f"Position of the tool: found, {found}."
+    return f"Position of the tool: --position {position} in the place of what was found, {found}."

@@ -100,6 +100,7 @@ def _dataset(profile: BandProfile) -> xr.Dataset:
             "uncertainty": (both, profile.uncertainty, kelvin),
             "uncertainty_calibration": (both, profile.calibration, kelvin),
             "uncertainty_position": (both, profile.position, kelvin),
+            "uncertainty_tool": (both, profile.tool_uncertainty, kelvin),
             "x": (both, profile.points[..., 0], {"units": "m"}),
             "y": (both, profile.points[..., 1], {"units": "m"}),
             "offset": ("time", profile.offset, {"units": "m"}),

@@ -4,7 +4,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from chipglow.analysis import RakeGrid
 from chipglow.io.table_file import celsius_text, number_text, write_table_or_dataset
@@ -17,6 +19,7 @@ _COLUMNS: Final = (
     "mean_degC",
     "deviation_K",
     "usable_pixels",
+    "tool_uncertainty_K",
 )
 
 
@@ -29,9 +32,9 @@ def write_rake_grid(grid: RakeGrid, path: Path) -> None:
         What to write.
     path : Path
         ``.csv``: a line for each square of each frame, with its units in the names of the columns;
-        what is left out has no mean. ``.nc``: NetCDF-4 in SI units with the dimensions (time,
-        depth, along), and the tool as a scene tells it. A file that is there is replaced at the
-        end.
+        what is left out has no mean, and a tool whose place is known no uncertainty. ``.nc``:
+        NetCDF-4 in SI units with the dimensions (time, depth, along), and the tool as a scene tells
+        it. A file that is there is replaced at the end.
 
     Raises
     ------
@@ -44,13 +47,20 @@ def write_rake_grid(grid: RakeGrid, path: Path) -> None:
 
 
 def _rows(grid: RakeGrid) -> Iterator[tuple[Any, ...]]:
+    uncertainty = _uncertainty(grid)
     for frame, time in enumerate(grid.times):
         for m, depth in enumerate(grid.depth):
             for n, along in enumerate(grid.along):
                 place = (f"{1e6 * time:.10g}", f"{1e6 * depth:.10g}", f"{1e6 * along:.10g}")
                 mean, deviation = grid.mean[frame, m, n], grid.deviation[frame, m, n]
                 values = (celsius_text(mean), number_text(deviation))
-                yield (*place, *values, int(grid.count[frame, m, n]))
+                of_tool = number_text(uncertainty[frame, m, n])
+                yield (*place, *values, int(grid.count[frame, m, n]), of_tool)
+
+
+def _uncertainty(grid: RakeGrid) -> NDArray[np.float64]:
+    """Standard uncertainty from the tool's place in K; NaN if none is told."""
+    return grid.tool_uncertainty if grid.from_tool else np.full(grid.mean.shape, np.nan)
 
 
 def _dataset(grid: RakeGrid) -> xr.Dataset:
@@ -59,6 +69,7 @@ def _dataset(grid: RakeGrid) -> xr.Dataset:
         {
             "mean": (dimensions, grid.mean, {"units": "K", "long_name": "radiance temperature"}),
             "deviation": (dimensions, grid.deviation, {"units": "K"}),
+            "tool_uncertainty": (dimensions, _uncertainty(grid), {"units": "K"}),
             "count": (dimensions, grid.count, {"units": "1"}),
         },
         coords={

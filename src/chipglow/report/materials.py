@@ -1,4 +1,4 @@
-"""Pictures of materials: flow stress over strain; heat and elasticity over temperature."""
+"""Pictures of materials: flow stress over strain; heat, elasticity and density over temperature."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -16,7 +16,7 @@ _STRAINS: Final = np.linspace(0.0, 2.0, 81)
 
 
 def material_figure(material: MaterialFile) -> Figure:
-    """Flow stress of every set; conductivity, heat capacity and elastic moduli.
+    """Flow stress of every set; conductivity, heat capacity, elastic moduli and density.
 
     Parameters
     ----------
@@ -31,14 +31,15 @@ def material_figure(material: MaterialFile) -> Figure:
     if not material.workpieces:
         raise ValueError(f"{material.name} is a tool's material, expected a workpiece's to draw")
     sets = material.workpieces
-    rows = len(sets) + 1
+    count = len(sets)
     with style():
-        figure = new_figure(2.6 * rows)
-        grid = figure.add_gridspec(rows, 3)
-        for row, (name, workpiece) in enumerate(sets.items()):
-            _flow_stress_panel(figure.add_subplot(grid[row, :]), name, workpiece)
-        below = [figure.add_subplot(grid[-1, column]) for column in range(3)]
-        _temperature_panels(below, next(iter(sets.values())))
+        figure = new_figure(2.6 * (count + 1))
+        halves = figure.subfigures(2, 1, squeeze=False, height_ratios=(count, 1))
+        above, below = halves[:, 0]
+        panels = above.subplots(count, squeeze=False)[:, 0]
+        for axes, (name, workpiece) in zip(panels, sets.items(), strict=True):
+            _flow_stress_panel(axes, name, workpiece)
+        _temperature_panels(below.subplots(1, 4), next(iter(sets.values())))
         figure.suptitle(f"{material.name}: {material.description}")
     return figure
 
@@ -59,10 +60,10 @@ def _flow_stress_panel(axes: Axes, name: str, workpiece: WorkpieceMaterial) -> N
 
 
 def _temperature_panels(panels: Sequence[Axes], workpiece: WorkpieceMaterial) -> None:
-    """Conductivity, heat capacity and elastic moduli over the temperature."""
+    """Conductivity, heat capacity, elastic moduli and density over the temperature."""
     celsius = np.linspace(0.0, workpiece.melting_temperature - KELVIN, 300)
     kelvins = celsius + KELVIN
-    left, middle, right = panels
+    left, middle, right, last = panels
     left.plot(celsius, workpiece.conductivity.at(kelvins), color=BLUE)
     left.set_ylabel("conductivity / W/(m K)")
     middle.plot(celsius, workpiece.heat_capacity.at(kelvins), color=VERMILLION)
@@ -71,6 +72,9 @@ def _temperature_panels(panels: Sequence[Axes], workpiece: WorkpieceMaterial) ->
     right.plot(celsius, workpiece.shear_modulus_at(kelvins) / 1e9, color=BLUE, label="shear")
     right.set_ylabel("modulus / GPa")
     right.legend()
+    for axes in (left, middle, right):
+        axes.set_ylim(bottom=0.0)
+    last.plot(celsius, workpiece.density_at(kelvins) / 1e3, color=VERMILLION)
+    last.set_ylabel("density / (g/cm³)")
     for axes in panels:
         axes.set_xlabel("temperature / °C")
-        axes.set_ylim(bottom=0.0)

@@ -299,8 +299,9 @@ def _check_structure(data: xr.Dataset) -> None:
         _check_unit(name, data[name], unit)
     for group in (MATERIAL_COORDINATE_UNITS, FORCE_UNITS, ENERGY_UNITS):
         present = [name for name in group if name in data]
-        if present and len(present) < len(group):
-            raise SceneError(f"scene: {present[0]!r} needs the others of {list(group)}")
+        missing = [name for name in group if name not in data]
+        if present and missing:
+            raise SceneError(f"scene: {', '.join(missing)} missing, expected with {present[0]!r}")
         for name in present:
             _check_unit(name, data[name], group[name])
     for name in (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS, QUALITY):

@@ -1,0 +1,49 @@
+"""How the camera's errors depend on the width of the shear band.
+
+    python benchmarks/band_width.py [28 20 14 10 7]
+
+The solver's shear band is about two cells wide, so its width is chosen by the cell (in um). For
+each the paper's cut is made, and looked at as the paper's study does, with frames and samples as
+coarse as those of the quick study. Scenes are kept in chipglow's cache. Prints a Markdown table.
+"""
+
+import sys
+
+from chipglow.report.comparison import comparison_rows
+from chipglow.study import Study, run
+
+CELLS = (28.0, 20.0, 14.0, 10.0, 7.0)
+SHOWN = {
+    "band_width_um": "band / um",
+    "band_error_degC": "error at the band's centre / °C",
+    "band_psf_share_percent": "PSF's share / %",
+    "band_worst_error_degC": "largest beside the band / °C",
+    "rake_error_degC": "error at the rake face / °C",
+    "rake_psf_share_percent": "PSF's share / %",
+}
+
+
+def study_with(cell):
+    """The quick study with another cell in um."""
+    study = Study.quick()
+    numerics = study.cutting.numerics.model_copy(update={"cell": cell * 1e-6})
+    cutting = study.cutting.model_copy(update={"numerics": numerics})
+    return study.model_copy(update={"cutting": cutting})
+
+
+def row(cell):
+    """Cut and look, and return the cell's row of the table."""
+    found = {each.key: each.here for each in comparison_rows(run(study_with(cell)))}
+    return [f"{cell:g}", *(f"{found[key]:.0f}" for key in SHOWN)]
+
+
+def main():
+    cells = [float(text) for text in sys.argv[1:]] or CELLS
+    print("| cell / um | " + " | ".join(SHOWN.values()) + " |")
+    print("|---" * (1 + len(SHOWN)) + "|")
+    for cell in cells:
+        print("| " + " | ".join(row(cell)) + " |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,306 @@
+"""How uncertain a tool's place is, in the squares at the rake face and along the shear band."""
+
+import csv
+from dataclasses import replace
+from math import hypot, radians
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from measured_band import RASTER, TOOL, measured
+from seen_chip import look, noisy
+from typer.testing import CliRunner
+
+from chipglow.analysis import (
+    Reading,
+    StatedUncertainties,
+    ToolUncertainty,
+    band_profile,
+    compare,
+    find_tool,
+    normalised_error,
+    rake_grid,
+)
+from chipglow.cli import app
+from chipglow.io import read_measurement, write_measurement
+from chipglow.scene import PlacedTool, ToolGeometry
+from chipglow.surface import CHIP_2
+
+X, Y = np.meshgrid(RASTER.x, RASTER.y)
+SLOPE = np.array([2e5, 1e5])
+CURVE = TOOL.edge_point + np.array([[-30e-6, 30e-6], [-230e-6, 230e-6]])
+UP, INTO = np.array(TOOL.rake_direction), np.array(TOOL.rake_normal)
+FOUND = ToolUncertainty(along=16e-6, across=2e-6, angle=radians(1.5), pivot=70e-6)
+
+
+def linear(count=3):
+    """Frames whose radiance temperature is linear in x and y, with the slope `SLOPE`."""
+    return measured([700.0 + SLOPE[0] * X + SLOPE[1] * Y] * count)
+
+
+def moved(tool, uncertainty, along, across, angle):
+    """A tool that is off by so many standard uncertainties."""
+    turned = replace(tool, rake_angle=tool.rake_angle + angle * uncertainty.angle)
+    way = along * uncertainty.along * np.array(tool.rake_direction)
+    way = way + across * uncertainty.across * np.array(tool.rake_normal)
+    tip = tool.rake_point(uncertainty.pivot) + way - turned.rake_point(uncertainty.pivot)
+    return PlacedTool(turned, (float(tip[0]), float(tip[1])))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    kind=st.sampled_from([0, 1, 2]),
+    angle=st.floats(-25.0, 25.0),
+    pivot=st.floats(-50e-6, 200e-6),
+    up=st.floats(-100e-6, 300e-6),
+    into=st.floats(0.0, 100e-6),
+)
+def test_displacements_are_those_of_a_tool_that_is_moved_and_turned(kind, angle, pivot, up, into):
+    tool = ToolGeometry(rake_angle=radians(angle))
+    # So small that the sine is the angle to a millionth.
+    small = ToolUncertainty(1e-8, 1e-8, 1e-6, pivot)
+    other = moved(tool, small, *np.eye(3)[kind])
+    here, there = (t.rake_point(up) + into * np.array(t.rake_normal) for t in (tool, other))
+    found = small.displacements(tool, here)[kind]
+    np.testing.assert_allclose(found, there - here, atol=1e-14)
+
+
+def test_squares_are_uncertain_by_slope_times_position():
+    grid = rake_grid(linear(), TOOL, uncertainty=FOUND)
+    up = grid.along[None, :] - FOUND.pivot
+    turn = grid.depth[:, None] * (SLOPE @ UP) - up * (SLOPE @ INTO)
+    expected = [
+        np.full(turn.shape, FOUND.along * (SLOPE @ UP)),
+        np.full(turn.shape, FOUND.across * (SLOPE @ INTO)),
+        FOUND.angle * turn,
+    ]
+    known = grid.frame_count > 0
+    assert known.sum() > 30
+    for part, value in zip(grid.frame_from_tool, expected, strict=True):
+        # A thousandth of a kelvin is lost on the way through radiance.
+        np.testing.assert_allclose(part[known], value[known], atol=1e-3)
+    total = np.sqrt(sum(value**2 for value in expected))
+    np.testing.assert_allclose(grid.frame_tool_uncertainty[known], total[known], rtol=1e-3)
+    np.testing.assert_allclose(grid.tool_uncertainty[1][known], total[known], rtol=1e-3)
+
+
+def test_a_tool_whose_place_is_known_has_none():
+    grid = rake_grid(linear(), TOOL)
+    assert grid.from_tool == ()
+    assert (grid.tool_uncertainty == 0.0).all() and (grid.frame_tool_uncertainty == 0.0).all()
+    assert (band_profile(linear(), TOOL, curve=CURVE).tool_uncertainty == 0.0).all()
+
+
+def test_the_distance_along_a_curve_is_uncertain_by_the_edge():
+    """A straight curve through the edge: only what moves the edge along it counts."""
+    way = (CURVE[1] - CURVE[0]) / np.hypot(*(CURVE[1] - CURVE[0]))
+    moves = FOUND.displacements(TOOL, TOOL.edge_point)
+    profile = band_profile(linear(), TOOL, curve=CURVE, uncertainty=FOUND)
+    alone = band_profile(linear(), TOOL, curve=CURVE)
+    expected = np.abs(moves @ way * (SLOPE @ way))
+    known = np.isfinite(profile.temperature)
+    for part, value in zip(profile.from_tool, expected, strict=True):
+        np.testing.assert_allclose(np.abs(part[known]), value, atol=1e-3)
+    total = np.hypot(alone.uncertainty[known], np.hypot.reduce(expected))
+    np.testing.assert_allclose(profile.uncertainty[known], total, rtol=1e-3)
+
+
+def test_a_comparison_has_the_uncertainty_of_the_tool_s_place():
+    stated = StatedUncertainties(temperature=3.0, tool=FOUND)
+    result = compare(linear(), {"same": linear()}, TOOL, CURVE, stated)
+    grid = rake_grid(linear(), TOOL, uncertainty=FOUND)
+    assert result.grid is not None and result.band is not None
+    known = np.isfinite(result.grid.measured.temperature)
+    expected = np.hypot(3.0, grid.frame_tool_uncertainty)
+    # Frames that are alike: nothing else, not the pixel's position either.
+    np.testing.assert_allclose(result.grid.measured.uncertainty[known], expected[known], rtol=1e-3)
+    # The curve is laid on the simulation by the edge, so that it is off with it in any direction.
+    moves = FOUND.displacements(TOOL, TOOL.edge_point) @ SLOPE
+    pixel = RASTER.spacing / np.sqrt(12.0) * np.hypot(*SLOPE)
+    known = np.isfinite(result.band.measured.temperature)
+    np.testing.assert_allclose(
+        result.band.measured.uncertainty[known], hypot(3.0, pixel, *moves), rtol=1e-3
+    )
+    assert result.grid.simulated[0].from_tool == ()
+
+
+def test_a_tool_that_is_off_moves_all_squares_together():
+    """The mean of many squares is as uncertain as each where the slope is the same everywhere."""
+    tool = ToolUncertainty(along=16e-6, across=0.0)
+    stated = StatedUncertainties(temperature=1e-3, tool=tool)
+    result = compare(linear(), {"same": linear()}, TOOL, CURVE, stated)
+    own = StatedUncertainties(temperature=1e-3, position=16e-6)
+    each = compare(linear(), {"same": linear()}, TOOL, CURVE, own)
+    expected = 16e-6 * abs(SLOPE @ UP)
+    for together, apart in zip(result.places[:2], each.places[:2], strict=True):
+        assert together.fits[0].bias_uncertainty == pytest.approx(expected, rel=1e-3)
+        count = apart.fits[0].count
+        single = 16e-6 * np.hypot(*SLOPE) / np.sqrt(count)
+        assert apart.fits[0].bias_uncertainty == pytest.approx(single, rel=1e-2)
+
+
+@pytest.mark.parametrize(("turned", "doubted"), [(2.9, False), (3.1, True)])
+def test_a_rake_angle_is_doubted_beyond_its_expanded_uncertainty(turned, doubted):
+    other = linear().with_tool(replace(TOOL, rake_angle=TOOL.rake_angle + radians(turned)))
+    result = compare(linear(), {"other": other}, TOOL, CURVE, StatedUncertainties(1.0, tool=FOUND))
+    assert any("rake angle of other differs" in doubt for doubt in result.doubts) is doubted
+
+
+def test_how_sure_the_best_is_knows_of_the_tool():
+    """A slope along the face and two sets, 10 K too cold and 30 K too hot: the first stays nearer
+    while the tool's error makes up to 10 K, as for any error that all values have in common.
+    """
+    base = 700.0 + 1e6 * (X * UP[0] + Y * UP[1])
+    sets = {"cold": measured([base - 10.0] * 3), "hot": measured([base + 30.0] * 3)}
+    stated = StatedUncertainties(tool=ToolUncertainty(along=15e-6, across=0.0))
+    result = compare(measured([base] * 3), sets, TOOL, CURVE, stated)
+    # 15 K: the normal distribution's probability of under 10 K; 4000 draws are good to 0.8 %.
+    assert result.places[0].confidence == pytest.approx(0.748, abs=0.025)
+
+
+def test_the_uncertainty_holds_for_tools_that_are_off_at_random():
+    """A chip that is hot at the face, where contact ends: neither slope nor bend is even."""
+    along = (X - TOOL.rake_foot[0]) * UP[0] + (Y - TOOL.rake_foot[1]) * UP[1]
+    depth = np.abs(TOOL.signed_distance(X, Y))
+    contact = 1 / (1 + np.exp((along - 150e-6) / 30e-6))
+    chip = measured([600.0 + 300.0 * contact * np.exp(-depth / 50e-6)])
+    true = rake_grid(chip, TOOL)
+    rng = np.random.default_rng(5)
+    within, count = 0, 0
+    for off in rng.standard_normal((120, 3)):
+        grid = rake_grid(chip, moved(TOOL, FOUND, *off), uncertainty=FOUND)
+        columns = min(grid.along.size, true.along.size)
+        here, there = (g.frame_mean[:, :columns] for g in (grid, true))
+        none = np.zeros(here.shape)
+        parts = tuple(part[:, :columns] for part in grid.frame_from_tool)
+        e_n = normalised_error(Reading(here, none, none, parts), Reading(there, none, none))
+        within += int((e_n <= 1).sum())
+        count += int(np.isfinite(e_n).sum())
+    # 120 tools whose squares go together: a standard deviation of 2 %.
+    assert within / count == pytest.approx(0.954, abs=0.05)
+
+
+# The commands
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch, seen):
+    monkeypatch.chdir(tmp_path)
+    write_measurement(seen, tmp_path / "told.nc")
+    write_measurement(noisy(seen, 0), tmp_path / "real.nc")
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def seen():
+    return look(-7.0, CHIP_2)
+
+
+def command(*arguments):
+    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "160"})
+    return result.exit_code, result.stdout, result.stderr.strip()
+
+
+def test_the_place_of_a_found_tool_is_uncertain_and_position_wins(folder):
+    (folder / "tool.yaml").write_text("rake_angle: -7 deg\ntip: [0 um, 0 um]\n")
+    measurement = read_measurement(folder / "real.nc")
+    found = find_tool(measurement)
+    stated = ToolUncertainty(along=5e-6, across=5e-6)
+    for options, tool, uncertainty, said in (
+        (["--tool", "found"], found.tool, found.uncertainty, "found, ± 16 um along the face"),
+        (
+            ["--tool", "found", "--position", "5 um"],
+            found.tool,
+            stated,
+            "--position 5 um in the place of what was found, ± 16 um along",
+        ),
+        (["--tool", "tool.yaml", "--position", "5 um"], None, stated, None),
+        (["--tool", "tool.yaml"], None, None, None),
+    ):
+        code, text, _ = command("rake", "real.nc", *options, "--out", "grid.nc")
+        assert code == 0
+        with xr.open_dataset(folder / "grid.nc", engine="h5netcdf", decode_times=False) as data:
+            written = data["tool_uncertainty"].values
+        tool = tool or PlacedTool(ToolGeometry(radians(-7.0)), (0.0, 0.0))
+        grid = rake_grid(measurement, tool, uncertainty=uncertainty)
+        expected = grid.tool_uncertainty if uncertainty else np.full(grid.mean.shape, np.nan)
+        np.testing.assert_array_equal(written, expected)
+        assert ("Position of the tool: " in text) is (said is not None)
+        assert said is None or f"Position of the tool: {said}" in text
+        assert ("The position of the tool makes a standard uncertainty of" in text) is (
+            uncertainty is not None
+        )
+        if uncertainty:
+            most = np.nanmax(grid.frame_tool_uncertainty)
+            assert f"up to {most:.1f} K; it moves all squares together" in " ".join(text.split())
+
+
+def test_the_place_of_a_found_tool_goes_into_the_comparison(folder):
+    """The same image on both sides, so that all is equal but the place of the tool."""
+    widths = {}
+    for name, options in (
+        ("found", ["--tool", "found"]),
+        ("stated", ["--tool", "found", "--position", "0.001 um"]),
+    ):
+        files = ("real.nc", "told.nc", "--uncertainty", "1 K", "--out", name)
+        code, text, _ = command("compare", *files, *options)
+        assert code == 0 and "Position of the tool: " in text
+        with (folder / name / "comparison.csv").open(encoding="utf-8") as table:
+            rows = [row for row in csv.DictReader(table) if row["place"] == "rake face"]
+        widths[name] = np.array([float(row["measured_expanded_K"] or "nan") for row in rows])
+    measurement = read_measurement(folder / "real.nc")
+    found = find_tool(measurement)
+    grid = rake_grid(measurement, found.tool, uncertainty=found.uncertainty)
+    added = np.sqrt(widths["found"] ** 2 - widths["stated"] ** 2)
+    expected = 2 * grid.frame_tool_uncertainty[:, : added.size // grid.depth.size].ravel()
+    known = np.isfinite(added)
+    assert known.sum() > 5
+    # Four digits after the point are written.
+    np.testing.assert_allclose(added[known], expected[known], rtol=1e-3)
+
+
+def test_the_place_of_a_found_tool_goes_into_the_band(folder):
+    (folder / "curve.csv").write_text("x_um,y_um\n-30,40\n-150,140\n")
+    uncertainty = {}
+    for name, options in (("found", []), ("stated", ["--position", "2 um"])):
+        usual = ("real.nc", "--curve", "curve.csv", "--tool", "found", "--out", f"{name}.nc")
+        code, text, _ = command("shearband", *usual, *options)
+        assert code == 0 and "Position of the tool: " in text
+        path = folder / f"{name}.nc"
+        with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as data:
+            uncertainty[name] = data["uncertainty_tool"].values
+            whole = np.hypot(data["uncertainty_position"], data["uncertainty_tool"])
+            np.testing.assert_allclose(data["uncertainty"], whole)
+    assert np.nanmin(uncertainty["found"]) >= 0.0
+    assert np.nanmax(uncertainty["found"]) > 1.0
+    assert (uncertainty["stated"] == 0.0).all()
+
+
+# What is wrong
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"along": -1e-6}, "along is -1e-06, expected 0 or more"),
+        ({"across": np.nan}, "across is nan"),
+        ({"angle": np.inf}, "angle is inf"),
+        ({"pivot": np.nan}, "pivot is nan m, expected a finite one"),
+    ],
+)
+def test_impossible_uncertainties_are_refused(wrong, message):
+    with pytest.raises(ValueError, match=f"^tool uncertainty: {message}"):
+        ToolUncertainty(**({"along": 1e-6, "across": 1e-6} | wrong))
+
+
+def test_shapes_of_what_the_tool_makes_must_fit():
+    grid = rake_grid(linear(1), TOOL)
+    with pytest.raises(ValueError, match=r"from_tool has shape \(2,\)"):
+        replace(grid, from_tool=(np.zeros(2),))
+    with pytest.raises(ValueError, match=r"from_tool has shape \(2,\), expected \(3,\)"):
+        Reading(np.zeros(3), np.zeros(3), np.zeros(3), (np.zeros(2),))
+    profile = band_profile(linear(1), TOOL, curve=CURVE)
+    with pytest.raises(ValueError, match=r"band profile: from_tool has shape \(2,\)"):
+        replace(profile, from_tool=(np.zeros(2),))
