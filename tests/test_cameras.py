@@ -84,7 +84,7 @@ def test_a_sequence_of_flir(tmp_path, order):
 def test_what_is_behind_the_last_frame_of_flir_is_said(tmp_path):
     recording = read_recording(make(tmp_path, "a.seq", files.seq(PICTURES) + b"an index"))
     assert np.array_equal(recording.signal, PICTURES)
-    assert "Doubtful: 8 bytes behind the last frame are no frame." in recording.notes
+    assert recording.doubts == ("8 bytes behind the last frame are no frame.",)
 
 
 def test_big_endian_counts_and_zeros_between_frames(tmp_path):
@@ -137,7 +137,7 @@ def test_stamps_that_do_not_ascend_give_way_to_the_frame_rate(tmp_path):
     path = make(tmp_path, "a.seq", files.seq(PICTURES, np.zeros(5), rate=50))
     recording = read_recording(path)
     assert recording.times == pytest.approx(np.arange(5) / 50)
-    assert any("Assumed: the frames are 1/50 s apart" in note for note in recording.notes)
+    assert any("the frames are 1/50 s apart" in assumed for assumed in recording.assumptions)
     assert read_recording(path, interval=0.1).times == pytest.approx(0.1 * np.arange(5))
     without = make(tmp_path, "b.seq", files.seq(PICTURES, np.zeros(5), rate=0))
     with pytest.raises(SourceError, match="give an interval"):
@@ -160,13 +160,13 @@ def test_ptw(tmp_path, lock_in):
         {"emissivity": 0.8, "reflected": 296.15, "transmission": 0.98, "atmosphere": 295.15}
     )
     assert any("lock-in" in note for note in recording.notes) == lock_in
-    assert not any("Doubtful" in note for note in recording.notes)
+    assert not recording.doubts
 
 
 def test_frames_missing_in_ptw_are_said(tmp_path):
     stamps = np.array([0, 1, 2, 12, 13]) / 600
     recording = read_recording(make(tmp_path, "a.ptw", files.ptw(PICTURES, stamps=stamps)))
-    assert any("frames may be missing" in note for note in recording.notes)
+    assert any("frames may be missing" in doubt for doubt in recording.doubts)
 
 
 def test_ptw_without_period_has_the_times_of_its_stamps_also_over_midnight(tmp_path):
@@ -219,7 +219,7 @@ def test_cine_whose_exposure_changes_has_no_integration_time(tmp_path):
     path = make(tmp_path, "a.cine", files.cine(PICTURES, exposures=exposures))
     recording = read_recording(path)
     assert recording.integration_time is None
-    assert any("Doubtful: the integration time goes" in note for note in recording.notes)
+    assert any("the integration time goes" in doubt for doubt in recording.doubts)
     assert read_recording(path, slice(2, 5)).integration_time == pytest.approx(5e-6, rel=1e-4)
 
 

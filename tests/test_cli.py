@@ -8,6 +8,7 @@ from json import dumps, loads
 
 import numpy as np
 import pytest
+import typer
 from analytic_chip import AnalyticChip
 from typer.testing import CliRunner
 
@@ -199,6 +200,28 @@ def test_a_foreign_folder_is_refused_before_anything_is_computed(folder, runs):
 def test_a_place_that_is_not_there_is_refused_before_anything_is_computed(command, runs):
     assert_refused(chipglow(command, "study.yaml", "--out", "no/where"), "no folder no")
     assert runs == []
+
+
+PICTURES = ("--plot", "--overlay")
+ENDINGS = {"--out": ".nc", "--table": ".csv", "--pairs": ".csv", "--blink": ".gif"}
+WRITTEN = [
+    (name, option.opts[0])
+    for name, command in typer.main.get_command(app).commands.items()
+    for option in command.params
+    if option.opts[0] in (*PICTURES, *ENDINGS) and option.metavar == "FILE"
+]
+
+
+@pytest.mark.parametrize(("command", "option"), WRITTEN)
+def test_a_file_that_cannot_be_written_is_refused_before_anything_is_read(command, option):
+    """Of all commands, without the files that they need."""
+    if option in PICTURES:
+        message = f"{option}: a.txt, expected a file that ends in .png, .pdf or .svg"
+        assert_refused(chipglow(command, option, "a.txt"), message)
+    ending = ENDINGS.get(option, ".PNG")
+    if (command, option) == ("register", "--out"):
+        ending = ".yaml"
+    assert_refused(chipglow(command, option, f"no/a{ending}"), "there is no folder no")
 
 
 def test_a_bad_study_is_refused_and_writes_nothing(folder, runs):

@@ -495,6 +495,7 @@ def test_the_command_writes_table_map_and_picture(folder):
     spread = ["--truth-uncertainty", "2 K", "--environment-uncertainty", "1 degC"]
     result = command("a.nc", "--truth", "391degC", *spread, *outputs)
     assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines()[-3:] == ["e.nc", "t.csv", "p.png"]
     assert "Assumed: the camera's calibration is exact" in result.output
     assert "repeatability" in result.output
     with Path("t.csv").open(encoding="utf-8", newline="") as file:

@@ -367,6 +367,7 @@ def test_command_draws(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["materials", "al-7075-t6", "--plot", str(path)])
     assert result.exit_code == 0
     assert path.read_bytes().startswith(b"\x89PNG")
+    assert result.output.count(str(path)) == 1
     assert CliRunner().invoke(app, ["materials", "carbide", "--plot", str(path)]).exit_code == 2
     assert CliRunner().invoke(app, ["materials", "cheese"]).exit_code == 2
     assert CliRunner().invoke(app, ["materials", "--plot", str(path)]).exit_code == 2

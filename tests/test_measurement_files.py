@@ -2,12 +2,14 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import camera_files
 import numpy as np
 import pytest
 import yaml
 from analytic_chip import AnalyticChip
+from PIL import Image
 from typer.testing import CliRunner
 
 from chipglow.camera import Detector, Flag, Recording, fit_linear, fit_sakuma_hattori
@@ -15,6 +17,7 @@ from chipglow.cli import app
 from chipglow.io import (
     is_measurement,
     read_measurement,
+    read_recording,
     write_hcc,
     write_measurement,
     write_scene,
@@ -26,10 +29,12 @@ from chipglow.study import (
     CalibrationDescription,
     MeasurementDescription,
     StudyError,
+    UniformObjects,
     calibration_text,
     load_calibration,
     load_description,
     load_measurement,
+    measured,
     measurement_text,
     uniform_counts,
 )
@@ -374,6 +379,7 @@ def test_calibrate_prints_fits_and_writes_the_preferred(laboratory, tmp_path):
     assert "degrees of freedom" in said
     assert "Doubtful" not in said
     assert plot.read_bytes().startswith(b"\x89PNG")
+    assert said.splitlines()[-2:] == [str(out), str(plot)]
     calibration = load_calibration(out)
     assert (calibration.integration_time, calibration.range_name) == (1e-5, "A")
     assert (calibration.lowest, calibration.highest) == pytest.approx((573.15, 1273.15))
@@ -439,14 +445,34 @@ def test_what_is_assumed_and_doubtful_of_a_camera_s_file_is_said_by_who_takes_it
         "regions: {all: {rectangle: [[10, 10], [30, 20]], feature: chip body}}"
     )
     (laboratory / "tool.yaml").write_text("{rake_angle: 0 deg, tip: [0 um, 0 um]}")
+    Image.fromarray(np.zeros((60, 80), np.uint8)).save("visible.png")
+    corners = ["5,5,10,11", "35,5,70,11", "35,25,70,51", "5,25,10,51"]
+    head = "infrared_column,infrared_row,visible_column,visible_row"
+    (laboratory / "corners.csv").write_text("\n".join([head, *corners]) + "\n")
     for command in (
         ["emissivity", "chip.yaml", "--truth", "900 degC", "--regions", "all.yaml"],
         ["rake", "chip.yaml", "--tool", "tool.yaml"],
+        ["temperature", "chip.yaml", "--emissivity", "0.5", "--regions", "all.yaml"],
+        ["register", "chip.yaml", "visible.png", "--points", "corners.csv"],
     ):
         code, said = run(*command, *settings)
         assert code == 0, said
         assert said.count("Assumed: No pixel is saturated") == 1
         assert "Doubtful: 5 values are 65535" in said
+
+
+def test_what_the_camera_s_file_leaves_in_doubt_is_said_once(laboratory, tmp_path):
+    exposures = [3e-6, 3e-6, 5e-6, 5e-6, 5e-6]
+    written = camera_files.cine(camera_files.pictures(bits=12), "16", exposures=exposures)
+    (tmp_path / "a.cine").write_bytes(written)
+    doubt = "Doubtful: the integration time goes from 3.00002 us to 5.00004 us."
+    code, said = run("convert", tmp_path / "a.cine")
+    assert "It is no measurement yet" in said
+    assert said.count(doubt) == 1
+    settings = ("--set", f"calibration={laboratory / 'calibration.yaml'}", "--set", "pitch=6 um")
+    code, said = run("convert", tmp_path / "a.cine", *settings)
+    assert code == 0, said
+    assert said.count(doubt) == 1
 
 
 def test_a_scene_is_no_measurement(tmp_path):
@@ -541,6 +567,32 @@ def test_calibrate_takes_recordings_in_the_place_of_counts(laboratory):
     expected = fit_linear(CELSIUS[:4] + 273.15, counts, BAND).calibration
     found = load_calibration("of files.yaml")
     np.testing.assert_allclose(found.parameters, expected.parameters, rtol=1e-6)
+
+
+def test_frames_that_correct_all_black_bodies_are_read_once(laboratory, monkeypatch):
+    seen_bodies(laboratory)
+    read = []
+
+    def read_and_told(path, *arguments, **told):
+        read.append(Path(path).name)
+        return read_recording(path, *arguments, **told)
+
+    monkeypatch.setattr(measured, "read_recording", read_and_told)
+    settings = [part for setting in CORRECTED for part in ("--set", setting)]
+    code, output = run("calibrate", "bodies.csv", "--band", "3.8-5.1 um", *settings)
+    assert code == 0, output
+    assert sorted(read) == sorted(
+        ["cold.npy", "hot.npy", *(f"body {celsius:g}.npy" for celsius in CELSIUS[:4])]
+    )
+
+
+def test_frames_of_one_description_do_not_correct_recordings_of_another(laboratory):
+    objects = UniformObjects()
+    by_cold, by_hot = ([*CAMERA, f"uniform.frames={name}.npy"] for name in ("cold", "hot"))
+    several = (by_cold, by_hot, CAMERA, by_cold)
+    found = [uniform_counts("hot.npy", settings, objects) for settings in several]
+    assert found == [uniform_counts("hot.npy", settings) for settings in several]
+    assert len(set(found)) == 3
 
 
 @pytest.mark.parametrize(

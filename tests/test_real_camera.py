@@ -269,6 +269,15 @@ def test_without_object_parameters_it_is_said_what_is_assumed():
     assert measured.calibration_uncertainty is None
 
 
+def test_what_the_file_says_is_kept_apart_from_what_was_assumed_and_is_doubtful():
+    said = {"notes": ("Lens: 25 mm.",), "assumptions": ("an even rate.",), "doubts": ("a gap.",)}
+    measured = develop_recording(recording(np.full((1, 2, 2), 9.0), "radiance", **said))
+    attributes = measured.data.attrs
+    assert attributes["notes"] == "Lens: 25 mm."
+    assert "an even rate." in attributes["assumed"].splitlines()
+    assert "a gap." in attributes["doubtful"].splitlines()
+
+
 def test_radiance_is_taken_as_it_is():
     radiance = np.array([[[1000.0, np.inf, -5.0]]])
     told = ObjectParameters(emissivity=0.5)

@@ -22,7 +22,7 @@ from chipglow.analysis import (
 )
 from chipglow.camera import Measurement
 from chipglow.cli import app
-from chipglow.io import read_pictures, read_points, write_measurement
+from chipglow.io import read_measurement, read_pictures, read_points, write_measurement
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 from chipglow.study import load_registration, write_registration
@@ -382,15 +382,17 @@ def test_the_command_aligns_the_clocks(folder):
     region = ("--align", "60 um, 30 um, 120 um, 90 um")
     code, output = register(*arguments, *region)
     assert (code, "--visible-interval" in output) == (2, True)
-    code, output = register(
-        *arguments, *region, "--visible-interval", "200 us", "--pairs", "pairs.csv"
-    )
-    assert code == 0, output
-    offset = float(output.split("infrared clock + ")[1].split(" us")[0])
+    command = ["register", *arguments, *region, "--visible-interval", "200 us"]
+    result = CliRunner().invoke(app, [*command, "--pairs", "pairs.csv"], env={"COLUMNS": "120"})
+    assert result.exit_code == 0, result.output
+    assert "Assumed: a visible exposure lasts as long as its frame, 200 us." in result.stderr
+    assert "Assumed" not in result.stdout
+    offset = float(" ".join(result.stdout.split()).split("infrared clock + ")[1].split(" us")[0])
     # The visible frames are exposed for 200 us, whose middle is 100 us after their times.
     assert offset == pytest.approx(7000 + 100 - 5, abs=20)
     lines = (folder / "pairs.csv").read_text().splitlines()
     assert lines[0] == "infrared_frame,infrared_time_us,visible_frames"
+    assert len(lines) == 1 + read_measurement("infrared.nc").times.size
     assert lines[1].split(",")[2] == "35"
 
 

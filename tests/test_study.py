@@ -332,6 +332,7 @@ def load(text, folder):
         ("a: [1,", "line 1", "expected YAML"),
         ("seed: 1\nseed: 2", "line 2", "key 'seed' is there twice"),
         ("x: !!python/object/apply:os.system [ls]", "line 1", "could not determine a constructor"),
+        ("seed: 2026-13-45", "", "month must be in 1..12, expected YAML"),
     ],
 )
 def test_bad_input_is_one_line_with_file_field_value_and_expectation(
@@ -367,6 +368,17 @@ def test_a_file_that_is_not_text_is_refused(tmp_path):
     (tmp_path / "study.yaml").write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
     with pytest.raises(StudyError, match=r"study\.yaml: expected text in UTF-8"):
         load_study(tmp_path / "study.yaml")
+
+
+def test_a_file_that_nobody_writes_by_hand_is_refused_unread(tmp_path):
+    (tmp_path / "study.yaml").write_text("seed: 1\n" + 1_000_000 * "#")
+    with pytest.raises(StudyError, match=r"study\.yaml: expected a file of up to 1000 kB"):
+        load_study(tmp_path / "study.yaml")
+
+
+def test_a_mark_of_the_order_of_bytes_is_no_part_of_the_study(tmp_path):
+    (tmp_path / "study.yaml").write_text("seed: 3\n", encoding="utf-8-sig")
+    assert load_study(tmp_path / "study.yaml").seed == 3
 
 
 def test_an_empty_study_or_section_means_the_defaults(tmp_path):

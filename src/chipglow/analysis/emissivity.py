@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.analysis.observations import (
-    DOUBTFUL_SHARE,
+    AreaResult,
     Scatter,
     check_same_pixels,
     count_flags,
-    coverage_factor,
     flag_text,
     observed_flags,
     observed_radiance,
@@ -225,7 +224,7 @@ class EmissivityMap:
 
 
 @dataclass(frozen=True, eq=False)
-class RegionEmissivity:
+class RegionEmissivity(AreaResult):
     """Emissivity of an area: a row of the table; made by `EmissivityMap.of`.
 
     Parameters
@@ -296,28 +295,14 @@ class RegionEmissivity:
         return float(self.scatter.degrees_of_freedom * ratio**4)
 
     @property
-    def coverage_factor(self) -> float:
-        """Student's t for 95 %: 1.96 where chance plays no part."""
-        return coverage_factor(self.degrees_of_freedom)
-
-    @property
-    def expanded_uncertainty(self) -> float:
-        """Half the width of the interval that holds the mean emissivity with 95 %."""
-        return self.coverage_factor * self.standard_uncertainty
-
-    @property
     def doubts(self) -> tuple[str, ...]:
         """Why the result may be wrong beyond its uncertainty, a sentence each."""
         return tuple(self._doubts())
 
     def _doubts(self) -> list[str]:
         doubts = []
-        total = self.pixels + self.left_out
-        if self.left_out > DOUBTFUL_SHARE * total:
-            text = (
-                f"{self.name}: {self.left_out} of {total} pixels are left out "
-                f"({flag_text(self.flagged)})"
-            )
+        text = self.left_out_doubt()
+        if text is not None:
             if self.flagged[Flag.BELOW_FLOOR]:
                 text += (
                     "; what is left is brighter than the region, as the camera's floor hides "

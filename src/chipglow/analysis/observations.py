@@ -1,5 +1,6 @@
 """Images of one place as observations: what they have in common, and what chance does to them."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite, nan, sqrt
@@ -11,15 +12,59 @@ from scipy.special import stdtrit
 
 from chipglow.camera import Flag, Measurement
 
-DOUBTFUL_SHARE: Final = 0.05
+_DOUBTFUL_SHARE: Final = 0.05
 """Share of an area's pixels that may be left out before its result is doubtful."""
 
 _COVERAGE: Final = 0.975
 
 
-def coverage_factor(degrees_of_freedom: float) -> float:
-    """Student's t for an interval of 95 %: 1.96 where chance plays no part."""
-    return float(stdtrit(degrees_of_freedom, _COVERAGE))
+class AreaResult(ABC):
+    """What is determined of an area: the interval that holds it, and whether enough pixels count.
+
+    Attributes
+    ----------
+    name : str
+        The area's name.
+    pixels, left_out : int
+        Number of pixels that count, and of those that do not, because they are flagged.
+    flagged : dict
+        How many have each `Flag`.
+    """
+
+    name: str
+    pixels: int
+    left_out: int
+    flagged: dict[Flag, int]
+
+    @property
+    @abstractmethod
+    def standard_uncertainty(self) -> float:
+        """Combined standard uncertainty."""
+
+    @property
+    @abstractmethod
+    def degrees_of_freedom(self) -> float:
+        """Effective number of the standard uncertainty."""
+
+    @property
+    def coverage_factor(self) -> float:
+        """Student's t for 95 %: 1.96 where chance plays no part."""
+        return float(stdtrit(self.degrees_of_freedom, _COVERAGE))
+
+    @property
+    def expanded_uncertainty(self) -> float:
+        """Half the width of the interval that holds what is determined with 95 %, in its unit."""
+        return self.coverage_factor * self.standard_uncertainty
+
+    def left_out_doubt(self) -> str | None:
+        """A sentence if many pixels are left out."""
+        total = self.pixels + self.left_out
+        if self.left_out <= _DOUBTFUL_SHARE * total:
+            return None
+        return (
+            f"{self.name}: {self.left_out} of {total} pixels are left out "
+            f"({flag_text(self.flagged)})"
+        )
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What an analysis has to assume and what is doubtful in it, collected on the way."""
+"""What had to be assumed and what is doubtful, collected on the way to a result."""
 
 from dataclasses import dataclass, field
 

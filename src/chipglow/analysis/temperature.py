@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.emissivity import LABORATORY, Heating
 from chipglow.analysis.observations import (
-    DOUBTFUL_SHARE,
+    AreaResult,
     Scatter,
     check_same_pixels,
     count_flags,
-    coverage_factor,
     flag_text,
     observed_flags,
     observed_radiance,
@@ -110,7 +109,7 @@ class Surroundings:
 
 
 @dataclass(frozen=True, eq=False)
-class TrueTemperature:
+class TrueTemperature(AreaResult):
     """True temperature of an area; made by `true_temperature`.
 
     Parameters
@@ -168,25 +167,10 @@ class TrueTemperature:
         return self.standard_uncertainty**4 / parts if parts > 0 else inf
 
     @property
-    def coverage_factor(self) -> float:
-        """Student's t for 95 %: 1.96 where chance plays no part."""
-        return coverage_factor(self.degrees_of_freedom)
-
-    @property
-    def expanded_uncertainty(self) -> float:
-        """Half the width in K of the interval that holds the true temperature with 95 %."""
-        return self.coverage_factor * self.standard_uncertainty
-
-    @property
     def doubts(self) -> tuple[str, ...]:
         """Why the result may be wrong beyond its uncertainty, a sentence each."""
-        doubts = []
-        total = self.pixels + self.left_out
-        if self.left_out > DOUBTFUL_SHARE * total:
-            doubts.append(
-                f"{self.name}: {self.left_out} of {total} pixels are left out "
-                f"({flag_text(self.flagged)})"
-            )
+        left_out = self.left_out_doubt()
+        doubts = [] if left_out is None else [left_out]
         uneven = abs(self.value - self.mean_of_pixels)
         if uneven > max(_UNEVEN * self.standard_uncertainty, _NO_MATTER):
             doubts.append(

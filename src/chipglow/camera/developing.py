@@ -22,8 +22,6 @@ _SAME: Final = 0.01
 """Relative difference up to which two integration times or limits of bands are the same."""
 _PIXELS_AT_ONCE: Final = 1 << 22
 _NODES: Final = 513
-_ASSUMED: Final = "Assumed: "
-"""How notes of a recording begin that are no more than that."""
 _FULL_SCALES: Final = tuple(2**bits - 1 for bits in (8, 10, 12, 13, 14, 16))
 
 
@@ -322,7 +320,7 @@ def _attributes(
         "range": _known(recording, calibration, "range_name"),
         "calibration": calibration.description if calibration else None,
         "object_parameters": _told(recording),
-        "notes": "\n".join(note for note in recording.notes if not note.startswith(_ASSUMED)),
+        "notes": "\n".join(recording.notes),
         "assumed": "\n".join(_assumed(recording, calibration, position)),
         "doubtful": "\n".join(_doubtful(recording, uncertainty_known)),
     }
@@ -355,9 +353,7 @@ def _told(recording: Recording) -> str | None:
 def _assumed(
     recording: Recording, calibration: Calibration | None, position: ImagePosition
 ) -> Iterator[str]:
-    for note in recording.notes:
-        if note.startswith(_ASSUMED):
-            yield note.removeprefix(_ASSUMED)
+    yield from recording.assumptions
     told = recording.object_parameters
     if recording.quantity == "temperature" and told is None:
         yield (
@@ -382,6 +378,7 @@ def _assumed(
 
 
 def _doubtful(recording: Recording, uncertainty_known: bool) -> Iterator[str]:
+    yield from recording.doubts
     if not uncertainty_known:
         yield "The uncertainty of the radiance from the calibration is not known."
     signal = recording.signal

@@ -79,9 +79,13 @@ class Recording:
         What the camera was told of the object. Temperatures were computed with them; counts do not
         depend on them.
     notes : tuple of str
-        What else the file says and what had to be assumed, a sentence each.
+        What else the file says, a sentence each.
     range_name : str, optional
         The measuring range that was chosen, as the maker calls it.
+    assumptions : tuple of str
+        What had to be assumed to read it, a sentence each.
+    doubts : tuple of str
+        Why the file may not be relied on, a sentence each.
 
     Raises
     ------
@@ -101,6 +105,8 @@ class Recording:
     object_parameters: ObjectParameters | None = None
     notes: tuple[str, ...] = ()
     range_name: str | None = None
+    assumptions: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.signal.ndim != 3 or 0 in self.signal.shape:

@@ -13,6 +13,7 @@ from chipglow.cli.calibrate import calibrate
 from chipglow.cli.compare import compare
 from chipglow.cli.convert import convert
 from chipglow.cli.emissivity import emissivity
+from chipglow.cli.options import file_option, picture_option
 from chipglow.cli.psf import psf
 from chipglow.cli.rake import rake
 from chipglow.cli.register import register
@@ -136,7 +137,7 @@ def run(study: StudyFile, out: ResultFolder, resume: Resume = False) -> None:
 @app.command()
 def cut(
     study: StudyFile,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The scene to write, NetCDF.")],
+    out: Annotated[Path, file_option("The scene to write, NetCDF.")],
     preview: Annotated[
         Path | None,
         typer.Option(
@@ -169,9 +170,7 @@ def import_source(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="The scene to write, NetCDF; without it, only say what is there."
-        ),
+        file_option("The scene to write, NetCDF; without it, only say what is there."),
     ] = None,
     settings: Annotated[
         list[str] | None,
@@ -198,7 +197,7 @@ def measure(
     study: Annotated[
         Path, typer.Option(metavar="STUDY", help="The study that says surface and camera.")
     ],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The measurement to write, NetCDF.")],
+    out: Annotated[Path, file_option("The measurement to write, NetCDF.")],
     start: Annotated[
         str | None,
         typer.Option(
@@ -228,10 +227,7 @@ def show(
         str | None,
         typer.Option(metavar="TIME", help="When, such as '400 us'; by default in the middle."),
     ] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Draw the fields at that time, PNG, PDF or SVG."),
-    ] = None,
+    plot: Annotated[Path | None, picture_option("Draw the fields at that time")] = None,
 ) -> None:
     """Show what is in a scene or a measurement: samples, times, values, where it comes from."""
     from chipglow.io import is_measurement
@@ -245,8 +241,6 @@ def show(
 
         check_shown(file)
         show_scene(file, at, plot)
-    if plot is not None:
-        print(plot)
 
 
 @app.command()
@@ -255,10 +249,7 @@ def materials(
         str | None,
         typer.Argument(metavar="NAME", help="Show this one: a name, or your own file (.yaml)."),
     ] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Draw flow stress and heat properties, PNG, PDF or SVG."),
-    ] = None,
+    plot: Annotated[Path | None, picture_option("Draw flow stress and heat properties")] = None,
 ) -> None:
     """List the materials, or show the numbers of one with their sources."""
     from chipglow.cli.materials import list_materials, plot_material, show_material
@@ -271,7 +262,6 @@ def materials(
     show_material(name)
     if plot is not None:
         plot_material(name, plot)
-        print(plot)
 
 
 for command in (

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from chipglow.cli.options import Settings
+from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -44,12 +44,8 @@ def calibrate(
         ),
     ],
     model: Annotated[Model, typer.Option(help="Which form to fit.")] = Model.LINEAR,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="The calibration to write, YAML.")
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw fits and residuals, PNG, PDF or SVG.")
-    ] = None,
+    out: Annotated[Path | None, file_option("The calibration to write, YAML.")] = None,
+    plot: Annotated[Path | None, picture_option("Draw fits and residuals")] = None,
     common_uncertainty: Annotated[
         str | None,
         typer.Option(
@@ -74,25 +70,17 @@ def calibrate(
 
     from chipglow.camera import fit_linear, fit_sakuma_hattori
     from chipglow.cli.assumed import say_doubtful
-    from chipglow.cli.pictures import check_picture_path
     from chipglow.cli.quantities import parse
-    from chipglow.io.atomic import check_folder
     from chipglow.io.column_file import read_calibration_points
-    from chipglow.study.measured import uniform_counts
+    from chipglow.study.measured import UniformObjects, uniform_counts
     from chipglow.study.measurement_schema import band_of
     from chipglow.study.units import TEMPERATURE_DIFFERENCE, TIME
 
-    if plot is not None:
-        check_picture_path(plot)
-    for path in (out, plot):
-        if path is not None:
-            check_folder(path)
-
-    recordings = []
+    recordings, uniform = [], UniformObjects()
 
     def counts_of(file: str) -> float:
         recordings.append(file)
-        return uniform_counts(points.parent / file, settings or ())
+        return uniform_counts(points.parent / file, settings or (), uniform)
 
     table = read_calibration_points(points, counts_of)
     if settings and not recordings:
@@ -134,14 +122,12 @@ def calibrate(
     say_doubtful(_doubtful(chosen, fits[chosen], common_uncertainty is not None))
     if out is not None:
         _write(fits[chosen], out)
+        print(out)
     if plot is not None:
         from chipglow.cli.pictures import write_picture
         from chipglow.report import draw_calibrations
 
         write_picture(draw_calibrations(fits), plot)
-    for path in (out, plot):
-        if path is not None:
-            print(path)
 
 
 def _write(fit: "CalibrationFit[FittedCalibration]", out: Path) -> None:

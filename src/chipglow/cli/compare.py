@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chipglow.cli.options import Settings, ToolChoice
+from chipglow.cli.options import Settings, ToolChoice, picture_option
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -71,10 +71,7 @@ def compare(
             help="Folder of the results: comparison.csv, summary.json, comparison.png and .svg.",
         ),
     ] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Draw the comparison, PNG, PDF or SVG."),
-    ] = None,
+    plot: Annotated[Path | None, picture_option("Draw the comparison")] = None,
     settings: Settings = None,
 ) -> None:
     """Lay a measurement and simulations over each other and tell which fits where."""
@@ -84,15 +81,13 @@ def compare(
 
     from chipglow.analysis import compare as compare_all
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
-    from chipglow.cli.pictures import check_picture_path, write_picture
+    from chipglow.cli.pictures import write_picture
     from chipglow.cli.times import frame_at
     from chipglow.cli.tools import chosen_tool
     from chipglow.io import read_curve
     from chipglow.report import draw_comparison
     from chipglow.study.measured import load_measurement
 
-    if plot is not None:
-        check_picture_path(plot)
     stated = _stated(uncertainty, emissivity_uncertainty, position)
     whole = load_measurement(measured, settings or ())
     if uncertainty is not None and whole.calibration_uncertainty is not None:
@@ -125,7 +120,6 @@ def compare(
         print(out)
     if plot is not None:
         write_picture(draw_comparison(result), plot)
-        print(plot)
 
 
 def _stated(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chipglow.cli.options import Settings
+from chipglow.cli.options import Settings, file_option
 
 if TYPE_CHECKING:
     from chipglow.camera import Recording
@@ -21,25 +21,20 @@ def convert(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="The measurement to write, NetCDF; without it, only say what is there.",
-        ),
+        file_option("The measurement to write, NetCDF; without it, only say what is there."),
     ] = None,
     settings: Settings = None,
 ) -> None:
     """Make a measurement of a camera's file."""
     from rich.console import Console
 
+    from chipglow.cli.assumed import say_assumed, say_doubtful
     from chipglow.cli.showing import listed
     from chipglow.cli.showing_measurement import say_measurement
     from chipglow.io import is_measurement, write_measurement
-    from chipglow.io.atomic import check_folder
     from chipglow.study import load_description
     from chipglow.study.measured import load_recording, measurement_of
 
-    if out is not None:
-        check_folder(out)
     if is_measurement(source):
         raise ValueError(f"{source}: is a measurement already, expected a camera's file")
     description = load_description(source, settings or ())
@@ -54,6 +49,8 @@ def convert(
         if out is not None:
             raise
         console.print(f"\nIt is no measurement yet. {error}")
+        say_assumed(recording.assumptions)
+        say_doubtful(recording.doubts)
         return
     console.print("\nThe measurement:")
     say_measurement(measurement)

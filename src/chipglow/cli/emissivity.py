@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chipglow.cli.options import Settings
+from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -54,17 +54,9 @@ def emissivity(
             "by default that which the measurement tells.",
         ),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write maps and regions, NetCDF."),
-    ] = None,
-    table: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the table of regions, CSV.")
-    ] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Draw image, regions and map, PNG, PDF or SVG."),
-    ] = None,
+    out: Annotated[Path | None, file_option("Write maps and regions, NetCDF.")] = None,
+    table: Annotated[Path | None, file_option("Write the table of regions, CSV.")] = None,
+    plot: Annotated[Path | None, picture_option("Draw image, regions and map")] = None,
     settings: Settings = None,
 ) -> None:
     """Determine emissivity from images of an object of known temperature."""
@@ -72,16 +64,9 @@ def emissivity(
 
     from chipglow.analysis import areas, determine_emissivity, emissivity_line, shared_pixels
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
-    from chipglow.cli.pictures import check_picture_path
-    from chipglow.io.atomic import check_folder
     from chipglow.study.files import load_regions
     from chipglow.study.measured import load_measurement
 
-    if plot is not None:
-        check_picture_path(plot)
-    for path in (out, table, plot):
-        if path is not None:
-            check_folder(path)
     heatings = _heatings(
         images, truth, environment, truth_uncertainty, environment_uncertainty, camera_uncertainty
     )
@@ -113,9 +98,6 @@ def emissivity(
 
         whole = [line for line, area in zip(lines, found, strict=False) if area.whole]
         write_picture(draw_emissivity(maps[0], named, whole), plot)
-    for path in (out, table, plot):
-        if path is not None:
-            print(path)
 
 
 def _heatings(
@@ -251,5 +233,7 @@ def _write(
 
     if out is not None:
         write_emissivity(maps, rows, out)
+        print(out)
     if table is not None:
         write_emissivity_table([row for of in rows for row in of], table)
+        print(table)

@@ -8,7 +8,6 @@ from rich.table import Table
 from chipglow.cli.assumed import say_assumed
 from chipglow.cli.progress import progress_bars
 from chipglow.io import import_scene, prospect
-from chipglow.io.atomic import check_folder
 from chipglow.io.importing import Prospect, kept_import
 from chipglow.study import ImportDescription
 
@@ -25,8 +24,6 @@ def import_fields(description: ImportDescription, out: Path | None, resume: bool
     resume : bool
         Whether to go on where an earlier import of the same was ended.
     """
-    if out is not None:
-        check_folder(out)
     wanted = description.build()
     looked = prospect(wanted)
     _say(looked)

@@ -5,7 +5,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from chipglow.cli.pictures import check_picture_path, write_picture
+from chipglow.cli.pictures import write_picture
 from chipglow.cutting import material_file, material_names
 
 
@@ -39,5 +39,4 @@ def plot_material(name: str, path: Path) -> None:
     """Draw a material to a picture whose kind is that of the file's name."""
     from chipglow.report.materials import material_figure
 
-    check_picture_path(path)
     write_picture(material_figure(material_file(name)), path)

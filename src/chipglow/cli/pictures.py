@@ -7,21 +7,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def check_picture_path(path: Path, option: str = "--plot") -> None:
-    """Check the name of a picture before anything is computed.
-
-    Raises
-    ------
-    ValueError
-        If it ends in something else than .png, .pdf or .svg.
-    """
-    if path.suffix.lower() not in (".png", ".pdf", ".svg"):
-        raise ValueError(f"{option}: {path}, expected a file that ends in .png, .pdf or .svg")
-
-
 def write_picture(figure: "Figure", path: Path) -> None:
-    """Write a figure as the kind of picture that the file's name says."""
+    """Write a figure as the kind of picture that the file's name says, and print that name."""
     from chipglow.io import atomic_path
 
     with atomic_path(path) as temporary:
         figure.savefig(temporary, format=path.suffix[1:].lower(), dpi=150)
+    print(path)

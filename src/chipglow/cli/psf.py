@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chipglow.cli.options import Settings
+from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
     from chipglow.analysis import KnifeEdge
@@ -43,27 +43,16 @@ def psf(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="The point spread function to write, NetCDF (.nc)."),
+        file_option("The point spread function to write, NetCDF (.nc).", ".nc"),
     ] = None,
-    plot: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Draw edges, spread and MTF, PNG, PDF or SVG."),
-    ] = None,
+    plot: Annotated[Path | None, picture_option("Draw edges, spread and MTF")] = None,
     settings: Settings = None,
 ) -> None:
     """Determine a camera's point spread function and MTF from images of an edge."""
     from chipglow.analysis import aperture_image, edge_image, knife_edge
-    from chipglow.cli.pictures import check_picture_path, write_picture
-    from chipglow.io.atomic import check_folder
+    from chipglow.cli.pictures import write_picture
     from chipglow.study import load_apertures, load_measurement
 
-    if plot is not None:
-        check_picture_path(plot)
-    if out is not None and out.suffix.lower() != ".nc":
-        raise ValueError(f"--out: {out}, expected a file that ends in .nc")
-    for path in (out, plot):
-        if path is not None:
-            check_folder(path)
     part = None if region is None else _region(region)
     given = settings or ()
     images = [edge_image(load_measurement(path, given), path.name, part) for path in edges]
@@ -83,7 +72,6 @@ def psf(
         from chipglow.report import draw_knife_edge
 
         write_picture(draw_knife_edge(found), plot)
-        print(plot)
 
 
 def _region(text: str) -> tuple[slice, slice]:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chipglow.cli.options import MeasurementFile, Settings, ToolChoice
+from chipglow.cli.options import MeasurementFile, Settings, ToolChoice, picture_option, table_option
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -40,15 +40,9 @@ def rake(
             "default that of a tool that is found, else none.",
         ),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the squares of every frame, .csv or .nc."),
-    ] = None,
+    out: Annotated[Path | None, table_option("Write the squares of every frame")] = None,
     plot: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Draw the grid on the image and its profiles, PNG, PDF or SVG."
-        ),
+        Path | None, picture_option("Draw the grid on the image and its profiles")
     ] = None,
     settings: Settings = None,
 ) -> None:
@@ -57,18 +51,14 @@ def rake(
 
     from chipglow.analysis import ToolUncertainty, rake_grid
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
-    from chipglow.cli.pictures import check_picture_path, write_picture
+    from chipglow.cli.pictures import write_picture
     from chipglow.cli.quantities import parse
     from chipglow.cli.tools import chosen_tool
-    from chipglow.io import check_table_path, write_rake_grid
+    from chipglow.io import write_rake_grid
     from chipglow.report import draw_rake_grid
     from chipglow.study.measured import load_measurement
     from chipglow.study.units import LENGTH
 
-    if plot is not None:
-        check_picture_path(plot)
-    if out is not None:
-        check_table_path(out)
     reach = parse("--depth", LENGTH, depth)
     stated = parse("--position", LENGTH, position)
     given = None if stated is None else ToolUncertainty(stated, stated)
@@ -88,7 +78,6 @@ def rake(
         print(out)
     if plot is not None:
         write_picture(draw_rake_grid(measured, grid), plot)
-        print(plot)
 
 
 def _frames(measurement: "Measurement", frame: str, at: str | None) -> list[int] | None:

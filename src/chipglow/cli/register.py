@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from chipglow.cli.options import Settings
+from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
     import numpy as np
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from chipglow.analysis import DotFit, ImageFit, PointFit, Registration
     from chipglow.camera import Measurement, Recording
-    from chipglow.scene import Tool
 
     Points = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -99,34 +98,31 @@ def register(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the map, .yaml, to be used again.")
+        Path | None, file_option("Write the map, .yaml, to be used again.", ".yaml", ".yml")
     ] = None,
     pairs: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="With --align, write each infrared frame's visible ones, CSV.",
-        ),
+        file_option("With --align, write each infrared frame's visible ones, CSV.", ".csv"),
     ] = None,
-    overlay: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Draw both images on each other, PNG, PDF or SVG."),
-    ] = None,
-    blink: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Show both images in turns, .gif.")
-    ] = None,
+    overlay: Annotated[Path | None, picture_option("Draw both images on each other")] = None,
+    blink: Annotated[Path | None, file_option("Show both images in turns, .gif.", ".gif")] = None,
     settings: Settings = None,
 ) -> None:
     """Find where each point of an infrared image is in a visible picture."""
     from rich.console import Console
 
+    from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
+    from chipglow.cli.pictures import write_picture
     from chipglow.cli.quantities import parse
     from chipglow.io import read_pictures, read_points
+    from chipglow.io.picture_file import write_blink
+    from chipglow.report import blink_pictures, draw_registration
     from chipglow.study import load_registration, tool_of, write_registration
     from chipglow.study.measured import load_measurement
     from chipglow.study.units import TIME
 
-    _check_names(out, pairs, overlay, blink, align)
+    if pairs is not None and align is None:
+        raise ValueError(f"--pairs: {pairs} without --align, expected both")
     _check_method(method, points, known)
     interval = parse("--visible-interval", TIME, visible_interval)
     region = None if align is None else _region(align)
@@ -146,38 +142,21 @@ def register(
     else:
         found, marked = _by_images(console, measured, frame, picture, model, method)
     _say(console, found, measured)
+    say_of_measurements(measured)
+    say_assumed(f"{visible}: {sentence}" for sentence in seen.assumptions)
+    say_doubtful(f"{visible}: {sentence}" for sentence in seen.doubts)
     if align is not None and region is not None:
         _align(console, found, measured, seen, region, pairs)
     if out is not None:
         write_registration(found, out)
         print(out)
     temperature = measured.radiance_temperature()[frame]
+    shown = found, temperature, measured.raster, picture, outline
     if overlay is not None:
-        _write_overlay(overlay, found, temperature, measured, picture, outline, marked)
+        write_picture(draw_registration(*shown, marked), overlay)
     if blink is not None:
-        _write_blink(blink, found, temperature, measured, picture, outline)
-
-
-def _check_names(
-    out: Path | None,
-    pairs: Path | None,
-    overlay: Path | None,
-    blink: Path | None,
-    align: str | None,
-) -> None:
-    from chipglow.cli.pictures import check_picture_path
-
-    if overlay is not None:
-        check_picture_path(overlay, "--overlay")
-    for option, path, suffixes in (
-        ("--out", out, (".yaml", ".yml")),
-        ("--pairs", pairs, (".csv",)),
-        ("--blink", blink, (".gif",)),
-    ):
-        if path is not None and path.suffix.lower() not in suffixes:
-            raise ValueError(f"{option}: {path}, expected a file that ends in {suffixes[0]}")
-    if pairs is not None and align is None:
-        raise ValueError(f"--pairs: {pairs} without --align, expected both")
+        write_blink(blink_pictures(*shown), blink)
+        print(blink)
 
 
 def _check_method(method: MethodName | None, points: Path | None, known: Path | None) -> None:
@@ -274,6 +253,8 @@ def _print_points(console: "Console", fit: "PointFit", given: "Points") -> None:
 
 
 def _print_dots(console: "Console", fit: "DotFit") -> None:
+    from chipglow.cli.assumed import say_assumed
+
     _print_points(console, fit.points, (fit.positions, fit.pixels))
     for name, dots, pixel in (
         ("Infrared", fit.infrared, "infrared"),
@@ -283,21 +264,27 @@ def _print_dots(console: "Console", fit: "DotFit") -> None:
             f"{name}: {len(dots.pixels)} {'bright' if dots.bright else 'dark'} dots of a radius of "
             f"{dots.radius:.1f} {pixel} pixels; {len(fit.pixels)} match."
         )
-    console.print(
-        "Assumed: the visible picture is not mirrored, is turned by up to 30 degrees, and shows "
-        "half to twice the infrared image's width; else give --points."
+    say_assumed(
+        [
+            "the visible picture is not mirrored, is turned by up to 30 degrees, and shows half "
+            "to twice the infrared image's width; else give --points."
+        ]
     )
 
 
 def _print_images(console: "Console", fit: "ImageFit") -> None:
+    from chipglow.cli.assumed import say_assumed
+
     console.print(
         f"Mutual information: {fit.information:.3f} bits a sensor; score of the placement "
         f"{fit.placement:.3g}, of {fit.by_chance.size} unrelated images at most "
         f"{fit.by_chance.max():.3g}."
     )
-    console.print(
-        "Assumed: the visible picture is not mirrored, and shows the infrared image's width "
-        "within 25 % and its middle within a quarter of the width; else give --points."
+    say_assumed(
+        [
+            "the visible picture is not mirrored, and shows the infrared image's width within "
+            "25 % and its middle within a quarter of the width; else give --points."
+        ]
     )
 
 
@@ -337,7 +324,7 @@ def _align(
 
     from chipglow.analysis import align_times, simultaneous_frames
     from chipglow.analysis.time_alignment import region_signals
-    from chipglow.cli.assumed import say_doubtful
+    from chipglow.cli.assumed import say_assumed, say_doubtful
 
     integration = float(measured.data.attrs["integration_time"])
     frames, pictures = region_signals(
@@ -345,9 +332,7 @@ def _align(
     )
     exposure = seen.integration_time or float(np.median(np.diff(seen.times)))
     if seen.integration_time is None:
-        console.print(
-            f"Assumed: a visible exposure lasts as long as its frame, {1e6 * exposure:.4g} us."
-        )
+        say_assumed([f"a visible exposure lasts as long as its frame, {1e6 * exposure:.4g} us."])
     alignment = align_times(
         measured.times + integration / 2, frames, seen.times + exposure / 2, pictures
     )
@@ -368,44 +353,11 @@ def _align(
 def _write_pairs(
     path: Path, times: "NDArray[np.float64]", within: "list[NDArray[np.int64]]"
 ) -> None:
-    from chipglow.io import atomic_path
+    from chipglow.io.table_file import write_table
 
-    lines = ["infrared_frame,infrared_time_us,visible_frames"]
-    for number, (time, frames) in enumerate(zip(times, within, strict=True)):
-        lines.append(f"{number},{1e6 * time:.9g},{' '.join(map(str, frames.tolist()))}")
-    with atomic_path(path) as temporary:
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    print(path)
-
-
-def _write_overlay(
-    path: Path,
-    found: "Registration",
-    temperature: "NDArray[np.float64]",
-    measured: "Measurement",
-    picture: "NDArray[Any]",
-    outline: "Tool | None",
-    marked: "Points | None",
-) -> None:
-    from chipglow.cli.pictures import write_picture
-    from chipglow.report import draw_registration
-
-    figure = draw_registration(found, temperature, measured.raster, picture, outline, marked)
-    write_picture(figure, path)
-    print(path)
-
-
-def _write_blink(
-    path: Path,
-    found: "Registration",
-    temperature: "NDArray[np.float64]",
-    measured: "Measurement",
-    picture: "NDArray[Any]",
-    outline: "Tool | None",
-) -> None:
-    from chipglow.io.picture_file import write_blink
-    from chipglow.report import blink_pictures
-
-    pictures = blink_pictures(found, temperature, measured.raster, picture, outline)
-    write_blink(pictures, path)
+    rows = (
+        (number, f"{1e6 * time:.9g}", " ".join(map(str, frames.tolist())))
+        for number, (time, frames) in enumerate(zip(times, within, strict=True))
+    )
+    write_table(path, ("infrared_frame", "infrared_time_us", "visible_frames"), rows)
     print(path)

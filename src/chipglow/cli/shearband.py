@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chipglow.cli.options import MeasurementFile, Settings, ToolChoice
+from chipglow.cli.options import MeasurementFile, Settings, ToolChoice, picture_option, table_option
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -54,15 +54,9 @@ def shearband(
             "side over the root of 12, and that of the edge, where the tool is found.",
         ),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the temperatures along the band, .csv or .nc."),
-    ] = None,
+    out: Annotated[Path | None, table_option("Write the temperatures along the band")] = None,
     plot: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Draw the curves on the image and the profiles, PNG, PDF or SVG."
-        ),
+        Path | None, picture_option("Draw the curves on the image and the profiles")
     ] = None,
     settings: Settings = None,
 ) -> None:
@@ -71,19 +65,15 @@ def shearband(
 
     from chipglow.analysis import band_profile
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
-    from chipglow.cli.pictures import check_picture_path, write_picture
+    from chipglow.cli.pictures import write_picture
     from chipglow.cli.quantities import parse
     from chipglow.cli.times import frame_at
     from chipglow.cli.tools import chosen_tool
-    from chipglow.io import check_table_path, read_curve, write_band_profile
+    from chipglow.io import read_curve, write_band_profile
     from chipglow.report import draw_band_profile
     from chipglow.study.measured import load_measurement
     from chipglow.study.units import LENGTH
 
-    if plot is not None:
-        check_picture_path(plot)
-    if out is not None:
-        check_table_path(out)
     measured = load_measurement(measurement, settings or ())
     times = measured.times
     chosen = chosen_tool(measured, tool, position)
@@ -116,7 +106,6 @@ def shearband(
         print(out)
     if plot is not None:
         write_picture(draw_band_profile(measured, chosen.tool, profile), plot)
-        print(plot)
 
 
 def _table(profile: "BandProfile") -> "Table":

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from chipglow.cli.pictures import check_picture_path, write_picture
+from chipglow.cli.pictures import write_picture
 from chipglow.cli.times import parse_instant
 from chipglow.io import StoredScene, open_scene
 from chipglow.io.contents import holds
@@ -38,8 +38,6 @@ def show_scene(path: Path, at: str | None, plot: Path | None) -> None:
     plot : Path, optional
         The picture to write, .png, .pdf or .svg.
     """
-    if plot is not None:
-        check_picture_path(plot)
     scene = open_scene(path)
     time = None if at is None else _time_in(scene, at)
     summary = scene_summary(scene, time)

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from chipglow.camera import Flag, Measurement
 from chipglow.cli.assumed import say_of_measurements
-from chipglow.cli.pictures import check_picture_path, write_picture
+from chipglow.cli.pictures import write_picture
 from chipglow.cli.showing import attribute_rows, listed, microseconds, where_and_when
 from chipglow.cli.times import parse_instant
 from chipglow.io import read_measurement
@@ -37,8 +37,6 @@ def show_measurement(path: Path, at: str | None, plot: Path | None) -> None:
     plot : Path, optional
         The picture to write, .png, .pdf or .svg.
     """
-    if plot is not None:
-        check_picture_path(plot)
     measurement = read_measurement(path)
     time = None if at is None else parse_instant("--at", at)
     say_measurement(measurement, time)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chipglow.cli.options import Settings
+from chipglow.cli.options import Settings, file_option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -58,24 +58,19 @@ def temperature(
         str | None,
         typer.Option(metavar="KELVINS", help="Its standard uncertainty, such as '2 K'."),
     ] = None,
-    table: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the table of regions, CSV.")
-    ] = None,
+    table: Annotated[Path | None, file_option("Write the table of regions, CSV.")] = None,
     settings: Settings = None,
 ) -> None:
     """Determine the true temperature of regions whose emissivity is known."""
     from rich.console import Console
 
     from chipglow.analysis import areas, true_temperature
-    from chipglow.cli.assumed import say_assumed, say_doubtful
+    from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.io import write_temperature_table
-    from chipglow.io.atomic import check_folder
     from chipglow.study import load_calibration
     from chipglow.study.files import load_regions
     from chipglow.study.measured import load_measurement
 
-    if table is not None:
-        check_folder(table)
     named = load_regions(regions)
     room = _room(environment, environment_uncertainty)
     known = None if calibration is None else load_calibration(calibration)
@@ -89,6 +84,7 @@ def temperature(
         if area.name in emissivities
     ]
     _print(Console(highlight=False, markup=False), rows)
+    say_of_measurements(*measurements)
     say_assumed(_assumptions(rows, emissivities, room))
     say_doubtful(f"{doubt}." for row in rows for doubt in row.doubts)
     if table is not None:

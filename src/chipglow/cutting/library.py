@@ -8,8 +8,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-import yaml
-
 from chipglow.cutting import laws as _laws  # noqa: F401  (registers the laws)
 from chipglow.cutting.damage import JohnsonCookDamage
 from chipglow.cutting.flow_stress import LAWS, comes_with_chipglow
@@ -19,9 +17,9 @@ from chipglow.cutting.material import (
     ToolMaterial,
     WorkpieceMaterial,
 )
+from chipglow.text import read_yaml
 
 FOLDER: Final = Path(__file__).with_name("materials")
-_LARGEST_FILE: Final = 100_000
 
 
 class MaterialError(ValueError):
@@ -223,17 +221,10 @@ def read_material(path: Path) -> MaterialFile:
     OSError
         If it cannot be read.
     """
-    if path.stat().st_size > _LARGEST_FILE:
-        raise MaterialError(f"{path.name}: expected a material of up to {_LARGEST_FILE // 1000} kB")
     try:
-        data = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
-    except UnicodeDecodeError:
-        raise MaterialError(f"{path.name}: expected text in UTF-8") from None
-    except (yaml.YAMLError, RecursionError) as error:
-        mark = getattr(error, "problem_mark", None)
-        place = f"line {mark.line + 1}: " if mark else ""
-        problem = getattr(error, "problem", None) or "is no YAML"
-        raise MaterialError(f"{path.name}: {place}{problem}, expected YAML") from None
+        data = read_yaml(path)
+    except ValueError as error:
+        raise MaterialError(str(error)) from None
     return _Reader(path.name).material(data)
 
 
@@ -253,19 +244,6 @@ def _is_tool(name: str) -> bool:
 
 def _has_rows(data: object) -> bool:
     return isinstance(data, Mapping) and isinstance(data.get("value"), list)
-
-
-class _Loader(yaml.SafeLoader):
-    """YAML in which no key is twice in a mapping."""
-
-    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
-        for key in keys:
-            if keys.count(key) > 1:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"key {key!r} is there twice", node.start_mark
-                )
-        return super().construct_mapping(node, deep=deep)
 
 
 class _Reader:

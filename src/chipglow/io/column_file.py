@@ -11,10 +11,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.small_text import read_small_text
 from chipglow.io.sources.conventions import Unit
 from chipglow.io.sources.unit_text import parse_unit
 from chipglow.radiometry import TabulatedResponse
+from chipglow.text import read_small_text
 
 
 @dataclass(frozen=True)

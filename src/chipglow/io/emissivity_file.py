@@ -144,9 +144,7 @@ def _stored(row: xr.Dataset, heating: Heating) -> StoredEmissivity:
     )
 
 
-def read_emissivity_map(
-    path: str | os.PathLike[str], truth: float | None = None, elsewhere: float = 0.0
-) -> MapSurface:
+def read_emissivity_map(path: str | os.PathLike[str], truth: float | None = None) -> MapSurface:
     """Read an emissivity map as a surface.
 
     Parameters
@@ -155,8 +153,6 @@ def read_emissivity_map(
         A file of `write_emissivity`.
     truth : float, optional
         True temperature in K of the map to take, the nearest; the file's first by default.
-    elsewhere : float
-        Emissivity off the image.
 
     Returns
     -------
@@ -176,7 +172,7 @@ def read_emissivity_map(
         values = np.clip(data["emissivity"].values[index].astype(np.float64), 0.0, 1.0)
         x, y, pitch = data["x"].values, data["y"].values, float(data.attrs["pitch"])
         raster = Raster(float(x[0]) - pitch / 2, float(y[0]) + pitch / 2, pitch, len(y), len(x))
-        return MapSurface(values, raster, elsewhere)
+        return MapSurface(values, raster)
 
     return _read(Path(path), surface)
 

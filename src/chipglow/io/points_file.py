@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.small_text import read_small_text
 from chipglow.scene import Raster
+from chipglow.text import read_small_text
 
 _VISIBLE: Final = ["visible_column", "visible_row"]
 _BY_LENGTH: Final = ["x_um", "y_um", *_VISIBLE]

@@ -4,7 +4,7 @@ import csv
 from pathlib import Path
 from typing import Final
 
-from chipglow.io.small_text import read_small_text
+from chipglow.text import read_small_text
 
 _HEADER: Final = ["x_um", "y_um"]
 

@@ -14,7 +14,13 @@ from chipglow.study.files import (
 )
 from chipglow.study.fitting import Fitted, fit
 from chipglow.study.import_schema import ImportDescription
-from chipglow.study.measured import load_measurement, load_recording, measurement_of, uniform_counts
+from chipglow.study.measured import (
+    UniformObjects,
+    load_measurement,
+    load_recording,
+    measurement_of,
+    uniform_counts,
+)
 from chipglow.study.measurement_schema import MeasurementDescription
 from chipglow.study.preview import preview_raster
 from chipglow.study.reference import FieldEntry, field_entries, field_tables
@@ -35,6 +41,7 @@ __all__ = [
     "Progress",
     "Study",
     "StudyError",
+    "UniformObjects",
     "cache_folder",
     "cached_scenes",
     "calibration_text",

@@ -1,13 +1,12 @@
 """Study files: YAML in, one clear line for whatever is wrong with it."""
 
-import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-import yaml
 from pydantic import BaseModel, ValidationError
 
+from chipglow import text
 from chipglow.analysis.regions import Region
 from chipglow.camera import FittedCalibration
 from chipglow.study.apertures import ApertureList
@@ -18,8 +17,6 @@ from chipglow.study.regions import RegionsDescription
 from chipglow.study.schema import Study
 
 Kind = TypeVar("Kind", bound=BaseModel)
-
-_LARGEST_FILE: Final = 1_000_000
 
 
 class StudyError(ValueError):
@@ -154,7 +151,7 @@ def load_apertures(path: str | Path) -> list[tuple[Path, float]]:
 
 
 def read_yaml(path: Path) -> Any:
-    """What a YAML file holds, read with the safe loader.
+    """What a YAML file holds.
 
     Raises
     ------
@@ -163,14 +160,10 @@ def read_yaml(path: Path) -> Any:
     OSError
         If it cannot be read.
     """
-    if path.stat().st_size > _LARGEST_FILE:
-        raise StudyError(f"{path.name}: expected a file of up to {_LARGEST_FILE // 1000} kB")
     try:
-        return yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
-    except UnicodeDecodeError:
-        raise StudyError(f"{path.name}: expected text in UTF-8") from None
-    except (yaml.YAMLError, RecursionError) as error:
-        raise StudyError(f"{path.name}: {_yaml_problem(error)}") from None
+        return text.read_yaml(path)
+    except ValueError as error:
+        raise StudyError(str(error)) from None
 
 
 def validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
@@ -200,15 +193,14 @@ def validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
 
 def _with(data: Any, setting: str) -> Any:
     """The description with one field set."""
-    place, equals, text = setting.partition("=")
+    place, equals, value = setting.partition("=")
     names = place.strip().split(".")
     if not equals or not all(names):
         raise StudyError(f"--set {setting}: expected FIELD=VALUE such as units.length=mm")
     try:
-        value = yaml.load(text, Loader=_Loader)
-    except (yaml.YAMLError, RecursionError) as error:
-        raise StudyError(f"--set {setting}: {_yaml_problem(error)}") from None
-    return _placed(data, names, value)
+        return _placed(data, names, text.parse_yaml(value))
+    except ValueError as error:
+        raise StudyError(f"--set {setting}: {error}") from None
 
 
 def _placed(data: Any, names: list[str], value: Any) -> Any:
@@ -236,28 +228,3 @@ def problem(error: ValidationError) -> str:
 
 
 _PSF_KINDS: Final = ("annular-aperture", "gaussian", "measured")
-
-
-class _Loader(yaml.SafeLoader):
-    """YAML with no key twice in a mapping, and with numbers such as 1e-3 as YAML 1.2 has them."""
-
-    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        seen: set[str] = set()
-        for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
-            if key.value in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"key {key.value!r} is there twice", key.start_mark
-                )
-            seen.add(key.value)
-        return super().construct_mapping(node, deep=deep)
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"[-+]?\d+[eE][-+]?\d+$"), list("-+0123456789")
-)
-
-
-def _yaml_problem(error: Exception) -> str:
-    mark = getattr(error, "problem_mark", None)
-    place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-    return f"{place}{getattr(error, 'problem', None) or 'is no YAML'}, expected YAML"

@@ -2,8 +2,9 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,7 +109,7 @@ def measurement_of(
         If a file that the description names cannot be read.
     """
     try:
-        uniform = _uniform_frames(description, recording)
+        uniform = UniformObjects().of(description, recording)
         calibration = description.calibration
         return develop_recording(
             recording,
@@ -122,7 +123,9 @@ def measurement_of(
         raise StudyError(f"{name}: {error}") from error
 
 
-def uniform_counts(source: str | Path, settings: Iterable[str] = ()) -> float:
+def uniform_counts(
+    source: str | Path, settings: Iterable[str] = (), objects: "UniformObjects | None" = None
+) -> float:
     """Mean counts of a recording of a uniform object, such as a black body.
 
     Its sensors are corrected as those of a measurement with the same description: the counts are
@@ -134,6 +137,8 @@ def uniform_counts(source: str | Path, settings: Iterable[str] = ()) -> float:
         A camera's file, or a YAML file (.yaml, .yml) that describes one.
     settings : iterable of str
         Fields of the description.
+    objects : UniformObjects, optional
+        What was read for the recording before, where several are corrected by the same frames.
 
     Returns
     -------
@@ -152,7 +157,7 @@ def uniform_counts(source: str | Path, settings: Iterable[str] = ()) -> float:
     try:
         if recording.quantity != "counts":
             raise ValueError(f"holds {recording.quantity}, expected counts")
-        uniform = _uniform_frames(description, recording)
+        uniform = (objects or UniformObjects()).of(description, recording)
         bad = _bad_pixels(description, recording, uniform)
         signal = recording.signal.astype(np.float64)
         if uniform is not None and description.uniform.correct:
@@ -169,50 +174,74 @@ def uniform_counts(source: str | Path, settings: Iterable[str] = ()) -> float:
     return float(signal[:, good].mean())
 
 
+class UniformObjects:
+    """Frames of uniform objects, read and judged once for recordings that have them in common.
+
+    Those of the last description are kept.
+    """
+
+    def __init__(self) -> None:
+        self._read = lru_cache(maxsize=1)(_read_uniform)
+
+    def of(self, description: MeasurementDescription, recording: Recording) -> "_Uniform | None":
+        """Those that a recording's description names, if it does.
+
+        Raises
+        ------
+        ValueError
+            If some are missing, or are of no use for the recording; the message names the field.
+        OSError
+            If a file cannot be read.
+        """
+        section = description.uniform
+        if section.frames is None:
+            if section.brighter is not None or description.bad_pixels == "find":
+                raise ValueError("uniform.frames: is missing, expected frames of a uniform object")
+            return None
+        # Which frames of which file are corrected makes no difference to what corrects them.
+        uniform = self._read(description.model_copy(update={"file": None, "frames": None}))
+        for name, found in (("brighter", uniform.brighter), ("frames", uniform.frames)):
+            problem = None if found is None else _misfit(found, recording)
+            if problem is not None:
+                raise ValueError(f"uniform.{name}: {problem}")
+        return uniform
+
+
 @dataclass(frozen=True, eq=False)
 class _Uniform:
     """Frames of one or two uniform objects."""
 
-    frames: NDArray[Any]
-    brighter: NDArray[Any] | None
+    frames: Recording
+    brighter: Recording | None
 
-    @property
+    @cached_property
     def correction(self) -> NonUniformity:
         if self.brighter is None:
-            return NonUniformity.one_point(self.frames)
-        return NonUniformity.two_point(self.frames, self.brighter)
+            return NonUniformity.one_point(self.frames.signal)
+        return NonUniformity.two_point(self.frames.signal, self.brighter.signal)
 
-    @property
+    @cached_property
     def bad_pixels(self) -> BadPixels:
-        if len(self.frames) < LEAST_FRAMES:
+        frames = self.frames.signal
+        if len(frames) < LEAST_FRAMES:
             raise ValueError(
-                f"uniform.frames: {len(self.frames)} frames, expected {LEAST_FRAMES} or more to "
-                "find bad pixels in"
+                f"uniform.frames: {len(frames)} frames, expected {LEAST_FRAMES} or more to find "
+                "bad pixels in"
             )
-        return find_bad_pixels(self.frames, self.brighter)
+        return find_bad_pixels(frames, None if self.brighter is None else self.brighter.signal)
 
 
-def _uniform_frames(description: MeasurementDescription, recording: Recording) -> _Uniform | None:
+def _read_uniform(description: MeasurementDescription) -> _Uniform:
     section = description.uniform
-    if section.frames is None:
-        if section.brighter is not None or description.bad_pixels == "find":
-            raise ValueError("uniform.frames: is missing, expected frames of a uniform object")
-        return None
-    brighter = None if section.brighter is None else _uniform(description, recording, "brighter")
-    return _Uniform(_uniform(description, recording, "frames"), brighter)
+    brighter = None if section.brighter is None else _uniform(description, section.brighter)
+    return _Uniform(_uniform(description, str(section.frames)), brighter)
 
 
-def _uniform(description: MeasurementDescription, recording: Recording, name: str) -> NDArray[Any]:
-    file = getattr(description.uniform, name)
+def _uniform(description: MeasurementDescription, file: str) -> Recording:
     if CAMERA_FORMATS[find_format(Path(file))].tells_quantity:
         # What the description says of the recording's file, this file says itself.
-        found = read_recording(file)
-    else:
-        found = _read(description, file, every=True)
-    problem = _misfit(found, recording)
-    if problem is not None:
-        raise ValueError(f"uniform.{name}: {problem}")
-    return found.signal
+        return read_recording(file)
+    return _read(description, file, every=True)
 
 
 def _misfit(uniform: Recording, recording: Recording) -> str | None:

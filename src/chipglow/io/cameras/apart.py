@@ -22,7 +22,8 @@ from chipglow.io.sources.worker import limit_memory
 from chipglow.radiometry import ObjectParameters
 
 _LONGEST_HEADER: Final = 100_000_000
-_PLAIN: Final = ("quantity", "camera", "integration_time", "saturation", "pitch", "notes")
+_PLAIN: Final = ("quantity", "camera", "integration_time", "saturation", "pitch")
+_SENTENCES: Final = ("notes", "assumptions", "doubts")
 
 
 def read_apart(path: Path, kind: str, frames: slice | None, told: Told) -> Recording:
@@ -81,12 +82,14 @@ def _recording(header: dict[str, Any], samples: memoryview) -> Recording:
     if kind.kind not in "fiu" or count > MOST_SAMPLES or count * kind.itemsize != len(samples):
         raise SourceError(f"the reader of {header['camera']!r} gave no whole answer")
     conversion, told = header["conversion"], header["object_parameters"]
+    sentences: dict[str, Any] = {name: tuple(header[name]) for name in _SENTENCES}
     return Recording(
         signal=np.frombuffer(samples, kind).reshape(shape),
         times=np.asarray(header["times"], np.float64),
         conversion=None if conversion is None else PlanckConversion(**conversion),
         object_parameters=None if told is None else ObjectParameters(**told),
-        **{**{name: header[name] for name in _PLAIN}, "notes": tuple(header["notes"])},
+        **{name: header[name] for name in _PLAIN},
+        **sentences,
     )
 
 
@@ -119,7 +122,7 @@ def _read(request: dict[str, Any]) -> Recording:
 
 def _header(recording: Recording) -> dict[str, Any]:
     return {
-        **{name: getattr(recording, name) for name in _PLAIN},
+        **{name: getattr(recording, name) for name in (*_PLAIN, *_SENTENCES)},
         "conversion": recording.conversion and asdict(recording.conversion),
         "object_parameters": recording.object_parameters and asdict(recording.object_parameters),
         "times": recording.times.tolist(),

@@ -10,6 +10,7 @@ from typing import Any, BinaryIO, Final
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources.arrays import check_samples
 from chipglow.io.sources.source import SourceError
 from chipglow.radiometry import ObjectParameters
@@ -169,7 +170,7 @@ def even_times(frames: Sequence[int], interval: float) -> NDArray[np.float64]:
 
 
 def stamped_times(
-    path: Path, stamps: NDArray[np.float64], frames: range, rate: float, notes: list[str]
+    path: Path, stamps: NDArray[np.float64], frames: range, rate: float, remarks: FileRemarks
 ) -> NDArray[np.float64]:
     """Times of frames from their stamps, or from the frame rate where the stamps are no good.
 
@@ -183,7 +184,7 @@ def stamped_times(
         Their numbers.
     rate : float
         Frame rate in Hz; 0 if it is not known.
-    notes : list of str
+    remarks : FileRemarks
         Takes what had to be assumed.
 
     Raises
@@ -198,38 +199,37 @@ def stamped_times(
         raise SourceError(
             f"{path}: has neither time stamps that ascend nor a frame rate, give an interval"
         )
-    notes.append(
-        f"Assumed: the frames are 1/{rate:g} s apart, as the file says; it has no time stamps "
-        "that ascend."
+    remarks.assumptions.append(
+        f"the frames are 1/{rate:g} s apart, as the file says; it has no time stamps that ascend."
     )
     return even_times(frames, 1 / rate)
 
 
-def common_exposure(exposures: NDArray[np.float64], notes: list[str]) -> float | None:
+def common_exposure(exposures: NDArray[np.float64], remarks: FileRemarks) -> float | None:
     """The integration time in s that all frames have; None if they differ or it is not told.
 
     Parameters
     ----------
     exposures : ndarray
         Integration time of each frame in s, shape (frames,); 0 where it is not told.
-    notes : list of str
+    remarks : FileRemarks
         Takes between which times they are, if they differ.
     """
     least, greatest = float(exposures.min()), float(exposures.max())
     if least == greatest:
         return least or None
-    notes.append(
-        f"Doubtful: the integration time goes from {least * 1e6:g} us to {greatest * 1e6:g} us."
+    remarks.doubts.append(
+        f"the integration time goes from {least * 1e6:g} us to {greatest * 1e6:g} us."
     )
     return None
 
 
-def object_parameters(notes: list[str], **given: float | None) -> ObjectParameters:
+def object_parameters(remarks: FileRemarks, **given: float | None) -> ObjectParameters:
     """What a camera was told of the object; impossible values are noted and left out.
 
     Parameters
     ----------
-    notes : list of str
+    remarks : FileRemarks
         Takes what is left out.
     **given
         Fields of `ObjectParameters`.
@@ -241,5 +241,5 @@ def object_parameters(notes: list[str], **given: float | None) -> ObjectParamete
                 {} if value is None else {name: ObjectParameters(**{name: value}).__dict__[name]}
             )
         except ValueError:
-            notes.append(f"Left out: the file says {value:g} for {name}, which cannot be.")
+            remarks.notes.append(f"Left out: the file says {value:g} for {name}, which cannot be.")
     return ObjectParameters(**known)

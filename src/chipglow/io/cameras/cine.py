@@ -21,6 +21,7 @@ from chipglow.io.cameras.binary import (
     opened,
     stamped_times,
 )
+from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources.source import SourceError
 
 _FILE: Final = layout(
@@ -121,19 +122,19 @@ def read_cine(path: Path, frames: slice | None = None, interval: float | None = 
         for position, number in enumerate(chosen):
             start = _image_start(binary, int(places[number]), pictures, number)
             signal[position] = pictures.image(binary.read(start, pictures.size, f"frame {number}"))
-        notes = [f"Frame 0 is number {header['first']} of the recording."]
+        remarks = FileRemarks(notes=[f"Frame 0 is number {header['first']} of the recording."])
         blocks = _blocks(binary, header, setup)
-        times = _times(binary, blocks, header, setup["rate"], chosen, interval, notes)
-        integration_time = _integration_time(binary, blocks, header, setup, chosen, notes)
-    return Recording(
+        times = _times(binary, blocks, header, setup["rate"], chosen, interval, remarks)
+        integration_time = _integration_time(binary, blocks, header, setup, chosen, remarks)
+    recording = Recording(
         signal=signal,
         quantity="counts",
         times=times,
         camera=f"Phantom {setup['camera']}, serial number {setup['serial']}",
         integration_time=integration_time,
         saturation=2.0**pictures.bits - 2,
-        notes=tuple(notes),
     )
+    return remarks.kept_with(recording)
 
 
 def _pictures(binary: Binary, header: dict[str, Any], setup: dict[str, Any]) -> _Pictures:
@@ -244,19 +245,19 @@ def _times(
     rate: int,
     chosen: range,
     interval: float | None,
-    notes: list[str],
+    remarks: FileRemarks,
 ) -> NDArray[np.float64]:
     if interval is not None:
         return even_times(chosen, interval)
     stamps = _of_frames(binary, blocks, _TIMES, header["count"], "<u8")
     if stamps is None:
-        return stamped_times(binary.path, np.full(len(chosen), np.nan), chosen, rate, notes)
+        return stamped_times(binary.path, np.full(len(chosen), np.nan), chosen, rate, remarks)
     ticks = stamps >> 2 << 2  # the two lowest bits are flags
     after = float(int(header["trigger"]) - int(ticks[0])) * _TICK
-    notes += first_moment(float(ticks[0]) * _TICK)
-    notes.append(f"The trigger was at {after:.9g} s.")
+    remarks.notes.extend(first_moment(float(ticks[0]) * _TICK))
+    remarks.notes.append(f"The trigger was at {after:.9g} s.")
     since = (ticks[list(chosen)] - ticks[0]).astype(np.int64) * _TICK
-    return stamped_times(binary.path, since, chosen, rate, notes)
+    return stamped_times(binary.path, since, chosen, rate, remarks)
 
 
 def _integration_time(
@@ -265,9 +266,9 @@ def _integration_time(
     header: dict[str, Any],
     setup: dict[str, Any],
     chosen: range,
-    notes: list[str],
+    remarks: FileRemarks,
 ) -> float | None:
     exposures = _of_frames(binary, blocks, _EXPOSURES, header["count"], "<u4")
     if exposures is None:
         return setup["shutter"] * 1e-9 or None
-    return common_exposure(exposures[list(chosen)] * _TICK, notes)
+    return common_exposure(exposures[list(chosen)] * _TICK, remarks)

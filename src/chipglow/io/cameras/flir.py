@@ -25,6 +25,7 @@ from chipglow.io.cameras.binary import (
     stamped_times,
     text_of,
 )
+from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources.arrays import reading
 from chipglow.io.sources.source import SourceError
 from chipglow.radiometry import ObjectParameters
@@ -103,9 +104,9 @@ def read_flir(path: Path, frames: slice | None = None, interval: float | None = 
     -----
     The layout is that of ExifTool's documentation of FLIR's tags.
     """
-    notes: list[str] = []
+    remarks = FileRemarks()
     with _records(path) as binary:
-        places = _frames(binary, notes)
+        places = _frames(binary, remarks)
         first = places[0]
         height, width = _shape(binary, first, 0)
         chosen = chosen_frames(path, frames, len(places), height * width)
@@ -116,17 +117,18 @@ def read_flir(path: Path, frames: slice | None = None, interval: float | None = 
             signal[position] = _image(binary, places[number], number, (height, width))
             stamps[position] = _moment(_camera_fields(binary, places[number])) - start
         fields = _camera_fields(binary, places[chosen[0]])
-    notes += first_moment(start)
-    return Recording(
+    remarks.notes.extend(first_moment(start))
+    recording = Recording(
         signal=signal,
         quantity="counts",
-        times=_times(path, stamps, fields, chosen, interval, len(places), notes),
+        times=_times(path, stamps, fields, chosen, interval, len(places), remarks),
         camera=_camera(fields),
         saturation=_saturation(fields),
-        conversion=_conversion(fields, notes),
-        object_parameters=_object(fields, notes),
-        notes=(*notes, *_further(fields)),
+        conversion=_conversion(fields, remarks),
+        object_parameters=_object(fields, remarks),
     )
+    remarks.notes.extend(_further(fields))
+    return remarks.kept_with(recording)
 
 
 # Records
@@ -167,7 +169,7 @@ def _inside_jpeg(binary: Binary) -> bytes:
     return b"".join(parts[number] for number in range(last + 1))
 
 
-def _frames(binary: Binary, notes: list[str]) -> list[_Frame]:
+def _frames(binary: Binary, remarks: FileRemarks) -> list[_Frame]:
     """Where all frames are."""
     found: list[_Frame] = []
     place: int | None = 0
@@ -175,11 +177,11 @@ def _frames(binary: Binary, notes: list[str]) -> list[_Frame]:
         found.append(_frame(binary, place, len(found)))
         if len(found) > MOST_FRAMES:
             raise SourceError(f"{binary.path}: has over {MOST_FRAMES} frames")
-        place = _next(binary, found[-1].end, notes)
+        place = _next(binary, found[-1].end, remarks)
     return found
 
 
-def _next(binary: Binary, end: int, notes: list[str]) -> int | None:
+def _next(binary: Binary, end: int, remarks: FileRemarks) -> int | None:
     """Where the next frame begins: there may be zeros or something else before it."""
     if binary.read(end, min(4, binary.size - end), "what follows a frame") == _MAGIC:
         return end
@@ -190,7 +192,7 @@ def _next(binary: Binary, end: int, notes: list[str]) -> int | None:
     if rest and _MAGIC.startswith(rest):
         raise SourceError(f"{binary.path}: is cut short, a frame begins at byte {end}, its last")
     if rest.strip(b"\0"):
-        notes.append(f"Doubtful: {binary.size - end} bytes behind the last frame are no frame.")
+        remarks.doubts.append(f"{binary.size - end} bytes behind the last frame are no frame.")
     return None
 
 
@@ -357,12 +359,12 @@ def _times(
     chosen: range,
     interval: float | None,
     count: int,
-    notes: list[str],
+    remarks: FileRemarks,
 ) -> NDArray[np.float64]:
     if interval is not None or count == 1:
         return even_times(chosen, interval or 0.0)
     rate = fields.number(0x464, "H")
-    return stamped_times(path, np.round(stamps, 3), chosen, rate, notes)
+    return stamped_times(path, np.round(stamps, 3), chosen, rate, remarks)
 
 
 def _camera(fields: _Fields) -> str:
@@ -377,7 +379,7 @@ def _saturation(fields: _Fields) -> float | None:
     return high if low < high < 65_535 else None
 
 
-def _conversion(fields: _Fields, notes: list[str]) -> PlanckConversion | None:
+def _conversion(fields: _Fields, remarks: FileRemarks) -> PlanckConversion | None:
     try:
         return PlanckConversion(
             r1=fields.number(0x58, "f"),
@@ -387,28 +389,30 @@ def _conversion(fields: _Fields, notes: list[str]) -> PlanckConversion | None:
             r2=fields.number(0x30C, "f"),
         )
     except ValueError as error:
-        notes.append(f"Left out: the conversion to temperature in the file cannot be ({error}).")
+        remarks.notes.append(
+            f"Left out: the conversion to temperature in the file cannot be ({error})."
+        )
         return None
 
 
-def _object(fields: _Fields, notes: list[str]) -> ObjectParameters:
+def _object(fields: _Fields, remarks: FileRemarks) -> ObjectParameters:
     distance, humidity = _finite(fields, 0x24), _finite(fields, 0x3C)
     atmosphere, window = _finite(fields, 0x2C), _finite(fields, 0x34)
     transmission = window if window is not None and window > 0 else 1.0
     if distance is not None and humidity is not None and atmosphere is not None:
         share = humidity / 100 if humidity > 2 else humidity
-        notes.append(
+        remarks.notes.append(
             f"The camera was told of an object at {distance:g} m and a humidity of "
             f"{share * 100:g} %."
         )
         transmission *= _through_air(fields, distance, share, atmosphere)
     if window is not None and window != 1:
-        notes.append(
+        remarks.notes.append(
             f"The camera was told of a window that lets {window * 100:g} % pass, at "
             f"{fields.number(0x30, 'f') - _ZERO:g} degC; here it is as warm as the air."
         )
     return object_parameters(
-        notes,
+        remarks,
         emissivity=_finite(fields, 0x20),
         reflected=_finite(fields, 0x28),
         transmission=transmission,

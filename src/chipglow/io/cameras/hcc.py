@@ -21,6 +21,7 @@ from chipglow.io.cameras.binary import (
     opened,
     stamped_times,
 )
+from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources.source import SourceError
 
 _HEADER: Final = layout(
@@ -109,16 +110,17 @@ def read_hcc(path: Path, frames: slice | None = None, interval: float | None = N
             stored[position] = frame[0]
     headers = stored["header"]
     _check_alike(path, headers, first, chosen)
-    notes = [f"The samples are {label} (Telops header {first['major']}.{first['minor']})."]
-    return Recording(
+    version = f"Telops header {first['major']}.{first['minor']}"
+    remarks = FileRemarks(notes=[f"The samples are {label} ({version})."])
+    recording = Recording(
         signal=_signal(stored, quantity, path),
         quantity=quantity,
-        times=_times(path, headers, first, chosen, interval, notes),
+        times=_times(path, headers, first, chosen, interval, remarks),
         camera=f"Telops, serial number {first['serial']}" if first["serial"] else "Telops",
-        integration_time=_integration_time(headers, notes),
+        integration_time=_integration_time(headers, remarks),
         saturation=_saturation(first),
-        notes=tuple(notes),
     )
+    return remarks.kept_with(recording)
 
 
 def _frame(header_length: int, height: int, width: int) -> np.dtype[Any]:
@@ -172,28 +174,28 @@ def _times(
     first: dict[str, Any],
     chosen: range,
     interval: float | None,
-    notes: list[str],
+    remarks: FileRemarks,
 ) -> NDArray[np.float64]:
     rate = first["rate"] * _RATE
     if interval is not None:
         return even_times(chosen, interval)
     if first["major"] < _WITH_TIME or not headers["seconds"].any():
         nowhere = np.full(len(chosen), np.nan)
-        return stamped_times(path, nowhere, chosen, rate, notes)
-    notes += first_moment(first["seconds"] + _SUBSECOND * first["subseconds"])
+        return stamped_times(path, nowhere, chosen, rate, remarks)
+    remarks.notes.extend(first_moment(first["seconds"] + _SUBSECOND * first["subseconds"]))
     # Whole seconds first: their difference is exact.
     stamps = (
         headers["seconds"].astype(np.int64)
         - first["seconds"]
         + _SUBSECOND * (headers["subseconds"].astype(np.int64) - first["subseconds"])
     )
-    return stamped_times(path, stamps, chosen, rate, notes)
+    return stamped_times(path, stamps, chosen, rate, remarks)
 
 
-def _integration_time(headers: NDArray[Any], notes: list[str]) -> float | None:
+def _integration_time(headers: NDArray[Any], remarks: FileRemarks) -> float | None:
     if len(np.unique(headers["filter_position"])) > 1:
-        notes.append("Doubtful: the filter wheel turned between frames.")
-    return common_exposure(headers["exposure"] * _EXPOSURE, notes)
+        remarks.doubts.append("the filter wheel turned between frames.")
+    return common_exposure(headers["exposure"] * _EXPOSURE, remarks)
 
 
 def _saturation(first: dict[str, Any]) -> float | None:

@@ -19,6 +19,7 @@ from chipglow.io.cameras.binary import (
     stamped_times,
     text_of,
 )
+from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources.source import SourceError
 
 # Places as in the Altair Reference Guide DL002U-D, after pyradi's ryptw.
@@ -108,9 +109,9 @@ def read_ptw(path: Path, frames: slice | None = None, interval: float | None = N
             signal[position] = binary.numbers(
                 start + number * stride, rows * columns, "<u2", what
             ).reshape(rows, columns)
-        notes = _notes(header, skipped)
-        times = _times(binary, header, stride, chosen, interval, notes)
-    return Recording(
+        remarks = FileRemarks(notes=_notes(header, skipped))
+        times = _times(binary, header, stride, chosen, interval, remarks)
+    recording = Recording(
         signal=signal,
         quantity="counts",
         times=times,
@@ -118,14 +119,14 @@ def read_ptw(path: Path, frames: slice | None = None, interval: float | None = N
         integration_time=_positive(header["integration_time"]),
         saturation=2.0 ** header["bits"] - 2 if 8 <= header["bits"] <= 16 else None,
         object_parameters=object_parameters(
-            notes,
+            remarks,
             emissivity=header["emissivity"],
             reflected=header["ambient"],
             transmission=_positive(header["transmission"]),
             atmosphere=_positive(header["atmosphere"]),
         ),
-        notes=tuple(notes),
     )
+    return remarks.kept_with(recording)
 
 
 def _stride(binary: Binary, header: dict[str, Any], rows: int, columns: int) -> int:
@@ -166,7 +167,7 @@ def _times(
     stride: int,
     chosen: range,
     interval: float | None,
-    notes: list[str],
+    remarks: FileRemarks,
 ) -> NDArray[np.float64]:
     if interval is not None:
         return even_times(chosen, interval)
@@ -177,13 +178,13 @@ def _times(
     since = np.mod(stamps[1:] - stamps[0], _DAY) if has_stamps else np.full(len(chosen), np.nan)
     period = header["period"]
     if not 0 < period < _LONGEST_PERIOD:
-        return stamped_times(binary.path, since, chosen, 0.0, notes)
+        return stamped_times(binary.path, since, chosen, 0.0, remarks)
     times = even_times(chosen, period)
     # The stamps are whole milliseconds, so that the period is the finer measure.
     apart = np.abs(times - since).max()
     if has_stamps and since.any() and apart > 0.002 + 0.01 * period:
-        notes.append(
-            f"Doubtful: the times are from the frame period, {period * 1e6:g} us; the frames' own "
+        remarks.doubts.append(
+            f"the times are from the frame period, {period * 1e6:g} us; the frames' own "
             f"stamps are up to {apart:.3g} s off: frames may be missing."
         )
     return times

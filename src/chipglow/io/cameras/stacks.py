@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera.recording import QUANTITIES, Quantity, Recording
 from chipglow.io.cameras.binary import check_picture, chosen_frames, even_times
+from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources.arrays import (
     ARRAY_READERS,
     MOST_ON_A_SIDE,
@@ -119,22 +120,24 @@ def read_stack(path: Path, kind: str, frames: slice | None, told: Told) -> Recor
         chosen = chosen_frames(path, frames, lengths.get("time", 1), lengths["y"] * lengths["x"])
         times = _times(one, arrays, axes, chosen, told, remarks)
         signal = _signal(one, axes, chosen)
-    notes = [f"From the file: {sentence}." for sentence in remarks.from_file]
-    notes += [f"Assumed: {sentence}." for sentence in remarks.assumed]
+    said = FileRemarks(
+        notes=[f"From the file: {sentence}." for sentence in remarks.from_file],
+        assumptions=[f"{sentence}." for sentence in remarks.assumed],
+    )
     if skipped := one.array.attributes.get("lines_of_text"):
-        notes.append(f"Left out: {skipped} lines of text before the numbers.")
+        said.notes.append(f"Left out: {skipped} lines of text before the numbers.")
     quantity, offset = RECORDING_UNITS[unit]
     if quantity != "counts":
         # 32 bits hold temperature to 1e-4 K, where the file does not hold more.
         precision = np.float32 if signal.dtype.itemsize <= 4 else np.float64
         signal = (signal.astype(np.float64) + offset).astype(precision)
-    return Recording(
+    recording = Recording(
         signal=signal,
         quantity=quantity,
         times=times,
         camera="unknown",
-        notes=tuple(notes),
     )
+    return said.kept_with(recording)
 
 
 def _dataset(path: Path, arrays: Mapping[str, StoredArray], name: str | None) -> Chosen:

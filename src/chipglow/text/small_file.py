@@ -1,4 +1,4 @@
-"""Text files that people write by hand: tables of points, columns of numbers."""
+"""Text files that people write by hand: descriptions, tables of points, columns of numbers."""
 
 from pathlib import Path
 from typing import Final

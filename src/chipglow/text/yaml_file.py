@@ -1,0 +1,64 @@
+"""YAML that people write: safe, no key twice, one line for whatever is wrong with it."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from chipglow.text.small_file import read_small_text
+
+
+def read_yaml(path: Path) -> Any:
+    """What a YAML file holds.
+
+    Raises
+    ------
+    ValueError
+        If it is too large or no YAML; the message names the file.
+    OSError
+        If it cannot be read.
+    """
+    text = read_small_text(path)
+    try:
+        return parse_yaml(text)
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}") from None
+
+
+def parse_yaml(text: str) -> Any:
+    """What a text in YAML holds, read with the safe loader.
+
+    Raises
+    ------
+    ValueError
+        If it is no YAML; the message names line and column.
+    """
+    try:
+        return yaml.load(text, Loader=_Loader)
+    except ValueError as error:  # Such as an impossible date.
+        raise ValueError(f"{error}, expected YAML") from None
+    except (yaml.YAMLError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        problem = getattr(error, "problem", None) or "is no YAML"
+        raise ValueError(f"{place}{problem}, expected YAML") from None
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML with no key twice in a mapping, and with numbers such as 1e-3 as YAML 1.2 has them."""
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        seen: set[str] = set()
+        for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
+            if key.value in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"key {key.value!r} is there twice", key.start_mark
+                )
+            seen.add(key.value)
+        return super().construct_mapping(node, deep=deep)
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?\d+[eE][-+]?\d+$"), list("-+0123456789")
+)
