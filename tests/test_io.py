@@ -523,6 +523,21 @@ def test_a_scene_goes_on_from_a_checkpoint(tmp_path, hottest):
         assert_as_kept(found, expected)
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="files are not locked there")
+def test_a_scene_is_held_till_it_is_in_its_place(tmp_path, monkeypatch):
+    """Whoever looks for abandoned scenes just then must not find, and delete, this one."""
+    path, move, found = tmp_path / "scene.nc", Path.replace, []
+
+    def replace(part, target):
+        found.append(unfinished_scenes(path))
+        return move(part, target)
+
+    monkeypatch.setattr(Path, "replace", replace)
+    with SceneWriter(path, RASTER) as writer:
+        writer.append(a_frame())
+    assert found == [[]]
+
+
 def test_quality_flags_come_back_and_survive_a_copy(tmp_path):
     flags = np.random.default_rng(5).integers(0, 256, RASTER.shape).astype(np.uint8)
     with SceneWriter(tmp_path / "one.nc", RASTER, quality=True) as writer:

@@ -23,6 +23,7 @@ from chipglow.io.unfinished import (
     UnfinishedScene,
     checkpoint_path,
     has_checkpoint,
+    keep_hold,
     write_checkpoint,
 )
 from chipglow.scene import (
@@ -267,8 +268,11 @@ class SceneWriter:
 
     def _open(self, stack: ExitStack) -> None:
         stack.push(self._drop_checkpoint)
+        # A part that nobody holds is taken for abandoned: it is held until it is in its place.
+        moved = stack.enter_context(ExitStack())
         self._part = stack.enter_context(atomic_path(self.path, has_checkpoint))
         self._sink = stack.enter_context(KeptErrorFile(self._part))
+        keep_hold(self._sink, moved)
         stack.callback(self._sink.check, self.path)
         self._hdf = stack.enter_context(h5py.File(self._sink, "w", track_order=True))
         self._file = stack.enter_context(h5netcdf.File(self._hdf, "w"))
