@@ -301,6 +301,24 @@ def test_three_unequal_segments_have_a_period():
     assert found.period == pytest.approx((372 - 222) / 2 * 1e-6, abs=6e-6)
 
 
+def test_segments_too_unequal_for_the_autocorrelation_have_a_period():
+    # The cutting force of a cut with twice the fracture energy, cell 14 um, in N/mm every 6 us.
+    forces = [
+        282, 493, 549, 570, 596, 607, 619, 628, 642, 646, 649, 648, 621, 623, 604, 575, 550, 510,
+        486, 459, 460, 428, 476, 495, 500, 516, 534, 556, 557, 567, 584, 594, 603, 605, 597, 605,
+        596, 593, 581, 472, 497, 503, 502, 514, 527, 519, 529, 541, 546, 562, 545, 544, 527, 495,
+        441, 472, 495, 491, 516, 520, 536, 537, 543, 554, 558, 548, 549, 517, 478, 466, 507, 493,
+        521, 523, 549, 554, 558, 551,
+    ]  # fmt: skip
+    time = np.arange(0.0, 463e-6, 1e-6)
+    force = np.interp(time, 6e-6 * np.arange(len(forces)), forces) * 1e3
+    found = segmentation(time, force, force)
+    assert np.isnan(found.correlation_period)
+    assert found.segments == 3
+    # Plateaus of some 20 us end at 214, 300 and 396 us.
+    assert found.period == pytest.approx((396 - 214) / 2 * 1e-6, abs=8e-6)
+
+
 def test_noise_has_no_period():
     time = np.arange(0.0, 470e-6, 2e-6)
     found = 0

@@ -14,6 +14,13 @@ _LEAST_PROMINENCE: Final = 0.3
 """Least rise of the autocorrelation from the valley before its first peak to that peak: in a few
 unequal segments the peak is low, but the valley deep; noise has neither."""
 
+_STANDING_OUT: Final = 0.35
+"""Least prominence of the peaks of unequal segments over the range of the force."""
+
+_LEAST_SMOOTH: Final = 0.7
+"""Least share of its range that a force with unequal segments keeps when it is smoothed over a
+quarter of the time in which it forgets itself: noise keeps less."""
+
 _LEAST_SWING: Final = 0.1
 """Least range of the force, from 5 % to 95 % of its values, over its mean: less is the ripple of a
 continuous chip."""
@@ -33,7 +40,8 @@ class Segmentation:
         Standard uncertainty of the period in s: the deviation of the intervals over the root of
         their number; NaN for less than two intervals.
     correlation_period : float
-        The period in s from the autocorrelation of the whole history, as a check.
+        The period in s from the autocorrelation of the whole history, as a check; NaN where
+        segments are too unequal for it.
     peaks : ndarray
         Times of the force peaks in s.
     cutting_mean, thrust_mean : float
@@ -80,9 +88,11 @@ def segmentation(
     The history counts from where the cutting force first reaches the median of its second half,
     and from a fifth of its duration on at the earliest. A force whose range is under a tenth of its
     mean has no segments: a continuous chip ripples, by some per cent.
-    The autocorrelation of what remains gives a first period; the force is smoothed over a
-    fifteenth of it, and its peaks, at least six tenths of a period apart and a fifth of the swing
-    high, give the period and its uncertainty.
+    The autocorrelation of what remains gives a first period. Segments that are too unequal for
+    that (105 and 75 us, say) are told by three or more peaks that stand out by a third of the range
+    when the force is smoothed over a quarter of the time in which it forgets itself. Then the force
+    is smoothed over a fifteenth of that period, and its peaks, at least six tenths of a period
+    apart and a fifth of the swing high, give the period and its uncertainty.
     """
     times = np.asarray(time, dtype=np.float64)
     cutting = np.asarray(cutting_force, dtype=np.float64)
@@ -93,7 +103,10 @@ def segmentation(
     step = float(steps.mean())
     first = end_of_build_up(cutting)
     times, cutting, thrust = times[first:], cutting[first:], thrust[first:]
-    coarse = _correlation_period(cutting, step) if _swings(cutting) else nan
+    correlation = coarse = nan
+    if _swings(cutting):
+        correlation = _correlation_period(cutting, step)
+        coarse = correlation if np.isfinite(correlation) else _unequal_period(cutting, step)
     peaks = np.zeros(0, dtype=np.int64)
     swings = [nan, nan]
     if np.isfinite(coarse):
@@ -107,7 +120,7 @@ def segmentation(
         period_uncertainty=(
             float(intervals.std(ddof=1)) / sqrt(intervals.size) if intervals.size > 1 else nan
         ),
-        correlation_period=coarse,
+        correlation_period=correlation,
         peaks=times[peaks],
         cutting_mean=float(cutting.mean()),
         thrust_mean=float(thrust.mean()),
@@ -129,23 +142,20 @@ def end_of_build_up(cutting_force: NDArray[np.float64]) -> int:
 
 
 def _swings(force: NDArray[np.float64]) -> bool:
-    low, high = np.percentile(detrend(force), [5.0, 95.0])
-    return bool(high - low > _LEAST_SWING * abs(force.mean()))
+    return _range(detrend(force)) > _LEAST_SWING * abs(float(force.mean()))
+
+
+def _range(force: NDArray[np.float64]) -> float:
+    """From 5 % to 95 % of the values."""
+    low, high = np.percentile(force, [5.0, 95.0])
+    return float(high - low)
 
 
 def _correlation_period(force: NDArray[np.float64], step: float) -> float:
     """Lag of the first clear peak of the unbiased autocorrelation; NaN if there is none."""
     if force.size < 8:
         return nan
-    swing = detrend(force)
-    spectrum = np.fft.rfft(swing, 2 * swing.size)
-    raw = np.fft.irfft(np.abs(spectrum) ** 2)[: swing.size]
-    if not raw[0] > 0:
-        return nan
-    lags = slice(0, swing.size // 2)
-    correlation = (raw / np.arange(swing.size, 0, -1))[lags]
-    correlation /= correlation[0]
-    correlation = gaussian_filter1d(correlation, 2.0)
+    correlation = _correlation(force)
     down = np.flatnonzero(correlation < 0)
     if down.size == 0:
         return nan
@@ -154,9 +164,32 @@ def _correlation_period(force: NDArray[np.float64], step: float) -> float:
     return float(peaks[0] * step) if peaks.size else nan
 
 
+def _unequal_period(force: NDArray[np.float64], step: float) -> float:
+    """Mean interval between the peaks that stand out; NaN if there are less than three."""
+    swing = detrend(force)
+    down = np.flatnonzero(_correlation(force) < 0)
+    if down.size == 0:
+        return nan
+    smooth = gaussian_filter1d(swing, down[0] / 4)
+    if _range(smooth) < _LEAST_SMOOTH * _range(swing):
+        return nan
+    peaks, _ = find_peaks(smooth, prominence=_STANDING_OUT * _range(smooth))
+    return float(np.diff(peaks).mean() * step) if peaks.size > 2 else nan
+
+
+def _correlation(force: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Autocorrelation up to half of the history, slightly smoothed; 0 for a constant force."""
+    swing = detrend(force)
+    spectrum = np.fft.rfft(swing, 2 * swing.size)
+    raw = np.fft.irfft(np.abs(spectrum) ** 2)[: swing.size]
+    if not raw[0] > 0:
+        return np.zeros(swing.size // 2)
+    correlation = (raw / np.arange(swing.size, 0, -1))[: swing.size // 2]
+    return np.asarray(gaussian_filter1d(correlation / correlation[0], 2.0))
+
+
 def _peaks(force: NDArray[np.float64], period: float) -> NDArray[np.int64]:
-    low, high = np.percentile(force, [5.0, 95.0])
-    peaks, _ = find_peaks(force, distance=max(0.6 * period, 1.0), prominence=(high - low) / 5)
+    peaks, _ = find_peaks(force, distance=max(0.6 * period, 1.0), prominence=_range(force) / 5)
     return np.asarray(peaks, dtype=np.int64)
 
 
