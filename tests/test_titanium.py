@@ -32,9 +32,8 @@ def test_every_test_of_the_data_is_a_cut_that_can_be_computed():
             cut = titanium.simulation(found, rake)
             assert (cut.conditions.speed, cut.conditions.feed) == at
             assert cut.conditions.feed / cut.numerics.cell >= 10 * (1 - 1e-9)
-            # About two cells or more on the radius of the edge, eight feeds or more of cut.
+            # About two cells or more on the radius of the edge.
             assert cut.tool.edge_radius / cut.numerics.cell > 1.9
-            assert cut.conditions.length_of_cut / at.feed > 7.9
 
 
 def test_the_data_are_those_of_the_source():
