@@ -1,6 +1,6 @@
 """Measured orthogonal cuts of Ti-6Al-4V beside the same cuts computed here.
 
-    python benchmarks/titanium.py [--cell 14] [--markdown] [NAME ...]
+    python benchmarks/titanium.py [--cell 10] [--markdown] [NAME ...]
 
 The tests, and where they stand, are in titanium.yaml. Neither the width of cut nor the rake angle
 is known: what does not depend on the width is compared, at two rake angles. A cut takes minutes;
@@ -50,7 +50,6 @@ ALLOWED = {"wear": ("L", "M"), "status": ("ok", "short")}
 
 RAKES = (0.0, 10.0)  # degrees: no source that was read tells it
 CLEARANCE = 7.0
-CELLS_A_FEED, LARGEST_CELL = 10, 14e-6
 FEEDS_A_CUT = 6  # a longer chip curls down on the uncut surface
 
 
@@ -156,7 +155,7 @@ def ratios(cuts: Mapping[Condition, Cut]) -> dict[str, float]:
     return found
 
 
-def simulation(trials: list[Trial], rake: float, cell: float | None = None) -> CuttingSimulation:
+def simulation(trials: list[Trial], rake: float, cell: float) -> CuttingSimulation:
     """The cut of the tests; materials are the library's, friction and numerics the solver's own."""
     speed, feed = trials[0].speed, trials[0].feed
     edge_radius = fmean(trial.edge_radius for trial in trials)
@@ -165,9 +164,7 @@ def simulation(trials: list[Trial], rake: float, cell: float | None = None) -> C
         conditions=CuttingConditions(speed, feed, FEEDS_A_CUT * feed),
         tool=ToolGeometry(radians(rake), radians(CLEARANCE), edge_radius),
         tool_material=tool_material("carbide"),
-        numerics=Numerics(
-            cell or min(feed / CELLS_A_FEED, LARGEST_CELL), upstream=max(0.75e-3, 4 * feed)
-        ),
+        numerics=Numerics(cell, upstream=max(0.75e-3, 4 * feed)),
     )
 
 
@@ -216,15 +213,13 @@ def comparison(
 def cuts_made(
     outcomes: Mapping[tuple[Condition, float], Means | SolverError],
     tests: Mapping[Condition, list[Trial]],
-    cell: float | None,
 ) -> list[list[str]]:
     """Rows of the table of how each cut went, its head first."""
-    head = ["speed / (m/min)", "feed / mm", "rake / °", "cell / µm", "Fc / (N/mm)", "Ff / (N/mm)"]
+    head = ["speed / (m/min)", "feed / mm", "rake / °", "Fc / (N/mm)", "Ff / (N/mm)"]
     head += ["Fc measured / computed / mm", "segment / µm", "segments", "drift / %"]
     rows = [[*head, "unaccounted work / %", "time / s"]]
     for (at, rake), means in outcomes.items():
-        side = simulation(tests[at], rake, cell).numerics.cell
-        row = [_m_a_minute(at.speed), _mm(at.feed), f"{rake:g}", number(side, SMALL_LENGTH)]
+        row = [_m_a_minute(at.speed), _mm(at.feed), f"{rake:g}"]
         if isinstance(means, SolverError):
             rows.append([*row, str(means), *["–"] * 7])
             continue
@@ -243,7 +238,7 @@ def cuts_made(
     return rows
 
 
-def outcome_of(trials: list[Trial], rake: float, cell: float | None) -> Means | SolverError:
+def outcome_of(trials: list[Trial], rake: float, cell: float) -> Means | SolverError:
     """Means of the cut, kept or computed now, or what stopped it."""
     cut = simulation(trials, rake, cell)
     name = f"{Condition(trials[0].speed, trials[0].feed).name}-{rake:g}"
@@ -285,7 +280,7 @@ def _mm(length: float) -> str:
 def arguments(names: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
-    parser.add_argument("--cell", type=float, help="side of a cell in um, of all cuts")
+    parser.add_argument("--cell", type=float, default=10.0, help="side of a cell in um")
     parser.add_argument("--markdown", action="store_true", help="print Markdown tables")
     given = parser.parse_args()
     if unknown := sorted(set(given.names) - set(names)):
@@ -298,17 +293,18 @@ def main() -> None:
     tests = repeats(trials)
     given = arguments([at.name for at in tests])
     tests = {at: found for at, found in tests.items() if at.name in given.names or not given.names}
-    cell = given.cell and given.cell * 1e-6
     outcomes = {
-        (at, rake): outcome_of(found, rake, cell) for at, found in tests.items() for rake in RAKES
+        (at, rake): outcome_of(found, rake, given.cell / 1e6)
+        for at, found in tests.items()
+        for rake in RAKES
     }
     there = ratios({at: mean(found) for at, found in tests.items()})
     table = markdown if given.markdown else aligned
-    print(f"Solver {SOLVER_VERSION}. Measured: {source}")
+    print(f"Cell {given.cell:g} um, solver {SOLVER_VERSION}. Measured: {source}")
     for rows in (
         measurements(tests),
         comparison(there, computed_ratios(outcomes)),
-        cuts_made(outcomes, tests, cell),
+        cuts_made(outcomes, tests),
     ):
         print(f"\n{table(rows)}")
 

@@ -29,11 +29,10 @@ def test_every_test_of_the_data_is_a_cut_that_can_be_computed():
     assert sum(map(len, tests.values())) == len(trials)
     for at, found in tests.items():
         for rake in titanium.RAKES:
-            cut = titanium.simulation(found, rake)
+            cut = titanium.simulation(found, rake, 10e-6)
             assert (cut.conditions.speed, cut.conditions.feed) == at
             assert cut.conditions.feed / cut.numerics.cell >= 10 * (1 - 1e-9)
-            # About two cells or more on the radius of the edge.
-            assert cut.tool.edge_radius / cut.numerics.cell > 1.9
+            assert cut.tool.edge_radius / cut.numerics.cell > 2.5
 
 
 def test_the_data_are_those_of_the_source():
@@ -134,19 +133,19 @@ def test_a_cut_that_stops_is_told_and_the_others_stay(monkeypatch, capsys):
 
     monkeypatch.setattr(titanium, "means_of", fail)
     tests = {Condition(SLOW, FINE): [trial()]}
-    outcome = {(at, 10.0): titanium.outcome_of(one, 10.0, None) for at, one in tests.items()}
+    outcome = {(at, 10.0): titanium.outcome_of(one, 10.0, 10e-6) for at, one in tests.items()}
     assert titanium.computed_ratios(outcome) == {0.0: {}, 10.0: {}}
-    head, row = titanium.cuts_made(outcome, tests, None)
-    assert row[:5] == ["60", "0.1", "10", "10", "60-0.1-10: a point crossed a cell"]
+    head, row = titanium.cuts_made(outcome, tests)
+    assert row[:4] == ["60", "0.1", "10", "60-0.1-10: a point crossed a cell"]
     assert len(row) == len(head)
 
 
 def test_forces_of_one_width_tell_it(monkeypatch):
     means = titanium.Means(200e3, 100e3, 0.12e-3, 0.2e-3, 80e-6, 5, -0.02, 0.012, 60.0)
     tests = {Condition(SLOW, FINE): [trial(), trial(cutting_force=110.0)]}
-    head, row = titanium.cuts_made({(Condition(SLOW, FINE), 0.0): means}, tests, 14e-6)
+    head, row = titanium.cuts_made({(Condition(SLOW, FINE), 0.0): means}, tests)
     told = dict(zip(head, row, strict=True))
     # 105 N over 200 N/mm; 80 us at 1 m/s.
     assert told["Fc measured / computed / mm"] == "0.53"
     assert told["segment / µm"] == "80"
-    assert (told["cell / µm"], told["drift / %"]) == ("14", "−2")
+    assert (told["drift / %"], told["unaccounted work / %"]) == ("−2", "1.2")
