@@ -1,0 +1,151 @@
+"""The benchmark that sets measured cuts of Ti-6Al-4V beside computed ones: data, means, ratios."""
+
+from dataclasses import replace
+from math import nan
+
+import pytest
+import titanium
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from titanium import Condition, Cut, Trial
+
+from chipglow.cutting import SolverError
+
+SLOW, FAST = 60 / 60, 120 / 60
+FINE, COARSE = 0.1e-3, 0.2e-3
+
+
+def trial(**changes):
+    first = Trial("V1", SLOW, FINE, 100.0, 60.0, 30e-6, 120e-6, "L", "ok")
+    return replace(first, **changes)
+
+
+def test_every_test_of_the_data_is_a_cut_that_can_be_computed():
+    source, trials = titanium.read_trials()
+    assert "10.1007/s00170-024-14597-2" in source
+    assert len({one.name for one in trials}) == len(trials)
+    tests = titanium.repeats(trials)
+    assert sum(map(len, tests.values())) == len(trials)
+    for at, found in tests.items():
+        for rake in titanium.RAKES:
+            cut = titanium.simulation(found, rake, 10e-6)
+            assert (cut.conditions.speed, cut.conditions.feed) == at
+            assert cut.conditions.feed / cut.numerics.cell >= 10 * (1 - 1e-9)
+            assert cut.tool.edge_radius / cut.numerics.cell > 2.5
+
+
+def test_the_data_are_those_of_the_source():
+    _, trials = titanium.read_trials()
+    # As they stand in the file that was read: force, force, radius in um, thickness in um.
+    read = {one.name: one for one in trials}["V0055"]
+    assert (read.speed, read.feed) == pytest.approx((212.2 / 60, 0.4e-3))
+    assert (read.cutting_force, read.feed_force) == (483.4, 216.1)
+    assert (read.edge_radius, read.thickness) == pytest.approx((33.4e-6, 351.4e-6))
+    assert (read.wear, read.status) == ("M", "short")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"feed": 0.1}, "0.1 has no unit"),
+        ({"speed": "89 mm"}, "'89 mm' is not a speed"),
+        ({"status": "error"}, "status 'error', expected one of ok, short"),
+        ({"wear": "H"}, "wear 'H', expected one of L, M"),
+        ({"thickness": "0 um"}, "0 um is not over 0"),
+    ],
+)
+def test_a_bad_entry_is_named(tmp_path, change, message):
+    data = yaml.safe_load(titanium.DATA.read_text(encoding="utf-8"))
+    data["tests"][0] |= change
+    path = tmp_path / "tests.yaml"
+    path.write_text(yaml.safe_dump(data), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"^tests\.yaml: V0025: " + message):
+        titanium.read_trials(path)
+
+
+def test_repeats_are_of_the_same_speed_and_feed():
+    trials = [
+        trial(name="a", feed=COARSE),
+        trial(name="b", speed=FAST),
+        trial(name="c"),
+        trial(name="d", feed=COARSE, cutting_force=140.0),
+    ]
+    found = titanium.repeats(trials)
+    assert list(found) == [(SLOW, FINE), (FAST, FINE), (SLOW, COARSE)]
+    assert [one.name for one in found[Condition(SLOW, COARSE)]] == ["a", "d"]
+    assert titanium.mean(found[Condition(SLOW, COARSE)]).cutting_force == 120.0
+
+
+def test_a_mean_is_over_the_tests_and_a_spread_needs_two():
+    trials = [trial(), trial(cutting_force=110.0, feed_force=80.0, thickness=160e-6)]
+    assert titanium.mean(trials) == pytest.approx((105.0, 70.0, 140e-6))
+    # Deviations of ±5 from the mean of two values: 5 √2.
+    assert titanium.spread([100.0, 110.0], 2) == "105.00 ± 7.07"
+    assert titanium.spread([100.0], 1) == "100.0"
+
+
+def test_ratios_by_hand():
+    cuts = {
+        Condition(SLOW, FINE): Cut(100.0, 60.0, 130e-6),
+        Condition(SLOW, COARSE): Cut(160.0, 80.0, 220e-6),
+        Condition(FAST, FINE): Cut(90.0, 45.0, 110e-6),
+    }
+    assert titanium.ratios(cuts) == pytest.approx(
+        {
+            "Ff / Fc at 60 m/min, 0.1 mm": 0.6,
+            "Ff / Fc at 120 m/min, 0.1 mm": 0.5,
+            "Ff / Fc at 60 m/min, 0.2 mm": 0.5,
+            "thickness / feed at 60 m/min, 0.1 mm": 1.3,
+            "thickness / feed at 120 m/min, 0.1 mm": 1.1,
+            "thickness / feed at 60 m/min, 0.2 mm": 1.1,
+            "Fc(0.2 mm) / Fc(0.1 mm) at 60 m/min": 1.6,
+            "Fc(120 m/min) / Fc(60 m/min) at 0.1 mm": 0.9,
+        }
+    )
+
+
+@given(
+    width=st.floats(1e-4, 1e-2),
+    forces=st.lists(st.floats(1e4, 1e6), min_size=4, max_size=4),
+)
+def test_no_ratio_depends_on_the_width_of_cut(width, forces):
+    places = [Condition(speed, feed) for speed in (SLOW, FAST) for feed in (FINE, COARSE)]
+    narrow = {at: Cut(f, 0.5 * f, at.feed) for at, f in zip(places, forces, strict=True)}
+    wide = {at: Cut(width * f, width * t, h) for at, (f, t, h) in narrow.items()}
+    assert titanium.ratios(wide) == pytest.approx(titanium.ratios(narrow), rel=1e-12)
+    assert len(titanium.ratios(narrow)) == 4 + 4 + 2 + 2
+
+
+def test_differences_are_over_measured_and_a_cut_that_failed_is_a_dash():
+    measured = {"Ff / Fc": 0.5, "thickness / feed": 1.25}
+    computed = {0.0: {"Ff / Fc": 0.4, "thickness / feed": 1.5}, 10.0: {"thickness / feed": nan}}
+    assert titanium.comparison(measured, computed) == [
+        ["quantity", "measured", "rake 0°", "difference", "rake 10°", "difference"],
+        ["Ff / Fc", "0.50", "0.40", "−20 %", "–", "–"],
+        ["thickness / feed", "1.25", "1.50", "+20 %", "–", "–"],
+    ]
+
+
+def test_a_cut_that_stops_is_told_and_the_others_stay(monkeypatch, capsys):
+    def fail(cut, name, folder):
+        raise SolverError(f"{name}: a point crossed a cell")
+
+    monkeypatch.setattr(titanium, "means_of", fail)
+    tests = {Condition(SLOW, FINE): [trial()]}
+    outcome = {(at, 10.0): titanium.outcome_of(one, 10.0, 10e-6) for at, one in tests.items()}
+    assert titanium.computed_ratios(outcome) == {0.0: {}, 10.0: {}}
+    head, row = titanium.cuts_made(outcome, tests)
+    assert row[:4] == ["60", "0.1", "10", "60-0.1-10: a point crossed a cell"]
+    assert len(row) == len(head)
+
+
+def test_forces_of_one_width_tell_it(monkeypatch):
+    means = titanium.Means(200e3, 100e3, 0.12e-3, 0.2e-3, 80e-6, 5, -0.02, 0.012, 60.0)
+    tests = {Condition(SLOW, FINE): [trial(), trial(cutting_force=110.0)]}
+    head, row = titanium.cuts_made({(Condition(SLOW, FINE), 0.0): means}, tests)
+    told = dict(zip(head, row, strict=True))
+    # 105 N over 200 N/mm; 80 us at 1 m/s.
+    assert told["Fc measured / computed / mm"] == "0.53"
+    assert told["segment / µm"] == "80"
+    assert (told["drift / %"], told["unaccounted work / %"]) == ("−2", "1.2")
