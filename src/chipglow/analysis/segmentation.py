@@ -103,10 +103,11 @@ def segmentation(
     step = float(steps.mean())
     first = end_of_build_up(cutting)
     times, cutting, thrust = times[first:], cutting[first:], thrust[first:]
-    correlation = coarse = nan
-    if _swings(cutting):
-        correlation = _correlation_period(cutting, step)
-        coarse = correlation if np.isfinite(correlation) else _unequal_period(cutting, step)
+    regular = coarse = nan
+    if cutting.size >= 8 and _range(swing := detrend(cutting)) > _LEAST_SWING * abs(cutting.mean()):
+        correlation = _correlation(swing)
+        regular = _correlation_period(correlation, step)
+        coarse = regular if np.isfinite(regular) else _unequal_period(swing, correlation, step)
     peaks = np.zeros(0, dtype=np.int64)
     swings = [nan, nan]
     if np.isfinite(coarse):
@@ -120,7 +121,7 @@ def segmentation(
         period_uncertainty=(
             float(intervals.std(ddof=1)) / sqrt(intervals.size) if intervals.size > 1 else nan
         ),
-        correlation_period=correlation,
+        correlation_period=regular,
         peaks=times[peaks],
         cutting_mean=float(cutting.mean()),
         thrust_mean=float(thrust.mean()),
@@ -141,21 +142,24 @@ def end_of_build_up(cutting_force: NDArray[np.float64]) -> int:
     return max(int(np.argmax(cutting_force >= np.median(later))), cutting_force.size // 5)
 
 
-def _swings(force: NDArray[np.float64]) -> bool:
-    return _range(detrend(force)) > _LEAST_SWING * abs(float(force.mean()))
-
-
 def _range(force: NDArray[np.float64]) -> float:
     """From 5 % to 95 % of the values."""
     low, high = np.percentile(force, [5.0, 95.0])
     return float(high - low)
 
 
-def _correlation_period(force: NDArray[np.float64], step: float) -> float:
+def _correlation(swing: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Autocorrelation up to half of the history, slightly smoothed; 0 for a constant force."""
+    spectrum = np.fft.rfft(swing, 2 * swing.size)
+    raw = np.fft.irfft(np.abs(spectrum) ** 2)[: swing.size]
+    if not raw[0] > 0:
+        return np.zeros(swing.size // 2)
+    correlation = (raw / np.arange(swing.size, 0, -1))[: swing.size // 2]
+    return np.asarray(gaussian_filter1d(correlation / correlation[0], 2.0))
+
+
+def _correlation_period(correlation: NDArray[np.float64], step: float) -> float:
     """Lag of the first clear peak of the unbiased autocorrelation; NaN if there is none."""
-    if force.size < 8:
-        return nan
-    correlation = _correlation(force)
     down = np.flatnonzero(correlation < 0)
     if down.size == 0:
         return nan
@@ -164,10 +168,11 @@ def _correlation_period(force: NDArray[np.float64], step: float) -> float:
     return float(peaks[0] * step) if peaks.size else nan
 
 
-def _unequal_period(force: NDArray[np.float64], step: float) -> float:
+def _unequal_period(
+    swing: NDArray[np.float64], correlation: NDArray[np.float64], step: float
+) -> float:
     """Mean interval between the peaks that stand out; NaN if there are less than three."""
-    swing = detrend(force)
-    down = np.flatnonzero(_correlation(force) < 0)
+    down = np.flatnonzero(correlation < 0)
     if down.size == 0:
         return nan
     smooth = gaussian_filter1d(swing, down[0] / 4)
@@ -175,17 +180,6 @@ def _unequal_period(force: NDArray[np.float64], step: float) -> float:
         return nan
     peaks, _ = find_peaks(smooth, prominence=_STANDING_OUT * _range(smooth))
     return float(np.diff(peaks).mean() * step) if peaks.size > 2 else nan
-
-
-def _correlation(force: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Autocorrelation up to half of the history, slightly smoothed; 0 for a constant force."""
-    swing = detrend(force)
-    spectrum = np.fft.rfft(swing, 2 * swing.size)
-    raw = np.fft.irfft(np.abs(spectrum) ** 2)[: swing.size]
-    if not raw[0] > 0:
-        return np.zeros(swing.size // 2)
-    correlation = (raw / np.arange(swing.size, 0, -1))[: swing.size // 2]
-    return np.asarray(gaussian_filter1d(correlation / correlation[0], 2.0))
 
 
 def _peaks(force: NDArray[np.float64], period: float) -> NDArray[np.int64]:
