@@ -81,10 +81,22 @@ QUANTITIES = [
         ("Frequency", "600 Hz", 600.0),
         ("Frequency", "0.6 kHz", 600.0),
         ("Length", "6e-3 mm", 6e-6),
+        ("Length", "2/3 um", 6.666666666666667e-07),
+        ("Position", "-2/3 um", -6.666666666666667e-07),
     ],
 )
 def test_quantities_are_exactly_the_float_that_python_writes(kind, text, value):
     assert quantity(getattr(units, kind)).parse(text) == value
+
+
+@pytest.mark.parametrize("text", ["2/3 um", "4/3 um", "1/7 um", "0.5 um", "0.66667 um"])
+def test_a_simple_fraction_is_written_as_such(text):
+    assert LENGTH.text(LENGTH.parse(text)) == text
+
+
+def test_a_fraction_of_nothing_is_refused():
+    with pytest.raises(ValueError, match="'1/0 um' is not a length"):
+        LENGTH.parse("1/0 um")
 
 
 def test_a_range_has_one_unit_for_both_limits():
@@ -151,12 +163,20 @@ def test_the_default_view_holds_the_papers_sensors():
     assert round(frames) == 455
 
 
+@pytest.mark.parametrize(("study", "samples"), [(Study(), 9), (Study.quick(), 4)])
+def test_a_whole_number_of_samples_makes_a_pixel_of_the_default_grids(study, samples):
+    raster, pitch = study.cutting.field_of_view.build(), study.camera.pitch
+    # Over the whole view the error adds up to under a millionth of a sample.
+    assert abs(pitch / raster.spacing - samples) * max(raster.shape) / samples < 1e-6
+    assert [n % samples for n in raster.shape] == [0, 0]
+
+
 def test_an_exposure_of_the_quick_study_has_ten_sub_frames_or_more():
     study = Study.quick()
     assert study.camera.integration_time / study.cutting.window.interval >= 10
     view, full = study.cutting.field_of_view.build(), Study().cutting.field_of_view.build()
-    # The quick view is the full one but for the rounding of its spacing to 5 digits.
-    np.testing.assert_allclose(view.extent, full.extent, atol=10e-9)
+    # The quick view is the full one but for the rounding of sums of floats.
+    np.testing.assert_allclose(view.extent, full.extent, atol=1e-15)
 
 
 @pytest.mark.parametrize("study", [Study(), Study.quick()], ids=["paper", "quick"])

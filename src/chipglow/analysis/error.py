@@ -21,7 +21,12 @@ and exposure; ``centre``: that of the sample under the sensor's centre in the mi
 exposure; ``true``: the greatest true temperature in the square during the exposure.
 """
 
-_LEAST_OVERLAP: Final = 1e-3
+LEAST_COVERED: Final = 0.05
+"""Part of a sample's width that a pixel must cover for the sample to count in its maximum.
+
+Where a whole number of samples makes a pixel, a pitch that was rounded adds up to slivers of the
+neighbours' samples. A single hot one would be the reference of the whole pixel.
+"""
 
 
 @dataclass(frozen=True)
@@ -136,8 +141,9 @@ def _maximum(
 def _covered(
     centres: NDArray[np.float64], side: float, samples: int, spacing: float
 ) -> list[slice]:
-    """Samples under each sensor along a line, without slivers that are there by rounding only."""
-    covered = overlap_lengths(centres - side / 2, side, samples, spacing) > _LEAST_OVERLAP * spacing
+    """Samples under each sensor along a line; slivers under `LEAST_COVERED` do not count."""
+    least = LEAST_COVERED * min(spacing, side)
+    covered = overlap_lengths(centres - side / 2, side, samples, spacing) > least
     first = covered.argmax(axis=1)
     return [slice(i, i + n) for i, n in zip(first, covered.sum(axis=1), strict=True)]
 

@@ -254,7 +254,9 @@ class FieldOfViewSection(Part):
     left: Position = described("-560 um", "Left edge of the scene.", _IN_REGION)
     top: Position = described("460 um", "Upper edge of the scene.", _IN_REGION)
     spacing: Length = described(
-        "0.66667 um", "Side of a sample; the paper has 9 to a sensor.", "over 0 um"
+        "2/3 um",
+        "Side of a sample. A whole number of them should make camera.pitch: the paper has 9.",
+        "over 0 um",
     )
     rows: int = described(810, "Samples from top to bottom.", "1 or more")
     columns: int = described(900, "Samples from left to right.", "1 or more")
@@ -620,7 +622,7 @@ class Study(Section):
                 "cutting": {
                     "numerics": {"cell": "20 um"},
                     "window": {"interval": "0.5 us"},
-                    "field_of_view": {"spacing": "1.33334 um", "rows": 405, "columns": 450},
+                    "field_of_view": {"spacing": "1.5 um", "rows": 360, "columns": 400},
                 },
                 "analysis": {"instants": 5, "psf_widths": ["4 um", "8 um", "12 um", "20 um"]},
             }

@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass
 from decimal import Decimal
+from fractions import Fraction
 from functools import cache
 from math import isfinite
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -14,11 +15,14 @@ if TYPE_CHECKING:
     from pint import UnitRegistry
 
 _NUMBER: Final = r"\d{1,40}(?:\.\d{0,40})?(?:[eE][+-]?\d{1,3})?|\.\d{1,40}(?:[eE][+-]?\d{1,3})?"
+_FRACTION: Final = r"\d{1,3}/\d{1,3}"
 _UNIT: Final = r"[A-Za-z°µμ][A-Za-z0-9°µμ/*^ .-]{0,60}"
-_QUANTITY: Final = re.compile(rf"\s*([-+−]?(?:{_NUMBER}))\s*({_UNIT})\s*")
+_QUANTITY: Final = re.compile(rf"\s*([-+−]?(?:{_FRACTION}|{_NUMBER}))\s*({_UNIT})\s*")
 _RANGE: Final = re.compile(rf"\s*({_NUMBER})\s*[-–]\s*({_NUMBER})\s*({_UNIT})?\s*")
 _BARE: Final = re.compile(rf"\s*[-+−]?(?:{_NUMBER})\s*")
 _MOST_DIGITS: Final = 21
+_LONGEST_NUMBER: Final = 12
+_LARGEST_DENOMINATOR: Final = 99
 
 
 @dataclass(frozen=True)
@@ -82,7 +86,10 @@ class Quantity:
 
     def text(self, value: float) -> str:
         """Shortest text in this quantity's unit that is read back as the same number."""
-        return f"{self._number(value)} {self.unit}"
+        number = self._number(value)
+        if len(number) > _LONGEST_NUMBER:
+            number = self._fraction(value) or number
+        return f"{number} {self.unit}"
 
     def range_text(self, limits: tuple[float, float]) -> str:
         """Text of a range that is read back as the same numbers."""
@@ -105,10 +112,10 @@ class Quantity:
         )
 
     def _to_base(self, value: str, number: str, unit: str) -> float:
-        decimal = Decimal(number.replace("−", "-"))
         try:
+            decimal = _decimal(number.replace("−", "-"))
             result = float(_registry().Quantity(decimal, _unit(unit)).to(self.base).magnitude)
-        # A malformed or foreign unit ends in pint as anything from AssertionError to TokenError.
+        # 1/0, or a malformed or foreign unit: anything from AssertionError to TokenError.
         except Exception:
             raise ValueError(self._not_this_kind(value)) from None
         if not isfinite(result):
@@ -124,8 +131,19 @@ class Quantity:
     def _zero(self) -> str:
         return " K" if self.base == "K" else ""
 
-    def _number(self, value: float) -> str:
+    def _fraction(self, value: float) -> str | None:
+        """A fraction that is read back as the same number, if there is a simple one."""
+        nearest = Fraction(self._in_unit(value)).limit_denominator(_LARGEST_DENOMINATOR)
+        text = str(nearest)
+        simple = re.fullmatch(f"-?{_FRACTION}", text) is not None
+        return text if simple and self._reads_back(text, value) else None
+
+    def _in_unit(self, value: float) -> Decimal:
         exact = _registry().Quantity(Decimal(repr(value)), self.base).to(self.unit).magnitude
+        return Decimal(exact)
+
+    def _number(self, value: float) -> str:
+        exact = self._in_unit(value)
         for digits in range(1, _MOST_DIGITS):
             rounded = Decimal(f"{exact:.{digits}g}")
             number = f"{rounded:f}" if -7 < rounded.adjusted() < 12 else f"{rounded:g}"
@@ -134,7 +152,7 @@ class Quantity:
         raise ValueError(f"{value!r} {self.base} cannot be written in {self.unit}")
 
     def _reads_back(self, number: str, value: float) -> bool:
-        decimal = Decimal(number)
+        decimal = _decimal(number)
         return float(_registry().Quantity(decimal, self.unit).to(self.base).magnitude) == value
 
 
@@ -183,6 +201,12 @@ Temperature = Annotated[float, TEMPERATURE]
 TEMPERATURE_DIFFERENCE: Final = Difference(
     "a difference of temperatures", "K", "K", "2 K", positive=False
 )
+
+
+def _decimal(number: str) -> Decimal:
+    """A number, or a fraction such as 2/3."""
+    numerator, _, denominator = number.partition("/")
+    return Decimal(numerator) / Decimal(denominator or 1)
 
 
 @cache
