@@ -6,8 +6,10 @@ from math import cos, hypot, log, radians, sin
 import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
+from figure6 import figure_6
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.interpolate import RegularGridInterpolator
 
 from chipglow.analysis import (
     NoShearBandError,
@@ -25,7 +27,7 @@ from chipglow.analysis import (
 from chipglow.analysis.error import LEAST_COVERED, ErrorImages
 from chipglow.camera import Camera, Exposure, GaussianPSF
 from chipglow.radiometry import Band
-from chipglow.scene import Material, Raster, ToolGeometry
+from chipglow.scene import Material, Raster, Scene, ToolGeometry
 from chipglow.study import Study
 from chipglow.surface import CHIP_1, CHIP_2
 
@@ -289,11 +291,13 @@ def test_lines_across_the_rake_face_follow_its_normal():
     rake = rake_errors(linear_errors(), 120e-6, TOOL, 30e-6, 1e-6)
     # Planes are read exactly, so rounding only.
     np.testing.assert_allclose(rake.case_1, -40.0 + rake.line.distance * 1e6, atol=1e-9)
-    np.testing.assert_allclose(rake.mean_case_1, rake.case_1, atol=1e-9)
     np.testing.assert_allclose(rake.contact_case_1, -40.0, atol=1e-9)
-    assert rake.error == pytest.approx(-40.0)
-    assert rake.mean_error == pytest.approx(-40.0)
-    assert rake.psf_share == pytest.approx(0.25)
+    assert rake.face.error == pytest.approx(-40.0)
+    assert rake.along_contact.error == pytest.approx(-40.0)
+    assert rake.face.psf_share == pytest.approx(0.25)
+    # Two pixels into the tool, the last place that belongs to the face.
+    assert rake.extremum.error == pytest.approx(-52.0)
+    assert rake.extremum.psf_share == pytest.approx(0.25)
     assert rake.contact.distance[-1] == 120e-6
 
 
@@ -395,7 +399,7 @@ def chip():
 
 @pytest.fixture(scope="module")
 def study(chip):
-    plan = Plan(instants=5, psf_widths=(6e-6, 12e-6, 18e-6))
+    plan = Plan(instants=5, phases=2, textures=3, psf_widths=(6e-6, 12e-6, 18e-6))
     told = []
     result = analyse(
         chip.scene(),
@@ -404,7 +408,7 @@ def study(chip):
         plan,
         lambda label, part: told.append((label, part)),
     )
-    assert {label for label, part in told if part == 1.0} >= {"shear band", "camera, chip 1"}
+    assert {label for label, part in told if part == 1.0} >= {"shear band", "camera", "draws"}
     assert all(0.0 <= part <= 1.0 for _, part in told)
     return result
 
@@ -422,32 +426,126 @@ def test_the_band_of_the_study_is_the_chips(study, chip):
     offset = chip.distance_to_band(band.ridge.points, middle)
     inner = (band.ridge.distance > 40e-6) & (band.ridge.distance < 0.85 * band.length)
     assert np.abs(offset[inner]).max() < 1e-6
-    assert study.momentary_band is not None
-    assert study.momentary_band.width == pytest.approx(chip.band_width, rel=0.03)
+    assert study.segment.momentary_band is not None
+    assert study.segment.band_width == pytest.approx(chip.band_width, rel=0.03)
     drift = chip.shear_angle_drift * CAMERA.integration_time * band.length / 2
-    assert study.sweep == pytest.approx(drift, abs=2e-6)
+    assert study.segment.sweep == pytest.approx(drift, abs=2e-6)
 
 
 def test_contact_and_errors_of_the_study_make_sense(study, chip):
     lift = 3e-6 / np.tan(radians(12.0))
     assert study.rake.contact_length == pytest.approx(chip.contact_length + lift, abs=8e-6)
-    assert study.rake.error < study.rake.psf_error < 0
-    assert study.band_errors.error < study.band_errors.psf_error < 0
-    assert study.band_errors.worst <= study.band_errors.error
-    assert study.surfaces["chip 1"].band_motion <= 0
+    rake, band = study.rake.face, study.band_errors.centre
+    assert rake.error < rake.psf_portion < 0
+    assert band.error < band.psf_portion < 0
+    assert study.rake.extremum.error <= rake.error
+    assert study.band_errors.worst.error <= band.error
+    assert study.band_errors.worst.error == min(study.band_errors.beside)
+    assert (study.draws.band_line.motion <= 0).all()
+
+
+def test_the_measured_centre_of_a_band_is_where_the_image_is_hottest(study):
+    band = study.band_errors
+    near = np.abs(band.line.distance) <= 2 * CAMERA.pitch
+    hottest = np.flatnonzero(near)[np.argmax(band.measured[near])]
+    assert band.measured_centre.error == band.case_1[hottest]
+    errors = study.surfaces["chip 1"].errors
+    measured = study.surfaces["chip 1"].measurement.radiance_temperature(flagged=True)
+    there = np.isfinite(errors.reference)
+    np.testing.assert_allclose(errors.measured[there], measured[study.developed][there], atol=1e-9)
+
+
+def test_the_first_draw_is_the_papers_procedure(study):
+    headlines = study.draws.headlines
+    for name, place in (
+        ("rake", study.rake.face),
+        ("rake_extremum", study.rake.extremum),
+        ("rake_mean", study.rake.along_contact),
+        ("band", study.band_errors.centre),
+        ("band_measured", study.band_errors.measured_centre),
+        ("band_worst", study.band_errors.worst),
+    ):
+        assert headlines[name].error.values.shape == (1, 3, 4)
+        assert headlines[name].error.values[0, 0, 0] == place.error
+        assert headlines[name].psf_portion.values[0, 0, 0] == place.psf_portion
+    np.testing.assert_array_equal(study.draws.rake_line.case_1[0, 0, 0], study.rake.case_1)
+
+
+def test_every_draw_is_the_loop_of_figure_6(chip):
+    """A literal transcription: textures of other seeds, pixels that begin at another sample."""
+    scene, phases, group = chip.scene(), 3, 3
+    surfaces = {"chip 1": CHIP_1, "chip 2": CHIP_2}
+    plan = Plan(instants=5, phases=phases, textures=2, psf_widths=(12e-6,))
+    result = analyse(scene, surfaces, CAMERA, plan)
+    start, kernel = result.segment.start, CAMERA.psf.kernel(CAMERA.pitch)
+    first = int(np.searchsorted(scene.times, start - 1e-9))
+    frames = [scene.frame(i) for i in range(first, first + 20)]
+    place = scene.tool.rake_point(result.rake.contact_length / 2)
+    for texture in range(2):
+        field = replace(CHIP_2, seed=CHIP_2.seed + texture).on(scene)
+        emissivities = [field.emissivity(frame) for frame in frames]
+        for phase in range(phases**2):
+            down, right = divmod(phase, phases)
+            rows = (chip.raster.rows - down) // group * group
+            columns = (chip.raster.columns - right) // group * group
+            part = (slice(down, down + rows), slice(right, right + columns))
+            hot = [frame.temperature[part].astype(np.float64) for frame in frames]
+            grey = [emissivity[part].astype(np.float64) for emissivity in emissivities]
+            measured = figure_6(hot, grey, BAND.radiance, BAND.temperature, kernel, group)
+            peak = np.max([e * BAND.radiance(t) for t, e in zip(hot, grey, strict=True)], axis=0)
+            grouped = peak.reshape(rows // group, group, columns // group, group)
+            error = measured - BAND.temperature(grouped.max(axis=(1, 3)))
+            x = chip.raster.left + right * 2e-6 + 6e-6 * (np.arange(columns // group) + 0.5)
+            y = chip.raster.top - down * 2e-6 - 6e-6 * (np.arange(rows // group) + 0.5)
+            read = RegularGridInterpolator((y[::-1], x), error[::-1])
+            found = result.draws.headlines["rake"].error.values[0, texture, phase]
+            # Radiance within 4e-7 by the look-up and float32: 1e-3 K.
+            assert found == pytest.approx(read(place[::-1]).item(), abs=5e-3)
+
+
+def test_each_part_of_a_scene_with_gaps_is_a_segment(chip):
+    whole = chip.scene()
+    # The first part grows the band, the second holds one exposure of 20 frames after a gap.
+    kept = [*range(0, 50), *range(55, 75)]
+    scene = Scene(whole.data.isel(time=kept))
+    plan = Plan(instants=5, phases=1, textures=2, psf_widths=(12e-6,))
+    result = analyse(scene, {"chip 1": CHIP_1, "chip 2": CHIP_2}, CAMERA, plan)
+    starts = [segment.start for segment in result.segments]
+    assert starts[1] == whole.times[55]
+    assert result.instants[-1].start <= whole.times[30]
+    assert result.draws.headlines["band"].error.values.shape == (2, 2, 1)
+    alone = Scene(whole.data.isel(time=range(55, 75)))
+    other = analyse(alone, {"chip 1": CHIP_1, "chip 2": CHIP_2}, CAMERA, plan)
+    np.testing.assert_allclose(
+        result.draws.headlines["band"].error.values[1],
+        other.draws.headlines["band"].error.values[0],
+        atol=1e-9,
+    )
 
 
 def test_the_sensitivity_meets_the_study_at_its_own_width(study):
     by_order = {series.psf_order: series for series in study.sensitivity}
-    series = by_order["sensor"]
-    at = int(np.flatnonzero(np.isclose(series.widths, 12e-6))[0])
-    assert series.rake_error[at] == pytest.approx(study.rake.error)
-    assert series.rake_share[at] == pytest.approx(study.rake.psf_share)
-    assert series.band_error[at] == pytest.approx(study.band_errors.error)
-    assert series.band_worst[at] == pytest.approx(study.band_errors.worst)
     for series in by_order.values():
-        assert (np.diff(series.band_error) < 0).all()
-        assert (np.diff(series.rake_share) > 0).all()
+        at = int(np.flatnonzero(np.isclose(series.widths, 12e-6))[0])
+        camera = replace(CAMERA, psf_order=series.psf_order)
+        for name, headline in study.draws.headlines.items():
+            if series.psf_order != CAMERA.psf_order:
+                continue
+            drawn = headline.error.values[:, 0]
+            np.testing.assert_allclose(series.errors[name][at], drawn.ravel(), atol=1e-9)
+            assert series.error(name)[at] == pytest.approx(drawn.mean())
+        face = series.errors["rake"][at, 0]
+        errors = error_images(camera, exposure_at(study, "chip 2"))
+        contact = study.rake.contact_length
+        expected = rake_errors(errors, contact, TOOL, 60e-6, 1e-6).face.error
+        assert face == pytest.approx(expected, abs=1e-9)
+        assert (np.diff(series.error("band")) < 0).all()
+        assert (np.diff(series.psf_share("rake")) > 0).all()
+
+
+def exposure_at(study, name):
+    surface = {"chip 1": CHIP_1, "chip 2": CHIP_2}[name]
+    return CAMERA.expose(AnalyticChip().scene(), surface, study.segment.start)
 
 
 def test_the_curves_run_along_the_ridges(study):
@@ -472,7 +570,7 @@ def test_a_study_that_can_not_be_is_refused(chip):
     plan = Plan(rake_surface="chip 1")
     with pytest.raises(ValueError, match="expected an exposure's 2e-05 s"):
         analyse(scene, surfaces, replace(CAMERA, integration_time=2e-5), plan)
-    for name in ("instants", "line_step", "touching"):
+    for name in ("instants", "phases", "textures", "line_step", "touching"):
         with pytest.raises(ValueError, match=f"plan: {name}"):
             Plan(**{name: 0})
     bare = scene.data.copy()

@@ -21,12 +21,12 @@ from chipglow.camera import (
     MeasuredPSF,
     Measurement,
 )
-from chipglow.camera.exposure import expose, frame_weights
+from chipglow.camera.exposure import expose, expose_all, frame_weights
 from chipglow.camera.sampling import integrate, overlap_lengths, sensor_raster
 from chipglow.io import read_measurement, write_measurement
 from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Raster, Scene
-from chipglow.surface import EmissivityField, Surface, UniformSurface
+from chipglow.surface import CHIP_1, CHIP_2, EmissivityField, Surface, UniformSurface
 
 SPACING = 2e-6 / 3
 STEP = 0.2e-6
@@ -154,8 +154,53 @@ def test_peaks_and_centre():
     # float32 has a step of 6e-8, the look-up is within 4e-7
     np.testing.assert_allclose(exposure.peak_radiance, radiance.max(axis=0), rtol=1e-6)
     np.testing.assert_allclose(exposure.centre_radiance, radiance[2], rtol=1e-6)
-    peak = np.where(surface.values > 0, temperature, np.nan).max(axis=0)
-    np.testing.assert_array_equal(exposure.peak_temperature, peak)
+    np.testing.assert_array_equal(exposure.peak_temperature, temperature.max(axis=0))
+
+
+def test_no_emissivity_is_not_no_material():
+    scene = make_scene(np.full((1, 18, 18), 900.0), material=0)
+    solid = make_scene(np.full((1, 18, 18), 900.0))
+    camera = Camera(reflected=800.0)
+    mirror, nothing = (camera.expose(s, UniformSurface(0.0), 0.0) for s in (solid, scene))
+    np.testing.assert_allclose(mirror.mean_radiance, camera.band.radiance(800.0))
+    assert (mirror.peak_temperature == 900.0).all()
+    assert (nothing.mean_radiance == 0.0).all()
+
+
+def test_exposures_of_several_surfaces_are_those_of_each():
+    scene, painted = random_scene()
+    surfaces = [painted, UniformSurface(0.3), CHIP_1.redrawn(2)]
+    coordinates = np.meshgrid(scene.raster.x, scene.raster.y)
+    data = scene.data.assign(
+        {
+            name: (("time", "y", "x"), np.broadcast_to(grid, (6, *grid.shape)), {"units": "m"})
+            for name, grid in zip(("material_x", "material_y"), coordinates, strict=True)
+        }
+    )
+    scene = Scene(data)
+    for some in (surfaces, [CHIP_1, CHIP_2, CHIP_1.redrawn(1)]):
+        fields = [surface.on(scene) for surface in some]
+        found = expose_all(scene, fields, Camera().band, 0.1 * STEP, 4 * STEP, 500.0)
+        for one, surface in zip(found, some, strict=True):
+            alone = expose(scene, surface.on(scene), Camera().band, 0.1 * STEP, 4 * STEP, 500.0)
+            for name in ("mean_radiance", "peak_radiance", "peak_temperature", "centre_radiance"):
+                np.testing.assert_array_equal(getattr(one, name), getattr(alone, name))
+
+
+@pytest.mark.parametrize("start", [3.0, 4.5, 6.0, 9.0])
+def test_an_exposure_in_a_gap_is_refused(start):
+    """Frames at 0 to 4 and 10 to 14: the one before a gap stands for one step, not for six."""
+    times = STEP * np.array([0, 1, 2, 3, 4, 10, 11, 12, 13, 14], float)
+    with pytest.raises(ValueError, match="reaches into a gap of the scene"):
+        frame_weights(times, STEP, start * STEP, 3 * STEP)
+
+
+def test_exposures_beside_a_gap_are_taken():
+    times = STEP * np.array([0, 1, 2, 3, 4, 10, 11, 12, 13, 14], float)
+    for start, expected in ((2.0, range(2, 5)), (10.0, range(5, 8)), (12.0, range(7, 10))):
+        indices, weights = frame_weights(times, STEP, start * STEP, 3 * STEP)
+        assert indices == expected
+        np.testing.assert_allclose(weights, 1 / 3)
 
 
 def test_peaks_count_only_what_the_exposure_covers():

@@ -10,13 +10,17 @@ import pytest
 import xarray as xr
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis import PAPER, Inertia, Plan, analyse
+from chipglow.analysis import PAPER, Distribution, Inertia, Plan, analyse
+from chipglow.analysis.draws import CAUSES
 from chipglow.camera import Camera
 from chipglow.report import Row, comparison_rows, write_report
 from chipglow.report.chip import chip_rows
-from chipglow.report.evidence import crossing
+from chipglow.report.comparison import cause_rows
+from chipglow.report.evidence import answer, crossing, place
 from chipglow.surface import CHIP_1, CHIP_2
 
+TITLE = "My <i>own</i> study"
+REMARKS = ["Assumed: the moon is made of <b>cheese</b>."]
 STUDY = "cutting:\n  speed: 250 m/min  # <script>alert('&')</script>\n"
 PROVENANCE = {"Study": "<b>the paper's</b>", "Version": "0.0", "Seed": "1"}
 FIGURES = {
@@ -38,14 +42,15 @@ def result():
         AnalyticChip(frames=60).scene(),
         {"chip 1": CHIP_1, "chip 2": CHIP_2},
         Camera(psf_order="sensor"),
-        Plan(instants=3, psf_widths=(4e-6, 12e-6, 20e-6)),
+        Plan(instants=3, phases=2, textures=2, psf_widths=(4e-6, 12e-6, 20e-6)),
     )
 
 
 @pytest.fixture(scope="module")
 def folder(result, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    assert write_report(result, folder, STUDY, PROVENANCE) == folder / "report.html"
+    report = write_report(result, folder, TITLE, STUDY, PROVENANCE, REMARKS)
+    assert report == folder / "report.html"
     return folder
 
 
@@ -57,12 +62,15 @@ class Page(HTMLParser):
     def __init__(self, text):
         super().__init__()
         self.open, self.seen, self.text, self.sources = [], [], [], []
+        self.ids, self.alts = [], []
         self.feed(text)
         self.close()
 
     def handle_starttag(self, tag, attrs):
         self.seen.append(tag)
         self.sources += [value for name, value in attrs if name in ("src", "href")]
+        self.ids += [value for name, value in attrs if name == "id"]
+        self.alts += [value for name, value in attrs if name == "alt"]
         if tag not in self.VOID:
             self.open.append(tag)
 
@@ -93,21 +101,51 @@ def test_the_page_stands_alone_and_escapes_text(folder, result):
     assert page.open == []
     assert page.seen.count("img") == len(FIGURES)
     assert all(s.startswith(("data:image/png;base64,", "#")) for s in page.sources)
-    assert "script" not in page.seen and "b" not in page.seen
+    assert not {"script", "b", "i"} & set(page.seen)
     shown = "".join(page.text)
     assert STUDY in shown
-    for value in PROVENANCE.values():
+    for value in (*PROVENANCE.values(), *REMARKS, *answer(result)):
         assert value in shown
-    for row in comparison_rows(result):
-        for part in (row.quantity, row.paper_text, row.here_text, row.explanation):
+    rows, causes, chip = comparison_rows(result), cause_rows(result), chip_rows(result.chip)
+    for row in rows:
+        for part in (row.quantity, row.paper_text, row.here_text, row.range_text, row.explanation):
             assert part in shown
+    for row in causes:
+        assert all(text in shown for text in row.texts)
     for number in (5, 6, 9, 10, 11):
         assert f"Figure {number}" in shown
-    chip = chip_rows(result.chip)
     for line in chip:
         for part in (line.quantity, line.value_text, line.spread_text, line.explanation):
             assert part in shown
-    assert page.seen.count("tr") == 2 + len(comparison_rows(result)) + len(chip)
+    # Explanations have rows of their own.
+    assert page.seen.count("tr") == 3 + 2 * len(rows) + len(causes) + 2 * len(chip)
+
+
+def test_the_study_heads_the_page_and_the_answer_comes_first(folder, result):
+    page = Page((folder / "report.html").read_text(encoding="utf-8"))
+    shown = "".join(page.text)
+    assert shown.count(TITLE) == 2
+    places = [shown.index(text) for text in (TITLE, answer(result)[0], REMARKS[0], "0.0")]
+    assert places == sorted(places)
+    assert shown.index(PROVENANCE["Study"]) > shown.index(answer(result)[-1])
+
+
+def test_every_id_is_there_once_and_every_picture_is_described(folder, result):
+    page = Page((folder / "report.html").read_text(encoding="utf-8"))
+    assert len(set(page.ids)) == len(page.ids)
+    linked = {source[1:] for source in page.sources if source.startswith("#")}
+    assert linked <= set(page.ids)
+    assert len(page.alts) == len(FIGURES)
+    assert all(len(alt) > 80 and alt.endswith(".") for alt in page.alts)
+
+
+def test_the_answer_states_scatter_and_whether_the_paper_differs(result):
+    sentences = answer(result)
+    error = result.draws.headlines["rake"].error
+    assert f"{-error.mean:.0f} ± {error.standard_deviation:.0f} °C" in sentences[0]
+    assert "8 draws" in sentences[0]
+    for sentence in sentences:
+        assert ("lies within this scatter" in sentence) != ("lies outside this scatter" in sentence)
 
 
 def test_inertia_that_is_too_much_is_said(result):
@@ -130,10 +168,19 @@ def test_the_summary_is_strict_json(folder, result):
     text = (folder / "summary.json").read_text(encoding="utf-8")
     summary = json.loads(text, parse_constant=refuse)
     assert summary["provenance"] == PROVENANCE
-    assert summary["results"]["rake_error_degC"] == result.rake.error
-    assert summary["results"]["band_error_degC"] == result.band_errors.error
+    for name, one in (("rake", result.rake.face), ("band", result.band_errors.centre)):
+        error = result.draws.headlines[name].error
+        key = f"{name}_error_degC"
+        assert summary["results"][key] == summary["draws"][key]["mean"] == error.mean
+        assert summary["draws"][key]["standard_deviation"] == error.standard_deviation
+        assert summary["draws"][key]["count"] == 8
+        assert summary["one_draw"][key] == one.error
+        parts = summary["causes"][key]
+        assert list(parts) == ["segment", "texture", "pixel phase", "causes together"]
+        assert sum(part["fraction_percent"] for part in parts.values()) == pytest.approx(100.0)
     assert summary["paper"]["rake_error_degC"] == -42.0
-    assert summary["difference"]["rake_error_degC"] == result.rake.error + 42.0
+    low, high = (summary["draws"]["rake_error_degC"][f"interval_{end}"] for end in ("low", "high"))
+    assert summary["differs"]["rake_error_degC"] is not (low <= -42.0 <= high)
     assert set(summary["explanation"]) == set(summary["results"])
     assert summary["chip"]["feed_um"] == pytest.approx(result.chip.feed * 1e6)
     assert set(summary["chip_spread"]) <= set(summary["chip"])
@@ -146,6 +193,9 @@ def test_the_arrays_come_back_with_units(folder, result):
         np.testing.assert_array_equal(stored["error_case_1"], surface.errors.case_1)
         np.testing.assert_array_equal(stored["rake_error"], surface.rake.case_1)
         np.testing.assert_array_equal(data["temperature"], result.frame.temperature)
+        drawn = result.draws.headlines["band_measured"].psf_portion.values
+        np.testing.assert_array_equal(data["draws_band_measured_psf_portion"], drawn)
+        np.testing.assert_array_equal(data["draws_rake_line_case_1"], result.draws.rake_line.case_1)
         curve = surface.curves[1]
         np.testing.assert_array_equal(stored["ridge_radiance_temperature"][1, : curve.size], curve)
         assert data.sizes["instant"] == len(result.instants)
@@ -165,8 +215,12 @@ def test_the_comparison_holds_what_the_paper_states(result):
     assert paper == {
         "rake_error_degC": -42.0,
         "rake_psf_share_percent": 45.0,
+        "rake_extremum_error_degC": -42.0,
+        "rake_extremum_psf_share_percent": 45.0,
         "band_error_degC": -46.0,
         "band_psf_share_percent": 15.0,
+        "band_measured_error_degC": -46.0,
+        "band_measured_psf_share_percent": 15.0,
         "band_worst_error_degC": -120.0,
         "segment_period_us": pytest.approx(90.0),
     }
@@ -178,11 +232,26 @@ def test_the_comparison_holds_what_the_paper_states(result):
 
 
 def test_numbers_are_printed_with_sign_unit_and_dash():
-    row = Row("error_degC", "Error", "°C", -42.0, -35.4, 0, "Why.")
-    assert (row.paper_text, row.here_text, row.difference_text) == ("−42 °C", "−35 °C", "+7 °C")
+    row = Row("error_degC", "Error", "°C", -42.0, -35.4, 0, "Why.", uncertainty=3.1)
+    assert (row.paper_text, row.here_text) == ("−42 °C", "−35 ± 3 °C")
+    assert (row.differs, row.differs_text, row.range_text) == (True, "yes", "–")
+    assert replace(row, uncertainty=3.4).differs is False
     rate = Row("rate_per_s", "Rate", "1/s", None, 123456.0, -3, "Why.")
     assert (rate.paper_text, rate.here_text) == ("–", "123 000 1/s")
-    assert rate.difference is None and rate.difference_text == "–"
+    assert rate.differs is None and rate.differs_text == "–"
+    draws = Distribution(np.array([[[-30.0, -50.0, -40.0, -44.0]]]), CAUSES)
+    drawn = replace(row, here=draws.mean, draws=draws, one_draw=-30.0, uncertainty=None)
+    assert (drawn.here_text, drawn.range_text) == ("−41 ± 8 °C", "−50 to −30")
+    assert (drawn.one_draw_text, drawn.differs_text) == ("−30 °C", "no")
+
+
+def test_the_place_of_the_papers_figure_is_stated():
+    draws = Distribution(np.array([[[-30.0, -50.0, -40.0, -44.0]]]), CAUSES)
+    near, far = (place(draws, paper, "°C") for paper in (-42.0, -120.0))
+    assert near.startswith("50 % of our 4 draws are lower than the paper's figure")
+    assert near.endswith("does not differ.") and far.endswith("the paper's differs.")
+    single = Distribution(np.full((1, 1, 1), -40.0), CAUSES)
+    assert "does not say whether" in place(single, -42.0, "°C")
 
 
 def test_a_width_is_found_where_the_series_meets_the_value():
@@ -193,10 +262,15 @@ def test_a_width_is_found_where_the_series_meets_the_value():
 
 
 def test_what_is_missing_is_left_out_and_unknown_is_null(result, tmp_path):
-    bare = replace(
-        result, forces=None, camera=replace(result.camera, psf=None, floor=None), sweep=float("nan")
-    )
-    write_report(bare, tmp_path, STUDY, PROVENANCE)
+    still = tuple(replace(segment, sweep=float("nan")) for segment in result.segments)
+    ideal = replace(result.camera, psf=None, floor=None)
+    headlines = {name: h for name, h in result.draws.headlines.items() if name != "rake"}
+    draws = replace(result.draws, headlines=headlines)
+    bare = replace(result, forces=None, camera=ideal, segments=still, draws=draws)
+    write_report(bare, tmp_path, TITLE, STUDY, PROVENANCE)
+    unseen = next(row for row in comparison_rows(bare) if row.key == "rake_error_degC")
+    assert (unseen.here_text, unseen.differs) == ("–", None)
+    assert unseen.one_draw == result.rake.face.error
     names = {path.stem for path in (tmp_path / "figures").iterdir()}
     assert names == FIGURES - {"psf", "forces"}
     assert "segment_period_us" not in {row.key for row in comparison_rows(bare)}

@@ -145,7 +145,7 @@ def test_the_default_study_has_the_librarys_defaults():
     assert cutting.tool.build() == ToolGeometry()
     assert cutting.friction.build() == Friction()
     assert cutting.numerics.build() == Numerics()
-    assert cutting.window.build() == OutputWindow()
+    assert replace(cutting.window.build(), later_bands=0) == OutputWindow()
     assert camera == Camera(psf_order="sensor")
     plan = study.analysis.build()
     # The same widths, but for the rounding of n * 1e-6.
@@ -273,12 +273,17 @@ def load(text, folder):
         (
             "cutting: {window: {end: 3 mm}}",
             "cutting",
-            "window.end: 3 mm is beyond length_of_cut, expected up to 1.958 mm",
+            "window.end: 3 mm is beyond length_of_cut, expected up to 2.6 mm",
         ),
         (
             "cutting: {window: {start: 1.9 mm, end: 1.8 mm}}",
             "cutting.window",
             "expected 0 <= start < end",
+        ),
+        (
+            "cutting: {window: {band_duration: 5 us}}",
+            "cutting.window.band_duration",
+            "5 us is shorter than the exposure, expected 10 us or more",
         ),
         ("cutting: 3", "cutting", "3 is no section, expected keys of speed"),
         ("camera: {band: 5.1-3.8 um}", "camera.band", "5.1-3.8 um is reversed"),

@@ -19,7 +19,9 @@ from chipglow.surface import (
     chip_share,
     shear_band_share,
 )
-from chipglow.surface.texture import MAP_SIZE, cubic_convolution
+from chipglow.surface.cubic import cubic_convolution
+from chipglow.surface.emissivity import REACH
+from chipglow.surface.texture import MAP_SIZE
 
 RASTER = Raster(left=-60e-6, top=80e-6, spacing=2e-6, rows=50, columns=60)
 VOID, WORKPIECE, TOOL = 0, 1, 2
@@ -33,7 +35,8 @@ FLAT = FeatureSurface(
 
 def texture(mean=0.5, deviation=0.05, grain=20e-6, seed=1, restore=True):
     generator = np.random.default_rng(seed)
-    return Texture.random(mean, deviation, grain, generator, restore_deviation=restore)
+    emissivity = Emissivity(mean, deviation)
+    return Texture.random(emissivity, grain, generator, restore_deviation=restore)
 
 
 def a_scene(times=(0.0,), coordinates=None, raster=RASTER, **changed):
@@ -72,17 +75,19 @@ def test_the_kernel_is_that_of_keys():
 def test_enlarging_is_bicubic(u, v):
     map_ = texture(grain=1.0)
     # float32: 24 bits of values and weights below 1.
-    assert map_.at(u, v) == pytest.approx(keys_by_hand(map_.nodes, u, v), abs=1e-6)
+    expected = 0.5 + 0.05 * keys_by_hand(map_.nodes, u, v)
+    assert map_.at(u, v) == pytest.approx(expected, abs=1e-6)
 
 
 def test_enlarging_passes_through_the_nodes_and_keeps_a_plane():
     map_ = texture(grain=1.0)
     node = np.arange(MAP_SIZE)
-    np.testing.assert_allclose(map_.at(node[None, :], node[:, None]), map_.nodes, atol=1e-7)
-    plane = 0.2 + 0.003 * node[None, :] + 0.002 * node[:, None]
-    inner = Texture(plane.astype(np.float32), 1.0)
+    at_nodes = map_.at(node[None, :], node[:, None])
+    np.testing.assert_allclose(at_nodes, 0.5 + 0.05 * map_.nodes, atol=1e-7)
+    plane = -4.0 + 0.03 * node[None, :] + 0.02 * node[:, None]
+    inner = Texture(plane.astype(np.float32), 1.0, Emissivity(0.5, 0.1))
     u, v = np.random.default_rng(2).uniform(2, MAP_SIZE - 3, (2, 500))
-    np.testing.assert_allclose(inner.at(u, v), 0.2 + 0.003 * u + 0.002 * v, atol=1e-6)
+    np.testing.assert_allclose(inner.at(u, v), 0.1 + 0.003 * u + 0.002 * v, atol=1e-6)
 
 
 def test_the_map_repeats():
@@ -106,7 +111,8 @@ def test_deviation_that_is_told_is_that_of_the_map(restore):
 
 
 def test_restoring_gives_the_deviation_asked_for():
-    assert texture(0.42, 0.07).deviation == pytest.approx(0.07, rel=1e-6)
+    # The sampled deviation is good to 1e-4 of itself.
+    assert texture(0.42, 0.07).deviation == pytest.approx(0.07, rel=1e-4)
 
 
 def test_without_restoring_enlarging_takes_a_fifth():
@@ -124,16 +130,58 @@ def test_mean_is_that_asked_for(restore, seed):
     assert map_.mean == pytest.approx(0.42, abs=4 * 0.07 * 1.25 / MAP_SIZE)
 
 
-def test_values_stay_within_0_and_1():
-    map_ = texture(0.95, 0.3)
-    values = map_.at(*np.random.default_rng(4).uniform(-1e-3, 1e-3, (2, 5000)))
+@pytest.mark.parametrize(
+    ("mean", "deviation"), [(0.05, 0.04), (0.03, 0.03), (0.95, 0.06), (0.5, 0.3), (0.42, 0.09)]
+)
+def test_low_and_high_emissivities_keep_mean_and_deviation_within_0_to_1(mean, deviation):
+    """Cut off at 0, mean and deviation of the first would be 0.057 and 0.033."""
+    maps = [texture(mean, deviation, seed=seed) for seed in range(12)]
+    values = np.concatenate([map_._samples.ravel() for map_ in maps])
+    assert not Emissivity(mean, deviation).is_normal
     assert values.min() >= 0.0
-    assert values.max() == 1.0
+    assert values.max() <= 1.0
+    # What would be cut off is 11 % of the first; of a beta distribution float32 rounds a few.
+    assert ((values == 0.0) | (values == 1.0)).mean() < 1e-4
+    # 12 x 16384 deviates: four standard errors of the mean, and as much of a deviation whose
+    # fourth moment is under eight times that of a normal distribution.
+    error = 1.25 * deviation / (MAP_SIZE * np.sqrt(12))
+    assert values.mean() == pytest.approx(mean, abs=4 * error)
+    assert values.std() == pytest.approx(deviation, abs=4 * error * 2)
+
+
+@given(st.floats(-5.0, 5.0))
+def test_the_papers_emissivities_are_normal(deviate):
+    for surface in (CHIP_1, CHIP_2):
+        for feature in (surface.chip, surface.shear_band, surface.workpiece, surface.tool):
+            table = feature.table.astype(np.float64)
+            assert feature.is_normal
+            found = np.interp(deviate, np.linspace(-REACH, REACH, table.size), table)
+            # float32 of a number below 1.
+            assert found == pytest.approx(feature.mean + feature.deviation * deviate, abs=1e-6)
+
+
+def test_surfaces_beside_each_other_are_those_alone():
+    generator = np.random.default_rng(7)
+    shape = (1, *RASTER.shape)
+    scene = a_scene(
+        coordinates=generator.uniform(-1e-3, 1e-3, (2, *shape)),
+        plastic_strain=generator.uniform(0.0, 0.8, shape),
+        plastic_strain_rate=generator.uniform(0.0, 4e4, shape),
+        material=generator.integers(0, 3, shape).astype(np.uint8),
+    )
+    frame = scene.frame(0)
+    many = [replace(chip, seed=seed) for seed in (3, 1, 2) for chip in (CHIP_1, CHIP_2)]
+    low = replace(CHIP_1, chip=Emissivity(0.05, 0.04))
+    for surfaces in ([*many, low], [CHIP_1, UniformSurface(0.3), low], [CHIP_2]):
+        fields = [surface.on(scene) for surface in surfaces]
+        found = fields[0].beside(fields[1:]).emissivities(frame)
+        for one, field in zip(found, fields, strict=True):
+            np.testing.assert_array_equal(one, field.emissivity(frame))
 
 
 def test_texture_refuses():
     with pytest.raises(ValueError, match=r"nodes have shape \(3, 3\), expected \(128, 128\)"):
-        Texture(np.zeros((3, 3), dtype=np.float32), 1.0)
+        Texture(np.zeros((3, 3), dtype=np.float32), 1.0, Emissivity(0.5))
     with pytest.raises(ValueError, match=r"grain must be over 0 m, got 0.0 m"):
         texture(grain=0.0)
 
@@ -147,7 +195,7 @@ def test_same_seed_same_maps_and_each_feature_its_own():
     for name in first:
         np.testing.assert_array_equal(first[name].nodes, again[name].nodes)
         assert not np.array_equal(first[name].nodes, other[name].nodes)
-    deviates = [(t.nodes - t.mean).ravel() / t.deviation for t in first.values()]
+    deviates = [texture.nodes.ravel() for texture in first.values()]
     # Independent streams: correlations of 16384 pairs scatter by 1/128; four of it.
     correlation = np.corrcoef(deviates) - np.eye(4)
     assert np.abs(correlation).max() < 4 / MAP_SIZE
@@ -342,8 +390,10 @@ def test_feature_surface_refuses(changed, message):
 def test_emissivities_refuse():
     with pytest.raises(ValueError, match=r"expected a mean of 0 to 1, got 1.2"):
         Emissivity(1.2, 0.1)
-    with pytest.raises(ValueError, match=r"expected a deviation of 0 to 0.5, got -0.1"):
+    with pytest.raises(ValueError, match=r"expected a deviation of 0 to 0.441 about a mean of 0.4"):
         Emissivity(0.4, -0.1)
+    with pytest.raises(ValueError, match=r"expected a deviation of 0 to 0 about a mean of 1"):
+        Emissivity(1.0, 0.1)
     with pytest.raises(ValueError, match=r"emissivity: expected 0 to 1, got -0.5"):
         UniformSurface(-0.5)
 

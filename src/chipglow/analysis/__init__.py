@@ -15,7 +15,9 @@ from chipglow.analysis.comparison import (
     compare,
     normalised_error,
 )
+from chipglow.analysis.distribution import Cause, Distribution
 from chipglow.analysis.dots import DotFit, Dots, find_dots, fit_dots
+from chipglow.analysis.draws import Draws, Headline, LineDraws
 from chipglow.analysis.edge_image import EdgeImage, edge_image
 from chipglow.analysis.edge_line import EdgeLine, NoEdgeError, find_edge
 from chipglow.analysis.emissivity import (
@@ -37,6 +39,7 @@ from chipglow.analysis.find_tool import FoundTool, find_tool
 from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.knife_edge import EdgeResult, KnifeEdge, knife_edge
 from chipglow.analysis.lines import Line, sample, straight_line
+from chipglow.analysis.local_error import LocalError
 from chipglow.analysis.mutual_information import ImageFit, fit_images
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
 from chipglow.analysis.psf_fit import ModelFit
@@ -46,8 +49,9 @@ from chipglow.analysis.rake_grid import RakeGrid, rake_grid
 from chipglow.analysis.regions import Area, Circle, Polygon, Region, areas, shared_pixels
 from chipglow.analysis.registration import PointFit, Registration, fit_points
 from chipglow.analysis.ridge import NoShearBandError
+from chipglow.analysis.segment import Instant, Segment
 from chipglow.analysis.segmentation import Segmentation, segmentation
-from chipglow.analysis.sensitivity import Sensitivity, Setting, sensitivity
+from chipglow.analysis.sensitivity import Sensitivity, sensitivity
 from chipglow.analysis.shear_band import ShearBand, find_shear_band
 from chipglow.analysis.size_of_source import ApertureImage, aperture_image
 from chipglow.analysis.temperature import (
@@ -66,12 +70,15 @@ __all__ = [
     "BandComparison",
     "BandErrors",
     "BandProfile",
+    "Cause",
     "ChipMetrics",
     "ChipScan",
     "Circle",
     "Comparison",
+    "Distribution",
     "DotFit",
     "Dots",
+    "Draws",
     "EdgeImage",
     "EdgeLine",
     "EdgeResult",
@@ -81,12 +88,16 @@ __all__ = [
     "Fit",
     "FoundTool",
     "GridComparison",
+    "Headline",
     "Heating",
     "ImageFit",
     "Inertia",
+    "Instant",
     "KnifeEdge",
     "KnownEmissivity",
     "Line",
+    "LineDraws",
+    "LocalError",
     "ModelFit",
     "NoEdgeError",
     "NoShearBandError",
@@ -102,9 +113,9 @@ __all__ = [
     "Region",
     "RegionEmissivity",
     "Registration",
+    "Segment",
     "Segmentation",
     "Sensitivity",
-    "Setting",
     "ShearBand",
     "Stage",
     "StatedUncertainties",

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.error import ErrorImages
 from chipglow.analysis.lines import Line, sample
-from chipglow.analysis.rake import share
+from chipglow.analysis.local_error import LocalError, lowest_near
 from chipglow.analysis.shear_band import ShearBand
 
 
@@ -22,26 +22,30 @@ class BandErrors:
         side, positive in the chip.
     case_1, psf_portion : ndarray
         On the line, with everything and the point spread function's part of it.
+    measured : ndarray
+        Measured radiance temperature on the line in K.
+    pitch : float
+        Distance between pixels in m.
     """
 
     line: Line
     case_1: NDArray[np.float64]
     psf_portion: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    pitch: float
 
     @property
-    def error(self) -> float:
-        """Error at the centre of the band in K: the paper's headline figure."""
-        return float(self.case_1[self._centre])
+    def centre(self) -> LocalError:
+        """On the ridge of the strain rate: the paper's figure."""
+        return self._at(self._centre)
 
     @property
-    def psf_error(self) -> float:
-        """The part of `error` that the point spread function makes, in K."""
-        return float(self.psf_portion[self._centre])
+    def measured_centre(self) -> LocalError:
+        """Where the measured temperature is greatest within two pixels of the ridge.
 
-    @property
-    def psf_share(self) -> float:
-        """The part of `error` that the point spread function makes, of 1; NaN for no error."""
-        return share(self.psf_error, self.error)
+        A camera shows no strain rate: there somebody who has the image alone sees the centre.
+        """
+        return self._at(lowest_near(self.line, -self.measured, self.pitch))
 
     @property
     def beside(self) -> tuple[float, float]:
@@ -50,13 +54,16 @@ class BandErrors:
         return float(np.nanmin(self.case_1[: centre + 1])), float(np.nanmin(self.case_1[centre:]))
 
     @property
-    def worst(self) -> float:
-        """The most negative error on either side in K."""
-        return min(self.beside)
+    def worst(self) -> LocalError:
+        """The most negative error on either side."""
+        return self._at(int(np.nanargmin(self.case_1)))
 
     @property
     def _centre(self) -> int:
         return int(np.argmin(np.abs(self.line.distance)))
+
+    def _at(self, index: int) -> LocalError:
+        return LocalError(float(self.case_1[index]), float(self.psf_portion[index]))
 
 
 def band_errors(
@@ -80,4 +87,6 @@ def band_errors(
         line=line,
         case_1=sample(errors.case_1, errors.raster, line.points),
         psf_portion=sample(errors.psf_portion, errors.raster, line.points),
+        measured=sample(errors.measured, errors.raster, line.points),
+        pitch=errors.raster.spacing,
     )

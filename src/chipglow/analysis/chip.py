@@ -161,7 +161,7 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     higher line, which a taller view would have, it has lifted off and curls, so that the line
     crosses the gap and the chip aslant. The means are over whole periods, each moment
     weighted by the chip's speed, which makes them means over the chip's length. At most 64
-    frames, evenly spread, are looked at.
+    frames, evenly spread, are looked at; of a scene with gaps those of its longest part without.
     """
     tool = scene.tool
     if tool is None:
@@ -295,8 +295,8 @@ class _Passing:
 
 
 def _frame_numbers(scene: Scene) -> list[int]:
-    count = len(scene.times)
-    even = np.linspace(0, count - 1, min(count, _MOST_FRAMES))
+    frames = scene.longest_block
+    even = np.linspace(frames[0], frames[-1], min(len(frames), _MOST_FRAMES))
     return [int(number) for number in even.round()]
 
 

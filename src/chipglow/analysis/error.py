@@ -56,6 +56,11 @@ class ErrorImages:
     flagged: NDArray[np.bool_]
 
     @property
+    def measured(self) -> NDArray[np.float64]:
+        """Measured radiance temperature in K, with everything, whether flagged or not."""
+        return self.reference + self.case_1
+
+    @property
     def psf_portion(self) -> NDArray[np.float64]:
         """The part of the error that the point spread function makes: case 1 − case 2, in K."""
         return self.case_1 - self.case_2
@@ -75,16 +80,58 @@ def error_images(
     reference : ReferenceKind
         What to compare with; the paper's is the maximum.
     """
-    measured = camera.develop(exposure)
-    ideal = replace(camera, psf=None).develop(exposure)
-    truth = reference_temperature(camera, exposure, reference)
-    return ErrorImages(
-        raster=measured.raster,
-        reference=truth,
-        case_1=_temperature(camera, measured.radiance[0]) - truth,
-        case_2=_temperature(camera, ideal.radiance[0]) - truth,
-        flagged=measured.flags[0] != 0,
-    )
+    return Unblurred.of(camera, exposure, reference).errors(camera.form_image(exposure))
+
+
+@dataclass(frozen=True)
+class Unblurred:
+    """What cameras that differ in their point spread function alone make of one exposure alike.
+
+    Parameters
+    ----------
+    camera : Camera
+        Any of them.
+    raster : Raster
+        The pixels' places.
+    reference : ndarray
+        As in `ErrorImages`.
+    ideal : ndarray
+        Radiance of the pixels without point spread function in W/(m² sr), shape (y, x).
+    """
+
+    camera: Camera
+    raster: Raster
+    reference: NDArray[np.float64]
+    ideal: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, camera: Camera, exposure: Exposure, reference: ReferenceKind) -> "Unblurred":
+        """Compute it for one exposure."""
+        return cls(
+            camera,
+            camera.sensors(exposure.raster),
+            reference_temperature(camera, exposure, reference),
+            replace(camera, psf=None).form_image(exposure),
+        )
+
+    def errors(self, radiance: NDArray[np.float64]) -> ErrorImages:
+        """Error images of what a camera measured.
+
+        Parameters
+        ----------
+        radiance : ndarray
+            Radiance of its pixels, as `Camera.form_image` gives it.
+        """
+        band, floor = self.camera.band, self.camera.floor
+        measured = np.asarray(band.temperature(radiance), dtype=np.float64)
+        ideal = np.asarray(band.temperature(self.ideal), dtype=np.float64)
+        return ErrorImages(
+            raster=self.raster,
+            reference=self.reference,
+            case_1=measured - self.reference,
+            case_2=ideal - self.reference,
+            flagged=~(measured >= (floor or 0.0)),
+        )
 
 
 def reference_temperature(

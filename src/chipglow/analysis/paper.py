@@ -1,6 +1,6 @@
 """The study of Heigel and Whitenton (2010): what they found, and the same analysis of a scene."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import nan
 from typing import Final
@@ -8,21 +8,22 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis.band_error import BandErrors, band_errors
+from chipglow.analysis.band_error import BandErrors
 from chipglow.analysis.chip import ChipMetrics, chip_metrics
+from chipglow.analysis.draws import Draws, Site, draw_errors
 from chipglow.analysis.error import ErrorImages, ReferenceKind, error_images
 from chipglow.analysis.inertia import Inertia, inertia
-from chipglow.analysis.lines import nearest, sample
-from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
+from chipglow.analysis.lines import sample
+from chipglow.analysis.rake import RakeErrors
 from chipglow.analysis.ridge import NoShearBandError
+from chipglow.analysis.segment import Instant, Segment
 from chipglow.analysis.segmentation import Segmentation, segmentation
-from chipglow.analysis.sensitivity import PSF_ORDERS, Sensitivity, Setting, sensitivity
-from chipglow.analysis.shear_band import ShearBand, find_shear_band
-from chipglow.camera import Camera, Exposure, Measurement
-from chipglow.camera.exposure import expose, frame_weights
+from chipglow.analysis.sensitivity import Sensitivity, sensitivity
+from chipglow.analysis.shear_band import ShearBand
+from chipglow.camera import Camera, Exposure, Measurement, expose_all
 from chipglow.cutting import EnergyHistory
 from chipglow.radiometry import Band
-from chipglow.scene import ENERGY_UNITS, Frame, Material, Raster, Scene, Tool
+from chipglow.scene import ENERGY_UNITS, Frame, Raster, Scene, Tool
 from chipglow.surface import EmissivityField, Surface
 
 Progress = Callable[[str, float], None]
@@ -62,7 +63,10 @@ class Plan:
     Parameters
     ----------
     instants : int
-        Number of exposures, spread evenly over the scene.
+        Number of exposures, spread evenly over the scene's longest part without a gap.
+    phases, textures : int
+        How often each headline is drawn anew: positions of the pixels along each axis (3 makes 9),
+        and textures of the emissivity. Segments are drawn as many as the scene has parts.
     rake_surface, band_surface : str
         Names of the surfaces whose errors are read at the rake face (the paper: chip 2) and at
         the shear band (the paper: chip 1).
@@ -83,6 +87,8 @@ class Plan:
     """
 
     instants: int = 9
+    phases: int = 3
+    textures: int = 5
     rake_surface: str = "chip 2"
     band_surface: str = "chip 1"
     psf_widths: tuple[float, ...] = field(
@@ -94,39 +100,14 @@ class Plan:
     touching: float = 3e-6
 
     def __post_init__(self) -> None:
-        if self.instants < 1:
-            raise ValueError(f"plan: instants is {self.instants!r}, expected 1 or more")
+        for name in ("instants", "phases", "textures"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"plan: {name} is {getattr(self, name)!r}, expected 1 or more")
         if not self.psf_widths or min(self.psf_widths) <= 0:
             raise ValueError(f"plan: psf_widths is {self.psf_widths!r}, expected lengths over 0 m")
         for name in ("line_reach", "line_step", "touching"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"plan: {name} is {getattr(self, name)!r}, expected over 0 m")
-
-
-@dataclass(frozen=True)
-class Instant:
-    """The shear band during one exposure.
-
-    Parameters
-    ----------
-    start : float
-        When the exposure begins in s.
-    band : ShearBand or None
-        Ridge of the strain rate's mean over the exposure; None if there is none.
-    temperatures : ndarray
-        Mean true temperature over the exposure along the ridge in K, shape (n,); NaN outside the
-        scene, empty without a band.
-    """
-
-    start: float
-    band: ShearBand | None
-    temperatures: NDArray[np.float64]
-
-    @property
-    def mean_temperature(self) -> float:
-        """Mean of the temperatures along the ridge in K; NaN without a band."""
-        known = self.temperatures[np.isfinite(self.temperatures)]
-        return float(known.mean()) if known.size else nan
 
 
 @dataclass(frozen=True)
@@ -150,9 +131,6 @@ class SurfaceResult:
     curves : tuple of ndarray
         Measured radiance temperature along the ridge of every instant in K, whether under the
         camera's floor or not; empty for instants without a band.
-    rake_motion, band_motion : float
-        Error in K that the motion during the exposure alone makes, without size of source and
-        point spread function: in the chip at mid-contact, and at the band's middle.
     """
 
     measurement: Measurement
@@ -162,8 +140,6 @@ class SurfaceResult:
     rake: RakeErrors
     band: BandErrors
     curves: tuple[NDArray[np.float64], ...]
-    rake_motion: float
-    band_motion: float
 
 
 @dataclass(frozen=True)
@@ -194,59 +170,66 @@ class StudyResult:
         The camera.
     raster : Raster
         The scene's samples.
-    tool : Tool
-        The tool.
-    frame : Frame
-        The scene in the middle of the developed instant's exposure.
     instants : tuple of Instant
-        The shear band over the scene.
+        The shear band over the scene's longest part without a gap.
     developed : int
         Number of the instant with the fully developed shear band: that with the greatest mean
         temperature along the ridge.
-    momentary_band : ShearBand or None
-        The band in `frame` alone, which motion does not blur; None if there is none.
-    sweep : float
-        How far the band's middle moves across itself during the developed exposure, in m; NaN
-        where it is not found in both the first and the last frame.
+    segments : tuple of Segment
+        Segments with a developed band: that of the developed instant, then one for each other part
+        of the scene.
     surfaces : mapping
-        Results by the surfaces' names.
+        By the surfaces' names: the paper's procedure, which is one draw.
+    draws : Draws
+        The headline errors over segments, textures and positions of the pixels.
     sensitivity : tuple of Sensitivity
         For either order of blur and sensors.
     forces : ForceHistory or None
         If the scene has them.
     chip : ChipMetrics
-        Shape, motion and shear band of the chip over the whole scene.
+        Shape, motion and shear band of the chip over the scene's longest part without a gap.
     """
 
     plan: Plan
     camera: Camera
     raster: Raster
-    tool: Tool
-    frame: Frame
     instants: tuple[Instant, ...]
     developed: int
-    momentary_band: ShearBand | None
-    sweep: float
+    segments: tuple[Segment, ...]
     surfaces: Mapping[str, SurfaceResult]
+    draws: Draws
     sensitivity: tuple[Sensitivity, ...]
     forces: ForceHistory | None
     chip: ChipMetrics
 
     @property
+    def segment(self) -> Segment:
+        """The segment of the paper's procedure."""
+        return self.segments[0]
+
+    @property
+    def tool(self) -> Tool:
+        """The tool."""
+        return self.segment.tool
+
+    @property
+    def frame(self) -> Frame:
+        """The scene in the middle of the developed instant's exposure."""
+        return self.segment.frame
+
+    @property
     def band(self) -> ShearBand:
         """The fully developed shear band."""
-        band = self.instants[self.developed].band
-        assert band is not None
-        return band
+        return self.segment.band
 
     @property
     def rake(self) -> RakeErrors:
-        """Errors at the rake face, with the surface that the plan names for it."""
+        """Errors at the rake face in one draw, with the surface that the plan names for it."""
         return self.surfaces[self.plan.rake_surface].rake
 
     @property
     def band_errors(self) -> BandErrors:
-        """Errors at the shear band, with the surface that the plan names for it."""
+        """Errors at the shear band in one draw, with the surface that the plan names for it."""
         return self.surfaces[self.plan.band_surface].band
 
 
@@ -280,30 +263,32 @@ def analyse(
     """
     _check(scene, surfaces, plan)
     tell = progress or _say_nothing
-    starts = _starts(scene, camera.integration_time, plan.instants)
-    instants = _instants(scene, camera, starts, tell)
+    duration = camera.integration_time
+    starts = _starts(scene, duration, plan.instants)
+    instants = _instants(scene, duration, starts, tell)
     means = [instant.mean_temperature for instant in instants]
     if np.isnan(means).all():
         raise NoShearBandError("shear band: none is found in any of the exposures")
     developed = int(np.nanargmax(means))
-    moment = _Moment.of(scene, camera, plan, instants[developed])
-    results, exposures = {}, {}
-    for name, surface in surfaces.items():
-        results[name], exposures[name] = _measure_surface(
-            scene, surface.on(scene), camera, plan, instants, developed, moment, name, tell
-        )
+    segments = _segments(scene, camera, plan, instants[developed])
+    results = _measure(scene, surfaces, camera, plan, instants, developed, segments[0], tell)
+    sites = _sites(scene, surfaces, camera, plan, segments, tell)
     return StudyResult(
         plan=plan,
         camera=camera,
         raster=scene.raster,
-        tool=moment.tool,
-        frame=moment.frame,
         instants=instants,
         developed=developed,
-        momentary_band=moment.momentary_band,
-        sweep=moment.sweep,
+        segments=segments,
         surfaces=results,
-        sensitivity=_sensitivities(camera, plan, moment, exposures, tell),
+        draws=draw_errors(camera, sites, plan.phases, lambda part: tell("draws", part)),
+        sensitivity=sensitivity(
+            camera,
+            [textures[0] for textures in sites],
+            plan.psf_widths,
+            plan.phases,
+            lambda part: tell("width of the point spread function", part),
+        ),
         forces=_forces(scene),
         chip=_chip(scene, tell),
     )
@@ -322,147 +307,132 @@ def _say_nothing(label: str, part: float) -> None:
 
 
 def _starts(scene: Scene, duration: float, count: int) -> NDArray[np.float64]:
-    """Beginnings of exposures spread over the scene, each at a frame of it."""
-    times = scene.times
-    last = times[-1] + scene.frame_spacing - duration
+    """Beginnings of exposures spread over the longest part of the scene, each at a frame of it."""
+    times, spacing = scene.times[scene.longest_block], scene.frame_spacing
+    last = times[-1] + spacing - duration
     if last < times[0] - 1e-6 * duration:
         raise ValueError(
-            f"scene: it lasts {times[-1] + scene.frame_spacing - times[0]:.4g} s, "
+            f"scene: it lasts {times[-1] + spacing - times[0]:.4g} s, "
             f"expected an exposure's {duration:.4g} s or more"
         )
     wanted = np.linspace(times[0], max(last, times[0]), count) if count > 1 else times[:1]
-    nearest_frame = np.searchsorted(times, wanted + 1e-6 * scene.frame_spacing, side="right") - 1
+    nearest_frame = np.searchsorted(times, wanted + 1e-6 * spacing, side="right") - 1
     return np.asarray(np.unique(times[nearest_frame]), dtype=np.float64)
 
 
 def _instants(
-    scene: Scene, camera: Camera, starts: NDArray[np.float64], tell: Progress
+    scene: Scene, duration: float, starts: NDArray[np.float64], tell: Progress
 ) -> tuple[Instant, ...]:
     instants = []
     for i, start in enumerate(starts):
         tell("shear band", i / starts.size)
-        instants.append(_instant(scene, camera, float(start)))
+        instants.append(Instant.at(scene, float(start), duration))
     tell("shear band", 1.0)
     return tuple(instants)
 
 
-def _instant(scene: Scene, camera: Camera, start: float) -> Instant:
+def _segments(scene: Scene, camera: Camera, plan: Plan, developed: Instant) -> tuple[Segment, ...]:
+    """The developed segment, then those of the scene's other parts that have band and contact."""
     duration = camera.integration_time
-    indices, weights = frame_weights(scene.times, scene.frame_spacing, start, duration)
-    rate = _mean(scene, "plastic_strain_rate", indices, weights)
-    workpiece = scene.data["material"][indices[len(indices) // 2]].values == Material.WORKPIECE
-    assert scene.tool is not None
-    try:
-        band = find_shear_band(scene.raster, rate, workpiece, scene.tool)
-    except NoShearBandError:
-        return Instant(start, None, np.zeros(0))
-    temperature = _mean(scene, "temperature", indices, weights)
-    return Instant(start, band, sample(temperature, scene.raster, band.ridge.points))
+    found = [developed]
+    for block in scene.blocks:
+        first, last = scene.times[block[0]], scene.times[block[-1]]
+        lasts = last - first + scene.frame_spacing
+        if block != scene.longest_block and lasts >= duration * (1 - 1e-6):
+            found.append(Instant.at(scene, float(first), duration))
+    segments = [
+        Segment.of(scene, instant, duration, plan.touching)
+        for instant in found
+        if instant.band is not None
+    ]
+    return (segments[0], *(segment for segment in segments[1:] if segment.contact_length > 0))
 
 
-def _mean(
-    scene: Scene, field_name: str, indices: range, weights: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    total = np.zeros(scene.raster.shape)
-    for index, weight in zip(indices, weights, strict=True):
-        total += weight * scene.data[field_name][index].values
-    return total
-
-
-@dataclass(frozen=True)
-class _Moment:
-    """The scene at the developed instant, and where its errors are read."""
-
-    frame: Frame
-    tool: Tool
-    band: ShearBand
-    contact: float
-    momentary_band: ShearBand | None
-    sweep: float
-
-    @classmethod
-    def of(cls, scene: Scene, camera: Camera, plan: Plan, instant: Instant) -> "_Moment":
-        assert scene.tool is not None and instant.band is not None
-        duration = camera.integration_time
-        indices, _ = frame_weights(scene.times, scene.frame_spacing, instant.start, duration)
-        frame = scene.frame(indices[len(indices) // 2])
-        workpiece = frame.material == Material.WORKPIECE
-        return cls(
-            frame=frame,
-            tool=scene.tool,
-            band=instant.band,
-            contact=contact_length(scene.raster, workpiece, scene.tool, plan.touching),
-            momentary_band=_momentary_band(scene.raster, frame, scene.tool),
-            sweep=_sweep(scene, indices, instant.band),
-        )
-
-
-def _momentary_band(raster: Raster, frame: Frame, tool: Tool) -> ShearBand | None:
-    workpiece = frame.material == Material.WORKPIECE
-    try:
-        return find_shear_band(raster, frame.plastic_strain_rate, workpiece, tool)
-    except NoShearBandError:
-        return None
-
-
-def _sweep(scene: Scene, indices: range, band: ShearBand) -> float:
-    """Travel of the greatest strain rate on the line across the band's middle."""
-    line = band.across(40e-6, scene.raster.spacing / 2)
-    places = []
-    for index in (indices[0], indices[-1]):
-        rate = scene.data["plastic_strain_rate"][index].values
-        values = np.nan_to_num(sample(rate, scene.raster, line.points))
-        inside = 0 < values.argmax() < values.size - 1
-        places.append(float(line.distance[values.argmax()]) if inside else nan)
-    return abs(places[1] - places[0])
-
-
-def _measure_surface(
+def _measure(
     scene: Scene,
-    emissivity: EmissivityField,
+    surfaces: Mapping[str, Surface],
     camera: Camera,
     plan: Plan,
     instants: tuple[Instant, ...],
     developed: int,
-    moment: _Moment,
-    name: str,
+    segment: Segment,
     tell: Progress,
-) -> tuple[SurfaceResult, Exposure]:
-    kept: list[Exposure] = []
+) -> dict[str, SurfaceResult]:
+    """What the camera makes of every instant, with every surface: the paper's procedure."""
+    fields = [surface.on(scene) for surface in surfaces.values()]
+    frames: list[list[Exposure]] = []
+    images: list[list[NDArray[np.float64]]] = [[] for _ in fields]
+    for i, instant in enumerate(instants):
+        tell("camera", i / len(instants))
+        exposures = _expose(scene, fields, camera, instant.start)
+        for image, exposure in zip(images, exposures, strict=True):
+            image.append(camera.form_image(exposure))
+        if i == developed:
+            frames.append(list(exposures))
+    tell("camera", 1.0)
+    starts = np.array([instant.start for instant in instants])
+    results = {}
+    for name, on_scene, exposure, image in zip(surfaces, fields, frames[0], images, strict=True):
+        measurement = camera.measurement(np.stack(image), starts, scene.raster)
+        errors = error_images(camera, exposure, plan.reference)
+        site = _site(plan, segment, exposure, exposure)
+        results[name] = SurfaceResult(
+            measurement=measurement,
+            emissivity=on_scene.emissivity(segment.frame),
+            scene_temperature=np.asarray(camera.band.temperature(exposure.centre_radiance)),
+            errors=errors,
+            rake=site.rake_errors(errors),
+            band=site.band_errors(errors),
+            curves=_curves(camera.band, measurement, instants),
+        )
+    return results
 
-    def exposures() -> Iterator[Exposure]:
-        for i, instant in enumerate(instants):
-            tell(f"camera, {name}", i / len(instants))
-            exposure = _expose(scene, emissivity, camera, instant.start)
-            if i == developed:
-                kept.append(exposure)
-            yield exposure
 
-    measurement = camera.develop(exposures())
-    tell(f"camera, {name}", 1.0)
-    exposure = kept[0]
-    errors = error_images(camera, exposure, plan.reference)
-    reach, step = plan.line_reach, plan.line_step
-    in_chip = moment.tool.rake_point(moment.contact / 2)
-    in_chip = in_chip + 1.5 * scene.raster.spacing * np.array(moment.tool.rake_normal)
-    middle = moment.band.ridge.points[moment.band.middle]
-    result = SurfaceResult(
-        measurement=measurement,
-        emissivity=emissivity.emissivity(moment.frame),
-        scene_temperature=np.asarray(camera.band.temperature(exposure.centre_radiance)),
-        errors=errors,
-        rake=rake_errors(errors, moment.contact, moment.tool, reach, step),
-        band=band_errors(errors, moment.band, reach, step),
-        curves=_curves(camera.band, measurement, instants),
-        rake_motion=_motion_error(camera.band, exposure, in_chip),
-        band_motion=_motion_error(camera.band, exposure, middle),
+def _sites(
+    scene: Scene,
+    surfaces: Mapping[str, Surface],
+    camera: Camera,
+    plan: Plan,
+    segments: tuple[Segment, ...],
+    tell: Progress,
+) -> list[list[Site]]:
+    """Exposures of every segment with every texture: each segment's frames are read once."""
+    used = [surfaces[name] for name in (plan.rake_surface, plan.band_surface)]
+    random = any(surface.redrawn(1) is not surface for surface in used)
+    textures = plan.textures if random else 1
+    fields = [surface.redrawn(k).on(scene) for k in range(textures) for surface in used]
+    sites = []
+    for i, segment in enumerate(segments):
+        tell("segments and textures", i / len(segments))
+        exposures = _expose(scene, fields, camera, segment.start)
+        sites.append(
+            [
+                _site(plan, segment, rake, band)
+                for rake, band in zip(exposures[::2], exposures[1::2], strict=True)
+            ]
+        )
+    tell("segments and textures", 1.0)
+    return sites
+
+
+def _site(plan: Plan, segment: Segment, rake: Exposure, band: Exposure) -> Site:
+    return Site(
+        rake_exposure=rake,
+        band_exposure=band,
+        contact_length=segment.contact_length,
+        tool=segment.tool,
+        band=segment.band,
+        half_length=plan.line_reach,
+        step=plan.line_step,
+        reference=plan.reference,
     )
-    return result, exposure
 
 
-def _expose(scene: Scene, emissivity: EmissivityField, camera: Camera, start: float) -> Exposure:
+def _expose(
+    scene: Scene, fields: Sequence[EmissivityField], camera: Camera, start: float
+) -> tuple[Exposure, ...]:
     duration = camera.integration_time
-    return expose(scene, emissivity, camera.band, start, duration, camera.reflected)
+    return expose_all(scene, fields, camera.band, start, duration, camera.reflected)
 
 
 def _curves(
@@ -475,38 +445,6 @@ def _curves(
         else np.zeros(0)
         for frame, instant in zip(frames, instants, strict=True)
     )
-
-
-def _motion_error(band: Band, exposure: Exposure, point: NDArray[np.float64]) -> float:
-    """Mean over the exposure less its peak, as radiance temperatures, at one sample."""
-    mean = nearest(exposure.mean_radiance, exposure.raster, point)
-    peak = nearest(exposure.peak_radiance, exposure.raster, point)
-    return float(band.temperature(mean)) - float(band.temperature(peak))
-
-
-def _sensitivities(
-    camera: Camera,
-    plan: Plan,
-    moment: _Moment,
-    exposures: Mapping[str, Exposure],
-    tell: Progress,
-) -> tuple[Sensitivity, ...]:
-    setting = Setting(
-        rake_exposure=exposures[plan.rake_surface],
-        band_exposure=exposures[plan.band_surface],
-        contact_length=moment.contact,
-        tool=moment.tool,
-        band=moment.band,
-        half_length=plan.line_reach,
-        step=plan.line_step,
-        reference=plan.reference,
-    )
-    results = []
-    for i, order in enumerate(PSF_ORDERS):
-        tell("width of the point spread function", i / len(PSF_ORDERS))
-        results.append(sensitivity(camera, setting, plan.psf_widths, order))
-    tell("width of the point spread function", 1.0)
-    return tuple(results)
 
 
 def _chip(scene: Scene, tell: Progress) -> ChipMetrics:

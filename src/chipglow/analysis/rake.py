@@ -1,7 +1,6 @@
 """The rake face: how far the chip touches it, and the measurement error along and across it."""
 
 from dataclasses import dataclass
-from math import nan
 from typing import Final
 
 import numpy as np
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.error import ErrorImages
 from chipglow.analysis.lines import Line, nearest, sample, straight_line
+from chipglow.analysis.local_error import LocalError, lowest_near
 from chipglow.scene import Raster, Tool
 
 _LONGEST_GAP: Final = 12e-6
@@ -31,8 +31,8 @@ class RakeErrors:
         Along the rake face over the contact; the distance in m counts from the edge.
     contact_case_1, contact_psf_portion : ndarray
         The same along the contact.
-    mean_case_1, mean_psf_portion : ndarray
-        The same at the distances of `line`, as the mean over the contact.
+    pitch : float
+        Distance between pixels in m.
     """
 
     contact_length: float
@@ -42,47 +42,32 @@ class RakeErrors:
     contact: Line
     contact_case_1: NDArray[np.float64]
     contact_psf_portion: NDArray[np.float64]
-    mean_case_1: NDArray[np.float64]
-    mean_psf_portion: NDArray[np.float64]
+    pitch: float
 
     @property
-    def error(self) -> float:
-        """Error on the rake face at mid-contact in K: the paper's headline figure."""
-        return float(self.case_1[self._face])
+    def face(self) -> LocalError:
+        """On the rake face at mid-contact: the paper's figure."""
+        return self._at(int(np.argmin(np.abs(self.line.distance))))
 
     @property
-    def psf_error(self) -> float:
-        """The part of `error` that the point spread function makes, in K."""
-        return float(self.psf_portion[self._face])
+    def extremum(self) -> LocalError:
+        """The most negative error on the line within two pixels of the face."""
+        return self._at(lowest_near(self.line, self.case_1, self.pitch))
 
     @property
-    def psf_share(self) -> float:
-        """The part of `error` that the point spread function makes, of 1; NaN for no error."""
-        return share(self.psf_error, self.error)
+    def along_contact(self) -> LocalError:
+        """The mean along the contact."""
+        return LocalError(
+            float(np.nanmean(self.contact_case_1)), float(np.nanmean(self.contact_psf_portion))
+        )
 
     @property
-    def mean_error(self) -> float:
-        """Mean error along the contact in K."""
-        return float(np.nanmean(self.contact_case_1))
-
-    @property
-    def mean_psf_share(self) -> float:
-        """The point spread function's part of the mean error along the contact, of 1."""
-        return share(float(np.nanmean(self.contact_psf_portion)), self.mean_error)
-
-    @property
-    def error_range(self) -> tuple[float, float]:
+    def contact_range(self) -> tuple[float, float]:
         """Least and greatest error along the contact in K."""
         return float(np.nanmin(self.contact_case_1)), float(np.nanmax(self.contact_case_1))
 
-    @property
-    def _face(self) -> int:
-        return int(np.argmin(np.abs(self.line.distance)))
-
-
-def share(part: float, whole: float) -> float:
-    """Part of a whole; NaN if the whole is 0."""
-    return part / whole if whole else nan
+    def _at(self, index: int) -> LocalError:
+        return LocalError(float(self.case_1[index]), float(self.psf_portion[index]))
 
 
 def contact_length(
@@ -152,11 +137,9 @@ def rake_errors(
     line = straight_line(tool.rake_point(contact / 2), tool.rake_normal, distance)
     along = np.linspace(0.0, contact, max(round(contact / step) + 1, 2))
     face = Line(along, tool.rake_point(along))
-    band = face.points[:, None] + distance[:, None] * np.array(tool.rake_normal)
     images = (errors.case_1, errors.psf_portion)
     on_line = [sample(image, errors.raster, line.points) for image in images]
     on_face = [sample(image, errors.raster, face.points) for image in images]
-    means = [_column_means(sample(image, errors.raster, band)) for image in images]
     return RakeErrors(
         contact_length=contact,
         line=line,
@@ -165,14 +148,5 @@ def rake_errors(
         contact=face,
         contact_case_1=on_face[0],
         contact_psf_portion=on_face[1],
-        mean_case_1=means[0],
-        mean_psf_portion=means[1],
+        pitch=errors.raster.spacing,
     )
-
-
-def _column_means(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean of each column over what is not NaN; NaN where nothing is left."""
-    known = np.isfinite(values)
-    count = known.sum(axis=0)
-    total = np.where(known, values, 0.0).sum(axis=0)
-    return np.asarray(np.divide(total, count, out=np.full(total.shape, nan), where=count > 0))

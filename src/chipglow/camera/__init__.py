@@ -10,9 +10,10 @@ from chipglow.camera.calibration import (
 )
 from chipglow.camera.calibration_fit import CalibrationFit, fit_linear, fit_sakuma_hattori
 from chipglow.camera.camera import Camera
+from chipglow.camera.convolution import blur
 from chipglow.camera.detector import Detector
 from chipglow.camera.developing import ImagePosition, develop_recording, flag_shares
-from chipglow.camera.exposure import Exposure
+from chipglow.camera.exposure import Exposure, expose, expose_all, frame_weights
 from chipglow.camera.measurement import UNUSABLE, Flag, Measurement
 from chipglow.camera.nonuniformity import NonUniformity
 from chipglow.camera.psf import AnnularAperturePSF, GaussianPSF, MeasuredPSF, PointSpreadFunction
@@ -41,10 +42,14 @@ __all__ = [
     "PointSpreadFunction",
     "Recording",
     "SakumaHattori",
+    "blur",
     "develop_recording",
+    "expose",
+    "expose_all",
     "find_bad_pixels",
     "fit_linear",
     "fit_sakuma_hattori",
     "flag_shares",
+    "frame_weights",
     "replace_bad_pixels",
 ]

@@ -200,10 +200,10 @@ class Camera:
                 raise ValueError(f"camera: exposures of different grids, {sensors} and {found}")
             sensors = found
             starts.append(exposure.start)
-            frames.append(self._read_out(exposure, sensors))
+            frames.append(self.form_image(exposure))
         if sensors is None:
             raise ValueError("camera: no exposure to develop, expected 1 or more")
-        return self._measurement(np.array(starts), np.stack(frames), sensors)
+        return self._measurement(np.stack(frames), np.array(starts), sensors)
 
     def measure(
         self, scene: Scene, surface: Surface, start: float | Sequence[float] | NDArray[np.float64]
@@ -238,9 +238,26 @@ class Camera:
         )
         return measured.with_tool(scene.tool) if scene.tool else measured
 
-    def _read_out(self, exposure: Exposure, sensors: Raster) -> NDArray[np.float64]:
-        """Radiance of every sensor, shape `sensors.shape`."""
+    def form_image(self, exposure: Exposure) -> NDArray[np.float64]:
+        """Image of an exposure on the pixels: point spread function and detector footprint.
+
+        Parameters
+        ----------
+        exposure : Exposure
+            What the scene sent.
+
+        Returns
+        -------
+        ndarray
+            Radiance of every pixel in W/(m² sr), shape `sensors(exposure.raster).shape`.
+
+        Raises
+        ------
+        ValueError
+            If the pixels do not fit the scene.
+        """
         image, raster = exposure.mean_radiance, exposure.raster
+        sensors = self.sensors(raster)
         if self.psf is not None and self.psf_order == "optics":
             image = blur(image, self.psf, raster.spacing)
         image = integrate(image, raster, sensors, self.fill_factor)
@@ -248,8 +265,24 @@ class Camera:
             image = blur(image, self.psf, self.pitch)
         return image
 
+    def measurement(
+        self, images: NDArray[np.float64], starts: NDArray[np.float64], scene: Raster
+    ) -> Measurement:
+        """The frames that the camera reads from images that it formed.
+
+        Parameters
+        ----------
+        images : ndarray
+            Radiance in W/(m² sr) as `form_image` gives it, shape (time, y, x).
+        starts : ndarray
+            When the integration of each began in s, shape (time,).
+        scene : Raster
+            The samples of the scene that they are images of.
+        """
+        return self._measurement(images, starts, self.sensors(scene))
+
     def _measurement(
-        self, starts: NDArray[np.float64], radiance: NDArray[np.float64], sensors: Raster
+        self, radiance: NDArray[np.float64], starts: NDArray[np.float64], sensors: Raster
     ) -> Measurement:
         return Measurement.from_radiance(
             radiance, self.band, starts, sensors, self.floor, attributes=self._attributes()

@@ -1,5 +1,6 @@
 """The exposure: a scene's radiance, summed over the integration time in one pass."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
@@ -10,11 +11,12 @@ from numpy.typing import NDArray
 
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
-from chipglow.scene import Raster, Scene
+from chipglow.scene import Material, Raster, Scene, is_gap
 from chipglow.surface import EmissivityField
 
 _STEPS_PER_KELVIN: Final = 32.0
 _ROUNDING: Final = 1e-6
+_VOID: Final = int(Material.VOID)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +35,7 @@ class Exposure:
         Largest apparent radiance of any sub-frame in W/(m² sr), float32, shape (y, x).
     peak_temperature : ndarray
         Highest true temperature of any sub-frame in K, float32, shape (y, x); NaN where no
-        sub-frame had a surface (an emissivity over 0).
+        sub-frame had material.
     centre_radiance : ndarray
         Apparent radiance at the middle of the integration in W/(m² sr), float64, shape (y, x).
 
@@ -90,45 +92,79 @@ def expose(
     Raises
     ------
     ValueError
-        If the integration reaches beyond the scene, or a temperature is outside 200 K to 4000 K
-        or an emissivity outside 0 to 1.
+        If the integration reaches beyond the scene or into a gap between its frames, or a
+        temperature is outside the range of the camera's tables or an emissivity outside 0 to 1.
 
     Notes
     -----
     Apparent radiance is ε L(T) (Equation 3 of the paper), or ε L(T) + (1 − ε) L(T_reflected)
-    (Equation 2). Where the emissivity is 0 the paper leaves the surface undefined: no radiance
-    at all. L is looked up between values 1/32 K apart, within 4e-7 of it from 250 K on.
+    (Equation 2). The void, "undefined" in the paper, has no radiance at all. L is looked up
+    between values 1/32 K apart, within 4e-7 of it from 250 K on.
+    """
+    return expose_all(scene, (emissivity,), band, start, duration, reflected)[0]
+
+
+def expose_all(
+    scene: Scene,
+    emissivities: Sequence[EmissivityField],
+    band: Band,
+    start: float,
+    duration: float,
+    reflected: float | None = None,
+) -> tuple[Exposure, ...]:
+    """Exposures of a scene with several surfaces: each of its frames is read once.
+
+    Parameters
+    ----------
+    scene, band, start, duration, reflected
+        As for `expose`.
+    emissivities : sequence of EmissivityField
+        The surfaces, laid on the scene; one or more.
+
+    Returns
+    -------
+    tuple of Exposure
+        One for each surface, the same as `expose` makes.
+
+    Raises
+    ------
+    ValueError
+        As for `expose`.
     """
     indices, weights = frame_weights(scene.times, scene.frame_spacing, start, duration)
     middle = _frame_at(scene, start + duration / 2, indices)
     environment = 0.0 if reflected is None else float(band.radiance(reflected))
     table, shape = _fine_table(band), scene.raster.shape
-    mean, centre = np.zeros(shape), np.zeros(shape)
-    peaks = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
+    stack = emissivities[0].beside(emissivities[1:])
+    mean, centre = (np.zeros((len(emissivities), *shape)) for _ in range(2))
+    peak = np.zeros(mean.shape, dtype=np.float32)
+    hottest = np.zeros(shape, dtype=np.float32)
     for index, weight in zip(indices, weights, strict=True):
         frame = scene.frame(index)
-        temperature = np.ascontiguousarray(frame.temperature)
-        surface = np.ascontiguousarray(emissivity.emissivity(frame))
-        _accumulate(temperature, surface, weight, table, environment, mean, *peaks)
+        sub_frame = (np.ascontiguousarray(frame.temperature), np.ascontiguousarray(frame.material))
+        surfaces = stack.emissivities(frame)
+        _accumulate(*sub_frame, surfaces, weight, table, environment, mean, peak, hottest)
         if index == middle:
             # Its peaks are in already: to take them again changes nothing.
-            _accumulate(temperature, surface, 1.0, table, environment, centre, *peaks)
+            _accumulate(*sub_frame, surfaces, 1.0, table, environment, centre, peak, hottest)
     if not np.isfinite(mean).all():
         raise ValueError(
             f"exposure: from {start:g} s, temperature must be {TABLE_COLDEST:g} to "
             f"{TABLE_HOTTEST:g} K and emissivity 0 to 1, but they are not at "
-            f"{np.count_nonzero(~np.isfinite(mean))} samples"
+            f"{np.count_nonzero(~np.isfinite(mean).all(axis=0))} samples"
         )
-    peak_radiance, peak_temperature = peaks
-    peak_temperature[peak_temperature == 0.0] = np.nan
-    return Exposure(
-        start=start,
-        duration=duration,
-        raster=scene.raster,
-        mean_radiance=mean,
-        peak_radiance=peak_radiance,
-        peak_temperature=peak_temperature,
-        centre_radiance=centre,
+    hottest[hottest == 0.0] = np.nan
+    return tuple(
+        Exposure(
+            start=start,
+            duration=duration,
+            raster=scene.raster,
+            mean_radiance=mean[n],
+            peak_radiance=peak[n],
+            peak_temperature=hottest,
+            centre_radiance=centre[n],
+        )
+        for n in range(len(emissivities))
     )
 
 
@@ -137,16 +173,16 @@ def frame_weights(
 ) -> tuple[range, NDArray[np.float64]]:
     """Share of an integration time that each sub-frame stands for.
 
-    A sub-frame stands for the time from its own to the next one's, the last one for
-    `frame_spacing`: 10 µs that begin with a sub-frame hold fifty of 0.2 µs, all of one weight. A
-    scene of one frame does not change, and stands for all times.
+    A sub-frame stands for the time from its own to the next one's, the last one and those before
+    a gap for `frame_spacing`: 10 µs that begin with a sub-frame hold fifty of 0.2 µs, all of one
+    weight. A scene of one frame does not change, and stands for all times.
 
     Parameters
     ----------
     times : ndarray
         Times of the scene's frames in s, ascending, shape (n,).
     frame_spacing : float
-        Time that the last frame stands for in s.
+        Usual time between frames in s.
     start, duration : float
         When the integration begins and how long it lasts, in s.
 
@@ -160,19 +196,27 @@ def frame_weights(
     Raises
     ------
     ValueError
-        If the integration reaches beyond the scene.
+        If the integration reaches beyond the scene, or into a gap between its frames.
     """
     if times.size == 1:
         return range(1), np.ones(1)
-    edges = np.append(times, times[-1] + frame_spacing)
+    ends = np.append(times[1:], times[-1] + frame_spacing)
+    before_gap = is_gap(ends - times, frame_spacing)
+    ends[before_gap] = times[before_gap] + frame_spacing
     rounding = _ROUNDING * min(frame_spacing, duration)
     end = start + duration
-    if not (start >= edges[0] - rounding and end <= edges[-1] + rounding):
+    if not (start >= times[0] - rounding and end <= ends[-1] + rounding):
         raise ValueError(
             f"exposure: {start:.9g} s to {end:.9g} s is not within the scene, which lasts from "
-            f"{edges[0]:.9g} s to {edges[-1]:.9g} s"
+            f"{times[0]:.9g} s to {ends[-1]:.9g} s"
         )
-    shared = np.minimum(edges[1:], end) - np.maximum(edges[:-1], start)
+    for gap in np.flatnonzero(before_gap):
+        if start < times[gap + 1] - rounding and end > ends[gap] + rounding:
+            raise ValueError(
+                f"exposure: {start:.9g} s to {end:.9g} s reaches into a gap of the scene, which "
+                f"has no frame from {ends[gap]:.9g} s to {times[gap + 1]:.9g} s"
+            )
+    shared = np.minimum(ends, end) - np.maximum(times, start)
     covered = np.flatnonzero(shared > rounding)
     weights = shared[covered]
     return range(int(covered[0]), int(covered[-1]) + 1), weights / weights.sum()
@@ -196,23 +240,31 @@ def _fine_table(band: Band) -> NDArray[np.float64]:
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def _accumulate(  # type: ignore[no-untyped-def]
-    temperature, emissivity, weight, table, environment, total, peak_radiance, peak_temperature
+    temperature, material, emissivity, weight, table, environment, total, peak, hottest
 ):
-    """Add one sub-frame; without branches, so that it is compiled to vector instructions."""
+    """Add one sub-frame; the innermost loops have no branches, and become vector instructions."""
+    surfaces, rows, columns = emissivity.shape
     last = table.size - 1
-    for y in prange(temperature.shape[0]):
-        for x in range(temperature.shape[1]):
+    for y in prange(rows):
+        reflected = np.empty(columns)
+        gain = np.empty(columns)
+        for x in range(columns):
             t = temperature[y, x]
-            e = emissivity[y, x]
+            there = material[y, x] != _VOID
             position = (np.float64(t) - TABLE_COLDEST) * _STEPS_PER_KELVIN
             inside = min(max(position, 0.0), last - 1.0)
             i = np.int32(inside)
             black = table[i] + (inside - i) * (table[i + 1] - table[i])
-            apparent = environment + np.float64(e) * (black - environment)
-            if e == 0.0:
-                apparent = 0.0
-            if not (0.0 <= position <= last and 0.0 <= e <= 1.0):
-                apparent = np.nan
-            total[y, x] += weight * apparent
-            peak_radiance[y, x] = max(peak_radiance[y, x], np.float32(apparent))
-            peak_temperature[y, x] = max(peak_temperature[y, x], t if e > 0.0 else np.float32(0.0))
+            if not 0.0 <= position <= last:
+                black = np.nan
+            reflected[x] = environment if there else 0.0
+            gain[x] = black - environment if there else 0.0
+            hottest[y, x] = max(hottest[y, x], t if there else np.float32(0.0))
+        for n in range(surfaces):
+            for x in range(columns):
+                e = np.float64(emissivity[n, y, x])
+                apparent = reflected[x] + e * gain[x]
+                if not 0.0 <= e <= 1.0:
+                    apparent = np.nan
+                total[n, y, x] += weight * apparent
+                peak[n, y, x] = max(peak[n, y, x], np.float32(apparent))

@@ -1,6 +1,7 @@
 """A study's results: computed, written into a folder, shown as a table."""
 
 import platform
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -18,7 +19,7 @@ from chipglow.report import comparison_rows, write_report
 from chipglow.study import Study, run, study_text
 
 
-def write_results(study: Study, folder: Path, resume: bool) -> None:
+def write_results(study: Study, folder: Path, resume: bool, remarks: Sequence[str] = ()) -> None:
     """Run a study, write its report and print the comparison with the paper.
 
     Parameters
@@ -30,6 +31,8 @@ def write_results(study: Study, folder: Path, resume: bool) -> None:
         before anything is computed.
     resume : bool
         Whether to go on with a cut that an earlier run left unfinished.
+    remarks : sequence of str
+        What a reader must know before quoting a number: printed, and on the page.
     """
     with atomic_folder(folder) as temporary:
         if study.scene is None:
@@ -38,21 +41,28 @@ def write_results(study: Study, folder: Path, resume: bool) -> None:
         with progress_bars() as progress:
             result = run(study, progress, resume, assumed.append)
             progress("report", 0.0)
-            provenance = _provenance(study, assumed)
-            report = write_report(result, temporary, study_text(study), provenance)
+            report = write_report(
+                result,
+                temporary,
+                study.title,
+                study_text(study),
+                _provenance(study),
+                [*remarks, *(f"Assumed: {sentence}" for sentence in assumed)],
+            )
             progress("report", 1.0)
     say_assumed(assumed)
     _print_comparison(result)
+    for remark in remarks:
+        print(remark)
     say_inertia(result.forces.inertia if result.forces else None)
     print(f"Report: {folder / report.relative_to(temporary)}")
 
 
-def _provenance(study: Study, assumed: list[str]) -> dict[str, str]:
+def _provenance(study: Study) -> dict[str, str]:
     origin = {"solver": SOLVER_VERSION} if study.scene is None else {"scene": study.scene}
     return {
         "chipglow": version("chipglow"),
         **origin,
-        **({"assumed": " ".join(assumed)} if assumed else {}),
         "seed": str(study.seed),
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         "python": platform.python_version(),
@@ -62,7 +72,7 @@ def _provenance(study: Study, assumed: list[str]) -> dict[str, str]:
 
 
 def _print_comparison(result: StudyResult) -> None:
-    table = Table("quantity", "the paper", "here", "difference")
+    table = Table("quantity", "the paper", "here", "range of draws", "differs")
     for row in comparison_rows(result):
-        table.add_row(row.quantity, row.paper_text, row.here_text, row.difference_text)
+        table.add_row(row.quantity, row.paper_text, row.here_text, row.range_text, row.differs_text)
     Console().print(table)

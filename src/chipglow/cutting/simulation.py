@@ -51,6 +51,7 @@ from chipglow.cutting.picture import Picture
 from chipglow.cutting.plastic_heat import heat_shares
 from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
 from chipglow.cutting.preview import Preview
+from chipglow.cutting.recording import Recorder
 from chipglow.cutting.tool_border import CELLS, border_nodes, conduct_beyond
 from chipglow.cutting.watch import Trouble, fastest_point, find_lost, find_off_grid, find_trouble
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
@@ -145,7 +146,7 @@ class CuttingSimulation:
         raster : Raster
             Samples of the frames.
         on_frame : callable
-            Called with every frame of the window, in their order.
+            Called with every frame of the window and of the bands after it, in their order.
         on_progress : callable, optional
             Called with the share of the cut that is done, 0 to 1.
         resume : Checkpoint, optional
@@ -161,7 +162,8 @@ class CuttingSimulation:
         Returns
         -------
         ForceHistory
-            Forces averaged over every interval of the window's length, from the start of the cut.
+            Forces averaged over every interval of the window's length, from the start of the cut to
+            the end of the window, or of the cut if bands after the window are recorded.
 
         Raises
         ------
@@ -175,12 +177,14 @@ class CuttingSimulation:
         state = _State(self, window.interval)
         picture = self._picture(raster, state)
         coarse = self._picture(preview.raster, state) if preview is not None else None
-        first, last = self.frame_range(window)
+        recorder = self._recorder(window)
+        last = recorder.last
         records = np.empty((last, 2 + ENERGIES))
         done = restore(state, resume, records) if resume is not None else 0
+        recorder.replay(records[:done, 0])
         for record in range(done + 1, last + 1):
             records[record - 1] = state.advance()
-            if record >= first:
+            if recorder.wants(record, records[record - 1, 0]):
                 on_frame(state.frame(picture))
             if preview is not None and coarse is not None and preview.shows(record, last):
                 preview.on_frame(state.frame(coarse))
@@ -203,11 +207,8 @@ class CuttingSimulation:
         density = cold * self.numerics.mass_scaling
         return density * self.conditions.speed**2 * self.conditions.feed
 
-    def frame_range(self, window: OutputWindow) -> tuple[int, int]:
-        """Numbers of the first and the last interval whose ends are recorded as frames."""
-        step = self.conditions.speed * window.interval
-        last = int(np.floor(window.end / step + 1e-9))
-        return max(ceil(window.start / step - 1e-9), 1), last
+    def _recorder(self, window: OutputWindow) -> Recorder:
+        return Recorder(window, self.conditions.speed, self.conditions.length_of_cut)
 
     def _check_window(self, window: OutputWindow) -> None:
         if window.end > self.conditions.length_of_cut * (1 + 1e-9):
@@ -215,8 +216,8 @@ class CuttingSimulation:
                 f"window end: {window.end * 1e3:g} mm is beyond the length of cut of "
                 f"{self.conditions.length_of_cut * 1e3:g} mm"
             )
-        first, last = self.frame_range(window)
-        if last < first:
+        recorder = self._recorder(window)
+        if recorder.last < recorder.first:
             raise ValueError(
                 f"window: no frame between {window.start * 1e3:g} mm and {window.end * 1e3:g} mm "
                 f"with an interval of {window.interval * 1e6:g} us"

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipglow.io.atomic import KeptErrorFile, atomic_path
 from chipglow.io.contents import holds
 from chipglow.io.interrupts import uninterrupted
-from chipglow.io.packing import HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
+from chipglow.io.packing import CUT, HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
 from chipglow.io.unfinished import (
     UnfinishedScene,
     checkpoint_path,
@@ -103,6 +103,8 @@ class SceneWriter:
     hottest : float
         Greatest temperature in K that the frames may have. Over the default, 1838.375 K,
         temperature takes 32 bits instead of 16 and reaches all that a scene may have.
+    packing : mapping
+        Resolution of each field; by default one that suits any scene.
     portable : bool
         Compress with zlib, which every reader of NetCDF-4 knows; by default with Blosc2, several
         times faster, which needs the HDF5 filter of ``hdf5plugin``.
@@ -113,7 +115,7 @@ class SceneWriter:
     -----
     One NetCDF-4 file, a chunk per field and frame. Temperature has steps of 25 mK from 200 K up,
     material coordinates steps of 20 nm; plastic strain, plastic strain rate and velocities are
-    within 2⁻¹⁴, 2⁻¹² and 2⁻¹¹ of their value.
+    within 2⁻¹⁴, 2⁻¹² and 2⁻¹¹ of their value, those of `packing.CUT` have steps too.
     """
 
     def __init__(
@@ -126,6 +128,7 @@ class SceneWriter:
         *,
         quality: bool = False,
         hottest: float = HOTTEST_PACKED,
+        packing: Mapping[str, Packing] = PACKING,
         portable: bool = False,
         resume: UnfinishedScene | None = None,
     ) -> None:
@@ -137,7 +140,7 @@ class SceneWriter:
             **(MATERIAL_COORDINATE_UNITS if material_coordinates else {}),
             **({QUALITY: "1"} if quality else {}),
         }
-        self._packing = packing_for(hottest)
+        self._packing = packing_for(hottest, packing)
         self._compression = _PORTABLE if portable else _FAST
         self._stack = ExitStack()
         self._times: list[float] = []
@@ -359,7 +362,7 @@ class StoredScene(Scene):
         self._file = h5py.File(path, "r")
         self._direct = {
             name: packing
-            for name, packing in (*PACKING.items(), ("temperature", HOT))
+            for name, packing in (*PACKING.items(), *CUT.items(), ("temperature", HOT))
             if self._is_packed(name, packing)
         }
         super().__init__(
@@ -371,6 +374,11 @@ class StoredScene(Scene):
         """Temperature in K over which the file can have none."""
         narrow = self._direct.get("temperature") == PACKING["temperature"]
         return HOTTEST_PACKED if narrow else HOTTEST_PLAUSIBLE
+
+    @property
+    def packing(self) -> Mapping[str, Packing]:
+        """Resolution of each field."""
+        return {**PACKING, **self._direct}
 
     @property
     def compression(self) -> str:
@@ -452,6 +460,7 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, portable: bool = 
         material_coordinates=scene.has_material_coordinates,
         quality=QUALITY in scene.data,
         hottest=scene.hottest if isinstance(scene, StoredScene) else HOTTEST_PLAUSIBLE,
+        packing=scene.packing if isinstance(scene, StoredScene) else PACKING,
         portable=portable,
     ) as writer:
         for frame in scene.frames():

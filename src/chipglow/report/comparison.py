@@ -1,11 +1,14 @@
-"""The paper's figures beside ours, each difference with its evidence."""
+"""The paper's figures beside ours, with their scatter, and whether the two differ."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
-from chipglow.analysis.paper import PAPER, PaperValue, StudyResult
+from chipglow.analysis import PAPER, Distribution, LocalError, StudyResult
+from chipglow.analysis.paper import PaperValue
 from chipglow.report import evidence
 from chipglow.report.quantity import quantity_text
 
@@ -23,13 +26,19 @@ class Row:
     unit : str
         Unit of the numbers, as printed.
     paper, here : float or None
-        The paper's figure and ours; None where there is none.
+        The paper's figure and ours, the mean where it was drawn; None where there is none.
     decimals : int
         Decimals worth printing.
     explanation : str
-        Why they differ, or what ours says.
+        What makes it, or what ours says.
     where : str
         Where the figure stands in the paper; empty without.
+    draws : Distribution or None
+        What `here` is the mean of, in the same unit; None where it is one number.
+    one_draw : float or None
+        What the paper's procedure gives, from one frame.
+    uncertainty : float or None
+        Standard uncertainty of `here` where it was not drawn, if it is known.
     """
 
     key: str
@@ -40,29 +49,88 @@ class Row:
     decimals: int
     explanation: str
     where: str = ""
+    draws: Distribution | None = None
+    one_draw: float | None = None
+    uncertainty: float | None = None
 
     @property
-    def difference(self) -> float | None:
-        """Ours less the paper's; None where one is missing."""
+    def differs(self) -> bool | None:
+        """Whether the paper's figure lies outside what one more draw would give; None: unknown.
+
+        Where ours was not drawn: whether the two are more than twice its uncertainty apart.
+        """
         if self.paper is None or self.here is None:
             return None
-        return self.here - self.paper
+        if self.draws is not None:
+            return self.draws.differs_from(self.paper) if self.draws.draws > 1 else None
+        if self.uncertainty is None:
+            return None
+        return abs(self.here - self.paper) > 2 * self.uncertainty
 
     @property
     def paper_text(self) -> str:
         """The paper's figure with its unit, or a dash."""
-        return quantity_text(self.paper, self.unit, self.decimals)
+        return self._text(self.paper)
 
     @property
     def here_text(self) -> str:
-        """Our figure with its unit, or a dash."""
-        return quantity_text(self.here, self.unit, self.decimals)
+        """Our figure with its scatter or uncertainty and its unit, or a dash."""
+        scatter = self.draws.standard_deviation if self.draws is not None else self.uncertainty
+        if self.here is None or scatter is None or not isfinite(scatter):
+            return self._text(self.here)
+        number, spread = (quantity_text(value, "", self.decimals) for value in (self.here, scatter))
+        return f"{number} ± {spread} {self.unit}".strip()
 
     @property
-    def difference_text(self) -> str:
-        """The difference with its sign and unit, or a dash; of shares in percentage points."""
-        text = quantity_text(self.difference, self.unit, self.decimals, sign="+")
-        return text.replace("%", "points")
+    def range_text(self) -> str:
+        """Least and greatest draw, or a dash."""
+        if self.draws is None or self.draws.draws < 2:
+            return "–"
+        low, high = (quantity_text(value, "", self.decimals) for value in self.draws.range)
+        return f"{low} to {high}"
+
+    @property
+    def one_draw_text(self) -> str:
+        """What one frame by the paper's procedure gives, or a dash."""
+        return self._text(self.one_draw)
+
+    @property
+    def differs_text(self) -> str:
+        """Whether the two differ: yes, no, or a dash where it is unknown."""
+        return {None: "–", True: "yes", False: "no"}[self.differs]
+
+    def _text(self, value: float | None) -> str:
+        return quantity_text(value, self.unit, self.decimals)
+
+
+@dataclass(frozen=True)
+class CauseRow:
+    """What makes one headline scatter, in percent of its sum of squares, and by how much.
+
+    Parameters
+    ----------
+    key, quantity, unit : str
+        As those of the headline's `Row`.
+    causes : tuple of tuple
+        Of each cause: its name, how many values it took, the standard deviation of the means in
+        the headline's unit (None for one value), its fraction in percent.
+    decimals : int
+        Decimals of the standard deviation worth printing.
+    """
+
+    key: str
+    quantity: str
+    unit: str
+    causes: tuple[tuple[str, int, float | None, float], ...]
+    decimals: int
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """Standard deviation and fraction of each cause."""
+        return tuple(
+            f"{quantity_text(deviation, self.unit, self.decimals)} ({fraction:.0f} %)"
+            for _, _, deviation, fraction in self.causes
+        )
 
 
 def comparison_rows(result: StudyResult) -> list[Row]:
@@ -81,46 +149,89 @@ def comparison_rows(result: StudyResult) -> list[Row]:
     return [*_error_rows(result), *_period_rows(result), *_further_rows(result)]
 
 
-def _error_rows(result: StudyResult) -> list[Row]:
+def cause_rows(result: StudyResult) -> list[CauseRow]:
+    """What makes the headlines scatter.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    """
+    return [
+        CauseRow(
+            key=row.key,
+            quantity=row.quantity,
+            unit=row.unit,
+            causes=tuple(
+                (name, part.draws, _known(part.standard_deviation), 100 * part.fraction)
+                for name, part in row.draws.parts.items()
+            ),
+            decimals=row.decimals,
+        )
+        for row in _error_rows(result)
+        if row.draws is not None and row.draws.draws > 1
+    ]
+
+
+def _error_rows(result: StudyResult) -> Iterator[Row]:
     rake, band = result.rake, result.band_errors
     on_rake, on_band = result.plan.rake_surface, result.plan.band_surface
-    return [
-        _error(
-            "rake_error_degC",
-            f"Error at the rake face, mid-contact ({on_rake})",
-            PAPER.rake_error,
-            rake.error,
-            evidence.rake_error(result),
+    yield from _headline(
+        result,
+        "rake",
+        f"Error at the rake face, mid-contact ({on_rake})",
+        rake.face,
+        (PAPER.rake_error, PAPER.rake_psf_share),
+        (evidence.rake_error(result), evidence.rake_share(result)),
+    )
+    yield from _headline(
+        result,
+        "rake_extremum",
+        f"Most negative error within two pixels of the rake face ({on_rake})",
+        rake.extremum,
+        (PAPER.rake_error, PAPER.rake_psf_share),
+        (
+            "On the same line. The error rises steeply to either side of its extremum, which "
+            "moves with the pixels; read at the face it is often less.",
+            "At the same place.",
         ),
-        _share(
-            "rake_psf_share_percent",
-            "PSF's share of it",
-            PAPER.rake_psf_share,
-            rake.psf_share,
-            evidence.rake_share(result),
+    )
+    yield from _headline(
+        result,
+        "rake_mean",
+        f"Mean error along the contact ({on_rake})",
+        rake.along_contact,
+        (None, None),
+        (evidence.contact(result), "Of the mean along the contact."),
+    )
+    yield from _headline(
+        result,
+        "band",
+        f"Error at the centre of the shear band, by the ridge of strain rate ({on_band})",
+        band.centre,
+        (PAPER.band_error, PAPER.band_psf_share),
+        (evidence.band_error(result), evidence.band_share(result)),
+    )
+    yield from _headline(
+        result,
+        "band_measured",
+        f"The same, by the ridge of measured temperature ({on_band})",
+        band.measured_centre,
+        (PAPER.band_error, PAPER.band_psf_share),
+        (
+            "Where the measured temperature is greatest within two pixels of the ridge of strain "
+            "rate: the centre for somebody who has the image alone.",
+            "At the same place.",
         ),
-        _error(
-            "band_error_degC",
-            f"Error at the centre of the shear band ({on_band})",
-            PAPER.band_error,
-            band.error,
-            evidence.band_error(result),
-        ),
-        _share(
-            "band_psf_share_percent",
-            "PSF's share of it",
-            PAPER.band_psf_share,
-            band.psf_share,
-            evidence.band_share(result),
-        ),
-        _error(
-            "band_worst_error_degC",
-            f"Most negative error beside the shear band ({on_band})",
-            PAPER.band_worst,
-            band.worst,
-            evidence.band_worst(result),
-        ),
-    ]
+    )
+    yield from _headline(
+        result,
+        "band_worst",
+        f"Most negative error beside the shear band ({on_band})",
+        band.worst,
+        (PAPER.band_worst, None),
+        (evidence.band_worst(result), "At the same place."),
+    )
 
 
 def _period_rows(result: StudyResult) -> list[Row]:
@@ -137,6 +248,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             0,
             evidence.period(result.forces.segmentation),
             PAPER.segment_period.where,
+            uncertainty=_known(segments.period_uncertainty * 1e6),
         ),
         _own(
             "force_segments_count",
@@ -201,49 +313,44 @@ def _period_rows(result: StudyResult) -> list[Row]:
 
 
 def _further_rows(result: StudyResult) -> list[Row]:
-    rake = result.rake
-    band = result.momentary_band or result.band
-    low, high = rake.error_range
+    segments = result.segments
+    contacts = np.array([segment.contact_length for segment in segments])
+    widths = np.array([segment.band_width for segment in segments])
+    rates = np.array([segment.moment.rate.max() for segment in segments])
+    middle = float(np.median([segment.moment.middle_rate for segment in segments]))
+    lengths = np.array([segment.band.length for segment in segments])
     return [
-        _own(
-            "rake_mean_error_degC",
-            "Mean error along the contact",
-            "°C",
-            rake.mean_error,
-            0,
-            f"From {_celsius(low)} to {_celsius(high)} along the contact.",
-        ),
-        _own(
+        _of_segments(
             "contact_length_um",
             "Contact length on the rake face",
             "µm",
-            rake.contact_length * 1e6,
+            contacts * 1e6,
             0,
             _contact_text(result),
         ),
-        _own(
+        _of_segments(
             "band_width_um",
             "Width of the shear band",
             "µm",
-            band.width * 1e6,
+            widths * 1e6,
             1,
             "Full width at half maximum of the plastic strain rate at one moment, median over the "
             "band's middle half. The paper's error depends on its own, which it does not state.",
         ),
-        _own(
+        _of_segments(
             "band_peak_rate_per_s",
             "Greatest plastic strain rate on the shear band",
             "1/s",
-            float(np.max(band.rate)),
+            rates,
             -3,
             "The paper's emissivity map takes 30 000 1/s and more for shear band wholly; the "
-            f"median over our band's middle half is {_thousands(band.middle_rate)} 1/s.",
+            f"median over our bands' middle halves is {_thousands(middle)} 1/s.",
         ),
-        _own(
+        _of_segments(
             "band_length_um",
             "Length of the shear band",
             "µm",
-            result.band.length * 1e6,
+            lengths * 1e6,
             0,
             "From the cutting edge to "
             + ("the free surface." if result.band.reaches_surface else "the border of the view."),
@@ -260,13 +367,76 @@ def _contact_text(result: StudyResult) -> str:
     return "From the edge up to where the chip leaves the face."
 
 
-def _error(key: str, quantity: str, paper: PaperValue, here: float, explanation: str) -> Row:
-    return Row(key, quantity, "°C", paper.value, _known(here), 0, explanation, paper.where)
+def _headline(
+    result: StudyResult,
+    name: str,
+    quantity: str,
+    one_draw: LocalError,
+    paper: tuple[PaperValue | None, PaperValue | None],
+    explanations: tuple[str, str],
+) -> Iterator[Row]:
+    """The rows of an error and of the point spread function's part of it."""
+    headline = result.draws.headlines.get(name)
+    error = headline.error if headline else None
+    share = headline.psf_share if headline else None
+    yield _drawn(
+        f"{name}_error_degC", quantity, "°C", paper[0], error, one_draw.error, explanations[0]
+    )
+    yield _drawn(
+        f"{name}_psf_share_percent",
+        "PSF's portion of it",
+        "%",
+        paper[1],
+        share,
+        one_draw.psf_share,
+        explanations[1],
+        scale=100.0,
+    )
 
 
-def _share(key: str, quantity: str, paper: PaperValue, here: float, explanation: str) -> Row:
-    percent = _known(100 * here)
-    return Row(key, quantity, "%", 100 * paper.value, percent, 0, explanation, paper.where)
+def _drawn(
+    key: str,
+    quantity: str,
+    unit: str,
+    paper: PaperValue | None,
+    draws: Distribution | None,
+    one_draw: float,
+    explanation: str,
+    scale: float = 1.0,
+) -> Row:
+    drawn = Distribution(scale * draws.values, draws.causes) if draws else None
+    return Row(
+        key,
+        quantity,
+        unit,
+        scale * paper.value if paper else None,
+        drawn.mean if drawn else None,
+        0,
+        evidence.joined(explanation, evidence.place(drawn, scale * paper.value, unit))
+        if drawn and paper
+        else explanation,
+        paper.where if paper else "",
+        drawn,
+        _known(scale * one_draw),
+    )
+
+
+def _of_segments(
+    key: str, quantity: str, unit: str, values: NDArray[np.float64], decimals: int, explanation: str
+) -> Row:
+    known = values[np.isfinite(values)]
+    draws = Distribution(known, ("segment",)) if known.size else None
+    return Row(
+        key,
+        quantity,
+        unit,
+        None,
+        draws.mean if draws else None,
+        decimals,
+        explanation,
+        draws=draws,
+        one_draw=_known(float(values[0])),
+    )
 
 
 def _own(key: str, quantity: str, unit: str, here: float, decimals: int, explanation: str) -> Row:
@@ -275,10 +445,6 @@ def _own(key: str, quantity: str, unit: str, here: float, decimals: int, explana
 
 def _known(value: float) -> float | None:
     return float(value) if isfinite(value) else None
-
-
-def _celsius(value: float) -> str:
-    return f"{value:.0f} °C".replace("-", "−")
 
 
 def _thousands(value: float) -> str:

@@ -7,22 +7,22 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis.lines import Line, sample
-from chipglow.analysis.paper import PAPER, StudyResult
-from chipglow.analysis.segmentation import Segmentation
-from chipglow.analysis.sensitivity import Sensitivity
+from chipglow.analysis import PAPER, Distribution, Segmentation, Sensitivity, StudyResult
+from chipglow.analysis.distribution import COVERAGE
 
 ORDER_TEXT: Final = {
-    "sensor": "from sensor to sensor, as in the paper",
-    "optics": "before the sensors integrate",
+    "sensor": "from pixel to pixel, as in the paper",
+    "optics": "before the pixels integrate",
 }
 
+_OUT_OF_VIEW: Final = "In some draws the place is not in the image."
+
 REFERENCE_TEXT: Final = {
-    "maximum": "the greatest radiance temperature (emissivity included) in a sensor's square "
+    "maximum": "the greatest radiance temperature (emissivity included) in a pixel's square "
     "during the exposure",
-    "mean": "the radiance temperature of the mean radiance over a sensor's square and the exposure",
-    "centre": "the radiance temperature under a sensor's centre in the middle of the exposure",
-    "true": "the greatest true temperature in a sensor's square during the exposure",
+    "mean": "the radiance temperature of the mean radiance over a pixel's square and the exposure",
+    "centre": "the radiance temperature under a pixel's centre in the middle of the exposure",
+    "true": "the greatest true temperature in a pixel's square during the exposure",
 }
 
 
@@ -31,78 +31,170 @@ def error_definition(result: StudyResult) -> str:
     return f"Errors are measured radiance temperature less {REFERENCE_TEXT[result.plan.reference]}."
 
 
+def answer(result: StudyResult) -> list[str]:
+    """What came out, in a few sentences with their scatter."""
+    sentences = [
+        _answer_text(
+            result,
+            "rake",
+            "At the rake face, half-way up the contact, the camera reads",
+            _against(result, "rake", PAPER.rake_error.value),
+        ),
+        _answer_text(
+            result,
+            "band",
+            "At the centre of the shear band it reads",
+            _against(result, "band", PAPER.band_error.value),
+        ),
+        _answer_text(
+            result,
+            "band_worst",
+            "Beside the band it reads up to",
+            _against(result, "band_worst", PAPER.band_worst.value),
+        ),
+    ]
+    return [sentence for sentence in sentences if sentence]
+
+
+def _answer_text(result: StudyResult, name: str, begin: str, end: str) -> str:
+    headline = result.draws.headlines.get(name)
+    if headline is None:
+        return ""
+    low, high = headline.error.range
+    share = headline.psf_share
+    psf = f", of which the point spread function makes {_spread(share, 100)} %" if share else ""
+    return (
+        f"{begin} {_spread(headline.error, -1)} °C too little radiance temperature ({-high:.0f} to "
+        f"{-low:.0f} °C in {headline.error.draws} draws of segment, texture and pixel phase)"
+        f"{psf}. {end}"
+    ).strip()
+
+
+def _spread(draws: Distribution, scale: float) -> str:
+    """Mean and standard deviation; the mean alone of a single draw."""
+    mean = f"{scale * draws.mean:.0f}".replace("-", "−")
+    if draws.draws < 2:
+        return mean
+    return f"{mean} ± {abs(scale) * draws.standard_deviation:.0f}"
+
+
+def _against(result: StudyResult, name: str, paper: float) -> str:
+    headline = result.draws.headlines.get(name)
+    if headline is None or headline.error.draws < 2:
+        return ""
+    if headline.error.differs_from(paper):
+        return f"The paper's {-paper:.0f} °C lies outside this scatter."
+    return f"The paper's {-paper:.0f} °C lies within this scatter."
+
+
 def rake_error(result: StudyResult) -> str:
-    """Why the error at the rake face differs."""
-    rake, surface = result.rake, result.surfaces[result.plan.rake_surface]
-    low, high = rake.error_range
+    """What makes the error at the rake face."""
+    headline, line = result.draws.headlines.get("rake"), result.draws.rake_line
+    if headline is None:
+        return _OUT_OF_VIEW
     pitch = result.camera.pitch
-    ends = sample(surface.scene_temperature, result.raster, rake.line.points)
-    distance = rake.line.distance
-    step = np.interp(pitch, distance, ends) - np.interp(-pitch, distance, ends)
-    return _join(
-        f"From one sensor inside the chip to one inside the tool the radiance temperature changes "
-        f"by {_degrees(-step)}.",
-        f"Without PSF the error is {_degrees(rake.error - rake.psf_error)}, of which motion during "
-        f"the exposure alone makes {_degrees(surface.rake_motion)}: the rest is size of source.",
-        _reach(result, lambda s: s.rake_error, PAPER.rake_error.value, _degrees),
-        f"The face crosses the sensors aslant, so along the contact the error runs from "
-        f"{_degrees(low)} to {_degrees(high)}, {_degrees(rake.mean_error)} in the mean.",
+    without = headline.error.mean - headline.psf_portion.mean
+    return joined(
+        "Means over the draws: from one pixel inside the chip to one inside the tool the radiance "
+        f"temperature changes by {_degrees(line.mean_change(pitch, -pitch))}.",
+        f"Without PSF the error is {_degrees(without)}, of which motion during the exposure alone "
+        f"makes {_degrees(float(line.motion.mean()))}: the rest is the detector footprint.",
+        _reach(result, lambda s: s.error("rake"), PAPER.rake_error.value, _degrees),
+        _scatter(headline.error),
     )
 
 
 def rake_share(result: StudyResult) -> str:
-    """Why the PSF's share at the rake face differs."""
-    return _join(
+    """What makes the PSF's portion at the rake face."""
+    return joined(
         _psf_text(result),
-        _wings_text(result, lambda s: s.rake_share, result.rake.psf_share),
-        _reach(result, lambda s: s.rake_share, PAPER.rake_psf_share.value, _percent),
-        f"Of the mean error along the contact it is {_percent(result.rake.mean_psf_share)}.",
+        _wings_text(result, "rake"),
+        _reach(result, lambda s: s.psf_share("rake"), PAPER.rake_psf_share.value, _percent),
+    )
+
+
+def contact(result: StudyResult) -> str:
+    """What the mean along the contact says."""
+    low, high = result.rake.contact_range
+    return (
+        "The rake face crosses the pixels obliquely, so the mean over the contact holds all their "
+        f"positions. In one draw the error runs from {_degrees(low)} to {_degrees(high)} along it."
     )
 
 
 def band_error(result: StudyResult) -> str:
-    """Why the error at the centre of the shear band differs."""
-    band, surface = result.band_errors, result.surfaces[result.plan.band_surface]
-    return _join(
+    """What makes the error at the centre of the shear band."""
+    headline, line = result.draws.headlines.get("band"), result.draws.band_line
+    if headline is None:
+        return _OUT_OF_VIEW
+    without = headline.error.mean - headline.psf_portion.mean
+    return joined(
         _band_text(result),
-        f"Without PSF the error is {_degrees(band.error - band.psf_error)}, of which motion during "
-        f"the exposure alone makes {_degrees(surface.band_motion)}.",
-        _reach(result, lambda s: s.band_error, PAPER.band_error.value, _degrees),
+        f"In the mean over the draws the error without PSF is {_degrees(without)}, of which motion "
+        f"during the exposure alone makes {_degrees(float(line.motion.mean()))}.",
+        _reach(result, lambda s: s.error("band"), PAPER.band_error.value, _degrees),
+        _scatter(headline.error),
     )
 
 
 def band_share(result: StudyResult) -> str:
-    """Why the PSF's share at the centre of the shear band differs."""
-    band = result.momentary_band or result.band
-    psf = result.camera.psf
+    """What makes the PSF's portion at the centre of the shear band."""
+    width, psf = _band_width(result), result.camera.psf
     compared = ""
-    if psf is not None and isfinite(band.width):
+    if psf is not None and isfinite(width):
         compared = (
-            f"The band's width of {_micrometres(band.width)} is "
-            f"{band.width / psf.fwhm:.1f} times the PSF's, and the PSF takes off the more, the "
-            "narrower the band."
+            f"The band's width of {_micrometres(width)} is {width / psf.fwhm:.1f} times the PSF's, "
+            "and the PSF takes off the more, the narrower the band."
         )
-    return _join(
+    return joined(
         compared,
-        _wings_text(result, lambda s: s.band_share, result.band_errors.psf_share),
-        _reach(result, lambda s: s.band_share, PAPER.band_psf_share.value, _percent),
+        _wings_text(result, "band"),
+        _reach(result, lambda s: s.psf_share("band"), PAPER.band_psf_share.value, _percent),
     )
 
 
 def band_worst(result: StudyResult) -> str:
-    """Why the error beside the shear band differs."""
-    band, surface = result.band_errors, result.surfaces[result.plan.band_surface]
-    workpiece_side, chip_side = band.beside
-    steepest = _steepest(
-        band.line, sample(surface.scene_temperature, result.raster, band.line.points), result
+    """What makes the error beside the shear band."""
+    line, pitch = result.draws.band_line, result.camera.pitch
+    sides = [
+        float(np.mean(np.nanmin(line.case_1[..., side], axis=-1)))
+        for side in (line.distance <= 0, line.distance >= 0)
+    ]
+    headline = result.draws.headlines.get("band_worst")
+    return joined(
+        f"In the mean over the draws {_degrees(sides[0])} on the workpiece's side and "
+        f"{_degrees(sides[1])} on the chip's, within {_micrometres(result.plan.line_reach)} of the "
+        "ridge.",
+        f"The radiance temperature changes there by up to {_degrees(line.mean_steepest(pitch))} "
+        f"over one pixel of {_micrometres(pitch)}.",
+        _reach(result, lambda s: s.error("band_worst"), PAPER.band_worst.value, _degrees),
+        _scatter(headline.error) if headline else "",
     )
-    return _join(
-        f"{_degrees(workpiece_side)} on the workpiece's side and {_degrees(chip_side)} on the "
-        f"chip's, within {_micrometres(result.plan.line_reach)} of the ridge.",
-        f"The radiance temperature changes there by up to {_degrees(steepest)} over one sensor of "
-        f"{_micrometres(result.camera.pitch)}.",
-        _reach(result, lambda s: s.band_worst, PAPER.band_worst.value, _degrees),
+
+
+def place(draws: Distribution, paper: float, unit: str) -> str:
+    """Where the paper's figure lies among the draws, and whether it differs.
+
+    Parameters
+    ----------
+    draws : Distribution
+        Ours, in a unit that is printed.
+    paper : float
+        The paper's figure in the same unit.
+    unit : str
+        The unit.
+    """
+    if draws.draws < 2:
+        return "A single draw: it does not say whether the paper's figure differs."
+    low, high = (f"{end:.0f}".replace("-", "−") for end in draws.interval)
+    below = draws.fraction_below(paper)
+    where = (
+        f"{below * 100:.0f} % of our {draws.draws} draws are lower than the paper's figure; with "
+        f"{COVERAGE * 100:.0f} % probability one more draw lies between {low} and {high} {unit}"
     )
+    if draws.differs_from(paper):
+        return f"{where}: the paper's differs."
+    return f"{where}: the paper's does not differ."
 
 
 def period(segments: Segmentation) -> str:
@@ -122,17 +214,38 @@ def period(segments: Segmentation) -> str:
     )
 
 
+def _band_width(result: StudyResult) -> float:
+    """Mean width of the segments' bands in m; NaN where one has none."""
+    return float(np.mean([segment.band_width for segment in result.segments]))
+
+
 def _band_text(result: StudyResult) -> str:
-    band = result.momentary_band or result.band
+    sweep = float(np.mean([segment.sweep for segment in result.segments]))
+    many = len(result.segments) > 1
     moved = (
-        f", and its middle moves {_micrometres(result.sweep)} across itself during the exposure"
-        if isfinite(result.sweep)
+        f", and {'their' if many else 'its'} middle moves {_micrometres(sweep)} across itself "
+        "during the exposure"
+        if isfinite(sweep)
         else ""
     )
+    subject = f"Our {len(result.segments)} bands are" if many else "Our band is"
     return (
-        f"Our band is {_micrometres(band.width)} wide (strain rate, full width at half maximum)"
-        f"{moved}."
+        f"{subject} {_micrometres(_band_width(result))} wide (strain rate, full width at half "
+        f"maximum){moved}."
     )
+
+
+def _scatter(draws: Distribution) -> str:
+    """Which cause makes the scatter, if one makes most of it."""
+    if draws.draws < 2:
+        return ""
+    name, part = max(draws.parts.items(), key=lambda item: item[1].fraction)
+    subject = {
+        "segment": "which segment is looked at",
+        "texture": "how the emissivity happens to vary",
+        "pixel phase": "where the pixels lie",
+    }.get(name, "several causes together")
+    return f"The largest part of the scatter, {_percent(part.fraction)}, comes from {subject}."
 
 
 def _psf_text(result: StudyResult) -> str:
@@ -145,19 +258,18 @@ def _psf_text(result: StudyResult) -> str:
     )
 
 
-def _wings_text(
-    result: StudyResult, values: Callable[[Sensitivity], NDArray[np.float64]], ours: float
-) -> str:
+def _wings_text(result: StudyResult, name: str) -> str:
     """What a Gaussian as wide at half maximum as the camera's PSF would make: the rest is wings."""
-    psf, found = result.camera.psf, _same_order(result)
-    if psf is None or not found.widths[0] <= psf.fwhm <= found.widths[-1]:
+    psf, found, headline = result.camera.psf, _same_order(result), result.draws.headlines.get(name)
+    share = headline.psf_share if headline else None
+    if psf is None or share is None or not found.widths[0] <= psf.fwhm <= found.widths[-1]:
         return ""
-    gaussian = float(np.interp(psf.fwhm, found.widths, values(found)))
-    if not (isfinite(ours) and isfinite(gaussian)):
+    gaussian = float(np.interp(psf.fwhm, found.widths, found.psf_share(name)))
+    if not isfinite(gaussian):
         return ""
     return (
-        f"It makes {_percent(ours)} of the error, a Gaussian of the same width {_percent(gaussian)}"
-        ": what it does beyond its half maximum counts too."
+        f"It makes {_percent(share.mean)} of the error, a Gaussian of the same width "
+        f"{_percent(gaussian)}: what it does beyond its half maximum counts too."
     )
 
 
@@ -203,13 +315,8 @@ def crossing(
     return float(widths[i] + part * (widths[i + 1] - widths[i]))
 
 
-def _steepest(line: Line, values: NDArray[np.float64], result: StudyResult) -> float:
-    """Greatest change over one sensor's pitch along a line."""
-    ahead = np.interp(line.distance + result.camera.pitch, line.distance, values)
-    return float(np.nanmax(np.abs(ahead - values)))
-
-
-def _join(*sentences: str) -> str:
+def joined(*sentences: str) -> str:
+    """Sentences one after the other, without those that are empty."""
     return " ".join(sentence for sentence in sentences if sentence)
 
 

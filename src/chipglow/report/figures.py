@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.analysis.paper import PAPER, StudyResult, SurfaceResult
+from chipglow.analysis import PAPER, LineDraws, Sensitivity, StudyResult
+from chipglow.analysis.paper import SurfaceResult
 from chipglow.camera import PointSpreadFunction
 from chipglow.report import drawing
 from chipglow.report.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, ImagePanel
@@ -36,6 +37,8 @@ class FigureFile:
         Heading.
     caption : str
         What it shows, and which figure of the paper it stands beside.
+    alt : str
+        What is seen in it, for who cannot see it.
     png, svg : Path
         The files.
     """
@@ -43,6 +46,7 @@ class FigureFile:
     name: str
     title: str
     caption: str
+    alt: str
     png: Path
     svg: Path
 
@@ -54,6 +58,7 @@ class _Drawing:
     name: str
     title: str
     caption: Callable[[StudyResult], str]
+    alt: Callable[[StudyResult], str]
     draw: Callable[[StudyResult], Figure | None]
 
 
@@ -73,7 +78,8 @@ def draw_figures(result: StudyResult, folder: Path) -> Iterator[FigureFile]:
             if figure is None:
                 continue
             png, svg = drawing.save(figure, folder, drawing_.name)
-        yield FigureFile(drawing_.name, drawing_.title, drawing_.caption(result), png, svg)
+        caption, alt = drawing_.caption(result), drawing_.alt(result)
+        yield FigureFile(drawing_.name, drawing_.title, caption, alt, png, svg)
 
 
 def fields(result: StudyResult) -> Figure:
@@ -179,14 +185,7 @@ def error_lines(result: StudyResult) -> Figure:
     figure = drawing.new_figure(3.9)
     left, right = figure.subplots(1, 2)
     rake, band = result.rake, result.band_errors
-    _draw_error_line(left, rake.line.distance, rake.case_1, rake.psf_portion)
-    left.plot(
-        rake.line.distance * 1e6,
-        rake.mean_case_1,
-        color=BLUE,
-        linestyle=":",
-        label="error, mean over the contact",
-    )
+    _draw_error_line(left, result.draws.rake_line, rake.case_1, rake.psf_portion)
     paper_rake = PAPER.rake_error.value
     _draw_point(left, 0.0, paper_rake, BLUE, "the paper's error")
     _draw_point(
@@ -194,7 +193,7 @@ def error_lines(result: StudyResult) -> Figure:
     )
     left.set_title(f"a) across the rake face, {result.plan.rake_surface}")
     left.set_xlabel("distance from the rake face / µm\n← tool      chip →")
-    _draw_error_line(right, band.line.distance, band.case_1, band.psf_portion)
+    _draw_error_line(right, result.draws.band_line, band.case_1, band.psf_portion)
     paper_band = PAPER.band_error.value
     _draw_point(right, 0.0, paper_band, BLUE, "the paper's error")
     _draw_point(
@@ -299,7 +298,7 @@ def chip(result: StudyResult) -> Figure | None:
     foot, normal = result.tool.rake_point(scan.height), np.array(result.tool.rake_normal)
     across = np.stack([foot, foot + thickness * normal])
     drawing.draw_line(left, across, VERMILLION, "thickness")
-    drawing.draw_line(left, (result.momentary_band or result.band).ridge.points, BLUE, "band")
+    drawing.draw_line(left, result.segment.moment.ridge.points, BLUE, "band")
     figure.legend(loc="outside lower center", ncols=2)
     left.set_title(f"a) at {frame.time * 1e6:.0f} µs")
     right.plot(scan.time * 1e6, scan.thickness * 1e6, color=VERMILLION)
@@ -332,7 +331,7 @@ def psf_sensitivity(result: StudyResult) -> Figure:
             colour, label = _ORDER_STYLE[series.psf_order]
             axes.plot(
                 series.widths * 1e6,
-                panel.scale * getattr(series, panel.name),
+                panel.scale * panel.values(series),
                 color=colour,
                 marker="o",
                 markersize=3.0,
@@ -341,7 +340,7 @@ def psf_sensitivity(result: StudyResult) -> Figure:
         axes.axhline(
             panel.scale * panel.paper, color="black", linestyle="--", linewidth=1.0, label="paper"
         )
-        if result.camera.psf is not None:
+        if result.camera.psf is not None and panel.own is not None:
             width, own = result.camera.psf.fwhm * 1e6, panel.scale * panel.own
             colour = _ORDER_STYLE[result.camera.psf_order][0]
             _draw_point(axes, width, own, colour, "this camera's PSF")
@@ -355,36 +354,48 @@ def psf_sensitivity(result: StudyResult) -> Figure:
 
 @dataclass(frozen=True)
 class _SensitivityPanel:
-    """One quantity of the sensitivity: its name there, the study's value and the paper's."""
+    """One quantity of the sensitivity: its values, the study's mean and the paper's figure."""
 
     title: str
-    name: str
+    values: Callable[[Sensitivity], NDArray[np.float64]]
     scale: float
-    own: float
+    own: float | None
     paper: float
 
 
 def _sensitivity_panels(result: StudyResult) -> tuple[_SensitivityPanel, ...]:
-    rake, band = result.rake, result.band_errors
+    own = {}
+    for name in ("rake", "band"):
+        headline = result.draws.headlines.get(name)
+        share = headline.psf_share if headline else None
+        own[name] = (headline.error.mean if headline else None, share.mean if share else None)
     return (
         _SensitivityPanel(
-            "a) error at the rake face", "rake_error", 1, rake.error, PAPER.rake_error.value
+            "a) error at the rake face",
+            lambda series: series.error("rake"),
+            1,
+            own["rake"][0],
+            PAPER.rake_error.value,
         ),
         _SensitivityPanel(
-            "b) error at the band's centre", "band_error", 1, band.error, PAPER.band_error.value
+            "b) error at the band's centre",
+            lambda series: series.error("band"),
+            1,
+            own["band"][0],
+            PAPER.band_error.value,
         ),
         _SensitivityPanel(
-            "c) PSF's share, rake face",
-            "rake_share",
+            "c) PSF's portion, rake face",
+            lambda series: series.psf_share("rake"),
             100,
-            rake.psf_share,
+            own["rake"][1],
             PAPER.rake_psf_share.value,
         ),
         _SensitivityPanel(
-            "d) PSF's share, band's centre",
-            "band_share",
+            "d) PSF's portion, band's centre",
+            lambda series: series.psf_share("band"),
             100,
-            band.psf_share,
+            own["band"][1],
             PAPER.band_psf_share.value,
         ),
     )
@@ -412,12 +423,30 @@ def _draw_analysis_lines(axes: Axes, result: StudyResult) -> None:
 
 def _draw_error_line(
     axes: Axes,
-    distance: NDArray[np.float64],
+    draws: LineDraws,
     case_1: NDArray[np.float64],
     portion: NDArray[np.float64],
 ) -> None:
-    axes.plot(distance * 1e6, case_1, color=BLUE, label="error")
-    axes.plot(distance * 1e6, portion, color=VERMILLION, label="PSF's portion")
+    """Mean over the draws with a standard deviation to either side, and one draw."""
+    for values, one, colour, name in (
+        (draws.case_1, case_1, BLUE, "error"),
+        (draws.psf_portion, portion, VERMILLION, "PSF's portion"),
+    ):
+        lines = values.reshape(-1, draws.distance.size)
+        mean, deviation = lines.mean(axis=0), lines.std(axis=0)
+        at = draws.distance * 1e6
+        axes.plot(at, mean, color=colour, label=f"{name}, mean of the draws")
+        label = f"{name}, ± 1 standard deviation"
+        axes.fill_between(
+            at,
+            mean - deviation,
+            mean + deviation,
+            color=colour,
+            alpha=0.2,
+            linewidth=0,
+            label=label,
+        )
+        axes.plot(at, one, color=colour, linewidth=0.9, linestyle=":", label=f"{name}, one draw")
 
 
 def _draw_point(axes: Axes, at: float, value: float, colour: str, label: str) -> None:
@@ -502,8 +531,9 @@ def _images_caption(result: StudyResult) -> str:
 def _lines_caption(result: StudyResult) -> str:
     return (
         "Errors along the green lines of the figure before: through mid-contact along the normal "
-        "of the rake face, and through the middle of the shear band. The paper's Figure 11, its "
-        "stated figures drawn as diamonds and as a dashed line."
+        "of the rake face, and through the middle of the shear band, over all draws of segment, "
+        "texture and pixel phase. The paper's Figure 11, its stated figures drawn as diamonds and "
+        "as a dashed line."
     )
 
 
@@ -520,10 +550,11 @@ def _forces_caption(result: StudyResult) -> str:
 
 def _sensitivity_caption(result: StudyResult) -> str:
     return (
-        "The headline errors with Gaussian PSFs of several widths, applied from sensor to sensor "
-        "as in the paper, or to the light before the sensors integrate it. Dashed: the paper's "
-        "figures, whose PSF's width is not stated. Diamond: this camera's PSF, which is not a "
-        "Gaussian, at its own width."
+        "The headline errors, in the mean over segments and pixel phases, with Gaussian PSFs of "
+        "several widths, applied from pixel to pixel as in the paper, or to the light before the "
+        "pixels integrate it. Dashed: the paper's figures, whose PSF's width is not stated. "
+        "Diamond: this camera's PSF, which is not a Gaussian, at its own width, in the mean over "
+        "all draws."
     )
 
 
@@ -536,16 +567,112 @@ def _chip_caption(result: StudyResult) -> str:
     )
 
 
+def _fields_alt(result: StudyResult) -> str:
+    frame = result.frame
+    hottest = float(frame.temperature[frame.material == Material.WORKPIECE].max()) - KELVIN
+    return (
+        "Four images of chip, workpiece and tool: temperature, which reaches "
+        f"{hottest:.0f} °C along the rake face; plastic strain; plastic strain rate, "
+        "a narrow band from the edge to the free surface; emissivity, mottled."
+    )
+
+
+def _measurement_alt(result: StudyResult) -> str:
+    measured = result.surfaces[result.plan.band_surface].measurement
+    temperature = measured.radiance_temperature()[result.developed] - KELVIN
+    return (
+        "Two images of radiance temperature side by side: the scene, sharp and mottled, and the "
+        "same as measured, blurred into pixels, with a highest value of "
+        f"{np.nanmax(temperature):.0f} °C."
+    )
+
+
+def _curves_alt(result: StudyResult) -> str:
+    return (
+        "Curves of measured radiance temperature over the distance from the cutting edge along the "
+        f"shear band, one for each of {len(result.instants)} exposures, one panel for each of "
+        f"{', '.join(result.surfaces)}. They rise with time until the band is developed."
+    )
+
+
+def _images_alt(result: StudyResult) -> str:
+    worst = ", ".join(
+        f"{np.nanmin(np.where(surface.errors.flagged, np.nan, surface.errors.case_1)):.0f} °C "
+        f"with {name}"
+        for name, surface in result.surfaces.items()
+    )
+    return (
+        "Images of the error, blue where too little is measured: strongest along the rake face and "
+        f"on both sides of the shear band, at most {worst}. Below, the part that the PSF makes."
+    )
+
+
+def _lines_alt(result: StudyResult) -> str:
+    return (
+        "Two panels of the error over the distance from the rake face and from the ridge of the "
+        "shear band, as mean and standard deviation over the draws. At the face: "
+        f"{result.draws.rake_line.case_1.mean(axis=(0, 1, 2)).min():.0f} °C at most; beside the "
+        f"band: {result.draws.band_line.case_1.mean(axis=(0, 1, 2)).min():.0f} °C."
+    )
+
+
+def _sensitivity_alt(result: StudyResult) -> str:
+    return (
+        "Four panels over the width of the PSF: the errors at rake face and band grow with it, and "
+        "so does the PSF's portion of them, from near 0 for the narrowest."
+    )
+
+
+def _psf_alt(result: StudyResult) -> str:
+    assert result.camera.psf is not None
+    return (
+        "The point spread function as an image and as a cross-section, with a full width at half "
+        f"maximum of {result.camera.psf.fwhm * 1e6:.2f} µm."
+    )
+
+
+def _forces_alt(result: StudyResult) -> str:
+    assert result.forces is not None
+    segments = result.forces.segmentation
+    return (
+        f"Cutting and thrust force over time: saw-teeth, {segments.segments} of them, about "
+        f"{segments.cutting_mean * 1e-3:.0f} and {segments.thrust_mean * 1e-3:.0f} N/mm."
+    )
+
+
+def _chip_alt(result: StudyResult) -> str:
+    return (
+        "The chip with the line on which its thickness is read, and that thickness over time: "
+        "between its valleys and peaks."
+    )
+
+
 _DRAWINGS: Final = (
-    _Drawing("fields", "The scene", _fields_caption, fields),
-    _Drawing("measurement", "The measurement", _measurement_caption, measurement),
-    _Drawing("band-curves", "The shear band as it develops", _curves_caption, band_curves),
-    _Drawing("error-images", "The measurement error", _images_caption, error_images),
-    _Drawing("error-lines", "Across the rake face and the shear band", _lines_caption, error_lines),
+    _Drawing("fields", "The scene", _fields_caption, _fields_alt, fields),
+    _Drawing("measurement", "The measurement", _measurement_caption, _measurement_alt, measurement),
     _Drawing(
-        "psf-sensitivity", "How much the PSF's width decides", _sensitivity_caption, psf_sensitivity
+        "band-curves",
+        "The shear band as it develops",
+        _curves_caption,
+        _curves_alt,
+        band_curves,
     ),
-    _Drawing("psf", "The camera's point spread function", _psf_caption, point_spread),
-    _Drawing("forces", "The forces", _forces_caption, forces),
-    _Drawing("chip", "The chip's thickness", _chip_caption, chip),
+    _Drawing("error-images", "The measurement error", _images_caption, _images_alt, error_images),
+    _Drawing(
+        "error-lines",
+        "Across the rake face and the shear band",
+        _lines_caption,
+        _lines_alt,
+        error_lines,
+    ),
+    _Drawing(
+        "psf-sensitivity",
+        "How much the PSF's width decides",
+        _sensitivity_caption,
+        _sensitivity_alt,
+        psf_sensitivity,
+    ),
+    _Drawing("psf", "The camera's point spread function", _psf_caption, _psf_alt, point_spread),
+    _Drawing("forces", "The forces", _forces_caption, _forces_alt, forces),
+    _Drawing("chip", "The chip's thickness", _chip_caption, _chip_alt, chip),
 )

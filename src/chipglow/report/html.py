@@ -1,22 +1,16 @@
-"""The report as one self-contained page."""
+"""The report as one self-contained page: the answer first, then what it rests on."""
 
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
 from typing import Final
 
 from chipglow import __version__
 from chipglow.report.chip import ChipRow
-from chipglow.report.comparison import Row
+from chipglow.report.comparison import CauseRow, Row
 from chipglow.report.figures import FigureFile
-
-TITLE: Final = "Temperature measurement of segmented chip formation"
-
-_LEAD: Final = (
-    "What an infrared camera makes of a known, simulated cutting process, and how far it is off: "
-    "the study of Heigel and Whitenton (2010), done anew."
-)
 
 _PAPER: Final = (
     "J. C. Heigel, E. P. Whitenton: The effects of emissivity and camera point spread function on "
@@ -25,28 +19,33 @@ _PAPER: Final = (
 )
 
 _SECTIONS: Final = (
+    ("answer", "The answer"),
     ("comparison", "The paper beside this study"),
-    ("chip", "The chip"),
+    ("scatter", "What makes the scatter"),
     ("figures", "Figures"),
+    ("chip", "The chip"),
     ("study", "The study as run"),
+    ("versions", "How it was made"),
     ("cite", "How to cite"),
 )
 
 
-def page(
-    rows: Sequence[Row],
-    definition: str,
-    chip: Sequence[ChipRow],
-    figures: Sequence[FigureFile],
-    study_text: str,
-    provenance: Mapping[str, str],
-) -> str:
-    """Self-contained page with the pictures in it.
+@dataclass(frozen=True)
+class Content:
+    """What the page shows.
 
     Parameters
     ----------
+    title : str
+        The study's title: heads the page.
+    answer : sequence of str
+        What came out, in a few sentences.
+    remarks : sequence of str
+        What the reader must know before quoting: assumptions, a coarse grid.
     rows : sequence of Row
         The paper's figures beside ours.
+    causes : sequence of CauseRow
+        What makes the headlines scatter.
     definition : str
         What an error is, as a sentence.
     chip : sequence of ChipRow
@@ -58,16 +57,41 @@ def page(
     provenance : mapping
         What, when, version, seed and the like, in the order in which it is shown.
     """
+
+    title: str
+    answer: Sequence[str]
+    remarks: Sequence[str]
+    rows: Sequence[Row]
+    causes: Sequence[CauseRow]
+    definition: str
+    chip: Sequence[ChipRow]
+    figures: Sequence[FigureFile]
+    study_text: str
+    provenance: Mapping[str, str]
+
+
+def page(content: Content) -> str:
+    """Self-contained page with the pictures in it.
+
+    Parameters
+    ----------
+    content : Content
+        What it shows.
+    """
     links = "".join(f'<a href="#{name}">{escape(title)}</a>' for name, title in _SECTIONS)
     bodies = {
-        "comparison": _table(rows, definition),
-        "chip": _chip_table(chip),
-        "figures": "\n".join(_figure(figure) for figure in figures),
-        "study": f"<pre><code>{escape(study_text)}</code></pre>",
+        "answer": _answer(content),
+        "comparison": _comparison(content.rows, content.definition),
+        "scatter": _causes(content.causes),
+        "figures": "\n".join(_figure(figure) for figure in content.figures),
+        "chip": _chip_table(content.chip),
+        "study": f"<pre><code>{escape(content.study_text)}</code></pre>",
+        "versions": _definitions(content.provenance),
         "cite": _citation(),
     }
     sections = "\n".join(
-        f'<h2 id="{name}">{escape(title)}</h2>\n{bodies[name]}' for name, title in _SECTIONS
+        f'<section id="{name}">\n<h2>{escape(title)}</h2>\n{bodies[name]}\n</section>'
+        for name, title in _SECTIONS
     )
     css = files("chipglow.report").joinpath("page.css").read_text(encoding="utf-8")
     return f"""<!DOCTYPE html>
@@ -75,15 +99,14 @@ def page(
 <head>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{escape(TITLE)}</title>
+<meta name="color-scheme" content="light dark">
+<title>{escape(content.title)}</title>
 <style>
 {css}</style>
 </head>
 <body>
 <header>
-<h1>{escape(TITLE)}</h1>
-<p class="lead">{escape(_LEAD)}</p>
-{_definitions(provenance)}
+<h1>{escape(content.title)}</h1>
 <nav>{links}</nav>
 </header>
 <main>
@@ -95,57 +118,98 @@ def page(
 """
 
 
-def _definitions(provenance: Mapping[str, str]) -> str:
-    items = "".join(
-        f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>\n" for name, value in provenance.items()
+def _answer(content: Content) -> str:
+    answer = "".join(f"<p>{escape(sentence)}</p>\n" for sentence in content.answer)
+    remarks = "".join(f'<p class="remark">{escape(remark)}</p>\n' for remark in content.remarks)
+    return f'<div class="answer">\n{answer}</div>\n{remarks}'
+
+
+def _comparison(rows: Sequence[Row], definition: str) -> str:
+    text = (
+        f"{definition} PSF: point spread function. Here: mean ± standard deviation over the draws "
+        "of segment, texture and pixel phase, or ± standard uncertainty where there is one number. "
+        "One draw: one frame by the paper's procedure. Differs: whether one more draw would be as "
+        "far off as the paper's figure in fewer than 5 of 100 cases."
     )
-    return f"<dl>\n{items}</dl>"
+    heads = ("Quantity", "Paper", "Here", "Range of draws", "One draw", "Differs")
+    return f"<p>{escape(text)}</p>\n" + _table(heads, _comparison_rows(rows, heads))
 
 
-def _table(rows: Sequence[Row], definition: str) -> str:
-    body = "\n".join(_row(row) for row in rows)
-    return f"""<p>{escape(definition)} PSF: point spread function.</p>
-<div class="scroll"><table>
-<thead><tr><th>Quantity</th><th class="number">Paper</th><th class="number">Here</th>
-<th class="number">Difference</th><th>Why</th></tr></thead>
-<tbody>
-{body}
-</tbody></table></div>"""
+def _comparison_rows(rows: Sequence[Row], heads: Sequence[str]) -> Iterator[str]:
+    for row in rows:
+        texts = (
+            row.paper_text,
+            row.here_text,
+            row.range_text,
+            row.one_draw_text,
+            row.differs_text,
+        )
+        where = f'<span class="where">Paper: {escape(row.where)}</span>' if row.where else ""
+        yield f"<tr><td>{escape(row.quantity)}{where}</td>{_numbers(texts, heads[1:])}</tr>"
+        yield f'<tr class="why"><td colspan="{len(heads)}">{escape(row.explanation)}</td></tr>'
+
+
+def _causes(rows: Sequence[CauseRow]) -> str:
+    if not rows:
+        return "<p>One draw only: it says nothing of the scatter.</p>"
+    names = [f"{name} ({count})" for name, count, _, _ in rows[0].causes]
+    text = (
+        "Each cause in the mean over the others: standard deviation, and its part of the sum of "
+        "squares. In brackets above, how many values it took. Causes together: what none of them "
+        "makes by itself."
+    )
+    heads = ("Quantity", *names)
+    body = (
+        f"<tr><td>{escape(row.quantity)}</td>{_numbers(row.texts, heads[1:])}</tr>" for row in rows
+    )
+    return f"<p>{escape(text)}</p>\n" + _table(heads, body)
 
 
 def _chip_table(rows: Sequence[ChipRow]) -> str:
-    body = "\n".join(
-        f'<tr><td>{escape(row.quantity)}</td><td class="number here">{escape(row.value_text)}</td>'
-        f'<td class="number">{escape(row.spread_text)}</td>'
-        f'<td class="why">{escape(row.explanation)}</td></tr>'
+    heads = ("Quantity", "Here", "Spread")
+    body = (
+        f"<tr><td>{escape(row.quantity)}</td>"
+        f"{_numbers((row.value_text, row.spread_text), heads[1:])}</tr>\n"
+        f'<tr class="why"><td colspan="{len(heads)}">{escape(row.explanation)}</td></tr>'
         for row in rows
     )
-    return f"""<div class="scroll"><table>
-<thead><tr><th>Quantity</th><th class="number">Here</th><th class="number">Spread</th>
-<th>How</th></tr></thead>
-<tbody>
-{body}
-</tbody></table></div>"""
+    return _table(heads, body)
 
 
-def _row(row: Row) -> str:
-    where = f'<span class="where">{escape(row.where)}</span>' if row.where else ""
+def _table(heads: Sequence[str], body: Iterator[str]) -> str:
+    first, *numbers = heads
+    head = f"<th>{escape(first)}</th>" + "".join(
+        f'<th class="number">{escape(name)}</th>' for name in numbers
+    )
     return (
-        f"<tr><td>{escape(row.quantity)}{where}</td>"
-        f'<td class="number">{escape(row.paper_text)}</td>'
-        f'<td class="number here">{escape(row.here_text)}</td>'
-        f'<td class="number">{escape(row.difference_text)}</td>'
-        f'<td class="why">{escape(row.explanation)}</td></tr>'
+        f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n"
+        + "\n".join(body)
+        + ("\n</tbody></table>")
+    )
+
+
+def _numbers(texts: Sequence[str], heads: Sequence[str]) -> str:
+    """Cells of numbers; on a narrow screen each says the head of its column itself."""
+    return "".join(
+        f'<td class="number" data-head="{escape(head)}">{escape(text)}</td>'
+        for text, head in zip(texts, heads, strict=True)
     )
 
 
 def _figure(figure: FigureFile) -> str:
     picture = b64encode(figure.png.read_bytes()).decode("ascii")
     return (
-        f'<h3 id="{escape(figure.name)}">{escape(figure.title)}</h3>\n'
-        f'<figure><img alt="{escape(figure.title)}" src="data:image/png;base64,{picture}">\n'
+        f'<figure id="figure-{escape(figure.name)}">\n<h3>{escape(figure.title)}</h3>\n'
+        f'<img alt="{escape(figure.alt)}" src="data:image/png;base64,{picture}">\n'
         f"<figcaption>{escape(figure.caption)}</figcaption></figure>"
     )
+
+
+def _definitions(provenance: Mapping[str, str]) -> str:
+    items = "".join(
+        f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>\n" for name, value in provenance.items()
+    )
+    return f"<dl>\n{items}</dl>"
 
 
 def _citation() -> str:

@@ -1,15 +1,16 @@
 """The study's arrays and numbers as data: results.nc and summary.json."""
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chipglow.analysis.paper import StudyResult
+from chipglow.analysis import Distribution, StudyResult
 from chipglow.report.chip import ChipRow
-from chipglow.report.comparison import Row
+from chipglow.report.comparison import CauseRow, Row
 from chipglow.scene import FIELD_UNITS
 from chipglow.scene.tool_attributes import tool_attributes
 
@@ -30,7 +31,8 @@ def results_dataset(result: StudyResult, provenance: Mapping[str, str]) -> xr.Da
         Dimensions: ``y``, ``x`` the scene's samples; ``sensor_y``, ``sensor_x`` the sensors;
         ``instant`` the exposures; ``surface`` the surfaces; ``ridge_point`` along the shear band,
         NaN beyond its end; ``rake_distance`` and ``band_distance`` along the analysis lines;
-        ``contact_distance`` up the rake face; ``psf_order`` and ``psf_width`` the sensitivity;
+        ``contact_distance`` up the rake face; ``segment``, ``texture`` and ``pixel_phase`` the
+        draws; ``psf_order``, ``psf_width`` and ``sensitivity_draw`` the sensitivity;
         ``force_time`` the force history; ``chip_time`` the chip as it passes one rake-normal line.
     """
     variables = {
@@ -38,6 +40,7 @@ def results_dataset(result: StudyResult, provenance: Mapping[str, str]) -> xr.Da
         **_sensors(result),
         **_ridges(result),
         **_lines(result),
+        **_draws(result),
         **_sensitivity(result),
         **_forces(result),
         **_chip(result),
@@ -71,7 +74,10 @@ def compression(data: xr.Dataset) -> dict[str, dict[str, Any]]:
 
 
 def summary(
-    rows: Sequence[Row], chip: Sequence[ChipRow], provenance: Mapping[str, str]
+    rows: Sequence[Row],
+    causes: Sequence[CauseRow],
+    chip: Sequence[ChipRow],
+    provenance: Mapping[str, str],
 ) -> dict[str, Any]:
     """Numbers of the study for scripts; a name ends in its unit, what is unknown is None.
 
@@ -79,6 +85,8 @@ def summary(
     ----------
     rows : sequence of Row
         The comparison.
+    causes : sequence of CauseRow
+        What makes the headlines scatter.
     chip : sequence of ChipRow
         What describes the chip.
     provenance : mapping
@@ -87,11 +95,36 @@ def summary(
     return {
         "provenance": dict(provenance),
         "results": {row.key: row.here for row in rows},
+        "draws": {row.key: _scatter(row.draws) for row in rows if row.draws is not None},
+        "causes": {row.key: _causes(row) for row in causes},
+        "one_draw": {row.key: row.one_draw for row in rows if row.one_draw is not None},
         "chip": {row.key: row.value for row in chip},
         "chip_spread": {row.key: row.spread for row in chip if row.spread is not None},
         "paper": {row.key: row.paper for row in rows if row.paper is not None},
-        "difference": {row.key: row.difference for row in rows if row.paper is not None},
+        "differs": {row.key: row.differs for row in rows if row.paper is not None},
         "explanation": {row.key: row.explanation for row in rows},
+    }
+
+
+def _scatter(draws: Distribution) -> dict[str, float | int | None]:
+    low, high = draws.range
+    ends = [end if isfinite(end) else None for end in draws.interval]
+    deviation = draws.standard_deviation
+    return {
+        "count": draws.draws,
+        "mean": draws.mean,
+        "standard_deviation": deviation if isfinite(deviation) else None,
+        "lowest": low,
+        "highest": high,
+        "interval_low": ends[0],
+        "interval_high": ends[1],
+    }
+
+
+def _causes(row: CauseRow) -> dict[str, dict[str, float | int | None]]:
+    return {
+        name: {"count": count, "standard_deviation": deviation, "fraction_percent": fraction}
+        for name, count, deviation, fraction in row.causes
     }
 
 
@@ -178,7 +211,6 @@ def _lines(result: StudyResult) -> dict[str, Any]:
     errors = {
         "rake_error": ("rake_distance", [r.case_1 for r in rakes]),
         "rake_psf_portion": ("rake_distance", [r.psf_portion for r in rakes]),
-        "rake_mean_error": ("rake_distance", [r.mean_case_1 for r in rakes]),
         "contact_error": ("contact_distance", [r.contact_case_1 for r in rakes]),
         "contact_psf_portion": ("contact_distance", [r.contact_psf_portion for r in rakes]),
         "band_error": ("band_distance", [b.case_1 for b in bands]),
@@ -193,22 +225,36 @@ def _lines(result: StudyResult) -> dict[str, Any]:
     }
 
 
-def _sensitivity(result: StudyResult) -> dict[str, Any]:
-    units = {
-        "rake_error": "K",
-        "rake_share": "1",
-        "rake_mean_error": "K",
-        "band_error": "K",
-        "band_share": "1",
-        "band_worst": "K",
+def _draws(result: StudyResult) -> dict[str, Any]:
+    draws, axes = result.draws, ("segment", "texture", "pixel_phase")
+    headlines = {
+        f"draws_{name}_{part}": (axes, getattr(headline, part).values, {"units": "K"})
+        for name, headline in draws.headlines.items()
+        for part in ("error", "psf_portion")
     }
-    return {
-        f"sensitivity_{name}": (
-            ("psf_order", "psf_width"),
-            np.stack([getattr(series, name) for series in result.sensitivity]),
-            {"units": unit},
+    lines = {
+        f"draws_{place}_line_{part}": (
+            (*axes, f"{place}_distance"),
+            getattr(line, part),
+            {"units": "K"},
         )
-        for name, unit in units.items()
+        for place, line in (("rake", draws.rake_line), ("band", draws.band_line))
+        for part in ("case_1", "psf_portion")
+    }
+    starts = [segment.start for segment in result.segments]
+    return {**headlines, **lines, "segment": ("segment", starts, {"units": "s"})}
+
+
+def _sensitivity(result: StudyResult) -> dict[str, Any]:
+    place = ("psf_order", "psf_width", "sensitivity_draw")
+    return {
+        f"sensitivity_{name}_{part}": (
+            place,
+            np.stack([getattr(series, f"{part}s")[name] for series in result.sensitivity]),
+            {"units": "K"},
+        )
+        for name in result.sensitivity[0].errors
+        for part in ("error", "psf_portion")
     }
 
 

@@ -13,6 +13,7 @@ from chipglow.scene.scene import (
     Material,
     Scene,
     SceneError,
+    is_gap,
 )
 from chipglow.scene.tool import Chamfer, Hone, Tool, ToolGeometry
 from chipglow.scene.tool_outline import ToolOutline, ToolOutlineError
@@ -37,4 +38,5 @@ __all__ = [
     "ToolGeometry",
     "ToolOutline",
     "ToolOutlineError",
+    "is_gap",
 ]

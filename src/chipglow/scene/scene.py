@@ -5,6 +5,7 @@ from copy import copy
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
+from itertools import pairwise
 from math import isfinite
 from typing import Any, Final, Self
 
@@ -59,6 +60,22 @@ ENERGY_UNITS: Final[Mapping[str, str]] = dict.fromkeys(
 
 COLDEST_PLAUSIBLE: Final = 200.0
 HOTTEST_PLAUSIBLE: Final = 6000.0
+
+
+_LONGEST_STEP: Final = 2.0
+
+
+def is_gap(steps: NDArray[np.float64], frame_spacing: float) -> NDArray[np.bool_]:
+    """Which times between frames are gaps: those of over twice the usual time between frames.
+
+    Parameters
+    ----------
+    steps : ndarray
+        Times between frames in s.
+    frame_spacing : float
+        Usual time between frames in s.
+    """
+    return np.asarray(steps > _LONGEST_STEP * frame_spacing)
 
 
 class Material(IntEnum):
@@ -167,9 +184,21 @@ class Scene:
 
     @property
     def frame_spacing(self) -> float:
-        """Mean time between frames in s; 0 for a single frame."""
+        """Usual time between frames in s: the median; 0 for a single frame."""
         times = self.times
-        return float((times[-1] - times[0]) / max(len(times) - 1, 1))
+        return float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+
+    @property
+    def blocks(self) -> list[range]:
+        """Numbers of the frames between gaps: ranges of frames that follow one another."""
+        gaps = np.flatnonzero(is_gap(np.diff(self.times), self.frame_spacing)) + 1
+        bounds = [0, *gaps.tolist(), len(self.times)]
+        return [range(first, last) for first, last in pairwise(bounds)]
+
+    @property
+    def longest_block(self) -> range:
+        """The longest of the `blocks`, the first of those that are alike."""
+        return max(self.blocks, key=len)
 
     @cached_property
     def raster(self) -> Raster:

@@ -17,6 +17,7 @@ from chipglow.cutting import (
 )
 from chipglow.io import SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.interrupts import uninterrupted
+from chipglow.io.packing import CUT
 from chipglow.scene import Frame, SceneError, ToolOutline
 from chipglow.study.cache import scene_path
 from chipglow.study.fitting import fit
@@ -28,7 +29,7 @@ Progress: TypeAlias = Callable[[str, float], None]
 
 CUTTING_STEP: Final = "cutting simulation"
 PREVIEW_STEP: Final = "preview"
-SCENE_FORMAT: Final = 2
+SCENE_FORMAT: Final = 3
 """Changes whenever the same frames are written as another file."""
 
 CHECKPOINT_INTERVAL: Final = 30.0
@@ -198,7 +199,8 @@ def _compute(
     left = unfinished_scenes(path) if resume else []
     start = left[0] if left and left[0].progress > 0 else None
     state = Checkpoint(start.state(), start.progress) if start else None
-    with SceneWriter(path, raster, cutting.tool.build(), attributes, resume=start) as writer:
+    tool = cutting.tool.build()
+    with SceneWriter(path, raster, tool, attributes, packing=CUT, resume=start) as writer:
         keeper = _Keeper(writer)
         if start and state:
             keeper.note_kept(state, start.checkpoint)

@@ -239,10 +239,34 @@ class WindowSection(Part):
     interval: Time = described(
         "0.2 us", "Time between frames.", "1 ns to 1 ms; up to the camera's integration_time"
     )
+    later_bands: int = described(
+        2,
+        "Segments after the window of which one exposure is kept, when the shear band is\n"
+        "developed, so that the headlines are drawn from several segments.",
+        "0 to 1000; as many as length_of_cut leaves room for",
+    )
+    band_delay: float = described(
+        0.22,
+        "When the band is developed: this part of the time between the last two valleys of the\n"
+        "cutting force after the later one.",
+        "0 to 1",
+    )
+    band_duration: Time = described(
+        "10 us",
+        "How long each of them is kept.",
+        "1 ns to 1 ms; the camera's integration_time or more",
+    )
 
     def build(self) -> OutputWindow:
         """When the solver hands out frames."""
-        return OutputWindow(start=self.start, end=self.end, interval=self.interval)
+        return OutputWindow(
+            start=self.start,
+            end=self.end,
+            interval=self.interval,
+            later_bands=self.later_bands,
+            band_delay=self.band_delay,
+            band_duration=self.band_duration,
+        )
 
 
 _IN_REGION: Final = "the whole scene within the simulated region"
@@ -272,7 +296,10 @@ class CuttingSection(Part):
     speed: Speed = described("250 m/min", "Cutting speed.", "over 0 m/min")
     feed: CutLength = described("0.3 mm", "Feed: thickness of the uncut chip.", "over 0 mm")
     length_of_cut: CutLength = described(
-        "1.958 mm", "Length of cut, from the first contact.", "over 0 mm"
+        "2.6 mm",
+        "Length of cut, from the first contact. The paper's window ends at 1.958 mm; segments\n"
+        "after it make the scatter of the headlines known.",
+        "over 0 mm",
     )
     initial_temperature: Temperature = described(
         "20 degC", "Temperature before the cut.", "200 K to 1500 K"
@@ -549,6 +576,18 @@ class AnalysisSection(Part):
     """What is computed from the simulated measurement."""
 
     instants: int = described(9, "Exposures, spread evenly over the scene.")
+    phases: int = described(
+        3,
+        "Positions of the pixels along each axis, evenly over a pixel, on which each headline is\n"
+        "drawn anew: 3 makes 9.",
+        "1 or more",
+    )
+    textures: int = described(
+        5,
+        "Textures of the emissivity on which each headline is drawn anew: of the study's seed and\n"
+        "those after it.",
+        "1 or more",
+    )
     rake_chip: str = described(
         "chip 2", "Chip whose errors are read at the rake face; the paper took its chip 2."
     )
@@ -570,6 +609,8 @@ class AnalysisSection(Part):
         """What to analyse."""
         return Plan(
             instants=self.instants,
+            phases=self.phases,
+            textures=self.textures,
             rake_surface=self.rake_chip,
             band_surface=self.band_chip,
             psf_widths=self.psf_widths,
@@ -621,10 +662,15 @@ class Study(Section):
                 "title": "Quick look at the study of Heigel and Whitenton (2010)",
                 "cutting": {
                     "numerics": {"cell": "20 um"},
-                    "window": {"interval": "0.5 us"},
+                    "window": {"interval": "0.5 us", "later_bands": 1},
                     "field_of_view": {"spacing": "1.5 um", "rows": 360, "columns": 400},
                 },
-                "analysis": {"instants": 5, "psf_widths": ["4 um", "8 um", "12 um", "20 um"]},
+                "analysis": {
+                    "instants": 5,
+                    "phases": 2,
+                    "textures": 2,
+                    "psf_widths": ["4 um", "8 um", "12 um", "20 um"],
+                },
             }
         )
 
@@ -658,6 +704,12 @@ class Study(Section):
             raise ValueError(
                 f"cutting.window.interval: {cutting.window.interval * 1e6:g} us is longer than the "
                 f"exposure, expected up to {camera.integration_time * 1e6:g} us"
+            )
+        window = cutting.window
+        if window.later_bands and window.band_duration < camera.integration_time * (1 - 1e-9):
+            raise ValueError(
+                f"cutting.window.band_duration: {window.band_duration * 1e6:g} us is shorter than "
+                f"the exposure, expected {camera.integration_time * 1e6:g} us or more"
             )
         view = cutting.field_of_view
         extent = view.spacing * min(view.rows, view.columns)

@@ -1,16 +1,16 @@
 """Surfaces: emissivity maps that follow the material."""
 
+from chipglow.surface.emissivity import Emissivity
 from chipglow.surface.feature import (
     CHIP_1,
     CHIP_2,
-    Emissivity,
     FeatureField,
     FeatureSurface,
     chip_share,
     shear_band_share,
 )
 from chipglow.surface.map import MapField, MapSurface
-from chipglow.surface.surface import EmissivityField, Surface, UniformSurface
+from chipglow.surface.surface import EmissivityField, EmissivityStack, Surface, UniformSurface
 from chipglow.surface.texture import Texture
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "CHIP_2",
     "Emissivity",
     "EmissivityField",
+    "EmissivityStack",
     "FeatureField",
     "FeatureSurface",
     "MapField",

@@ -1,17 +1,18 @@
 """Emissivity by feature: workpiece, chip, shear band and tool, as the paper maps it."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final, Literal
+from typing import Final, Literal, Self
 
 import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.scene import Frame, Material, Raster, Scene
-from chipglow.surface.surface import EmissivityField, Surface
-from chipglow.surface.texture import Texture, texture_value
+from chipglow.surface.emissivity import Emissivity
+from chipglow.surface.surface import EmissivityField, EmissivityStack, Surface
+from chipglow.surface.texture import Texture, emissivity_at, enlarged
 
 STRAIN_OF_WORKPIECE: Final = 0.3
 """Plastic strain up to which the workpiece's map holds alone."""
@@ -26,28 +27,6 @@ UNDEFORMED_STRAIN: Final = 0.01
 
 FEATURES: Final = ("workpiece", "chip", "shear_band", "tool")
 _VOID, _TOOL = int(Material.VOID), int(Material.TOOL)
-
-
-@dataclass(frozen=True)
-class Emissivity:
-    """Mean and standard deviation of a feature's emissivity.
-
-    Raises
-    ------
-    ValueError
-        If the mean is not within 0 to 1, or the deviation not within 0 to 0.5.
-    """
-
-    mean: float
-    deviation: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.mean <= 1.0:
-            raise ValueError(f"emissivity: expected a mean of 0 to 1, got {self.mean!r}")
-        if not 0.0 <= self.deviation <= 0.5:
-            raise ValueError(
-                f"emissivity: expected a deviation of 0 to 0.5, got {self.deviation!r}"
-            )
 
 
 @dataclass(frozen=True)
@@ -129,10 +108,13 @@ class FeatureSurface(Surface):
             shifts = _mean_shifts(scene)
         return FeatureField(self, scene.raster, times, shifts)
 
+    def redrawn(self, number: int) -> Self:
+        """The surface with the seed `number` further on."""
+        return replace(self, seed=self.seed + number) if number else self
+
     def _texture(self, emissivity: Emissivity, generator: np.random.Generator) -> Texture:
         return Texture.random(
-            emissivity.mean,
-            emissivity.deviation,
+            emissivity,
             self.grain,
             generator,
             restore_deviation=self.restore_deviation,
@@ -179,25 +161,29 @@ class FeatureField(EmissivityField):
         ValueError
             If the frame is not of the scene's shape, or lacks the material coordinates.
         """
-        if frame.material.shape != self.raster.shape:
-            raise ValueError(
-                f"frame: has shape {frame.material.shape}, expected {self.raster.shape}"
-            )
-        result = np.empty(self.raster.shape, dtype=np.float32)
-        _blend(
-            frame.material,
-            frame.plastic_strain,
-            frame.plastic_strain_rate,
-            *self._positions(frame),
-            self.shift(frame.time),
-            1.0 / self.surface.grain,
-            self._maps,
-            self._tool_map,
-            result,
-        )
+        result: NDArray[np.float32] = self._alone.emissivities(frame)[0]
         return result
 
-    def _positions(self, frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def beside(self, others: Sequence[EmissivityField]) -> EmissivityStack:
+        """Stack of this and other fields: textures that move alike are looked up together."""
+        fields = (self, *others)
+        if all(isinstance(other, FeatureField) and self._moves_like(other) for other in others):
+            return FeatureFields(tuple(f for f in fields if isinstance(f, FeatureField)))
+        return super().beside(others)
+
+    def _moves_like(self, other: "FeatureField") -> bool:
+        names = ("grain", "follow", "restore_deviation")
+        alike = all(getattr(self.surface, n) == getattr(other.surface, n) for n in names)
+        return alike and self.raster == other.raster and np.array_equal(self.shifts, other.shifts)
+
+    def positions(self, frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Where each sample is looked up in the maps before they are shifted, in m.
+
+        Raises
+        ------
+        ValueError
+            If the textures follow the material, and the frame lacks the material coordinates.
+        """
         if self.surface.follow == "mean":
             return self._sample_positions
         if frame.material_x is None or frame.material_y is None:
@@ -205,17 +191,88 @@ class FeatureField(EmissivityField):
         return frame.material_x, frame.material_y
 
     @cached_property
+    def tool_map(self) -> NDArray[np.float32]:
+        """The tool's emissivity at every sample, shape (y, x)."""
+        return self.surface.textures["tool"].at(self.raster.x[None, :], self.raster.y[:, None])
+
+    @cached_property
+    def _alone(self) -> "FeatureFields":
+        return FeatureFields((self,))
+
+    @cached_property
     def _sample_positions(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         x, y = np.meshgrid(self.raster.x, self.raster.y)
         return x.astype(np.float32), y.astype(np.float32)
 
-    @cached_property
-    def _maps(self) -> NDArray[np.float32]:
-        return np.stack([self.surface.textures[name].nodes for name in FEATURES[:3]])
+
+@dataclass(frozen=True, eq=False)
+class FeatureFields(EmissivityStack):
+    """Feature surfaces on one scene that differ by their numbers and seeds only.
+
+    Chips of the same seed share their deviates, and all share the place where they are looked up.
+
+    Parameters
+    ----------
+    fields : tuple of FeatureField
+        One or more, of one raster, grain and motion.
+    """
+
+    fields: tuple[FeatureField, ...]
+
+    def emissivities(self, frame: Frame) -> NDArray[np.float32]:
+        """Emissivity of every sample of a frame for every surface, shape (surface, y, x).
+
+        Raises
+        ------
+        ValueError
+            If the frame is not of the scene's shape, or lacks the material coordinates.
+        """
+        first = self.fields[0]
+        if frame.material.shape != first.raster.shape:
+            raise ValueError(
+                f"frame: has shape {frame.material.shape}, expected {first.raster.shape}"
+            )
+        result = np.empty((len(self.fields), *first.raster.shape), dtype=np.float32)
+        _blend(
+            frame.material,
+            frame.plastic_strain,
+            frame.plastic_strain_rate,
+            *first.positions(frame),
+            first.shift(frame.time),
+            1.0 / first.surface.grain,
+            self._nodes,
+            self._seed_numbers,
+            self._tables,
+            self._tool_maps,
+            result,
+        )
+        return result
 
     @cached_property
-    def _tool_map(self) -> NDArray[np.float32]:
-        return self.surface.textures["tool"].at(self.raster.x[None, :], self.raster.y[:, None])
+    def _seeds(self) -> list[int]:
+        return sorted({field.surface.seed for field in self.fields})
+
+    @cached_property
+    def _seed_numbers(self) -> NDArray[np.int64]:
+        return np.array([self._seeds.index(field.surface.seed) for field in self.fields])
+
+    @cached_property
+    def _nodes(self) -> NDArray[np.float32]:
+        """Deviates of the three moving features, shape (feature, row, column, seed)."""
+        of_seed = {field.surface.seed: field.surface.textures for field in self.fields}
+        maps = [[of_seed[seed][name].nodes for seed in self._seeds] for name in FEATURES[:3]]
+        return np.ascontiguousarray(np.moveaxis(np.array(maps), 1, -1))
+
+    @cached_property
+    def _tables(self) -> NDArray[np.float32]:
+        """What a deviate stands for, shape (surface, feature, entry)."""
+        return np.array(
+            [[getattr(f.surface, name).table for name in FEATURES[:3]] for f in self.fields]
+        )
+
+    @cached_property
+    def _tool_maps(self) -> NDArray[np.float32]:
+        return np.array([field.tool_map for field in self.fields])
 
 
 def chip_share(plastic_strain: ArrayLike) -> NDArray[np.float64]:
@@ -271,26 +328,30 @@ def _share(value, none, full):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, parallel=True)
-def _blend(material, strain, rate, x, y, shift, scale, maps, tool_map, result):  # type: ignore[no-untyped-def]
-    rows, columns = material.shape
+def _blend(  # type: ignore[no-untyped-def]
+    material, strain, rate, x, y, shift, scale, nodes, seed_numbers, tables, tool_maps, result
+):
+    """Emissivity of every surface: shares of the features times their textures."""
+    surfaces, rows, columns = result.shape
     for r in prange(rows):
+        deviates = np.empty(nodes.shape[3], np.float32)
         for c in range(columns):
             kind = material[r, c]
-            if kind == _VOID:
-                result[r, c] = 0.0
-                continue
-            if kind == _TOOL:
-                result[r, c] = tool_map[r, c]
+            for n in range(surfaces):
+                result[n, r, c] = tool_maps[n, r, c] if kind == _TOOL else np.float32(0.0)
+            if kind in (_VOID, _TOOL):
                 continue
             chip = _share(strain[r, c], STRAIN_OF_WORKPIECE, STRAIN_OF_CHIP)
             band = _share(rate[r, c], RATE_OF_CHIP, RATE_OF_SHEAR_BAND)
-            value, rest = np.float32(0.0), np.float32(1.0) - band
+            rest = np.float32(1.0) - band
             for k, share in ((0, rest - rest * chip), (1, rest * chip), (2, band)):
                 if share > 0:
                     u = (x[r, c] - shift[k, 0]) * scale
                     v = (y[r, c] - shift[k, 1]) * scale
-                    value += share * texture_value(maps[k], u, v)
-            result[r, c] = value
+                    enlarged(nodes[k], u, v, deviates)
+                    for n in range(surfaces):
+                        deviate = deviates[seed_numbers[n]]
+                        result[n, r, c] += share * emissivity_at(deviate, tables[n, k])
 
 
 @njit(cache=True, parallel=True)

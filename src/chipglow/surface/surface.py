@@ -1,7 +1,9 @@
 """What a surface owes the camera: an emissivity for every sample of every frame."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +11,41 @@ from numpy.typing import NDArray
 from chipglow.scene import Frame, Material, Scene
 
 
+class EmissivityStack(ABC):
+    """Emissivities of one scene's samples for several surfaces, frame by frame."""
+
+    @abstractmethod
+    def emissivities(self, frame: Frame) -> NDArray[np.float32]:
+        """Emissivity of every sample for every surface, shape (surface, y, x), from 0 to 1."""
+
+
 class EmissivityField(ABC):
     """Emissivity of one scene's samples, frame by frame."""
 
     @abstractmethod
     def emissivity(self, frame: Frame) -> NDArray[np.float32]:
-        """Emissivity of every sample of a frame, shape (y, x), from 0 to 1; 0 where undefined."""
+        """Emissivity of every sample of a frame, shape (y, x), from 0 to 1; 0 in the void."""
+
+    def beside(self, others: Sequence["EmissivityField"]) -> EmissivityStack:
+        """Stack of this and other fields of the same scene, this one first.
+
+        Parameters
+        ----------
+        others : sequence of EmissivityField
+            The others, which may be none.
+        """
+        return _OneByOne((self, *others))
+
+
+@dataclass(frozen=True)
+class _OneByOne(EmissivityStack):
+    """Fields that have nothing in common."""
+
+    fields: tuple[EmissivityField, ...]
+
+    def emissivities(self, frame: Frame) -> NDArray[np.float32]:
+        """See `EmissivityStack.emissivities`."""
+        return np.stack([field.emissivity(frame) for field in self.fields])
 
 
 class Surface(ABC):
@@ -23,6 +54,16 @@ class Surface(ABC):
     @abstractmethod
     def on(self, scene: Scene) -> EmissivityField:
         """Lay this surface on a scene; what depends on the whole scene is computed here."""
+
+    def redrawn(self, number: int) -> Self:
+        """The surface with another draw of what is random in it; itself where nothing is.
+
+        Parameters
+        ----------
+        number : int
+            Which draw; 0 is this surface.
+        """
+        return self
 
 
 @dataclass(frozen=True)

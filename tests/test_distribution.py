@@ -1,0 +1,124 @@
+"""Distributions of figures of merit: scatter, its causes, and where a value lies."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chipglow.analysis.distribution import COVERAGE, TOGETHER, Distribution, ratio
+
+CAUSES = ("segment", "texture", "pixel phase")
+
+
+def drawn(generator, shape, deviations, together=0.0):
+    """Draws of the random-effects model: a mean, one effect for each cause, and a rest."""
+    values = np.full(shape, -40.0)
+    for axis, deviation in enumerate(deviations):
+        effect = generator.normal(0.0, deviation, shape[axis])
+        others = tuple(other for other in range(len(shape)) if other != axis)
+        values = values + np.expand_dims(effect, others)
+    return values + generator.normal(0.0, together, shape)
+
+
+def test_mean_deviation_and_range_are_those_of_all_draws():
+    values = np.array([[[-30.0, -50.0], [-40.0, -44.0]]])
+    found = Distribution(values, CAUSES)
+    assert found.draws == 4
+    assert found.mean == -41.0
+    # Deviations of 11, -9, 1 and -3: squares of 212 over three degrees of freedom.
+    assert found.standard_deviation == pytest.approx(np.sqrt(212 / 3))
+    assert found.range == (-50.0, -30.0)
+
+
+def test_parts_by_hand():
+    # 10 from the first cause, 1 from the second, and nothing else: -11, -9, 9, 11.
+    found = Distribution(np.array([[-11.0, -9.0], [9.0, 11.0]]), ("a", "b")).parts
+    assert found["a"].standard_deviation == pytest.approx(np.sqrt(200.0))
+    assert found["a"].fraction == pytest.approx(400 / 404)
+    assert found["b"].fraction == pytest.approx(4 / 404)
+    assert found[TOGETHER].fraction == pytest.approx(0.0, abs=1e-12)
+    # Only the combination of both: no mean of either differs.
+    both = Distribution(np.array([[1.0, -1.0], [-1.0, 1.0]]), ("a", "b")).parts
+    assert both[TOGETHER].fraction == pytest.approx(1.0)
+    assert both[TOGETHER].standard_deviation == pytest.approx(2.0)
+
+
+@given(seed=st.integers(0, 10**6), shape=st.tuples(*[st.integers(1, 5)] * 3))
+@settings(max_examples=50)
+def test_fractions_sum_to_one(seed, shape):
+    values = drawn(np.random.default_rng(seed), shape, (5.0, 3.0, 1.0), 2.0)
+    found = Distribution(values, CAUSES).parts
+    total = sum(part.fraction for part in found.values())
+    assert total == pytest.approx(1.0 if values.size > 1 else 0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("shape", "deviations", "together"),
+    [
+        ((3, 5, 9), (8.0, 3.0, 6.0), 4.0),
+        ((3, 5, 9), (2.0, 2.0, 10.0), 1.0),
+        ((3, 5, 9), (10.0, 1.0, 1.0), 1.0),
+        ((2, 2, 4), (3.0, 3.0, 3.0), 3.0),
+    ],
+)
+def test_the_interval_holds_one_more_draw_as_often_as_it_says(shape, deviations, together):
+    generator = np.random.default_rng(11)
+    held, repeats = 0, 1500
+    total = np.sqrt(sum(d**2 for d in deviations) + together**2)
+    for _ in range(repeats):
+        found = Distribution(drawn(generator, shape, deviations, together), CAUSES)
+        held += not found.differs_from(generator.normal(-40.0, total))
+    # Three standard errors of 1500 repeats are 1.7 %; the interval may be too wide by what the
+    # other causes leave in the means of one, and by the degrees of freedom of few draws.
+    assert COVERAGE - 0.017 <= held / repeats <= 0.995
+
+
+def test_three_draws_of_what_decides_count_as_three():
+    values = np.broadcast_to(np.array([-50.0, -40.0, -30.0])[:, None, None], (3, 5, 9))
+    low, high = Distribution(values, CAUSES).interval
+    # t of two degrees of freedom, 4.303, times 10, times the root of 1 + 1/3.
+    assert high == pytest.approx(-40.0 + 4.303 * 10.0 * np.sqrt(4 / 3), rel=1e-3)
+    assert low == pytest.approx(-80.0 - high)
+
+
+def test_a_single_draw_says_nothing_of_the_scatter():
+    found = Distribution(np.full((1, 1, 1), -40.0), CAUSES)
+    assert np.isnan(found.standard_deviation)
+    assert found.interval == (-np.inf, np.inf)
+    assert not found.differs_from(1000.0)
+
+
+def test_draws_that_are_all_alike_differ_from_any_other_value():
+    found = Distribution(np.full((1, 1, 4), -40.0), CAUSES)
+    assert found.interval == (-40.0, -40.0)
+    assert found.differs_from(-41.0)
+    assert not found.differs_from(-40.0)
+
+
+def test_the_place_of_a_value():
+    found = Distribution(np.arange(10.0).reshape(1, 2, 5), CAUSES)
+    assert found.fraction_below(-1.0) == 0.0
+    assert found.fraction_below(4.0) == 0.45
+    assert found.fraction_below(100.0) == 1.0
+
+
+def test_a_ratio_is_taken_draw_by_draw():
+    part = Distribution(np.array([[[-10.0, -30.0]]]), CAUSES)
+    whole = Distribution(np.array([[[-40.0, -60.0]]]), CAUSES)
+    found = ratio(part, whole)
+    assert found is not None
+    np.testing.assert_allclose(found.values, [[[0.25, 0.5]]])
+    assert ratio(whole, Distribution(np.array([[[-1.0, 0.0]]]), CAUSES)) is None
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (np.zeros((0, 1, 1)), "expected one or more draws of each of segment, texture"),
+        (np.zeros((2, 2)), r"values have shape \(2, 2\)"),
+        (np.full((1, 1, 1), np.nan), "a value is not finite"),
+    ],
+)
+def test_refused(values, message):
+    with pytest.raises(ValueError, match=message):
+        Distribution(values, CAUSES)
