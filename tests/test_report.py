@@ -10,30 +10,37 @@ import pytest
 import xarray as xr
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis import PAPER, Distribution, Inertia, Plan, analyse
+from chipglow.analysis import PAPER, Distribution, Inertia, Plan, analyse, rake_grid
 from chipglow.analysis.draws import CAUSES
 from chipglow.camera import Camera
 from chipglow.report import Row, comparison_rows, write_report
 from chipglow.report.chip import chip_rows
 from chipglow.report.comparison import cause_rows
 from chipglow.report.evidence import answer, crossing, place
+from chipglow.report.paper import TABLE_1, table_1, table_2
+from chipglow.report.visible import visible_picture
+from chipglow.scene import Material
+from chipglow.study import Study
 from chipglow.surface import CHIP_1, CHIP_2
 
 TITLE = "My <i>own</i> study"
 REMARKS = ["Assumed: the moon is made of <b>cheese</b>."]
 STUDY = "cutting:\n  speed: 250 m/min  # <script>alert('&')</script>\n"
 PROVENANCE = {"Study": "<b>the paper's</b>", "Version": "0.0", "Seed": "1"}
-FIGURES = {
-    "fields",
-    "measurement",
-    "band-curves",
-    "error-images",
-    "error-lines",
-    "psf-sensitivity",
-    "psf",
-    "forces",
-    "chip",
+PAPER_FIGURES = {
+    "figure-2-psf": "Figure 2",
+    "figure-3-heated-chips": "Figure 3",
+    "figure-4-heated-tool": "Figure 4",
+    "figure-5-scene": "Figure 5",
+    "figure-6-measurement": "Figure 6",
+    "figure-7-rake-profiles": "Figure 7",
+    "figure-8-dual-spectrum": "Figure 8",
+    "figure-9-band-curves": "Figure 9",
+    "figure-10-error-images": "Figure 10",
+    "figure-11-error-lines": "Figure 11",
 }
+FIGURES = {*PAPER_FIGURES, "psf-sensitivity", "forces", "chip-thickness"}
+SETTINGS = table_2(Study())
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +56,7 @@ def result():
 @pytest.fixture(scope="module")
 def folder(result, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    report = write_report(result, folder, TITLE, STUDY, PROVENANCE, REMARKS)
+    report = write_report(result, folder, TITLE, STUDY, PROVENANCE, REMARKS, SETTINGS)
     assert report == folder / "report.html"
     return folder
 
@@ -112,13 +119,20 @@ def test_the_page_stands_alone_and_escapes_text(folder, result):
             assert part in shown
     for row in causes:
         assert all(text in shown for text in row.texts)
-    for number in (5, 6, 9, 10, 11):
-        assert f"Figure {number}" in shown
+    headings = [f"{number}:" for number in PAPER_FIGURES.values()]
+    headings.insert(2, "Table 1:")
+    headings.insert(4, "Table 2:")
+    places = [shown.index(heading) for heading in headings]
+    assert places == sorted(places)
+    tables = table_1(result)
+    for setting in SETTINGS:
+        assert all(text in shown for text in setting)
     for line in chip:
         for part in (line.quantity, line.value_text, line.spread_text, line.explanation):
             assert part in shown
     # Explanations have rows of their own.
-    assert page.seen.count("tr") == 3 + 2 * len(rows) + len(causes) + 2 * len(chip)
+    count = 5 + 2 * len(rows) + len(causes) + 2 * len(chip) + len(tables) + len(SETTINGS)
+    assert page.seen.count("tr") == count
 
 
 def test_the_study_heads_the_page_and_the_answer_comes_first(folder, result):
@@ -272,10 +286,55 @@ def test_what_is_missing_is_left_out_and_unknown_is_null(result, tmp_path):
     assert (unseen.here_text, unseen.differs) == ("–", None)
     assert unseen.one_draw == result.rake.face.error
     names = {path.stem for path in (tmp_path / "figures").iterdir()}
-    assert names == FIGURES - {"psf", "forces"}
+    assert names == FIGURES - {"figure-2-psf", "forces"}
     assert "segment_period_us" not in {row.key for row in comparison_rows(bare)}
     still = replace(result.forces.segmentation, period=float("nan"))
     unknown = replace(result, forces=replace(result.forces, segmentation=still))
     row = next(r for r in comparison_rows(unknown) if r.key == "segment_period_us")
     assert row.here is None and row.here_text == "–"
     assert "no period" in row.explanation
+
+
+def test_the_papers_emissivities_come_back_from_heated_objects(result):
+    """Within what the procedure states, and what the camera's blur is known to do."""
+    found = {row.feature: row for heated in result.heated for row in heated.rows}
+    assert set(found) == set(TABLE_1)
+    for feature, paper in TABLE_1.items():
+        row = found[feature]
+        assert row.true == paper
+        # Few grains of 20 um in a region: the mean of the textures scatters by the deviation over
+        # the root of some ten grains. Narrow bands are drawn toward the bodies by up to 0.06.
+        spread = 3 * paper.deviation / np.sqrt(10 * row.means.size)
+        drawn = 0.06 if "shear band" in feature else 0.02
+        assert row.means.mean() == pytest.approx(paper.mean, abs=spread + drawn)
+        if "shear band" not in feature:  # whose region holds the slope to the bodies too
+            assert (row.deviations < paper.deviation).all()
+    for chip in ("chip 1", "chip 2"):
+        body, band = found[f"{chip} chip body"].found, found[f"{chip} shear band"].found
+        assert band.mean > body.mean + 2 * band.standard_uncertainty
+
+
+def test_profiles_beside_the_rake_face_are_those_of_the_laboratory(result):
+    surface = result.surfaces["chip 2"]
+    grid = rake_grid(surface.measurement, result.tool)
+    np.testing.assert_array_equal(surface.rake_grid.frame_mean, grid.frame_mean)
+    assert surface.rake_grid.times.size == len(result.instants)
+
+
+def test_the_visible_picture_shows_tool_and_bands(result):
+    grey = visible_picture(result.frame, result.raster)
+    material, strain = result.frame.material, result.frame.plastic_strain
+    assert (grey[material == Material.TOOL] == 0.0).all()
+    steel = material == Material.WORKPIECE
+    assert grey.min() >= 0.0 and grey.max() <= 1.0
+    low, high = grey[steel & (strain < 1.0)].mean(), grey[steel & (strain > 2.0)].mean()
+    assert high < low
+
+
+def test_table_2_says_what_the_study_sets():
+    rows = {name: (paper, here) for name, paper, here in SETTINGS}
+    for name in ("Feed", "Cutting speed", "Rake angle", "Clearance angle", "Edge radius"):
+        assert rows[name][0] == rows[name][1], name
+    other = table_2(Study(cutting={"feed": "0.1 mm", "tool": {"rake_angle": "6 deg"}}))
+    assert ("Feed", "0.3 mm", "0.1 mm") in other
+    assert ("Rake angle", "−7°", "6°") in other

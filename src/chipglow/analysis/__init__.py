@@ -36,6 +36,7 @@ from chipglow.analysis.error import (
     reference_temperature,
 )
 from chipglow.analysis.find_tool import FoundTool, find_tool
+from chipglow.analysis.heated import HeatedObject, HeatedRow
 from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.knife_edge import EdgeResult, KnifeEdge, knife_edge
 from chipglow.analysis.lines import Line, sample, straight_line
@@ -89,6 +90,8 @@ __all__ = [
     "FoundTool",
     "GridComparison",
     "Headline",
+    "HeatedObject",
+    "HeatedRow",
     "Heating",
     "ImageFit",
     "Inertia",

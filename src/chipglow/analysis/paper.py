@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import nan
+from math import isfinite, nan
 from typing import Final
 
 import numpy as np
@@ -12,9 +12,11 @@ from chipglow.analysis.band_error import BandErrors
 from chipglow.analysis.chip import ChipMetrics, chip_metrics
 from chipglow.analysis.draws import Draws, Site, draw_errors
 from chipglow.analysis.error import ErrorImages, ReferenceKind, error_images
+from chipglow.analysis.heated import HeatedObject, heated_objects
 from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.lines import sample
 from chipglow.analysis.rake import RakeErrors
+from chipglow.analysis.rake_grid import RakeGrid, rake_grid
 from chipglow.analysis.ridge import NoShearBandError
 from chipglow.analysis.segment import Instant, Segment
 from chipglow.analysis.segmentation import Segmentation, segmentation
@@ -25,6 +27,12 @@ from chipglow.cutting import EnergyHistory
 from chipglow.radiometry import Band
 from chipglow.scene import ENERGY_UNITS, Frame, Raster, Scene, Tool
 from chipglow.surface import EmissivityField, Surface
+
+_USUAL_SPACING: Final = 180e-6
+"""Distance of shear bands along a chip in m, where the forces tell no period."""
+
+_AROUND: Final = 2
+"""Instants from the developed band to the one that still develops, and to the one that moved."""
 
 Progress = Callable[[str, float], None]
 """Told what is being done and which part of it, from 0 to 1, is done."""
@@ -118,6 +126,8 @@ class SurfaceResult:
     ----------
     measurement : Measurement
         One frame for each instant.
+    rake_grid : RakeGrid or None
+        Squares along the rake face in all frames; None if none is usable in any.
     emissivity : ndarray
         In the middle of the developed instant's exposure, on the scene's samples, shape (y, x).
     scene_temperature : ndarray
@@ -134,6 +144,7 @@ class SurfaceResult:
     """
 
     measurement: Measurement
+    rake_grid: RakeGrid | None
     emissivity: NDArray[np.float32]
     scene_temperature: NDArray[np.float64]
     errors: ErrorImages
@@ -171,10 +182,14 @@ class StudyResult:
     raster : Raster
         The scene's samples.
     instants : tuple of Instant
-        The shear band over the scene's longest part without a gap.
+        The shear band over the scene's longest part without a gap, then in each other part.
+    other_parts : int
+        How many other parts there are.
     developed : int
-        Number of the instant with the fully developed shear band: that with the greatest mean
-        temperature along the ridge.
+        Number of the instant with the fully developed shear band: that of the longest part with
+        the greatest mean temperature along the ridge.
+    moments : tuple of Frame
+        The scene in the middle of the instants before, with and after the developed band.
     segments : tuple of Segment
         Segments with a developed band: that of the developed instant, then one for each other part
         of the scene.
@@ -184,6 +199,8 @@ class StudyResult:
         The headline errors over segments, textures and positions of the pixels.
     sensitivity : tuple of Sensitivity
         For either order of blur and sensors.
+    heated : tuple of HeatedObject
+        Heated chips and tool, and the emissivity that their images give back.
     forces : ForceHistory or None
         If the scene has them.
     chip : ChipMetrics
@@ -194,13 +211,21 @@ class StudyResult:
     camera: Camera
     raster: Raster
     instants: tuple[Instant, ...]
+    other_parts: int
     developed: int
+    moments: tuple[Frame, ...]
     segments: tuple[Segment, ...]
     surfaces: Mapping[str, SurfaceResult]
     draws: Draws
     sensitivity: tuple[Sensitivity, ...]
+    heated: tuple[HeatedObject, ...]
     forces: ForceHistory | None
     chip: ChipMetrics
+
+    @property
+    def one_segment(self) -> tuple[Instant, ...]:
+        """The instants of the scene's longest part: how one band develops."""
+        return self.instants[: len(self.instants) - self.other_parts]
 
     @property
     def segment(self) -> Segment:
@@ -265,20 +290,24 @@ def analyse(
     tell = progress or _say_nothing
     duration = camera.integration_time
     starts = _starts(scene, duration, plan.instants)
-    instants = _instants(scene, duration, starts, tell)
-    means = [instant.mean_temperature for instant in instants]
+    others = _other_starts(scene, duration)
+    instants = _instants(scene, duration, (*starts, *others), tell)
+    means = [instant.mean_temperature for instant in instants[: len(starts)]]
     if np.isnan(means).all():
         raise NoShearBandError("shear band: none is found in any of the exposures")
     developed = int(np.nanargmax(means))
-    segments = _segments(scene, camera, plan, instants[developed])
+    segments = _segments(scene, duration, plan, [instants[developed], *instants[len(starts) :]])
     results = _measure(scene, surfaces, camera, plan, instants, developed, segments[0], tell)
     sites = _sites(scene, surfaces, camera, plan, segments, tell)
+    chip = _chip(scene, tell)
     return StudyResult(
         plan=plan,
         camera=camera,
         raster=scene.raster,
         instants=instants,
+        other_parts=len(others),
         developed=developed,
+        moments=_moments(scene, duration, instants[: len(starts)], developed),
         segments=segments,
         surfaces=results,
         draws=draw_errors(camera, sites, plan.phases, lambda part: tell("draws", part)),
@@ -289,8 +318,16 @@ def analyse(
             plan.phases,
             lambda part: tell("width of the point spread function", part),
         ),
+        heated=heated_objects(
+            camera,
+            surfaces,
+            segments[0].tool,
+            float(np.nanmean([segment.band_width for segment in segments])),
+            chip.chip_spacing if isfinite(chip.chip_spacing) else _USUAL_SPACING,
+            plan.textures,
+        ),
         forces=_forces(scene),
-        chip=_chip(scene, tell),
+        chip=chip,
     )
 
 
@@ -320,32 +357,49 @@ def _starts(scene: Scene, duration: float, count: int) -> NDArray[np.float64]:
     return np.asarray(np.unique(times[nearest_frame]), dtype=np.float64)
 
 
+def _other_starts(scene: Scene, duration: float) -> list[float]:
+    """Beginnings of the scene's other parts that hold an exposure."""
+    starts = []
+    for block in scene.blocks:
+        first, last = scene.times[block[0]], scene.times[block[-1]]
+        lasts = last - first + scene.frame_spacing
+        if block != scene.longest_block and lasts >= duration * (1 - 1e-6):
+            starts.append(float(first))
+    return starts
+
+
 def _instants(
-    scene: Scene, duration: float, starts: NDArray[np.float64], tell: Progress
+    scene: Scene, duration: float, starts: Sequence[float], tell: Progress
 ) -> tuple[Instant, ...]:
     instants = []
     for i, start in enumerate(starts):
-        tell("shear band", i / starts.size)
+        tell("shear band", i / len(starts))
         instants.append(Instant.at(scene, float(start), duration))
     tell("shear band", 1.0)
     return tuple(instants)
 
 
-def _segments(scene: Scene, camera: Camera, plan: Plan, developed: Instant) -> tuple[Segment, ...]:
+def _moments(
+    scene: Scene, duration: float, instants: Sequence[Instant], developed: int
+) -> tuple[Frame, ...]:
+    """Frames in the middle of instants: the band develops, is developed, has moved on."""
+    around = (developed - _AROUND, developed, developed + _AROUND)
+    chosen = sorted({min(max(number, 0), len(instants) - 1) for number in around})
+    middles = [instants[i].start + duration / 2 for i in chosen]
+    numbers = np.searchsorted(scene.times, np.array(middles) + 1e-6 * scene.frame_spacing) - 1
+    return tuple(scene.frame(max(int(number), 0)) for number in numbers)
+
+
+def _segments(
+    scene: Scene, duration: float, plan: Plan, instants: Sequence[Instant]
+) -> tuple[Segment, ...]:
     """The developed segment, then those of the scene's other parts that have band and contact."""
-    duration = camera.integration_time
-    found = [developed]
-    for block in scene.blocks:
-        first, last = scene.times[block[0]], scene.times[block[-1]]
-        lasts = last - first + scene.frame_spacing
-        if block != scene.longest_block and lasts >= duration * (1 - 1e-6):
-            found.append(Instant.at(scene, float(first), duration))
-    segments = [
+    first, *others = [
         Segment.of(scene, instant, duration, plan.touching)
-        for instant in found
+        for instant in instants
         if instant.band is not None
     ]
-    return (segments[0], *(segment for segment in segments[1:] if segment.contact_length > 0))
+    return (first, *(segment for segment in others if segment.contact_length > 0))
 
 
 def _measure(
@@ -378,6 +432,7 @@ def _measure(
         site = _site(plan, segment, exposure, exposure)
         results[name] = SurfaceResult(
             measurement=measurement,
+            rake_grid=_rake_grid(measurement, segment.tool),
             emissivity=on_scene.emissivity(segment.frame),
             scene_temperature=np.asarray(camera.band.temperature(exposure.centre_radiance)),
             errors=errors,
@@ -386,6 +441,13 @@ def _measure(
             curves=_curves(camera.band, measurement, instants),
         )
     return results
+
+
+def _rake_grid(measurement: Measurement, tool: Tool) -> RakeGrid | None:
+    try:
+        return rake_grid(measurement, tool)
+    except ValueError:  # no square is whole in the image, or all are under its lower limit
+        return None
 
 
 def _sites(

@@ -15,7 +15,7 @@ from chipglow.cli.inertia import say_inertia
 from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.cutting import SOLVER_VERSION
 from chipglow.io import atomic_folder
-from chipglow.report import comparison_rows, write_report
+from chipglow.report import comparison_rows, table_2, write_report
 from chipglow.study import Study, run, study_text
 
 
@@ -48,6 +48,7 @@ def write_results(study: Study, folder: Path, resume: bool, remarks: Sequence[st
                 study_text(study),
                 _provenance(study),
                 [*remarks, *(f"Assumed: {sentence}" for sentence in assumed)],
+                table_2(study) if study.scene is None else (),
             )
             progress("report", 1.0)
     say_assumed(assumed)

@@ -136,6 +136,11 @@ def draw_tool(axes: Axes, tool: Tool) -> None:
     axes.plot(*outline.T, color="black", linewidth=1.0)
 
 
+def black_tool(axes: Axes, tool: Tool) -> None:
+    """The tool in black."""
+    axes.fill(*(tool.outline(3e-3) * 1e6).T, color="black")
+
+
 def draw_line(axes: Axes, points: NDArray[np.float64], colour: str, label: str = "") -> None:
     """A curve in metres on micrometre axes, seen on dark and on light ground."""
     axes.plot(*(points * 1e6).T, color="white", linewidth=3.0)

@@ -1,4 +1,4 @@
-"""The figures of the report: the paper's 5, 6, 9, 10 and 11, and what stands behind them."""
+"""The figures of the report: the paper's, in its order, and what goes beyond it."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -17,6 +17,12 @@ from chipglow.camera import PointSpreadFunction
 from chipglow.report import drawing
 from chipglow.report.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, ImagePanel
 from chipglow.report.evidence import error_definition
+from chipglow.report.laboratory_figures import (
+    dual_spectrum,
+    heated_chips,
+    heated_tool,
+    rake_profiles,
+)
 from chipglow.scene import Material
 
 _ORDER_STYLE: Final = {
@@ -35,8 +41,10 @@ class FigureFile:
         Name of the files without ending.
     title : str
         Heading.
+    paper : str
+        The figure of the paper that it stands beside, such as "Figure 5"; empty without.
     caption : str
-        What it shows, and which figure of the paper it stands beside.
+        What it shows, what is the same as in the paper and what differs.
     alt : str
         What is seen in it, for who cannot see it.
     png, svg : Path
@@ -45,6 +53,7 @@ class FigureFile:
 
     name: str
     title: str
+    paper: str
     caption: str
     alt: str
     png: Path
@@ -57,6 +66,7 @@ class _Drawing:
 
     name: str
     title: str
+    paper: str
     caption: Callable[[StudyResult], str]
     alt: Callable[[StudyResult], str]
     draw: Callable[[StudyResult], Figure | None]
@@ -79,7 +89,7 @@ def draw_figures(result: StudyResult, folder: Path) -> Iterator[FigureFile]:
                 continue
             png, svg = drawing.save(figure, folder, drawing_.name)
         caption, alt = drawing_.caption(result), drawing_.alt(result)
-        yield FigureFile(drawing_.name, drawing_.title, caption, alt, png, svg)
+        yield FigureFile(drawing_.name, drawing_.title, drawing_.paper, caption, alt, png, svg)
 
 
 def fields(result: StudyResult) -> Figure:
@@ -132,10 +142,11 @@ def band_curves(result: StudyResult) -> Figure:
     """Measured temperature along the shear band as it grows (the paper's Figure 9)."""
     figure = drawing.new_figure(3.7)
     panels = figure.subplots(1, len(result.surfaces), sharex=True, sharey=True, squeeze=False)[0]
-    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.88, len(result.instants)))
+    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.88, len(result.one_segment)))
     first = result.instants[0].start
     for axes, (name, surface) in zip(panels, result.surfaces.items(), strict=True):
-        for i, (instant, curve) in enumerate(zip(result.instants, surface.curves, strict=True)):
+        curves = surface.curves[: len(result.one_segment)]
+        for i, (instant, curve) in enumerate(zip(result.one_segment, curves, strict=True)):
             if instant.band is None:
                 continue
             axes.plot(
@@ -268,8 +279,9 @@ def forces(result: StudyResult) -> Figure | None:
         axes.axvline(peak, color=GREY, linewidth=0.8, linestyle=":", label="" if i else "segments")
     axes.axvspan(time[0], segments.start * 1e6, color=drawing.VOID, label="first build-up")
     duration = result.camera.integration_time
-    begin, end = result.instants[0].start, result.instants[-1].start + duration
-    axes.axvspan(begin * 1e6, end * 1e6, ymax=0.03, color=GREEN, label="seen by the camera")
+    for i, instant in enumerate(result.instants):
+        seen = (instant.start * 1e6, (instant.start + duration) * 1e6)
+        axes.axvspan(*seen, ymax=0.03, color=GREEN, label="" if i else "exposures")
     axes.set_xlim(time[0], time[-1])
     axes.set_ylim(0.0)
     axes.set_xlabel("time / µs")
@@ -494,7 +506,9 @@ def _surface(result: StudyResult) -> SurfaceResult:
 def _fields_caption(result: StudyResult) -> str:
     return (
         f"The scene {result.frame.time * 1e6:.1f} µs into the cut, when its shear band is fully "
-        "developed. The paper's Figure 5. Grey: no material, or not of this field."
+        "developed. Grey: no material, or not of this field. Same as the paper: the fields, and "
+        "how strain and strain rate choose the emissivity. Different: strain follows the material "
+        "without remeshing, so that formed bands stay sharp, and textures follow every point."
     )
 
 
@@ -503,44 +517,92 @@ def _measurement_caption(result: StudyResult) -> str:
     if result.camera.floor is not None:
         share = float(np.mean(_surface(result).errors.flagged))
         floor = (
-            " Grey on the right: under the camera's floor of "
-            f"{result.camera.floor - KELVIN:.0f} °C, {100 * share:.0f} % of the sensors."
+            " Grey on the right: under the lower limit of the camera's range, "
+            f"{result.camera.floor - KELVIN:.0f} °C, {100 * share:.0f} % of the pixels."
         )
     return (
-        "What the simulated camera (the paper's Figure 6) makes of the scene: radiance temperature "
-        f"of the scene's samples at one moment, and of the sensors over the exposure.{floor}"
+        "What the simulated camera makes of the scene: radiance temperature of the scene's samples "
+        f"at one moment, and of the pixels over the exposure.{floor} The paper's figure is the "
+        "scheme of this calculation; here is its result."
+    )
+
+
+def _heated_caption(result: StudyResult) -> str:
+    return (
+        "Radiance temperature of evenly heated chips, and the regions whose mean is taken. Same as "
+        "the paper: temperatures, reflected laboratory of 20 °C, Equation 2. Different: a virtual "
+        "strip with straight shear bands as wide and as far apart as those of the cut, of known "
+        "emissivity, so that what the procedure finds can be held against the truth: Table 1. The "
+        "camera's lower limit is left out: at 300 °C it would hide emissivities under 0.46 of "
+        "chip 1."
+    )
+
+
+def _heated_tool_caption(result: StudyResult) -> str:
+    return (
+        "Radiance temperature of an evenly heated tool, and the emissivity of its pixels. Same as "
+        "the paper: temperature, mean and standard deviation put in. Different: the texture is "
+        "random; the paper's insert has an uneven oxide with a gradient."
+    )
+
+
+def _profiles_caption(result: StudyResult) -> str:
+    grid = next(s.rake_grid for s in result.surfaces.values() if s.rake_grid is not None)
+    return (
+        f"Mean radiance temperature in squares of 3 × 3 pixels along the rake face, by their depth "
+        f"in the chip; bars: standard deviation over {grid.times.size} exposures of "
+        f"{len(result.segments)} segments. A square counts where all its pixels are over the lower "
+        "limit of the range. Same as the paper: grid, limit, both chips. Different: squares of "
+        f"{grid.size * 1e6:.0f} µm (the paper's first middle of 7.5 µm means 15 µm), and our "
+        "contact reaches the border of the view. The paper's panel a is its measurement, of which "
+        "we have no data."
+    )
+
+
+def _dual_caption(result: StudyResult) -> str:
+    return (
+        "The same moments in visible light and in the infrared: the band develops, is developed, "
+        "has moved on. Same as the paper: pairs of one moment, tool blacked out. Different: on the "
+        "left is a drawing from the strain (darker where sheared), not a photograph, and infrared images "
+        "are as close in time as we like; the paper's camera takes 600 a second."
     )
 
 
 def _curves_caption(result: StudyResult) -> str:
     return (
         "Measured radiance temperature along the ridge of the shear band, by time after the first "
-        "exposure. The paper's Figure 9 b and c. The thick curve is the fully developed band, that "
-        "of the greatest mean temperature; the dashed line is the camera's floor."
+        "exposure. The thick curve is the fully developed band, that of the greatest mean "
+        "temperature; the dashed line is the lower limit of the camera's range. Same as the paper: "
+        "panels b and c. Different: bands of the paper's simulation are of another length; its "
+        "panel a is a measurement, of which we have no data."
     )
 
 
 def _images_caption(result: StudyResult) -> str:
     return (
-        f"{error_definition(result)} With the band fully developed; below, the part that the PSF "
-        "makes. The paper's Figure 10. Green: the lines of the next figure. Dashed: the "
-        "band's ridge. Paler: under the camera's floor; the scale is that of the others."
+        f"{error_definition(result)} With the band fully developed, in one draw; below, the part "
+        "that the PSF makes. Green: the lines of Figure 11. Dashed: the band's ridge. Paler: under "
+        "the lower limit of the camera's range; the scale is that of the others. Same as the "
+        "paper: definition, cases and panels. Different: our PSF, which the paper gives as a "
+        "picture only."
     )
 
 
 def _lines_caption(result: StudyResult) -> str:
     return (
-        "Errors along the green lines of the figure before: through mid-contact along the normal "
-        "of the rake face, and through the middle of the shear band, over all draws of segment, "
-        "texture and pixel phase. The paper's Figure 11, its stated figures drawn as diamonds and "
-        "as a dashed line."
+        "Errors along the green lines of Figure 10: through mid-contact along the normal of the "
+        "rake face, and through the middle of the shear band. The paper's stated figures are drawn "
+        "as diamonds and as a dashed line. Different: the paper shows one draw; here are the mean "
+        "and the standard deviation over all draws of segment, texture and pixel phase, and one "
+        "draw dotted."
     )
 
 
 def _psf_caption(result: StudyResult) -> str:
     return (
-        f"The camera's point spread function on the scene's plane: {result.camera.psf!r}. The "
-        "paper gives its own as a picture (Figure 2). White square: one sensor."
+        f"The camera's point spread function on the scene's plane: {result.camera.psf!r}. White "
+        "square: one pixel. Different: the paper measured its own with a knife edge and gives it "
+        "as a picture without numbers; ours is calculated."
     )
 
 
@@ -647,20 +709,110 @@ def _chip_alt(result: StudyResult) -> str:
     )
 
 
+def _heated_alt(result: StudyResult) -> str:
+    return (
+        "Images of heated strips of chip: bodies of the segments darker, shear bands across them "
+        "brighter, each with a frame around the pixels of one region."
+    )
+
+
+def _heated_tool_alt(result: StudyResult) -> str:
+    tool = next(heated for heated in result.heated if not heated.regions)
+    return (
+        "Image of a heated tool, mottled, and a histogram of the emissivity of its pixels about "
+        f"{tool.rows[0].found.mean:.2f}."
+    )
+
+
+def _profiles_alt(result: StudyResult) -> str:
+    hottest = ", ".join(
+        f"{np.nanmax(surface.rake_grid.frame_mean) - KELVIN:.0f} °C with {name}"
+        for name, surface in result.surfaces.items()
+        if surface.rake_grid is not None
+    )
+    return (
+        "Curves of radiance temperature over the distance along the rake face, one for each depth "
+        f"in the chip, hottest beside the face: {hottest} at most."
+    )
+
+
+def _dual_alt(result: StudyResult) -> str:
+    return (
+        f"{len(result.moments)} pairs of pictures: a grey drawing of the chip with dark shear "
+        "bands and a black tool, and beside it the infrared image of the same moment."
+    )
+
+
 _DRAWINGS: Final = (
-    _Drawing("fields", "The scene", _fields_caption, _fields_alt, fields),
-    _Drawing("measurement", "The measurement", _measurement_caption, _measurement_alt, measurement),
     _Drawing(
-        "band-curves",
+        "figure-2-psf",
+        "The camera's point spread function",
+        "Figure 2",
+        _psf_caption,
+        _psf_alt,
+        point_spread,
+    ),
+    _Drawing(
+        "figure-3-heated-chips",
+        "Heated chips",
+        "Figure 3",
+        _heated_caption,
+        _heated_alt,
+        heated_chips,
+    ),
+    _Drawing(
+        "figure-4-heated-tool",
+        "Heated tool",
+        "Figure 4",
+        _heated_tool_caption,
+        _heated_tool_alt,
+        heated_tool,
+    ),
+    _Drawing("figure-5-scene", "The scene", "Figure 5", _fields_caption, _fields_alt, fields),
+    _Drawing(
+        "figure-6-measurement",
+        "The measurement",
+        "Figure 6",
+        _measurement_caption,
+        _measurement_alt,
+        measurement,
+    ),
+    _Drawing(
+        "figure-7-rake-profiles",
+        "The chip beside the rake face",
+        "Figure 7",
+        _profiles_caption,
+        _profiles_alt,
+        rake_profiles,
+    ),
+    _Drawing(
+        "figure-8-dual-spectrum",
+        "Visible and infrared",
+        "Figure 8",
+        _dual_caption,
+        _dual_alt,
+        dual_spectrum,
+    ),
+    _Drawing(
+        "figure-9-band-curves",
         "The shear band as it develops",
+        "Figure 9",
         _curves_caption,
         _curves_alt,
         band_curves,
     ),
-    _Drawing("error-images", "The measurement error", _images_caption, _images_alt, error_images),
     _Drawing(
-        "error-lines",
+        "figure-10-error-images",
+        "The measurement error",
+        "Figure 10",
+        _images_caption,
+        _images_alt,
+        error_images,
+    ),
+    _Drawing(
+        "figure-11-error-lines",
         "Across the rake face and the shear band",
+        "Figure 11",
         _lines_caption,
         _lines_alt,
         error_lines,
@@ -668,11 +820,11 @@ _DRAWINGS: Final = (
     _Drawing(
         "psf-sensitivity",
         "How much the PSF's width decides",
+        "",
         _sensitivity_caption,
         _sensitivity_alt,
         psf_sensitivity,
     ),
-    _Drawing("psf", "The camera's point spread function", _psf_caption, _psf_alt, point_spread),
-    _Drawing("forces", "The forces", _forces_caption, _forces_alt, forces),
-    _Drawing("chip", "The chip's thickness", _chip_caption, _chip_alt, chip),
+    _Drawing("forces", "The forces", "", _forces_caption, _forces_alt, forces),
+    _Drawing("chip-thickness", "The chip's thickness", "", _chip_caption, _chip_alt, chip),
 )

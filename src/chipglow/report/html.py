@@ -11,6 +11,7 @@ from chipglow import __version__
 from chipglow.report.chip import ChipRow
 from chipglow.report.comparison import CauseRow, Row
 from chipglow.report.figures import FigureFile
+from chipglow.report.paper import EmissivityTexts
 
 _PAPER: Final = (
     "J. C. Heigel, E. P. Whitenton: The effects of emissivity and camera point spread function on "
@@ -22,7 +23,8 @@ _SECTIONS: Final = (
     ("answer", "The answer"),
     ("comparison", "The paper beside this study"),
     ("scatter", "What makes the scatter"),
-    ("figures", "Figures"),
+    ("figures", "The paper's figures and tables"),
+    ("beyond", "Beyond the paper"),
     ("chip", "The chip"),
     ("study", "The study as run"),
     ("versions", "How it was made"),
@@ -52,6 +54,10 @@ class Content:
         What describes the chip.
     figures : sequence of FigureFile
         Figures, whose PNG files are read.
+    emissivities : sequence of EmissivityTexts
+        The paper's Table 1 beside the study's.
+    settings : sequence of tuple
+        The paper's Table 2 beside the study's: what is set, there and here; empty without a cut.
     study_text : str
         The study's YAML.
     provenance : mapping
@@ -66,6 +72,8 @@ class Content:
     definition: str
     chip: Sequence[ChipRow]
     figures: Sequence[FigureFile]
+    emissivities: Sequence[EmissivityTexts]
+    settings: Sequence[tuple[str, str, str]]
     study_text: str
     provenance: Mapping[str, str]
 
@@ -83,7 +91,8 @@ def page(content: Content) -> str:
         "answer": _answer(content),
         "comparison": _comparison(content.rows, content.definition),
         "scatter": _causes(content.causes),
-        "figures": "\n".join(_figure(figure) for figure in content.figures),
+        "figures": "\n".join(_in_the_papers_order(content)),
+        "beyond": "\n".join(_figure(figure) for figure in content.figures if not figure.paper),
         "chip": _chip_table(content.chip),
         "study": f"<pre><code>{escape(content.study_text)}</code></pre>",
         "versions": _definitions(content.provenance),
@@ -196,10 +205,65 @@ def _numbers(texts: Sequence[str], heads: Sequence[str]) -> str:
     )
 
 
+def _in_the_papers_order(content: Content) -> Iterator[str]:
+    """Figures by their numbers; Table 1 after Figure 3, Table 2 after Figure 4."""
+    after = {"Figure 3": _table_1(content.emissivities), "Figure 4": _table_2(content.settings)}
+    for figure in content.figures:
+        if figure.paper:
+            yield _figure(figure)
+            yield after.pop(figure.paper, "")
+    yield from after.values()
+
+
+def _table_1(rows: Sequence[EmissivityTexts]) -> str:
+    if not rows:
+        return ""
+    heads = ("Feature", "Paper", "Put in", "Found", "Deviation found", "Several textures")
+    text = (
+        "Emissivity as mean ± standard deviation in the paper and put into the study. Found: mean "
+        "and standard uncertainty of one heated object's region (thermocouple of 2 K assumed), and "
+        "the standard deviation over its pixels; beside it mean ± standard deviation of the means "
+        "of several textures. Same as the paper: procedure and numbers. Different: here the truth "
+        "is known: the camera's blur takes from the standard deviation of bodies and tool, and "
+        "draws narrow shear bands toward the bodies beside them."
+    )
+    body = (
+        f"<tr><td>{escape(row.feature)}</td>"
+        + _numbers((row.paper, row.true, row.mean, row.deviation, row.textures), heads[1:])
+        + "</tr>"
+        for row in rows
+    )
+    return _table_part("table-1", "Table 1: emissivity of heated chips and tool", text, heads, body)
+
+
+def _table_2(rows: Sequence[tuple[str, str, str]]) -> str:
+    if not rows:
+        return ""
+    heads = ("Setting", "Paper", "Here")
+    text = (
+        "Settings of the cutting simulation. Not legible: a cell of the paper's table that its "
+        "copy does not show."
+    )
+    body = (
+        f"<tr><td>{escape(name)}</td>{_numbers((there, here), heads[1:])}</tr>"
+        for name, there, here in rows
+    )
+    return _table_part("table-2", "Table 2: settings of the simulation", text, heads, body)
+
+
+def _table_part(name: str, title: str, text: str, heads: Sequence[str], body: Iterator[str]) -> str:
+    return (
+        f'<div class="part" id="{name}">\n<h3>{escape(title)}</h3>\n<p>{escape(text)}</p>\n'
+        + _table(heads, body)
+        + "\n</div>"
+    )
+
+
 def _figure(figure: FigureFile) -> str:
     picture = b64encode(figure.png.read_bytes()).decode("ascii")
+    title = f"{figure.paper}: {figure.title}" if figure.paper else figure.title
     return (
-        f'<figure id="figure-{escape(figure.name)}">\n<h3>{escape(figure.title)}</h3>\n'
+        f'<figure id="{escape(figure.name)}">\n<h3>{escape(title)}</h3>\n'
         f'<img alt="{escape(figure.alt)}" src="data:image/png;base64,{picture}">\n'
         f"<figcaption>{escape(figure.caption)}</figcaption></figure>"
     )

@@ -10,6 +10,7 @@ from chipglow.report.comparison import cause_rows, comparison_rows
 from chipglow.report.evidence import answer, error_definition
 from chipglow.report.figures import draw_figures
 from chipglow.report.html import Content, page
+from chipglow.report.paper import table_1
 from chipglow.report.results import compression, results_dataset, summary
 
 
@@ -20,6 +21,7 @@ def write_report(
     study_text: str,
     provenance: Mapping[str, str],
     remarks: Sequence[str] = (),
+    settings: Sequence[tuple[str, str, str]] = (),
 ) -> Path:
     """Write everything that a study gives into a folder.
 
@@ -37,6 +39,8 @@ def write_report(
         What, when, version, seed and the like, in the order in which it is shown.
     remarks : sequence of str
         What a reader must know before quoting a number: sentences under the answer.
+    settings : sequence of tuple
+        Settings of the cut beside the paper's, see `paper.table_2`; none for a scene from a file.
 
     Returns
     -------
@@ -61,6 +65,8 @@ def write_report(
         definition=error_definition(result),
         chip=chip,
         figures=list(draw_figures(result, pictures)),
+        emissivities=table_1(result),
+        settings=settings,
         study_text=study_text,
         provenance=provenance,
     )

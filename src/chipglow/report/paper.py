@@ -1,0 +1,118 @@
+"""Tables 1 and 2 of Heigel and Whitenton (2010) beside the study's."""
+
+from dataclasses import dataclass
+from math import degrees
+from typing import Final
+
+from chipglow.analysis import StudyResult
+from chipglow.study import Study
+from chipglow.surface import Emissivity
+
+TABLE_1: Final = {
+    "chip 1 chip body": Emissivity(0.42, 0.07),
+    "chip 1 shear band": Emissivity(0.53, 0.05),
+    "chip 2 chip body": Emissivity(0.77, 0.03),
+    "chip 2 shear band": Emissivity(0.85, 0.02),
+    "tool": Emissivity(0.58, 0.06),
+}
+"""Mean and standard deviation of the emissivity; that of the tool stands in the paper's text."""
+
+
+@dataclass(frozen=True)
+class EmissivityTexts:
+    """A row of Table 1 as printed.
+
+    Parameters
+    ----------
+    feature : str
+        The feature.
+    paper, true : str
+        Mean ± standard deviation in the paper, and as put into the study.
+    mean, deviation : str
+        What comes back from the image of a heated object: mean with its standard uncertainty, and
+        the standard deviation over its pixels.
+    textures : str
+        Mean and standard deviation of the means of several textures.
+    """
+
+    feature: str
+    paper: str
+    true: str
+    mean: str
+    deviation: str
+    textures: str
+
+
+def table_1(result: StudyResult) -> list[EmissivityTexts]:
+    """Emissivity of heated chips and tool: in the paper, put in, and found.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    """
+    rows = []
+    for row in (row for heated in result.heated for row in heated.rows):
+        paper = TABLE_1.get(row.feature)
+        several = row.means.size > 1
+        rows.append(
+            EmissivityTexts(
+                feature=row.feature,
+                paper=_both(paper.mean, paper.deviation) if paper else "–",
+                true=_both(row.true.mean, row.true.deviation),
+                mean=f"{row.found.mean:.3f} ± {row.found.standard_uncertainty:.3f}",
+                deviation=f"{row.found.deviation:.3f}",
+                textures=(
+                    f"{row.means.mean():.3f} ± {row.means.std(ddof=1):.3f}" if several else "–"
+                ),
+            )
+        )
+    return rows
+
+
+def table_2(study: Study) -> list[tuple[str, str, str]]:
+    """Settings of the cutting simulation: what is set, in the paper, in the study.
+
+    Parameters
+    ----------
+    study : Study
+        A study that cuts.
+    """
+    cutting, tool = study.cutting, study.cutting.tool
+    region, window = cutting.numerics.build(), cutting.window
+    depth = f"{region.depth * 1e3:g} mm simulated"
+    if tool.outline:
+        angles = ("from a file", "from a file", "from a file")
+    else:
+        angles = (
+            f"{degrees(tool.rake_angle):g}°",
+            f"{degrees(tool.clearance_angle):g}°",
+            f"{tool.edge_radius * 1e6:g} µm",
+        )
+    frames = cutting.duration / window.interval
+    return [
+        ("Workpiece", "AISI 1045 (200 HB)", cutting.workpiece),
+        ("Tool", "carbide, general", tool.material),
+        ("Rake angle", "−7°", angles[0].replace("-", "−")),
+        ("Clearance angle", "7°", angles[1]),
+        ("Edge radius", "20 µm", angles[2]),
+        ("Feed", "0.3 mm", f"{cutting.feed * 1e3:g} mm"),
+        ("Cutting speed", "250 m/min", f"{cutting.speed * 60:g} m/min"),
+        ("Initial temperature", "20 °C", f"{cutting.initial_temperature - 273.15:g} °C"),
+        ("Workpiece height", "2 mm", depth),
+        ("Length of cut", "not legible", f"{cutting.length_of_cut * 1e3:g} mm"),
+        (
+            "Window",
+            "1.579 mm to 1.958 mm",
+            f"{window.start * 1e3:g} mm to {window.end * 1e3:g} mm",
+        ),
+        ("Time between frames", "0.2 µs", f"{window.interval * 1e6:g} µs"),
+        ("Frames of the window", "about 455", f"{frames:.0f}"),
+        ("Segments after it", "none", f"{window.later_bands}, one exposure each"),
+        ("Method", "finite elements, remeshed", "material points"),
+        ("Size of elements or cells", "not legible", f"{cutting.numerics.cell * 1e6:g} µm"),
+    ]
+
+
+def _both(mean: float, deviation: float) -> str:
+    return f"{mean:.2f} ± {deviation:.2f}"
