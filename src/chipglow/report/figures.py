@@ -563,8 +563,8 @@ def _dual_caption(result: StudyResult) -> str:
     return (
         "The same moments in visible light and in the infrared: the band develops, is developed, "
         "has moved on. Same as the paper: pairs of one moment, tool blacked out. Different: on the "
-        "left is a drawing from the strain (darker where sheared), not a photograph, and infrared images "
-        "are as close in time as we like; the paper's camera takes 600 a second."
+        "left is a drawing from the strain (darker where sheared), not a photograph, and infrared "
+        "images are as close in time as we like; the paper's camera takes 600 a second."
     )
 
 
