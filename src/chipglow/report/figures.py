@@ -486,8 +486,10 @@ def _measurement_caption(result: StudyResult) -> str:
 def _curves_caption(result: StudyResult) -> str:
     return (
         "Measured radiance temperature along the ridge of the shear band, by time after the first "
-        "exposure. The paper's Figure 9 b and c. The thick curve is the fully developed band, that "
-        "of the greatest mean temperature; the dashed line is the camera's floor."
+        "exposure. A curve begins where the band does, and its distance counts straight from the "
+        "cutting edge to there. The paper's Figure 9 b and c. The thick curve is the fully "
+        "developed band, that of the greatest mean temperature; the dashed line is the camera's "
+        "floor."
     )
 
 
