@@ -9,6 +9,7 @@ from analytic_chip import AnalyticChip
 from figure6 import figure_6
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from measured_band import BandImage
 from scipy.interpolate import RegularGridInterpolator
 
 from chipglow.analysis import (
@@ -213,11 +214,14 @@ def test_a_straight_ridge_is_found_where_it_is(degrees, width):
     across = offset[:, 0] * sin(angle) + offset[:, 1] * cos(angle)
     # The parabola through three samples of a Gaussian, 2 µm apart, is within 0.4 µm of its top.
     # The tool and the surface cut the ridge off aslant; that reaches as far in as the smoothing.
-    inner = (band.ridge.distance > 40e-6) & (band.ridge.distance < band.length - 40e-6)
+    distance = band.ridge.distance
+    inner = (distance > 40e-6) & (distance < distance[-1] - 40e-6)
     assert np.abs(across[inner]).max() < 0.4e-6
     assert np.abs(across).max() < width / 2
     assert band.reaches_surface
-    assert band.length == pytest.approx((200e-6 - edge[1]) / sin(angle), abs=width)
+    assert distance[-1] == pytest.approx((200e-6 - edge[1]) / sin(angle), abs=width)
+    # At 50 degrees and under 29 µm from the edge the ridge's line is in the layer left out.
+    assert band.start < (10e-6 if degrees < 45.0 else 35e-6)
     # Linear interpolation of the flanks at a sixth of the width: 2 %.
     assert band.width == pytest.approx(width, rel=0.02)
     # Bilinear reading between samples 2 µm apart cuts the top of the narrower one by up to 2 %.
@@ -231,7 +235,7 @@ def test_noise_and_a_sheared_rake_layer_do_not_lead_the_ridge_astray():
     band = find_shear_band(GRID, rate, workpiece, TOOL)
     offset = band.ridge.points - edge
     across = offset[:, 0] * sin(angle) + offset[:, 1] * cos(angle)
-    far = (band.ridge.distance > 60e-6) & (band.ridge.distance < band.length - 20e-6)
+    far = (band.ridge.distance > 60e-6) & (band.ridge.distance < band.ridge.distance[-1] - 20e-6)
     # The top of a Gaussian under 30 % noise may be taken a few samples beside it.
     assert np.abs(across[far]).max() < 6e-6
 
@@ -247,6 +251,105 @@ def test_without_a_band_there_is_none():
         find_shear_band(GRID, np.full(GRID.shape, 100.0), workpiece, TOOL)
     with pytest.raises(NoShearBandError, match="no path"):
         find_shear_band(GRID, np.full(GRID.shape, 1e5), np.zeros(GRID.shape, bool), TOOL)
+    with pytest.raises(NoShearBandError, match="no ridge"):
+        find_shear_band(GRID, rake_layer(300e3, 8e-6), workpiece, TOOL)
+
+
+def rake_layer(rate, depth):
+    """Strain rate of a layer that falls off from the rake face."""
+    x, y = np.meshgrid(GRID.x, GRID.y)
+    return rate * np.exp(-np.maximum(TOOL.signed_distance(x, y), 0.0) / depth)
+
+
+def band_scene(shape, width=20e-6, gap=0.0):
+    """Gaussian ridge along a circle, from a distance on, to a free surface at y = 200 µm."""
+    x, y = np.meshgrid(GRID.x, GRID.y)
+    along, across = shape.place(np.stack([x, y], axis=-1))
+    rate = 60e3 * np.exp(-4 * log(2) * (across / width) ** 2) * (along >= gap)
+    return rate, (y < 200e-6) & (TOOL.signed_distance(x, y) > 0)
+
+
+def depth_in_layer(points):
+    """Depth in m in the layer along the rake face that is left out; negative beyond it."""
+    radius = np.hypot(*(points - TOOL.edge_point).T)
+    return np.minimum(25e-6, 0.4 * radius) - TOOL.signed_distance(points[:, 0], points[:, 1])
+
+
+def turning(points):
+    """Sum of the magnitudes of all turns of a curve in rad."""
+    steps = np.diff(points, axis=0)
+    return np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))).sum()
+
+
+@pytest.mark.parametrize("layer", [0.0, 300e3])
+@pytest.mark.parametrize("gap", [40e-6, 80e-6])
+@pytest.mark.parametrize(("degrees", "bend"), [(35.0, 1.0), (42.0, 1.0), (45.0, 800.0)])
+def test_a_ridge_begins_where_the_band_does(degrees, bend, gap, layer):
+    shape = BandImage(angle=radians(degrees), bend=bend)
+    rate, workpiece = band_scene(shape, gap=gap)
+    band = find_shear_band(GRID, rate + rake_layer(layer, 8e-6), workpiece, TOOL)
+    points = band.ridge.points
+    along, across = shape.place(points)
+    # The path steps by a sample, and its first point lies up to 8 µm beside the ridge.
+    assert abs(along[0] - gap) < 3 * GRID.spacing
+    assert abs(band.start - gap) < 3 * GRID.spacing
+    assert band.start == pytest.approx(hypot(*(points[0] - TOOL.edge_point)))
+    assert depth_in_layer(points).max() < 0
+    inner = (along > gap + 40e-6) & (along < along[-1] - 40e-6)
+    assert np.abs(across[inner]).max() < 0.4e-6
+    # Both ends are cut off aslant: the path bends there by up to 30 degrees.
+    assert turning(points) < bend * band.length + radians(60.0)
+    whole = np.linspace(0.0, 0.4e-3, 4001)
+    end = np.interp(200e-6, shape.curve(whole)[:, 1], whole)
+    # The free surface cuts it off aslant, so that it ends within its width of 20 µm.
+    assert band.length == pytest.approx(end - gap, abs=20e-6)
+    half = 10e-6 + GRID.spacing
+    assert along[band.middle] == pytest.approx((gap + end) / 2, abs=half)
+    quarters = np.quantile([gap, end], [0.25, 0.75])
+    np.testing.assert_allclose(along[band.middle_half][[0, -1]], quarters, atol=3 / 4 * 20e-6)
+
+
+LEFT = [(35.0, 1.0, 50e-6), (35.0, 1.0, 100e-6), (45.0, 800.0, 50e-6), (45.0, 800.0, 70e-6)]
+
+
+@pytest.mark.parametrize(("degrees", "bend", "shift"), LEFT)
+def test_a_band_that_has_left_the_edge_begins_where_it_leaves_the_layer(degrees, bend, shift):
+    shape = BandImage(angle=radians(degrees), bend=bend, shift=shift)
+    rate, workpiece = band_scene(shape)
+    check_that_it_begins_beside_the_layer(rate + rake_layer(300e3, 8e-6), workpiece, shape)
+
+
+def test_the_next_band_is_no_part_of_one_that_has_left_the_edge():
+    """Its strong beginning would pay for the way over to the other, which reaches the surface."""
+    shape = BandImage(angle=radians(38.0), bend=1.0, shift=80e-6)
+    rate, workpiece = band_scene(shape)
+    following = BandImage(angle=radians(20.0), bend=1.0)
+    x, y = np.meshgrid(GRID.x, GRID.y)
+    along, _ = following.place(np.stack([x, y], axis=-1))
+    fading = 2 * np.exp(-np.maximum(along, 0.0) / 80e-6)
+    rate = rate + fading * band_scene(following, width=25e-6)[0] + rake_layer(300e3, 8e-6)
+    check_that_it_begins_beside_the_layer(rate, workpiece, shape)
+
+
+def check_that_it_begins_beside_the_layer(rate, workpiece, shape):
+    band = find_shear_band(GRID, rate, workpiece, TOOL)
+    along, across = shape.place(band.ridge.points)
+    whole = np.linspace(0.0, 0.5e-3, 5001)
+    leaves = whole[np.flatnonzero(depth_in_layer(shape.curve(whole)) >= 0)[-1]]
+    # The layer's slope hides the ridge's maximum until it is its own standard deviation away.
+    assert -2 * GRID.spacing < along[0] - leaves < 8.5e-6 + 2 * GRID.spacing
+    assert np.abs(across[along < along[-1] - 40e-6]).max() < 1.5e-6
+    assert depth_in_layer(band.ridge.points).max() < 0
+    # It is cut off aslant at one end.
+    assert turning(band.ridge.points) < shape.bend * band.length + radians(30.0)
+
+
+@pytest.mark.parametrize("degrees", [48.0, 50.0, 52.0])
+def test_what_climbs_into_the_layer_is_not_the_bands(degrees):
+    shape = BandImage(angle=radians(degrees), bend=600.0)
+    rate, workpiece = band_scene(shape, gap=40e-6)
+    band = find_shear_band(GRID, rate + rake_layer(100e3, 20e-6), workpiece, TOOL)
+    assert depth_in_layer(band.ridge.points).max() < 0
 
 
 # Rake face
@@ -424,7 +527,7 @@ def test_the_band_of_the_study_is_the_chips(study, chip):
     middle = study.instants[study.developed].start + CAMERA.integration_time / 2
     band = study.band
     offset = chip.distance_to_band(band.ridge.points, middle)
-    inner = (band.ridge.distance > 40e-6) & (band.ridge.distance < 0.85 * band.length)
+    inner = (band.ridge.distance > 40e-6) & (band.ridge.distance < 0.85 * band.ridge.distance[-1])
     assert np.abs(offset[inner]).max() < 1e-6
     assert study.segment.momentary_band is not None
     assert study.segment.band_width == pytest.approx(chip.band_width, rel=0.03)

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis import PAPER, Distribution, Inertia, Plan, analyse, rake_grid
+from chipglow.analysis import PAPER, Distribution, Inertia, Line, Plan, analyse, rake_grid
 from chipglow.analysis.draws import CAUSES
 from chipglow.camera import Camera
 from chipglow.report import Row, comparison_rows, write_report
@@ -243,6 +243,18 @@ def test_the_comparison_holds_what_the_paper_states(result):
     assert rows["contact_length_um"].paper_text == "–"
     assert all(row.explanation.endswith(".") for row in rows.values())
     assert PAPER.rake_error.where in rows["rake_error_degC"].where
+
+
+def test_a_band_that_begins_away_from_the_edge_is_as_long_as_itself(result):
+    whole = result.band
+    ridge = Line(whole.ridge.distance[20:], whole.ridge.points[20:])
+    values = {name: getattr(whole, name)[20:] for name in ("normals", "rate", "widths")}
+    segment = replace(result.segment, band=replace(whole, ridge=ridge, **values))
+    shorter = replace(result, segments=(segment,))
+    row = next(r for r in comparison_rows(shorter) if r.key == "band_length_um")
+    begins = whole.ridge.distance[20]
+    assert row.here == pytest.approx(1e6 * (whole.ridge.distance[-1] - begins))
+    assert f"begins {1e6 * begins:.0f} µm from the cutting edge" in row.explanation
 
 
 def test_numbers_are_printed_with_sign_unit_and_dash():

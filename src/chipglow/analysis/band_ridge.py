@@ -16,6 +16,7 @@ from chipglow.analysis.ridge import (
     even_steps,
     highest,
     normals_of,
+    strongest_part,
 )
 from chipglow.camera import Flag, Measurement
 from chipglow.scene import Raster, Tool
@@ -31,7 +32,6 @@ _ALONG_THE_FACE: Final = (10.0, 30.0)
 _STRENGTH: Final = 5.0
 _TOLL: Final = 0.8
 _STEP: Final = 0.5
-_WEAK: Final = 0.5
 _GAP: Final = 10.0
 _SEARCH: Final = 1.5
 _SIDES: Final = 10.0
@@ -192,31 +192,15 @@ def _path(image: ThermalImage, response: NDArray[np.float64], tool: Tool) -> NDA
     score = np.log1p(map_coordinates(response, polar.index, order=1) / _STRENGTH)
     if allowed[0].any():
         i, j = polar.best_path(score, allowed, allowed, _TOLL)
-        points = _unbroken(polar.points[i, j], score[i, j], _GAP * image.raster.spacing)
+        points = polar.points[i, j]
+        # It begins where the ridge does: near the edge the heat of the rake face may hide it.
+        points = points[strongest_part(points, score[i, j], _GAP * image.raster.spacing)]
         if arc_length(points)[-1] >= SHORTEST * image.raster.spacing:
             return points
     i, j = polar.best_path(score, allowed, allowed, _TOLL, anywhere=True)
     if i.size < 2:
         raise NoShearBandError(_NO_RIDGE)
     return polar.points[i, j]
-
-
-def _unbroken(
-    points: NDArray[np.float64], score: NDArray[np.float64], longest: float
-) -> NDArray[np.float64]:
-    """The strongest part of a path between stretches without a ridge that are too long.
-
-    It begins where the ridge does: near the edge the heat of the rake face may hide it.
-    """
-    weak = score < _WEAK * np.median(score)
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], weak, [False]]).astype(np.int8)))
-    along = arc_length(points)
-    gaps = [(a, b) for a, b in ends.reshape(-1, 2) if along[b - 1] - along[a] > longest]
-    bounds = [0, *(int(end) for gap in gaps for end in gap), score.size]
-    parts = [slice(a, b) for a, b in zip(bounds[::2], bounds[1::2], strict=True)]
-    best = max(parts, key=lambda part: float(score[part].sum()))
-    strong = np.flatnonzero(~weak[best])
-    return points[best][strong[0] : strong[-1] + 1]
 
 
 def _climbed(

@@ -399,8 +399,7 @@ def _band(scene: Scene, number: int) -> ShearBand | None:
 
 def _angle(band: ShearBand) -> float:
     """Angle of the straight line through the middle half, over the horizontal to the left."""
-    share = band.ridge.distance / band.length
-    points = band.ridge.points[(share >= 0.25) & (share <= 0.75)]
+    points = band.ridge.points[band.middle_half]
     offset = points - points.mean(axis=0)
     direction = np.linalg.svd(offset, full_matrices=False)[2][0]
     return float(np.arctan2(-direction[1] * np.sign(direction[0]), abs(direction[0])))

@@ -19,6 +19,7 @@ _STRAIGHTNESS: Final = 0.2
 _RAKE_LAYER: Final = 25e-6
 _RAKE_LAYER_SHARE: Final = 0.4
 _SMOOTHING: Final = 50e-6
+_WEAK: Final = 0.5
 _NOWHERE: Final = np.int64(-1)
 
 
@@ -73,17 +74,30 @@ class PolarGrid:
         row = (top - points[..., 1]) / raster.spacing - 0.5
         on_raster = (column >= 0) & (column <= raster.columns - 1)
         on_raster &= (row >= 0) & (row <= raster.rows - 1)
-        depth = tool.signed_distance(points[..., 0], points[..., 1])
-        layer = np.minimum(_RAKE_LAYER, _RAKE_LAYER_SHARE * radii)[:, None]
         return cls(
             points=points,
             index=np.stack([row, column]),
             on_raster=on_raster,
-            off_face=depth > layer,
+            off_face=off_face(points, tool),
             radii=radii,
             radius_step=step,
             angle_step=float(angles[1] - angles[0]),
         )
+
+    def slopes_from_face(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Where values only fall, at one radius, from the layer along the rake face up to there.
+
+        That is the slope of the layer, however far it reaches, and no ridge: before a ridge the
+        values rise.
+
+        Parameters
+        ----------
+        values : ndarray
+            Values at the places, shape (radii, angles).
+        """
+        rises = np.zeros_like(self.off_face)
+        rises[:, 1:] = self.off_face[:, :-1] & (np.diff(values, axis=1) > 0)
+        return ~np.logical_or.accumulate(rises, axis=1)
 
     def best_path(
         self,
@@ -166,6 +180,51 @@ class PolarGrid:
         best = candidates[np.arange(total.size), choice]
         came_from = np.clip(np.arange(total.size) + choice - reach, 0, total.size - 1)
         return best, came_from.astype(np.int64)
+
+
+def off_face(points: NDArray[np.float64], tool: Tool) -> NDArray[np.bool_]:
+    """Which points lie beyond the layer along the rake face, which friction shears and heats too.
+
+    Parameters
+    ----------
+    points : ndarray
+        x and y in m, shape (..., 2).
+    tool : Tool
+        The tool. The layer is 25 µm thick, and toward the edge 0.4 of the distance from it.
+    """
+    radius = np.linalg.norm(points - tool.edge_point, axis=-1)
+    depth = tool.signed_distance(points[..., 0], points[..., 1])
+    return np.asarray(depth > np.minimum(_RAKE_LAYER, _RAKE_LAYER_SHARE * radius))
+
+
+def strongest_part(
+    points: NDArray[np.float64], strength: NDArray[np.float64], longest: float
+) -> slice:
+    """The strongest part of a path between stretches without a ridge that are too long.
+
+    Parameters
+    ----------
+    points : ndarray
+        The path in m, shape (n, 2).
+    strength : ndarray
+        What each point adds, not negative, shape (n,); under half the median there is no ridge.
+    longest : float
+        Length in m over which a stretch without a ridge divides the path.
+
+    Returns
+    -------
+    slice
+        The points from the first to the last on the ridge of that part.
+    """
+    weak = strength < _WEAK * np.median(strength)
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], weak, [False]]).astype(np.int8)))
+    along = arc_length(points)
+    gaps = [(a, b) for a, b in ends.reshape(-1, 2) if along[b - 1] - along[a] > longest]
+    bounds = [0, *(int(end) for gap in gaps for end in gap), strength.size]
+    parts = [slice(a, b) for a, b in zip(bounds[::2], bounds[1::2], strict=True)]
+    best = max(parts, key=lambda part: float(strength[part].sum()))
+    strong = best.start + np.flatnonzero(~weak[best])
+    return slice(int(strong[0]), int(strong[-1]) + 1)
 
 
 def even_steps(points: NDArray[np.float64], step: float) -> NDArray[np.float64]:

@@ -352,7 +352,7 @@ def _further_rows(result: StudyResult) -> list[Row]:
             "µm",
             lengths * 1e6,
             0,
-            "From the cutting edge to "
+            f"It begins {result.band.start * 1e6:.0f} µm from the cutting edge and ends at "
             + ("the free surface." if result.band.reaches_surface else "the border of the view."),
         ),
     ]

@@ -571,10 +571,11 @@ def _dual_caption(result: StudyResult) -> str:
 def _curves_caption(result: StudyResult) -> str:
     return (
         "Measured radiance temperature along the ridge of the shear band, by time after the first "
-        "exposure. The thick curve is the fully developed band, that of the greatest mean "
-        "temperature; the dashed line is the lower limit of the camera's range. Same as the paper: "
-        "panels b and c. Different: bands of the paper's simulation are of another length; its "
-        "panel a is a measurement, of which we have no data."
+        "exposure. A curve begins where the band does, and its distance counts straight from the "
+        "cutting edge to there. The thick curve is the fully developed band, that of the greatest "
+        "mean temperature; the dashed line is the lower limit of the camera's range. Same as the "
+        "paper: panels b and c. Different: bands of the paper's simulation are of another length; "
+        "its panel a is a measurement, of which we have no data."
     )
 
 
