@@ -38,7 +38,7 @@ class GivenScene:
         self.frame_spacing = STEP
         self.raster = RASTER
 
-    def frame(self, index):
+    def frame(self, index, velocity=True):
         temperature = self.temperature[index]
         return Frame(self.times[index], temperature, *[temperature] * 5)
 

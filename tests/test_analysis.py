@@ -516,10 +516,11 @@ def study(chip):
     return result
 
 
-def test_the_developed_instant_is_the_hottest(study, chip):
+def test_the_developed_instant_is_the_first_near_the_greatest_rise(study, chip):
     middles = [instant.start + CAMERA.integration_time / 2 for instant in study.instants]
-    closest = int(np.argmin(np.abs(np.array(middles) - chip.grown_at)))
-    assert study.developed == closest
+    # On the ridge of the chip: half of what shearing heats, and all that the band does.
+    rise = np.array([180 / 2 + chip.peak_rise * chip.growth(middle) for middle in middles])
+    assert study.developed == np.flatnonzero(rise >= 0.95 * rise.max())[0]
     assert study.surfaces["chip 1"].measurement.times.tolist() == [i.start for i in study.instants]
 
 
@@ -569,9 +570,12 @@ def test_the_first_draw_is_the_papers_procedure(study):
         ("band_worst", study.band_errors.worst),
     ):
         assert headlines[name].error.values.shape == (1, 3, 4)
-        assert headlines[name].error.values[0, 0, 0] == place.error
-        assert headlines[name].psf_portion.values[0, 0, 0] == place.psf_portion
-    np.testing.assert_array_equal(study.draws.rake_line.case_1[0, 0, 0], study.rake.case_1)
+        # One texture and several are summed in another order: float32 of the emissivity, 1e-4 K.
+        assert headlines[name].error.values[0, 0, 0] == pytest.approx(place.error, abs=1e-4)
+        portion = headlines[name].psf_portion.values[0, 0, 0]
+        assert portion == pytest.approx(place.psf_portion, abs=1e-4)
+    drawn = study.draws.rake_line.case_1[0, 0, 0]
+    np.testing.assert_allclose(drawn, study.rake.case_1, atol=1e-4)
 
 
 def test_every_draw_is_the_loop_of_figure_6(chip):
@@ -642,7 +646,7 @@ def test_the_sensitivity_meets_the_study_at_its_own_width(study):
         errors = error_images(camera, exposure_at(study, "chip 2"))
         contact = study.rake.contact_length
         expected = rake_errors(errors, contact, TOOL, 60e-6, 1e-6).face.error
-        assert face == pytest.approx(expected, abs=1e-9)
+        assert face == pytest.approx(expected, abs=1e-4)
         assert (np.diff(series.error("band")) < 0).all()
         assert (np.diff(series.psf_share("rake")) > 0).all()
 

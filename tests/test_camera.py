@@ -183,8 +183,10 @@ def test_exposures_of_several_surfaces_are_those_of_each():
         found = expose_all(scene, fields, Camera().band, 0.1 * STEP, 4 * STEP, 500.0)
         for one, surface in zip(found, some, strict=True):
             alone = expose(scene, surface.on(scene), Camera().band, 0.1 * STEP, 4 * STEP, 500.0)
-            for name in ("mean_radiance", "peak_radiance", "peak_temperature", "centre_radiance"):
-                np.testing.assert_array_equal(getattr(one, name), getattr(alone, name))
+            np.testing.assert_array_equal(one.peak_temperature, alone.peak_temperature)
+            for name in ("mean_radiance", "peak_radiance", "centre_radiance"):
+                # One unit of float32 of the emissivity, see test_surface.
+                np.testing.assert_allclose(getattr(one, name), getattr(alone, name), rtol=1e-6)
 
 
 @pytest.mark.parametrize("start", [3.0, 4.5, 6.0, 9.0])

@@ -141,7 +141,7 @@ def test_low_and_high_emissivities_keep_mean_and_deviation_within_0_to_1(mean, d
     assert values.min() >= 0.0
     assert values.max() <= 1.0
     # What would be cut off is 11 % of the first; of a beta distribution float32 rounds a few.
-    assert ((values == 0.0) | (values == 1.0)).mean() < 1e-4
+    assert ((values == 0.0) | (values == 1.0)).mean() < 1e-3
     # 12 x 16384 deviates: four standard errors of the mean, and as much of a deviation whose
     # fourth moment is under eight times that of a normal distribution.
     error = 1.25 * deviation / (MAP_SIZE * np.sqrt(12))
@@ -176,7 +176,8 @@ def test_surfaces_beside_each_other_are_those_alone():
         fields = [surface.on(scene) for surface in surfaces]
         found = fields[0].beside(fields[1:]).emissivities(frame)
         for one, field in zip(found, fields, strict=True):
-            np.testing.assert_array_equal(one, field.emissivity(frame))
+            # The sums of one map and of several are fused in another order: one unit of float32.
+            np.testing.assert_allclose(one, field.emissivity(frame), rtol=0, atol=1.2e-7)
 
 
 def test_texture_refuses():

@@ -276,11 +276,11 @@ class _Passing:
         up = scene.tool.rake_direction
         for k, number in enumerate(frames):
             along_x, along_y = (
-                sample(scene.data[name][number].values, scene.raster, points)
+                sample(scene.field(name, number), scene.raster, points)
                 for name in ("velocity_x", "velocity_y")
             )
             speed[k] = (along_x * up[0] + along_y * up[1]).mean()
-            strain.append(sample(scene.data["plastic_strain"][number].values, scene.raster, points))
+            strain.append(sample(scene.field("plastic_strain", number), scene.raster, points))
         whole = np.logical_or.reduce(windows)
         moved = speed[whole].sum()
         greatest = [np.median(np.array(strain)[window].max(axis=0)) for window in windows]
@@ -350,6 +350,7 @@ def _speed(frame: Frame, solid: NDArray[np.bool_], raster: Raster) -> float:
     """Speed of what is not deformed, under the cut and before the edge."""
     before = (raster.y[:, None] < 0) & (raster.x < 0)
     still = before & solid & (frame.plastic_strain < _UNDEFORMED)
+    assert frame.velocity_x is not None
     return float(np.median(frame.velocity_x[still])) if still.any() else nan
 
 
@@ -387,9 +388,7 @@ def _developed_bands(scene: Scene, frames: list[int]) -> list[ShearBand]:
 
 def _band(scene: Scene, number: int) -> ShearBand | None:
     assert scene.tool is not None
-    rate, material = (
-        scene.data[name][number].values for name in ("plastic_strain_rate", "material")
-    )
+    rate, material = (scene.field(name, number) for name in ("plastic_strain_rate", "material"))
     try:
         band = find_shear_band(scene.raster, rate, material == Material.WORKPIECE, scene.tool)
     except NoShearBandError:

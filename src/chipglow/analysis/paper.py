@@ -31,6 +31,9 @@ from chipglow.surface import EmissivityField, Surface
 _USUAL_SPACING: Final = 180e-6
 """Distance of shear bands along a chip in m, where the forces tell no period."""
 
+_DEVELOPED: Final = 0.95
+"""Rise of a developed band's mean temperature, as a part of the greatest."""
+
 _AROUND: Final = 2
 """Instants from the developed band to the one that still develops, and to the one that moved."""
 
@@ -186,8 +189,8 @@ class StudyResult:
     other_parts : int
         How many other parts there are.
     developed : int
-        Number of the instant with the fully developed shear band: that of the longest part with
-        the greatest mean temperature along the ridge.
+        Number of the instant with the fully developed shear band: the first of the longest part
+        in which the rise of the mean temperature along the ridge is within 5 % of its greatest.
     moments : tuple of Frame
         The scene in the middle of the instants before, with and after the developed band.
     segments : tuple of Segment
@@ -292,10 +295,7 @@ def analyse(
     starts = _starts(scene, duration, plan.instants)
     others = _other_starts(scene, duration)
     instants = _instants(scene, duration, (*starts, *others), tell)
-    means = [instant.mean_temperature for instant in instants[: len(starts)]]
-    if np.isnan(means).all():
-        raise NoShearBandError("shear band: none is found in any of the exposures")
-    developed = int(np.nanargmax(means))
+    developed = _developed(scene, instants[: len(starts)])
     segments = _segments(scene, duration, plan, [instants[developed], *instants[len(starts) :]])
     results = _measure(scene, surfaces, camera, plan, instants, developed, segments[0], tell)
     sites = _sites(scene, surfaces, camera, plan, segments, tell)
@@ -377,6 +377,19 @@ def _instants(
         instants.append(Instant.at(scene, float(start), duration))
     tell("shear band", 1.0)
     return tuple(instants)
+
+
+def _developed(scene: Scene, instants: Sequence[Instant]) -> int:
+    """Number of the first instant whose band has come near the greatest rise of its temperature.
+
+    From then on the band's temperature hardly changes, but the chip carries it away from the edge:
+    the paper takes bands that are "fully developed but not moved".
+    """
+    means = np.array([instant.mean_temperature for instant in instants])
+    if np.isnan(means).all():
+        raise NoShearBandError("shear band: none is found in any of the exposures")
+    rise = means - float(scene.field("temperature", scene.longest_block[0]).min())
+    return int(np.argmax(np.nan_to_num(rise) >= _DEVELOPED * np.nanmax(rise)))
 
 
 def _moments(

@@ -52,7 +52,7 @@ class Instant:
         """
         indices, weights = frame_weights(scene.times, scene.frame_spacing, start, duration)
         rate = _mean(scene, "plastic_strain_rate", indices, weights)
-        workpiece = scene.data["material"][indices[len(indices) // 2]].values == Material.WORKPIECE
+        workpiece = scene.field("material", indices[len(indices) // 2]) == Material.WORKPIECE
         assert scene.tool is not None
         try:
             band = find_shear_band(scene.raster, rate, workpiece, scene.tool)
@@ -138,7 +138,7 @@ def _mean(
 ) -> NDArray[np.float64]:
     total = np.zeros(scene.raster.shape)
     for index, weight in zip(indices, weights, strict=True):
-        total += weight * scene.data[field_name][index].values
+        total += weight * scene.field(field_name, index)
     return total
 
 
@@ -155,7 +155,7 @@ def _sweep(scene: Scene, indices: range, band: ShearBand) -> float:
     line = band.across(40e-6, scene.raster.spacing / 2)
     places = []
     for index in (indices[0], indices[-1]):
-        rate = scene.data["plastic_strain_rate"][index].values
+        rate = scene.field("plastic_strain_rate", index)
         values = np.nan_to_num(sample(rate, scene.raster, line.points))
         inside = 0 < values.argmax() < values.size - 1
         places.append(float(line.distance[values.argmax()]) if inside else nan)

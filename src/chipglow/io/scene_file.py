@@ -360,6 +360,7 @@ class StoredScene(Scene):
     def __init__(self, path: Path) -> None:
         self.path = path
         self._file = h5py.File(path, "r")
+        self._datasets = {name: self._file[name] for name in PACKING if name in self._file}
         self._direct = {
             name: packing
             for name, packing in (*PACKING.items(), *CUT.items(), ("temperature", HOT))
@@ -399,7 +400,7 @@ class StoredScene(Scene):
     def _read(self, name: str, index: int) -> NDArray[Any]:
         try:
             if name in self._direct:
-                return self._direct[name].unpack(self._file[name][index])
+                return self._direct[name].unpack(self._datasets[name][index])
             return super()._read(name, index)
         except OSError as error:
             raise SceneError(

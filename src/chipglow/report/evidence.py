@@ -62,7 +62,9 @@ def _answer_text(result: StudyResult, name: str, begin: str, end: str) -> str:
         return ""
     low, high = headline.error.range
     share = headline.psf_share
-    psf = f", of which the point spread function makes {_spread(share, 100)} %" if share else ""
+    psf = ""
+    if share is not None and share.mean > 0:  # beside the band the blur may bring light
+        psf = f", of which the point spread function makes {_spread(share, 100)} %"
     return (
         f"{begin} {_spread(headline.error, -1)} °C too little radiance temperature ({-high:.0f} to "
         f"{-low:.0f} °C in {headline.error.draws} draws of segment, texture and pixel phase)"

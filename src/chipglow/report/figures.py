@@ -572,10 +572,10 @@ def _curves_caption(result: StudyResult) -> str:
     return (
         "Measured radiance temperature along the ridge of the shear band, by time after the first "
         "exposure. A curve begins where the band does, and its distance counts straight from the "
-        "cutting edge to there. The thick curve is the fully developed band, that of the greatest "
-        "mean temperature; the dashed line is the lower limit of the camera's range. Same as the "
-        "paper: panels b and c. Different: bands of the paper's simulation are of another length; "
-        "its panel a is a measurement, of which we have no data."
+        "cutting edge to there. The thick curve is the fully developed band, the first within 5 % "
+        "of its greatest rise; the dashed line is the lower limit of the camera's range. Same as "
+        "the paper: panels b and c. Different: bands of the paper's simulation are of another "
+        "length; its panel a is a measurement, of which we have no data."
     )
 
 

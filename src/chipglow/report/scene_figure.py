@@ -71,6 +71,7 @@ def _panels(frame: Frame) -> tuple[ImagePanel, ...]:
     temperature = np.where(there, TEMPERATURE(frame.temperature), np.nan)
     strain = np.where(solid, frame.plastic_strain, np.nan)
     rate = np.where(solid, frame.plastic_strain_rate, np.nan)
+    assert frame.velocity_x is not None and frame.velocity_y is not None
     speed = np.where(solid, np.hypot(frame.velocity_x, frame.velocity_y), np.nan)
     decades = _decades(rate)
     heat = _ends(temperature, (0.1, 99.9))
@@ -114,6 +115,7 @@ def _draw_arrows(axes: Axes, frame: Frame, raster: Raster) -> None:
     coarse = np.s_[step // 2 :: step, step // 2 :: step]
     solid = frame.material[coarse] == Material.WORKPIECE
     x, y = np.meshgrid(raster.x[coarse[1]] * 1e6, raster.y[coarse[0]] * 1e6)
+    assert frame.velocity_x is not None and frame.velocity_y is not None
     u, v = frame.velocity_x[coarse][solid], frame.velocity_y[coarse][solid]
     fastest = float(np.hypot(u, v).max(initial=0.0))
     if fastest > 0.0:

@@ -88,14 +88,17 @@ class Material(IntEnum):
 
 @dataclass(frozen=True)
 class Frame:
-    """The fields of a scene at one time, each of shape (y, x); see `FIELD_UNITS`."""
+    """The fields of a scene at one time, each of shape (y, x); see `FIELD_UNITS`.
+
+    What a scene does not have, and a velocity that was not asked for, is None.
+    """
 
     time: float
     temperature: NDArray[np.float32]
     plastic_strain: NDArray[np.float32]
     plastic_strain_rate: NDArray[np.float32]
-    velocity_x: NDArray[np.float32]
-    velocity_y: NDArray[np.float32]
+    velocity_x: NDArray[np.float32] | None
+    velocity_y: NDArray[np.float32] | None
     material: NDArray[np.uint8]
     material_x: NDArray[np.float32] | None = None
     material_y: NDArray[np.float32] | None = None
@@ -235,23 +238,24 @@ class Scene:
         """Whether the scene says where each point was before the cut."""
         return "material_x" in self.data
 
-    def frame(self, index: int) -> Frame:
+    def frame(self, index: int, velocity: bool = True) -> Frame:
         """Read and check one frame.
 
         Parameters
         ----------
         index : int
             Number of the frame.
+        velocity : bool
+            Whether to read the velocity too, which a camera does not need.
 
         Raises
         ------
         SceneError
             If a value of the frame breaks the contract.
         """
-        fields = {name: self._read(name, index) for name in self._fields}
-        for name, values in fields.items():
-            if name not in _BYTES:
-                fields[name] = np.asarray(values, dtype=np.float32)
+        names = [name for name in self._fields if velocity or name not in _VELOCITY]
+        fields: dict[str, Any] = dict.fromkeys(_VELOCITY)
+        fields |= {name: self.field(name, index) for name in names}
         frame = Frame(time=float(self.times[index]), **fields)
         check_frame(frame)
         return frame
@@ -260,6 +264,19 @@ class Scene:
         """Read frames one after the other."""
         for index in range(len(self.times)) if indices is None else indices:
             yield self.frame(index)
+
+    def field(self, name: str, index: int) -> NDArray[Any]:
+        """One field of one frame, unchecked: float32, or uint8 of the material and the quality.
+
+        Parameters
+        ----------
+        name : str
+            One of `FIELD_UNITS`, `MATERIAL_COORDINATE_UNITS` or `QUALITY`.
+        index : int
+            Number of the frame.
+        """
+        values = self._read(name, index)
+        return values if name in _BYTES else np.asarray(values, dtype=np.float32)
 
     def _read(self, name: str, index: int) -> NDArray[Any]:
         """One field of one frame; a scene in a file has a faster way."""
@@ -272,6 +289,7 @@ class Scene:
 
 
 _BYTES: Final = ("material", QUALITY)
+_VELOCITY: Final = ("velocity_x", "velocity_y")
 
 
 class SceneError(ValueError):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from chipglow.scene import Frame, Material, Raster, Scene
 from chipglow.surface.emissivity import Emissivity
 from chipglow.surface.surface import EmissivityField, EmissivityStack, Surface
-from chipglow.surface.texture import Texture, emissivity_at, enlarged
+from chipglow.surface.texture import Texture, cubic_taps, emissivity_at, enlarge_all, enlarged
 
 STRAIN_OF_WORKPIECE: Final = 0.3
 """Plastic strain up to which the workpiece's map holds alone."""
@@ -241,6 +241,7 @@ class FeatureFields(EmissivityStack):
             first.shift(frame.time),
             1.0 / first.surface.grain,
             self._nodes,
+            self._first_nodes,
             self._seed_numbers,
             self._tables,
             self._tool_maps,
@@ -262,6 +263,10 @@ class FeatureFields(EmissivityStack):
         of_seed = {field.surface.seed: field.surface.textures for field in self.fields}
         maps = [[of_seed[seed][name].nodes for seed in self._seeds] for name in FEATURES[:3]]
         return np.ascontiguousarray(np.moveaxis(np.array(maps), 1, -1))
+
+    @cached_property
+    def _first_nodes(self) -> NDArray[np.float32]:
+        return np.ascontiguousarray(self._nodes[..., 0])
 
     @cached_property
     def _tables(self) -> NDArray[np.float32]:
@@ -321,7 +326,7 @@ def _mean_velocities(frame: Frame, height: NDArray[np.float64]) -> NDArray[np.fl
     return np.asarray(velocity)
 
 
-@njit(inline="always")
+@njit(error_model="numpy", fastmath={"contract"}, forceinline=True)
 def _share(value, none, full):  # type: ignore[no-untyped-def]
     share = (value - np.float32(none)) * np.float32(1.0 / (full - none))
     return min(max(share, np.float32(0.0)), np.float32(1.0))
@@ -329,12 +334,26 @@ def _share(value, none, full):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, parallel=True)
 def _blend(  # type: ignore[no-untyped-def]
-    material, strain, rate, x, y, shift, scale, nodes, seed_numbers, tables, tool_maps, result
+    material,
+    strain,
+    rate,
+    x,
+    y,
+    shift,
+    scale,
+    nodes,
+    first_nodes,
+    seed_numbers,
+    tables,
+    tool_maps,
+    result,
 ):
     """Emissivity of every surface: shares of the features times their textures."""
     surfaces, rows, columns = result.shape
+    seeds = nodes.shape[3]
+    scale = np.float32(scale)
     for r in prange(rows):
-        deviates = np.empty(nodes.shape[3], np.float32)
+        deviates = np.empty(seeds, np.float32)
         for c in range(columns):
             kind = material[r, c]
             for n in range(surfaces):
@@ -346,9 +365,12 @@ def _blend(  # type: ignore[no-untyped-def]
             rest = np.float32(1.0) - band
             for k, share in ((0, rest - rest * chip), (1, rest * chip), (2, band)):
                 if share > 0:
-                    u = (x[r, c] - shift[k, 0]) * scale
-                    v = (y[r, c] - shift[k, 1]) * scale
-                    enlarged(nodes[k], u, v, deviates)
+                    across = cubic_taps((x[r, c] - np.float32(shift[k, 0])) * scale)
+                    down = cubic_taps((y[r, c] - np.float32(shift[k, 1])) * scale)
+                    if seeds == 1:
+                        deviates[0] = enlarged(first_nodes[k], down, across)
+                    else:
+                        enlarge_all(nodes[k], down, across, deviates)
                     for n in range(surfaces):
                         deviate = deviates[seed_numbers[n]]
                         result[n, r, c] += share * emissivity_at(deviate, tables[n, k])

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 from math import sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numba import njit, prange
@@ -17,6 +17,7 @@ MAP_SIZE: Final = 128
 
 _LAST: Final = round(2 * REACH * STEPS)
 _PER_NODE: Final = 10
+_FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "forceinline": True}
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +118,7 @@ class Texture:
         x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
         result = np.empty(x.size, dtype=np.float32)
         _look_up(
-            self.nodes[..., None],
+            self.nodes,
             self.emissivity.table,
             1.0 / self.grain,
             x.ravel(),
@@ -142,22 +143,42 @@ def _enlarged_deviation(nodes: NDArray[np.float64]) -> float:
     return sqrt(float((about_mean * smoothed).mean()))
 
 
-@njit(inline="always")
-def enlarged(nodes, u, v, deviates):  # type: ignore[no-untyped-def]
-    """Deviates of several maps, last axis of the nodes, at u nodes across and v nodes down."""
-    column, row = np.floor(u), np.floor(v)
-    s, t = np.float32(u - column), np.float32(v - row)
-    j, i = np.int64(column), np.int64(row)
+@njit(**_FAST)
+def cubic_taps(position):  # type: ignore[no-untyped-def]
+    """Number of the node before a position and the weights, float32, of the four around it.
+
+    Of a position in float32, which is faster, the weights are good to 1e-5 up to 150 nodes off.
+    """
+    before = np.floor(position)
+    s = np.float32(position - before)
     one, half = np.float32(1.0), np.float32(0.5)
     a = half * s * (s * (np.float32(2.0) - s) - one)
     d = half * s * s * (s - one)
     b = one + half * s * s * (np.float32(3.0) * s - np.float32(5.0))
-    c = one - a - b - d
-    e = half * t * (t * (np.float32(2.0) - t) - one)
-    h = half * t * t * (t - one)
-    f = one + half * t * t * (np.float32(3.0) * t - np.float32(5.0))
-    g = one - e - f - h
+    return np.int32(before), a, b, one - a - b - d, d
+
+
+@njit(**_FAST)
+def enlarged(nodes, down, across):  # type: ignore[no-untyped-def]
+    """Deviate of the enlarged map between the nodes of two `cubic_taps`."""
+    i, e, f, g, h = down
+    j, a, b, c, d = across
     wrap = MAP_SIZE - 1  # the size is a power of two, so the lower bits are the remainder
+    j0, j1, j2, j3 = (j - 1) & wrap, j & wrap, (j + 1) & wrap, (j + 2) & wrap
+    i0, i1, i2, i3 = (i - 1) & wrap, i & wrap, (i + 1) & wrap, (i + 2) & wrap
+    n0 = a * nodes[i0, j0] + b * nodes[i0, j1] + c * nodes[i0, j2] + d * nodes[i0, j3]
+    n1 = a * nodes[i1, j0] + b * nodes[i1, j1] + c * nodes[i1, j2] + d * nodes[i1, j3]
+    n2 = a * nodes[i2, j0] + b * nodes[i2, j1] + c * nodes[i2, j2] + d * nodes[i2, j3]
+    n3 = a * nodes[i3, j0] + b * nodes[i3, j1] + c * nodes[i3, j2] + d * nodes[i3, j3]
+    return e * n0 + f * n1 + g * n2 + h * n3
+
+
+@njit(**_FAST)
+def enlarge_all(nodes, down, across, deviates):  # type: ignore[no-untyped-def]
+    """The same of several maps, the last axis of `nodes`: side by side they are vectors."""
+    i, e, f, g, h = down
+    j, a, b, c, d = across
+    wrap = MAP_SIZE - 1
     j0, j1, j2, j3 = (j - 1) & wrap, j & wrap, (j + 1) & wrap, (j + 2) & wrap
     deviates[:] = np.float32(0.0)
     for lag, weight in ((-1, e), (0, f), (1, g), (2, h)):
@@ -166,7 +187,7 @@ def enlarged(nodes, u, v, deviates):  # type: ignore[no-untyped-def]
             deviates[k] += weight * (a * n[j0, k] + b * n[j1, k] + c * n[j2, k] + d * n[j3, k])
 
 
-@njit(inline="always")
+@njit(**_FAST)
 def emissivity_at(deviate, table):  # type: ignore[no-untyped-def]
     """Emissivity at a normal deviate, by straight lines between the entries of its table."""
     position = (deviate + np.float32(REACH)) * np.float32(STEPS)
@@ -179,7 +200,6 @@ def emissivity_at(deviate, table):  # type: ignore[no-untyped-def]
 def _look_up(nodes, table, scale, x, y, result):  # type: ignore[no-untyped-def]
     chunk = 4096
     for k in prange((x.size + chunk - 1) // chunk):
-        deviates = np.empty(1, np.float32)
         for i in range(k * chunk, min((k + 1) * chunk, x.size)):
-            enlarged(nodes, x[i] * scale, y[i] * scale, deviates)
-            result[i] = emissivity_at(deviates[0], table)
+            down, across = cubic_taps(y[i] * scale), cubic_taps(x[i] * scale)
+            result[i] = emissivity_at(enlarged(nodes, down, across), table)
