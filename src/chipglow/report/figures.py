@@ -26,8 +26,8 @@ from chipglow.report.laboratory_figures import (
 from chipglow.scene import Material
 
 _ORDER_STYLE: Final = {
-    "sensor": (BLUE, "Gaussian, sensor to sensor"),
-    "optics": (VERMILLION, "Gaussian, before the sensors"),
+    "sensor": (BLUE, "Gaussian, pixel to pixel"),
+    "optics": (VERMILLION, "Gaussian, before the pixels"),
 }
 
 
@@ -219,7 +219,7 @@ def error_lines(result: StudyResult) -> Figure:
         color=BLUE,
         linestyle="--",
         linewidth=1.0,
-        label="the paper's error beside the band",
+        label="the paper, beside",
     )
     # The line is no axis: it needs room below.
     right.set_ylim(bottom=min(right.get_ylim()[0], 1.1 * PAPER.band_worst.value))
@@ -447,7 +447,7 @@ def _draw_error_line(
         lines = values.reshape(-1, draws.distance.size)
         mean, deviation = lines.mean(axis=0), lines.std(axis=0)
         at = draws.distance * 1e6
-        axes.plot(at, mean, color=colour, label=f"{name}, mean of the draws")
+        axes.plot(at, mean, color=colour, label=f"{name}, mean")
         label = f"{name}, ± 1 standard deviation"
         axes.fill_between(
             at,
@@ -594,8 +594,8 @@ def _lines_caption(result: StudyResult) -> str:
         "Errors along the green lines of Figure 10: through mid-contact along the normal of the "
         "rake face, and through the middle of the shear band. The paper's stated figures are drawn "
         "as diamonds and as a dashed line. Different: the paper shows one draw; here are the mean "
-        "and the standard deviation over all draws of segment, texture and pixel phase, and one "
-        "draw dotted."
+        "and the standard deviation (sd) over all draws of segment, texture and pixel phase, and "
+        "one draw dotted."
     )
 
 

@@ -218,7 +218,7 @@ def _in_the_papers_order(content: Content) -> Iterator[str]:
 def _table_1(rows: Sequence[EmissivityTexts]) -> str:
     if not rows:
         return ""
-    heads = ("Feature", "Paper", "Put in", "Found", "Deviation found", "Several textures")
+    heads = ("Feature", "Paper", "Put in", "Found", "Standard deviation found", "Several textures")
     text = (
         "Emissivity as mean ± standard deviation in the paper and put into the study. Found: mean "
         "and standard uncertainty of one heated object's region (thermocouple of 2 K assumed), and "

@@ -46,9 +46,9 @@ def heated_tool(result: StudyResult) -> Figure | None:
     left.set_xlim(raster.extent[0] * 1e6, raster.extent[1] * 1e6)
     left.set_ylim(raster.extent[2] * 1e6, raster.extent[3] * 1e6)
     left.set_title(f"a) tool, at {tool.map.heating.truth - KELVIN:.0f} °C")
-    values = tool.map.emissivity[np.isfinite(tool.map.emissivity)]
+    inside = result.tool.signed_distance(*np.meshgrid(raster.x, raster.y)) < -3 * raster.spacing
     row = tool.rows[0]
-    right.hist(values[values > 0.05], bins=40, color=BLUE, density=True)
+    right.hist(tool.map.emissivity[inside], bins=40, color=BLUE, density=True)
     for value, style, label in (
         (row.found.mean, "-", "found"),
         (row.true.mean, "--", "put in"),
@@ -127,7 +127,7 @@ def dual_spectrum(result: StudyResult) -> Figure:
             right,
             images[max(number, 0)],
             surface.measurement.raster,
-            result.tool,
+            None,
             drawing.HEAT,
             (low, top),
         )
