@@ -173,6 +173,34 @@ def test_a_single_sample_is_as_wide_as_itself():
     assert MeasuredPSF(np.ones((1, 1)), 5e-6).fwhm == pytest.approx(5e-6)
 
 
+@pytest.mark.parametrize(("right", "down"), [(0, 3), (-4, 9)])
+def test_width_does_not_depend_on_where_in_the_kernel_the_light_is(right, down):
+    spacing, psf = 1e-6, AnnularAperturePSF()
+    kernel = np.pad(psf.kernel(spacing), 12)
+    moved = np.roll(kernel, (down, right), axis=(0, 1))
+    assert MeasuredPSF(moved, spacing).fwhm == MeasuredPSF(kernel, spacing).fwhm
+
+
+def test_width_of_a_flat_top_is_its_diameter():
+    x = np.arange(-20, 21)
+    disc = (np.hypot(x - 3, x[:, None] + 6) <= 12.5).astype(float)
+    # Its own middle row and column have 25 samples, the kernel's 21 and 25, its top row 7.
+    assert MeasuredPSF(disc, 1e-6).fwhm == pytest.approx(25e-6)
+
+
+@pytest.mark.parametrize(
+    "kernel",
+    [
+        [[0, 0, 1], [0, 0, 0], [1, 0, 0]],
+        [[0, 0, 0], [0, 0, 0], [0, 0, 1]],
+        [[0, 1, 0], [0, 0, 0], [0, 0, 0]],
+    ],
+)
+def test_width_of_a_kernel_with_nothing_in_its_middle(kernel):
+    # Along the row and the column through a single sample it is as wide as the sample.
+    assert MeasuredPSF(kernel, 1e-6).fwhm == pytest.approx(1e-6)
+
+
 def test_kernel_from_a_file(tmp_path):
     np.save(tmp_path / "psf.npy", LOPSIDED)
     np.savetxt(tmp_path / "psf.csv", LOPSIDED, delimiter=",")

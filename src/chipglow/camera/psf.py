@@ -24,6 +24,7 @@ ANNULAR_ENERGY: Final = 0.99
 
 _LARGEST_KERNEL: Final = 4097
 _FWHM_PER_SIGMA: Final = 2 * sqrt(2 * log(2))
+_EQUAL: Final = 1e-9
 
 
 class PointSpreadFunction(ABC):
@@ -194,7 +195,9 @@ class MeasuredPSF(PointSpreadFunction):
     Attributes
     ----------
     fwhm : float
-        Full width at half maximum in m: the mean of the middle row's and the middle column's.
+        Full width at half maximum in m: the mean of the widths along the row and the column through
+        the greatest value, wherever in the kernel it is; of equal ones, through the one nearest to
+        the middle of them all.
 
     Raises
     ------
@@ -216,8 +219,8 @@ class MeasuredPSF(PointSpreadFunction):
         weights = _normalised(_checked_weights(self.weights))
         weights.flags.writeable = False
         object.__setattr__(self, "weights", weights)
-        middle = weights.shape[0] // 2
-        widths = [_half_maximum_width(line) for line in (weights[middle], weights[:, middle])]
+        row, column = _peak(weights)
+        widths = [_half_maximum_width(line) for line in (weights[row], weights[:, column])]
         object.__setattr__(self, "fwhm", float(np.mean(widths)) * self.spacing)
 
     @classmethod
@@ -287,6 +290,15 @@ def _half_size(reach: float, spacing: float) -> int:
             f"for a kernel of {2 * reach:.3g} m"
         )
     return half
+
+
+def _peak(weights: NDArray[np.float64]) -> tuple[int, int]:
+    """Row and column of the greatest value; of equal ones, of that nearest to their middle."""
+    # What differs by rounding alone is equal: the top of a disc is flat.
+    places = np.argwhere(weights >= weights.max() * (1 - _EQUAL))
+    from_middle = np.hypot(*(places - places.mean(axis=0)).T)
+    row, column = places[int(np.argmin(from_middle))].tolist()
+    return row, column
 
 
 def _half_maximum_width(line: NDArray[np.float64]) -> float:
