@@ -479,11 +479,10 @@ def test_what_does_not_fit_the_scene_is_refused(camera, start, message):
         camera.measure(scene, BLACK, start)
 
 
-@pytest.mark.parametrize(("temperature", "emissivity"), [(4500.0, 1.0), (900.0, 1.5)])
-def test_what_has_no_radiance_is_refused(temperature, emissivity):
-    scene = make_scene(np.full((1, 9, 9), temperature))
-    surface = Painted(scene.times, np.full((1, 9, 9), emissivity, dtype=np.float32))
-    with pytest.raises(ValueError, match="temperature must be 200 to 4000 K and emissivity 0 to 1"):
+def test_what_has_no_radiance_is_refused():
+    scene = make_scene(np.full((1, 9, 9), 900.0))
+    surface = Painted(scene.times, np.full((1, 9, 9), 1.5, dtype=np.float32))
+    with pytest.raises(ValueError, match="temperature must be 200 to 6000 K and emissivity 0 to 1"):
         Camera().measure(scene, surface, 0.0)
 
 
