@@ -1,5 +1,6 @@
 """The camera against the paper's loop, and against what can be worked out by hand."""
 
+import re
 from dataclasses import replace
 from math import log, sqrt
 
@@ -83,7 +84,7 @@ def test_equals_the_loop_of_figure_6(psf):
         surface.values,
         camera.band.radiance,
         camera.band.temperature,
-        np.ones((1, 1)) if psf is None else psf.kernel(camera.pitch),
+        np.ones((1, 1)) if psf is None else psf.view_kernel(camera.pitch, 6, 8),
     )
     measured = camera.measure(scene, surface, 0.0)
     assert expected.shape == (6, 8)
@@ -321,6 +322,70 @@ def test_how_often_each_order_counts_the_footprint(order, footprints):
     expected = fwhm**2 / (8 * log(2)) + footprints * pitch**2 / 12
     # The energy that the kernel leaves out holds 0.2 % of the variance, a footprint 8 %.
     assert line @ middle**2 == pytest.approx(expected, rel=5e-3)
+
+
+@pytest.mark.parametrize("order", ["optics", "sensor"])
+@pytest.mark.parametrize("psf", PSFS, ids=repr)
+def test_a_pixel_does_not_depend_on_how_many_others_are_read_out(psf, order):
+    scene, surface = random_scene()
+    whole = Camera(integration_time=STEP, floor=None, psf=psf, psf_order=order)
+    part = replace(whole, shape=(2, 3), offset=(2 * whole.pitch, 3 * whole.pitch))
+    expected = whole.measure(scene, surface, 0.0).radiance[:, 3:5, 2:5]
+    # Places and transforms are rounded.
+    np.testing.assert_allclose(part.measure(scene, surface, 0.0).radiance, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("order", ["optics", "sensor"])
+def test_it_is_said_where_the_border_of_the_scene_matters(order):
+    temperature = np.full((1, 54, 180), 700.0)
+    temperature[..., 81:90] = 1300.0  # one column of pixels, at the border of the smaller scene
+    camera = Camera(psf=GaussianPSF(12e-6), psf_order=order)
+    larger = camera.measure(make_scene(temperature), BLACK, 0.0)
+    measured = camera.measure(make_scene(temperature[..., 81:]), BLACK, 0.0)
+    wrong = temperature_of(measured) - temperature_of(larger)[:, 9:]
+    # The rule, the scene goes on as at its edge, makes of a hot column a hot half plane.
+    assert wrong[3, 0] > 50.0
+    assert abs(wrong[3, -1]) < ROUNDING
+    (said,) = measured.data.attrs["doubtful"].splitlines()
+    found = re.search(
+        r"The border of the scene: .* ([\d.]+) % .*up to ([\d.]+) um .* 1 K, by ([\d.]+) K", said
+    )
+    share, reach, most = (float(number) for number in found.groups())
+    # Two pixels of 6 um and a part of a third are within the Gaussian's 12 um of it.
+    columns = np.flatnonzero((np.abs(wrong) > 1.0).any(axis=0)).max() + 1
+    assert reach == pytest.approx(6 * columns - 3, abs=6)
+    assert share == pytest.approx(100 * columns / wrong.shape[1], rel=0.7)
+    assert 0.3 * wrong.max() < most < 3 * wrong.max()
+
+
+@pytest.mark.parametrize("order", ["optics", "sensor"])
+def test_nothing_is_said_of_a_border_that_does_not_matter(order):
+    temperature = np.full((1, 90, 90), 700.0)
+    temperature[:, 42:48, 42:48] = 1300.0
+    camera = Camera(psf=GaussianPSF(4e-6), psf_order=order)
+    measured = camera.measure(make_scene(temperature), BLACK, 0.0)
+    assert "doubtful" not in measured.data.attrs
+
+
+def test_light_from_beyond_the_scene():
+    scene = Raster(0.0, 0.0, SPACING, 90, 180)
+    for order in ("optics", "sensor"):
+        camera = Camera(psf=GaussianPSF(8e-6), psf_order=order, shape=(10, 20))
+        beyond = camera.light_from_beyond(scene)
+        assert beyond.shape == (10, 20)
+        # The mean of (1 - erf) / 2 over a pixel at the border; with the sensors first the blur is
+        # wider by a footprint, but what is within a pixel stays there.
+        sigma = 8e-6 / (2 * sqrt(2 * log(2)))
+        nodes, weights = np.polynomial.legendre.leggauss(20)
+        x = 3e-6 * (1 + nodes)
+        at_border = ((1 - erf(x / (sqrt(2) * sigma))) / 2) @ weights / 2
+        if order == "sensor":
+            at_border = (1 - erf(3e-6 / (sqrt(2) * sigma))) / 2
+        assert beyond[5, 0] == pytest.approx(at_border, rel=2e-3)
+        assert beyond[5, 10] < 1e-12
+        part = replace(camera, shape=(2, 2), offset=(12e-6, 0.0)).light_from_beyond(scene)
+        np.testing.assert_allclose(part, beyond[:2, 2:4], atol=1e-9)
+    assert (Camera(psf=None).light_from_beyond(scene) == 0.0).all()
 
 
 def test_case_2_comes_from_the_same_exposure():

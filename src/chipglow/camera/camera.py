@@ -1,24 +1,29 @@
 """The virtual infrared camera."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Final, Literal
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.convolution import blur
+from chipglow.camera.convolution import blur, blur_of_like, light_from_beyond
 from chipglow.camera.exposure import Exposure, expose
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.psf import AnnularAperturePSF, PointSpreadFunction
-from chipglow.camera.sampling import integrate, sensor_raster
+from chipglow.camera.sampling import integrate, sensor_raster, whole_raster
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Raster, Scene
 from chipglow.surface import Surface
 
 PSF_ORDERS: Final = ("optics", "sensor")
+
+BORDER_TOLERANCE: Final = 1.0
+"""Change in K of a pixel from which on it is said that the border of the scene matters."""
+
+_Blur: TypeAlias = Callable[[NDArray[np.float64], PointSpreadFunction, float], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -184,26 +189,40 @@ class Camera:
         Returns
         -------
         Measurement
-            As many frames as exposures.
+            As many frames as exposures. Its attribute ``doubtful`` says how far the border of the
+            scene matters, if it changes a pixel by over `BORDER_TOLERANCE`.
 
         Raises
         ------
         ValueError
             If there is no exposure, they are of different grids, or the sensors do not fit.
+
+        Notes
+        -----
+        What is beyond the scene is not known. It is taken to be as at the scene's edge, and the
+        light that comes from there (`light_from_beyond`) is what a warning is about: it compares
+        with a second assumption, by which each pixel sees beyond the scene the like of what it
+        sees within.
         """
         if isinstance(exposures, Exposure):
             exposures = (exposures,)
-        starts, frames, sensors = [], [], None
+        starts, frames, alike, sensors = [], [], [], None
         for exposure in exposures:
             found = self.sensors(exposure.raster)
             if sensors not in (None, found):
                 raise ValueError(f"camera: exposures of different grids, {sensors} and {found}")
             sensors = found
             starts.append(exposure.start)
-            frames.append(self._read_out(exposure, sensors))
+            frames.append(self._read_out(exposure, sensors, blur))
+            if self.psf is not None:
+                alike.append(self._read_out(exposure, sensors, blur_of_like))
         if sensors is None:
             raise ValueError("camera: no exposure to develop, expected 1 or more")
-        return self._measurement(np.array(starts), np.stack(frames), sensors)
+        measured = self._measurement(np.array(starts), np.stack(frames), sensors)
+        if alike:
+            other = np.asarray(self.band.temperature(np.stack(alike)), np.float64)
+            measured.data.attrs |= _border_doubt(measured, other, exposure.raster)
+        return measured
 
     def measure(
         self, scene: Scene, surface: Surface, start: float | Sequence[float] | NDArray[np.float64]
@@ -238,15 +257,45 @@ class Camera:
         )
         return measured.with_tool(scene.tool) if scene.tool else measured
 
-    def _read_out(self, exposure: Exposure, sensors: Raster) -> NDArray[np.float64]:
+    def light_from_beyond(self, scene: Raster) -> NDArray[np.float64]:
+        """Fraction of the light of every pixel that comes from beyond a scene, where none is known.
+
+        Parameters
+        ----------
+        scene : Raster
+            The scene's samples.
+
+        Returns
+        -------
+        ndarray
+            From 0 to under 1, of the shape of `sensors`; 0 without a point spread function.
+
+        Raises
+        ------
+        ValueError
+            If the sensors do not fit the scene.
+        """
+        sensors = self.sensors(scene)
+        if self.psf is None:
+            return np.zeros(sensors.shape)
+        if self.psf_order == "optics":
+            fraction = light_from_beyond(self.psf, scene.spacing, scene.shape)
+            return integrate(fraction, scene, sensors, self.fill_factor)
+        whole, own = whole_raster(scene, sensors)
+        return light_from_beyond(self.psf, self.pitch, whole.shape)[own]
+
+    def _read_out(self, exposure: Exposure, sensors: Raster, blurred: _Blur) -> NDArray[np.float64]:
         """Radiance of every sensor, shape `sensors.shape`."""
         image, raster = exposure.mean_radiance, exposure.raster
-        if self.psf is not None and self.psf_order == "optics":
-            image = blur(image, self.psf, raster.spacing)
-        image = integrate(image, raster, sensors, self.fill_factor)
-        if self.psf is not None and self.psf_order == "sensor":
-            image = blur(image, self.psf, self.pitch)
-        return image
+        if self.psf is None:
+            return integrate(image, raster, sensors, self.fill_factor)
+        if self.psf_order == "optics":
+            image = blurred(image, self.psf, raster.spacing)
+            return integrate(image, raster, sensors, self.fill_factor)
+        # Sensors that are not read out tell what is beyond those that are.
+        whole, own = whole_raster(raster, sensors)
+        image = integrate(image, raster, whole, self.fill_factor)
+        return blurred(image, self.psf, self.pitch)[own]
 
     def _measurement(
         self, starts: NDArray[np.float64], radiance: NDArray[np.float64], sensors: Raster
@@ -268,6 +317,29 @@ class Camera:
             "reflected": self.reflected,
         }
         return {name: value for name, value in attributes.items() if value is not None}
+
+
+def _border_doubt(
+    measured: Measurement, other: NDArray[np.float64], scene: Raster
+) -> dict[str, str]:
+    """What the border of the scene may change, beside temperatures under another assumption."""
+    change = np.abs(measured.radiance_temperature() - other)
+    changed = change > BORDER_TOLERANCE
+    if not changed.any():
+        return {}
+    (left, right, bottom, top), at = scene.extent, measured.raster
+    across = np.minimum(at.x - left, right - at.x)
+    down = np.minimum(top - at.y, at.y - bottom)
+    reach = np.minimum(across, down[:, None])[changed.any(axis=0)].max()
+    return {
+        "doubtful": (
+            "The border of the scene: beyond it the surface is taken to be as at the edge. With "
+            "the like of what each pixel sees within the scene there instead, "
+            f"{100 * changed.mean():.3g} % of the pixels (up to {1e6 * reach:.3g} um from the "
+            f"border) would change by over {BORDER_TOLERANCE:g} K, by {np.nanmax(change):.3g} K at "
+            "most."
+        )
+    }
 
 
 def _expect(condition: bool, name: str, value: object, expected: str) -> None:

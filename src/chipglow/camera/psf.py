@@ -16,15 +16,24 @@ from scipy.special import erf, erfinv, j1
 
 from chipglow.camera.sampling import overlap_lengths
 
-GAUSSIAN_ENERGY: Final = 0.9999
-"""Share of a Gaussian's energy that its kernel holds before it is scaled to 1."""
+GAUSSIAN_ENERGY: Final = 1.0 - 1e-12
+"""Fraction of a Gaussian's light that its kernel holds: all but rounding.
+
+With 0.9999 a surface at 573 K beside one at 1300 K lacked, in a band of 1.0 to 1.7 um, all of the
+light that it gets from there: the hot one sends 10 000 times as much.
+"""
 
 ANNULAR_ENERGY: Final = 0.99
-"""The same for diffraction, whose energy beyond a radius r falls only as 1/r."""
+"""The same for diffraction, whose light beyond a radius r falls only as 1/r.
+
+The camera's blur has no use for it: `PointSpreadFunction.view_kernel` leaves out nothing.
+"""
 
 _LARGEST_KERNEL: Final = 4097
 _FWHM_PER_SIGMA: Final = 2 * sqrt(2 * log(2))
 _EQUAL: Final = 1e-9
+_FAR: Final = 30.0
+"""Radius, as v, from which on the mean of diffraction's rings falls as 1/r³: within 2 %."""
 
 
 class PointSpreadFunction(ABC):
@@ -50,14 +59,39 @@ class PointSpreadFunction(ABC):
         Returns
         -------
         ndarray
-            The share that falls on each square, of sum 1; a square array of odd side, first row
-            on top.
+            The fraction that falls on each square; a square array of odd side, first row on top.
+            What its sum lacks of 1 falls outside: `GAUSSIAN_ENERGY`, `ANNULAR_ENERGY`.
 
         Raises
         ------
         ValueError
             If the spacing is not positive, or so fine that the kernel would be too large.
         """
+
+    def view_kernel(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
+        """Fractions of a point's light in a view, of which none is left out.
+
+        Parameters
+        ----------
+        spacing : float
+            Side of a square in m. The point is in the middle of the middle square.
+        rows, columns : int
+            Squares of the view, 1 or more.
+
+        Returns
+        -------
+        ndarray
+            The fraction that falls on each square, of sum 1: up to `rows` squares up and down from
+            the middle one and `columns` to either side, shape (2 m + 1, 2 n + 1). The outermost
+            ones hold, besides their own, the light that goes farther in their direction. From no
+            square of the view are they in it.
+
+        Raises
+        ------
+        ValueError
+            As `kernel`.
+        """
+        return _folded(_normalised(self.kernel(spacing)), rows, columns)
 
 
 @final
@@ -87,8 +121,8 @@ class GaussianPSF(PointSpreadFunction):
         reach = sqrt(2) * deviation * float(erfinv(sqrt(GAUSSIAN_ENERGY)))
         half = _half_size(reach, spacing)
         edges = spacing * (np.arange(-half, half + 2) - 0.5)
-        line = np.diff(erf(edges / (sqrt(2) * deviation)))
-        return _normalised(np.outer(line, line))
+        line = np.diff(erf(edges / (sqrt(2) * deviation))) / 2
+        return np.outer(line, line)
 
 
 @final
@@ -145,17 +179,31 @@ class AnnularAperturePSF(PointSpreadFunction):
     def kernel(self, spacing: float) -> NDArray[np.float64]:
         """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
         half = _half_size(self._reach * self._unit, spacing)
+        return self._fractions(spacing, half, half)
+
+    def view_kernel(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
+        """Integrate over all squares of the view; see `PointSpreadFunction.view_kernel`."""
+        _check_length("spacing", spacing)
+        far = ceil(_FAR * self._unit / spacing)
+        kernel = self._fractions(spacing, max(rows, far), max(columns, far))
+        return _folded(_with_the_rest(kernel, spacing), rows, columns)
+
+    def _fractions(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
+        """Fractions of the light on squares, so many up and down and to either side."""
         # Gauss nodes: two, and three more for every ring (π in v) that a square spans.
         count = 2 + ceil(3 * spacing / (pi * self._unit))
         node, weight = np.polynomial.legendre.leggauss(count)
-        line = ((np.arange(half + 1)[:, None] + node / 2) * spacing / self._unit).ravel()
-        weights = np.tile(weight, half + 1)
-        quadrant = np.empty((half + 1, half + 1))
-        for row in range(half + 1):
-            part = slice(row * count, (row + 1) * count)
-            value = self._profile(np.hypot(line[part, None], line)) * weights
-            quadrant[row] = weight @ value.reshape(count, half + 1, count).sum(axis=2)
-        return _normalised(np.pad(quadrant, ((half, 0), (half, 0)), mode="reflect"))
+        side = spacing / self._unit
+        down = (np.arange(rows + 1)[:, None] + node / 2) * side
+        across = ((np.arange(columns + 1)[:, None] + node / 2) * side).ravel()
+        weights = np.tile(weight, columns + 1)
+        quadrant = np.empty((rows + 1, columns + 1))
+        for row, v in enumerate(down):
+            value = self._profile(np.hypot(v[:, None], across)) * weights
+            quadrant[row] = weight @ value.reshape(count, columns + 1, count).sum(axis=2)
+        # The integral of the profile over the plane is 4π / (1 − o²), by Parseval.
+        quadrant *= (side / 2) ** 2 * (1 - self.obscuration**2) / (4 * pi)
+        return np.pad(quadrant, ((rows, 0), (columns, 0)), mode="reflect")
 
     @property
     def _unit(self) -> float:
@@ -208,6 +256,7 @@ class MeasuredPSF(PointSpreadFunction):
     -----
     At another spacing the light is taken as even within each measured square and shared among
     the new squares by area: nothing is lost and nothing is made up between the measured values.
+    The weights are scaled to a sum of 1: what the measurement did not reach is not there.
     """
 
     weights: NDArray[np.float64] = field(repr=False)
@@ -277,6 +326,35 @@ def _jinc(v: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _normalised(kernel: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(kernel / kernel.sum())
+
+
+def _with_the_rest(kernel: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
+    """A kernel with a ring of squares more that holds all that it lacks of 1.
+
+    Far away the mean of diffraction's rings falls as 1/r³. The integral of that over all x > X and
+    y > Y is (X + Y − R) / XY, and over all x > X and y of 0 to Y it is (R − X) / XY, with
+    R² = X² + Y².
+    """
+    y, x = (spacing * (np.arange(n + 1) - n / 2) for n in kernel.shape)
+    corner = np.hypot(x[-1], y[-1])
+    ring = np.zeros((kernel.shape[0] + 2, kernel.shape[1] + 2))
+    ring[1:-1, [0, -1]] = np.diff((np.hypot(x[-1], y) - x[-1]) / (x[-1] * y))[:, None]
+    ring[[0, -1], 1:-1] = np.diff((np.hypot(y[-1], x) - y[-1]) / (y[-1] * x))
+    ring[np.ix_([0, -1], [0, -1])] = (x[-1] + y[-1] - corner) / (x[-1] * y[-1])
+    return np.asarray(np.pad(kernel, 1) + ring * (1 - kernel.sum()) / ring.sum())
+
+
+def _folded(kernel: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.float64]:
+    """A kernel no larger than this on each side; its outermost squares hold what was beyond."""
+    for axis, reach in enumerate((rows, columns)):
+        line = np.moveaxis(kernel, axis, 0)
+        beyond = line.shape[0] // 2 - reach
+        if beyond > 0:
+            kept = line[beyond:-beyond].copy()
+            kept[0] += line[:beyond].sum(axis=0)
+            kept[-1] += line[-beyond:].sum(axis=0)
+            kernel = np.moveaxis(kept, 0, axis)
+    return kernel
 
 
 def _half_size(reach: float, spacing: float) -> int:
