@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from math import log, sqrt
+from warnings import catch_warnings
 
 import numba
 import numpy as np
@@ -16,6 +17,7 @@ from scipy.special import erf
 from chipglow.camera import (
     AnnularAperturePSF,
     Camera,
+    ChipglowWarning,
     Exposure,
     Flag,
     GaussianPSF,
@@ -27,6 +29,7 @@ from chipglow.camera.sampling import integrate, overlap_lengths, sensor_raster
 from chipglow.io import read_measurement, write_measurement
 from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Raster, Scene
+from chipglow.study import Study
 from chipglow.surface import EmissivityField, Surface, UniformSurface
 
 SPACING = 2e-6 / 3
@@ -518,12 +521,55 @@ def test_broken_measurements_are_refused(broken):
         {"frame_rate": -600.0},
         {"floor": 20.0},
         {"reflected": 20.0},
+        {"band": "3-5 um"},
+        {"pitch": "6 um"},
+        {"shape": 5},
+        {"shape": "5x"},
+        {"shape": (5.0, 5.0)},
+        {"offset": 6e-6},
+        {"offset": "00"},
+        {"fill_factor": "1"},
+        {"psf": "12 um"},
+        {"integration_time": "10 us"},
+        {"frame_rate": "600 Hz"},
+        {"frame_rate": float("inf")},
+        {"floor": "300 degC"},
+        {"reflected": "20 degC"},
     ],
     ids=str,
 )
 def test_impossible_cameras_are_refused(values):
     with pytest.raises(ValueError, match=f"camera: {next(iter(values))} is .*, expected"):
         Camera(**values)
+
+
+@pytest.mark.parametrize("floor", [300.0, 250, 370.0])
+def test_a_floor_that_is_meant_in_degrees_celsius_is_doubted(floor):
+    with pytest.warns(
+        ChipglowWarning, match=rf"floor is {floor:g} K, .* {floor + 273.15:g} K"
+    ) as w:
+        camera = Camera(floor=floor)
+    assert camera.floor == floor
+    assert w[0].filename == __file__
+
+
+@pytest.mark.parametrize("floor", [None, 253.15, 273.15, 400.0, 573.15])
+def test_other_floors_are_not_doubted(floor):
+    with catch_warnings(action="error"):
+        assert Camera(floor=floor).floor == floor
+
+
+@pytest.mark.parametrize("look", [Camera.expose, Camera.measure])
+@pytest.mark.parametrize("surface", ["chip-1", 0.6, None])
+def test_what_is_no_surface_is_refused(look, surface):
+    scene = make_scene(np.full((1, 18, 18), 900.0))
+    with pytest.raises(ValueError, match=f"camera: surface is {surface!r}, expected a Surface"):
+        look(Camera(), scene, surface, 0.0)
+
+
+def test_the_papers_camera_is_that_of_a_study():
+    assert Camera.paper() == Study().camera.build()
+    assert Camera.paper() == replace(Camera(), psf_order="sensor")
 
 
 @pytest.mark.parametrize(

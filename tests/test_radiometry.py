@@ -83,7 +83,16 @@ def test_wide_band_obeys_stefan_boltzmann():
 
 
 @pytest.mark.parametrize(
-    ("lower", "upper"), [(5.1e-6, 3.8e-6), (0, 1e-6), (3.8, 5.1), (np.nan, 1e-6), (-1e-6, 1e-6)]
+    ("lower", "upper"),
+    [
+        (5.1e-6, 3.8e-6),
+        (0, 1e-6),
+        (3.8, 5.1),
+        (np.nan, 1e-6),
+        (-1e-6, 1e-6),
+        ("3 um", "5 um"),
+        (1e-6, np.inf),
+    ],
 )
 def test_impossible_bands_are_refused(lower, upper):
     with pytest.raises(ValueError, match="band"):

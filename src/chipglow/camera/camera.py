@@ -3,7 +3,10 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
+from numbers import Integral, Real
+from sys import float_info
 from typing import Final, Literal, TypeAlias
+from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +16,19 @@ from chipglow.camera.exposure import Exposure, expose
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.psf import AnnularAperturePSF, PointSpreadFunction
 from chipglow.camera.sampling import integrate, sensor_raster, whole_raster
+from chipglow.camera.warning import ChipglowWarning
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Raster, Scene
-from chipglow.surface import Surface
+from chipglow.surface import EmissivityField, Surface
 
 PSF_ORDERS: Final = ("optics", "sensor")
 
 BORDER_TOLERANCE: Final = 1.0
 """Change in K of a pixel from which on it is said that the border of the scene matters."""
+
+_COLD_FLOOR: Final = 373.15
+"""Floor in K up to which a round number is probably one of degrees Celsius."""
 
 _Blur: TypeAlias = Callable[[NDArray[np.float64], PointSpreadFunction, float], NDArray[np.float64]]
 
@@ -29,6 +36,8 @@ _Blur: TypeAlias = Callable[[NDArray[np.float64], PointSpreadFunction, float], N
 @dataclass(frozen=True)
 class Camera:
     """An infrared camera looking at a scene (Figure 6 of Heigel and Whitenton, 2010).
+
+    By default it is the paper's in all but the order of blur and sensors; `paper` is the paper's.
 
     Parameters
     ----------
@@ -65,6 +74,11 @@ class Camera:
     ------
     ValueError
         If a value is impossible; the message names it and what was expected.
+
+    Warns
+    -----
+    ChipglowWarning
+        If the floor is so low and so round a number of K that it is probably meant in °C.
     """
 
     band: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
@@ -80,44 +94,65 @@ class Camera:
     reflected: float | None = None
 
     def __post_init__(self) -> None:
-        _expect(0.0 < self.pitch <= 1e-2, "pitch", self.pitch, "over 0 to 1e-2 m; 6 um is 6e-6")
         _expect(
-            self.shape is None or (len(self.shape) == 2 and min(self.shape) >= 1),
+            isinstance(self.band, Band), "band", self.band, "a Band such as Band(3.8e-6, 5.1e-6)"
+        )
+        _expect_number("pitch", self.pitch, 0.0, 1e-2, "over 0 to 1e-2 m; 6 um is 6e-6")
+        _expect(
+            self.shape is None or (_are_numbers(self.shape, Integral) and min(self.shape) >= 1),
             "shape",
             self.shape,
             "rows and columns of 1 or more",
         )
         _expect(
-            len(self.offset) == 2 and all(isfinite(o) and o >= 0.0 for o in self.offset),
+            _are_numbers(self.offset, Real) and all(isfinite(o) and o >= 0.0 for o in self.offset),
             "offset",
             self.offset,
             "two lengths of 0 m or more",
         )
-        _expect(0.0 < self.fill_factor <= 1.0, "fill_factor", self.fill_factor, "over 0 to 1")
+        _expect_number("fill_factor", self.fill_factor, 0.0, 1.0, "over 0 to 1")
         _expect(
             self.psf is None or isinstance(self.psf, PointSpreadFunction),
             "psf",
             self.psf,
-            "a PointSpreadFunction, or None",
+            "a PointSpreadFunction such as GaussianPSF(12e-6), or None",
         )
         _expect(self.psf_order in PSF_ORDERS, "psf_order", self.psf_order, " or ".join(PSF_ORDERS))
-        _expect(
-            0.0 < self.frame_rate < float("inf"), "frame_rate", self.frame_rate, "over 0 a second"
-        )
-        _expect(
-            0.0 < self.integration_time <= 1 / self.frame_rate,
+        _expect_number("frame_rate", self.frame_rate, 0.0, float_info.max, "over 0 a second")
+        _expect_number(
             "integration_time",
             self.integration_time,
+            0.0,
+            1 / self.frame_rate,
             f"over 0 to {1 / self.frame_rate:g} s, the time between frames",
         )
         for name in ("floor", "reflected"):
             value = getattr(self, name)
             _expect(
-                value is None or TABLE_COLDEST <= value <= TABLE_HOTTEST,
+                value is None
+                or (isinstance(value, Real) and TABLE_COLDEST <= float(value) <= TABLE_HOTTEST),
                 name,
                 value,
                 f"{TABLE_COLDEST:g} to {TABLE_HOTTEST:g} K, or None",
             )
+        if self.floor is not None and self.floor <= _COLD_FLOOR and self.floor % 10 == 0:
+            warn(
+                f"camera: floor is {self.floor:g} K, which is {self.floor - 273.15:g} °C; if "
+                f"{self.floor:g} °C is meant, it is {self.floor + 273.15:g} K",
+                ChipglowWarning,
+                stacklevel=3,
+            )
+
+    @classmethod
+    def paper(cls) -> "Camera":
+        """The camera of the paper's simulation, as far as the paper tells it.
+
+        The blur is applied from sensor to sensor (`psf_order` is ``sensor``), as in its Figure 6:
+        that is what it differs in from `Camera()`, by up to 7 K. The point spread function, which
+        the paper prints as a picture only, is an assumption: see `AnnularAperturePSF`. A study's
+        camera is this one, unless it says otherwise.
+        """
+        return cls(psf_order="sensor")
 
     def sensors(self, scene: Raster) -> Raster:
         """Where the sensors lie on a scene.
@@ -166,11 +201,12 @@ class Camera:
         Raises
         ------
         ValueError
-            If the integration reaches beyond the scene, or the sensors do not fit it.
+            If the surface is none, the integration reaches beyond the scene, or the sensors do not
+            fit it.
         """
         self.sensors(scene.raster)
         return expose(
-            scene, surface.on(scene), self.band, start, self.integration_time, self.reflected
+            scene, _laid(surface, scene), self.band, start, self.integration_time, self.reflected
         )
 
     def develop(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
@@ -250,7 +286,7 @@ class Camera:
             If an integration reaches beyond the scene, or the sensors do not fit it.
         """
         self.sensors(scene.raster)
-        emissivity = surface.on(scene)
+        emissivity = _laid(surface, scene)
         measured = self.develop(
             expose(scene, emissivity, self.band, at, self.integration_time, self.reflected)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
@@ -319,6 +355,17 @@ class Camera:
         return {name: value for name, value in attributes.items() if value is not None}
 
 
+def _laid(surface: Surface, scene: Scene) -> EmissivityField:
+    """A surface on a scene."""
+    _expect(
+        isinstance(surface, Surface),
+        "surface",
+        surface,
+        "a Surface such as chipglow.CHIP_1 or UniformSurface(0.6)",
+    )
+    return surface.on(scene)
+
+
 def _border_doubt(
     measured: Measurement, other: NDArray[np.float64], scene: Raster
 ) -> dict[str, str]:
@@ -340,6 +387,19 @@ def _border_doubt(
             "most."
         )
     }
+
+
+def _are_numbers(values: object, kind: type) -> bool:
+    """Whether these are two numbers of a kind."""
+    return (
+        isinstance(values, (tuple, list))
+        and len(values) == 2
+        and all(isinstance(value, kind) for value in values)
+    )
+
+
+def _expect_number(name: str, value: object, over: float, most: float, expected: str) -> None:
+    _expect(isinstance(value, Real) and over < float(value) <= most, name, value, expected)
 
 
 def _expect(condition: bool, name: str, value: object, expected: str) -> None:

@@ -3,7 +3,8 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from errno import ENOENT
-from math import ceil, inf, isfinite, log, pi, sqrt
+from math import ceil, inf, log, pi, sqrt
+from numbers import Real
 from pathlib import Path
 from typing import Any, Final, final
 
@@ -167,11 +168,10 @@ class AnnularAperturePSF(PointSpreadFunction):
 
     def __post_init__(self) -> None:
         _check_length("wavelength", self.wavelength)
-        if not 0.0 < self.numerical_aperture <= 1.0:
-            raise ValueError(
-                f"psf: numerical_aperture is {self.numerical_aperture!r}, expected over 0 to 1"
-            )
-        if not 0.0 <= self.obscuration <= 0.9:
+        aperture = self.numerical_aperture
+        if not (isinstance(aperture, Real) and 0.0 < aperture <= 1.0):
+            raise ValueError(f"psf: numerical_aperture is {aperture!r}, expected over 0 to 1")
+        if not (isinstance(self.obscuration, Real) and 0.0 <= self.obscuration <= 0.9):
             raise ValueError(f"psf: obscuration is {self.obscuration!r}, expected 0 to 0.9")
         half = brentq(lambda v: float(self._profile(np.array(v))) - 0.5, 0.1, 3.0)
         object.__setattr__(self, "fwhm", 2 * float(half) * self._unit)
@@ -391,7 +391,7 @@ def _half_maximum_width(line: NDArray[np.float64]) -> float:
 
 
 def _check_length(name: str, value: float) -> None:
-    if not (isfinite(value) and 0.0 < value <= 1e-3):
+    if not (isinstance(value, Real) and 0.0 < value <= 1e-3):
         raise ValueError(f"psf: {name} is {value!r}, expected over 0 to 1e-3 m; 8 um is 8e-6")
 
 

@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil, isfinite, log
+from math import ceil, inf, log
+from numbers import Real
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -52,7 +53,8 @@ class Band:
     response: Response | None = None
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.lower) and isfinite(self.upper) and 0 < self.lower < self.upper):
+        numbers = isinstance(self.lower, Real) and isinstance(self.upper, Real)
+        if not (numbers and 0 < self.lower < self.upper < inf):
             raise ValueError(
                 f"band: expected 0 < lower < upper in m, got lower={self.lower!r}, "
                 f"upper={self.upper!r}"
