@@ -6,16 +6,20 @@ from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
 from math import isfinite
-from typing import Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
+from chipglow.scene.notebook import ZERO_CELSIUS, frames_text, plot_image
 from chipglow.scene.raster import Raster
 from chipglow.scene.tool import Tool
 from chipglow.scene.tool_attributes import stored_tool, tool_attributes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FIELD_UNITS: Final[Mapping[str, str]] = {
     "temperature": "K",
@@ -171,6 +175,53 @@ class Scene:
             attrs={**(attributes or {}), **(tool_attributes(tool) if tool else {})},
         )
         return cls(data)
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.times)
+
+    def __repr__(self) -> str:
+        told = frames_text(self.times, self.raster, "samples", self._shown(0))
+        return f"<Scene: {told}; {'with' if self.tool else 'without'} tool>"
+
+    def celsius(self, frame: int = 0) -> NDArray[np.float64]:
+        """Temperature of one frame in °C.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame.
+
+        Returns
+        -------
+        ndarray
+            Shape (y, x). Where there is no material it means nothing.
+        """
+        return np.asarray(self._read("temperature", frame), np.float64) - ZERO_CELSIUS
+
+    def plot(self, frame: int = 0, axes: "Axes | None" = None) -> "Axes":
+        """Draw the temperature of one frame in °C over x and y in µm, with the tool's outline.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; a new figure by default.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            With the picture; grey where there is no material.
+        """
+        time = float(self.times[frame])
+        shown = self._shown(frame)
+        return plot_image(shown, self.raster, self.tool, "temperature / °C", time, axes)
+
+    def _shown(self, frame: int) -> NDArray[np.float64]:
+        """Temperature of one frame in °C, NaN where there is no material."""
+        void = self._read("material", frame) == Material.VOID
+        return np.where(void, np.nan, self.celsius(frame))
 
     @property
     def times(self) -> NDArray[np.float64]:
