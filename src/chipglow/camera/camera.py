@@ -138,7 +138,7 @@ class Camera:
         if self.floor is not None and self.floor <= _COLD_FLOOR and self.floor % 10 == 0:
             warn(
                 f"camera: floor is {self.floor:g} K, which is {self.floor - 273.15:g} °C; if "
-                f"{self.floor:g} °C is meant, it is {self.floor + 273.15:g} K",
+                f"{self.floor:g} °C is meant, it is {self.floor + 273.15:g} K.",
                 ChipglowWarning,
                 stacklevel=3,
             )
@@ -318,7 +318,7 @@ class Camera:
             fraction = light_from_beyond(self.psf, scene.spacing, scene.shape)
             return integrate(fraction, scene, sensors, self.fill_factor)
         whole, own = whole_raster(scene, sensors)
-        return light_from_beyond(self.psf, self.pitch, whole.shape)[own]
+        return light_from_beyond(self.psf, self.pitch, whole.shape)[own].copy()
 
     def _read_out(self, exposure: Exposure, sensors: Raster, blurred: _Blur) -> NDArray[np.float64]:
         """Radiance of every sensor, shape `sensors.shape`."""

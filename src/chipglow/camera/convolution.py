@@ -11,7 +11,7 @@ from scipy import fft
 from chipglow.camera.psf import PointSpreadFunction
 
 _ROUNDING: Final = 1e-13
-_FARTHEST: Final = 1024
+_FARTHEST: Final = 2048
 """Squares that a kernel reaches at most: light that goes farther is taken to go so far."""
 
 
@@ -63,7 +63,7 @@ def blur_of_like(
     return _without_rounding(within / (1 - light_from_beyond(psf, spacing, radiance.shape)))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)
 def light_from_beyond(
     psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]
 ) -> NDArray[np.float64]:
@@ -124,7 +124,7 @@ class _Transfer:
         return np.asarray(image[:, 2 * self.right :][:, :columns])
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)
 def _transfer(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]) -> _Transfer:
     rows, columns = (min(count, _FARTHEST) for count in shape)
     kernel = psf.view_kernel(spacing, rows, columns)
