@@ -37,6 +37,7 @@ class GivenScene:
         self.times = STEP * np.arange(len(temperature))
         self.frame_spacing = STEP
         self.raster = RASTER
+        self.tool = None
 
     def frame(self, index, velocity=True):
         temperature = self.temperature[index]
@@ -100,7 +101,7 @@ def main():
     temperature = smooth_fields(rng, 300.0, 1500.0, 30)
     emissivity = smooth_fields(rng, 0.3, 0.6, 15)
     scene, surface = GivenScene(temperature), GivenSurface(emissivity)
-    kernel = CAMERA.psf.kernel(CAMERA.pitch)
+    kernel = CAMERA.psf.view_kernel(CAMERA.pitch, 90, 100)
     table, quadrature = table_radiance(), quadrature_radiance()
 
     def literal(radiance, count):

@@ -181,7 +181,7 @@ def test_a_tabulated_response_is_the_band_that_it_samples():
         ({"counts": [3.0, 2.0, 1.0]}, "do not rise"),
         ({"counts": [1.0, np.nan, 3.0]}, "not finite"),
         ({"temperatures": [600.0, 600.0, 600.0]}, "at 1 temperatures, expected 3 points"),
-        ({"temperatures": [20.0, 30.0, 40.0]}, r"at 20 K \(-253.15 °C\), expected 200 to 4000 K"),
+        ({"temperatures": [20.0, 30.0, 40.0]}, r"at 20 K \(-253.15 °C\), expected 200 to 6000 K"),
         ({"counts": [1.0, 4095.0, 4095.0]}, "are 4095 at each of 426.85, 526.85 °C and nowhere"),
         ({"count_uncertainty": [1.0, 2.0]}, "not of as many points"),
         ({"count_uncertainty": -1.0}, "finite, 0 or more"),

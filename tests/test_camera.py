@@ -1,7 +1,9 @@
 """The camera against the paper's loop, and against what can be worked out by hand."""
 
+import re
 from dataclasses import replace
 from math import log, sqrt
+from warnings import catch_warnings
 
 import numba
 import numpy as np
@@ -15,6 +17,7 @@ from scipy.special import erf
 from chipglow.camera import (
     AnnularAperturePSF,
     Camera,
+    ChipglowWarning,
     Exposure,
     Flag,
     GaussianPSF,
@@ -26,6 +29,7 @@ from chipglow.camera.sampling import integrate, overlap_lengths, sensor_raster
 from chipglow.io import read_measurement, write_measurement
 from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Raster, Scene
+from chipglow.study import Study
 from chipglow.surface import CHIP_1, CHIP_2, EmissivityField, Surface, UniformSurface
 
 SPACING = 2e-6 / 3
@@ -83,7 +87,7 @@ def test_equals_the_loop_of_figure_6(psf):
         surface.values,
         camera.band.radiance,
         camera.band.temperature,
-        np.ones((1, 1)) if psf is None else psf.kernel(camera.pitch),
+        np.ones((1, 1)) if psf is None else psf.view_kernel(camera.pitch, 6, 8),
     )
     measured = camera.measure(scene, surface, 0.0)
     assert expected.shape == (6, 8)
@@ -143,6 +147,13 @@ def test_radiance_is_as_exact_as_it_is_said_to_be():
     exposure = Camera().expose(make_scene(temperature), BLACK, 0.0)
     exact = Camera().band.radiance(temperature[0].astype(np.float64))
     np.testing.assert_allclose(exposure.mean_radiance, exact, rtol=4e-7)
+
+
+@pytest.mark.parametrize("temperature", [200.0, 6000.0])
+def test_the_ends_of_the_tables_are_as_exact(temperature):
+    scene = make_scene(np.full((1, 9, 9), temperature))
+    exposure = Camera().expose(scene, BLACK, 0.0)
+    np.testing.assert_allclose(exposure.mean_radiance, Camera().band.radiance(temperature), 1e-9)
 
 
 def test_peaks_and_centre():
@@ -370,6 +381,70 @@ def test_how_often_each_order_counts_the_footprint(order, footprints):
     assert line @ middle**2 == pytest.approx(expected, rel=5e-3)
 
 
+@pytest.mark.parametrize("order", ["optics", "sensor"])
+@pytest.mark.parametrize("psf", PSFS, ids=repr)
+def test_a_pixel_does_not_depend_on_how_many_others_are_read_out(psf, order):
+    scene, surface = random_scene()
+    whole = Camera(integration_time=STEP, floor=None, psf=psf, psf_order=order)
+    part = replace(whole, shape=(2, 3), offset=(2 * whole.pitch, 3 * whole.pitch))
+    expected = whole.measure(scene, surface, 0.0).radiance[:, 3:5, 2:5]
+    # Places and transforms are rounded.
+    np.testing.assert_allclose(part.measure(scene, surface, 0.0).radiance, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("order", ["optics", "sensor"])
+def test_it_is_said_where_the_border_of_the_scene_matters(order):
+    temperature = np.full((1, 54, 180), 700.0)
+    temperature[..., 81:90] = 1300.0  # one column of pixels, at the border of the smaller scene
+    camera = Camera(psf=GaussianPSF(12e-6), psf_order=order)
+    larger = camera.measure(make_scene(temperature), BLACK, 0.0)
+    measured = camera.measure(make_scene(temperature[..., 81:]), BLACK, 0.0)
+    wrong = temperature_of(measured) - temperature_of(larger)[:, 9:]
+    # The rule, the scene goes on as at its edge, makes of a hot column a hot half plane.
+    assert wrong[3, 0] > 50.0
+    assert abs(wrong[3, -1]) < ROUNDING
+    (said,) = measured.data.attrs["doubtful"].splitlines()
+    found = re.search(
+        r"The border of the scene: .* ([\d.]+) % .*up to ([\d.]+) um .* 1 K, by ([\d.]+) K", said
+    )
+    share, reach, most = (float(number) for number in found.groups())
+    # Two pixels of 6 um and a part of a third are within the Gaussian's 12 um of it.
+    columns = np.flatnonzero((np.abs(wrong) > 1.0).any(axis=0)).max() + 1
+    assert reach == pytest.approx(6 * columns - 3, abs=6)
+    assert share == pytest.approx(100 * columns / wrong.shape[1], rel=0.7)
+    assert 0.3 * wrong.max() < most < 3 * wrong.max()
+
+
+@pytest.mark.parametrize("order", ["optics", "sensor"])
+def test_nothing_is_said_of_a_border_that_does_not_matter(order):
+    temperature = np.full((1, 90, 90), 700.0)
+    temperature[:, 42:48, 42:48] = 1300.0
+    camera = Camera(psf=GaussianPSF(4e-6), psf_order=order)
+    measured = camera.measure(make_scene(temperature), BLACK, 0.0)
+    assert "doubtful" not in measured.data.attrs
+
+
+def test_light_from_beyond_the_scene():
+    scene = Raster(0.0, 0.0, SPACING, 90, 180)
+    for order in ("optics", "sensor"):
+        camera = Camera(psf=GaussianPSF(8e-6), psf_order=order, shape=(10, 20))
+        beyond = camera.light_from_beyond(scene)
+        assert beyond.shape == (10, 20)
+        # The mean of (1 - erf) / 2 over a pixel at the border; with the sensors first the blur is
+        # wider by a footprint, but what is within a pixel stays there.
+        sigma = 8e-6 / (2 * sqrt(2 * log(2)))
+        nodes, weights = np.polynomial.legendre.leggauss(20)
+        x = 3e-6 * (1 + nodes)
+        at_border = ((1 - erf(x / (sqrt(2) * sigma))) / 2) @ weights / 2
+        if order == "sensor":
+            at_border = (1 - erf(3e-6 / (sqrt(2) * sigma))) / 2
+        assert beyond[5, 0] == pytest.approx(at_border, rel=2e-3)
+        assert beyond[5, 10] < 1e-12
+        part = replace(camera, shape=(2, 2), offset=(12e-6, 0.0)).light_from_beyond(scene)
+        np.testing.assert_allclose(part, beyond[:2, 2:4], atol=1e-9)
+    assert (Camera(psf=None).light_from_beyond(scene) == 0.0).all()
+
+
 def test_case_2_comes_from_the_same_exposure():
     scene, surface = random_scene()
     camera = Camera(integration_time=6 * STEP, floor=None)
@@ -500,12 +575,55 @@ def test_broken_measurements_are_refused(broken):
         {"frame_rate": -600.0},
         {"floor": 20.0},
         {"reflected": 20.0},
+        {"band": "3-5 um"},
+        {"pitch": "6 um"},
+        {"shape": 5},
+        {"shape": "5x"},
+        {"shape": (5.0, 5.0)},
+        {"offset": 6e-6},
+        {"offset": "00"},
+        {"fill_factor": "1"},
+        {"psf": "12 um"},
+        {"integration_time": "10 us"},
+        {"frame_rate": "600 Hz"},
+        {"frame_rate": float("inf")},
+        {"floor": "300 degC"},
+        {"reflected": "20 degC"},
     ],
     ids=str,
 )
 def test_impossible_cameras_are_refused(values):
     with pytest.raises(ValueError, match=f"camera: {next(iter(values))} is .*, expected"):
         Camera(**values)
+
+
+@pytest.mark.parametrize("floor", [300.0, 250, 370.0])
+def test_a_floor_that_is_meant_in_degrees_celsius_is_doubted(floor):
+    with pytest.warns(
+        ChipglowWarning, match=rf"floor is {floor:g} K, .* {floor + 273.15:g} K"
+    ) as w:
+        camera = Camera(floor=floor)
+    assert camera.floor == floor
+    assert w[0].filename == __file__
+
+
+@pytest.mark.parametrize("floor", [None, 253.15, 273.15, 400.0, 573.15])
+def test_other_floors_are_not_doubted(floor):
+    with catch_warnings(action="error"):
+        assert Camera(floor=floor).floor == floor
+
+
+@pytest.mark.parametrize("look", [Camera.expose, Camera.measure])
+@pytest.mark.parametrize("surface", ["chip-1", 0.6, None])
+def test_what_is_no_surface_is_refused(look, surface):
+    scene = make_scene(np.full((1, 18, 18), 900.0))
+    with pytest.raises(ValueError, match=f"camera: surface is {surface!r}, expected a Surface"):
+        look(Camera(), scene, surface, 0.0)
+
+
+def test_the_papers_camera_is_that_of_a_study():
+    assert Camera.paper() == Study().camera.build()
+    assert Camera.paper() == replace(Camera(), psf_order="sensor")
 
 
 @pytest.mark.parametrize(
@@ -526,11 +644,10 @@ def test_what_does_not_fit_the_scene_is_refused(camera, start, message):
         camera.measure(scene, BLACK, start)
 
 
-@pytest.mark.parametrize(("temperature", "emissivity"), [(4500.0, 1.0), (900.0, 1.5)])
-def test_what_has_no_radiance_is_refused(temperature, emissivity):
-    scene = make_scene(np.full((1, 9, 9), temperature))
-    surface = Painted(scene.times, np.full((1, 9, 9), emissivity, dtype=np.float32))
-    with pytest.raises(ValueError, match="temperature must be 200 to 4000 K and emissivity 0 to 1"):
+def test_what_has_no_radiance_is_refused():
+    scene = make_scene(np.full((1, 9, 9), 900.0))
+    surface = Painted(scene.times, np.full((1, 9, 9), 1.5, dtype=np.float32))
+    with pytest.raises(ValueError, match="temperature must be 200 to 6000 K and emissivity 0 to 1"):
         Camera().measure(scene, surface, 0.0)
 
 

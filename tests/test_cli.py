@@ -316,6 +316,8 @@ def test_measure_writes_frames_at_the_camera_rate(folder, scene):
     measurement = read_measurement("m.nc")
     np.testing.assert_allclose(measurement.times, [0.0, 1 / 60e3], atol=1e-12)
     assert measurement.data.attrs["surface"] == "chip 1"
+    # The analytic chip goes on beyond the view, bands and all.
+    assert " ".join(result.output.split()).count("Doubtful: The border of the scene: ") == 1
 
 
 def test_measure_lays_a_measured_emissivity_map_on_the_scene(folder, scene, chip_scene):

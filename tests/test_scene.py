@@ -1,5 +1,6 @@
 """The contract of a scene, its raster, and the tool's outline."""
 
+import re
 from dataclasses import replace
 from math import cos, radians, sin
 
@@ -8,7 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from chipglow.camera import Camera
 from chipglow.scene import FIELD_UNITS, Raster, Scene, SceneError, ToolGeometry
+from chipglow.scene.scene import COLDEST_PLAUSIBLE, HOTTEST_PLAUSIBLE
+from chipglow.surface import UniformSurface
 
 RASTER = Raster(left=-6e-6, top=4e-6, spacing=2e-6, rows=4, columns=5)
 TIMES = np.array([0.0, 0.2e-6, 0.4e-6])
@@ -110,6 +114,59 @@ def test_material_coordinates_reach_the_frames():
 def test_a_wrong_value_is_named(name, value, message):
     with pytest.raises(SceneError, match=message):
         Scene.from_fields(RASTER, TIMES, with_value(name, value))
+
+
+@pytest.mark.parametrize("value", [257, -255, 1.7, np.nan, 1e300])
+@pytest.mark.parametrize("name", ["material", "quality"])
+def test_a_byte_is_checked_before_it_is_one(name, value):
+    # As a byte, 257, -255 and 1.7 would be 1: workpiece.
+    values = np.ones((3, *RASTER.shape))
+    values[1, 2, 3] = value
+    with pytest.raises(
+        SceneError, match=rf"scene: {name} has value {re.escape(f'{value:g}')}, exp"
+    ):
+        scene(**{name: values})
+
+
+@pytest.mark.parametrize("kind", [np.int64, np.float64, np.bool_])
+def test_whole_numbers_of_any_type_are_materials(kind):
+    made = scene(material=np.ones((3, *RASTER.shape), kind))
+    assert made.frame(0).material.dtype == np.uint8
+    assert (made.frame(0).material == 1).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        (
+            "temperature",
+            np.full(RASTER.shape, 300.0),
+            r"shape \(4, 5\), expected \(3, 4, 5\): time",
+        ),
+        ("velocity_x", np.zeros((3, 5, 4)), r"shape \(3, 5, 4\), expected \(3, 4, 5\): time, y, x"),
+        ("plastic_strain", 0.0, r"shape \(\), expected \(3, 4, 5\)"),
+        ("temperature", np.full((3, 4, 5), "20 degC"), "type <U7, expected numbers"),
+    ],
+)
+def test_a_field_of_another_shape_or_type_is_named(name, values, message):
+    with pytest.raises(SceneError, match=f"scene: '{name}' has {message}"):
+        scene(**{name: values})
+
+
+def test_times_are_a_line():
+    with pytest.raises(SceneError, match=r"scene: times have shape \(\), expected \(time,\)"):
+        Scene.from_fields(RASTER, 0.0, fields())
+
+
+def test_a_camera_looks_at_whatever_a_scene_may_have():
+    for temperature in (COLDEST_PLAUSIBLE, HOTTEST_PLAUSIBLE - 1):
+        made = scene(temperature=np.full((3, *RASTER.shape), temperature))
+        measured = Camera(pitch=2e-6, integration_time=0.2e-6, floor=None).measure(
+            made, UniformSurface(), 0.0
+        )
+        # Both are nodes of the exposure's table and of the inverse's first and last step: rounding.
+        found = measured.radiance_temperature()
+        np.testing.assert_allclose(found, temperature, rtol=1e-9)
 
 
 def test_wrong_structure_is_named():

@@ -151,7 +151,7 @@ def test_the_default_study_has_the_librarys_defaults():
     # The same widths, but for the rounding of n * 1e-6.
     assert plan == replace(Plan(), psf_widths=plan.psf_widths)
     np.testing.assert_allclose(plan.psf_widths, Plan().psf_widths, rtol=1e-15)
-    chips = study.surface.build(seed=1)
+    chips = study.surface.build(study.seed)
     assert list(chips.values()) == [CHIP_1, CHIP_2]
 
 

@@ -67,6 +67,20 @@ def test_displacements_are_those_of_a_tool_that_is_moved_and_turned(kind, angle,
     np.testing.assert_allclose(found, there - here, atol=1e-14)
 
 
+def test_the_tool_of_the_measurement_is_taken_if_none_is_given():
+    other = PlacedTool(TOOL, (20e-6, 0.0))
+    told = linear(1).with_tool(other)
+    assert rake_grid(told).tool == other
+    assert rake_grid(told, TOOL).tool == TOOL
+    expected = band_profile(told, other, curve=CURVE).distance
+    np.testing.assert_array_equal(band_profile(told, curve=CURVE).distance, expected)
+    attributes = {k: v for k, v in told.data.attrs.items() if not k.startswith("tool_")}
+    told.data.attrs = attributes
+    for analysis in (rake_grid, band_profile):
+        with pytest.raises(ValueError, match="tool: none is given and the measurement has none"):
+            analysis(told)
+
+
 def test_squares_are_uncertain_by_slope_times_position():
     grid = rake_grid(linear(), TOOL, uncertainty=FOUND)
     up = grid.along[None, :] - FOUND.pivot

@@ -16,7 +16,7 @@ from chipglow.analysis.frames import frame_numbers
 from chipglow.analysis.lines import Line, sample
 from chipglow.analysis.remarks import Remarks
 from chipglow.analysis.ridge import NoShearBandError, arc_length, normals_of
-from chipglow.analysis.tool_position import ToolUncertainty, combined, contribution
+from chipglow.analysis.tool_position import ToolUncertainty, chosen_tool, combined, contribution
 from chipglow.camera import Measurement
 from chipglow.scene import Tool
 
@@ -144,7 +144,7 @@ class BandProfile:
 
 def band_profile(
     measurement: Measurement,
-    tool: Tool,
+    tool: Tool | None = None,
     frames: Sequence[int] | None = None,
     curve: NDArray[np.float64] | None = None,
     reference: int | None = None,
@@ -158,8 +158,8 @@ def band_profile(
     ----------
     measurement : Measurement
         Frames of a camera.
-    tool : Tool
-        The tool, in the measurement's coordinates.
+    tool : Tool, optional
+        The tool, in the measurement's coordinates; the measurement's own by default.
     frames : sequence of int, optional
         Numbers of the frames; all by default.
     curve : ndarray, optional
@@ -182,7 +182,7 @@ def band_profile(
     NoShearBandError
         If no frame has a band; of a single frame with the reason.
     ValueError
-        If a number is impossible, or nothing on a given curve is usable.
+        If there is no tool, a number is impossible, or nothing on a given curve is usable.
 
     Notes
     -----
@@ -199,7 +199,7 @@ def band_profile(
     the curve's first point, contributes half the difference of the temperatures so far up and down
     the curve.
     """
-    pitch = measurement.raster.spacing
+    tool, pitch = chosen_tool(measurement, tool), measurement.raster.spacing
     width = pitch if width is None else width
     position = pitch / sqrt(12.0) if position is None else position
     for name, value in (("width", width), ("position", position)):

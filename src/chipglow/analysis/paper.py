@@ -141,6 +141,8 @@ class SurfaceResult:
         At the developed instant.
     band : BandErrors
         At the developed instant.
+    warnings : tuple of str
+        What to know of the image of the developed instant, a sentence each.
     curves : tuple of ndarray
         Measured radiance temperature along the ridge of every instant in K, whether under the
         camera's floor or not; empty for instants without a band.
@@ -153,6 +155,7 @@ class SurfaceResult:
     errors: ErrorImages
     rake: RakeErrors
     band: BandErrors
+    warnings: tuple[str, ...]
     curves: tuple[NDArray[np.float64], ...]
 
 
@@ -451,6 +454,7 @@ def _measure(
             errors=errors,
             rake=site.rake_errors(errors),
             band=site.band_errors(errors),
+            warnings=tuple(camera.develop(exposure).warnings),
             curves=_curves(camera.band, measurement, instants),
         )
     return results

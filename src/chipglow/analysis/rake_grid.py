@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.band_ridge import ThermalImage
 from chipglow.analysis.frames import frame_numbers
-from chipglow.analysis.tool_position import ToolUncertainty, combined, contribution
+from chipglow.analysis.tool_position import ToolUncertainty, chosen_tool, combined, contribution
 from chipglow.camera import UNUSABLE, Measurement
 from chipglow.scene import Raster, Tool
 
@@ -134,7 +134,7 @@ class RakeGrid:
 
 def rake_grid(
     measurement: Measurement,
-    tool: Tool,
+    tool: Tool | None = None,
     pixels: float = PIXELS,
     depth: float = DEPTH,
     frames: Sequence[int] | None = None,
@@ -146,8 +146,8 @@ def rake_grid(
     ----------
     measurement : Measurement
         Frames of a camera.
-    tool : Tool
-        The tool, in the measurement's coordinates.
+    tool : Tool, optional
+        The tool, in the measurement's coordinates; the measurement's own by default.
     pixels : float
         Side of a square in pixels; the paper's 3 by default.
     depth : float
@@ -161,7 +161,8 @@ def rake_grid(
     Raises
     ------
     ValueError
-        If no square is inside the image, or none beside the rake face is usable in any frame.
+        If there is no tool, no square is inside the image, or none beside the rake face is usable
+        in any frame.
 
     Notes
     -----
@@ -183,7 +184,7 @@ def rake_grid(
     uncertainty; half the difference of the temperatures there is what it contributes (JCGM 100,
     5.1.3). Pixels that are not usable are filled as in `ThermalImage`.
     """
-    raster = measurement.raster
+    tool, raster = chosen_tool(measurement, tool), measurement.raster
     size = _checked_size(pixels, depth, raster)
     numbers = frame_numbers(frames, measurement.times.size)
     rows = int(depth / size + _ROUNDING)

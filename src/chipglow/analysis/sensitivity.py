@@ -98,9 +98,12 @@ class _Place:
         return cls(site, rake, band)
 
     def blurred_on_pixels(self, psf: GaussianPSF) -> dict[str, LocalError]:
-        pitch = self.rake.camera.pitch
-        rake, band = (one.errors(blur(one.ideal, psf, pitch)) for one in (self.rake, self.band))
-        return self._readings(rake, band)
+        """Readings of a camera whose point spread function acts from pixel to pixel."""
+        camera = replace(self.rake.camera, psf=psf, psf_order="sensor")
+        return self._readings(
+            self.rake.errors(camera.form_image(self.site.rake_exposure)),
+            self.band.errors(camera.form_image(self.site.band_exposure)),
+        )
 
     def of_exposures(self, rake: Exposure, band: Exposure) -> dict[str, LocalError]:
         """Readings on exposures that are blurred already."""

@@ -9,7 +9,32 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from chipglow.analysis.band_ridge import ThermalImage
+from chipglow.camera import Measurement
 from chipglow.scene import Tool
+
+
+def chosen_tool(measurement: Measurement, given: Tool | None) -> Tool:
+    """The given tool, or else the measurement's own.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Frames of a camera.
+    given : Tool, optional
+        A tool, in the measurement's coordinates.
+
+    Raises
+    ------
+    ValueError
+        If there is neither.
+    """
+    tool = measurement.tool if given is None else given
+    if tool is None:
+        raise ValueError(
+            "tool: none is given and the measurement has none, expected one; find_tool looks for "
+            "it in the image"
+        )
+    return tool
 
 
 @dataclass(frozen=True)

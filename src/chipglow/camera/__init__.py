@@ -18,6 +18,7 @@ from chipglow.camera.measurement import UNUSABLE, Flag, Measurement
 from chipglow.camera.nonuniformity import NonUniformity
 from chipglow.camera.psf import AnnularAperturePSF, GaussianPSF, MeasuredPSF, PointSpreadFunction
 from chipglow.camera.recording import PlanckConversion, Recording
+from chipglow.camera.warning import ChipglowWarning
 
 __all__ = [
     "LEAST_FRAMES",
@@ -27,6 +28,7 @@ __all__ = [
     "Calibration",
     "CalibrationFit",
     "Camera",
+    "ChipglowWarning",
     "Detector",
     "Exposure",
     "FittedCalibration",

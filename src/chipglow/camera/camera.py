@@ -1,29 +1,43 @@
 """The virtual infrared camera."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Final, Literal
+from numbers import Integral, Real
+from sys import float_info
+from typing import Final, Literal, TypeAlias
+from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.convolution import blur
+from chipglow.camera.convolution import blur, blur_of_like, light_from_beyond
 from chipglow.camera.exposure import Exposure, expose
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.psf import AnnularAperturePSF, PointSpreadFunction
-from chipglow.camera.sampling import integrate, sensor_raster
+from chipglow.camera.sampling import integrate, sensor_raster, whole_raster
+from chipglow.camera.warning import ChipglowWarning
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Raster, Scene
-from chipglow.surface import Surface
+from chipglow.surface import EmissivityField, Surface
 
 PSF_ORDERS: Final = ("optics", "sensor")
+
+BORDER_TOLERANCE: Final = 1.0
+"""Change in K of a pixel from which on it is said that the border of the scene matters."""
+
+_COLD_FLOOR: Final = 373.15
+"""Floor in K up to which a round number is probably one of degrees Celsius."""
+
+_Blur: TypeAlias = Callable[[NDArray[np.float64], PointSpreadFunction, float], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
 class Camera:
     """An infrared camera looking at a scene (Figure 6 of Heigel and Whitenton, 2010).
+
+    By default it is the paper's in all but the order of blur and sensors; `paper` is the paper's.
 
     Parameters
     ----------
@@ -60,6 +74,11 @@ class Camera:
     ------
     ValueError
         If a value is impossible; the message names it and what was expected.
+
+    Warns
+    -----
+    ChipglowWarning
+        If the floor is so low and so round a number of K that it is probably meant in °C.
     """
 
     band: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
@@ -75,44 +94,65 @@ class Camera:
     reflected: float | None = None
 
     def __post_init__(self) -> None:
-        _expect(0.0 < self.pitch <= 1e-2, "pitch", self.pitch, "over 0 to 1e-2 m; 6 um is 6e-6")
         _expect(
-            self.shape is None or (len(self.shape) == 2 and min(self.shape) >= 1),
+            isinstance(self.band, Band), "band", self.band, "a Band such as Band(3.8e-6, 5.1e-6)"
+        )
+        _expect_number("pitch", self.pitch, 0.0, 1e-2, "over 0 to 1e-2 m; 6 um is 6e-6")
+        _expect(
+            self.shape is None or (_are_numbers(self.shape, Integral) and min(self.shape) >= 1),
             "shape",
             self.shape,
             "rows and columns of 1 or more",
         )
         _expect(
-            len(self.offset) == 2 and all(isfinite(o) and o >= 0.0 for o in self.offset),
+            _are_numbers(self.offset, Real) and all(isfinite(o) and o >= 0.0 for o in self.offset),
             "offset",
             self.offset,
             "two lengths of 0 m or more",
         )
-        _expect(0.0 < self.fill_factor <= 1.0, "fill_factor", self.fill_factor, "over 0 to 1")
+        _expect_number("fill_factor", self.fill_factor, 0.0, 1.0, "over 0 to 1")
         _expect(
             self.psf is None or isinstance(self.psf, PointSpreadFunction),
             "psf",
             self.psf,
-            "a PointSpreadFunction, or None",
+            "a PointSpreadFunction such as GaussianPSF(12e-6), or None",
         )
         _expect(self.psf_order in PSF_ORDERS, "psf_order", self.psf_order, " or ".join(PSF_ORDERS))
-        _expect(
-            0.0 < self.frame_rate < float("inf"), "frame_rate", self.frame_rate, "over 0 a second"
-        )
-        _expect(
-            0.0 < self.integration_time <= 1 / self.frame_rate,
+        _expect_number("frame_rate", self.frame_rate, 0.0, float_info.max, "over 0 a second")
+        _expect_number(
             "integration_time",
             self.integration_time,
+            0.0,
+            1 / self.frame_rate,
             f"over 0 to {1 / self.frame_rate:g} s, the time between frames",
         )
         for name in ("floor", "reflected"):
             value = getattr(self, name)
             _expect(
-                value is None or TABLE_COLDEST <= value <= TABLE_HOTTEST,
+                value is None
+                or (isinstance(value, Real) and TABLE_COLDEST <= float(value) <= TABLE_HOTTEST),
                 name,
                 value,
                 f"{TABLE_COLDEST:g} to {TABLE_HOTTEST:g} K, or None",
             )
+        if self.floor is not None and self.floor <= _COLD_FLOOR and self.floor % 10 == 0:
+            warn(
+                f"camera: floor is {self.floor:g} K, which is {self.floor - 273.15:g} °C; if "
+                f"{self.floor:g} °C is meant, it is {self.floor + 273.15:g} K.",
+                ChipglowWarning,
+                stacklevel=3,
+            )
+
+    @classmethod
+    def paper(cls) -> "Camera":
+        """The camera of the paper's simulation, as far as the paper tells it.
+
+        The blur is applied from sensor to sensor (`psf_order` is ``sensor``), as in its Figure 6:
+        that is what it differs in from `Camera()`, by up to 7 K. The point spread function, which
+        the paper prints as a picture only, is an assumption: see `AnnularAperturePSF`. A study's
+        camera is this one, unless it says otherwise.
+        """
+        return cls(psf_order="sensor")
 
     def sensors(self, scene: Raster) -> Raster:
         """Where the sensors lie on a scene.
@@ -161,11 +201,12 @@ class Camera:
         Raises
         ------
         ValueError
-            If the integration reaches beyond the scene, or the sensors do not fit it.
+            If the surface is none, the integration reaches beyond the scene, or the sensors do not
+            fit it.
         """
         self.sensors(scene.raster)
         return expose(
-            scene, surface.on(scene), self.band, start, self.integration_time, self.reflected
+            scene, _laid(surface, scene), self.band, start, self.integration_time, self.reflected
         )
 
     def develop(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
@@ -184,26 +225,40 @@ class Camera:
         Returns
         -------
         Measurement
-            As many frames as exposures.
+            As many frames as exposures. Its attribute ``doubtful`` says how far the border of the
+            scene matters, if it changes a pixel by over `BORDER_TOLERANCE`.
 
         Raises
         ------
         ValueError
             If there is no exposure, they are of different grids, or the sensors do not fit.
+
+        Notes
+        -----
+        What is beyond the scene is not known. It is taken to be as at the scene's edge, and the
+        light that comes from there (`light_from_beyond`) is what a warning is about: it compares
+        with a second assumption, by which each pixel sees beyond the scene the like of what it
+        sees within.
         """
         if isinstance(exposures, Exposure):
             exposures = (exposures,)
-        starts, frames, sensors = [], [], None
+        starts, frames, alike, sensors = [], [], [], None
         for exposure in exposures:
             found = self.sensors(exposure.raster)
             if sensors not in (None, found):
                 raise ValueError(f"camera: exposures of different grids, {sensors} and {found}")
             sensors = found
             starts.append(exposure.start)
-            frames.append(self.form_image(exposure))
+            frames.append(self._read_out(exposure, sensors, blur))
+            if self.psf is not None:
+                alike.append(self._read_out(exposure, sensors, blur_of_like))
         if sensors is None:
             raise ValueError("camera: no exposure to develop, expected 1 or more")
-        return self._measurement(np.stack(frames), np.array(starts), sensors)
+        measured = self._measurement(np.stack(frames), np.array(starts), sensors)
+        if alike:
+            other = np.asarray(self.band.temperature(np.stack(alike)), np.float64)
+            measured.data.attrs |= _border_doubt(measured, other, exposure.raster)
+        return measured
 
     def measure(
         self, scene: Scene, surface: Surface, start: float | Sequence[float] | NDArray[np.float64]
@@ -231,12 +286,39 @@ class Camera:
             If an integration reaches beyond the scene, or the sensors do not fit it.
         """
         self.sensors(scene.raster)
-        emissivity = surface.on(scene)
+        emissivity = _laid(surface, scene)
         measured = self.develop(
             expose(scene, emissivity, self.band, at, self.integration_time, self.reflected)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
         )
         return measured.with_tool(scene.tool) if scene.tool else measured
+
+    def light_from_beyond(self, scene: Raster) -> NDArray[np.float64]:
+        """Fraction of the light of every pixel that comes from beyond a scene, where none is known.
+
+        Parameters
+        ----------
+        scene : Raster
+            The scene's samples.
+
+        Returns
+        -------
+        ndarray
+            From 0 to under 1, of the shape of `sensors`; 0 without a point spread function.
+
+        Raises
+        ------
+        ValueError
+            If the sensors do not fit the scene.
+        """
+        sensors = self.sensors(scene)
+        if self.psf is None:
+            return np.zeros(sensors.shape)
+        if self.psf_order == "optics":
+            fraction = light_from_beyond(self.psf, scene.spacing, scene.shape)
+            return integrate(fraction, scene, sensors, self.fill_factor)
+        whole, own = whole_raster(scene, sensors)
+        return light_from_beyond(self.psf, self.pitch, whole.shape)[own].copy()
 
     def form_image(self, exposure: Exposure) -> NDArray[np.float64]:
         """Image of an exposure on the pixels: point spread function and detector footprint.
@@ -256,14 +338,20 @@ class Camera:
         ValueError
             If the pixels do not fit the scene.
         """
+        return self._read_out(exposure, self.sensors(exposure.raster), blur)
+
+    def _read_out(self, exposure: Exposure, sensors: Raster, blurred: _Blur) -> NDArray[np.float64]:
+        """Radiance of every sensor, shape `sensors.shape`."""
         image, raster = exposure.mean_radiance, exposure.raster
-        sensors = self.sensors(raster)
-        if self.psf is not None and self.psf_order == "optics":
-            image = blur(image, self.psf, raster.spacing)
-        image = integrate(image, raster, sensors, self.fill_factor)
-        if self.psf is not None and self.psf_order == "sensor":
-            image = blur(image, self.psf, self.pitch)
-        return image
+        if self.psf is None:
+            return integrate(image, raster, sensors, self.fill_factor)
+        if self.psf_order == "optics":
+            image = blurred(image, self.psf, raster.spacing)
+            return integrate(image, raster, sensors, self.fill_factor)
+        # Sensors that are not read out tell what is beyond those that are.
+        whole, own = whole_raster(raster, sensors)
+        image = integrate(image, raster, whole, self.fill_factor)
+        return blurred(image, self.psf, self.pitch)[own]
 
     def measurement(
         self, images: NDArray[np.float64], starts: NDArray[np.float64], scene: Raster
@@ -301,6 +389,53 @@ class Camera:
             "reflected": self.reflected,
         }
         return {name: value for name, value in attributes.items() if value is not None}
+
+
+def _laid(surface: Surface, scene: Scene) -> EmissivityField:
+    """A surface on a scene."""
+    _expect(
+        isinstance(surface, Surface),
+        "surface",
+        surface,
+        "a Surface such as chipglow.CHIP_1 or UniformSurface(0.6)",
+    )
+    return surface.on(scene)
+
+
+def _border_doubt(
+    measured: Measurement, other: NDArray[np.float64], scene: Raster
+) -> dict[str, str]:
+    """What the border of the scene may change, beside temperatures under another assumption."""
+    change = np.abs(measured.radiance_temperature() - other)
+    changed = change > BORDER_TOLERANCE
+    if not changed.any():
+        return {}
+    (left, right, bottom, top), at = scene.extent, measured.raster
+    across = np.minimum(at.x - left, right - at.x)
+    down = np.minimum(top - at.y, at.y - bottom)
+    reach = np.minimum(across, down[:, None])[changed.any(axis=0)].max()
+    return {
+        "doubtful": (
+            "The border of the scene: beyond it the surface is taken to be as at the edge. With "
+            "the like of what each pixel sees within the scene there instead, "
+            f"{100 * changed.mean():.3g} % of the pixels (up to {1e6 * reach:.3g} um from the "
+            f"border) would change by over {BORDER_TOLERANCE:g} K, by {np.nanmax(change):.3g} K at "
+            "most."
+        )
+    }
+
+
+def _are_numbers(values: object, kind: type) -> bool:
+    """Whether these are two numbers of a kind."""
+    return (
+        isinstance(values, (tuple, list))
+        and len(values) == 2
+        and all(isinstance(value, kind) for value in values)
+    )
+
+
+def _expect_number(name: str, value: object, over: float, most: float, expected: str) -> None:
+    _expect(isinstance(value, Real) and over < float(value) <= most, name, value, expected)
 
 
 def _expect(condition: bool, name: str, value: object, expected: str) -> None:

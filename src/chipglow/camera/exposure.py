@@ -252,8 +252,8 @@ def _accumulate(  # type: ignore[no-untyped-def]
             t = temperature[y, x]
             there = material[y, x] != _VOID
             position = (np.float64(t) - TABLE_COLDEST) * _STEPS_PER_KELVIN
-            inside = min(max(position, 0.0), last - 1.0)
-            i = np.int32(inside)
+            inside = min(max(position, 0.0), np.float64(last))
+            i = min(np.int32(inside), last - 1)
             black = table[i] + (inside - i) * (table[i + 1] - table[i])
             if not 0.0 <= position <= last:
                 black = np.nan

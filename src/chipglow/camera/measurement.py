@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from enum import IntFlag
 from functools import cached_property
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import xarray as xr
@@ -11,8 +11,12 @@ from numpy.typing import NDArray
 
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import Raster, Tool
+from chipglow.scene.notebook import ZERO_CELSIUS, frames_text, plot_image
 from chipglow.scene.scene import raster_coordinates
 from chipglow.scene.tool_attributes import stored_tool, tool_attributes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MEASUREMENT_UNITS: Final = {"radiance_temperature": "K", "radiance": "W m-2 sr-1", "flags": "1"}
 """The variables that every measurement has, and their units."""
@@ -132,6 +136,22 @@ class Measurement:
         )
         return cls(data if band.response is None else data.assign(_response(band)))
 
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.times)
+
+    def __repr__(self) -> str:
+        told = frames_text(self.times, self.raster, "pixels", self.celsius())
+        tool = f"{'with' if self.tool else 'without'} tool"
+        count = len(self.warnings)
+        said = f"; {count} warning{'s' if count > 1 else ''}: see .warnings" if count else ""
+        return f"<Measurement: {told}; {tool}{said}>"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why it may not be relied on, a sentence each."""
+        return tuple(str(self.data.attrs.get("doubtful", "")).splitlines())
+
     @cached_property
     def band(self) -> Band:
         """The camera's band.
@@ -229,6 +249,40 @@ class Measurement:
         if not flagged:
             return stored
         return np.where(self.usable, stored, self.band.temperature(self.radiance))
+
+    def celsius(self, frame: int = 0) -> NDArray[np.float64]:
+        """Radiance temperature of one frame in °C.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame.
+
+        Returns
+        -------
+        ndarray
+            Shape (y, x), NaN where flagged as unusable.
+        """
+        kelvin = self.data["radiance_temperature"][frame].values
+        return np.asarray(kelvin, np.float64) - ZERO_CELSIUS
+
+    def plot(self, frame: int = 0, axes: "Axes | None" = None) -> "Axes":
+        """Draw one frame's radiance temperature in °C over x and y in µm, with the tool's outline.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; a new figure by default.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            With the picture; grey where a pixel has no radiance temperature.
+        """
+        time, label = float(self.times[frame]), "radiance temperature / °C"
+        return plot_image(self.celsius(frame), self.raster, self.tool, label, time, axes)
 
     @property
     def calibration_uncertainty(self) -> NDArray[np.float64] | None:

@@ -79,6 +79,22 @@ def sensor_raster(
     return Raster(left + offset[0], top - offset[1], pitch, rows, columns)
 
 
+def whole_raster(scene: Raster, sensors: Raster) -> tuple[Raster, tuple[slice, slice]]:
+    """All whole sensors that fit a scene, in line with some of them, and where those are in it.
+
+    Parameters
+    ----------
+    scene, sensors : Raster
+        The scene's samples, and sensors within it.
+    """
+    pitch = sensors.spacing
+    down, right = scene.top - sensors.top, sensors.left - scene.left
+    above, before = (int(length / pitch + _ROUNDING) for length in (down, right))
+    corner = max(right - before * pitch, 0.0), max(down - above * pitch, 0.0)
+    own = slice(above, above + sensors.rows), slice(before, before + sensors.columns)
+    return sensor_raster(scene, pitch, corner, None), own
+
+
 def integrate(
     radiance: NDArray[np.float64], scene: Raster, sensors: Raster, fill_factor: float
 ) -> NDArray[np.float64]:

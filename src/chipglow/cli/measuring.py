@@ -4,7 +4,7 @@ from math import floor
 from pathlib import Path
 
 from chipglow.camera import Measurement
-from chipglow.cli.assumed import say_assumed
+from chipglow.cli.assumed import say_assumed, say_of_measurements
 from chipglow.cli.progress import progress_bars
 from chipglow.cli.times import parse_instant
 from chipglow.io import open_scene, write_measurement
@@ -53,4 +53,6 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
         progress("measurement", 1.0)
-    write_measurement(Measurement(measured), out)
+    measurement = Measurement(measured)
+    say_of_measurements(measurement)
+    write_measurement(measurement, out)

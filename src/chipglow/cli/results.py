@@ -47,16 +47,22 @@ def write_results(study: Study, folder: Path, resume: bool, remarks: Sequence[st
                 study.title,
                 study_text(study),
                 _provenance(study),
-                [*remarks, *(f"Assumed: {sentence}" for sentence in assumed)],
+                [*remarks, *(f"Assumed: {sentence}" for sentence in assumed), *_warnings(result)],
                 table_2(study) if study.scene is None else (),
             )
             progress("report", 1.0)
     say_assumed(assumed)
     _print_comparison(result)
-    for remark in remarks:
+    for remark in (*remarks, *_warnings(result)):
         print(remark)
     say_inertia(result.forces.inertia if result.forces else None)
     print(f"Report: {folder / report.relative_to(temporary)}")
+
+
+def _warnings(result: StudyResult) -> list[str]:
+    """What to know of the images, each sentence once."""
+    found = [warning for surface in result.surfaces.values() for warning in surface.warnings]
+    return list(dict.fromkeys(found))
 
 
 def _provenance(study: Study) -> dict[str, str]:

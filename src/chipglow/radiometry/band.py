@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil, isfinite, log
+from math import ceil, inf, log
+from numbers import Real
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -16,7 +17,7 @@ Response: TypeAlias = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Relative spectral response of a camera: wavelengths in m to values of 0 or more."""
 
 TABLE_COLDEST: Final = 200.0
-TABLE_HOTTEST: Final = 4000.0
+TABLE_HOTTEST: Final = 6000.0
 _NODES_PER_PANEL: Final = 16
 _TEMPERATURE_STEP: Final = 0.25
 _INVERSE_NODES: Final = 4096
@@ -52,7 +53,8 @@ class Band:
     response: Response | None = None
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.lower) and isfinite(self.upper) and 0 < self.lower < self.upper):
+        numbers = isinstance(self.lower, Real) and isinstance(self.upper, Real)
+        if not (numbers and 0 < self.lower < self.upper < inf):
             raise ValueError(
                 f"band: expected 0 < lower < upper in m, got lower={self.lower!r}, "
                 f"upper={self.upper!r}"
@@ -106,10 +108,8 @@ class Band:
         result = np.empty_like(values)
         first, step, nodes, slopes = self._inverse_table
         _look_up_temperature(values.ravel(), first, step, nodes, slopes, result.ravel())
-        last = first + step * (nodes.size - 1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            logarithm = np.log(values.astype(np.float64))
-        outside = np.isfinite(logarithm) & ~((logarithm >= first) & (logarithm <= last))
+        # What the table did not answer, so that rounding at its ends leaves no gap.
+        outside = np.isnan(result) & (values > 0) & np.isfinite(values)
         if outside.any():
             result[outside] = self._invert(values[outside].astype(np.float64))
         return result
@@ -126,7 +126,7 @@ class Band:
         -------
         ndarray
             In W/(m² sr K), of the same shape, by straight lines between values 0.25 K apart, within
-            1e-5 of it; NaN outside 200 K to 4000 K.
+            1e-5 of it; NaN outside 200 K to 6000 K.
         """
         values = np.asarray(temperature, np.float64)
         position = (values - TABLE_COLDEST) / _TEMPERATURE_STEP
@@ -140,7 +140,7 @@ class Band:
 
     @cached_property
     def radiance_table(self) -> NDArray[np.float64]:
-        """Radiance and its derivative at every 0.25 K from 200 K to 4000 K, shape (n, 2)."""
+        """Radiance and its derivative at every 0.25 K from 200 K to 6000 K, shape (n, 2)."""
         count = round((TABLE_HOTTEST - TABLE_COLDEST) / _TEMPERATURE_STEP) + 1
         temperature = TABLE_COLDEST + _TEMPERATURE_STEP * np.arange(count, dtype=np.float64)
         return np.stack([self._integrate(temperature), self._derivative(temperature)], axis=1)

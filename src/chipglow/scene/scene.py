@@ -7,15 +7,20 @@ from enum import IntEnum
 from functools import cached_property
 from itertools import pairwise
 from math import isfinite
-from typing import Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
+from chipglow.scene.notebook import ZERO_CELSIUS, frames_text, plot_image
 from chipglow.scene.raster import Raster
 from chipglow.scene.tool import Tool
 from chipglow.scene.tool_attributes import stored_tool, tool_attributes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FIELD_UNITS: Final[Mapping[str, str]] = {
     "temperature": "K",
@@ -58,8 +63,9 @@ ENERGY_UNITS: Final[Mapping[str, str]] = dict.fromkeys(
 )
 """Energy account on `force_time`, per width of cut and since the start: optional, all or none."""
 
-COLDEST_PLAUSIBLE: Final = 200.0
-HOTTEST_PLAUSIBLE: Final = 6000.0
+COLDEST_PLAUSIBLE: Final = TABLE_COLDEST
+HOTTEST_PLAUSIBLE: Final = TABLE_HOTTEST
+"""Limits of a scene's temperature in K: what a scene may have, a camera can look at."""
 
 
 _LONGEST_STEP: Final = 2.0
@@ -161,24 +167,81 @@ class Scene:
             The tool's outline, for the analyses that need the rake face.
         attributes : mapping, optional
             Further attributes of the dataset, such as provenance.
+
+        Raises
+        ------
+        SceneError
+            If an array is unknown, missing, of another shape or with values that cannot be; the
+            message names the field.
         """
         units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS, QUALITY: "1"}
         unknown = sorted(set(fields) - set(units))
         if unknown:
             raise SceneError(f"scene: unknown field {unknown[0]!r}, expected one of {list(units)}")
+        times = np.asarray(times, dtype=np.float64)
+        if times.ndim != 1:
+            raise SceneError(f"scene: times have shape {times.shape}, expected (time,)")
+        shape = (times.size, *raster.shape)
         data = xr.Dataset(
             {
                 name: (
                     ("time", "y", "x"),
-                    np.asarray(values, dtype=np.uint8 if name in _BYTES else np.float32),
+                    _as_stored(name, np.asarray(values), shape),
                     {"units": units[name]},
                 )
                 for name, values in fields.items()
             },
-            coords=raster_coordinates(raster, np.asarray(times, dtype=np.float64)),
+            coords=raster_coordinates(raster, times),
             attrs={**(attributes or {}), **(tool_attributes(tool) if tool else {})},
         )
         return cls(data)
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.times)
+
+    def __repr__(self) -> str:
+        told = frames_text(self.times, self.raster, "samples", self._shown(0))
+        return f"<Scene: {told}; {'with' if self.tool else 'without'} tool>"
+
+    def celsius(self, frame: int = 0) -> NDArray[np.float64]:
+        """Temperature of one frame in °C.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame.
+
+        Returns
+        -------
+        ndarray
+            Shape (y, x). Where there is no material it means nothing.
+        """
+        return np.asarray(self._read("temperature", frame), np.float64) - ZERO_CELSIUS
+
+    def plot(self, frame: int = 0, axes: "Axes | None" = None) -> "Axes":
+        """Draw the temperature of one frame in °C over x and y in µm, with the tool's outline.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame.
+        axes : matplotlib.axes.Axes, optional
+            Where to draw; a new figure by default.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            With the picture; grey where there is no material.
+        """
+        time = float(self.times[frame])
+        shown = self._shown(frame)
+        return plot_image(shown, self.raster, self.tool, "temperature / °C", time, axes)
+
+    def _shown(self, frame: int) -> NDArray[np.float64]:
+        """Temperature of one frame in °C, NaN where there is no material."""
+        void = self._read("material", frame) == Material.VOID
+        return np.where(void, np.nan, self.celsius(frame))
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -290,10 +353,27 @@ class Scene:
 
 _BYTES: Final = ("material", QUALITY)
 _VELOCITY: Final = ("velocity_x", "velocity_y")
+_MATERIALS: Final = ", ".join(f"{m.value} ({m.name.lower()})" for m in Material)
 
 
 class SceneError(ValueError):
     """Fields that break the contract of a scene."""
+
+
+def _as_stored(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    """An array of this shape in the type that a scene keeps; bytes only if nothing is lost."""
+    if values.shape != shape:
+        raise SceneError(f"scene: {name!r} has shape {values.shape}, expected {shape}: time, y, x")
+    if values.dtype.kind not in "biuf":
+        raise SceneError(f"scene: {name!r} has type {values.dtype}, expected numbers")
+    with np.errstate(over="ignore", invalid="ignore"):
+        stored = values.astype(np.uint8 if name in _BYTES else np.float32, copy=False)
+    if name in _BYTES and (stored != values).any():
+        expected = _MATERIALS if name == "material" else "whole numbers of 0 to 255"
+        raise SceneError(
+            f"scene: {name} has value {values[stored != values][0]:g}, expected {expected}"
+        )
+    return stored
 
 
 def check_frame(frame: Frame) -> None:
@@ -401,5 +481,5 @@ def _check_material(values: NDArray[Any], time: float) -> None:
     if values.dtype != np.uint8 or highest > max(Material):
         raise SceneError(
             f"scene: material has value {highest} of type {values.dtype} at {time:.9g} s, expected "
-            f"uint8 of {', '.join(f'{m.value} ({m.name.lower()})' for m in Material)}"
+            f"uint8 of {_MATERIALS}"
         )

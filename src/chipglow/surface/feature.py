@@ -43,7 +43,8 @@ class FeatureSurface(Surface):
         How the textures move. "material": each point keeps its own, by the scene's material
         coordinates. "mean": the paper's way, each map is shifted by its feature's mean velocity.
     seed : int
-        Seed of the textures; each feature has an independent stream of it.
+        Seed of the textures; each feature has an independent stream of it. By default that of the
+        paper's study.
     restore_deviation : bool
         Make up for the deviation that enlarging takes from a map of deviates.
 
@@ -66,7 +67,7 @@ class FeatureSurface(Surface):
     tool: Emissivity = field(default_factory=lambda: Emissivity(0.58, 0.06))
     grain: float = 20e-6
     follow: Literal["material", "mean"] = "material"
-    seed: int = 1
+    seed: int = 2010
     restore_deviation: bool = True
 
     def __post_init__(self) -> None:

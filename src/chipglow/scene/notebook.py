@@ -1,0 +1,94 @@
+"""What a notebook shows of frames on a grid: a line of text, and a picture."""
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.scene.raster import Raster
+from chipglow.scene.tool import Tool
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+ZERO_CELSIUS: Final = 273.15
+
+_FACE: Final = 3e-3
+_NOTHING: Final = "#e5e7eb"
+
+
+def frames_text(
+    times: NDArray[np.float64], raster: Raster, values: str, celsius: NDArray[Any]
+) -> str:
+    """Number, shape, times and range of frames, in a line.
+
+    Parameters
+    ----------
+    times : ndarray
+        Times of the frames in s.
+    raster : Raster
+        Their grid.
+    values : str
+        What its values are called, such as ``samples``.
+    celsius : ndarray
+        The first frame in °C, shape (y, x), NaN where there is none.
+    """
+    count, first, last = times.size, 1e6 * times[0], 1e6 * times[-1]
+    known = celsius[np.isfinite(celsius)]
+    parts = (
+        f"{count} frame{'s' if count > 1 else ''} of {raster.rows} x {raster.columns} {values} of "
+        f"{1e6 * raster.spacing:.4g} µm",
+        f"{first:.6g} µs to {last:.6g} µs" if count > 1 else f"at {first:.6g} µs",
+        f"{known.min():.4g} °C to {known.max():.4g} °C{' in the first' if count > 1 else ''}"
+        if known.size
+        else f"no temperature{' in the first' if count > 1 else ''}",
+    )
+    return "; ".join(parts)
+
+
+def plot_image(
+    celsius: NDArray[Any],
+    raster: Raster,
+    tool: Tool | None,
+    label: str,
+    time: float,
+    axes: "Axes | None",
+) -> "Axes":
+    """Draw temperatures on micrometre axes, with the tool's outline and a colour bar.
+
+    Parameters
+    ----------
+    celsius : ndarray
+        Temperature in °C, shape (y, x), NaN where there is none.
+    raster : Raster
+        Its grid.
+    tool : Tool, optional
+        The tool.
+    label : str
+        Of the colour bar, with its unit.
+    time : float
+        In s, for the title.
+    axes : matplotlib.axes.Axes, optional
+        Where to draw; a new figure by default.
+    """
+    import matplotlib
+
+    if axes is None:
+        from matplotlib import pyplot as plt
+
+        axes = plt.subplots(layout="constrained")[1]
+    left, right, bottom, top = (1e6 * edge for edge in raster.extent)
+    picture = axes.imshow(
+        np.ma.masked_invalid(celsius),
+        extent=(left, right, bottom, top),
+        cmap=matplotlib.colormaps["inferno"].with_extremes(bad=_NOTHING),
+        interpolation="nearest",
+    )
+    if tool is not None:
+        outline = 1e6 * tool.outline(_FACE)
+        axes.plot(*outline.T, color="white", linewidth=2.2)
+        axes.plot(*outline.T, color="black", linewidth=1.0)
+    axes.set(xlim=(left, right), ylim=(bottom, top), xlabel="x / µm", ylabel="y / µm")
+    axes.set_title(f"{1e6 * time:.6g} µs", loc="left")
+    axes.figure.colorbar(picture, ax=axes, label=label)
+    return axes

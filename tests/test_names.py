@@ -1,0 +1,31 @@
+"""The names of the package itself: those that its pages use, and no others."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import chipglow
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+CODE = re.compile(r"```python\n(.*?)```", re.DOTALL)
+
+
+@pytest.mark.parametrize("name", chipglow.__all__)
+def test_every_name_is_there(name):
+    assert getattr(chipglow, name) is not None
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_what_a_page_uses_is_in_the_package_itself(page):
+    code = "\n".join(CODE.findall(page.read_text(encoding="utf-8")))
+    assert re.findall(r"(?:from|import) +chipglow\.[\w.]+", code) == []
+    used = re.findall(r"from chipglow import ([^\n]+)", code)
+    names = {name.strip() for line in used for name in line.split(",")}
+    names |= set(re.findall(r"\bchipglow\.(\w+)", code))
+    assert names <= set(chipglow.__all__)
+
+
+def test_a_plan_is_at_hand_for_the_analysis():
+    assert chipglow.Plan(instants=3).instants == 3
