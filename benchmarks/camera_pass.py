@@ -37,6 +37,7 @@ class GivenScene:
         self.times = STEP * np.arange(len(temperature))
         self.frame_spacing = STEP
         self.raster = RASTER
+        self.tool = None
 
     def frame(self, index):
         temperature = self.temperature[index]
