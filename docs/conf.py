@@ -1,5 +1,6 @@
 """How the documentation is built: ``sphinx-build -W -b html docs FOLDER``."""
 
+import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from chipglow.study import (
 
 HERE = Path(__file__).parent
 GENERATED = HERE / "generated"
+sys.path.insert(0, str(HERE))  # for mathml
 
 project = "chipglow"
 author = "The chipglow developers"
@@ -20,10 +22,10 @@ copyright = "The chipglow developers, Apache-2.0"
 release = version = installed_version("chipglow")
 
 extensions = [
+    "mathml",
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
 ]
 templates_path = ["_templates"]
@@ -36,7 +38,7 @@ exclude_patterns = [
 ]
 default_role = "py:obj"
 
-myst_enable_extensions = ["amsmath", "dollarmath"]
+myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
@@ -48,15 +50,15 @@ napoleon_use_rtype = False
 
 html_theme = "pydata_sphinx_theme"
 html_title = "chipglow"
-html_theme_options = {"show_toc_level": 2, "navigation_with_keys": False}
-html_sidebars = {
-    "index": [],
-    "tutorial": [],
-    "physics": [],
-    "cutting": [],
-    "study": [],
-    "files": [],
-    "import": [],
+html_math_renderer = "mathml"
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
+html_sidebars = {"**": ["all-pages"]}
+html_theme_options = {
+    "show_toc_level": 2,
+    "navigation_with_keys": False,
+    "navbar_center": [],
+    "secondary_sidebar_items": ["page-toc"],
 }
 
 # The page on files shows the paper's study as the program itself writes it.
