@@ -4,17 +4,19 @@ import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
-from chipglow.study import (
+HERE = Path(__file__).parent
+GENERATED = HERE / "generated"
+sys.path.insert(0, str(HERE))  # for mathml and sample_files
+
+from sample_files import SAMPLES, write_archive  # noqa: E402
+
+from chipglow.study import (  # noqa: E402
     ImportDescription,
     MeasurementDescription,
     Study,
     field_tables,
     study_text,
 )
-
-HERE = Path(__file__).parent
-GENERATED = HERE / "generated"
-sys.path.insert(0, str(HERE))  # for mathml
 
 project = "chipglow"
 author = "The chipglow developers"
@@ -77,3 +79,7 @@ GENERATED.mkdir(exist_ok=True)
 (GENERATED / "measurement-fields.md").write_text(
     field_tables(MeasurementDescription(), "measurement"), encoding="utf-8"
 )
+
+# Pages offer the files with which their commands can be tried.
+for page in SAMPLES:
+    write_archive(page, GENERATED / f"{page}.zip")

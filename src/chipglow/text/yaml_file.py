@@ -73,6 +73,4 @@ class _Loader(yaml.SafeLoader):
 
 for _tag in (_WHOLE, _FRACTION):
     _Loader.add_constructor(_tag, _Loader.construct_number)
-_Loader.add_implicit_resolver(
-    _FRACTION, re.compile(r"[-+]?\d+[eE][-+]?\d+$"), list("-+0123456789")
-)
+_Loader.add_implicit_resolver(_FRACTION, re.compile(r"[-+]?\d+[eE][-+]?\d+$"), list("-+0123456789"))

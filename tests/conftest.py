@@ -1,0 +1,32 @@
+"""The quick study, computed once for all tests that look at what it leaves."""
+
+import subprocess
+import sys
+from typing import NamedTuple
+
+import pytest
+
+
+class QuickStudy(NamedTuple):
+    """Folder of the results, folder of the cache, and what the command printed."""
+
+    results: object
+    cache: object
+    printed: str
+
+
+@pytest.fixture(scope="session")
+def quick_study(tmp_path_factory):
+    """What ``chipglow reproduce --quick`` writes, as a user runs it."""
+    folder = tmp_path_factory.mktemp("reproduce")
+    command = [sys.executable, "-c", "from chipglow.cli import main; main()"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CHIPGLOW_CACHE", str(folder / "cache"))
+        run = subprocess.run(
+            [*command, "reproduce", "--quick", "--out", str(folder / "run")],
+            capture_output=True,
+            text=True,
+            timeout=1200,
+        )
+    assert run.returncode == 0, run.stderr
+    return QuickStudy(folder / "run", folder / "cache", run.stdout)
