@@ -24,12 +24,13 @@ FENCE = re.compile(r"( *)(```+)(.*)")
 
 @dataclass(frozen=True)
 class Block:
-    """What stands between fences, and the comment on the line before."""
+    """What stands between fences, the comment on the line before, and the words before that."""
 
     page: Path
     line: int
     language: str
     text: str
+    words: str
     note: str | None
     about: str
 
@@ -39,7 +40,8 @@ class Block:
 
 def blocks(page):
     """The blocks of a page in their order."""
-    lines, found, start = page.read_text(encoding="utf-8").splitlines(), [], 0
+    lines, found = page.read_text(encoding="utf-8").splitlines(), []
+    start = after = 0
     while start < len(lines):
         if not (fence := FENCE.fullmatch(lines[start])):
             start += 1
@@ -47,9 +49,10 @@ def blocks(page):
         end = lines.index(fence[1] + fence[2], start + 1)
         note = NOTE.fullmatch(lines[start - 1])
         text = dedent("\n".join(lines[start + 1 : end])) + "\n"
+        words = "\n".join(lines[after : start - bool(note)])
         said = note.groups() if note else (None, "")
-        found.append(Block(page, start + 1, fence[3], text, *said))
-        start = end + 1
+        found.append(Block(page, start + 1, fence[3], text, words, *said))
+        start = after = end + 1
     return found
 
 

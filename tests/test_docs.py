@@ -60,6 +60,7 @@ def test_a_block_says_what_it_is(page):
         assert block.language in LANGUAGES or DIRECTIVES.fullmatch(block.language), str(block)
         assert block.language != "yaml" or block.note, f"{block}: a file, or which kind?"
         if block.note == "file":
+            assert block.about in block.words, f"{block}: the reader is not told the name"
             assert any(block.about in later.text for later in found[number + 1 :]), str(block)
     indented = re.compile(r"\n\n {4}(chipglow|python|pip) ")
     assert not indented.search(page.read_text(encoding="utf-8"))
