@@ -1,10 +1,12 @@
-"""The quick study, computed once for all tests that look at what it leaves."""
+"""What several files of tests share: the quick study, computed once, and the registry of laws."""
 
 import subprocess
 import sys
 from typing import NamedTuple
 
 import pytest
+
+from chipglow.cutting.flow_stress import LAWS
 
 
 class QuickStudy(NamedTuple):
@@ -30,3 +32,12 @@ def quick_study(tmp_path_factory):
         )
     assert run.returncode == 0, run.stderr
     return QuickStudy(folder / "run", folder / "cache", run.stdout)
+
+
+@pytest.fixture
+def own_laws():
+    """Forget the laws that a test registers."""
+    before = dict(LAWS)
+    yield
+    LAWS.clear()
+    LAWS.update(before)

@@ -23,18 +23,20 @@ def page_id(page):
 
 
 @pytest.fixture
-def reader(tmp_path, quick_study, monkeypatch):
+def reader(tmp_path, quick_study, own_laws, monkeypatch):
     """A reader whose cache holds the scene of the quick study."""
     cache, folder = tmp_path / "cache", tmp_path / "work"
     cache.mkdir()
     folder.mkdir()
-    for scene in quick_study.cache.glob("scene-*.nc"):
-        os.link(scene, cache / scene.name)
+    known = {scene.name for scene in quick_study.cache.glob("scene-*.nc")}
+    for name in known:
+        os.link(quick_study.cache / name, cache / name)
     monkeypatch.setenv("CHIPGLOW_CACHE", str(cache))
     monkeypatch.setattr(plt, "show", lambda: None)
     matplotlib.use("Agg")
     yield Reader(folder)
     plt.close("all")
+    assert {scene.name for scene in cache.iterdir()} == known, "a page makes its reader wait"
 
 
 @pytest.mark.parametrize("page", WITH_CODE, ids=page_id)
