@@ -69,19 +69,25 @@ def heated(
     background: NDArray[np.bool_],
     temperature: float,
     camera: Camera | None = None,
+    frames: int = FRAMES,
 ) -> Measurement:
     """Frames of the chip at one temperature, with noise and drift."""
-    fields = {name: np.zeros((11, *RASTER.shape), np.float32) for name in FIELD_UNITS}
-    fields["material"][:] = ~background
-    fields["temperature"][:] = np.where(background, LABORATORY, temperature)
-    scene = Scene.from_fields(RASTER, np.arange(11) * 1e-6, fields)
+    scene = heated_scene(background, temperature)
     camera = camera or Camera(pitch=PITCH, floor=473.15, reflected=LABORATORY)
     image = camera.measure(scene, MapSurface(emissivity, RASTER), 0.0)
     generator = np.random.default_rng(3)
-    radiance = image.radiance + NOISE * generator.standard_normal((FRAMES, *image.raster.shape))
-    radiance += DRIFT * generator.standard_normal((FRAMES, 1, 1))
-    times = np.arange(FRAMES) / camera.frame_rate
+    radiance = image.radiance + NOISE * generator.standard_normal((frames, *image.raster.shape))
+    radiance += DRIFT * generator.standard_normal((frames, 1, 1))
+    times = np.arange(frames) / camera.frame_rate
     return Measurement.from_radiance(radiance, BAND, times, image.raster, camera.floor)
+
+
+def heated_scene(background: NDArray[np.bool_], temperature: float) -> Scene:
+    """A scene as long as an exposure in which nothing happens."""
+    fields = {name: np.zeros((11, *RASTER.shape), np.float32) for name in FIELD_UNITS}
+    fields["material"][:] = ~background
+    fields["temperature"][:] = np.where(background, LABORATORY, temperature)
+    return Scene.from_fields(RASTER, np.arange(11) * 1e-6, fields)
 
 
 def table(found: EmissivityMap, chip: NDArray[np.float64]) -> None:
