@@ -143,7 +143,7 @@ def test_run_writes_a_report_and_prints_the_comparison(folder, runs):
     result = chipglow("run", "study.yaml", "--out", "results")
     assert result.exit_code == 0, result.output
     assert "results/report.html" in result.output
-    for heading in ("quantity", "paper", "here", "difference", "−42", "90"):
+    for heading in ("quantity", "the paper", "here", "range of draws", "differs", "−42", "90"):
         assert heading in result.output
     names = {path.name for path in (folder / "results").iterdir()}
     assert {"report.html", "summary.json", "results.nc", "study.yaml", "figures"} <= names
@@ -163,7 +163,7 @@ def earlier_results(folder, runs):
 
 
 def test_a_second_run_finds_the_scene_and_replaces_the_results(earlier_results, runs, monkeypatch):
-    def write_report(result, folder, text, provenance):
+    def write_report(result, folder, title, text, provenance, remarks, settings):
         (folder / "summary.json").write_text(text)
         return folder / "summary.json"
 
