@@ -382,5 +382,4 @@ def test_a_psf_says_in_words_what_it_is():
         "diffraction of a round pupil of NA 0.28, obscured to 0.35 of its diameter, at 4.5 µm"
     )
     assert "obscured" not in str(AnnularAperturePSF(4.5e-6, 0.28, 0.0))
-    weights = np.outer([1.0, 2.0, 1.0], [0.0, 1.0, 3.0, 1.0, 0.0])
-    assert str(MeasuredPSF(weights, 2e-6)) == "measured, 3 x 5 values 2 µm apart"
+    assert str(MeasuredPSF(np.ones((5, 5)), 2e-6)) == "measured, 5 x 5 values 2 µm apart"
