@@ -124,7 +124,7 @@ def test_without_strain_the_chip_is_the_outline_that_was_given():
     x, y = np.meshgrid(RASTER.x, RASTER.y)
     inside = (x > 40e-6) & (x < 80e-6) & (y > 30e-6) & (y < 60e-6)
     assert np.array_equal(frame.plastic_strain, inside.astype(np.float32))
-    assert (frame.plastic_strain_rate == 0).all()
+    assert frame.plastic_strain_rate is None
     assert "chip's outline" in scene.data.attrs["assumed"]
 
 
@@ -234,7 +234,8 @@ def test_read_elsewhere_is_read_the_same(worker_finds_tests):
 def test_a_reader_that_goes_wrong_leaves_one_error_and_no_file(
     how, wrong, tmp_path, worker_finds_tests
 ):
-    source = Isolated(Broken(WHOLE, how=how), "block", memory=10**9, patience=6.0)
+    patience = 6.0 if how == "hang" else 120.0
+    source = Isolated(Broken(WHOLE, how=how), "block", memory=10**9, patience=patience)
     with pytest.raises(SourceError, match=wrong):
         import_scene(Import(source), tmp_path / "scene.nc")
     assert not list(tmp_path.iterdir())

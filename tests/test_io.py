@@ -173,7 +173,7 @@ def test_write_scene_keeps_all(tmp_path):
 
 def test_a_scene_without_material_coordinates(tmp_path):
     bare = a_frame(material_x=None, material_y=None)
-    with SceneWriter(tmp_path / "bare.nc", RASTER, material_coordinates=False) as writer:
+    with SceneWriter(tmp_path / "bare.nc", RASTER, fields=tuple(FIELD_UNITS)) as writer:
         writer.append(bare)
     scene = open_scene(tmp_path / "bare.nc")
     assert not scene.has_material_coordinates
@@ -571,7 +571,7 @@ def test_a_scene_is_held_till_it_is_in_its_place(tmp_path, monkeypatch):
 
 def test_quality_flags_come_back_and_survive_a_copy(tmp_path):
     flags = np.random.default_rng(5).integers(0, 256, RASTER.shape).astype(np.uint8)
-    with SceneWriter(tmp_path / "one.nc", RASTER, quality=True) as writer:
+    with SceneWriter(tmp_path / "one.nc", RASTER, fields=(*FIELD_UNITS, "quality")) as writer:
         writer.append(a_frame(quality=flags))
     write_scene(open_scene(tmp_path / "one.nc"), tmp_path / "two.nc")
     assert np.array_equal(open_scene(tmp_path / "two.nc").frame(0).quality, flags)
@@ -581,7 +581,7 @@ def test_quality_flags_are_bytes(tmp_path):
     wrong = np.zeros(RASTER.shape, np.float32)
     with (
         pytest.raises(SceneError, match="quality has type float32"),
-        SceneWriter(tmp_path / "one.nc", RASTER, quality=True) as writer,
+        SceneWriter(tmp_path / "one.nc", RASTER, fields=(*FIELD_UNITS, "quality")) as writer,
     ):
         writer.append(a_frame(quality=wrong))
     assert not list(tmp_path.iterdir())

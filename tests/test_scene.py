@@ -173,7 +173,7 @@ def test_wrong_structure_is_named():
     with pytest.raises(SceneError, match="unknown field 'pressure'"):
         scene(pressure=np.zeros((3, 4, 5)))
     data = scene().data
-    with pytest.raises(SceneError, match="field 'velocity_x' is missing"):
+    with pytest.raises(SceneError, match="velocity_x missing, expected with 'velocity_y'"):
         Scene(data.drop_vars("velocity_x"))
     with pytest.raises(SceneError, match="coordinate 'time' is missing"):
         Scene(data.drop_vars("time"))

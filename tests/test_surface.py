@@ -379,7 +379,7 @@ def test_a_frame_of_another_scene_is_refused():
     ("changed", "message"),
     [
         ({"grain": 0.0}, "grain: expected over 0 m, got 0.0 m"),
-        ({"follow": "chip"}, "follow: expected 'material' or 'mean', got 'chip'"),
+        ({"follow": "chip"}, "follow: expected 'material', 'mean' or 'none', got 'chip'"),
         ({"seed": -1}, "seed: expected 0 or more, got -1"),
     ],
 )

@@ -381,7 +381,7 @@ def test_a_tool_survives_in_a_scenes_file(tool, tmp_path):
     fields["temperature"] += 300.0
     scene = Scene.from_fields(raster, [0.0], fields, tool=tool)
     assert scene.tool == tool
-    with SceneWriter(tmp_path / "scene.nc", raster, tool, material_coordinates=False) as writer:
+    with SceneWriter(tmp_path / "scene.nc", raster, tool, fields=tuple(FIELD_UNITS)) as writer:
         writer.append(scene.frame(0))
     stored = open_scene(tmp_path / "scene.nc")
     assert stored.tool == tool

@@ -43,6 +43,7 @@ from chipglow.analysis.lines import Line, sample, straight_line
 from chipglow.analysis.local_error import LocalError
 from chipglow.analysis.mutual_information import ImageFit, fit_images
 from chipglow.analysis.paper import PAPER, Plan, StudyResult, analyse
+from chipglow.analysis.places import LinePlace, Place, PointPlace, RegionPlace
 from chipglow.analysis.psf_fit import ModelFit
 from chipglow.analysis.radial_psf import RadialPSF
 from chipglow.analysis.rake import RakeErrors, contact_length, rake_errors
@@ -50,6 +51,7 @@ from chipglow.analysis.rake_grid import RakeGrid, rake_grid
 from chipglow.analysis.regions import Area, Circle, Polygon, Region, areas, shared_pixels
 from chipglow.analysis.registration import PointFit, Registration, fit_points
 from chipglow.analysis.ridge import NoShearBandError
+from chipglow.analysis.scene_error import SceneErrors, ScenePlan, scene_errors
 from chipglow.analysis.segment import Instant, Segment
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, sensitivity
@@ -100,13 +102,16 @@ __all__ = [
     "KnownEmissivity",
     "Line",
     "LineDraws",
+    "LinePlace",
     "LocalError",
     "ModelFit",
     "NoEdgeError",
     "NoShearBandError",
+    "Place",
     "PlaceResult",
     "Plan",
     "PointFit",
+    "PointPlace",
     "Polygon",
     "RadialPSF",
     "RakeErrors",
@@ -115,7 +120,10 @@ __all__ = [
     "ReferenceKind",
     "Region",
     "RegionEmissivity",
+    "RegionPlace",
     "Registration",
+    "SceneErrors",
+    "ScenePlan",
     "Segment",
     "Segmentation",
     "Sensitivity",
@@ -157,6 +165,7 @@ __all__ = [
     "rake_grid",
     "reference_temperature",
     "sample",
+    "scene_errors",
     "segmentation",
     "sensitivity",
     "shared_pixels",

@@ -349,9 +349,8 @@ def _feed(frame: Frame, solid: NDArray[np.bool_], raster: Raster) -> float:
 def _speed(frame: Frame, solid: NDArray[np.bool_], raster: Raster) -> float:
     """Speed of what is not deformed, under the cut and before the edge."""
     before = (raster.y[:, None] < 0) & (raster.x < 0)
-    still = before & solid & (frame.plastic_strain < _UNDEFORMED)
-    assert frame.velocity_x is not None
-    return float(np.median(frame.velocity_x[still])) if still.any() else nan
+    still = before & solid & (frame.needed("plastic_strain") < _UNDEFORMED)
+    return float(np.median(frame.needed("velocity_x")[still])) if still.any() else nan
 
 
 def _scan_row(looks: list[_Look], feed: float) -> int | None:

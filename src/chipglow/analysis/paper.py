@@ -15,13 +15,14 @@ from chipglow.analysis.error import ErrorImages, ReferenceKind, error_images
 from chipglow.analysis.heated import HeatedObject, heated_objects
 from chipglow.analysis.inertia import Inertia, inertia
 from chipglow.analysis.lines import sample
-from chipglow.analysis.rake import RakeErrors
+from chipglow.analysis.rake import NoContactError, RakeErrors
 from chipglow.analysis.rake_grid import RakeGrid, rake_grid
 from chipglow.analysis.ridge import NoShearBandError
 from chipglow.analysis.segment import Instant, Segment
 from chipglow.analysis.segmentation import Segmentation, segmentation
 from chipglow.analysis.sensitivity import Sensitivity, sensitivity
 from chipglow.analysis.shear_band import ShearBand
+from chipglow.analysis.starts import other_starts, spread_starts
 from chipglow.camera import Camera, Exposure, Measurement, expose_all
 from chipglow.cutting import EnergyHistory
 from chipglow.radiometry import Band
@@ -295,8 +296,8 @@ def analyse(
     _check(scene, surfaces, plan)
     tell = progress or _say_nothing
     duration = camera.integration_time
-    starts = _starts(scene, duration, plan.instants)
-    others = _other_starts(scene, duration)
+    starts = spread_starts(scene, duration, plan.instants)
+    others = other_starts(scene, duration)
     instants = _instants(scene, duration, (*starts, *others), tell)
     developed = _developed(scene, instants[: len(starts)])
     segments = _segments(scene, duration, plan, [instants[developed], *instants[len(starts) :]])
@@ -346,31 +347,6 @@ def _say_nothing(label: str, part: float) -> None:
     pass
 
 
-def _starts(scene: Scene, duration: float, count: int) -> NDArray[np.float64]:
-    """Beginnings of exposures spread over the longest part of the scene, each at a frame of it."""
-    times, spacing = scene.times[scene.longest_block], scene.frame_spacing
-    last = times[-1] + spacing - duration
-    if last < times[0] - 1e-6 * duration:
-        raise ValueError(
-            f"scene: it lasts {times[-1] + spacing - times[0]:.4g} s, "
-            f"expected an exposure's {duration:.4g} s or more"
-        )
-    wanted = np.linspace(times[0], max(last, times[0]), count) if count > 1 else times[:1]
-    nearest_frame = np.searchsorted(times, wanted + 1e-6 * spacing, side="right") - 1
-    return np.asarray(np.unique(times[nearest_frame]), dtype=np.float64)
-
-
-def _other_starts(scene: Scene, duration: float) -> list[float]:
-    """Beginnings of the scene's other parts that hold an exposure."""
-    starts = []
-    for block in scene.blocks:
-        first, last = scene.times[block[0]], scene.times[block[-1]]
-        lasts = last - first + scene.frame_spacing
-        if block != scene.longest_block and lasts >= duration * (1 - 1e-6):
-            starts.append(float(first))
-    return starts
-
-
 def _instants(
     scene: Scene, duration: float, starts: Sequence[float], tell: Progress
 ) -> tuple[Instant, ...]:
@@ -415,6 +391,8 @@ def _segments(
         for instant in instants
         if instant.band is not None
     ]
+    if not first.contact_length > 0:
+        raise NoContactError("rake face: the chip does not touch it in the developed instant")
     return (first, *(segment for segment in others if segment.contact_length > 0))
 
 

@@ -14,6 +14,10 @@ from chipglow.scene import Raster, Tool
 _LONGEST_GAP: Final = 12e-6
 
 
+class NoContactError(ValueError):
+    """The chip does not touch the rake face."""
+
+
 @dataclass(frozen=True)
 class RakeErrors:
     """Measurement error at the rake face, in K of radiance temperature.
@@ -127,11 +131,11 @@ def rake_errors(
 
     Raises
     ------
-    ValueError
+    NoContactError
         If the chip does not touch the rake face.
     """
     if not contact > 0:
-        raise ValueError("rake face: the chip does not touch it, so it has no error there")
+        raise NoContactError("rake face: the chip does not touch it, so it has no error there")
     count = round(half_length / step)
     distance = step * np.arange(-count, count + 1)
     line = straight_line(tool.rake_point(contact / 2), tool.rake_normal, distance)

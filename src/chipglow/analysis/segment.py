@@ -145,7 +145,7 @@ def _mean(
 def _momentary_band(raster: Raster, frame: Frame, tool: Tool) -> ShearBand | None:
     workpiece = frame.material == Material.WORKPIECE
     try:
-        return find_shear_band(raster, frame.plastic_strain_rate, workpiece, tool)
+        return find_shear_band(raster, frame.needed("plastic_strain_rate"), workpiece, tool)
     except NoShearBandError:
         return None
 

@@ -21,6 +21,7 @@ from chipglow.cli.shearband import shearband
 from chipglow.cli.temperature import temperature
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
+ERROR_FOLDER: Final = Path("chipglow-error")
 
 app = typer.Typer(
     cls=Boundary,
@@ -136,6 +137,29 @@ def run(study: StudyFile, out: ResultFolder, resume: Resume = False) -> None:
     from chipglow.study import load_study
 
     write_results(load_study(study), out, resume)
+
+
+@app.command()
+def error(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a NetCDF file.")],
+    study: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="STUDY",
+            help="Says surface, camera and places; what it leaves out is the paper's.",
+        ),
+    ] = None,
+    emissivity: Annotated[
+        float | None,
+        typer.Option(metavar="NUMBER", help="One emissivity, in the place of the study's surface."),
+    ] = None,
+    out: ResultFolder = ERROR_FOLDER,
+) -> None:
+    """Tell a camera's error on any scene: of a cut, a weld, a melt pool, a plate."""
+    from chipglow.cli.results import write_errors
+    from chipglow.cli.scene_error import study_of
+
+    write_errors(study_of(scene, study, emissivity), out)
 
 
 @app.command()

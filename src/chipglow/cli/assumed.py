@@ -21,6 +21,13 @@ def say_doubtful(sentences: Iterable[str]) -> None:
         console.print(f"Doubtful: {sentence}")
 
 
+def say_missing(sentences: Iterable[str]) -> None:
+    """Say beside the results what is not among them, and why, a sentence each."""
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    for sentence in sentences:
+        console.print(f"Missing: {sentence}")
+
+
 def say_of_measurements(*measurements: Measurement) -> None:
     """Say what was assumed of measurements and what is doubtful of them, each sentence once.
 

@@ -1,7 +1,7 @@
 """A study's results: computed, written into a folder, shown as a table."""
 
 import platform
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -9,14 +9,20 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from chipglow.analysis.paper import StudyResult
-from chipglow.cli.assumed import say_assumed
+from chipglow.analysis import SceneErrors, StudyResult
+from chipglow.cli.assumed import say_assumed, say_missing
 from chipglow.cli.inertia import say_inertia
 from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.cutting import SOLVER_VERSION
 from chipglow.io import atomic_folder
-from chipglow.report import comparison_rows, table_2, write_report
-from chipglow.study import Study, run, study_text
+from chipglow.report import (
+    comparison_rows,
+    place_rows,
+    table_2,
+    write_report,
+    write_scene_report,
+)
+from chipglow.study import Study, errors, run, study_text
 
 
 def write_results(study: Study, folder: Path, resume: bool, remarks: Sequence[str] = ()) -> None:
@@ -34,32 +40,65 @@ def write_results(study: Study, folder: Path, resume: bool, remarks: Sequence[st
     remarks : sequence of str
         What a reader must know before quoting a number: printed, and on the page.
     """
+    _write(study, folder, resume, remarks, run)
+
+
+def write_errors(study: Study, folder: Path) -> None:
+    """Write and print the measurement error of a study's scene, whatever it shows.
+
+    Parameters
+    ----------
+    study : Study
+        What to do.
+    folder : Path
+        As for `write_results`.
+    """
+    _write(study, folder, False, (), errors)
+
+
+def _write(
+    study: Study,
+    folder: Path,
+    resume: bool,
+    remarks: Sequence[str],
+    compute: Callable[..., StudyResult | SceneErrors],
+) -> None:
     with atomic_folder(folder) as temporary:
         if study.scene is None:
             say_where_it_starts(study, resume)
         assumed: list[str] = []
         with progress_bars() as progress:
-            result = run(study, progress, resume, assumed.append)
+            result = compute(study, progress, resume, assumed.append)
             progress("report", 0.0)
-            report = write_report(
-                result,
-                temporary,
-                study.title,
-                study_text(study),
-                _provenance(study),
-                [*remarks, *(f"Assumed: {sentence}" for sentence in assumed), *_warnings(result)],
-                table_2(study) if study.scene is None else (),
-            )
+            said = [*remarks, *(f"Assumed: {one}" for one in assumed), *_warnings(result)]
+            report = _report(result, temporary, study, said)
             progress("report", 1.0)
     say_assumed(assumed)
-    _print_comparison(result)
+    _print_table(result)
     for remark in (*remarks, *_warnings(result)):
         print(remark)
-    say_inertia(result.forces.inertia if result.forces else None)
+    if isinstance(result, StudyResult):
+        say_inertia(result.forces.inertia if result.forces else None)
+    else:
+        say_missing(result.missing)
     print(f"Report: {folder / report.relative_to(temporary)}")
 
 
-def _warnings(result: StudyResult) -> list[str]:
+def _report(
+    result: StudyResult | SceneErrors, folder: Path, study: Study, remarks: Sequence[str]
+) -> Path:
+    provenance = _provenance(study)
+    if isinstance(result, StudyResult):
+        text, settings = study_text(study), table_2(study) if study.scene is None else ()
+        return write_report(result, folder, study.title, text, provenance, remarks, settings)
+    if study.title == Study().title:
+        of = Path(study.scene).name if study.scene is not None else "the cut"
+        study = study.model_copy(update={"title": f"Measurement error of {of}"})
+    text = study_text(study)
+    return write_scene_report(result, folder, study.title, text, provenance, remarks)
+
+
+def _warnings(result: StudyResult | SceneErrors) -> list[str]:
     """What to know of the images."""
     return [
         f"Image of {name}. {warning}"
@@ -81,8 +120,15 @@ def _provenance(study: Study) -> dict[str, str]:
     }
 
 
-def _print_comparison(result: StudyResult) -> None:
-    table = Table("quantity", "the paper", "here", "range of draws", "differs")
-    for row in comparison_rows(result):
-        table.add_row(row.quantity, row.paper_text, row.here_text, row.range_text, row.differs_text)
+def _print_table(result: StudyResult | SceneErrors) -> None:
+    """The paper's figures beside ours; of any scene the error at each place."""
+    if isinstance(result, StudyResult):
+        table = Table("quantity", "the paper", "here", "range of draws", "differs")
+        for row in comparison_rows(result):
+            texts = (row.paper_text, row.here_text, row.range_text, row.differs_text)
+            table.add_row(row.quantity, *texts)
+    else:
+        table = Table("place", "reference", "error", "range", "PSF's portion")
+        for place in place_rows(result):
+            table.add_row(*place)
     Console().print(table)

@@ -176,7 +176,8 @@ def prospect(wanted: Import) -> Prospect:
         *dict.fromkeys(note for name, note in wanted.notes.items() if name in survey.found),
         *wanted.completion.assumptions(survey.found, len(survey.times)),
     ]
-    if Completion.uses_flow(survey.found, len(survey.times)) and find_spec("skimage") is None:
+    flow = wanted.completion.uses_flow(survey.found, len(survey.times))
+    if flow and find_spec("skimage") is None:
         raise SourceError(
             "velocity: the source has none and the optical flow needs scikit-image, expected "
             "pip install 'chipglow[flow]'"
@@ -218,17 +219,16 @@ def import_scene(
     """
     looked = looked or prospect(wanted)
     survey, raster, completion = looked.survey, looked.raster, wanted.completion
+    fields = completion.fields(survey.found, len(survey.times))
     key = _key(wanted, looked)
     done = len(resume.frames()[0]) if resume else 0
     attributes = _attributes(key, looked)
-    coordinates = {"material_x", "material_y"} <= set(survey.found)
     with SceneWriter(
         path,
         raster,
         completion.tool,
         attributes,
-        coordinates,
-        quality=True,
+        fields,
         hottest=HOTTEST_PLAUSIBLE,
         resume=resume,
     ) as writer:

@@ -1,7 +1,7 @@
 """Scenes in NetCDF-4 files: written frame by frame, read lazily."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
@@ -80,6 +80,10 @@ _PORTABLE: Final[Mapping[str, Any]] = {
 }
 
 
+CUT_FIELDS: Final = (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS)
+"""The fields that the cutting simulation knows."""
+
+
 class SceneWriter:
     """Write a scene to a file, one frame after the other.
 
@@ -96,10 +100,8 @@ class SceneWriter:
         The tool's outline.
     attributes : mapping, optional
         Attributes of the file, such as provenance: text and numbers.
-    material_coordinates : bool
-        Whether the frames have material coordinates.
-    quality : bool
-        Whether the frames have flags of their quality.
+    fields : sequence of str
+        Names of the fields that the frames have; by default those of a cut.
     hottest : float
         Greatest temperature in K that the frames may have. Over the default, 1838.375 K,
         temperature takes 32 bits instead of 16 and reaches all that a scene may have.
@@ -124,9 +126,8 @@ class SceneWriter:
         raster: Raster,
         tool: Tool | None = None,
         attributes: Mapping[str, Any] | None = None,
-        material_coordinates: bool = True,
+        fields: Sequence[str] = CUT_FIELDS,
         *,
-        quality: bool = False,
         hottest: float = HOTTEST_PACKED,
         packing: Mapping[str, Packing] = PACKING,
         portable: bool = False,
@@ -135,11 +136,8 @@ class SceneWriter:
         self.path = Path(path)
         self.raster = raster
         self._attributes = {**(attributes or {}), **(tool_attributes(tool) if tool else {})}
-        self._units = {
-            **FIELD_UNITS,
-            **(MATERIAL_COORDINATE_UNITS if material_coordinates else {}),
-            **({QUALITY: "1"} if quality else {}),
-        }
+        units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS, QUALITY: "1"}
+        self._units = {name: units[name] for name in fields}
         self._packing = packing_for(hottest, packing)
         self._compression = _PORTABLE if portable else _FAST
         self._stack = ExitStack()
@@ -439,7 +437,7 @@ def open_scene(path: str | os.PathLike[str]) -> StoredScene:
 
 def is_scene(path: str | os.PathLike[str]) -> bool:
     """Whether a file is one that `SceneWriter` or `write_scene` wrote, or like it."""
-    return holds(path, FIELD_UNITS)
+    return holds(path, ("temperature",))
 
 
 def write_scene(scene: Scene, path: str | os.PathLike[str], *, portable: bool = False) -> None:
@@ -458,8 +456,7 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, portable: bool = 
         path,
         scene.raster,
         attributes=scene.data.attrs,
-        material_coordinates=scene.has_material_coordinates,
-        quality=QUALITY in scene.data,
+        fields=scene.fields,
         hottest=scene.hottest if isinstance(scene, StoredScene) else HOTTEST_PLAUSIBLE,
         packing=scene.packing if isinstance(scene, StoredScene) else PACKING,
         portable=portable,

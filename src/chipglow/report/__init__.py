@@ -14,6 +14,7 @@ from chipglow.report.rake_figure import draw_rake_grid
 from chipglow.report.registration_figure import blink_pictures, draw_registration
 from chipglow.report.report import write_report
 from chipglow.report.scene_figure import draw_scene
+from chipglow.report.scene_report import place_rows, write_scene_report
 from chipglow.report.scene_summary import (
     FieldSummary,
     QualitySummary,
@@ -45,7 +46,9 @@ __all__ = [
     "draw_registration",
     "draw_scene",
     "measurement_summary",
+    "place_rows",
     "scene_summary",
     "table_2",
     "write_report",
+    "write_scene_report",
 ]

@@ -31,6 +31,8 @@ SIGNED: Final = "RdBu_r"
 
 KELVIN: Final = 273.15
 
+_LARGEST_IN_MICRONS: Final = 5e-3
+
 _STYLE: Final[Any] = {
     "font.size": 9.5,
     "axes.titlesize": 10,
@@ -98,8 +100,9 @@ def show_image(
     *,
     log: bool = False,
 ) -> AxesImage:
-    """Image on micrometre axes with the tool's outline; grey where there is no value."""
-    extent = np.array(raster.extent) * 1e6
+    """Image with the tool's outline; grey where there is no value. See `length_unit`."""
+    factor, unit = length_unit(raster)
+    extent = np.array(raster.extent) * factor
     shown = matplotlib.colormaps.get_cmap(colours).with_extremes(bad=VOID)
     picture = axes.imshow(
         np.ma.masked_invalid(image),
@@ -108,12 +111,18 @@ def show_image(
         norm=LogNorm(*limits) if log else Normalize(*limits),
     )
     if tool is not None:
-        draw_tool(axes, tool)
+        draw_tool(axes, tool, factor)
     axes.set_xlim(extent[0], extent[1])
     axes.set_ylim(extent[2], extent[3])
-    axes.set_xlabel("x / µm")
-    axes.set_ylabel("y / µm")
+    axes.set_xlabel(f"x / {unit}")
+    axes.set_ylabel(f"y / {unit}")
     return picture
+
+
+def length_unit(raster: Raster) -> tuple[float, str]:
+    """Factor from m and name of the unit in which an image's axes are read: µm, or mm."""
+    longest = raster.spacing * max(raster.rows, raster.columns)
+    return (1e6, "µm") if longest < _LARGEST_IN_MICRONS else (1e3, "mm")
 
 
 def veil(
@@ -126,12 +135,12 @@ def veil(
     """Make part of an image paler, or give it a colour."""
     layer = np.broadcast_to(to_rgba(colour), (*where.shape, 4)).copy()
     layer[..., 3] = np.where(where, opacity, 0.0)
-    axes.imshow(layer, extent=tuple(np.array(raster.extent) * 1e6))
+    axes.imshow(layer, extent=tuple(np.array(raster.extent) * length_unit(raster)[0]))
 
 
-def draw_tool(axes: Axes, tool: Tool) -> None:
+def draw_tool(axes: Axes, tool: Tool, factor: float = 1e6) -> None:
     """The tool's outline, seen on dark and on light ground."""
-    outline = tool.outline(3e-3) * 1e6
+    outline = tool.outline(3e-3) * factor
     axes.plot(*outline.T, color="white", linewidth=2.2)
     axes.plot(*outline.T, color="black", linewidth=1.0)
 
@@ -141,10 +150,16 @@ def black_tool(axes: Axes, tool: Tool) -> None:
     axes.fill(*(tool.outline(3e-3) * 1e6).T, color="black")
 
 
-def draw_line(axes: Axes, points: NDArray[np.float64], colour: str, label: str = "") -> None:
-    """A curve in metres on micrometre axes, seen on dark and on light ground."""
-    axes.plot(*(points * 1e6).T, color="white", linewidth=3.0)
-    axes.plot(*(points * 1e6).T, color=colour, linewidth=1.6, label=label)
+def draw_line(
+    axes: Axes,
+    points: NDArray[np.float64],
+    colour: str,
+    label: str = "",
+    factor: float = 1e6,
+) -> None:
+    """A curve in metres on axes of another unit, seen on dark and on light ground."""
+    axes.plot(*(points * factor).T, color="white", linewidth=3.0)
+    axes.plot(*(points * factor).T, color=colour, linewidth=1.6, label=label)
 
 
 def colour_bar(figure: Figure, picture: AxesImage, axes: Any, label: str) -> None:
@@ -199,3 +214,32 @@ def round_limit(values: NDArray[np.float64], percentile: float, step: float) -> 
     if known.size == 0:
         return step
     return max(step, float(np.ceil(np.percentile(known, percentile) / step)) * step)
+
+
+@dataclass(frozen=True)
+class FigureFile:
+    """A figure as written.
+
+    Parameters
+    ----------
+    name : str
+        Name of the files without ending.
+    title : str
+        Heading.
+    paper : str
+        The figure of the paper that it stands beside, such as "Figure 5"; empty without.
+    caption : str
+        What it shows; beside one of the paper, what is the same and what differs.
+    alt : str
+        What is seen in it, for who cannot see it.
+    png, svg : Path
+        The files.
+    """
+
+    name: str
+    title: str
+    paper: str
+    caption: str
+    alt: str
+    png: Path
+    svg: Path

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from chipglow.analysis import PAPER, Distribution, Segmentation, Sensitivity, StudyResult
 from chipglow.analysis.distribution import COVERAGE
+from chipglow.analysis.error import ReferenceKind
 
 ORDER_TEXT: Final = {
     "sensor": "from pixel to pixel, as in the paper",
@@ -28,7 +29,12 @@ REFERENCE_TEXT: Final = {
 
 def error_definition(result: StudyResult) -> str:
     """What an error of this study is."""
-    return f"Errors are measured radiance temperature less {REFERENCE_TEXT[result.plan.reference]}."
+    return definition_of(result.plan.reference)
+
+
+def definition_of(reference: ReferenceKind) -> str:
+    """What an error is with a reference, as a sentence."""
+    return f"Errors are measured radiance temperature less {REFERENCE_TEXT[reference]}."
 
 
 def answer(result: StudyResult) -> list[str]:

@@ -15,7 +15,15 @@ from chipglow.analysis import PAPER, LineDraws, Sensitivity, StudyResult
 from chipglow.analysis.paper import SurfaceResult
 from chipglow.camera import PointSpreadFunction
 from chipglow.report import drawing
-from chipglow.report.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, ImagePanel
+from chipglow.report.drawing import (
+    BLUE,
+    GREEN,
+    GREY,
+    KELVIN,
+    VERMILLION,
+    FigureFile,
+    ImagePanel,
+)
 from chipglow.report.evidence import error_definition
 from chipglow.report.laboratory_figures import (
     dual_spectrum,
@@ -29,35 +37,6 @@ _ORDER_STYLE: Final = {
     "sensor": (BLUE, "Gaussian, pixel to pixel"),
     "optics": (VERMILLION, "Gaussian, before the pixels"),
 }
-
-
-@dataclass(frozen=True)
-class FigureFile:
-    """A figure as written.
-
-    Parameters
-    ----------
-    name : str
-        Name of the files without ending.
-    title : str
-        Heading.
-    paper : str
-        The figure of the paper that it stands beside, such as "Figure 5"; empty without.
-    caption : str
-        What it shows, what is the same as in the paper and what differs.
-    alt : str
-        What is seen in it, for who cannot see it.
-    png, svg : Path
-        The files.
-    """
-
-    name: str
-    title: str
-    paper: str
-    caption: str
-    alt: str
-    png: Path
-    svg: Path
 
 
 @dataclass(frozen=True)
@@ -97,9 +76,9 @@ def fields(result: StudyResult) -> Figure:
     frame, surface = result.frame, result.surfaces[result.plan.band_surface]
     solid = frame.material == Material.WORKPIECE
     there = frame.material != Material.VOID
-    rate = np.where(solid, frame.plastic_strain_rate, np.nan) * 1e-3
+    rate = np.where(solid, frame.needed("plastic_strain_rate"), np.nan) * 1e-3
     temperature = _celsius(frame.temperature, there)
-    strain = np.where(solid, frame.plastic_strain, np.nan)
+    strain = np.where(solid, frame.needed("plastic_strain"), np.nan)
     emissivity = np.where(there, surface.emissivity, np.nan)
     hottest = drawing.round_limit(temperature, 99.9, 50.0)
     name = result.plan.band_surface
@@ -301,7 +280,7 @@ def chip(result: StudyResult) -> Figure | None:
     figure = drawing.new_figure(3.6)
     left, right = figure.subplots(1, 2)
     frame = result.frame
-    strain = np.where(frame.material == Material.WORKPIECE, frame.plastic_strain, np.nan)
+    strain = np.where(frame.material == Material.WORKPIECE, frame.needed("plastic_strain"), np.nan)
     picture = drawing.show_image(
         left, strain, result.raster, result.tool, drawing.PLAIN, (0.0, 4.0)
     )

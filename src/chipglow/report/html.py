@@ -1,16 +1,22 @@
 """The report as one self-contained page: the answer first, then what it rests on."""
 
-from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from importlib.resources import files
 from typing import Final
 
 from chipglow import __version__
 from chipglow.report.chip import ChipRow
 from chipglow.report.comparison import CauseRow, Row
-from chipglow.report.figures import FigureFile
+from chipglow.report.drawing import FigureFile
+from chipglow.report.page import (
+    answer_part,
+    definition_list,
+    document,
+    figure_part,
+    number_cells,
+    table_part,
+)
 from chipglow.report.paper import EmissivityTexts
 
 _PAPER: Final = (
@@ -86,51 +92,18 @@ def page(content: Content) -> str:
     content : Content
         What it shows.
     """
-    links = "".join(f'<a href="#{name}">{escape(title)}</a>' for name, title in _SECTIONS)
     bodies = {
-        "answer": _answer(content),
+        "answer": answer_part(content.answer, content.remarks),
         "comparison": _comparison(content.rows, content.definition),
         "scatter": _causes(content.causes),
         "figures": "\n".join(_in_the_papers_order(content)),
-        "beyond": "\n".join(_figure(figure) for figure in content.figures if not figure.paper),
+        "beyond": "\n".join(figure_part(figure) for figure in content.figures if not figure.paper),
         "chip": _chip_table(content.chip),
         "study": f"<pre><code>{escape(content.study_text)}</code></pre>",
-        "versions": _definitions(content.provenance),
+        "versions": definition_list(content.provenance),
         "cite": _citation(),
     }
-    sections = "\n".join(
-        f'<section id="{name}">\n<h2>{escape(title)}</h2>\n{bodies[name]}\n</section>'
-        for name, title in _SECTIONS
-    )
-    css = files("chipglow.report").joinpath("page.css").read_text(encoding="utf-8")
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
-<title>{escape(content.title)}</title>
-<style>
-{css}</style>
-</head>
-<body>
-<header>
-<h1>{escape(content.title)}</h1>
-<nav>{links}</nav>
-</header>
-<main>
-{sections}
-<footer>Made by chipglow {escape(__version__)}.</footer>
-</main>
-</body>
-</html>
-"""
-
-
-def _answer(content: Content) -> str:
-    answer = "".join(f"<p>{escape(sentence)}</p>\n" for sentence in content.answer)
-    remarks = "".join(f'<p class="remark">{escape(remark)}</p>\n' for remark in content.remarks)
-    return f'<div class="answer">\n{answer}</div>\n{remarks}'
+    return document(content.title, [(name, title, bodies[name]) for name, title in _SECTIONS])
 
 
 def _comparison(rows: Sequence[Row], definition: str) -> str:
@@ -141,7 +114,7 @@ def _comparison(rows: Sequence[Row], definition: str) -> str:
         "far off as the paper's figure in fewer than 5 of 100 cases."
     )
     heads = ("Quantity", "Paper", "Here", "Range of draws", "One draw", "Differs")
-    return f"<p>{escape(text)}</p>\n" + _table(heads, _comparison_rows(rows, heads))
+    return f"<p>{escape(text)}</p>\n" + table_part(heads, _comparison_rows(rows, heads))
 
 
 def _comparison_rows(rows: Sequence[Row], heads: Sequence[str]) -> Iterator[str]:
@@ -154,7 +127,7 @@ def _comparison_rows(rows: Sequence[Row], heads: Sequence[str]) -> Iterator[str]
             row.differs_text,
         )
         where = f'<span class="where">Paper: {escape(row.where)}</span>' if row.where else ""
-        yield f"<tr><td>{escape(row.quantity)}{where}</td>{_numbers(texts, heads[1:])}</tr>"
+        yield f"<tr><td>{escape(row.quantity)}{where}</td>{number_cells(texts, heads[1:])}</tr>"
         yield f'<tr class="why"><td colspan="{len(heads)}">{escape(row.explanation)}</td></tr>'
 
 
@@ -169,40 +142,21 @@ def _causes(rows: Sequence[CauseRow]) -> str:
     )
     heads = ("Quantity", *names)
     body = (
-        f"<tr><td>{escape(row.quantity)}</td>{_numbers(row.texts, heads[1:])}</tr>" for row in rows
+        f"<tr><td>{escape(row.quantity)}</td>{number_cells(row.texts, heads[1:])}</tr>"
+        for row in rows
     )
-    return f"<p>{escape(text)}</p>\n" + _table(heads, body)
+    return f"<p>{escape(text)}</p>\n" + table_part(heads, body)
 
 
 def _chip_table(rows: Sequence[ChipRow]) -> str:
     heads = ("Quantity", "Here", "Spread")
     body = (
         f"<tr><td>{escape(row.quantity)}</td>"
-        f"{_numbers((row.value_text, row.spread_text), heads[1:])}</tr>\n"
+        f"{number_cells((row.value_text, row.spread_text), heads[1:])}</tr>\n"
         f'<tr class="why"><td colspan="{len(heads)}">{escape(row.explanation)}</td></tr>'
         for row in rows
     )
-    return _table(heads, body)
-
-
-def _table(heads: Sequence[str], body: Iterator[str]) -> str:
-    first, *numbers = heads
-    head = f"<th>{escape(first)}</th>" + "".join(
-        f'<th class="number">{escape(name)}</th>' for name in numbers
-    )
-    return (
-        f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n"
-        + "\n".join(body)
-        + ("\n</tbody></table>")
-    )
-
-
-def _numbers(texts: Sequence[str], heads: Sequence[str]) -> str:
-    """Cells of numbers; on a narrow screen each says the head of its column itself."""
-    return "".join(
-        f'<td class="number" data-head="{escape(head)}">{escape(text)}</td>'
-        for text, head in zip(texts, heads, strict=True)
-    )
+    return table_part(heads, body)
 
 
 def _in_the_papers_order(content: Content) -> Iterator[str]:
@@ -210,7 +164,7 @@ def _in_the_papers_order(content: Content) -> Iterator[str]:
     after = {"Figure 3": _table_1(content.emissivities), "Figure 4": _table_2(content.settings)}
     for figure in content.figures:
         if figure.paper:
-            yield _figure(figure)
+            yield figure_part(figure)
             yield after.pop(figure.paper, "")
     yield from after.values()
 
@@ -229,7 +183,7 @@ def _table_1(rows: Sequence[EmissivityTexts]) -> str:
     )
     body = (
         f"<tr><td>{escape(row.feature)}</td>"
-        + _numbers((row.paper, row.true, row.mean, row.deviation, row.textures), heads[1:])
+        + number_cells((row.paper, row.true, row.mean, row.deviation, row.textures), heads[1:])
         + "</tr>"
         for row in rows
     )
@@ -245,7 +199,7 @@ def _table_2(rows: Sequence[tuple[str, str, str]]) -> str:
         "copy does not show."
     )
     body = (
-        f"<tr><td>{escape(name)}</td>{_numbers((there, here), heads[1:])}</tr>"
+        f"<tr><td>{escape(name)}</td>{number_cells((there, here), heads[1:])}</tr>"
         for name, there, here in rows
     )
     return _table_part("table-2", "Table 2: settings of the simulation", text, heads, body)
@@ -254,26 +208,9 @@ def _table_2(rows: Sequence[tuple[str, str, str]]) -> str:
 def _table_part(name: str, title: str, text: str, heads: Sequence[str], body: Iterator[str]) -> str:
     return (
         f'<div class="part" id="{name}">\n<h3>{escape(title)}</h3>\n<p>{escape(text)}</p>\n'
-        + _table(heads, body)
+        + table_part(heads, body)
         + "\n</div>"
     )
-
-
-def _figure(figure: FigureFile) -> str:
-    picture = b64encode(figure.png.read_bytes()).decode("ascii")
-    title = f"{figure.paper}: {figure.title}" if figure.paper else figure.title
-    return (
-        f'<figure id="{escape(figure.name)}">\n<h3>{escape(title)}</h3>\n'
-        f'<img alt="{escape(figure.alt)}" src="data:image/png;base64,{picture}">\n'
-        f"<figcaption>{escape(figure.caption)}</figcaption></figure>"
-    )
-
-
-def _definitions(provenance: Mapping[str, str]) -> str:
-    items = "".join(
-        f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>\n" for name, value in provenance.items()
-    )
-    return f"<dl>\n{items}</dl>"
 
 
 def _citation() -> str:

@@ -101,10 +101,10 @@ class CutPicture:
         """Picture of a frame: red, green and blue, shape (rows, columns, 3)."""
         solid = frame.material == Material.WORKPIECE
         there = frame.material != Material.VOID
-        rate = np.maximum(frame.plastic_strain_rate, self._slowest)
+        rate = np.maximum(frame.needed("plastic_strain_rate"), self._slowest)
         for image, values, shown in zip(
             self._images,
-            (frame.temperature - np.float32(drawing.KELVIN), frame.plastic_strain, rate),
+            (frame.temperature - np.float32(drawing.KELVIN), frame.needed("plastic_strain"), rate),
             (there, solid, solid),
             strict=True,
         ):

@@ -95,7 +95,7 @@ def summary(
     return {
         "provenance": dict(provenance),
         "results": {row.key: row.here for row in rows},
-        "draws": {row.key: _scatter(row.draws) for row in rows if row.draws is not None},
+        "draws": {row.key: scatter(row.draws) for row in rows if row.draws is not None},
         "causes": {row.key: _causes(row) for row in causes},
         "one_draw": {row.key: row.one_draw for row in rows if row.one_draw is not None},
         "chip": {row.key: row.value for row in chip},
@@ -106,7 +106,8 @@ def summary(
     }
 
 
-def _scatter(draws: Distribution) -> dict[str, float | int | None]:
+def scatter(draws: Distribution) -> dict[str, float | int | None]:
+    """How a figure scatters, for summary.json; what is unknown is None."""
     low, high = draws.range
     ends = [end if isfinite(end) else None for end in draws.interval]
     deviation = draws.standard_deviation

@@ -16,11 +16,11 @@ from chipglow.report.scene_summary import RATE, STRAIN, TEMPERATURE
 from chipglow.scene import FILLED, Frame, Material, Raster, Scene, Tool
 
 _COLOURS: Final = {Material.VOID: VOID, Material.WORKPIECE: BLUE, Material.TOOL: GREY}
-_ROWS: Final = 3
+_SPEED: Final = "speed / (m/s)"
 _PANEL_WIDTH: Final = 2.6
 _PANEL_HEIGHTS: Final = (1.0, 3.4)
 _AROUND: Final = 0.46
-_HISTOGRAMS: Final = 3.6
+_HISTOGRAM: Final = 1.8
 _DECADES: Final = 4
 _BINS: Final = 60
 _ARROWS: Final = 14
@@ -43,51 +43,70 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
     """
     frame = scene.frame(shown_frame(scene.times, time, "scene"))
     raster, tool, panels = scene.raster, scene.tool, _panels(frame)
+    has_quality = frame.quality is not None and bool(
+        frame.quality[frame.material != Material.VOID].any()
+    )
+    told_apart = tool is not None or bool((frame.material != Material.WORKPIECE).any())
+    rows = ceil((len(panels) + told_apart + has_quality) / 2)
+    histogram_rows = ceil(len(panels) / 2)
     with drawing.style():
-        images = _ROWS * (_panel_height(raster) + _AROUND) + _AROUND
-        figure = drawing.new_figure(images + _HISTOGRAMS)
+        images = rows * (_panel_height(raster) + _AROUND) + _AROUND
+        histograms = histogram_rows * _HISTOGRAM
+        figure = drawing.new_figure(images + histograms)
         figure.suptitle(f"{frame.time * 1e6:.6g} µs")
-        parts: Any = figure.subfigures(2, 1, height_ratios=(images, _HISTOGRAMS))
+        parts: Any = figure.subfigures(2, 1, height_ratios=(images, histograms))
         top, bottom = parts
-        grid = top.subplots(_ROWS, 2, sharex=True, sharey=True)
-        for axes, panel in zip(grid.flat, panels, strict=False):
+        grid = top.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
+        places = iter(grid.flat)
+        for panel in panels:
+            axes = next(places)
             panel.draw(top, axes, raster, tool)
-        _draw_arrows(grid[1, 1], frame, raster)
-        _draw_material(top, grid[2, 0], frame, raster, tool)
-        if frame.quality is not None and frame.quality[frame.material != Material.VOID].any():
-            _draw_quality(top, grid[2, 1], frame, frame.quality, raster, tool)
-        else:
-            _leave_out(grid[2, 1], grid[1, 1])
+            if panel.label == _SPEED:
+                _draw_arrows(axes, frame, raster)
+        if told_apart:
+            _draw_material(top, next(places), frame, raster, tool)
+        if has_quality and frame.quality is not None:
+            _draw_quality(top, next(places), frame, frame.quality, raster, tool)
+        for empty in places:
+            _leave_out(empty, grid[-2, 1] if rows > 1 else None)
         solid = frame.material == Material.WORKPIECE
-        for axes, panel in zip(bottom.subplots(2, 2).flat, panels, strict=True):
+        below = bottom.subplots(histogram_rows, 2, squeeze=False)
+        for axes, panel in zip(below.flat, panels, strict=False):
             _draw_histogram(axes, panel, panel.image[solid])
-        bottom.supylabel("share of the workpiece's samples / %", fontsize=9.5)
+        for axes in below.flat[len(panels) :]:
+            axes.remove()
+        whose = " of the workpiece's samples" if histogram_rows > 1 else ""
+        bottom.supylabel(f"share{whose} / %", fontsize=9.5)
     return figure
 
 
-def _panels(frame: Frame) -> tuple[ImagePanel, ...]:
-    """Temperature, strain, strain rate and speed."""
+def _panels(frame: Frame) -> list[ImagePanel]:
+    """Temperature, and of strain, strain rate and speed what the frame has."""
     there, solid = frame.material != Material.VOID, frame.material == Material.WORKPIECE
     temperature = np.where(there, TEMPERATURE(frame.temperature), np.nan)
-    strain = np.where(solid, frame.plastic_strain, np.nan)
-    rate = np.where(solid, frame.plastic_strain_rate, np.nan)
-    assert frame.velocity_x is not None and frame.velocity_y is not None
-    speed = np.where(solid, np.hypot(frame.velocity_x, frame.velocity_y), np.nan)
-    decades = _decades(rate)
     heat = _ends(temperature, (0.1, 99.9))
-    return (
-        ImagePanel("temperature", TEMPERATURE.label, temperature, heat, drawing.HEAT),
-        ImagePanel("plastic strain", STRAIN.label, strain, (0.0, _ends(strain, (0.0, 99.9))[1])),
-        ImagePanel(
-            "plastic strain rate",
-            RATE.label,
-            np.maximum(rate, decades[0]),
-            decades,
-            drawing.RATE,
-            log=True,
-        ),
-        ImagePanel("speed", "speed / (m/s)", speed, (0.0, _ends(speed, (0.0, 99.9))[1])),
-    )
+    panels = [ImagePanel("temperature", TEMPERATURE.label, temperature, heat, drawing.HEAT)]
+    if frame.plastic_strain is not None:
+        strain = np.where(solid, frame.plastic_strain, np.nan)
+        ends = (0.0, _ends(strain, (0.0, 99.9))[1])
+        panels.append(ImagePanel("plastic strain", STRAIN.label, strain, ends))
+    if frame.plastic_strain_rate is not None:
+        rate = np.where(solid, frame.plastic_strain_rate, np.nan)
+        decades = _decades(rate)
+        panels.append(
+            ImagePanel(
+                "plastic strain rate",
+                RATE.label,
+                np.maximum(rate, decades[0]),
+                decades,
+                drawing.RATE,
+                log=True,
+            )
+        )
+    if frame.velocity_x is not None and frame.velocity_y is not None:
+        speed = np.where(solid, np.hypot(frame.velocity_x, frame.velocity_y), np.nan)
+        panels.append(ImagePanel("speed", _SPEED, speed, (0.0, _ends(speed, (0.0, 99.9))[1])))
+    return panels
 
 
 def _ends(image: NDArray[Any], percentiles: tuple[float, float]) -> tuple[float, float]:
@@ -115,8 +134,8 @@ def _draw_arrows(axes: Axes, frame: Frame, raster: Raster) -> None:
     coarse = np.s_[step // 2 :: step, step // 2 :: step]
     solid = frame.material[coarse] == Material.WORKPIECE
     x, y = np.meshgrid(raster.x[coarse[1]] * 1e6, raster.y[coarse[0]] * 1e6)
-    assert frame.velocity_x is not None and frame.velocity_y is not None
-    u, v = frame.velocity_x[coarse][solid], frame.velocity_y[coarse][solid]
+    u = frame.needed("velocity_x")[coarse][solid]
+    v = frame.needed("velocity_y")[coarse][solid]
     fastest = float(np.hypot(u, v).max(initial=0.0))
     if fastest > 0.0:
         scale = fastest / (step * raster.spacing * 1e6)
@@ -154,9 +173,11 @@ def _draw_quality(
     drawing.veil(axes, filled, raster, VERMILLION, 1.0)
 
 
-def _leave_out(axes: Axes, above: Axes) -> None:
+def _leave_out(axes: Axes, above: Axes | None) -> None:
     """Remove a panel; the one above it is then the lowest of its column."""
     axes.remove()
+    if above is None:
+        return
     above.set_xlabel("x / µm")
     above.tick_params(labelbottom=True)
 

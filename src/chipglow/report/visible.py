@@ -35,7 +35,7 @@ def visible_picture(frame: Frame, raster: Raster) -> NDArray[np.float64]:
     generator = np.random.default_rng(_SEED)
     steel = Texture.random(_STEEL, _GRAIN, generator, restore_deviation=True).at(x, y)
     low, high = _SHEARED
-    sheared = np.clip((frame.plastic_strain - low) / (high - low), 0.0, 1.0)
+    sheared = np.clip((frame.needed("plastic_strain") - low) / (high - low), 0.0, 1.0)
     grey = steel * (1.0 - _DARKEST * sheared)
     grey = np.where(frame.material == Material.WORKPIECE, grey, _VOID)
     return np.asarray(np.where(frame.material == Material.TOOL, 0.0, grey), np.float64)

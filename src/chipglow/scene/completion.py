@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import Final
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from chipglow.scene.sampled import SampledFrame
 from chipglow.scene.scene import (
     FILLED,
     MATERIAL_COORDINATE_UNITS,
+    QUALITY,
     Frame,
     Material,
     SceneError,
@@ -26,6 +27,7 @@ from chipglow.scene.tool import Tool
 STRAIN_OF_CHIP: Final = 1.0
 """Plastic strain of the region that is said to be chip, where a source has no strain."""
 
+_VELOCITY: Final = frozenset(("velocity_x", "velocity_y"))
 _CHIP_STARTS, _CHIP_ENDS = 0.3, 0.5
 _MOST_FILLED: Final = 0.5
 _MOST_FRAMES: Final = 20
@@ -47,6 +49,9 @@ class Completion:
         Speed of the workpiece along x in m/s, for a source without velocity.
     chip : tuple of points, optional
         Outline of the chip in m, ((x, y), ...): for a source without plastic strain.
+    motion : {"auto", "flow", "none"}
+        Velocity of a source that has none: that of the optical flow, or none. "auto": the flow
+        where there is a strain, a chip or a cutting speed, for what is cut moves.
     rate_frames : int
         Number of frames over which the strain rate is taken, for a source without it: more of them
         make less noise and more blur.
@@ -61,6 +66,7 @@ class Completion:
     tool: Tool | None = None
     cutting_speed: float | None = None
     chip: tuple[tuple[float, float], ...] | None = None
+    motion: Literal["auto", "flow", "none"] = "auto"
     rate_frames: int = 1
 
     def __post_init__(self) -> None:
@@ -70,6 +76,10 @@ class Completion:
             raise ValueError(f"cutting_speed: {self.cutting_speed!r} m/s, expected a finite speed")
         if self.chip is not None and len(self.chip) < 3:
             raise ValueError(f"chip: {len(self.chip)} corners, expected 3 or more")
+        if self.motion not in ("auto", "flow", "none"):
+            raise ValueError(f"motion: {self.motion!r}, expected auto, flow or none")
+        if self.motion == "none" and self.cutting_speed is not None:
+            raise ValueError("motion: 'none' beside a cutting_speed, expected one or the other")
         if not 1 <= self.rate_frames <= _MOST_FRAMES:
             raise ValueError(f"rate_frames: {self.rate_frames}, expected 1 to {_MOST_FRAMES}")
 
@@ -78,25 +88,64 @@ class Completion:
         """How many frames before one it depends on."""
         return max(self.rate_frames, _FLOW_FRAMES)
 
+    def fields(self, found: Iterable[str], frames: int) -> tuple[str, ...]:
+        """Names of the fields of the scene, in their order.
+
+        Parameters
+        ----------
+        found : iterable of str
+            Those that the source has.
+        frames : int
+            Number of its frames.
+        """
+        known = set(found)
+        has = {
+            "temperature": True,
+            "plastic_strain": self._has_strain(known),
+            "plastic_strain_rate": self._has_rate(known, frames),
+            "velocity_x": self._has_velocity(known),
+            "velocity_y": self._has_velocity(known),
+            "material": True,
+            **{name: set(MATERIAL_COORDINATE_UNITS) <= known for name in MATERIAL_COORDINATE_UNITS},
+            QUALITY: True,
+        }
+        return tuple(name for name, there in has.items() if there)
+
     def assumptions(self, found: Iterable[str], frames: int) -> tuple[str, ...]:
         """What stands in for what is not among the fields that were found, a sentence each."""
         known = set(found)
         return tuple(
             sentence
             for missing, sentence in (
-                (not known & {"velocity_x", "velocity_y"}, self._of_velocity(frames)),
+                (not known & _VELOCITY, self._of_velocity(known, frames)),
                 ("plastic_strain" not in known, self._of_strain()),
                 ("plastic_strain_rate" not in known, self._of_rate(known, frames)),
             )
             if missing
         )
 
-    @staticmethod
-    def uses_flow(found: Iterable[str], frames: int) -> bool:
+    def uses_flow(self, found: Iterable[str], frames: int) -> bool:
         """Whether the optical flow may be asked for the velocity."""
-        return frames > 1 and not set(found) & {"velocity_x", "velocity_y"}
+        known = set(found)
+        return frames > 1 and not known & _VELOCITY and self._has_velocity(known)
 
-    def _of_velocity(self, frames: int) -> str:
+    def _has_strain(self, known: set[str]) -> bool:
+        return "plastic_strain" in known or self.chip is not None
+
+    def _has_rate(self, known: set[str], frames: int) -> bool:
+        taken = "plastic_strain" in known and frames > 1 and self._has_velocity(known)
+        return "plastic_strain_rate" in known or taken
+
+    def _has_velocity(self, known: set[str]) -> bool:
+        if known & _VELOCITY:
+            return True
+        if self.motion == "auto":
+            return self.cutting_speed is not None or self._has_strain(known)
+        return self.motion == "flow"
+
+    def _of_velocity(self, known: set[str], frames: int) -> str:
+        if not self._has_velocity(known):
+            return "velocity: none, nothing is said to move (completion.motion: flow looks for it)"
         if self.cutting_speed is None and frames == 1:
             return "velocity: 0 everywhere, as there is one frame and no cutting speed"
         if self.cutting_speed is None:
@@ -106,14 +155,12 @@ class Completion:
 
     def _of_strain(self) -> str:
         if self.chip is None:
-            return "plastic strain: 0 everywhere, so the workpiece's emissivity is used for all"
+            return "plastic strain: none, so that no feature of a chip has its own emissivity"
         return f"plastic strain: {STRAIN_OF_CHIP:g} in the chip's outline, 0 elsewhere"
 
     def _of_rate(self, known: set[str], frames: int) -> str:
-        if frames == 1 or "plastic_strain" not in known:
-            return (
-                "plastic strain rate: 0 everywhere, so no shear band has an emissivity of its own"
-            )
+        if not self._has_rate(known, frames):
+            return "plastic strain rate: none, so that no shear band has an emissivity of its own"
         return "plastic strain rate: from the change of the strain along the motion"
 
 
@@ -139,15 +186,17 @@ def complete(
     """
     chip, in_tool = _inside(completion.chip, raster), _in_tool(completion.tool, raster)
     history: deque[SampledFrame] = deque(maxlen=completion.memory)
+    found: set[str] = set()
     for number, sampled in enumerate(frames):
+        found = found or set(sampled.fields)
         now = _prepared(sampled, completion, chip, in_tool)
         if number == 1:
-            yield _finished(history[0], [now], raster, completion)
+            yield _finished(history[0], [now], raster, completion, found)
         if number > 0:
-            yield _finished(now, history, raster, completion)
+            yield _finished(now, history, raster, completion, found)
         history.append(now)
     if history and number == 0:
-        yield _finished(history[0], [], raster, completion)
+        yield _finished(history[0], [], raster, completion, found)
 
 
 def _prepared(
@@ -174,10 +223,9 @@ def _prepared(
         )
     fields = {name: _without_holes(values, solid) for name, values in sampled.fields.items()}
     fields["temperature"][bare] = completion.surroundings
-    if "plastic_strain" not in fields:
+    if "plastic_strain" not in fields and completion.chip is not None:
         strain = np.where(chip, np.float32(STRAIN_OF_CHIP), np.float32(0.0))
         fields["plastic_strain"] = np.where(solid, strain, np.float32(np.nan))
-        fields.setdefault("plastic_strain_rate", np.zeros(material.shape, np.float32))
     quality = np.zeros(material.shape, np.uint8) if sampled.quality is None else sampled.quality
     quality = np.where(holes, np.uint8(FILLED), quality)
     return SampledFrame(sampled.time, fields, material, quality)
@@ -196,36 +244,43 @@ def _finished(
     others: Sequence[SampledFrame],
     raster: Raster,
     completion: Completion,
+    found: set[str],
 ) -> Frame:
     """The whole frame; `others` are those before it, or the one after it."""
-    fields = now.fields
-    velocity = _velocity(now, others, raster, completion)
-    rate = fields.get("plastic_strain_rate")
-    if rate is None and others:
-        other = others[max(len(others) - completion.rate_frames, 0)]
-        before = other.fields["plastic_strain"]
-        interval = now.time - other.time
-        rate = strain_rate_along(
-            fields["plastic_strain"], before, velocity, interval, raster.spacing
-        )
-    zero = np.zeros(raster.shape, np.float32)
-    coordinates = {name: fields[name] for name in MATERIAL_COORDINATE_UNITS if name in fields}
-    return Frame(
-        time=now.time,
-        temperature=_elsewhere(fields["temperature"], completion.surroundings),
-        plastic_strain=np.maximum(_elsewhere(fields["plastic_strain"]), 0.0),
-        plastic_strain_rate=zero if rate is None else np.maximum(_elsewhere(rate), 0.0),
-        velocity_x=_elsewhere(velocity[0]),
-        velocity_y=_elsewhere(velocity[1]),
-        material=now.material,
-        quality=now.quality,
-        **{name: _elsewhere(values) for name, values in coordinates.items()},
-    )
+    names = completion.fields(found, 2 if others else 1)
+    fields = {name: now.fields[name] for name in names if name in now.fields}
+    if "velocity_x" in names:
+        velocity = _velocity(now, others, raster, completion)
+        fields |= zip(("velocity_x", "velocity_y"), velocity, strict=True)
+        if "plastic_strain_rate" in names and "plastic_strain_rate" not in fields:
+            fields["plastic_strain_rate"] = _rate(now, others, velocity, raster, completion)
+    whole = {name: _elsewhere(values) for name, values in fields.items()}
+    for name in ("plastic_strain", "plastic_strain_rate"):
+        if name in whole:
+            whole[name] = np.maximum(whole[name], 0.0)
+    whole["temperature"] = _elsewhere(fields["temperature"], completion.surroundings)
+    return Frame(time=now.time, material=now.material, quality=now.quality, **whole)
+
+
+_Velocity: TypeAlias = tuple[NDArray[np.float32], NDArray[np.float32]]
+
+
+def _rate(
+    now: SampledFrame,
+    others: Sequence[SampledFrame],
+    velocity: _Velocity,
+    raster: Raster,
+    completion: Completion,
+) -> NDArray[np.float32]:
+    """Strain rate from the change of the strain along the motion."""
+    other = others[max(len(others) - completion.rate_frames, 0)]
+    strain, before = (frame.fields["plastic_strain"] for frame in (now, other))
+    return strain_rate_along(strain, before, velocity, now.time - other.time, raster.spacing)
 
 
 def _velocity(
     now: SampledFrame, others: Sequence[SampledFrame], raster: Raster, completion: Completion
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+) -> _Velocity:
     zero = np.zeros(raster.shape, np.float32)
     known = [now.fields.get(name) for name in ("velocity_x", "velocity_y")]
     if any(values is not None for values in known):
@@ -234,7 +289,7 @@ def _velocity(
     moves = (now.material == Material.WORKPIECE).astype(np.float32)
     speed, chip = completion.cutting_speed or 0.0, moves
     if completion.cutting_speed is not None:
-        strain = _elsewhere(now.fields["plastic_strain"])
+        strain = _elsewhere(now.fields.get("plastic_strain", zero))
         chip = moves * np.clip((strain - _CHIP_STARTS) / (_CHIP_ENDS - _CHIP_STARTS), 0.0, 1.0)
     across, up = zero, zero
     if others and chip.any():
@@ -245,7 +300,7 @@ def _velocity(
 
 def _pattern(frame: SampledFrame) -> NDArray[np.float32]:
     """What the optical flow follows: the logarithm of the strain, or the temperature."""
-    strain = _elsewhere(frame.fields["plastic_strain"])
+    strain = _elsewhere(frame.fields.get("plastic_strain", frame.fields["temperature"] * 0.0))
     if strain.max() > strain.min():
         return np.log1p(np.maximum(strain, 0.0))
     temperature = frame.fields["temperature"]

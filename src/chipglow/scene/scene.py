@@ -30,7 +30,7 @@ FIELD_UNITS: Final[Mapping[str, str]] = {
     "velocity_y": "m/s",
     "material": "1",
 }
-"""The fields that every scene has, and their units."""
+"""The fields of a cut, and their units. Temperature alone is enough for a scene."""
 
 MATERIAL_COORDINATE_UNITS: Final[Mapping[str, str]] = {"material_x": "m", "material_y": "m"}
 """Where each point was before the cut: optional, both or none."""
@@ -96,30 +96,50 @@ class Material(IntEnum):
 class Frame:
     """The fields of a scene at one time, each of shape (y, x); see `FIELD_UNITS`.
 
-    What a scene does not have, and a velocity that was not asked for, is None.
+    What a scene does not have, and a velocity that was not asked for, is None. A scene without
+    material is workpiece everywhere.
     """
 
     time: float
     temperature: NDArray[np.float32]
-    plastic_strain: NDArray[np.float32]
-    plastic_strain_rate: NDArray[np.float32]
-    velocity_x: NDArray[np.float32] | None
-    velocity_y: NDArray[np.float32] | None
     material: NDArray[np.uint8]
+    plastic_strain: NDArray[np.float32] | None = None
+    plastic_strain_rate: NDArray[np.float32] | None = None
+    velocity_x: NDArray[np.float32] | None = None
+    velocity_y: NDArray[np.float32] | None = None
     material_x: NDArray[np.float32] | None = None
     material_y: NDArray[np.float32] | None = None
     quality: NDArray[np.uint8] | None = None
 
+    def needed(self, name: str) -> NDArray[np.float32]:
+        """A field that what follows cannot do without.
+
+        Parameters
+        ----------
+        name : str
+            One of `FIELD_UNITS`.
+
+        Raises
+        ------
+        SceneError
+            If the scene does not have it.
+        """
+        values: NDArray[np.float32] | None = getattr(self, name)
+        if values is None:
+            raise SceneError(f"scene: has no {name}, expected it: this needs it")
+        return values
+
 
 class Scene:
-    """Fields of temperature, strain, strain rate, velocity and material over time.
+    """Fields of temperature, and where there are any of strain, velocity and material, over time.
 
     Parameters
     ----------
     data : xarray.Dataset
-        Fields of `FIELD_UNITS` with dimensions (time, y, x) and a ``units`` attribute each;
-        coordinates ``time`` in s, ascending; ``x`` in m, ascending; ``y`` in m, descending.
-        Optional: ``material_x`` and ``material_y`` in m, where each point was before the cut;
+        ``temperature``, and any other fields of `FIELD_UNITS`, with dimensions (time, y, x) and a
+        ``units`` attribute each; coordinates ``time`` in s, ascending; ``x`` in m, ascending;
+        ``y`` in m, descending. The velocity has both components or none.
+        Further: ``material_x`` and ``material_y`` in m, where each point was before the cut;
         ``quality``, see `QUALITY`; ``cutting_force`` and ``thrust_force`` in N/m over
         ``force_time`` in s.
 
@@ -139,7 +159,7 @@ class Scene:
         _check_structure(data)
         self.data = data
         last = len(self.times) - 1
-        lazy = any(not isinstance(data[name].variable._data, np.ndarray) for name in self._fields)
+        lazy = any(not isinstance(data[name].variable._data, np.ndarray) for name in self.fields)
         for index in {0, last} if lazy else range(last + 1):
             self.frame(index)
 
@@ -161,7 +181,7 @@ class Scene:
         times : array_like
             Times of the frames in s, shape (time,).
         fields : mapping
-            Arrays of shape (time, y, x) by the names of `FIELD_UNITS`, and optionally of
+            Arrays of shape (time, y, x): temperature, and any others of `FIELD_UNITS`,
             `MATERIAL_COORDINATE_UNITS` and `QUALITY`.
         tool : Tool, optional
             The tool's outline, for the analyses that need the rake face.
@@ -316,9 +336,9 @@ class Scene:
         SceneError
             If a value of the frame breaks the contract.
         """
-        names = [name for name in self._fields if velocity or name not in _VELOCITY]
-        fields: dict[str, Any] = dict.fromkeys(_VELOCITY)
-        fields |= {name: self.field(name, index) for name in names}
+        names = [name for name in self.fields if velocity or name not in _VELOCITY]
+        fields: dict[str, Any] = {name: self.field(name, index) for name in names}
+        fields.setdefault("material", self._workpiece)
         frame = Frame(time=float(self.times[index]), **fields)
         check_frame(frame)
         return frame
@@ -334,10 +354,19 @@ class Scene:
         Parameters
         ----------
         name : str
-            One of `FIELD_UNITS`, `MATERIAL_COORDINATE_UNITS` or `QUALITY`.
+            One of `fields`, or ``material``.
         index : int
             Number of the frame.
+
+        Raises
+        ------
+        SceneError
+            If the scene does not have it.
         """
+        if name == "material" and name not in self.data:
+            return self._workpiece
+        if name not in self.data:
+            raise SceneError(f"scene: has no {name}, expected it: this needs it")
         values = self._read(name, index)
         return values if name in _BYTES else np.asarray(values, dtype=np.float32)
 
@@ -345,10 +374,16 @@ class Scene:
         """One field of one frame; a scene in a file has a faster way."""
         return np.asarray(self.data[name][index].values)
 
-    @property
-    def _fields(self) -> list[str]:
-        optional = (*MATERIAL_COORDINATE_UNITS, QUALITY)
-        return [*FIELD_UNITS, *(name for name in optional if name in self.data)]
+    @cached_property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the fields that the scene has, in one order."""
+        known = (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS, QUALITY)
+        return tuple(name for name in known if name in self.data)
+
+    @cached_property
+    def _workpiece(self) -> NDArray[np.uint8]:
+        """The material of a scene that does not tell it."""
+        return np.full(self.raster.shape, Material.WORKPIECE, dtype=np.uint8)
 
 
 _BYTES: Final = ("material", QUALITY)
@@ -420,11 +455,11 @@ def _check_structure(data: xr.Dataset) -> None:
     _check_even("y", data["y"].values, ascending=False)
     if not np.isclose(np.diff(data["x"].values).mean(), -np.diff(data["y"].values).mean()):
         raise SceneError("scene: samples must be square, but the steps of x and y differ")
-    for name, unit in FIELD_UNITS.items():
-        if name not in data:
-            raise SceneError(f"scene: field {name!r} is missing")
-        _check_unit(name, data[name], unit)
-    for group in (MATERIAL_COORDINATE_UNITS, FORCE_UNITS, ENERGY_UNITS):
+    if "temperature" not in data:
+        raise SceneError("scene: field 'temperature' is missing")
+    single = [{name: unit} for name, unit in FIELD_UNITS.items() if name not in _VELOCITY]
+    velocity = {name: FIELD_UNITS[name] for name in _VELOCITY}
+    for group in (*single, velocity, MATERIAL_COORDINATE_UNITS, FORCE_UNITS, ENERGY_UNITS):
         present = [name for name in group if name in data]
         missing = [name for name in group if name not in data]
         if present and missing:

@@ -25,7 +25,15 @@ from chipglow.study.measurement_schema import MeasurementDescription
 from chipglow.study.preview import preview_raster
 from chipglow.study.reference import FieldEntry, field_entries, field_tables
 from chipglow.study.registered import load_registration, write_registration
-from chipglow.study.running import CUTTING_STEP, Progress, cut, is_cut, kept_progress, run
+from chipglow.study.running import (
+    CUTTING_STEP,
+    Progress,
+    cut,
+    errors,
+    is_cut,
+    kept_progress,
+    run,
+)
 from chipglow.study.schema import Study
 from chipglow.study.template import calibration_text, import_text, measurement_text, study_text
 from chipglow.study.tool_description import load_tool, tool_of
@@ -47,6 +55,7 @@ __all__ = [
     "calibration_text",
     "clear_cache",
     "cut",
+    "errors",
     "field_entries",
     "field_tables",
     "fit",

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study.schema import Study
@@ -15,7 +16,7 @@ class Fitted:
     Parameters
     ----------
     scene : Scene
-        The scene; it tells a tool.
+        The scene, with the study's tool if it tells none and the study does.
     surfaces : mapping
         The study's surfaces by name.
     assumed : tuple of str
@@ -31,7 +32,7 @@ def fit(study: Study, scene: Scene) -> Fitted:
     """Fit a study to a scene that lacks material coordinates or a tool, as imports often do.
 
     Textures then move by the mean velocities of their features, as the paper's did, and the tool
-    is that of the study's cutting section.
+    is that of the study's section cutting.tool, if it is given there.
 
     Parameters
     ----------
@@ -47,12 +48,12 @@ def fit(study: Study, scene: Scene) -> Fitted:
     """
     surfaces = study.surface.build(study.seed)
     assumed = []
-    if scene.tool is None:
+    if scene.tool is None and "tool" in study.cutting.model_fields_set:
         scene = scene.with_tool(study.cutting.tool.build())
         assumed.append(
             "The scene does not tell its tool: it is that of the study's section cutting.tool."
         )
-    if not (scene.frame(0).material == Material.TOOL).any():
+    if scene.tool is not None and not (scene.frame(0).material == Material.TOOL).any():
         assumed.append(
             "The scene shows no tool: beyond the rake face nothing shines into the blur of the "
             "chip, and errors there are larger than with a warm tool."
@@ -63,10 +64,15 @@ def fit(study: Study, scene: Scene) -> Fitted:
         if isinstance(surface, FeatureSurface) and surface.follow == "material"
     }
     if following and not scene.has_material_coordinates:
-        surfaces |= {name: replace(surface, follow="mean") for name, surface in following.items()}
+        follow: Literal["mean", "none"] = "mean" if "velocity_x" in scene.fields else "none"
+        surfaces |= {name: replace(surface, follow=follow) for name, surface in following.items()}
+        moving = {
+            "mean": "textures move with the mean velocity of their feature",
+            "none": "textures stay where they are, as it has no velocity either",
+        }
         assumed.append(
-            "The scene does not say where each point was before the cut: textures move with the "
-            "mean velocity of their feature (surface.follow: mean)."
+            f"The scene does not say where each point was before the cut: {moving[follow]} "
+            f"(surface.follow: {follow})."
         )
     assumed.extend(uncovered(surfaces, scene.raster))
     return Fitted(scene, surfaces, tuple(assumed))
@@ -86,7 +92,7 @@ def uncovered(surfaces: Mapping[str, Surface], scene: Raster) -> Iterator[str]:
         share = surface.known_share(scene)
         if share == 0.0:
             raise ValueError(
-                f"surface.maps: {name}: lies at {_place(surface.raster)}, expected the scene's "
+                f"surface: the map {name!r} lies at {_place(surface.raster)}, expected the scene's "
                 f"place, {_place(scene)} (the tip of the emissivity's measurement puts it there)"
             )
         if share < 1.0:

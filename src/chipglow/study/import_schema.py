@@ -127,6 +127,11 @@ class CompletionSection(Part):
         "Corners of the chip, for a source without plastic strain.",
         "none, or [[-300 um, 0 um], [-50 um, 0 um], [-50 um, 400 um]]",
     )
+    motion: Literal["auto", "flow", "none"] = described(
+        "auto",
+        "Velocity of a source that has none: flow (the optical flow), none, or auto: the flow\n"
+        "where there is a strain, a chip or a cutting speed.",
+    )
     rate_frames: int = described(
         1, "Frames over which a missing strain rate is taken: more are smoother.", "1 to 20"
     )
@@ -137,6 +142,7 @@ class CompletionSection(Part):
             surroundings=self.surroundings,
             cutting_speed=self.cutting_speed,
             chip=self.chip,
+            motion=self.motion,
             rate_frames=self.rate_frames,
         )
 

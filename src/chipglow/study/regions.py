@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
-from pydantic import PlainValidator, Strict, field_validator, model_validator
+from pydantic import PlainSerializer, PlainValidator, Strict, field_validator, model_validator
 
 from chipglow.analysis.regions import Circle, Point, Polygon, Region
 from chipglow.study.section import OR_NONE, Part, Section, described
@@ -41,7 +41,13 @@ def _coordinate(value: object) -> Coordinate:
         ) from None
 
 
-CoordinateField = Annotated[Coordinate, PlainValidator(_coordinate)]
+def _as_written(coordinate: Coordinate) -> float | str:
+    return coordinate.value if coordinate.unit == "pixel" else POSITION.text(coordinate.value)
+
+
+CoordinateField = Annotated[
+    Coordinate, PlainValidator(_coordinate), PlainSerializer(_as_written, when_used="json")
+]
 PointField = Annotated[tuple[CoordinateField, CoordinateField], Strict(False)]
 
 

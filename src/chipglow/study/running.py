@@ -1,6 +1,7 @@
 """Running a study: the cut (or the scene that was cut before), the camera, the analysis."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict
 from json import dumps
 from pathlib import Path
@@ -8,6 +9,9 @@ from time import monotonic
 from typing import Any, Final, TypeAlias
 
 from chipglow.analysis.paper import StudyResult, analyse
+from chipglow.analysis.rake import NoContactError
+from chipglow.analysis.ridge import NoShearBandError
+from chipglow.analysis.scene_error import SceneErrors, scene_errors
 from chipglow.cutting import (
     SOLVER_VERSION,
     Checkpoint,
@@ -18,9 +22,9 @@ from chipglow.cutting import (
 from chipglow.io import SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.interrupts import uninterrupted
 from chipglow.io.packing import CUT
-from chipglow.scene import Frame, SceneError, ToolOutline
+from chipglow.scene import Frame, Scene, SceneError, ToolOutline
 from chipglow.study.cache import scene_path
-from chipglow.study.fitting import fit
+from chipglow.study.fitting import Fitted, fit
 from chipglow.study.preview import preview_of, show_scene
 from chipglow.study.schema import Study
 
@@ -94,7 +98,7 @@ def run(
     progress: Progress | None = None,
     resume: bool = False,
     assume: Callable[[str], None] | None = None,
-) -> StudyResult:
+) -> StudyResult | SceneErrors:
     """Run a study from the cut, or from the scene that takes its place, to the analysis.
 
     Parameters
@@ -110,33 +114,100 @@ def run(
 
     Returns
     -------
-    StudyResult
-        All that the report shows.
+    StudyResult or SceneErrors
+        All that the report shows: the paper's analysis of a cut; or, of a scene that shows no
+        shear band or no contact with a tool, and at places of the user's own, the camera's error
+        there and what is missing.
 
     Raises
     ------
     ValueError
         If the scene cannot be analysed as the study wants it; the message names the scene's file.
     """
-    if study.scene is None:
-        return _look(study, cut(study, progress, resume), progress, assume)
+    path = cut(study, progress, resume) if study.scene is None else Path(study.scene)
+    with _naming(study):
+        return _look(study, path, progress, assume)
+
+
+def errors(
+    study: Study,
+    progress: Progress | None = None,
+    resume: bool = False,
+    assume: Callable[[str], None] | None = None,
+) -> SceneErrors:
+    """Measurement error of any scene: images, and readings at the study's places.
+
+    Nothing is asked of the scene but its temperature: it may be of no cut at all.
+
+    Parameters
+    ----------
+    study : Study
+        What to do; `scene` says of what, else it is the study's cut.
+    progress, resume, assume
+        As for `run`.
+
+    Raises
+    ------
+    ValueError
+        If a surface cannot be laid on the scene, or a place is outside the pixels.
+    """
+    path = cut(study, progress, resume) if study.scene is None else Path(study.scene)
+    with _naming(study):
+        fitted = _fitted(study, path, assume)
+        plan = study.analysis.scene_plan()
+        return scene_errors(fitted.scene, fitted.surfaces, study.camera.build(), plan, progress)
+
+
+@contextmanager
+def _naming(study: Study) -> Iterator[None]:
+    """Name the scene's file in what is wrong with it."""
     try:
-        return _look(study, Path(study.scene), progress, assume)
+        yield
     except SceneError:
         raise
     except ValueError as error:
+        if study.scene is None:
+            raise
         raise ValueError(f"{study.scene}: {error}") from None
 
 
 def _look(
     study: Study, path: Path, progress: Progress | None, assume: Callable[[str], None] | None
-) -> StudyResult:
+) -> StudyResult | SceneErrors:
+    fitted = _fitted(study, path, assume)
+    camera = study.camera.build()
+    missing = [] if study.analysis.places else list(_lacking(fitted.scene))
+    if not missing and not study.analysis.places:
+        try:
+            return analyse(fitted.scene, fitted.surfaces, camera, study.plan, progress)
+        except (NoShearBandError, NoContactError) as error:
+            missing = [f"The errors of the paper's places are not here: {error}."]
+    plan = study.analysis.scene_plan()
+    return scene_errors(fitted.scene, fitted.surfaces, camera, plan, progress, missing)
+
+
+def _fitted(study: Study, path: Path, assume: Callable[[str], None] | None) -> Fitted:
     fitted = fit(study, open_scene(path))
     if assume:
         for sentence in fitted.assumed:
             assume(sentence)
-    camera, plan = study.camera.build(), study.analysis.build()
-    return analyse(fitted.scene, fitted.surfaces, camera, plan, progress)
+    return fitted
+
+
+def _lacking(scene: Scene) -> Iterator[str]:
+    """What the scene lacks for the analysis of a cut, a sentence each."""
+    if scene.tool is None:
+        yield (
+            "No rake face is read: the scene has no tool (the section cutting.tool of the study "
+            "gives it one)."
+        )
+    for name, title, why in (
+        ("plastic_strain", "plastic strain", "no chip is told from the workpiece"),
+        ("plastic_strain_rate", "plastic strain rate", "no shear band is looked for"),
+        ("velocity_x", "velocity", "the chip's speed and shape are not measured"),
+    ):
+        if name not in scene.fields:
+            yield f"The scene has no {title}: {why}."
 
 
 def _inputs(study: Study) -> dict[str, Any]:

@@ -1,6 +1,8 @@
 """What a study says: its sections and fields, the paper's study as defaults, what they mean."""
 
+from abc import abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final, Literal, Self
 
@@ -13,6 +15,8 @@ from pydantic import (
 )
 
 from chipglow.analysis.paper import Plan
+from chipglow.analysis.places import LinePlace, Place, PointPlace, RegionPlace
+from chipglow.analysis.scene_error import ScenePlan
 from chipglow.camera import (
     AnnularAperturePSF,
     Camera,
@@ -35,6 +39,7 @@ from chipglow.cutting import (
 from chipglow.io import read_emissivity_map, read_tool_outline
 from chipglow.radiometry import Band
 from chipglow.scene import Chamfer, Hone, Raster, Tool, ToolGeometry
+from chipglow.study.regions import RegionSection
 from chipglow.study.section import OR_NONE, FileBeside, Part, Section, described
 from chipglow.study.units import (
     Angle,
@@ -49,7 +54,15 @@ from chipglow.study.units import (
     Wavelength,
     WavelengthRange,
 )
-from chipglow.surface import CHIP_1, CHIP_2, Emissivity, FeatureSurface, Surface
+from chipglow.surface import (
+    CHIP_1,
+    CHIP_2,
+    Emissivity,
+    FeatureSurface,
+    Surface,
+    TemperatureSurface,
+    UniformSurface,
+)
 
 CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2}
 """Chips of the paper's Table 1 by the names of a study."""
@@ -368,6 +381,11 @@ class CuttingSection(Part):
         )
 
 
+PointOfScene = Annotated[tuple[Position, Position], Strict(False)]
+Corners = Annotated[tuple[PointOfScene, ...], Strict(False)]
+TableRow = Annotated[tuple[Temperature, float], Strict(False)]
+
+
 class EmissivitySection(Part):
     """Emissivity of one feature."""
 
@@ -398,9 +416,17 @@ class ChipSection(Section):
         return {"body": _numbers(preset.chip), "shear_band": _numbers(preset.shear_band)}
 
 
-class SurfaceSection(Section):
-    """Emissivity maps."""
+class FeaturesSection(Section):
+    """Emissivity of the features of chips: the paper's maps."""
 
+    kind: Literal["features"] = described(
+        "features",
+        "What tells the emissivity: the features of a chip, each with its texture. Other kinds:\n"
+        "  {kind: uniform, emissivity: 0.5}  everywhere the same\n"
+        "  {kind: map, file: emissivity.nc}  an image, what chipglow emissivity writes\n"
+        "  {kind: temperature, table: [[20 degC, 0.2], [1400 degC, 0.4]]}  linear between\n"
+        "  {kind: phase, solid: 0.4, liquid: 0.25, solidus: 1658 K, liquidus: 1723 K}",
+    )
     chips: dict[str, ChipSection] = described(
         {"chip 1": "chip-1", "chip 2": "chip-2"},
         "Chips by name, each laid on the same scene. A chip is chip-1 or chip-2 (the paper's\n"
@@ -417,10 +443,10 @@ class SurfaceSection(Section):
     )
     tool: EmissivitySection = described(_numbers(CHIP_1.tool), "The tool's side.")
     grain: Length = described("20 um", "Size of a grain of the emissivity's texture.")
-    follow: Literal["material", "mean"] = described(
+    follow: Literal["material", "mean", "none"] = described(
         "material",
-        "How textures move: material (each point keeps its own) or mean (the paper's shift by\n"
-        "the feature's mean velocity).",
+        "How textures move: material (each point keeps its own), mean (the paper's shift by the\n"
+        "feature's mean velocity) or none.",
     )
     restore_deviation: bool = described(
         True, "Make up for the deviation that is lost when a texture is enlarged."
@@ -474,6 +500,91 @@ class SurfaceSection(Section):
             for name, chip in self.chips.items()
         }
         return {**chips, **{name: read_emissivity_map(file) for name, file in self.maps.items()}}
+
+
+class SameSurfaceSection(Part):
+    """One surface, whose kind names it."""
+
+    kind: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of the one surface."""
+        return (self.kind,)
+
+    @abstractmethod
+    def surface(self) -> Surface:
+        """The surface.
+
+        Raises
+        ------
+        ValueError
+            If it is not possible.
+        OSError
+            If its file is not there.
+        """
+
+    def build(self, seed: int = 0) -> dict[str, Surface]:
+        """The one surface by its name; nothing of it is random."""
+        return {self.kind: self.surface()}
+
+
+class UniformSection(SameSurfaceSection):
+    """One emissivity."""
+
+    kind: Literal["uniform"] = described("uniform", "Everywhere the same emissivity.")
+    emissivity: float = Field(description="The emissivity.")
+
+    def surface(self) -> Surface:
+        """The surface."""
+        return UniformSurface(self.emissivity)
+
+
+class MapSection(SameSurfaceSection):
+    """An image of emissivities."""
+
+    kind: Literal["map"] = described("map", "An image that stays where it is.")
+    file: FileBeside = Field(description="What chipglow emissivity writes.")
+
+    def surface(self) -> Surface:
+        """The surface."""
+        return read_emissivity_map(self.file)
+
+
+class TemperatureTableSection(SameSurfaceSection):
+    """Emissivity over temperature."""
+
+    kind: Literal["temperature"] = described("temperature", "A table over the true temperature.")
+    table: Annotated[tuple[TableRow, ...], Strict(False)] = Field(
+        description="Temperature and emissivity, a pair a row; linear between."
+    )
+
+    def surface(self) -> Surface:
+        """The surface."""
+        return TemperatureSurface(
+            tuple(temperature for temperature, _ in self.table),
+            tuple(emissivity for _, emissivity in self.table),
+        )
+
+
+class PhaseSection(SameSurfaceSection):
+    """Emissivity by phase."""
+
+    kind: Literal["phase"] = described("phase", "Solid or liquid, by the true temperature.")
+    solid: float = Field(description="Emissivity up to the solidus.")
+    liquid: float = Field(description="Emissivity from the liquidus on; between them linear.")
+    solidus: Temperature = Field(description="Temperature at which melting begins.")
+    liquidus: Temperature = Field(description="Temperature at which all is melted.")
+
+    def surface(self) -> Surface:
+        """The surface."""
+        return TemperatureSurface((self.solidus, self.liquidus), (self.solid, self.liquid))
+
+
+SurfaceSection = Annotated[
+    FeaturesSection | UniformSection | MapSection | TemperatureTableSection | PhaseSection,
+    Field(discriminator="kind"),
+]
 
 
 class AnnularApertureSection(Part):
@@ -605,6 +716,47 @@ class AnalysisSection(Part):
         "Full widths at half maximum of Gaussians for which the headline errors are shown.",
     )
 
+    points: dict[str, PointOfScene] = described(
+        {},
+        "Points by name where the error is read, in the place of rake face and shear band.",
+        "{} or positions: {middle of the pool: [0 um, -20 um]}",
+    )
+    lines: dict[str, Corners] = described(
+        {},
+        "Lines by name, from corner to corner.",
+        "{} or positions: {across: [[-100 um, 0 um], [100 um, 0 um]]}",
+    )
+    regions: dict[str, RegionSection] = described(
+        {},
+        "Regions by name: a polygon, a rectangle or a circle.",
+        "{} or {pad: {rectangle: [[0 um, 0 um], [100 um, -50 um]]}}; also\n"
+        "{circle: {centre: [0 um, 0 um], radius: 20 um}}",
+    )
+
+    @property
+    def places(self) -> tuple[Place, ...]:
+        """Where the user wants the error to be read."""
+        return (
+            *(PointPlace(name, point) for name, point in self.points.items()),
+            *(LinePlace(name, corners) for name, corners in self.lines.items()),
+            *(RegionPlace(name, one.region(name)) for name, one in self.regions.items()),
+        )
+
+    def scene_plan(self) -> ScenePlan:
+        """What to analyse of a scene that is no cut, or at the user's places."""
+        return ScenePlan(
+            places=self.places,
+            instants=self.instants,
+            phases=self.phases,
+            textures=self.textures,
+            reference=self.reference,
+        )
+
+    @model_validator(mode="after")
+    def _possible_places(self) -> Self:
+        self.scene_plan()
+        return self
+
     def build(self) -> Plan:
         """What to analyse."""
         return Plan(
@@ -650,9 +802,20 @@ class Study(Section):
     cutting: CuttingSection = described(
         {}, "The cutting simulation; defaults: the paper's Table 2."
     )
-    surface: SurfaceSection = described({}, "Emissivity maps; defaults: the paper's Table 1.")
+    surface: SurfaceSection = described(
+        {"kind": "features"}, "Emissivities; defaults: the paper's Table 1."
+    )
     camera: CameraSection = described({}, "The infrared camera.")
     analysis: AnalysisSection = described({}, "What is computed from the simulated measurement.")
+
+    @property
+    def plan(self) -> Plan:
+        """What to analyse of a cut; a surface that is the only one is seen everywhere."""
+        plan = self.analysis.build()
+        if isinstance(self.surface, FeaturesSection):
+            return plan
+        (name,) = self.surface.names
+        return replace(plan, rake_surface=name, band_surface=name)
 
     @classmethod
     def quick(cls) -> Self:
@@ -681,8 +844,19 @@ class Study(Section):
             raise ValueError(f"{seed} is negative, expected 0 or more")
         return seed
 
+    @field_validator("surface", mode="before")
+    @classmethod
+    def _features_by_default(cls, surface: object) -> object:
+        if surface is None:
+            return {"kind": "features"}
+        if isinstance(surface, Mapping) and "kind" not in surface:
+            return {"kind": "features", **surface}
+        return surface
+
     @model_validator(mode="after")
     def _chips_are_there(self) -> Self:
+        if not isinstance(self.surface, FeaturesSection):
+            return self
         for field in ("rake_chip", "band_chip"):
             name = getattr(self.analysis, field)
             if name not in self.surface.names:

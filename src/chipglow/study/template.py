@@ -1,6 +1,6 @@
 """Studies as commented YAML."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any, Final
 
 import yaml
@@ -58,12 +58,21 @@ def calibration_text(description: CalibrationDescription) -> str:
 
 
 def study_text(study: Study) -> str:
-    """A study as YAML, every field with a comment; `load_study` reads the same study from it."""
-    return "\n".join([_HEADER, *_section_lines(study, study.model_dump(mode="json"), "")]) + "\n"
+    """A study as YAML, every field with a comment; `load_study` reads the same study from it.
+
+    The section of the cut is left out where a scene takes its place and nothing was said of it.
+    """
+    unused = {"cutting"} if study.scene and "cutting" not in study.model_fields_set else set()
+    values = study.model_dump(mode="json")
+    return "\n".join([_HEADER, *_section_lines(study, values, "", unused)]) + "\n"
 
 
-def _section_lines(section: Section, values: Mapping[str, Any], indent: str) -> Iterator[str]:
+def _section_lines(
+    section: Section, values: Mapping[str, Any], indent: str, unused: Collection[str] = ()
+) -> Iterator[str]:
     for name, field in type(section).model_fields.items():
+        if name in unused:
+            continue
         value = getattr(section, name)
         if not indent and isinstance(value, BaseModel):
             yield ""

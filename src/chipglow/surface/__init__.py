@@ -11,6 +11,7 @@ from chipglow.surface.feature import (
 )
 from chipglow.surface.map import MapField, MapSurface
 from chipglow.surface.surface import EmissivityField, EmissivityStack, Surface, UniformSurface
+from chipglow.surface.temperature import TemperatureSurface
 from chipglow.surface.texture import Texture
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "MapField",
     "MapSurface",
     "Surface",
+    "TemperatureSurface",
     "Texture",
     "UniformSurface",
     "chip_share",

@@ -39,9 +39,10 @@ class FeatureSurface(Surface):
         What each feature has. Workpiece and tool default to the paper's.
     grain : float
         Size of one deviate of the textures in m.
-    follow : {"material", "mean"}
+    follow : {"material", "mean", "none"}
         How the textures move. "material": each point keeps its own, by the scene's material
         coordinates. "mean": the paper's way, each map is shifted by its feature's mean velocity.
+        "none": they stay where they are.
     seed : int
         Seed of the textures; each feature has an independent stream of it. By default that of the
         paper's study.
@@ -58,7 +59,8 @@ class FeatureSurface(Surface):
     "Create emissivity maps for each feature" and what follows in Heigel and Whitenton (2010). The
     chip's share rises linearly from 0 at a plastic strain of 0.3 to 1 at 0.5; over that blend of
     chip and workpiece the shear band's rises from 0 at a plastic strain rate of 6 000 /s to 1 at
-    30 000 /s. The tool's map is fixed. The void has emissivity 0.
+    30 000 /s; a scene without strain rate has no shear band. The tool's map is fixed. The void
+    has emissivity 0.
     """
 
     chip: Emissivity
@@ -66,15 +68,15 @@ class FeatureSurface(Surface):
     workpiece: Emissivity = field(default_factory=lambda: Emissivity(0.40, 0.03))
     tool: Emissivity = field(default_factory=lambda: Emissivity(0.58, 0.06))
     grain: float = 20e-6
-    follow: Literal["material", "mean"] = "material"
+    follow: Literal["material", "mean", "none"] = "material"
     seed: int = 2010
     restore_deviation: bool = True
 
     def __post_init__(self) -> None:
         if not 0 < self.grain < np.inf:
             raise ValueError(f"grain: expected over 0 m, got {self.grain!r} m")
-        if self.follow not in ("material", "mean"):
-            raise ValueError(f"follow: expected 'material' or 'mean', got {self.follow!r}")
+        if self.follow not in ("material", "mean", "none"):
+            raise ValueError(f"follow: expected 'material', 'mean' or 'none', got {self.follow!r}")
         if self.seed < 0:
             raise ValueError(f"seed: expected 0 or more, got {self.seed!r}")
 
@@ -98,11 +100,23 @@ class FeatureSurface(Surface):
         Raises
         ------
         ValueError
-            If the textures shall follow the material, and the scene has no material coordinates.
+            If the scene has no plastic strain, by which features are told, or no material
+            coordinates or velocity that the textures shall follow.
         """
+        if "plastic_strain" not in scene.fields:
+            raise ValueError(
+                "surface: the scene has no plastic strain, by which chip and workpiece are told "
+                "apart; expected a surface of another kind, such as {kind: uniform, emissivity: "
+                "0.5}"
+            )
+        if self.follow == "mean" and "velocity_x" not in scene.fields:
+            raise ValueError(
+                "follow: the scene has no velocity for 'mean', expected 'material' or 'none'"
+            )
         if self.follow == "material" and not scene.has_material_coordinates:
             raise ValueError(
-                "follow: the scene has no material coordinates for 'material', expected 'mean'"
+                "follow: the scene has no material coordinates for 'material', expected 'mean' or "
+                "'none'"
             )
         times, shifts = scene.times, np.zeros((len(scene.times), 3, 2))
         if self.follow == "mean":
@@ -185,7 +199,7 @@ class FeatureField(EmissivityField):
         ValueError
             If the textures follow the material, and the frame lacks the material coordinates.
         """
-        if self.surface.follow == "mean":
+        if self.surface.follow != "material":
             return self._sample_positions
         if frame.material_x is None or frame.material_y is None:
             raise ValueError("frame: has no material coordinates, expected them for 'material'")
@@ -233,11 +247,12 @@ class FeatureFields(EmissivityStack):
             raise ValueError(
                 f"frame: has shape {frame.material.shape}, expected {first.raster.shape}"
             )
+        rate = frame.plastic_strain_rate
         result = np.empty((len(self.fields), *first.raster.shape), dtype=np.float32)
         _blend(
             frame.material,
-            frame.plastic_strain,
-            frame.plastic_strain_rate,
+            frame.needed("plastic_strain"),
+            np.zeros(first.raster.shape, np.float32) if rate is None else rate,
             *first.positions(frame),
             first.shift(frame.time),
             1.0 / first.surface.grain,
@@ -310,13 +325,13 @@ def _mean_shifts(scene: Scene) -> NDArray[np.float64]:
 
 def _mean_velocities(frame: Frame, height: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean velocity of workpiece, chip and shear band in m/s, shape (3, 2); NaN if not there."""
-    rows = np.empty((len(height), 3, 3))
+    rows, rate = np.empty((len(height), 3, 3)), frame.plastic_strain_rate
     _sum_velocities(
         frame.material,
-        frame.plastic_strain,
-        frame.plastic_strain_rate,
-        frame.velocity_x,
-        frame.velocity_y,
+        frame.needed("plastic_strain"),
+        np.zeros(frame.material.shape, np.float32) if rate is None else rate,
+        frame.needed("velocity_x"),
+        frame.needed("velocity_y"),
         height,
         rows,
     )

@@ -1,0 +1,5 @@
+"""``python -m chipglow``: the command."""
+
+from chipglow.cli import main
+
+main()

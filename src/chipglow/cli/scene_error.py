@@ -1,0 +1,34 @@
+"""The study of ``chipglow error``: a scene, and what is said beside it."""
+
+from pathlib import Path
+
+from chipglow.study import Study, StudyError, load_study
+from chipglow.study.schema import UniformSection
+
+
+def study_of(scene: Path, study: Path | None, emissivity: float | None) -> Study:
+    """The study, or the defaults, with a scene and perhaps one emissivity.
+
+    Parameters
+    ----------
+    scene : Path
+        The scene's file.
+    study : Path, optional
+        The study's file.
+    emissivity : float, optional
+        In the place of the study's surface.
+
+    Raises
+    ------
+    StudyError
+        If the emissivity is not from 0 to 1.
+    """
+    known = load_study(study) if study is not None else Study()
+    if not scene.is_file():
+        raise StudyError(f"{scene}: there is no such file, expected a scene")
+    changed: dict[str, object] = {"scene": str(scene.resolve())}
+    if emissivity is not None:
+        if not 0 <= emissivity <= 1:
+            raise StudyError(f"--emissivity: {emissivity:g}, expected 0 to 1")
+        changed["surface"] = UniformSection(emissivity=emissivity)
+    return known.model_copy(update=changed)

@@ -1,0 +1,303 @@
+"""The error on any scene: temperature alone is enough, and places are the user's own."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from chipglow.analysis import LinePlace, PointPlace, RegionPlace, ScenePlan, scene_errors
+from chipglow.analysis.regions import Circle, Polygon, Region
+from chipglow.camera import Camera, GaussianPSF
+from chipglow.cli import app
+from chipglow.io import open_scene, write_scene
+from chipglow.radiometry import Band
+from chipglow.scene import Raster, Scene, SceneError, ToolGeometry
+from chipglow.study import Study, run
+from chipglow.surface import CHIP_1, TemperatureSurface, UniformSurface
+
+RASTER = Raster(left=-60e-6, top=40e-6, spacing=1e-6, rows=80, columns=120)
+BAND = Band(3.8e-6, 5.1e-6)
+COLD, HOT = 500.0, 900.0
+CAMERA = Camera(
+    band=BAND,
+    pitch=4e-6,
+    psf=GaussianPSF(8e-6),
+    psf_order="optics",
+    integration_time=2e-6,
+    floor=None,
+)
+MIDDLE = PointPlace("middle", (30e-6, 0.0))
+ACROSS = LinePlace("across", ((-40e-6, 2e-6), (40e-6, 2e-6)))
+
+
+def plate(temperature=None, times=(0.0, 1e-6, 2e-6, 3e-6)):
+    """A plate of temperature alone, hot on the right of x = 0."""
+    hot = np.where(RASTER.x > 0, HOT, COLD) * np.ones((RASTER.rows, 1))
+    one = hot if temperature is None else temperature
+    return Scene.from_fields(RASTER, times, {"temperature": np.stack([one] * len(times))})
+
+
+def found(scene=None, camera=CAMERA, surface=None, **plan):
+    surfaces = {"plate": surface or UniformSurface(0.6)}
+    plan = {"instants": 2, "phases": 2, **plan}
+    return scene_errors(scene or plate(), surfaces, camera, ScenePlan(**plan))
+
+
+def reading(result, place, name):
+    readings = result.surfaces["plate"].readings
+    return next(one for one in readings if (one.place, one.reading) == (place, name))
+
+
+def test_a_scene_of_temperature_alone_is_whole():
+    scene = plate()
+    frame = scene.frame(0)
+    assert scene.fields == ("temperature",)
+    assert (frame.material == 1).all()
+    assert frame.plastic_strain is None and frame.velocity_x is None
+    with pytest.raises(SceneError, match="has no plastic_strain, expected it"):
+        scene.field("plastic_strain", 0)
+
+
+def test_a_file_of_temperature_alone_is_read_as_written(tmp_path):
+    write_scene(plate(), tmp_path / "plate.nc")
+    back = open_scene(tmp_path / "plate.nc")
+    assert back.fields == ("temperature",)
+    # Packed in steps of 1/40 K.
+    np.testing.assert_allclose(back.frame(0).temperature, plate().frame(0).temperature, atol=0.0126)
+
+
+def test_an_even_plate_is_measured_without_error():
+    """Blur and pixels change nothing where nothing changes: rounding and the table's 1/32 K."""
+    even = plate(np.full(RASTER.shape, 800.0))
+    result = found(even, places=(MIDDLE, ACROSS))
+    for place, name in (("middle", "pixel"), ("across", "mean"), ("hottest pixel", "peak")):
+        error = reading(result, place, name).error
+        assert np.abs(error.values).max() < 1e-3, place
+        assert error.values.shape == (2, 1, 4)
+
+
+def test_at_an_edge_the_blurred_radiance_is_the_mean_of_both_sides():
+    """The pixels beside the edge: erf over a pixel's width, calculated from the closed form."""
+    from scipy.integrate import quad
+    from scipy.special import erf
+
+    point = PointPlace("cold side", (-2e-6, 2e-6))
+    result = found(places=(point,), phases=1)
+    deviation = 8e-6 / np.sqrt(8 * np.log(2))
+    bright, _ = quad(lambda x: 0.5 * (1 + erf(x / (np.sqrt(2) * deviation))), -4e-6, 0.0)
+    share = bright / 4e-6
+    radiance = [0.6 * float(BAND.radiance(np.array(T))) for T in (COLD, HOT)]
+    measured = float(BAND.temperature((1 - share) * radiance[0] + share * radiance[1]))
+    reference = float(BAND.temperature(radiance[0]))
+    one = reading(result, "cold side", "pixel")
+    # The kernel is summed over samples of 1 um: 0.03 of the 8 um of its width.
+    assert one.error.mean == pytest.approx(measured - reference, abs=1.5)
+    assert one.reference.mean == pytest.approx(reference, abs=0.01)
+    assert one.psf_portion.mean == pytest.approx(one.error.mean, abs=1e-4)  # the inverse
+
+
+def test_lines_and_regions_give_mean_and_extremes():
+    pad = RegionPlace("pad", Region("pad", Circle((40e-6, 0.0), 10e-6), unit="m"))
+    result = found(places=(ACROSS, pad))
+    mean, worst, most = (
+        reading(result, "across", name).error for name in ("mean", "most negative", "greatest")
+    )
+    assert (worst.values < mean.values).all() and (mean.values < most.values).all()
+    assert worst.mean < -20 and most.mean > 20  # cold spills into hot, and hot into cold
+    assert abs(reading(result, "pad", "mean").error.mean) < 1.0  # far from the edge
+    profile = result.surfaces["plate"].profiles[0]
+    errors = result.surfaces["plate"].errors
+    assert profile.line.distance[-1] == pytest.approx(80e-6)
+    assert profile.error.shape == (4, profile.line.distance.size)
+    assert np.abs(errors.case_1).max() >= np.nanmax(np.abs(profile.error[0])) - 1e-9
+
+
+def test_the_pixel_phase_scatters_at_the_edge_and_not_far_from_it():
+    near = PointPlace("near", (-1e-6, 2e-6))
+    result = found(places=(near, MIDDLE), phases=4)
+    assert reading(result, "near", "pixel").error.parts["pixel phase"].fraction > 0.99
+    assert np.ptp(reading(result, "near", "pixel").error.values) > 5.0
+    assert np.ptp(reading(result, "middle", "pixel").error.values) < 0.5
+
+
+def test_emissivity_follows_the_temperature():
+    metal = TemperatureSurface((600.0, 700.0), (0.2, 0.8))
+    ramp = np.linspace(500.0, 800.0, RASTER.columns) * np.ones((RASTER.rows, 1))
+    frame = plate(ramp).frame(0)
+    expected = np.clip(0.2 + 0.6 * (ramp - 600.0) / 100.0, 0.2, 0.8)
+    np.testing.assert_allclose(metal.on(plate()).emissivity(frame), expected, atol=1e-6)
+    for temperatures, emissivities, wrong in (
+        ((600.0,), (0.2,), "2 or more"),
+        ((700.0, 600.0), (0.2, 0.3), "ascending"),
+        ((600.0, 700.0), (0.2, 1.3), "expected 0 to 1"),
+    ):
+        with pytest.raises(ValueError, match=wrong):
+            TemperatureSurface(temperatures, emissivities)
+
+
+@pytest.mark.parametrize(
+    ("place", "wrong"),
+    [
+        (lambda: PointPlace("far", (1.0, 0.0)), r"far: reaches over x 1e\+06"),
+        (lambda: LinePlace("dot", ((0.0, 0.0), (0.0, 0.0))), "two corners are the same"),
+        (lambda: LinePlace("short", ((0.0, 0.0),)), "1 corners, expected 2"),
+        (lambda: PointPlace(" ", (0.0, 0.0)), "the name is empty"),
+        (
+            lambda: RegionPlace(
+                "pixels", Region("pixels", Polygon(((1, 1), (5, 1), (5, 5))), unit="pixel")
+            ),
+            "is in pixels, expected lengths",
+        ),
+    ],
+)
+def test_places_that_cannot_be_are_refused(place, wrong):
+    with pytest.raises(ValueError, match=wrong):
+        found(places=(place(),))
+
+
+def test_two_places_have_two_names():
+    with pytest.raises(ValueError, match="two places have the name 'middle'"):
+        ScenePlan(places=(MIDDLE, MIDDLE))
+
+
+def test_features_of_a_chip_need_the_strain():
+    with pytest.raises(ValueError, match=r"no plastic strain.*expected a surface of another"):
+        CHIP_1.on(plate())
+
+
+def test_a_place_that_some_pixels_do_not_hold_is_told_of():
+    corner = PointPlace("corner", (-59.5e-6, 39.5e-6))
+    result = found(places=(corner,))
+    assert any("corner, plate: not read" in sentence for sentence in result.missing)
+
+
+STUDY = """
+surface: {kind: uniform, emissivity: 0.6}
+camera:
+  pitch: 4 um
+  integration_time: 2 us
+  floor: none
+  psf: {kind: gaussian, fwhm: 8 um}
+  psf_order: optics
+analysis:
+  instants: 2
+  phases: 2
+  points: {middle: [30 um, 0 um]}
+  lines: {across: [[-40 um, 2 um], [40 um, 2 um]]}
+  regions: {pad: {circle: {centre: [40 um, 0 um], radius: 10 um}}}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_scene(plate(), tmp_path / "plate.nc")
+    (tmp_path / "study.yaml").write_text(STUDY)
+    return tmp_path
+
+
+def chipglow(*arguments):
+    return CliRunner().invoke(app, arguments)
+
+
+def test_the_command_reports_without_a_word_of_cutting(folder):
+    done = chipglow("error", "plate.nc", "--study", "study.yaml", "--out", "out")
+    assert done.exit_code == 0, done.output
+    for word in ("hottest", "middle", "across", "pad"):
+        assert word in done.output
+    page = (folder / "out" / "report.html").read_text(encoding="utf-8")
+    told = re.sub(r"<pre>.*?</pre>|src=\"[^\"]*\"|<style>.*?</style>", "", page, flags=re.S)
+    told = told.replace("chipglow", "")
+    assert not re.search(r"\b(chip|rake|shear|cut|cutting|tool|workpiece|paper)\b", told, re.I)
+    assert "Measurement error of plate.nc" in told
+    results = json.loads((folder / "out" / "summary.json").read_text())["results"]["uniform"]
+    errors = found(places=(MIDDLE, ACROSS))
+    here = reading(errors, "across", "most negative").error.mean
+    # The file's temperatures are rounded to 1/40 K.
+    assert results["across"]["most negative"]["error_degC"]["mean"] == pytest.approx(here, abs=0.1)
+    with xr.open_dataset(folder / "out" / "results.nc", engine="h5netcdf") as data:
+        assert data["profile_across_uniform"].shape[0] == 4
+        assert all(data[name].attrs.get("units") for name in data.data_vars)
+
+
+def test_the_study_as_run_runs_again(folder):
+    assert chipglow("error", "plate.nc", "--study", "study.yaml", "--out", "out").exit_code == 0
+    done = chipglow("run", "out/study.yaml", "--out", "again")
+    assert done.exit_code == 0, done.output
+    first, second = (
+        json.loads((folder / name / "summary.json").read_text())["results"]
+        for name in ("out", "again")
+    )
+    assert first == second
+
+
+def test_one_emissivity_is_enough(folder):
+    (folder / "short.yaml").write_text("camera: {integration_time: 2 us, floor: none}\n")
+    done = chipglow(
+        "error", "plate.nc", "--study", "short.yaml", "--emissivity", "0.5", "--out", "out"
+    )
+    assert done.exit_code == 0, done.output
+    assert (folder / "out" / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("plate.nc", "--emissivity", "1.5"), ("--emissivity", "1.5", "expected 0 to 1")),
+        (("none.nc",), ("none.nc", "no such file")),
+        (("plate.nc",), ("plate.nc", "no plastic strain", "kind: uniform")),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(folder, arguments, words):
+    done = chipglow("error", *arguments, "--out", "out")
+    assert done.exit_code != 0
+    told = done.stderr
+    assert all(word in told for word in words), told
+    assert not (folder / "out").exists()
+
+
+def test_run_is_partial_where_something_is_missing_and_says_what(folder):
+    study = Study(
+        scene=str(folder / "plate.nc"),
+        surface={"kind": "uniform", "emissivity": 0.6},
+        camera={"integration_time": "2 us", "floor": "none", "pitch": "4 um"},
+        analysis={"instants": 1, "phases": 1},
+    )
+    result = run(study)
+    missing = " ".join(result.missing)
+    for word in ("no tool", "no plastic strain rate", "no velocity"):
+        assert word in missing
+    assert [place.name for place in result.places] == ["hottest pixel"]
+
+
+def test_a_chip_without_a_shear_band_still_has_a_rake_face(tmp_path):
+    """A continuous chip: it touches the tool, and no strain rate stands out."""
+    tool = ToolGeometry(np.radians(-7), np.radians(7), 5e-6)
+    x, y = np.meshgrid(RASTER.x, RASTER.y)
+    inside = tool.signed_distance(x, y) < 0
+    zero = np.zeros(RASTER.shape)
+    fields = {
+        "temperature": np.where(inside, 700.0, 800.0 + 1e6 * x),
+        "plastic_strain": zero + 1.0,
+        "plastic_strain_rate": zero,
+        "velocity_x": zero,
+        "velocity_y": zero + 1.0,
+        "material": np.where(inside, 2, 1),
+    }
+    times = [0.0, 1e-6, 2e-6]
+    stacked = {name: np.stack([values] * 3) for name, values in fields.items()}
+    write_scene(Scene.from_fields(RASTER, times, stacked, tool), tmp_path / "chip.nc")
+    study = Study(
+        scene=str(tmp_path / "chip.nc"),
+        surface={"kind": "uniform", "emissivity": 0.6},
+        camera={"integration_time": "2 us", "floor": "none", "pitch": "4 um"},
+        analysis={"instants": 1, "phases": 1},
+    )
+    result = run(study)
+    assert [place.name for place in result.places] == ["hottest pixel", "rake face"]
+    assert any("shear band" in sentence for sentence in result.missing)
+    readings = {(one.place, one.reading) for one in result.surfaces["uniform"].readings}
+    assert ("rake face", "mid-contact") in readings
