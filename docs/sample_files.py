@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 HERE: Final = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "benchmarks"), str(HERE.parent / "tests")]
 
+import any_scene  # noqa: E402
 from analytic_chip import AnalyticChip  # noqa: E402
 from band_pictures import experiment  # noqa: E402
 from camera_files import cine  # noqa: E402
@@ -281,6 +282,7 @@ def write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[Any]
 
 
 SAMPLES: Final = {
+    "any-scene": any_scene.samples,
     "camera-files": recordings,
     "compare": a_chip,
     "emissivity": a_heated_chip,

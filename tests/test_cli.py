@@ -282,7 +282,10 @@ def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(folder, runs, ch
     (folder / "import.yaml").write_text(dumps(described))
     result = chipglow("import", "import.yaml", "--out", "scene.nc")
     assert result.exit_code == 0, result.output
-    (folder / "study.yaml").write_text("scene: scene.nc\nanalysis: {instants: 3}\n")
+    (folder / "study.yaml").write_text(
+        "scene: scene.nc\ncutting: {tool: {}}\n"
+        "analysis: {instants: 2, phases: 1, textures: 1, psf_widths: [8 um]}\n"
+    )
     result = chipglow("run", "study.yaml", "--out", "results")
     assert result.exit_code == 0, result.output
     assert runs == []

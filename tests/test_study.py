@@ -666,5 +666,5 @@ def test_what_an_emissivity_map_leaves_of_the_scene_is_said():
     (sentence,) = uncovered({"half": maps["half"]}, raster)
     assert sentence.startswith("The emissivity map 'half' tells 50")
     assert "elsewhere its emissivity is 0" in sentence
-    with pytest.raises(ValueError, match=r"surface.maps: away: lies at x .* expected the scene's"):
+    with pytest.raises(ValueError, match=r"the map 'away' lies at x .* expected the scene's"):
         list(uncovered({"away": maps["away"]}, raster))

@@ -108,7 +108,7 @@ class GaussianPSF(PointSpreadFunction):
     Raises
     ------
     ValueError
-        If the width is not positive, or longer than 1 mm.
+        If the width is not positive, or longer than 0.1 m.
     """
 
     fwhm: float
@@ -405,8 +405,8 @@ def _half_maximum_width(line: NDArray[np.float64]) -> float:
 
 
 def _check_length(name: str, value: float) -> None:
-    if not (isinstance(value, Real) and 0.0 < value <= 1e-3):
-        raise ValueError(f"psf: {name} is {value!r}, expected over 0 to 1e-3 m; 8 um is 8e-6")
+    if not (isinstance(value, Real) and 0.0 < value <= 0.1):
+        raise ValueError(f"psf: {name} is {value!r}, expected over 0 to 0.1 m; 8 um is 8e-6")
 
 
 def _checked_weights(weights: ArrayLike) -> NDArray[np.float64]:

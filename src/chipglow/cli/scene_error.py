@@ -23,12 +23,11 @@ def study_of(scene: Path, study: Path | None, emissivity: float | None) -> Study
     StudyError
         If the emissivity is not from 0 to 1.
     """
-    known = load_study(study) if study is not None else Study()
     if not scene.is_file():
         raise StudyError(f"{scene}: there is no such file, expected a scene")
-    changed: dict[str, object] = {"scene": str(scene.resolve())}
-    if emissivity is not None:
-        if not 0 <= emissivity <= 1:
-            raise StudyError(f"--emissivity: {emissivity:g}, expected 0 to 1")
-        changed["surface"] = UniformSection(emissivity=emissivity)
-    return known.model_copy(update=changed)
+    known = Study(scene=str(scene.resolve())) if study is None else load_study(study, scene)
+    if emissivity is None:
+        return known
+    if not 0 <= emissivity <= 1:
+        raise StudyError(f"--emissivity: {emissivity:g}, expected 0 to 1")
+    return known.model_copy(update={"surface": UniformSection(emissivity=emissivity)})

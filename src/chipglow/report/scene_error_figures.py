@@ -60,7 +60,9 @@ def scene(result: SceneErrors) -> Figure:
     panels = [ImagePanel("temperature", "temperature / °C", temperature, ends, drawing.HEAT)]
     for name, surface in result.surfaces.items():
         emissivity = np.where(there, surface.emissivity, np.nan)
-        panels.append(ImagePanel(f"emissivity, {name}", "emissivity", emissivity, (0.0, 1.0)))
+        panels.append(
+            ImagePanel(_titled("emissivity", name, result), "emissivity", emissivity, (0.0, 1.0))
+        )
     return _grid_of(panels, result)
 
 
@@ -79,7 +81,7 @@ def measurement(result: SceneErrors) -> Figure:
         drawing.show_image(axes[0], truth, result.raster, result.tool, drawing.HEAT, shown)
         pixels = surface.measurement.raster
         picture = drawing.show_image(axes[1], measured, pixels, result.tool, drawing.HEAT, shown)
-        axes[0].set_title(f"scene, {name}, one moment")
+        axes[0].set_title(_titled("scene, one moment", name, result))
         axes[1].set_title("as measured")
         axes[0].label_outer()
         axes[1].label_outer()
@@ -101,7 +103,7 @@ def error_images(result: SceneErrors) -> Figure:
         ):
             limit = drawing.round_limit(image[seen], 99.5, 10.0)
             panel = ImagePanel(
-                f"{what}, {name}", f"{what} / °C", image, (-limit, limit), drawing.SIGNED
+                _titled(what, name, result), f"{what} / °C", image, (-limit, limit), drawing.SIGNED
             )
             panel.draw(figure, one, errors.raster, result.tool)
             drawing.veil(one, errors.flagged, errors.raster)
@@ -112,7 +114,7 @@ def error_images(result: SceneErrors) -> Figure:
 def profiles(result: SceneErrors) -> Figure | None:
     """Temperatures and errors along the user's lines."""
     found = [
-        (f"{one.name}, {name}", one)
+        (_titled(one.name, name, result), one)
         for name, surface in result.surfaces.items()
         for one in surface.profiles
     ]
@@ -163,13 +165,18 @@ def over_time(result: SceneErrors) -> Figure | None:
                 label=f"{reading.place}: {reading.reading}",
             )
         axes.axhline(0.0, color=GREY, linewidth=0.6)
-        axes.set_title(name)
+        axes.set_title(_titled("error", name, result))
         axes.set_xlabel(f"begin of the exposure / {unit}")
         axes.label_outer()
     panels[0].set_ylabel("error / °C")
     handles = panels[0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=2)
     return figure
+
+
+def _titled(what: str, surface: str, result: SceneErrors) -> str:
+    """Title of a panel; with the surface's name where there are several."""
+    return f"{what}, {surface}" if len(result.surfaces) > 1 else what
 
 
 def _first_readings(surface: SurfaceErrors) -> list[PlaceErrors]:

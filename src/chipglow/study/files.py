@@ -23,13 +23,15 @@ class StudyError(ValueError):
     """A study that cannot be run: the message names the file, the field and what was expected."""
 
 
-def load_study(path: str | Path) -> Study:
+def load_study(path: str | Path, scene: str | Path | None = None) -> Study:
     """Read a study from a YAML file.
 
     Parameters
     ----------
     path : str or Path
         The file. Files that it names are looked up beside it.
+    scene : str or Path, optional
+        A scene in the place of that which the file names, or of its cut.
 
     Raises
     ------
@@ -39,7 +41,10 @@ def load_study(path: str | Path) -> Study:
         If the file cannot be read.
     """
     path = Path(path)
-    return validated(Study, read_yaml(path), path.name, path.parent)
+    data = read_yaml(path)
+    if scene is not None:
+        data = _placed(data, ["scene"], str(Path(scene).resolve()))
+    return validated(Study, data, path.name, path.parent)
 
 
 def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescription:

@@ -505,7 +505,7 @@ class FeaturesSection(Section):
 class SameSurfaceSection(Part):
     """One surface, whose kind names it."""
 
-    kind: str
+    kind: str = Field(description="What tells the emissivity.")
 
     @property
     def names(self) -> tuple[str, ...]:
