@@ -180,15 +180,15 @@ def test_a_second_run_finds_the_scene_and_replaces_the_results(earlier_results, 
 def test_reproduce_runs_the_papers_study(folder, monkeypatch):
     seen = []
 
-    def note(study, out, resume, remarks=()):
-        seen.append((study, str(out), resume, list(remarks)))
+    def note(study, out, resume, agreed, remarks=()):
+        seen.append((study, str(out), resume, agreed, list(remarks)))
 
     monkeypatch.setattr("chipglow.cli.results.write_results", note)
     assert chipglow("reproduce").exit_code == 0
-    assert chipglow("reproduce", "--quick", "--out", "quick", "--resume").exit_code == 0
+    assert chipglow("reproduce", "--quick", "--out", "quick", "--resume", "--yes").exit_code == 0
     assert seen == [
-        (Study(), "chipglow-paper", False, []),
-        (Study.quick(), "quick", True, [QUICK]),
+        (Study(), "chipglow-paper", False, False, []),
+        (Study.quick(), "quick", True, True, [QUICK]),
     ]
 
 
@@ -300,7 +300,7 @@ def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(folder, runs, ch
     write_scene(chip_scene, folder / "scene.nc")
     result = chipglow("run", "study.yaml", "--out", "own")
     assert result.exit_code == 0, result.output
-    assert "Assumed" not in result.stderr
+    assert "Assumed: The scene" not in result.stderr
     own = loads((folder / "own" / "summary.json").read_text())["results"]
     for name in ("rake_error_degC", "band_error_degC"):
         assert foreign[name] == pytest.approx(own[name], rel=0.2), name

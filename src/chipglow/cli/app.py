@@ -37,6 +37,9 @@ StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="The study, a Y
 ResultFolder = Annotated[
     Path, typer.Option(metavar="DIR", help="Folder of the results; earlier results are replaced.")
 ]
+Yes = Annotated[
+    bool, typer.Option("--yes", help="Do not ask before a cut of many minutes or gigabytes.")
+]
 Resume = Annotated[
     bool, typer.Option("--resume", help="Go on with the same cut where an earlier run was ended.")
 ]
@@ -78,6 +81,7 @@ def reproduce(
     ] = False,
     out: ResultFolder = PAPER_FOLDER,
     resume: Resume = False,
+    yes: Yes = False,
 ) -> None:
     """Do the paper's study anew and set its figures beside the paper's."""
     from chipglow.cli.results import write_results
@@ -85,9 +89,9 @@ def reproduce(
     from chipglow.study import Study
 
     if quick:
-        write_results(Study.quick(), out, resume, [QUICK])
+        write_results(Study.quick(), out, resume, yes, [QUICK])
     else:
-        write_results(Study(), out, resume)
+        write_results(Study(), out, resume, yes)
 
 
 @app.command()
@@ -131,12 +135,12 @@ def init(
 
 
 @app.command()
-def run(study: StudyFile, out: ResultFolder, resume: Resume = False) -> None:
+def run(study: StudyFile, out: ResultFolder, resume: Resume = False, yes: Yes = False) -> None:
     """Run a study: cut, look, analyse, report."""
     from chipglow.cli.results import write_results
     from chipglow.study import load_study
 
-    write_results(load_study(study), out, resume)
+    write_results(load_study(study), out, resume, yes)
 
 
 @app.command()
@@ -176,12 +180,13 @@ def cut(
         ),
     ] = None,
     resume: Resume = False,
+    yes: Yes = False,
 ) -> None:
     """Do only the cutting simulation of a study."""
     from chipglow.cli.cutting import cut_study
     from chipglow.study import load_study
 
-    cut_study(load_study(study), out, preview, resume)
+    cut_study(load_study(study), out, preview, resume, yes)
     print(out)
     if preview is not None:
         print(preview)

@@ -15,7 +15,7 @@ from chipglow.scene import Frame
 from chipglow.study import Study, cut, is_cut, kept_progress, preview_raster
 
 
-def cut_study(study: Study, out: Path, preview: Path | None, resume: bool) -> None:
+def cut_study(study: Study, out: Path, preview: Path | None, resume: bool, agreed: bool) -> None:
     """Cut, or find what was cut before, and write the scene.
 
     Parameters
@@ -29,9 +29,11 @@ def cut_study(study: Study, out: Path, preview: Path | None, resume: bool) -> No
         a scene that was found.
     resume : bool
         Whether to go on with a cut that an earlier run left unfinished.
+    agreed : bool
+        Whether the user agreed beforehand to what it costs.
     """
     with atomic_path(out) as temporary, _movie(study, preview) as on_preview:
-        say_where_it_starts(study, resume)
+        say_where_it_starts(study, resume, agreed)
         if on_preview:
             _say_what_it_shows(study, resume)
         with progress_bars() as progress:

@@ -36,7 +36,8 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
     ValueError
         If there is no such chip, or no exposure fits into the scene.
     """
-    fitted, camera = fit(study, open_scene(path)), study.camera.build()
+    fitted = fit(study, open_scene(path))
+    camera = study.camera.on(fitted.scene.raster)
     scene, surfaces = fitted.scene, fitted.surfaces
     name = next(iter(surfaces)) if chip is None else chip
     if name not in surfaces:

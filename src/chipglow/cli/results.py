@@ -25,7 +25,9 @@ from chipglow.report import (
 from chipglow.study import Study, errors, run, study_text
 
 
-def write_results(study: Study, folder: Path, resume: bool, remarks: Sequence[str] = ()) -> None:
+def write_results(
+    study: Study, folder: Path, resume: bool, agreed: bool, remarks: Sequence[str] = ()
+) -> None:
     """Run a study, write its report and print the comparison with the paper.
 
     Parameters
@@ -37,10 +39,12 @@ def write_results(study: Study, folder: Path, resume: bool, remarks: Sequence[st
         before anything is computed.
     resume : bool
         Whether to go on with a cut that an earlier run left unfinished.
+    agreed : bool
+        Whether the user agreed beforehand to what it costs.
     remarks : sequence of str
         What a reader must know before quoting a number: printed, and on the page.
     """
-    _write(study, folder, resume, remarks, run)
+    _write(study, folder, resume, agreed, remarks, run)
 
 
 def write_errors(study: Study, folder: Path) -> None:
@@ -53,19 +57,20 @@ def write_errors(study: Study, folder: Path) -> None:
     folder : Path
         As for `write_results`.
     """
-    _write(study, folder, False, (), errors)
+    _write(study, folder, False, True, (), errors)
 
 
 def _write(
     study: Study,
     folder: Path,
     resume: bool,
+    agreed: bool,
     remarks: Sequence[str],
     compute: Callable[..., StudyResult | SceneErrors],
 ) -> None:
     with atomic_folder(folder) as temporary:
         if study.scene is None:
-            say_where_it_starts(study, resume)
+            say_where_it_starts(study, resume, agreed)
         assumed: list[str] = []
         with progress_bars() as progress:
             result = compute(study, progress, resume, assumed.append)
@@ -123,10 +128,12 @@ def _provenance(study: Study) -> dict[str, str]:
 def _print_table(result: StudyResult | SceneErrors) -> None:
     """The paper's figures beside ours; of any scene the error at each place."""
     if isinstance(result, StudyResult):
-        table = Table("quantity", "the paper", "here", "range of draws", "differs")
+        beside = result.plan.beside_paper
+        heads = ("the paper", "here", "range of draws", "differs")
+        table = Table("quantity", *(heads if beside else heads[1:3]))
         for row in comparison_rows(result):
             texts = (row.paper_text, row.here_text, row.range_text, row.differs_text)
-            table.add_row(row.quantity, *texts)
+            table.add_row(row.quantity, *(texts if beside else texts[1:3]))
     else:
         table = Table("place", "reference", "error", "range", "PSF's portion")
         for place in place_rows(result):

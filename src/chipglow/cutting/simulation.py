@@ -207,6 +207,15 @@ class CuttingSimulation:
         density = cold * self.numerics.mass_scaling
         return density * self.conditions.speed**2 * self.conditions.feed
 
+    @property
+    def point_steps(self) -> float:
+        """Material points times time steps of the whole cut, about: its time follows them."""
+        numerics, conditions = self.numerics, self.conditions
+        side = numerics.cell / numerics.points_per_side
+        points = (numerics.upstream + numerics.downstream) * (numerics.depth + conditions.feed)
+        step = numerics.courant * numerics.cell / (_sound(self) + conditions.speed)
+        return points / side**2 * conditions.length_of_cut / conditions.speed / step
+
     def _recorder(self, window: OutputWindow) -> Recorder:
         return Recorder(window, self.conditions.speed, self.conditions.length_of_cut)
 

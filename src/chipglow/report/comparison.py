@@ -1,7 +1,7 @@
 """The paper's figures beside ours, with their scatter, and whether the two differ."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
@@ -146,7 +146,10 @@ def comparison_rows(result: StudyResult) -> list[Row]:
     list of Row
         The paper's quantities first.
     """
-    return [*_error_rows(result), *_period_rows(result), *_further_rows(result)]
+    rows = [*_error_rows(result), *_period_rows(result), *_further_rows(result)]
+    if result.plan.beside_paper:
+        return rows
+    return [replace(row, paper=None, where="") for row in rows]
 
 
 def cause_rows(result: StudyResult) -> list[CauseRow]:
@@ -246,7 +249,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             PAPER.segment_period.value * 1e6,
             _known(segments.period * 1e6),
             0,
-            evidence.period(result.forces.segmentation),
+            evidence.period(result, result.forces.segmentation),
             PAPER.segment_period.where,
             uncertainty=_known(segments.period_uncertainty * 1e6),
         ),
@@ -264,7 +267,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             "N/mm",
             segments.cutting_mean * 1e-3,
             0,
-            "Per width of cut; the paper gives no forces.",
+            evidence.beside(result, "Per width of cut.", "The paper gives no forces."),
         ),
         _own(
             "cutting_force_swing_N_per_mm",
@@ -280,7 +283,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             "N/mm",
             segments.thrust_mean * 1e-3,
             0,
-            "Per width of cut; the paper gives no forces.",
+            evidence.beside(result, "Per width of cut.", "The paper gives no forces."),
         ),
         _own(
             "energy_unaccounted_percent",
@@ -334,8 +337,12 @@ def _further_rows(result: StudyResult) -> list[Row]:
             "µm",
             widths * 1e6,
             1,
-            "Full width at half maximum of the plastic strain rate at one moment, median over the "
-            "band's middle half. The paper's error depends on its own, which it does not state.",
+            evidence.beside(
+                result,
+                "Full width at half maximum of the plastic strain rate at one moment, median over "
+                "the band's middle half.",
+                "The paper's error depends on its own, which it does not state.",
+            ),
         ),
         _of_segments(
             "band_peak_rate_per_s",
@@ -343,7 +350,7 @@ def _further_rows(result: StudyResult) -> list[Row]:
             "1/s",
             rates,
             -3,
-            "The paper's emissivity map takes 30 000 1/s and more for shear band wholly; the "
+            "The emissivity map takes 30 000 1/s and more for shear band wholly; the "
             f"median over our bands' middle halves is {_thousands(middle)} 1/s.",
         ),
         _of_segments(
@@ -377,6 +384,7 @@ def _headline(
 ) -> Iterator[Row]:
     """The rows of an error and of the point spread function's part of it."""
     headline = result.draws.headlines.get(name)
+    paper = paper if result.plan.beside_paper else (None, None)
     error = headline.error if headline else None
     share = headline.psf_share if headline else None
     yield _drawn(
@@ -405,6 +413,8 @@ def _drawn(
     scale: float = 1.0,
 ) -> Row:
     drawn = Distribution(scale * draws.values, draws.causes) if draws else None
+    if drawn and paper:
+        explanation = evidence.joined(explanation, evidence.place(drawn, scale * paper.value, unit))
     return Row(
         key,
         quantity,
@@ -412,9 +422,7 @@ def _drawn(
         scale * paper.value if paper else None,
         drawn.mean if drawn else None,
         0,
-        evidence.joined(explanation, evidence.place(drawn, scale * paper.value, unit))
-        if drawn and paper
-        else explanation,
+        explanation,
         paper.where if paper else "",
         drawn,
         _known(scale * one_draw),

@@ -12,7 +12,7 @@ from chipglow.analysis.distribution import COVERAGE
 from chipglow.analysis.error import ReferenceKind
 
 ORDER_TEXT: Final = {
-    "sensor": "from pixel to pixel, as in the paper",
+    "sensor": "from pixel to pixel",
     "optics": "before the pixels integrate",
 }
 
@@ -88,7 +88,7 @@ def _spread(draws: Distribution, scale: float) -> str:
 
 def _against(result: StudyResult, name: str, paper: float) -> str:
     headline = result.draws.headlines.get(name)
-    if headline is None or headline.error.draws < 2:
+    if headline is None or headline.error.draws < 2 or not result.plan.beside_paper:
         return ""
     if headline.error.differs_from(paper):
         return f"The paper's {-paper:.0f} °C lies outside this scatter."
@@ -205,8 +205,8 @@ def place(draws: Distribution, paper: float, unit: str) -> str:
     return f"{where}: the paper's does not differ."
 
 
-def period(segments: Segmentation) -> str:
-    """Why the segment period differs."""
+def period(result: StudyResult, segments: Segmentation) -> str:
+    """How the segment period is found, and why the paper's is another."""
     if not isfinite(segments.period):
         return "The cutting force shows no period: the chip is not segmented regularly."
     uncertain = (
@@ -214,11 +214,12 @@ def period(segments: Segmentation) -> str:
         if isfinite(segments.period_uncertainty)
         else "too few to say how uncertain"
     )
-    return (
+    return beside(
+        result,
         f"Mean of the intervals between {segments.segments} force peaks, {uncertain}; the "
-        f"autocorrelation gives {segments.correlation_period * 1e6:.0f} µs. The camera has no part "
-        "in it: the flow stress and its softening set the period, and the paper's simulation has "
-        "other ones than ours."
+        f"autocorrelation gives {segments.correlation_period * 1e6:.0f} µs.",
+        "The camera has no part in it: the flow stress and its softening set the period, and the "
+        "paper's simulation has other ones than ours.",
     )
 
 
@@ -260,9 +261,11 @@ def _psf_text(result: StudyResult) -> str:
     psf = result.camera.psf
     if psf is None:
         return "This camera has no PSF."
-    return (
+    return beside(
+        result,
         f"Our PSF is {_micrometres(psf.fwhm)} wide at half maximum, applied "
-        f"{ORDER_TEXT[result.camera.psf_order]}; the paper gives its own as a picture only."
+        f"{ORDER_TEXT[result.camera.psf_order]}.",
+        "The paper gives its own as a picture only.",
     )
 
 
@@ -302,6 +305,8 @@ def _reach(
         f"Gaussian PSFs of {widths[0] * 1e6:.0f} to {_micrometres(widths[-1])} give "
         f"{text(series[0])} to {text(series[-1])}"
     )
+    if not result.plan.beside_paper:
+        return f"{span}."
     width = crossing(widths, series, target)
     if width is None:
         return f"{span}, none of them the paper's {text(target)}."
@@ -321,6 +326,11 @@ def crossing(
     i = int(changes[0])
     part = (target - series[i]) / (series[i + 1] - series[i])
     return float(widths[i] + part * (widths[i + 1] - widths[i]))
+
+
+def beside(result: StudyResult, text: str, of_paper: str) -> str:
+    """A text, and what is said of the paper where the study is beside it."""
+    return f"{text} {of_paper}" if result.plan.beside_paper else text
 
 
 def joined(*sentences: str) -> str:

@@ -24,7 +24,7 @@ from chipglow.report.drawing import (
     FigureFile,
     ImagePanel,
 )
-from chipglow.report.evidence import error_definition
+from chipglow.report.evidence import beside, error_definition
 from chipglow.report.laboratory_figures import (
     dual_spectrum,
     heated_chips,
@@ -62,13 +62,17 @@ def draw_figures(result: StudyResult, folder: Path) -> Iterator[FigureFile]:
         An existing folder; ``<name>.png`` and ``<name>.svg`` are written.
     """
     for drawing_ in _DRAWINGS:
+        paper, name = drawing_.paper, drawing_.name
+        if not result.plan.beside_paper:
+            name = name.removeprefix(f"{paper.lower().replace(' ', '-')}-")
+            paper = ""
         with drawing.style():
             figure = drawing_.draw(result)
             if figure is None:
                 continue
-            png, svg = drawing.save(figure, folder, drawing_.name)
+            png, svg = drawing.save(figure, folder, name)
         caption, alt = drawing_.caption(result), drawing_.alt(result)
-        yield FigureFile(drawing_.name, drawing_.title, drawing_.paper, caption, alt, png, svg)
+        yield FigureFile(name, drawing_.title, paper, caption, alt, png, svg)
 
 
 def fields(result: StudyResult) -> Figure:
@@ -176,32 +180,11 @@ def error_lines(result: StudyResult) -> Figure:
     left, right = figure.subplots(1, 2)
     rake, band = result.rake, result.band_errors
     _draw_error_line(left, result.draws.rake_line, rake.case_1, rake.psf_portion)
-    paper_rake = PAPER.rake_error.value
-    _draw_point(left, 0.0, paper_rake, BLUE, "the paper's error")
-    _draw_point(
-        left, 0.0, paper_rake * PAPER.rake_psf_share.value, VERMILLION, "the paper's PSF portion"
-    )
     left.set_title(f"a) across the rake face, {result.plan.rake_surface}")
     left.set_xlabel("distance from the rake face / µm\n← tool      chip →")
     _draw_error_line(right, result.draws.band_line, band.case_1, band.psf_portion)
-    paper_band = PAPER.band_error.value
-    _draw_point(right, 0.0, paper_band, BLUE, "the paper's error")
-    _draw_point(
-        right,
-        0.0,
-        paper_band * PAPER.band_psf_share.value,
-        VERMILLION,
-        "the paper's PSF portion",
-    )
-    right.axhline(
-        PAPER.band_worst.value,
-        color=BLUE,
-        linestyle="--",
-        linewidth=1.0,
-        label="the paper, beside",
-    )
-    # The line is no axis: it needs room below.
-    right.set_ylim(bottom=min(right.get_ylim()[0], 1.1 * PAPER.band_worst.value))
+    if result.plan.beside_paper:
+        _draw_papers_points(left, right)
     right.set_title(f"b) across the shear band, {result.plan.band_surface}")
     right.set_xlabel("distance from the ridge / µm\n← workpiece      chip →")
     for axes in (left, right):
@@ -212,6 +195,20 @@ def error_lines(result: StudyResult) -> Figure:
     handles |= dict(zip(*reversed(right.get_legend_handles_labels()), strict=True))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3)
     return figure
+
+
+def _draw_papers_points(left: Axes, right: Axes) -> None:
+    """The figures that the paper states, on the lines of its Figure 11."""
+    for axes, error, share in (
+        (left, PAPER.rake_error.value, PAPER.rake_psf_share.value),
+        (right, PAPER.band_error.value, PAPER.band_psf_share.value),
+    ):
+        _draw_point(axes, 0.0, error, BLUE, "the paper's error")
+        _draw_point(axes, 0.0, error * share, VERMILLION, "the paper's PSF portion")
+    worst = PAPER.band_worst.value
+    right.axhline(worst, color=BLUE, linestyle="--", linewidth=1.0, label="the paper, beside")
+    # The line is no axis: it needs room below.
+    right.set_ylim(bottom=min(right.get_ylim()[0], 1.1 * worst))
 
 
 def point_spread(result: StudyResult) -> Figure | None:
@@ -328,9 +325,9 @@ def psf_sensitivity(result: StudyResult) -> Figure:
                 markersize=3.0,
                 label=label,
             )
-        axes.axhline(
-            panel.scale * panel.paper, color="black", linestyle="--", linewidth=1.0, label="paper"
-        )
+        if result.plan.beside_paper:
+            level, style = panel.scale * panel.paper, "--"
+            axes.axhline(level, color="black", linestyle=style, linewidth=1.0, label="paper")
         if result.camera.psf is not None and panel.own is not None:
             width, own = result.camera.psf.fwhm * 1e6, panel.scale * panel.own
             colour = _ORDER_STYLE[result.camera.psf_order][0]
@@ -483,11 +480,13 @@ def _surface(result: StudyResult) -> SurfaceResult:
 
 
 def _fields_caption(result: StudyResult) -> str:
-    return (
+    return beside(
+        result,
         f"The scene {result.frame.time * 1e6:.1f} µs into the cut, when its shear band is fully "
-        "developed. Grey: no material, or not of this field. Same as the paper: the fields, and "
-        "how strain and strain rate choose the emissivity. Different: strain follows the material "
-        "without remeshing, so that formed bands stay sharp, and textures follow every point."
+        "developed. Grey: no material, or not of this field.",
+        "Same as the paper: the fields, and how strain and strain rate choose the emissivity. "
+        "Different: strain follows the material without remeshing, so that formed bands stay "
+        "sharp, and textures follow every point.",
     )
 
 
@@ -499,104 +498,123 @@ def _measurement_caption(result: StudyResult) -> str:
             " Grey on the right: under the lower limit of the camera's range, "
             f"{result.camera.floor - KELVIN:.0f} °C, {100 * share:.0f} % of the pixels."
         )
-    return (
+    return beside(
+        result,
         "What the simulated camera makes of the scene: radiance temperature of the scene's samples "
-        f"at one moment, and of the pixels over the exposure.{floor} The paper's figure is the "
-        "scheme of this calculation; here is its result."
+        f"at one moment, and of the pixels over the exposure.{floor}",
+        "The paper's figure is the scheme of this calculation; here is its result.",
     )
 
 
 def _heated_caption(result: StudyResult) -> str:
-    return (
-        "Radiance temperature of evenly heated chips, and the regions whose mean is taken. Same as "
-        "the paper: temperatures, reflected laboratory of 20 °C, Equation 2. Different: a virtual "
-        "strip with straight shear bands as wide and as far apart as those of the cut, of known "
-        "emissivity, so that what the procedure finds can be held against the truth: Table 1. The "
-        "camera's lower limit is left out: at 300 °C it would hide emissivities under 0.46 of "
-        "chip 1."
+    return beside(
+        result,
+        "Radiance temperature of evenly heated chips, and the regions whose mean is taken: a "
+        "virtual strip with straight shear bands as wide and as far apart as those of the cut, of "
+        "known emissivity, so that what the procedure finds can be held against the truth "
+        "(Table 1). The camera's lower limit is left out.",
+        "Same as the paper: temperatures, reflected laboratory of 20 °C, Equation 2. Different: "
+        "the strip is not a chip; at the limit of 300 °C emissivities under 0.46 of chip 1 would "
+        "be hidden.",
     )
 
 
 def _heated_tool_caption(result: StudyResult) -> str:
-    return (
-        "Radiance temperature of an evenly heated tool, and the emissivity of its pixels. Same as "
-        "the paper: temperature, mean and standard deviation put in. Different: the texture is "
-        "random; the paper's insert has an uneven oxide with a gradient."
+    return beside(
+        result,
+        "Radiance temperature of an evenly heated tool, and the emissivity of its pixels.",
+        "Same as the paper: temperature, mean and standard deviation put in. Different: the "
+        "texture is random; the paper's insert has an uneven oxide with a gradient.",
     )
 
 
 def _profiles_caption(result: StudyResult) -> str:
     grid = next(s.rake_grid for s in result.surfaces.values() if s.rake_grid is not None)
-    return (
-        f"Mean radiance temperature in squares of 3 × 3 pixels along the rake face, by their depth "
+    return beside(
+        result,
+        "Mean radiance temperature in squares of 3 × 3 pixels along the rake face, by their depth "
         f"in the chip; bars: standard deviation over {grid.times.size} exposures of "
         f"{len(result.segments)} segments. A square counts where all its pixels are over the lower "
-        "limit of the range. Same as the paper: grid, limit, both chips. Different: squares of "
+        "limit of the range.",
+        f"Same as the paper: grid, limit, both chips. Different: squares of "
         f"{grid.size * 1e6:.0f} µm (the paper's first middle of 7.5 µm means 15 µm), and our "
         "contact reaches the border of the view. The paper's panel a is its measurement, of which "
-        "we have no data."
+        "we have no data.",
     )
 
 
 def _dual_caption(result: StudyResult) -> str:
-    return (
+    return beside(
+        result,
         "The same moments in visible light and in the infrared: the band develops, is developed, "
-        "has moved on. Same as the paper: pairs of one moment, tool blacked out. Different: on the "
-        "left is a drawing from the strain (darker where sheared), not a photograph, and infrared "
-        "images are as close in time as we like; the paper's camera takes 600 a second."
+        "has moved on. On the left is a drawing from the strain (darker where sheared), not a "
+        "photograph.",
+        "Same as the paper: pairs of one moment, tool blacked out. Different: infrared images are "
+        "as close in time as we like; the paper's camera takes 600 a second.",
     )
 
 
 def _curves_caption(result: StudyResult) -> str:
-    return (
+    return beside(
+        result,
         "Measured radiance temperature along the ridge of the shear band, by time after the first "
         "exposure. A curve begins where the band does, and its distance counts straight from the "
         "cutting edge to there. The thick curve is the fully developed band, the first within 5 % "
-        "of its greatest rise; the dashed line is the lower limit of the camera's range. Same as "
-        "the paper: panels b and c. Different: bands of the paper's simulation are of another "
-        "length; its panel a is a measurement, of which we have no data."
+        "of its greatest rise; the dashed line is the lower limit of the camera's range.",
+        "Same as the paper: panels b and c. Different: bands of the paper's simulation are of "
+        "another length; its panel a is a measurement, of which we have no data.",
     )
 
 
 def _images_caption(result: StudyResult) -> str:
-    return (
+    return beside(
+        result,
         f"{error_definition(result)} With the band fully developed, in one draw; below, the part "
-        "that the PSF makes. Green: the lines of Figure 11. Dashed: the band's ridge. Paler: under "
-        "the lower limit of the camera's range; the scale is that of the others. Same as the "
-        "paper: definition, cases and panels. Different: our PSF, which the paper gives as a "
-        "picture only."
+        "that the PSF makes. Green: the lines along which the error is read. Dashed: the band's "
+        "ridge. Paler: under the lower limit of the camera's range; the scale is that of the "
+        "others.",
+        "Same as the paper: definition, cases and panels. Different: our PSF, which the paper "
+        "gives as a picture only.",
     )
 
 
 def _lines_caption(result: StudyResult) -> str:
-    return (
-        "Errors along the green lines of Figure 10: through mid-contact along the normal of the "
-        "rake face, and through the middle of the shear band. The paper's stated figures are drawn "
-        "as diamonds and as a dashed line. Different: the paper shows one draw; here are the mean "
-        "and the standard deviation (sd) over all draws of segment, texture and pixel phase, and "
-        "one draw dotted."
+    return beside(
+        result,
+        "Errors along the green lines of the error images: through mid-contact along the normal of "
+        "the rake face, and through the middle of the shear band; mean and standard deviation (sd) "
+        "over all draws of segment, texture and pixel phase, and one draw dotted.",
+        "The paper's stated figures are drawn as diamonds and as a dashed line. Different: the "
+        "paper shows one draw.",
     )
 
 
 def _psf_caption(result: StudyResult) -> str:
-    return (
+    return beside(
+        result,
         f"The camera's point spread function on the scene's plane: {result.camera.psf}. White "
-        "square: one pixel. Different: the paper measured its own with a knife edge and gives it "
-        "as a picture without numbers; ours is calculated."
+        "square: one pixel.",
+        "Different: the paper measured its own with a knife edge and gives it as a picture without "
+        "numbers; ours is calculated.",
     )
 
 
 def _forces_caption(result: StudyResult) -> str:
-    return "Force history of the cut. Each peak is a segment. The paper does not show forces."
+    return beside(
+        result,
+        "Force history of the cut. Each peak is a segment.",
+        "The paper does not show forces.",
+    )
 
 
 def _sensitivity_caption(result: StudyResult) -> str:
-    return (
+    return beside(
+        result,
         "The headline errors, in the mean over segments and pixel phases, with Gaussian PSFs of "
-        "several widths, applied from pixel to pixel as in the paper, or to the light before the "
-        "pixels integrate it. Dashed: the paper's figures, whose PSF's width is not stated. "
-        "Diamond: this camera's PSF, which is not a Gaussian, at its own width, in the mean over "
-        "all draws."
+        "several widths, applied from pixel to pixel, or to the light before the pixels integrate "
+        "it. Diamond: this camera's PSF, which is not a Gaussian, at its own width, in the mean "
+        "over all draws.",
+        "Dashed: the paper's figures, whose PSF's width is not stated.",
     )
 
 

@@ -25,17 +25,16 @@ _PAPER: Final = (
     "Proceedings of the ASME International Manufacturing Science and Engineering Conference, 2010."
 )
 
-_SECTIONS: Final = (
-    ("answer", "The answer"),
-    ("comparison", "The paper beside this study"),
-    ("scatter", "What makes the scatter"),
-    ("figures", "The paper's figures and tables"),
-    ("beyond", "Beyond the paper"),
-    ("chip", "The chip"),
-    ("study", "The study as run"),
-    ("versions", "How it was made"),
-    ("cite", "How to cite"),
-)
+_BESIDE_PAPER: Final = {
+    "comparison": "The paper beside this study",
+    "figures": "The paper's figures and tables",
+    "beyond": "Beyond the paper",
+}
+_OWN: Final = {
+    "comparison": "The errors, and more",
+    "emissivity": "Emissivity",
+    "beyond": "Figures",
+}
 
 
 @dataclass(frozen=True)
@@ -68,6 +67,8 @@ class Content:
         The study's YAML.
     provenance : mapping
         What, when, version, seed and the like, in the order in which it is shown.
+    beside_paper : bool
+        Whether the study is the paper's, and stands beside it.
     """
 
     title: str
@@ -82,6 +83,7 @@ class Content:
     settings: Sequence[tuple[str, str, str]]
     study_text: str
     provenance: Mapping[str, str]
+    beside_paper: bool
 
 
 def page(content: Content) -> str:
@@ -92,40 +94,54 @@ def page(content: Content) -> str:
     content : Content
         What it shows.
     """
+    titles = _BESIDE_PAPER if content.beside_paper else _OWN
     bodies = {
-        "answer": answer_part(content.answer, content.remarks),
-        "comparison": _comparison(content.rows, content.definition),
-        "scatter": _causes(content.causes),
+        "comparison": _comparison(content),
         "figures": "\n".join(_in_the_papers_order(content)),
+        "emissivity": _emissivities(content.emissivities),
         "beyond": "\n".join(figure_part(figure) for figure in content.figures if not figure.paper),
-        "chip": _chip_table(content.chip),
-        "study": f"<pre><code>{escape(content.study_text)}</code></pre>",
-        "versions": definition_list(content.provenance),
-        "cite": _citation(),
     }
-    return document(content.title, [(name, title, bodies[name]) for name, title in _SECTIONS])
+    middle = [(name, title, bodies[name]) for name, title in titles.items() if bodies[name]]
+    sections = [
+        ("answer", "The answer", answer_part(content.answer, content.remarks)),
+        middle[0],
+        ("scatter", "What makes the scatter", _causes(content.causes)),
+        *middle[1:],
+        ("chip", "The chip", _chip_table(content.chip)),
+        (
+            "study",
+            "The study as run",
+            f"<pre><code>{escape(content.study_text)}</code></pre>",
+        ),
+        ("versions", "How it was made", definition_list(content.provenance)),
+        ("cite", "How to cite", _citation()),
+    ]
+    return document(content.title, sections)
 
 
-def _comparison(rows: Sequence[Row], definition: str) -> str:
+def _comparison(content: Content) -> str:
     text = (
-        f"{definition} PSF: point spread function. Here: mean ± standard deviation over the draws "
-        "of segment, texture and pixel phase, or ± standard uncertainty where there is one number. "
-        "One draw: one frame by the paper's procedure. Differs: whether one more draw would be as "
-        "far off as the paper's figure in fewer than 5 of 100 cases."
+        f"{content.definition} PSF: point spread function. Here: mean ± standard deviation over "
+        "the draws of segment, texture and pixel phase, or ± standard uncertainty where there is "
+        "one number. One draw: one frame"
     )
-    heads = ("Quantity", "Paper", "Here", "Range of draws", "One draw", "Differs")
-    return f"<p>{escape(text)}</p>\n" + table_part(heads, _comparison_rows(rows, heads))
-
-
-def _comparison_rows(rows: Sequence[Row], heads: Sequence[str]) -> Iterator[str]:
-    for row in rows:
-        texts = (
-            row.paper_text,
-            row.here_text,
-            row.range_text,
-            row.one_draw_text,
-            row.differs_text,
+    heads: tuple[str, ...] = ("Quantity", "Here", "Range of draws", "One draw")
+    if not content.beside_paper:
+        text += "."
+    else:
+        text += (
+            " by the paper's procedure. Differs: whether one more draw would be as far off as the "
+            "paper's figure in fewer than 5 of 100 cases."
         )
+        heads = ("Quantity", "Paper", *heads[1:], "Differs")
+    return f"<p>{escape(text)}</p>\n" + table_part(heads, _comparison_rows(content, heads))
+
+
+def _comparison_rows(content: Content, heads: Sequence[str]) -> Iterator[str]:
+    for row in content.rows:
+        texts = [row.here_text, row.range_text, row.one_draw_text]
+        if content.beside_paper:
+            texts = [row.paper_text, *texts, row.differs_text]
         where = f'<span class="where">Paper: {escape(row.where)}</span>' if row.where else ""
         yield f"<tr><td>{escape(row.quantity)}{where}</td>{number_cells(texts, heads[1:])}</tr>"
         yield f'<tr class="why"><td colspan="{len(heads)}">{escape(row.explanation)}</td></tr>'
@@ -169,17 +185,39 @@ def _in_the_papers_order(content: Content) -> Iterator[str]:
     yield from after.values()
 
 
+def _emissivities(rows: Sequence[EmissivityTexts]) -> str:
+    """Table 1 of a study that is not the paper's."""
+    heads = ("Feature", "Put in", "Found", "Standard deviation found", "Several textures")
+    text = (
+        "Emissivity of evenly heated objects as mean ± standard deviation put into the study. "
+        f"{_FOUND} The camera's blur takes from the standard deviation, and draws narrow shear "
+        "bands toward the bodies beside them."
+    )
+    body = (
+        f"<tr><td>{escape(row.feature)}</td>"
+        + number_cells((row.true, row.mean, row.deviation, row.textures), heads[1:])
+        + "</tr>"
+        for row in rows
+    )
+    return f"<p>{escape(text)}</p>\n" + table_part(heads, body) if rows else ""
+
+
+_FOUND: Final = (
+    "Found: mean and standard uncertainty of one heated object's region (thermocouple of 2 K "
+    "assumed), and the standard deviation over its pixels; beside it mean ± standard deviation of "
+    "the means of several textures."
+)
+
+
 def _table_1(rows: Sequence[EmissivityTexts]) -> str:
     if not rows:
         return ""
     heads = ("Feature", "Paper", "Put in", "Found", "Standard deviation found", "Several textures")
     text = (
-        "Emissivity as mean ± standard deviation in the paper and put into the study. Found: mean "
-        "and standard uncertainty of one heated object's region (thermocouple of 2 K assumed), and "
-        "the standard deviation over its pixels; beside it mean ± standard deviation of the means "
-        "of several textures. Same as the paper: procedure and numbers. Different: here the truth "
-        "is known: the camera's blur takes from the standard deviation of bodies and tool, and "
-        "draws narrow shear bands toward the bodies beside them."
+        f"Emissivity as mean ± standard deviation in the paper and put into the study. {_FOUND} "
+        "Same as the paper: procedure and numbers. Different: here the truth is known: the "
+        "camera's blur takes from the standard deviation of bodies and tool, and draws narrow "
+        "shear bands toward the bodies beside them."
     )
     body = (
         f"<tr><td>{escape(row.feature)}</td>"

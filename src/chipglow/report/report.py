@@ -66,9 +66,10 @@ def write_report(
         chip=chip,
         figures=list(draw_figures(result, pictures)),
         emissivities=table_1(result),
-        settings=settings,
+        settings=settings if result.plan.beside_paper else (),
         study_text=study_text,
         provenance=provenance,
+        beside_paper=result.plan.beside_paper,
     )
     data = results_dataset(result, provenance)
     data.to_netcdf(folder / "results.nc", engine="h5netcdf", encoding=compression(data))

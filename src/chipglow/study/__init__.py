@@ -2,6 +2,7 @@
 
 from chipglow.study.cache import CachedScene, cache_folder, cached_scenes, clear_cache
 from chipglow.study.calibration_schema import CalibrationDescription
+from chipglow.study.cost import Cost, expected_cost
 from chipglow.study.emissivity import surface_text
 from chipglow.study.files import (
     StudyError,
@@ -42,6 +43,7 @@ __all__ = [
     "CUTTING_STEP",
     "CachedScene",
     "CalibrationDescription",
+    "Cost",
     "FieldEntry",
     "Fitted",
     "ImportDescription",
@@ -56,6 +58,7 @@ __all__ = [
     "clear_cache",
     "cut",
     "errors",
+    "expected_cost",
     "field_entries",
     "field_tables",
     "fit",

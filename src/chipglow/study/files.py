@@ -42,6 +42,10 @@ def load_study(path: str | Path, scene: str | Path | None = None) -> Study:
     """
     path = Path(path)
     data = read_yaml(path)
+    if data is None and scene is None:
+        raise StudyError(
+            f"{path.name}: is empty, expected a study (chipglow init writes the paper's)"
+        )
     if scene is not None:
         data = _placed(data, ["scene"], str(Path(scene).resolve()))
     return validated(Study, data, path.name, path.parent)
@@ -244,6 +248,6 @@ def _place(location: Sequence[str | int]) -> Iterator[str]:
 
 
 _KINDS: Final[Mapping[str, tuple[str, ...]]] = {
-    "psf": ("annular-aperture", "gaussian", "measured"),
+    "psf": ("annular-aperture", "airy", "gaussian", "measured"),
     "surface": ("features", "uniform", "map", "temperature", "phase"),
 }

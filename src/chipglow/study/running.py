@@ -23,6 +23,7 @@ from chipglow.io import SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.interrupts import uninterrupted
 from chipglow.io.packing import CUT
 from chipglow.scene import Frame, Scene, SceneError, ToolOutline
+from chipglow.study.assumed import left_to_the_paper
 from chipglow.study.cache import scene_path
 from chipglow.study.fitting import Fitted, fit
 from chipglow.study.preview import preview_of, show_scene
@@ -155,7 +156,9 @@ def errors(
     with _naming(study):
         fitted = _fitted(study, path, assume)
         plan = study.analysis.scene_plan()
-        return scene_errors(fitted.scene, fitted.surfaces, study.camera.build(), plan, progress)
+        return scene_errors(
+            fitted.scene, fitted.surfaces, study.camera.on(fitted.scene.raster), plan, progress
+        )
 
 
 @contextmanager
@@ -175,7 +178,7 @@ def _look(
     study: Study, path: Path, progress: Progress | None, assume: Callable[[str], None] | None
 ) -> StudyResult | SceneErrors:
     fitted = _fitted(study, path, assume)
-    camera = study.camera.build()
+    camera = study.camera.on(fitted.scene.raster)
     missing = [] if study.analysis.places else list(_lacking(fitted.scene))
     if not missing and not study.analysis.places:
         try:
@@ -189,7 +192,7 @@ def _look(
 def _fitted(study: Study, path: Path, assume: Callable[[str], None] | None) -> Fitted:
     fitted = fit(study, open_scene(path))
     if assume:
-        for sentence in fitted.assumed:
+        for sentence in (*left_to_the_paper(study), *fitted.assumed):
             assume(sentence)
     return fitted
 

@@ -37,9 +37,11 @@ from chipglow.cutting import (
     workpiece,
 )
 from chipglow.io import read_emissivity_map, read_tool_outline
+from chipglow.io.column_file import read_response
 from chipglow.radiometry import Band
 from chipglow.scene import Chamfer, Hone, Raster, Tool, ToolGeometry
 from chipglow.study.regions import RegionSection
+from chipglow.study.scaling import scaled, with_pitch
 from chipglow.study.section import OR_NONE, FileBeside, Part, Section, described
 from chipglow.study.units import (
     Angle,
@@ -593,6 +595,7 @@ class AnnularApertureSection(Part):
     kind: Literal["annular-aperture"] = described(
         "annular-aperture",
         "Diffraction of a reflecting microscope objective. Other kinds:\n"
+        "  {kind: airy, f_number: 2.5}  or numerical_aperture: a round aperture\n"
         "  {kind: gaussian, fwhm: 12 um}  full width at half maximum\n"
         "  {kind: measured, file: psf.npy, spacing: 1 um}  .npy or .csv, side of its samples\n"
         "  {kind: measured, file: psf.nc}  what chipglow psf writes",
@@ -604,6 +607,49 @@ class AnnularApertureSection(Part):
     def build(self) -> PointSpreadFunction:
         """The point spread function."""
         return AnnularAperturePSF(self.wavelength, self.numerical_aperture, self.obscuration)
+
+
+class AirySection(Part):
+    """Diffraction of a round aperture, by the data sheet of a lens."""
+
+    kind: Literal["airy"] = described("airy", "Diffraction of a round aperture.")
+    wavelength: Annotated[Wavelength | None, *OR_NONE] = described(
+        "none", "Wavelength of the diffraction; none: the middle of the camera's band."
+    )
+    numerical_aperture: Annotated[float | None, *OR_NONE] = described(
+        "none", "Numerical aperture on the scene's side.", "over 0, up to 1, or none"
+    )
+    f_number: Annotated[float | None, *OR_NONE] = described(
+        "none",
+        "F-number of the lens, focused at infinity; with the camera's magnification m the\n"
+        "numerical aperture is m / (2 f_number (1 + m)).",
+        "over 0, or none",
+    )
+
+    def build(self) -> PointSpreadFunction:
+        """The point spread function of a camera of 4.5 um at a magnification of 1."""
+        return self.psf(4.5e-6, 1.0)
+
+    def psf(self, middle: float, magnification: float) -> PointSpreadFunction:
+        """The point spread function.
+
+        Parameters
+        ----------
+        middle : float
+            Middle of the camera's band in m.
+        magnification : float
+            Of the camera's lens.
+        """
+        given = (self.numerical_aperture, self.f_number)
+        if (given[0] is None) == (given[1] is None):
+            raise ValueError("expected one of numerical_aperture and f_number")
+        aperture = self.numerical_aperture
+        if self.f_number is not None:
+            if not self.f_number > 0:
+                raise ValueError(f"f_number: {self.f_number:g}, expected over 0")
+            aperture = magnification / (2 * self.f_number * (1 + magnification))
+        assert aperture is not None
+        return AnnularAperturePSF(self.wavelength or middle, aperture, 0.0)
 
 
 class GaussianSection(Part):
@@ -637,7 +683,8 @@ class MeasuredSection(Part):
 
 
 PSFSection = Annotated[
-    AnnularApertureSection | GaussianSection | MeasuredSection, Field(discriminator="kind")
+    AnnularApertureSection | AirySection | GaussianSection | MeasuredSection,
+    Field(discriminator="kind"),
 ]
 
 
@@ -645,7 +692,29 @@ class CameraSection(Part):
     """The infrared camera."""
 
     band: WavelengthRange = described("3.8-5.1 um", "Spectral band.")
+    response: Annotated[FileBeside | None, *OR_NONE] = described(
+        "none",
+        "Relative spectral response, a CSV file: its first line wavelength_um,response, then a\n"
+        "point a line; it counts within the band.",
+        "none, or a file such as response.csv",
+    )
     pitch: Length = described("6 um", "Distance between sensors, as seen on the scene.")
+    detector_pitch: Annotated[Length | None, *OR_NONE] = described(
+        "none",
+        "The same on the detector, of its data sheet, in the place of pitch; with magnification.",
+        "none, or over 0 um",
+    )
+    magnification: Annotated[float | None, *OR_NONE] = described(
+        "none",
+        "Of the lens: a pitch of 15 um at 2.5 is 6 um on the scene.",
+        "none, or over 0",
+    )
+    array: Annotated[tuple[int, int] | None, Strict(False), *OR_NONE] = described(
+        "none",
+        "Columns and rows of the detector; none, and where the scene is smaller: as many as see\n"
+        "the scene.",
+        "none, or such as [640, 512]",
+    )
     fill_factor: float = described(1.0, "Share of a sensor's square that takes light.")
     offset_right: Position = described("0 um", "First sensor's corner from the scene's left edge.")
     offset_down: Position = described("0 um", "First sensor's corner from the scene's upper edge.")
@@ -667,20 +736,46 @@ class CameraSection(Part):
         "none", "Temperature of the surroundings that the surface reflects, or none."
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _pitch_on_the_scene(cls, data: object) -> object:
+        return with_pitch(data) if isinstance(data, Mapping) else data
+
     def build(self) -> Camera:
-        """The camera."""
+        """The camera, with as many sensors as see the scene."""
+        response = None if self.response is None else read_response(self.response)
         return Camera(
-            band=Band(*self.band),
+            band=Band(*self.band, response),
             pitch=self.pitch,
             offset=(self.offset_right, self.offset_down),
             fill_factor=self.fill_factor,
-            psf=None if self.psf is None else self.psf.build(),
+            psf=self._psf(),
             psf_order=self.psf_order,
             integration_time=self.integration_time,
             frame_rate=self.frame_rate,
             floor=self.floor,
             reflected=self.reflected,
         )
+
+    def on(self, scene: Raster) -> Camera:
+        """The camera on a scene, with no more sensors than its detector has.
+
+        Parameters
+        ----------
+        scene : Raster
+            The scene's samples.
+        """
+        camera = self.build()
+        if self.array is None:
+            return camera
+        seen = camera.sensors(scene)
+        columns, rows = self.array
+        return replace(camera, shape=(min(rows, seen.rows), min(columns, seen.columns)))
+
+    def _psf(self) -> PointSpreadFunction | None:
+        if isinstance(self.psf, AirySection):
+            return self.psf.psf(sum(self.band) / 2, self.magnification or 1.0)
+        return None if self.psf is None else self.psf.build()
 
 
 class AnalysisSection(Part):
@@ -811,11 +906,26 @@ class Study(Section):
     @property
     def plan(self) -> Plan:
         """What to analyse of a cut; a surface that is the only one is seen everywhere."""
-        plan = self.analysis.build()
+        plan = replace(self.analysis.build(), beside_paper=self.is_papers)
         if isinstance(self.surface, FeaturesSection):
             return plan
         (name,) = self.surface.names
         return replace(plan, rake_surface=name, band_surface=name)
+
+    @property
+    def is_papers(self) -> bool:
+        """Whether it cuts, looks and reads as the paper does: its figures may stand beside it.
+
+        How finely it is computed, and how often drawn, does not matter.
+        """
+        paper, finely = type(self)(), {"numerics", "window", "field_of_view", "length_of_cut"}
+        return (
+            self.scene is None
+            and self.cutting.model_dump(exclude=finely) == paper.cutting.model_dump(exclude=finely)
+            and self.surface == paper.surface
+            and self.camera == paper.camera
+            and self.analysis.reference == paper.analysis.reference
+        )
 
     @classmethod
     def quick(cls) -> Self:
@@ -843,6 +953,11 @@ class Study(Section):
         if seed < 0:
             raise ValueError(f"{seed} is negative, expected 0 or more")
         return seed
+
+    @model_validator(mode="before")
+    @classmethod
+    def _scaled(cls, data: object) -> object:
+        return scaled(data) if isinstance(data, Mapping) else data
 
     @field_validator("surface", mode="before")
     @classmethod

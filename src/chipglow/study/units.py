@@ -182,7 +182,8 @@ POSITION: Final = Quantity("a position", "m", "um", "-420 um", positive=False)
 Position = Annotated[float, POSITION]
 LENGTH: Final = Quantity("a length", "m", "um", "6 um")
 Length = Annotated[float, LENGTH]
-CutLength = Annotated[float, Quantity("a length", "m", "mm", "0.3 mm")]
+CUT_LENGTH: Final = Quantity("a length", "m", "mm", "0.3 mm")
+CutLength = Annotated[float, CUT_LENGTH]
 Wavelength = Annotated[float, Quantity("a wavelength", "m", "um", "4.5 um")]
 WAVELENGTHS: Final = Quantity("a band of wavelengths", "m", "um", "3.8-5.1 um")
 WavelengthRange = Annotated[tuple[float, float], WAVELENGTHS]
@@ -190,7 +191,8 @@ TIME: Final = Quantity("a time", "s", "us", "10 us")
 Time = Annotated[float, TIME]
 INSTANT: Final = Quantity("a time", "s", "us", "10 us", positive=False)
 Frequency = Annotated[float, Quantity("a frequency", "Hz", "Hz", "600 Hz")]
-Speed = Annotated[float, Quantity("a speed", "m/s", "m/min", "250 m/min")]
+SPEED: Final = Quantity("a speed", "m/s", "m/min", "250 m/min")
+Speed = Annotated[float, SPEED]
 Angle = Annotated[float, Quantity("an angle", "rad", "deg", "-7 deg", positive=False)]
 HeatTransfer = Annotated[
     float,

@@ -1,0 +1,61 @@
+"""What a study that is not the paper's leaves to it: said, lest it is taken for the user's own."""
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import yaml
+
+from chipglow.study.schema import FeaturesSection, Study
+from chipglow.study.section import Section
+
+_HOW_FINELY: Final = {
+    "cutting": {"numerics", "window", "field_of_view", "length_of_cut", "surroundings"},
+    "camera": {"offset_right", "offset_down", "fill_factor", "psf_order", "reflected"},
+    "surface": {"kind", "maps", "grain", "follow", "restore_deviation"},
+}
+"""Fields whose defaults are no property of the paper's experiment."""
+
+
+def left_to_the_paper(study: Study) -> Iterator[str]:
+    """What is the paper's in a study that is another, a sentence for each section.
+
+    Parameters
+    ----------
+    study : Study
+        The study; of the paper's own nothing is said.
+    """
+    if study.is_papers:
+        return
+    sections = ["surface", "camera"] if study.scene else ["cutting", "surface", "camera"]
+    for name in sections:
+        section = getattr(study, name)
+        if name == "surface" and not isinstance(section, FeaturesSection):
+            continue
+        values = section.model_dump(mode="json")
+        left = list(_unset(section, values, _HOW_FINELY[name], ""))
+        if left:
+            yield f"Not said by the study and so the paper's, of {name}: {', '.join(left)}."
+
+
+def _unset(
+    section: Section, values: dict[str, Any], without: set[str], prefix: str
+) -> Iterator[str]:
+    """Fields that nobody set, with their values as a study writes them."""
+    for name in type(section).model_fields:
+        value = getattr(section, name)
+        if name in without:
+            continue
+        if name not in section.model_fields_set:
+            yield f"{prefix}{name} {_written(values[name])}"
+        elif isinstance(value, Section):
+            yield from _unset(value, values[name], {"kind"}, f"{prefix}{name}.")
+
+
+def _written(value: Any) -> str:
+    """A value in one line, without what is none."""
+    if isinstance(value, dict):
+        value = {key: inner for key, inner in value.items() if inner not in ("none", None, {}, [])}
+    text: str = yaml.safe_dump(
+        value, default_flow_style=True, allow_unicode=True, width=10_000, sort_keys=False
+    )
+    return text.removesuffix("\n").removesuffix("\n...")

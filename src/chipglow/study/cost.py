@@ -1,0 +1,68 @@
+"""What a study will cost before it is begun: time, disk and memory."""
+
+from dataclasses import dataclass
+from math import ceil
+from typing import Final
+
+from numba import get_num_threads
+
+from chipglow.study.schema import Study
+
+_POINT_STEPS: Final = 13e6
+"""Points times steps that a thread of the solver does in a second: 13.5 to 14.5 million."""
+
+_SECONDS_A_SAMPLE: Final = 150e-9
+"""Sampling, packing and writing a frame of the scene, for each of its samples."""
+
+_BYTES_A_SAMPLE: Final = 3.9
+"""Of a scene's file: 1.56 GB of the default's 555 frames of 810 x 900."""
+
+_ANALYSIS_SECONDS: Final = 210e-9
+"""Analysis, for each sample of each frame of each exposure that it reads."""
+
+_MEMORY, _MEMORY_A_SAMPLE = 0.3e9, 1100.0
+"""Memory in bytes: of the libraries, and of a frame's samples in all that is computed of them."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a study costs that has not been cut before.
+
+    Parameters
+    ----------
+    seconds : float
+        Time.
+    disk : float
+        Bytes of the cache.
+    memory : float
+        Bytes of memory.
+    """
+
+    seconds: float
+    disk: float
+    memory: float
+
+
+def expected_cost(study: Study) -> Cost:
+    """What a study costs on this machine, from its sizes; right within a factor of two or so.
+
+    Parameters
+    ----------
+    study : Study
+        A study that cuts.
+    """
+    cutting, camera = study.cutting, study.camera
+    view, window = cutting.field_of_view, cutting.window
+    samples = view.rows * view.columns
+    kept = window.later_bands * ceil(window.band_duration / window.interval)
+    frames = ceil(cutting.duration / window.interval) + kept
+    solver = cutting.simulation().point_steps / (_POINT_STEPS * get_num_threads())
+    exposed = ceil(camera.integration_time / window.interval)
+    exposures = study.analysis.instants + window.later_bands + 1
+    return Cost(
+        seconds=solver
+        + _SECONDS_A_SAMPLE * frames * samples
+        + _ANALYSIS_SECONDS * exposures * exposed * samples,
+        disk=_BYTES_A_SAMPLE * frames * samples,
+        memory=_MEMORY + _MEMORY_A_SAMPLE * samples,
+    )

@@ -1,0 +1,198 @@
+"""A study of one's own: what follows from it, what it leaves to the paper, what it will cost."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import typer
+from analytic_chip import AnalyticChip
+
+from chipglow.analysis.paper import Plan, analyse
+from chipglow.camera import AnnularAperturePSF, Camera
+from chipglow.cli import progress
+from chipglow.report import comparison_rows, write_report
+from chipglow.scene import Raster
+from chipglow.study import Study, StudyError, expected_cost, load_study, study_text
+from chipglow.study.assumed import left_to_the_paper
+from chipglow.surface import CHIP_1, CHIP_2
+
+TITANIUM = {
+    "cutting": {"workpiece": "ti-6al-4v", "speed": "60 m/min", "feed": "0.1 mm"},
+    "camera": {
+        "band": "3-5 um",
+        "detector_pitch": "15 um",
+        "magnification": 2.5,
+        "array": [640, 512],
+        "psf": {"kind": "airy", "f_number": 2.5},
+        "integration_time": "20 us",
+    },
+}
+
+
+def test_view_window_and_length_of_cut_follow_the_feed():
+    paper, own = Study().cutting, Study(**TITANIUM).cutting
+    for ours, papers in (
+        (own.window.start, paper.window.start),
+        (own.length_of_cut, paper.length_of_cut),
+        (own.field_of_view.left, paper.field_of_view.left),
+        (own.field_of_view.top, paper.field_of_view.top),
+    ):
+        assert ours == pytest.approx(papers / 3, rel=1e-3)  # written in um and mm
+    view = own.field_of_view
+    assert view.spacing == pytest.approx(6e-6 / 9, rel=1e-5)
+    assert view.rows * view.spacing == pytest.approx(180e-6, abs=view.spacing)
+    # In the time between frames the chip moves a third as far, at a quarter of the speed.
+    assert own.window.interval == pytest.approx(0.2e-6 * (250 / 60) / 3, rel=1e-3)
+
+
+def test_an_exposure_fits_into_what_is_kept():
+    own = Study(**TITANIUM)
+    assert own.cutting.window.band_duration == 20e-6
+    assert own.cutting.duration >= 3 * 20e-6 - 1e-9
+    long = Study(camera={"integration_time": "100 us"}).cutting
+    assert long.duration >= 300e-6 * (1 - 1e-6)
+    assert long.length_of_cut > long.window.end
+
+
+def test_what_is_given_stays_and_the_papers_own_study_does_not_change():
+    data = {**TITANIUM["cutting"], "window": {"start": "0.5 mm"}, "length_of_cut": "1 mm"}
+    own = Study(cutting=data, camera=TITANIUM["camera"]).cutting
+    assert own.window.start == 0.5e-3
+    assert own.length_of_cut == 1e-3
+    assert Study(cutting={"feed": "0.3 mm", "speed": "250 m/min"}) == Study()
+    assert Study(camera={"pitch": "5 um"}).cutting == Study().cutting
+
+
+def test_a_study_as_written_is_the_same_study(tmp_path):
+    own = Study(**TITANIUM)
+    (tmp_path / "own.yaml").write_text(study_text(own))
+    back = load_study(tmp_path / "own.yaml")
+    assert back.cutting == own.cutting
+    assert back.camera == own.camera
+
+
+def test_a_data_sheet_makes_the_camera():
+    camera = Study(**TITANIUM).camera.build()
+    assert camera.pitch == pytest.approx(6e-6)
+    aperture = 2.5 / (2 * 2.5 * 3.5)
+    assert isinstance(camera.psf, AnnularAperturePSF)
+    assert (camera.psf.wavelength, camera.psf.numerical_aperture) == pytest.approx((4e-6, aperture))
+    assert camera.psf.obscuration == 0
+    # Airy: the first dark ring is 0.61 wavelengths over the aperture from the middle, the full
+    # width at half maximum 0.514 (Born and Wolf, 8.5.2).
+    assert camera.psf.fwhm == pytest.approx(0.5145 * 4e-6 / aperture, rel=2e-3)
+
+
+def test_a_small_array_sees_a_part_and_a_large_one_all():
+    scene = Raster(left=0.0, top=0.0, spacing=1e-6, rows=300, columns=400)
+    camera = {"pitch": "6 um"}
+    assert Study(camera={**camera, "array": [640, 512]}).camera.on(scene).shape == (50, 66)
+    assert Study(camera={**camera, "array": [20, 10]}).camera.on(scene).shape == (10, 20)
+
+
+def test_a_response_file_weighs_the_band(tmp_path):
+    (tmp_path / "r.csv").write_text("wavelength_um,response\n3,0\n4,1\n5,0\n")
+    (tmp_path / "s.yaml").write_text("camera: {band: 3-5 um, response: r.csv}\n")
+    band = load_study(tmp_path / "s.yaml").camera.build().band
+    assert band.response is not None
+    assert band.response(np.array([3.5e-6]))[0] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("camera", "wrong"),
+    [
+        ({"detector_pitch": "15 um"}, "magnification: is missing"),
+        ({"detector_pitch": "15 um", "magnification": -1}, "magnification: -1, expected over 0"),
+        ({"detector_pitch": "15 um", "magnification": 2.5, "pitch": "5 um"}, "makes 6 um"),
+        ({"psf": {"kind": "airy"}}, "expected one of numerical_aperture and f_number"),
+        (
+            {"psf": {"kind": "airy", "f_number": 2.0, "numerical_aperture": 0.2}},
+            "expected one of numerical_aperture and f_number",
+        ),
+    ],
+)
+def test_data_sheets_that_cannot_be_are_refused(camera, wrong):
+    with pytest.raises(ValueError, match=wrong):
+        Study(camera=camera)
+
+
+def test_what_is_left_to_the_paper_is_said():
+    told = " ".join(left_to_the_paper(Study(**TITANIUM)))
+    for name in ("of cutting", "tool", "friction", "of surface", "chips", "floor 300 degC"):
+        assert name in told, told
+    for name in ("workpiece ti-6al-4v", "feed", "integration_time", "detector_pitch"):
+        assert name not in told, told
+    assert list(left_to_the_paper(Study())) == []
+    assert list(left_to_the_paper(Study.quick())) == []
+    whole = Study(**Study(**TITANIUM).model_dump(mode="json"))
+    assert list(left_to_the_paper(whole)) == []
+
+
+@pytest.fixture(scope="module")
+def own_result():
+    plan = Plan(instants=2, phases=1, textures=1, psf_widths=(8e-6, 12e-6), beside_paper=False)
+    scene = AnalyticChip().scene()
+    camera = Camera(integration_time=5e-6)
+    return analyse(scene, {"chip 1": CHIP_1, "chip 2": CHIP_2}, camera, plan)
+
+
+def test_the_paper_stands_beside_its_own_study_only(own_result, tmp_path):
+    rows = comparison_rows(own_result)
+    assert all(row.paper is None and not row.where for row in rows)
+    write_report(own_result, tmp_path, "Titanium", "cutting: {}\n", {"seed": "1"})
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    told = page[page.index("<main>") : page.index('<section id="study">')]
+    assert "paper" not in told.lower().replace("data:image/png;base64", "")
+    assert "Figure 5" not in told
+    assert (tmp_path / "figures" / "scene.png").exists()
+    beside = replace(own_result, plan=replace(own_result.plan, beside_paper=True))
+    assert any(row.paper is not None for row in comparison_rows(beside))
+
+
+def test_the_cost_of_the_papers_study_is_about_what_it_was():
+    """Measured: 1.56 GB, 1.1 GB of memory, and 4 to 5 min with two threads, of which 2 the cut."""
+    cost = expected_cost(Study())
+    assert cost.disk == pytest.approx(1.56e9, rel=0.1)
+    assert cost.memory == pytest.approx(1.1e9, rel=0.2)
+    assert 60 < cost.seconds < 1200
+    finer = expected_cost(Study(cutting={"numerics": {"cell": "5 um"}}))
+    assert finer.seconds > 3 * cost.seconds
+    assert finer.disk == cost.disk
+
+
+@pytest.mark.parametrize(("agreed", "asked"), [(False, 1), (True, 0)])
+def test_a_dear_cut_is_begun_only_if_the_user_says_so(agreed, asked, monkeypatch, tmp_path, capsys):
+    questions = []
+    monkeypatch.setenv("CHIPGLOW_CACHE", str(tmp_path))
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
+    monkeypatch.setattr("rich.console.Console.is_terminal", True)
+
+    def confirm(text, **_):
+        questions.append(text)
+        raise typer.Abort
+
+    monkeypatch.setattr(typer, "confirm", confirm)
+    dear = Study(cutting={"numerics": {"cell": "2 um"}})
+    if asked:
+        with pytest.raises(typer.Abort):
+            progress.say_where_it_starts(dear, False, agreed)
+    else:
+        progress.say_where_it_starts(dear, False, agreed)
+    assert len(questions) == asked
+    assert "Expected: about" in capsys.readouterr().err
+    progress.say_where_it_starts(Study.quick(), False, False)
+    assert len(questions) == asked
+
+
+def test_an_empty_file_is_no_study(tmp_path):
+    (tmp_path / "empty.yaml").write_text("")
+    with pytest.raises(StudyError, match=r"empty.yaml: is empty, expected a study"):
+        load_study(tmp_path / "empty.yaml")
+
+
+def test_the_package_runs_as_a_module():
+    command = [sys.executable, "-m", "chipglow", "--version"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("chipglow ")
