@@ -27,7 +27,7 @@ app = typer.Typer(
     cls=Boundary,
     help="A virtual infrared camera for metal cutting.",
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
 )
 cache_app = typer.Typer(help="Scenes that were computed before.", no_args_is_help=True)
