@@ -1,12 +1,14 @@
 """The quick study from the command line to its report, as a user runs it."""
 
 import json
-import subprocess
-import sys
+import re
 from html.parser import HTMLParser
 
 import pytest
 import xarray as xr
+from documented import ROOT
+
+from chipglow.report import QUICK
 
 PAPER_ROWS = [
     "rake_error_degC",
@@ -37,21 +39,10 @@ class Page(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("reproduce")
-    command = [sys.executable, "-c", "from chipglow.cli import main; main()"]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("CHIPGLOW_CACHE", str(folder / "cache"))
-        run = subprocess.run(
-            [*command, "reproduce", "--quick", "--out", str(folder / "run")],
-            capture_output=True,
-            text=True,
-            timeout=1200,
-        )
-    assert run.returncode == 0, run.stderr
-    assert "report.html" in run.stdout
-    assert "the paper" in run.stdout
-    return folder / "run"
+def results(quick_study):
+    assert "report.html" in quick_study.printed
+    assert "the paper" in quick_study.printed
+    return quick_study.results
 
 
 def test_summary_holds_the_papers_figures_beside_ours(results):
@@ -65,6 +56,19 @@ def test_summary_holds_the_papers_figures_beside_ours(results):
     assert -150 < here["band_error_degC"] < -10
     assert here["band_worst_error_degC"] < here["band_error_degC"]
     assert 0 < here["rake_psf_share_percent"] < 100
+
+
+def test_the_quick_studys_remark_states_its_own_errors_and_those_of_the_page(results):
+    page = (ROOT / "docs" / "paper-study.md").read_text(encoding="utf-8")
+    summary = json.loads((results / "summary.json").read_text(encoding="utf-8"))
+    stated = re.findall(r"−(\d+) °C in place of −(\d+) °C", QUICK)
+    names = ("rake_error_degC", "band_error_degC", "band_worst_error_degC")
+    for name, (quick, full) in zip(names, stated, strict=True):
+        # Another processor rounds another way, and the chip differs in detail: within the scatter.
+        scatter = summary["draws"][name]["standard_deviation"]
+        assert -summary["results"][name] == pytest.approx(float(quick), abs=scatter), name
+        assert re.search(rf"−{quick} ± \d+ \| −{full} ± ", page), name
+        assert re.search(rf"\| −{full} ± \d+ \| −\d+ to −\d+ \|", page), name
 
 
 def test_chip_is_segmented_as_the_study_needs(results):
@@ -83,7 +87,7 @@ def test_page_is_whole_and_stands_alone(results):
     assert len(page.images) >= 8
     assert all(image.startswith("data:image/") for image in page.images)
     assert not page.links
-    for word in ("−42", "−46", "−120", "90 µs", "seed"):
+    for word in ("−42", "−46", "−120", "90 µs", "seed", QUICK):
         assert word in page.words
 
 
