@@ -1,7 +1,6 @@
 """What a study says: its sections and fields, the paper's study as defaults, what they mean."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import (
@@ -35,7 +34,14 @@ from chipglow.cutting import (
 from chipglow.io import read_emissivity_map, read_tool_outline
 from chipglow.radiometry import Band
 from chipglow.scene import Chamfer, Hone, Raster, Tool, ToolGeometry
-from chipglow.study.section import OR_NONE, FileBeside, Part, Section, described
+from chipglow.study.section import (
+    OR_NONE,
+    FileBeside,
+    Part,
+    Section,
+    beside_the_study,
+    described,
+)
 from chipglow.study.units import (
     Angle,
     CutLength,
@@ -325,7 +331,7 @@ class CuttingSection(Part):
     @classmethod
     def _known(cls, name: str, info: ValidationInfo) -> str:
         if is_own_file(name):
-            name = str(Path((info.context or {}).get("folder") or ".", name).resolve())
+            name = beside_the_study(name, info)
         try:
             workpiece(name)
         except OSError as error:

@@ -24,6 +24,7 @@ from chipglow.io.sources.source import (
     SourceError,
     Survey,
     missing_extra,
+    span_of,
 )
 from chipglow.scene import Material, Raster
 from chipglow.scene.rasterise import NOTHING, rasterise
@@ -129,6 +130,7 @@ class MeshSource(Source):
             tuple(sorted(set(every) - set(found.values()))),
             assumed=(*reader.assumed, *assumed, *self._assumed(blocks, found)),
             from_file=(*self._lacking(blocks, found), *_from_file(found, tuple(ends.values()))),
+            temperatures=self._temperatures(flat, found),
         )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
@@ -316,6 +318,22 @@ class MeshSource(Source):
             raise SourceError(f"{reader.file(0)}: no element has finite positions")
         (left, bottom), (right, top) = placed.min(axis=0), placed.max(axis=0)
         return float(left), float(right), float(bottom), float(top)
+
+    def _temperatures(
+        self, meshes: Sequence[FlatMesh], found: Mapping[str, str]
+    ) -> tuple[float, float] | None:
+        """Least and greatest temperature of what is not tool."""
+        if "temperature" not in found:
+            return None
+        name = found["temperature"]
+        values = [np.empty(0, np.float32)]
+        for mesh in meshes:
+            if name in mesh.of_nodes:
+                used = np.unique(mesh.triangles[~mesh.tool])
+                values.append(self._values("temperature", mesh.of_nodes[name][used]))
+            if name in mesh.of_elements:
+                values.append(self._values("temperature", mesh.of_elements[name][~mesh.tool]))
+        return span_of(np.concatenate(values))
 
     def _sampled(
         self, mesh: FlatMesh, time: float, raster: Raster, found: Mapping[str, str]
