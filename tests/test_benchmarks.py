@@ -35,6 +35,10 @@ PROGRAMS = {
     "fuzz/fuzz.py": ("--cases 30 --only .npz", {"| grid.npz |": 7, "| all |": 6, "30 cases": 2}),
     "knife_edge.py": ("--repeats 2", {"Gaussian, noise 0.01": 4, "diffraction, noise 0.03": 3}),
     "movie_codecs.py": ("--pictures 1", {"| jet | uncompressed": 6, "| rainbow, 12 bands": 7}),
+    "movie_matrix.py": (
+        "--pictures 1 --maps jet --bands 0 12 --codecs GIF",
+        {"| jet | none | no": 3, "| jet | none | yes": 3, "| jet | 12 | yes": 4, "0 cases": 1},
+    ),
     "rasterise.py": (
         "--file",
         {"| rasterise, 5 fields": 5, "| VTK's probe": 5, "| SciPy": 5, "read ": 4},
@@ -55,6 +59,7 @@ PROGRAMS = {
 NEEDED = {
     "fuzz/fuzz.py": ("hypothesis", "lasso", "pyvista", "tifffile", "zarr"),
     "movie_codecs.py": ("av",),
+    "movie_matrix.py": ("av",),
     "rasterise.py": ("pyvista",),
     "synthetic_laboratory.py": ("tifffile",),
 }

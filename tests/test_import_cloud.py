@@ -500,3 +500,127 @@ def test_frames_that_differ_in_length(tmp_path):
 def test_impossible_arguments(changed, text):
     with pytest.raises(ValueError, match=text):
         CloudSource(**{"files": "p.csv", **changed})
+
+
+# Dumps of LAMMPS
+
+
+def write_dump(path, frames, units=None, columns="id type x y z vx vy vz v_temp", box=None):
+    """As LAMMPS 2022 writes ``dump custom``; TIME and UNITS are options of ``dump_modify``."""
+    text = ""
+    for number, (time, rows) in enumerate(frames):
+        if units and number == 0:
+            text += f"ITEM: UNITS\n{units}\n"
+        if time is not None:
+            text += f"ITEM: TIME\n{time:g}\n"
+        text += f"ITEM: TIMESTEP\n{1000 * number}\nITEM: NUMBER OF ATOMS\n{len(rows)}\n"
+        text += box or "ITEM: BOX BOUNDS pp ff pp\n0.0 6e1\n0.0 4e1\n-0.5 0.5\n"
+        text += f"ITEM: ATOMS {columns}\n"
+        text += "".join(" ".join(f"{cell:g}" for cell in row) + " \n" for row in rows)
+    path.write_text(text)
+    return path
+
+
+def dump_rows(time, places=None, share=False):
+    places = lattice() / 1e-6 if places is None else places
+    heat = np.round(linear(*places.T * 1e-6, time), 2)
+    shown = places / (60.0, 40.0) if share else places
+    return [
+        (number, 1 + (x > 50), *at, 0.5 if share else 0.0, 3.0, 1.0, 0.0, one)
+        for number, (x, at, one) in enumerate(zip(places[:, 0], shown, heat, strict=True), 1)
+    ]
+
+
+@pytest.mark.parametrize("name", ["cut.dump", "cut.lammpstrj", "dump.txt"])
+@pytest.mark.parametrize("share", [False, True])
+def test_a_dump_of_lammps_over_time(tmp_path, name, share):
+    columns = "id type xs ys zs vx vy vz v_temp" if share else "id type x y z vx vy vz v_temp"
+    frames = [(time * 1e6, dump_rows(time, share=share)) for time in TIMES]
+    path = write_dump(tmp_path / name, frames, "micro", columns)
+    source = CloudSource(str(path), names={"temperature": "v_temp"}, tool_parts=(2,))
+    survey = source.survey()
+    assert survey.times == pytest.approx(TIMES)
+    assert survey.found["velocity_x"] == "vx"
+    x, y = np.meshgrid(RASTER.x, RASTER.y)
+    for time, frame in zip(TIMES, source.frames(RASTER), strict=True):
+        inside = (x > A) & (x < 45e-6) & (y > A) & (y < 38e-6)
+        found = frame.fields["temperature"][inside]
+        # %g keeps six digits.
+        np.testing.assert_allclose(found, linear(x, y, time)[inside], atol=0.02)
+        assert (frame.fields["velocity_x"][inside] == 3.0).all()
+        assert frame.material[50, -1] == 0 or frame.material.max() == 1
+
+
+def test_a_dump_without_times_or_units_says_what_is_assumed(tmp_path):
+    places = lattice() / 1e-6
+    path = write_dump(tmp_path / "cut.dump", [(None, dump_rows(0.0, places))] * 2)
+    source = CloudSource(str(path), {"temperature": "v_temp"}, units=Units(length=Unit(1e-6)))
+    assert "no times in the files: frames are 1 s apart" in source.survey().assumed
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda text: text[:-40], "cut short"),
+        (lambda text: text[:-3], "cut short"),
+        (lambda text: text.replace("ITEM: NUMBER OF ATOMS\n600", "ITEM: NUMBER OF ATOMS\nmany"),
+         "head is damaged"),
+        (str, "oblique box"),
+    ],
+)  # fmt: skip
+def test_a_damaged_dump_is_refused(tmp_path, change, said):
+    tilted = "ITEM: BOX BOUNDS xy xz yz pp ff pp\n0 60 0\n0 40 0\n-0.5 0.5 0\n"
+    columns = "id type xs ys zs vx vy vz v_temp"
+    path = write_dump(tmp_path / "cut.dump", [(None, dump_rows(0.0))], None, columns, tilted)
+    path.write_text(change(path.read_text()))
+    with pytest.raises(SourceError, match=rf"cut\.dump.*{said}"):
+        CloudSource(str(path), names={"temperature": "v_temp"}).survey()
+
+
+# The end of a table, and t
+
+
+def table(rows, form="%.3e", newline=True):
+    lines = [",".join(form % cell for cell in row) for row in rows]
+    return "x,y,temperature\n" + "\n".join(lines) + "\n" * newline
+
+
+ROWS_OF_TABLE = [(x, y, linear(x, y)) for x, y in lattice(5, 4)]
+
+
+@pytest.mark.parametrize("lost", [4, 1, 5, 6])
+def test_a_number_that_is_cut_at_the_end_is_refused(tmp_path, lost):
+    text = table(ROWS_OF_TABLE, newline=False)
+    (tmp_path / "p.csv").write_text(text[:-lost])
+    with pytest.raises(SourceError, match=r"p\.csv: ends with .* cut short"):
+        CloudSource(str(tmp_path / "p.csv")).survey()
+
+
+def test_decimals_that_are_cut_are_refused(tmp_path):
+    (tmp_path / "p.csv").write_text(table(ROWS_OF_TABLE, "%.9f", newline=False)[:-6])
+    with pytest.raises(SourceError, match="cut short"):
+        CloudSource(str(tmp_path / "p.csv")).survey()
+
+
+@pytest.mark.parametrize("form", ["%.3e", "%.9f", "%g", "%.12g"])
+def test_a_whole_table_may_lack_its_last_end_of_line(tmp_path, form):
+    rows = [(x, y, 300.0 if number % 3 else 300.25) for number, (x, y, _) in
+            enumerate(ROWS_OF_TABLE)]  # fmt: skip
+    (tmp_path / "p.csv").write_text(table(rows, form, newline=False))
+    assert CloudSource(str(tmp_path / "p.csv")).survey().found["temperature"] == "temperature"
+
+
+def test_t_is_the_time_beside_a_temperature_and_the_temperature_alone(tmp_path):
+    places, times = lattice(6, 5), [0.0, 2e-6]
+    heat = np.stack([linear(*places.T, time) for time in times])
+    np.savez(tmp_path / "p.npz", position=np.stack([places] * 2), temperature=heat, t=times)
+    np.savez(tmp_path / "q.npz", position=places, t=heat[0])
+    rows = [f"{x},{y},{t},{linear(x, y, t)}\n" for t in times for x, y in places]
+    (tmp_path / "r.csv").write_text("x,y,t,temp\n" + "".join(rows))
+    for name in ("p.npz", "r.csv"):
+        survey = CloudSource(str(tmp_path / name)).survey()
+        assert survey.times.tolist() == times
+        assert "t" not in survey.unused
+    survey = CloudSource(str(tmp_path / "q.npz")).survey()
+    assert survey.found == {"temperature": "t"}
+    assert len(survey.times) == 1

@@ -191,7 +191,7 @@ def test_units_that_follow_from_others_are_said(arrays, tmp_path):
 @pytest.mark.parametrize(
     ("values", "wrong"),
     [
-        (np.full((4, 6), np.nan), "no sample of any frame shows material"),
+        (np.full((4, 6), np.nan), "has no number in the frames"),
         (np.full((4, 6), np.inf), "T: has infinite numbers"),
         (np.full((4, 6), 25.0), "if it is in °C, expected units.temperature: degC"),
     ],
@@ -260,3 +260,21 @@ def test_what_is_no_source_is_one_line(tmp_path, name, content, wrong):
 def test_a_setting_is_no_python(arrays):
     with pytest.raises(StudyError, match="could not determine a constructor"):
         load_import(arrays, ["grid=!!python/object/apply:os.getcwd []"])
+
+
+@pytest.mark.parametrize("name", ["loop.npz", "loop.vtu", "loop.csv", "loop.avi"])
+def test_a_link_to_itself_is_one_error(tmp_path, name):
+    (tmp_path / name).symlink_to(tmp_path / name)
+    result = RUNNER.invoke(app, ["import", str(tmp_path / name), *options(["movie.pixel=1 um"])])
+    assert result.exit_code == 2
+    assert isinstance(result.exception, SystemExit)
+    assert name in result.output
+
+
+def test_a_link_is_judged_by_its_own_name(arrays, tmp_path):
+    arrays.rename(tmp_path / "blob.0001")
+    (tmp_path / "link.npz").symlink_to("blob.0001")
+    link = str(tmp_path / "link.npz")
+    result = RUNNER.invoke(app, ["import", link, *options(SETTINGS)])
+    assert result.exit_code == 0, result.output
+    assert "link.npz" in result.output

@@ -619,3 +619,17 @@ def test_names_with_numbers_follow_each_other(tmp_path):
     arrays = open_arrays(str(tmp_path / "T*.npy"), None)
     assert list(arrays) == ["T"]
     np.testing.assert_array_equal(arrays["T"].read((slice(None),) * 3)[:, 0, 0], [1, 2, 10])
+
+
+def test_a_list_t_is_the_time_and_an_array_t_the_temperature(tmp_path):
+    times = [0.0, 1e-6, 3e-6, 4e-6]
+    np.savez(tmp_path / "timed.npz", t=times, temperature=a_stack())
+    np.savez(tmp_path / "heat.npz", t=a_stack())
+    timed, heat = (
+        a_source(str(tmp_path / f"{name}.npz"), interval=None).survey()
+        for name in ("timed", "heat")
+    )
+    assert timed.times.tolist() == times
+    assert timed.unused == ()
+    assert heat.found == {"temperature": "t"}
+    assert len(heat.times) == FRAMES

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from exodus_file import Exodus, write_exodus
 from fuzz.cgns_file import write_cgns
 from fuzz.foam_case import write_foam
 
@@ -142,13 +143,15 @@ def test_facing_shows_the_side_toward_the_camera(tmp_path, placement, offset):
 @pytest.mark.parametrize("section", [None, -1e-4, 4e-4])
 def test_a_solid_mesh_needs_a_section_that_cuts_it(tmp_path, section):
     grid_of(depth=3e-4).save(tmp_path / "solid.vtu")
-    with pytest.raises(SourceError, match=r"solid\.vtu: section: n.*expected"):
+    with pytest.raises(
+        SourceError, match=r"solid\.vtu: mesh\.section: n.*along z from 0 m to 0\.0003 m"
+    ):
         MeshSource(tmp_path / "solid.vtu", section=section).survey()
 
 
 def test_a_flat_mesh_has_no_section(tmp_path):
     grid_of().save(tmp_path / "flat.vtu")
-    with pytest.raises(SourceError, match=r"flat\.vtu: section: .*flat"):
+    with pytest.raises(SourceError, match=r"flat\.vtu: mesh\.section: .*flat"):
         MeshSource(tmp_path / "flat.vtu", section=0.0).survey()
 
 
@@ -785,3 +788,143 @@ def test_files_that_came_with_pyvista():
     assert set(np.unique(frame.fields["plastic_strain"])) <= set(
         mesh.cell_data["sample_cell_scalars"]
     )
+
+
+def solid(x0, x1, count=(4, 3, 2), first=0):
+    """Points and hexahedra of a block, its elements in the order of x, y and z."""
+    nx, ny, nz = count
+    at = [np.linspace(*ends, n + 1) for ends, n in (((x0, x1), nx), ((0, 1), ny), ((0, 1), nz))]
+    z, y, x = np.meshgrid(*at[::-1], indexing="ij")
+    k, j, i = np.mgrid[:nz, :ny, :nx].reshape(3, -1)
+    corner = first + (k * (ny + 1) + j) * (nx + 1) + i
+    level = (nx + 1) * (ny + 1)
+    lower = np.stack([corner, corner + 1, corner + nx + 2, corner + nx + 1], axis=1)
+    points = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
+    return points, np.concatenate([lower, lower + level], axis=1)
+
+
+def test_a_section_has_nothing_of_side_sets(tmp_path):
+    points, hexes = solid(0.0, 2.0)
+    heat = 300.0 + 100.0 * points[:, 0] + 50.0 * points[:, 2]
+    heat[points[:, 2] == 1.0] = 913.0
+    top = np.arange(1, 13) + 12
+    exodus = Exodus(points, {"steel": hexes}, "HEX8", [0.0], {"temp": heat[None]},
+                    {"hot": (top, np.full(12, 6))})  # fmt: skip
+    path = write_exodus(tmp_path / "block.e", exodus)
+    raster = Raster(0.0, 1.0, 0.1, 10, 20)
+    found = only_frame(MeshSource(path, section=0.25), raster).fields["temperature"]
+    expected = 300.0 + 100.0 * np.broadcast_to(raster.x, raster.shape) + 12.5
+    np.testing.assert_allclose(found, expected, atol=1e-3)
+
+
+def test_boundaries_of_an_openfoam_case_are_no_material(tmp_path):
+    path = write_foam(tmp_path, sides="type fixedValue; value uniform 250;")
+    raster = Raster(0.0, 1.0, 0.1, 10, 20)
+    for section in (0.5, "facing"):
+        frame = next(MeshSource(path, section=section).frames(raster))
+        assert set(np.unique(frame.fields["temperature"])) == {300.0, 400.0}
+
+
+def test_u_of_openfoam_is_the_velocity(tmp_path):
+    source = MeshSource(write_foam(tmp_path, velocity="(3 1 2)"), section=0.5)
+    survey = survey_of(source)
+    assert survey.found["velocity_x"] == survey.found["velocity_y"] == "U"
+    assert not any("U is not added" in sentence for sentence in survey.assumed)
+    frame = next(source.frames(Raster(0.0, 1.0, 0.1, 10, 20)))
+    assert (frame.fields["velocity_x"] == 3.0).all()
+    assert (frame.fields["velocity_y"] == 1.0).all()
+
+
+def test_all_times_of_cgns(tmp_path):
+    grid = grid_of()
+    heat = np.stack([grid_of(at=at).point_data["NT11"] for at in range(3)])
+    path = tmp_path / "chip.cgns"
+    quads = grid.cells_dict[9]
+    write_cgns(path, grid.points, quads, {"Temperature": heat}, {}, (1.0, 2.0, 4.0))
+    source = MeshSource(path)
+    assert survey_of(source).times.tolist() == [1.0, 2.0, 4.0]
+    for number, frame in enumerate(source.frames(RASTER)):
+        check_linear(frame, at=number)
+
+
+def vtkhdf_over_time(path, times):
+    """After VTK's description of its format: a still mesh, and values that follow one another."""
+    h5py = pytest.importorskip("h5py")
+    grid = grid_of()
+    count, points, cells = len(times), grid.n_points, grid.n_cells
+    with h5py.File(path, "w") as file:
+        root = file.create_group("VTKHDF")
+        root.attrs["Version"] = (2, 0)
+        root.attrs.create("Type", b"UnstructuredGrid", dtype=h5py.string_dtype("ascii", 16))
+        nodes = np.asarray(grid.cell_connectivity)
+        for name, values in (
+            ("NumberOfPoints", points), ("NumberOfCells", cells),
+            ("NumberOfConnectivityIds", len(nodes)),
+        ):  # fmt: skip
+            root[name] = np.array([values])
+        root["Points"], root["Connectivity"] = np.asarray(grid.points), nodes
+        root["Offsets"], root["Types"] = 4 * np.arange(cells + 1), np.full(cells, 9, np.uint8)
+        root["PointData/NT11"] = np.concatenate(
+            [grid_of(at=at).point_data["NT11"] for at in range(count)]
+        )
+        steps = root.create_group("Steps")
+        steps.attrs["NSteps"] = count
+        steps["Values"] = np.asarray(times, float)
+        none = np.zeros(count, int)
+        steps["NumberOfParts"], steps["PartOffsets"], steps["PointOffsets"] = none + 1, none, none
+        steps["CellOffsets"] = steps["ConnectivityIdOffsets"] = none[:, None]
+        steps["PointDataOffsets/NT11"] = points * np.arange(count)
+    return path
+
+
+def test_all_times_of_vtkhdf(tmp_path):
+    source = MeshSource(vtkhdf_over_time(tmp_path / "chip.vtkhdf", (0.0, 0.5, 2.0)))
+    assert survey_of(source).times.tolist() == [0.0, 0.5, 2.0]
+    for number, frame in enumerate(source.frames(RASTER)):
+        check_linear(frame, at=number)
+
+
+def two_materials(path, other="temperature_steel", divided=False, whole_name=None):
+    """Two blocks that share nodes, with a field each; what a block has not is written as 0."""
+    points, hexes = solid(0.0, 2.0, (4, 3, 2))
+    left = points[hexes][:, :, 0].mean(axis=1) < 1.0
+    blocks = {"graphite": hexes[left], "steel": hexes[~left]}
+    heat = 300.0 + 100.0 * points[:, 0] + 20.0 * points[:, 2]
+    heat = np.stack([heat, heat + 10.0])
+    fields = {}
+    for name, elements in blocks.items():
+        of_block = np.isin(np.arange(len(points)), elements)
+        share = np.where(points[:, 0] == 1.0, 0.5 if divided else 1.0, 1.0)
+        fields[f"temperature_{name}"] = np.where(of_block, heat * share, 0.0)
+    if whole_name:
+        fields = {whole_name: fields["temperature_graphite"]}
+    return write_exodus(path, Exodus(points, blocks, "HEX8", [0.0, 1.0], fields))
+
+
+TWO = Raster(0.0, 1.0, 0.1, 10, 20)
+
+
+@pytest.mark.parametrize("divided", [False, True])
+def test_fields_of_two_materials_are_one_temperature(tmp_path, divided):
+    source = MeshSource(two_materials(tmp_path / "two.e", divided=divided), section=0.5)
+    survey = survey_of(source)
+    assert survey.found == {"temperature": "temperature_graphite, temperature_steel"}
+    assert not any(name.startswith("temperature") for name in survey.unused)
+    for number, frame in enumerate(source.frames(TWO)):
+        expected = 310.0 + 100.0 * np.broadcast_to(TWO.x, TWO.shape) + 10.0 * number
+        np.testing.assert_allclose(frame.fields["temperature"], expected, atol=1e-3)
+        assert (frame.material == WORKPIECE).all()
+
+
+def test_a_block_without_a_temperature_is_void_and_never_of_0_kelvin(tmp_path):
+    path = two_materials(tmp_path / "two.e", whole_name="temp")
+    source = MeshSource(path, section=0.5)
+    assert "steel has no temperature: it is void" in survey_of(source).from_file
+    frame = next(source.frames(TWO))
+    right = np.broadcast_to(TWO.x > 1.0, TWO.shape)
+    np.testing.assert_array_equal(frame.material, np.where(right, VOID, WORKPIECE))
+    expected = 310.0 + 100.0 * np.broadcast_to(TWO.x, TWO.shape)
+    np.testing.assert_allclose(frame.fields["temperature"][~right], expected[~right], atol=1e-3)
+    assert np.isnan(frame.fields["temperature"][right]).all()
+    tool = next(MeshSource(path, section=0.5, tool_parts=("steel",)).frames(TWO))
+    np.testing.assert_array_equal(tool.material, np.where(right, TOOL, WORKPIECE))

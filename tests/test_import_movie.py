@@ -12,11 +12,12 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from matplotlib import colormaps
 from movie_codecs import CODECS, Codec, drawn, encode, known_field, measure
+from movie_matrix import GIF, MJPEG, Case, outcome, picture_of, write
 
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.colour_scale import ColourScale, colour_uncertainty, lab
 from chipglow.io.sources.conventions import Placement
-from chipglow.io.sources.legend import find_legend, legend_pixels
+from chipglow.io.sources.legend import find_legend, is_cut, legend_pixels
 from chipglow.io.sources.movie import (
     FieldMovie,
     Legend,
@@ -25,7 +26,7 @@ from chipglow.io.sources.movie import (
     metre_per_pixel,
 )
 from chipglow.io.sources.moving_pictures import index_movie, pictures
-from chipglow.io.sources.overlays import find_background
+from chipglow.io.sources.overlays import dark_lines, find_background
 from chipglow.io.sources.picture_sampling import PictureSampling
 from chipglow.scene import FILLED, Material, Raster
 from chipglow.scene.nearest import extended, nearest
@@ -432,7 +433,9 @@ def test_the_background_is_found_and_told(tmp_path):
     picture = drawn(known_field(0, SHAPE), RAINBOW)
     scale = ColourScale.named("rainbow", ENDS)
     assert find_background(picture, scale) == (((255, 255, 255),), ())
-    assert find_background(picture, ColourScale.named("gray", ENDS)) == ((), ((255, 255, 255),))
+    grey = drawn(known_field(0, SHAPE), NamedMap("gray"))
+    found, refused = find_background(grey, ColourScale.named("gray", ENDS))
+    assert found == () and (255, 255, 255) in refused
     found = a_source(a_movie(tmp_path / "a.avi")).survey()
     assert "temperature: background colours at the border: (255, 255, 255)" in found.assumed
 
@@ -618,3 +621,114 @@ def test_the_maps_of_matplotlib_are_told_from_ours():
     assert theirs == pytest.approx(colormaps["rainbow"](np.arange(256))[:, :3])
     assert np.abs(ours - theirs).max() > 0.4
     assert all(one < other for one, other in pairwise(ColourScale.named("jet", ENDS).knots))
+
+
+# A matrix of maps, bands, edges and codecs; all of it in benchmarks/movie_matrix.py
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        Case("jet", 0, False, MJPEG),  # colours mixed along the scale, a page that is no white
+        Case("jet", 0, True, MJPEG),  # edges within the colours of the ends of the scale
+        Case("rainbow", 9, False, MJPEG),  # bands whose jumps are blurred
+        Case("viridis", 0, False, MJPEG),
+        Case("hot", 12, False, MJPEG),
+        Case("gray", 0, True, GIF),  # edges of the colour of a value
+    ],
+    ids=lambda case: f"{case.name}-{case.bands}-{case.edges}-{case.codec.name}",
+)
+def test_what_is_stated_of_a_movie_holds(tmp_path, case):
+    found = outcome(tmp_path, case, 1)
+    assert not found.refused
+    assert found.held >= 0.9
+
+
+def one_picture(tmp_path, case, codec=MJPEG):
+    path = tmp_path / f"one{codec.suffix}"
+    write(path, iter([picture_of(case, 0)]), codec)
+    return next(pictures(path, index_movie(path)))
+
+
+@pytest.mark.parametrize("bands", [9, 12])
+@pytest.mark.parametrize("name", ["jet", "viridis", "gray"])
+def test_bands_are_counted_though_a_codec_blurs_them(tmp_path, name, bands):
+    picture = one_picture(tmp_path, Case(name, bands, False, MJPEG))
+    scale = ColourScale.from_legend(legend_pixels(picture, find_legend(picture)), ENDS)
+    assert scale.banded
+    assert len(scale.values) == bands
+    assert scale.values[0] == pytest.approx(ENDS[0] + (ENDS[1] - ENDS[0]) / 2 / bands)
+
+
+@pytest.mark.parametrize("name", ["jet", "viridis", "gray", "turbo"])
+def test_colours_that_run_on_are_no_bands(tmp_path, name):
+    picture = one_picture(tmp_path, Case(name, 0, False, MJPEG))
+    assert not ColourScale.from_legend(legend_pixels(picture, find_legend(picture)), ENDS).banded
+
+
+def test_lines_of_a_mesh_are_found_and_a_narrow_band_is_none(tmp_path):
+    meshed = one_picture(tmp_path, Case("gray", 0, True, GIF), GIF)
+    assert 0.1 < dark_lines(meshed)[100:, :250].mean() < 0.3
+    hot = drawn(known_field(0, SHAPE), NamedMap("jet"))
+    hot[:, 40:42] = (0, 0, 0)
+    assert not dark_lines(hot).any()
+
+
+def test_a_legend_that_is_not_of_the_picture_is_refused(tmp_path):
+    def with_other_legend(picture):
+        return with_legend(picture, NamedMap("viridis"))
+
+    path = a_movie(tmp_path / "a.avi", colours=NamedMap("jet"), change=with_other_legend)
+    with pytest.raises(SourceError, match=r"a\.avi: legend: .*100, 10, 108, 80.* of what it shows"):
+        a_source(path, Legend(), crop=(0, 0, 88, SHAPE[0])).survey()
+    with pytest.raises(SourceError, match="give the box of the legend, or a named map"):
+        a_source(path, Legend((100, 10, 108, 80)), crop=(0, 0, 88, SHAPE[0])).survey()
+
+
+def test_a_legend_whose_ends_are_not_seen_is_refused(tmp_path, monkeypatch):
+    whole = with_legend(drawn(known_field(0, SHAPE), RAINBOW))
+    assert not is_cut(whole, (100, 10, 108, 80))
+    assert is_cut(whole, (100, 30, 108, 80))
+    path = a_movie(tmp_path / "a.avi", change=with_legend)
+    monkeypatch.setattr("chipglow.io.sources.movie.find_legend", lambda picture: (100, 30, 108, 80))
+    with pytest.raises(
+        SourceError, match=r"legend: an end of the one found at \(100, 30, 108, 80\)"
+    ):
+        a_source(path, Legend(), crop=(0, 0, 88, SHAPE[0])).survey()
+
+
+def test_a_plain_coloured_background_is_no_material(tmp_path):
+    def on_slate(picture):
+        picture = picture.copy()
+        picture[np.isnan(known_field(0, SHAPE))] = (82, 87, 110)
+        return picture
+
+    path = a_movie(tmp_path / "a.avi", count=1, change=on_slate)
+    frame = first_frame(a_source(path))
+    shown = frame.material == Material.WORKPIECE
+    # A corner of one pixel counts as a line of the background's colour.
+    assert (shown != np.isfinite(known_field(0, SHAPE))).sum() <= 2
+
+
+def test_a_background_of_the_scale_alone_is_refused_unless_said(tmp_path):
+    path = a_movie(tmp_path / "a.avi", colours=NamedMap("gray"))
+    with pytest.raises(SourceError, match=r"background: \(255, 255, 255\) .* or background: \[\]"):
+        a_source(path, NamedMap("gray")).survey()
+    assert a_source(path, NamedMap("gray"), background=()).survey().kind
+
+
+def test_what_lies_under_lines_is_in_the_uncertainty(tmp_path):
+    def meshed(picture):
+        picture = picture.copy()
+        picture[::9] = picture[:, ::9] = 0
+        return picture
+
+    plain = a_source(a_movie(tmp_path / "a.avi")).uncertainty()["temperature"]
+    source = a_source(a_movie(tmp_path / "b.avi", change=meshed))
+    found = source.uncertainty()["temperature"]
+    assert plain.lines == 0.0
+    assert found.lines > 2 * found.colours
+    assert "by the lines drawn over them" in source.survey().assumed[-1]
+    frame = first_frame(source)
+    error = (frame.fields["temperature"] - known_field(0, SHAPE))[frame.material == 1]
+    assert 0.5 < np.sqrt(np.nanmean(error**2)) / found.total < 2

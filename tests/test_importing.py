@@ -10,7 +10,7 @@ import pytest
 from moving_block import RATE, SPEED, UP, Broken, MovingBlock, strain_at
 
 from chipglow.io import open_scene, unfinished_scenes
-from chipglow.io.importing import Import, import_scene, kept_import, prospect, read_scene
+from chipglow.io.importing import Import, View, import_scene, kept_import, prospect, read_scene
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.isolated import Isolated, patience_for
@@ -322,3 +322,37 @@ def test_an_answer_that_is_none_is_neither_unpickled_nor_given_room():
         read_message(BufferedReader(BytesIO((10**15).to_bytes(8, "little") + b"{}")), RASTER)
         is None
     )
+
+
+def a_stack(folder, values):
+    np.save(folder / "T.npy", np.broadcast_to(values, (3, 4, 5)))
+    return Import(GridSource(str(folder / "T.npy"), spacing=(5e-6, 5e-6), interval=1e-6))
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        (np.nan, "has no number in the frames"),
+        (-5.0, "-5 in T, expected kelvin"),
+        (-500.0, "-500 in T, expected kelvin"),
+        (25.0, "25 in T, expected kelvin .* units.temperature: degC"),
+    ],
+)
+def test_what_no_import_could_take_is_refused_at_the_first_look(tmp_path, values, said):
+    with pytest.raises(SourceError, match=f"temperature: .*{said}"):
+        prospect(a_stack(tmp_path, values))
+
+
+def test_a_source_may_have_a_temperature_in_the_middle_of_its_time_only(tmp_path):
+    values = np.full((3, 1, 1), np.nan)
+    values[1] = 500.0
+    assert prospect(a_stack(tmp_path, values)).survey.temperatures == (500.0, 500.0)
+
+
+def test_what_is_out_of_view_may_be_colder(tmp_path):
+    values = np.full((1, 1, 5), 500.0)
+    values[..., 0] = 0.0
+    wanted = a_stack(tmp_path, values)
+    with pytest.raises(SourceError, match="0 in T, expected kelvin"):
+        prospect(wanted)
+    prospect(replace(wanted, view=View(left=6e-6)))

@@ -1,5 +1,6 @@
 """A CGNS file by hand, after the standard's mapping to HDF5: one zone of quadrilaterals."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,17 @@ _QUAD_4 = 7
 
 
 def write_cgns(
-    path: Path, points: Any, quads: Any, of_nodes: dict[str, Any], of_elements: dict[str, Any]
+    path: Path,
+    points: Any,
+    quads: Any,
+    of_nodes: dict[str, Any],
+    of_elements: dict[str, Any],
+    times: Sequence[float] = (),
 ) -> None:
-    """Write points (n, 3), quadrilaterals (m, 4), and fields of nodes and of elements."""
+    """Write points (n, 3), quadrilaterals (m, 4), and fields of nodes and of elements.
+
+    With times, fields are those of nodes, with a row for each.
+    """
     with h5py.File(path, "w", track_order=True) as file:
         _mark(file, "HDF5 MotherNode", "Root Node of HDF5 File")
         file.create_dataset(" format", data=_text("IEEE_LITTLE_32\0"))
@@ -29,11 +38,31 @@ def write_cgns(
         _node(elements, "ElementRange", "IndexRange_t", np.int32([1, len(quads)]))
         connectivity = np.int32(quads).ravel() + np.int32(1)
         _node(elements, "ElementConnectivity", "DataArray_t", connectivity)
-        for place, fields in (("Vertex", of_nodes), ("CellCenter", of_elements)):
-            solution = _node(zone, f"At{place}", "FlowSolution_t")
-            _node(solution, "GridLocation", "GridLocation_t", _text(place))
-            for name, values in fields.items():
-                _node(solution, name, "DataArray_t", np.asarray(values, np.float64))
+        if times:
+            _over_time(base, zone, of_nodes, times)
+        else:
+            _solution(zone, "AtVertex", "Vertex", of_nodes)
+            _solution(zone, "AtCellCenter", "CellCenter", of_elements)
+
+
+def _over_time(base: Any, zone: Any, of_nodes: dict[str, Any], times: Sequence[float]) -> None:
+    """A solution for each time, as Sandia's programs name them."""
+    names = [f"VertexSolutionAtStep{step:05}" for step in range(1, len(times) + 1)]
+    for number, name in enumerate(names):
+        fields = {field: values[number] for field, values in of_nodes.items()}
+        _solution(zone, name, "Vertex", fields)
+    of_zone = _node(zone, "ZoneIterativeData", "ZoneIterativeData_t")
+    pointers = np.stack([_text(name.ljust(32)) for name in names])
+    _node(of_zone, "FlowSolutionPointers", "DataArray_t", pointers)
+    steps = _node(base, "TimeIterValues", "BaseIterativeData_t", np.int32([len(times)]))
+    _node(steps, "TimeValues", "DataArray_t", np.asarray(times, np.float64))
+
+
+def _solution(zone: Any, name: str, place: str, fields: dict[str, Any]) -> None:
+    solution = _node(zone, name, "FlowSolution_t")
+    _node(solution, "GridLocation", "GridLocation_t", _text(place))
+    for field, values in fields.items():
+        _node(solution, field, "DataArray_t", np.asarray(values, np.float64))
 
 
 def _text(text: str) -> Any:

@@ -12,8 +12,11 @@ PARTS = (
 _HEAD = "FoamFile {{ version 2.0; format ascii; class {}; object {}; }}\n"
 
 
-def write_foam(folder: Path) -> Path:
-    """Write the case into a folder; temperatures are 300 and 400, the first 305 at 0.5 s."""
+def write_foam(folder: Path, sides: str = "type zeroGradient;", velocity: str = "") -> Path:
+    """Write the case into a folder; temperatures are 300 and 400, the first 305 at 0.5 s.
+
+    With the condition of temperature on all sides, and a velocity in all cells such as (3 1 0).
+    """
     mesh = folder / "constant" / "polyMesh"
     mesh.mkdir(parents=True)
     (folder / "system").mkdir()
@@ -54,7 +57,11 @@ def write_foam(folder: Path) -> Path:
         (folder / time).mkdir()
         values = f"nonuniform List<scalar> 2({300 + 10 * float(time)} 400)"
         field = f"dimensions [0 0 0 1 0 0 0];\ninternalField {values};\n"
-        field += "boundaryField { sides { type zeroGradient; } }\n"
+        field += f"boundaryField {{ sides {{ {sides} }} }}\n"
         (folder / time / "T").write_text(_HEAD.format("volScalarField", "T") + field)
+        if velocity:
+            field = f"dimensions [0 1 -1 0 0 0 0];\ninternalField uniform {velocity};\n"
+            field += "boundaryField { sides { type zeroGradient; } }\n"
+            (folder / time / "U").write_text(_HEAD.format("volVectorField", "U") + field)
     (folder / "case.foam").touch()
     return folder / "case.foam"

@@ -29,6 +29,10 @@ MOST_SAMPLES: Final = 100_000_000
 _CHECKPOINT_INTERVAL: Final = 30.0
 _KEY: Final = "import"
 _SMALLEST, _LARGEST = 5e-6, 0.05
+_KELVIN: Final = (
+    f"expected kelvin of {COLDEST_PLAUSIBLE:g} or more; if it is in °C, expected "
+    "units.temperature: degC"
+)
 
 
 @dataclass(frozen=True)
@@ -171,6 +175,7 @@ def prospect(wanted: Import) -> Prospect:
             f"temperature: NAME with one of {listed}"
         )
     raster = wanted.view.raster(survey)
+    _check_temperatures(survey, raster)
     assumed = [
         *_doubtful_size(survey),
         *dict.fromkeys(note for name, note in wanted.notes.items() if name in survey.found),
@@ -313,10 +318,33 @@ def _check_kelvin(frame: Frame) -> None:
     """Refuse temperatures that look like °C, in the words of an import."""
     lowest = float(frame.temperature.min())
     if -100.0 < lowest < COLDEST_PLAUSIBLE:
+        raise SourceError(f"temperature: {lowest:.6g} at {frame.time:.9g} s, {_KELVIN}")
+
+
+def _check_temperatures(survey: Survey, raster: Raster) -> None:
+    """Refuse what no import could take: no temperature at all, or what is none in kelvin.
+
+    If only a part of the source is in view, the least temperature need not be.
+    """
+    if survey.temperatures is None:
+        return
+    lowest, highest = survey.temperatures
+    if not isfinite(highest):
         raise SourceError(
-            f"temperature: {lowest:.6g} at {frame.time:.9g} s, expected kelvin of "
-            f"{COLDEST_PLAUSIBLE:g} or more; if it is in °C, expected units.temperature: degC"
+            f"temperature: {survey.found['temperature']} has no number in the frames that were "
+            "looked at, expected some"
         )
+    if highest < COLDEST_PLAUSIBLE or (lowest < COLDEST_PLAUSIBLE and _holds_all(raster, survey)):
+        worst = highest if highest < COLDEST_PLAUSIBLE else lowest
+        raise SourceError(f"temperature: {worst:.6g} in {survey.found['temperature']}, {_KELVIN}")
+
+
+def _holds_all(raster: Raster, survey: Survey) -> bool:
+    outer, inner = raster.extent, survey.extent
+    within = 1e-6 * raster.spacing
+    return all(
+        outer[i] <= inner[i] + within and outer[i + 1] >= inner[i + 1] - within for i in (0, 2)
+    )
 
 
 def _doubtful_size(survey: Survey) -> tuple[str, ...]:

@@ -10,7 +10,16 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Strict, model_validator
 
 from chipglow.io.importing import Import, View
-from chipglow.io.sources import Placement, Source, Unit, Units, mesh_meshio, mesh_tecplot, mesh_vtk
+from chipglow.io.sources import (
+    Placement,
+    Source,
+    Unit,
+    Units,
+    lammps_dump,
+    mesh_meshio,
+    mesh_tecplot,
+    mesh_vtk,
+)
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.isolated import Isolated
@@ -25,12 +34,13 @@ from chipglow.study.units import Length, Position, Speed, Temperature, Time
 KINDS: Final[Mapping[str, tuple[str, ...]]] = {
     "movie": (".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif"),
     "mesh": (*mesh_vtk.KINDS, *mesh_meshio.KINDS, *mesh_tecplot.ENDINGS, ".inp", "d3plot"),
+    "points": lammps_dump.ENDINGS,
     "grid": (
         ".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr", ".npy", ".npz", ".mat", ".tif", ".tiff",
         ".csv", ".txt", ".hdf", ".he5", ".zip",
     ),
 }  # fmt: skip
-"""Kinds of sources by how the file's name ends; a source of points has to be called so."""
+"""Kinds of sources by how the file's name ends; most sources of points have to be called so."""
 
 Pixels = Annotated[tuple[float, float], Strict(False)]
 Corners = Annotated[tuple[tuple[Position, Position], ...], Strict(False)]

@@ -3,7 +3,6 @@
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import (
@@ -42,7 +41,14 @@ from chipglow.radiometry import Band
 from chipglow.scene import Chamfer, Hone, Raster, Tool, ToolGeometry
 from chipglow.study.regions import RegionSection
 from chipglow.study.scaling import scaled, with_pitch
-from chipglow.study.section import OR_NONE, FileBeside, Part, Section, described
+from chipglow.study.section import (
+    OR_NONE,
+    FileBeside,
+    Part,
+    Section,
+    beside_the_study,
+    described,
+)
 from chipglow.study.units import (
     Angle,
     CutLength,
@@ -340,7 +346,7 @@ class CuttingSection(Part):
     @classmethod
     def _known(cls, name: str, info: ValidationInfo) -> str:
         if is_own_file(name):
-            name = str(Path((info.context or {}).get("folder") or ".", name).resolve())
+            name = beside_the_study(name, info)
         try:
             workpiece(name)
         except OSError as error:

@@ -34,8 +34,15 @@ OR_NONE: Final = (BeforeValidator(_none_of_text), WrapSerializer(_text_of_none, 
 
 
 def beside_the_study(file: str, info: ValidationInfo) -> str:
-    """Path of a file that a study names: relative to the study's folder."""
-    return str(Path((info.context or {}).get("folder") or ".", file).resolve())
+    """Path of a file that a study names: relative to the study's folder.
+
+    A link keeps its own name, which says what kind of file it is.
+    """
+    path = Path((info.context or {}).get("folder") or ".", file)
+    try:
+        return str(path.parent.resolve() / path.name)
+    except (OSError, RuntimeError):  # Python 3.13 and later let a link to itself be
+        raise ValueError(f"{file!r}: its folder is a link to itself") from None
 
 
 FileBeside = Annotated[str, AfterValidator(beside_the_study)]

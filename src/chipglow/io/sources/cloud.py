@@ -19,7 +19,15 @@ from chipglow.io.sources.conventions import (
 )
 from chipglow.io.sources.layout import check_times, unit_of
 from chipglow.io.sources.point_files import MOST_POINTS, PointFrames, PointTable, open_points
-from chipglow.io.sources.source import READABLE, Remarks, SampledFrame, Source, SourceError, Survey
+from chipglow.io.sources.source import (
+    READABLE,
+    Remarks,
+    SampledFrame,
+    Source,
+    SourceError,
+    Survey,
+    span_of,
+)
 from chipglow.scene import Material, Raster
 from chipglow.scene.cloud import Cloud, neighbour_distance, sample_cloud
 
@@ -119,6 +127,7 @@ class CloudSource(Source):
                 spacing=float(np.median(clouds[0].spacing)),
                 assumed=tuple(dict.fromkeys(points.remarks.assumed)),
                 from_file=tuple(dict.fromkeys(points.remarks.from_file)),
+                temperatures=_temperatures(clouds, list(points.found)),
             )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
@@ -136,6 +145,15 @@ def _extent(clouds: list[Cloud]) -> tuple[float, float, float, float]:
     low = np.min([(c.places - c.spacing[:, None] / 2).min(axis=0) for c in clouds], axis=0)
     high = np.max([(c.places + c.spacing[:, None] / 2).max(axis=0) for c in clouds], axis=0)
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def _temperatures(clouds: list[Cloud], found: list[str]) -> tuple[float, float] | None:
+    """The greatest temperature twice: samples are means, so that the least need not be seen."""
+    if "temperature" not in found:
+        return None
+    number = found.index("temperature")
+    highest = max(span_of(cloud.values[:, number])[1] for cloud in clouds)
+    return highest, highest
 
 
 class _Points:
@@ -195,7 +213,7 @@ class _Points:
         """Columns of the fields: in the scene (`found`), and by what they are in the file."""
         source = self._source
         used = set(self._extra.values())
-        labels = [label for label in table.columns if label not in used]
+        labels = [label for label in table.columns if label not in (*used, self.files.time_label)]
         vectors = {label[:-2] for label in labels if label.endswith("_y")}
         given = {n: label for n, label in source.names.items() if n in COMMON_NAMES}
         vector = given.pop("velocity", None)

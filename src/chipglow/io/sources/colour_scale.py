@@ -21,6 +21,10 @@ _SAME: Final = 7.0  # a difference in Lab that a codec makes between two pixels 
 _APART: Final = 15.0
 _CHORD: Final = 0.01  # half of the share of the scale over which its slope is taken
 _BAND_JUMP: Final = 3.0
+_FEWEST_BANDS, _MOST_BANDS = 4, 40
+_NARROWEST_BAND: Final = 6
+_BLURRED: Final = 2.0
+_BANDED: Final = 0.5
 # D65, IEC 61966-2-1
 _WHITE: Final = np.array([0.95047, 1.0, 1.08883])
 _XYZ: Final = np.array(
@@ -124,6 +128,11 @@ class ColourScale:
         It has bands if its colour stands still but for jumps.
         """
         colours = pixels / 255.0
+        count = _equal_bands(colours)
+        if count:
+            ends = pairwise(np.linspace(0, len(pixels), count + 1))
+            plain = np.array([np.median(_inner(colours, *of), axis=0) for of in ends])
+            return cls._linear(plain, values, banded=True)
         steps = np.linalg.norm(np.diff(lab(colours), axis=0), axis=1)
         jumps = np.flatnonzero(steps > _BAND_JUMP)
         banded = 0 < len(jumps) < len(pixels) / 4 and steps[jumps].sum() > 0.8 * steps.sum()
@@ -271,15 +280,21 @@ class ColourUncertainty:
         Because the scale has a finite number of colours.
     noise : float
         Because the colours are not those of the scale: compression and rounding.
+    legend : float
+        Because the ends of a legend are known to a pixel.
+    lines : float
+        Because values under lines and text are those of pixels beside them.
     """
 
     colours: float
     noise: float
+    legend: float = 0.0
+    lines: float = 0.0
 
     @property
     def total(self) -> float:
-        """Both together."""
-        return sqrt(self.colours**2 + self.noise**2)
+        """All together."""
+        return sqrt(self.colours**2 + self.noise**2 + self.legend**2 + self.lines**2)
 
 
 def colour_uncertainty(
@@ -337,6 +352,46 @@ def _map_colours(name: str, count: int) -> NDArray[np.float64]:
     if plain not in colormaps:
         raise SourceError("unknown colour map, expected rainbow or one of matplotlib's, as jet")
     return np.asarray(colormaps[plain].resampled(count)(np.arange(count)))[:, :3]
+
+
+def _equal_bands(colours: NDArray[np.float64]) -> int:
+    """Number of bands of equal width that a legend has; 0 if its colours run on, or for others.
+
+    Bands are told from a run of colours by how near the pixels are to the middle of their band, and
+    to lines between the middles: codecs blur the jumps, by which they cannot be counted.
+    """
+    labs = lab(colours)
+    tried = range(_FEWEST_BANDS, min(_MOST_BANDS, len(colours) // _NARROWEST_BAND) + 1)
+    apart = np.array([_misfits(labs, count) for count in tried]).reshape(-1, 2)
+    if not len(apart):
+        return 0
+    least = apart[:, 0].min()
+    best = int(np.flatnonzero(apart[:, 0] <= 1.3 * least + 0.2)[0])
+    of_bands, of_lines = apart[best]
+    return tried[best] if of_bands < _BANDED * of_lines else 0
+
+
+def _misfits(labs: NDArray[np.float64], count: int) -> tuple[float, float]:
+    """Mean distance of a legend's pixels from equal bands, and from lines between their middles."""
+    edges = np.linspace(0, len(labs), count + 1)
+    middles = np.array([np.median(_inner(labs, *ends), axis=0) for ends in pairwise(edges)])
+    place = np.arange(len(labs)) + 0.5
+    inside = np.abs(place - edges[:, None]).min(axis=0) > _BLURRED
+    centres = (edges[1:] + edges[:-1]) / 2
+    lines = np.stack([np.interp(place, centres, part) for part in middles.T], axis=1)
+    inside &= (place > centres[0]) & (place < centres[-1])
+    if not inside.any():
+        return np.inf, np.inf
+    band = np.clip(np.searchsorted(edges, place) - 1, 0, count - 1)
+    of_bands = np.linalg.norm(labs - middles[band], axis=1)[inside].mean()
+    return float(of_bands), float(np.linalg.norm(labs - lines, axis=1)[inside].mean())
+
+
+def _inner(colours: NDArray[np.float64], first: float, last: float) -> NDArray[np.float64]:
+    """The middle of a band, at least a pixel."""
+    trim = min(_BLURRED, (last - first) / 4)
+    start = int(np.ceil(first + trim - 0.5))
+    return colours[start : max(int(last - trim + 0.5), start + 1)]
 
 
 def _bands(colours: NDArray[np.float64], jumps: NDArray[np.intp]) -> list[slice]:

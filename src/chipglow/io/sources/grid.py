@@ -32,7 +32,15 @@ from chipglow.io.sources.layout import (
     unpacked,
     unused_names,
 )
-from chipglow.io.sources.source import READABLE, Remarks, SampledFrame, Source, SourceError, Survey
+from chipglow.io.sources.source import (
+    READABLE,
+    Remarks,
+    SampledFrame,
+    Source,
+    SourceError,
+    Survey,
+    span_of,
+)
 from chipglow.scene import Material, Raster
 from chipglow.scene.regrid import regrid, taps
 
@@ -125,7 +133,7 @@ class GridSource(Source):
         """Look at what is there; see `Source.survey`."""
         with ExitStack() as stack:
             grid = _open(self, stack)
-            grid.check_ends()
+            temperatures = grid.check_ends()
             return Survey(
                 kind=grid.kind,
                 times=grid.times,
@@ -135,6 +143,7 @@ class GridSource(Source):
                 spacing=min(grid.steps),
                 assumed=tuple(dict.fromkeys(grid.remarks.assumed)),
                 from_file=tuple(dict.fromkeys(grid.remarks.from_file)),
+                temperatures=temperatures,
             )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
@@ -254,10 +263,21 @@ class _Grid:
             float(self.y[0] + down),
         )
 
-    def check_ends(self) -> None:
-        """Read the first and the last frame: what is wrong there is found before all are read."""
-        for index in {0, len(self.times) - 1}:
-            self.read(index)
+    def check_ends(self) -> tuple[float, float] | None:
+        """Read the first and the last frame: what is wrong there is found before all are read.
+
+        And the others until one has a temperature. Gives the least and the greatest.
+        """
+        last = len(self.times) - 1
+        found: list[float] = []
+        for index in dict.fromkeys((0, last, *range(last))):
+            if index not in (0, last) and (found or "temperature" not in self.layers):
+                break
+            values, material = self.read(index)
+            if "temperature" in self.layers:
+                heat = values[list(self.layers).index("temperature")][material != Material.VOID]
+                found += [value for value in span_of(heat) if isfinite(value)]
+        return span_of(found) if "temperature" in self.layers else None
 
     def read(self, index: int) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
         """Fields in SI, shape (fields, y, x), and material of a frame, as they lie in the scene."""

@@ -85,6 +85,7 @@ class Isolated(Source):
                 "unused": tuple(header["unused"]),
                 "assumed": tuple(header["assumed"]),
                 "from_file": tuple(header["from_file"]),
+                "temperatures": header["temperatures"] and tuple(header["temperatures"]),
             }
         )
 

@@ -14,7 +14,7 @@ from chipglow.io.sources.unit_text import SI_UNITS, parse_unit
 
 AXES: Final = ("time", "y", "x")
 COORDINATES: Final[Mapping[str, tuple[str, ...]]] = {
-    "time": ("time", "times"),
+    "time": ("time", "times", "t"),
     "x": ("x", "x_coordinate", "xc"),
     "y": ("y", "y_coordinate", "yc"),
     "z": ("z", "z_coordinate", "zc"),
@@ -226,6 +226,8 @@ def coordinate(
             raise SourceError(f"{next(iter(files))}: there is no list {given!r} for {axis}")
     else:
         match = [one for one in every if _is_coordinate(one.label, axis, dim)]
+        # Of several names the surest: t may be a number of another kind.
+        match.sort(key=lambda one: simple(one.label.rsplit("/", 1)[-1]) == "t")
     if not match:
         return None
     count = int(np.prod(match[0].array.shape, dtype=np.float64))

@@ -5,21 +5,31 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_closing
 
 from chipglow.io.sources.colour_scale import ColourScale, lab
+from chipglow.io.sources.overlays import MARK_TOLERANCE, Box, dark_lines, plain_colours
 from chipglow.io.sources.source import SourceError
-
-Box = tuple[int, int, int, int]
-"""Left, top, right and bottom edge in whole pixels from the upper left corner of a picture."""
 
 _SHORTEST: Final = 24
 _NARROWEST: Final = 4
 _EDGE: Final = 8.0  # differences in CIE L*a*b*
+_END: Final = 16.0
+_USUAL: Final = 1.5
 _FLAT: Final = 6.0
+_UNEVEN: Final = 0.15
 _PATH: Final = 60.0
 _DISTINCT: Final = 5
 _BLUR: Final = 3
 _MOST_EDGES: Final = 400
+_MOST_BOXES: Final = 40
+_GAP: Final = 5
+_BEYOND: Final = 4
+_AROUND: Final = 6
+_MOST_PIXELS: Final = 3000
+
+LEAST_EXPLAINED: Final = 0.7
+"""Share of a picture that must have the colours of its legend."""
 
 
 def find_legend(picture: NDArray[np.uint8]) -> Box | None:
@@ -39,7 +49,112 @@ def find_legend(picture: NDArray[np.uint8]) -> Box | None:
     lying = ((top, left, bottom, right) for left, top, right, bottom in _upright_bars(
         picture.transpose(1, 0, 2)
     ))  # fmt: skip
-    return max([*upright, *lying], key=_length_then_narrow, default=None)
+    boxes = sorted([*upright, *lying], key=_length_then_narrow, reverse=True)[:_MOST_BOXES]
+    best = max(boxes, key=lambda box: _worth(picture, box), default=None)
+    if best is None:
+        return None
+    # An outline moves the ends by a pixel or two; the bar within it is the smaller one.
+    within = [box for box in boxes if _is_within(box, best)]
+    return _extended(picture, min(within, key=_area))
+
+
+def _is_within(box: Box, outer: Box) -> bool:
+    inward = (box[0] - outer[0], box[1] - outer[1], outer[2] - box[2], outer[3] - box[3])
+    return all(0 <= pixels <= _BLUR for pixels in inward)
+
+
+def _area(box: Box) -> int:
+    return (box[2] - box[0]) * (box[3] - box[1])
+
+
+def is_cut(picture: NDArray[np.uint8], box: Box) -> bool:
+    """Whether the colours go on beyond an end of a legend as they are there.
+
+    Parameters
+    ----------
+    picture : ndarray
+        Red, green and blue, shape (y, x, 3), uint8.
+    box : Box
+        The legend.
+    """
+    along, first, last = _along(picture, box)
+    return _goes_on(along[last:], along[first:last][::-1]) or _goes_on(
+        along[:first][::-1], along[first:last]
+    )
+
+
+def _goes_on(beyond: NDArray[np.float64], inside: NDArray[np.float64]) -> bool:
+    """Whether colours from an end outward change no more than those from it inward."""
+    if len(beyond) < _BEYOND:
+        return False
+    jump = np.linalg.norm(beyond[:_BEYOND] - inside[0], axis=1).max()
+    run = inside[_BLUR : _BLUR + _BEYOND + 1]
+    usual = np.linalg.norm(run - run[0], axis=1).max()
+    return bool(jump < max(_END, _USUAL * usual))
+
+
+def _along(picture: NDArray[np.uint8], box: Box) -> tuple[NDArray[np.float64], int, int]:
+    """Colours of a row or column in the middle of a bar, where the bar begins, where it ends."""
+    left, top, right, bottom = box
+    upright = bottom - top >= right - left
+    strip = picture[:, left:right] if upright else picture[top:bottom].transpose(1, 0, 2)
+    along = np.median(_middle(lab(strip / 255.0)), axis=1)
+    return (along, top, bottom) if upright else (along, left, right)
+
+
+def _extended(picture: NDArray[np.uint8], box: Box) -> Box:
+    """A bar up to where its colours do not run on: its sides may be too faint to be seen."""
+    along, first, last = _along(picture, box)
+    steps = np.linalg.norm(np.diff(along, axis=0), axis=1)
+    if steps[first : last - 1].max() > _END:
+        return box
+    jumps = np.flatnonzero(steps > _END)
+    before, after = jumps[jumps < first], jumps[jumps >= last - 1]
+    first = int(before[-1]) + 1 if before.size else 0
+    last = int(after[0]) + 1 if after.size else len(along)
+    left, top, right, bottom = box
+    longer = (
+        (left, first, right, last) if bottom - top >= right - left else (first, top, last, bottom)
+    )
+    return longer if last - first <= 2 * max(right - left, bottom - top) else box
+
+
+def explained(picture: NDArray[np.uint8], box: Box, scale: ColourScale) -> float:
+    """Share of what a picture shows, beside legend, background and lines, in colours of a scale.
+
+    Parameters
+    ----------
+    picture : ndarray
+        Red, green and blue, shape (y, x, 3), uint8.
+    box : Box
+        The legend.
+    scale : ColourScale
+        What it says.
+    """
+    left, top, right, bottom = box
+    shown = ~dark_lines(picture)
+    shown[max(top - _AROUND, 0) : bottom + _AROUND, max(left - _AROUND, 0) : right + _AROUND] = (
+        False
+    )
+    labs = lab(picture[shown][:: max(1, int(shown.sum()) // _MOST_PIXELS)] / 255.0)
+    for colour in plain_colours(picture):
+        labs = labs[np.linalg.norm(labs - lab(np.array(colour) / 255.0), axis=1) > MARK_TOLERANCE]
+    if not len(labs):
+        return 0.0
+    apart = np.linalg.norm(labs[:, None] - _path(scale)[None], axis=2).min(axis=1)
+    return float((apart < MARK_TOLERANCE).mean())
+
+
+def _path(scale: ColourScale) -> NDArray[np.float64]:
+    """Colours of a scale, those between two of them as well."""
+    labs = scale.labs
+    return labs if scale.banded else np.concatenate([labs, (labs[1:] + labs[:-1]) / 2])
+
+
+def _worth(picture: NDArray[np.uint8], box: Box) -> tuple[float, int, int]:
+    """How much of the picture a legend explains, in tenths; then as `_length_then_narrow`."""
+    scale = ColourScale.from_legend(legend_pixels(picture, box), (0.0, 1.0))
+    return (round(10 * explained(picture, box, scale)), *_length_then_narrow(box))
 
 
 def legend_pixels(picture: NDArray[np.uint8], box: Box) -> NDArray[np.uint8]:
@@ -68,7 +183,6 @@ def legend_pixels(picture: NDArray[np.uint8], box: Box) -> NDArray[np.uint8]:
 
 def _length_then_narrow(box: Box) -> tuple[int, int]:
     width, height = box[2] - box[0], box[3] - box[1]
-    # An outline moves the ends by a pixel or two; the bar within it is the narrower one.
     return max(width, height) // 8, -min(width, height)
 
 
@@ -88,6 +202,9 @@ def _upright_bars(picture: NDArray[np.uint8]) -> Iterator[Box]:
 def _edges(labs: NDArray[np.float64]) -> list[tuple[int, int, int]]:
     """Long vertical edges: the column right of each, first row, and row after the last."""
     edge = np.linalg.norm(np.diff(labs, axis=1), axis=2) > _EDGE
+    # A codec, or a colour of the bar like the one beside it, leaves gaps.
+    edge = np.asarray(binary_closing(np.pad(edge, ((_GAP, _GAP), (0, 0))), np.ones((_GAP, 1))))
+    edge = edge[_GAP:-_GAP]
     shortest = _shortest(labs)
     result = []
     for column in np.flatnonzero(edge.sum(axis=0) >= shortest)[:_MOST_EDGES]:
@@ -108,7 +225,7 @@ def _is_legend(picture: NDArray[np.uint8], labs: NDArray[np.float64], box: Box) 
     inner = _middle(labs[top:bottom, left:right])
     along = np.median(inner, axis=1)
     apart = np.linalg.norm(inner - along[:, None], axis=2).max(axis=1)
-    if (apart > _FLAT).mean() > 0.05:
+    if (apart > _FLAT).mean() > _UNEVEN:
         return False
     path = np.linalg.norm(np.diff(along, axis=0), axis=1).sum()
     if path < _PATH or len(np.unique(np.round(along / 10), axis=0)) < _DISTINCT:

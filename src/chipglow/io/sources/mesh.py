@@ -16,6 +16,7 @@ from chipglow.io.sources.mesh_abaqus import AbaqusReader
 from chipglow.io.sources.mesh_block import Block, FlatMesh, check_grid, fields_of, flatten
 from chipglow.io.sources.mesh_dyna import DynaReader
 from chipglow.io.sources.mesh_reader import MeshReader, files_of
+from chipglow.io.sources.mesh_restricted import RestrictedFields
 from chipglow.io.sources.source import (
     READABLE,
     SampledFrame,
@@ -23,6 +24,7 @@ from chipglow.io.sources.source import (
     SourceError,
     Survey,
     missing_extra,
+    span_of,
 )
 from chipglow.scene import Material, Raster
 from chipglow.scene.rasterise import NOTHING, rasterise
@@ -114,10 +116,9 @@ class MeshSource(Source):
     def survey(self) -> Survey:
         """Look at the first and the last mesh; see `Source.survey`."""
         reader = self._reader()
-        blocks = self._read(reader, 0)
-        found = self._found(blocks, reader.file(0))
-        last = reader.count - 1
-        ends = {0: blocks} if last == 0 else {0: blocks, last: self._read(reader, last)}
+        ends, restricted = self._ends(reader)
+        blocks = ends[0]
+        found = self._found(reader, blocks, restricted)
         flat = [self._flat(reader, number, there, found) for number, there in ends.items()]
         times, assumed = self._times(reader)
         every = fields_of(blocks)
@@ -128,17 +129,26 @@ class MeshSource(Source):
             {ours: found[ours] for ours in READABLE if ours in found},
             tuple(sorted(set(every) - set(found.values()))),
             assumed=(*reader.assumed, *assumed, *self._assumed(blocks, found)),
-            from_file=_from_file(found, tuple(ends.values())),
+            from_file=(*self._lacking(blocks, found), *_from_file(found, tuple(ends.values()))),
+            temperatures=self._temperatures(flat, found),
         )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
         """Sample the meshes one after the other; see `Source.frames`."""
         reader = self._reader()
         times, _ = self._times(reader)
-        found = self._found(self._read(reader, 0), reader.file(0))
+        ends, restricted = self._ends(reader)
+        found = self._found(reader, ends[0], restricted)
         for number in range(start, reader.count):
-            mesh = self._flat(reader, number, None, found)
+            blocks = restricted.of_blocks(self._read(reader, number))
+            mesh = self._flat(reader, number, blocks, found)
             yield self._sampled(mesh, float(times[number]), raster, found)
+
+    def _ends(self, reader: MeshReader) -> tuple[dict[int, tuple[Block, ...]], RestrictedFields]:
+        """The first and the last mesh, and whose fields are whose in them."""
+        ends = {number: self._read(reader, number) for number in sorted({0, reader.count - 1})}
+        restricted = RestrictedFields.of(tuple(ends.values()), self.names)
+        return {number: restricted.of_blocks(there) for number, there in ends.items()}, restricted
 
     def _reader(self) -> MeshReader:
         if find_spec("pyvista") is None or find_spec("meshio") is None:
@@ -180,13 +190,16 @@ class MeshSource(Source):
         grid.points = points
         return Block(block.names, grid, block.sets)
 
-    def _found(self, blocks: Sequence[Block], file: Path) -> dict[str, str]:
+    def _found(
+        self, reader: MeshReader, blocks: Sequence[Block], restricted: RestrictedFields
+    ) -> dict[str, str]:
         """The file's fields by the names of a scene; a vector of velocity is both components."""
-        sizes = fields_of(blocks)
-        for ours, theirs in self.names.items():
+        sizes, file = fields_of(blocks), reader.file(0)
+        known_here = {ours: theirs for ours, theirs in reader.known.items() if theirs in sizes}
+        given = {**known_here, **restricted.names, **self.names}
+        for ours, theirs in given.items():
             _check_size(file, ours, theirs, sizes)
         fitting = {name: size for name, size in sizes.items() if size not in _TENSOR_SIZES}
-        given = self.names
         vectors = [name for name, size in fitting.items() if size in _VECTOR_SIZES]
         scalars = [name for name, size in fitting.items() if size not in _VECTOR_SIZES]
         known = [name for name in READABLE if name not in _COMPONENTS]
@@ -211,21 +224,25 @@ class MeshSource(Source):
         self,
         reader: MeshReader,
         number: int,
-        blocks: Sequence[Block] | None,
+        blocks: Sequence[Block],
         found: Mapping[str, str],
     ) -> FlatMesh:
         file = reader.file(number)
-        blocks = blocks or self._read(reader, number)
         missing = set(found.values()) - set(fields_of(blocks))
         if missing:
             name = sorted(missing)[0]
             raise SourceError(f"{file}: frame {number} has no field {name!r}, the first one has")
-        section = self.section
-        if isinstance(section, float | int):
-            section = section / self.units.length.scale
         try:
             with mesh_vtk.reading(file):
-                return flatten(blocks, found.values(), self._tool(blocks), self.placement, section)
+                known, tool = _with_temperature(blocks, self._tool(blocks), found)
+                return flatten(
+                    known,
+                    found.values(),
+                    tool,
+                    self.placement,
+                    self.section,
+                    self.units.length.scale,
+                )
         except SourceError as error:
             raise error if str(file) in str(error) else SourceError(f"{file}: {error}") from None
 
@@ -245,6 +262,15 @@ class MeshSource(Source):
             )
             for block, grid in zip(parts, (block.grid for block in blocks), strict=True)
         ]
+
+    def _lacking(self, blocks: Sequence[Block], found: Mapping[str, str]) -> Iterator[str]:
+        """What is said of blocks without a temperature."""
+        for block, is_tool in zip(blocks, self._tool(blocks), strict=True):
+            name = found.get("temperature")
+            if block.grid.n_cells and name and not _has_field(block, name):
+                named = block.names[0] if block.names else "a block"
+                what = "tool of the surroundings' temperature" if is_tool.any() else "void"
+                yield f"{named} has no temperature: it is {what}"
 
     def _times(self, reader: MeshReader) -> tuple[NDArray[np.float64], tuple[str, ...]]:
         count = reader.count
@@ -271,7 +297,11 @@ class MeshSource(Source):
                     "of integration points: their mean is taken"
                 )
         names = {simple(name): name for name in sizes}
-        moving = [names[name] for name in ("displacement", "u") if name in names]
+        moving = [
+            names[name]
+            for name in ("displacement", "u")
+            if name in names and names[name] not in found.values()
+        ]
         if moving and self.displacement is None and not _is_exodus(self.path):
             sentences.append(f"positions are those of the file, {moving[0]} is not added to them")
         if not self.tool_parts:
@@ -288,6 +318,22 @@ class MeshSource(Source):
             raise SourceError(f"{reader.file(0)}: no element has finite positions")
         (left, bottom), (right, top) = placed.min(axis=0), placed.max(axis=0)
         return float(left), float(right), float(bottom), float(top)
+
+    def _temperatures(
+        self, meshes: Sequence[FlatMesh], found: Mapping[str, str]
+    ) -> tuple[float, float] | None:
+        """Least and greatest temperature of what is not tool."""
+        if "temperature" not in found:
+            return None
+        name = found["temperature"]
+        values = [np.empty(0, np.float32)]
+        for mesh in meshes:
+            if name in mesh.of_nodes:
+                used = np.unique(mesh.triangles[~mesh.tool])
+                values.append(self._values("temperature", mesh.of_nodes[name][used]))
+            if name in mesh.of_elements:
+                values.append(self._values("temperature", mesh.of_elements[name][~mesh.tool]))
+        return span_of(np.concatenate(values))
 
     def _sampled(
         self, mesh: FlatMesh, time: float, raster: Raster, found: Mapping[str, str]
@@ -306,7 +352,8 @@ class MeshSource(Source):
         )
         fields: dict[str, NDArray[np.float32]] = {}
         for name, values in zip((*nodes, *elements), sampled.fields, strict=True):
-            fields[name] = np.fmax(fields[name], values) if name in fields else values
+            before = fields.get(name, values)
+            fields[name] = np.where(np.isfinite(before), before, values)
         tool = np.append(mesh.tool, False)[sampled.element]
         material = np.where(tool, Material.TOOL, Material.WORKPIECE)
         material[sampled.element == NOTHING] = Material.VOID
@@ -331,6 +378,26 @@ class MeshSource(Source):
         sign = np.prod(self.placement.signs) * parity
         height: NDArray[np.float64] = sign * mesh.points[:, self.placement.depth]
         return height
+
+
+def _with_temperature(
+    blocks: Sequence[Block], tool: Sequence[NDArray[np.bool_]], found: Mapping[str, str]
+) -> tuple[list[Block], list[NDArray[np.bool_]]]:
+    """What has a temperature, and the tool: of what has none the scene can say nothing."""
+    kept: list[Block] = []
+    of_tool: list[NDArray[np.bool_]] = []
+    for block, is_tool in zip(blocks, tool, strict=True):
+        if "temperature" not in found or _has_field(block, found["temperature"]):
+            kept.append(block)
+            of_tool.append(is_tool)
+        elif is_tool.any():
+            kept.append(Block(block.names, block.grid.extract_cells(np.flatnonzero(is_tool))))
+            of_tool.append(is_tool[is_tool])
+    return kept, of_tool
+
+
+def _has_field(block: Block, name: str) -> bool:
+    return name in block.grid.point_data or name in block.grid.cell_data
 
 
 def _check_size(file: Path, ours: str, theirs: str, sizes: Mapping[str, int]) -> None:

@@ -1,6 +1,6 @@
 """A part of a mesh at one time, and how it is made flat: cut, or seen from the side."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
@@ -128,8 +128,12 @@ def flatten(
     tool: Sequence[NDArray[np.bool_]],
     placement: Placement,
     section: Section,
+    unit: float,
 ) -> FlatMesh:
     """Triangles of all blocks with the fields that are wanted.
+
+    Of a mesh with solid elements, flat ones are not seen in a cut, and where they have the nodes of
+    solid ones they are their boundary and left out.
 
     Parameters
     ----------
@@ -142,7 +146,9 @@ def flatten(
     placement : Placement
         Which axis is the depth.
     section : float, "facing" or None
-        Where along the depth to cut a solid mesh, in the file's unit, or its visible surface.
+        Where along the depth to cut a solid mesh, in m, or its visible surface.
+    unit : float
+        The file's unit of length in m.
 
     Raises
     ------
@@ -150,28 +156,73 @@ def flatten(
         If the mesh is solid and no section is given, or flat and one is, or nothing is cut.
     """
     wanted = set(fields)
-    flat: list[FlatMesh] = []
-    solid = False
-    for block, is_tool in zip(blocks, tool, strict=True):
-        grid = _with_only(block.grid, wanted, is_tool)
-        if not grid.n_cells:
-            continue
-        is_solid = bool(np.isin(grid.celltypes, (*_FLAT, *_OTHER_FLAT), invert=True).any())
-        solid |= is_solid
-        flat += _solid(grid, placement, section) if is_solid else _flat(grid)
-    if not solid and isinstance(section, float):
-        raise SourceError("section: a position in a mesh that is flat, expected none")
+    grids = [
+        grid
+        for block, is_tool in zip(blocks, tool, strict=True)
+        if (grid := _with_only(block.grid, wanted, is_tool)).n_cells
+    ]
+    solids = [grid for grid in grids if _is_solid(grid).any()]
+    if not solids:
+        if section is not None and section != "facing":
+            raise SourceError("mesh.section: a position in a mesh that is flat, expected none")
+        flat = [part for grid in grids for part in _flat(grid)]
+    elif section is None:
+        raise SourceError(
+            f"mesh.section: none for a solid mesh, expected {_range(solids, placement, unit)}, or "
+            "facing for the surface that the camera sees"
+        )
+    elif section == "facing":
+        flat = [part for grid in _without_boundary(grids) for part in _seen(grid)]
+    else:
+        flat = [part for grid in solids for part in _sections(grid, placement, section / unit)]
+        if not flat:
+            raise SourceError(
+                f"mesh.section: nothing at {section:g} m, expected "
+                f"{_range(solids, placement, unit)}"
+            )
     if not flat:
-        raise SourceError(_nothing(blocks, placement, section))
+        raise SourceError("the mesh has no elements with an area")
     return _joined(flat)
 
 
-def _nothing(blocks: Sequence[Block], placement: Placement, section: Section) -> str:
-    if not isinstance(section, float):
-        return "the mesh has no elements with an area"
-    ends = [block.grid.bounds[2 * placement.depth :][:2] for block in blocks if block.grid.n_points]
-    low, high = min(end[0] for end in ends), max(end[1] for end in ends)
-    return f"section: nothing at {section:g}, expected a position from {low:g} to {high:g}"
+def _range(solids: Sequence[Any], placement: Placement, unit: float) -> str:
+    ends = [grid.bounds[2 * placement.depth :][:2] for grid in solids]
+    low, high = unit * min(end[0] for end in ends), unit * max(end[1] for end in ends)
+    return f"a position along {'xyz'[placement.depth]} from {low:g} m to {high:g} m"
+
+
+def _is_solid(grid: Any) -> NDArray[np.bool_]:
+    return np.asarray(np.isin(grid.celltypes, (*_FLAT, *_OTHER_FLAT), invert=True))
+
+
+def _without_boundary(grids: Sequence[Any]) -> Iterator[Any]:
+    """Grids without flat elements on the nodes of solid ones; flat elements are seen, too."""
+    solid = [_used_nodes(grid, _is_solid(grid)) for grid in grids]
+    taken = np.unique(np.concatenate(solid))
+    for grid in grids:
+        is_solid = _is_solid(grid)
+        if is_solid.all():
+            yield grid
+            continue
+        free = ~np.isin(_keys(grid.points), taken)[np.asarray(grid.cell_connectivity)]
+        before = np.append(0, np.cumsum(free))[offsets_of(grid)]
+        kept = np.flatnonzero(is_solid | (np.diff(before) > 0))
+        if kept.size:
+            yield grid.extract_cells(kept)
+
+
+def _used_nodes(grid: Any, chosen: NDArray[np.bool_]) -> NDArray[np.uint64]:
+    """Keys of the nodes of chosen elements."""
+    nodes = np.asarray(grid.cell_connectivity)[np.repeat(chosen, np.diff(offsets_of(grid)))]
+    return _keys(np.asarray(grid.points)[np.unique(nodes)])
+
+
+def _keys(points: Any) -> NDArray[np.uint64]:
+    """A number for each place, the same for the same place and for hardly any other."""
+    bits = (np.asarray(points, np.float64) + 0.0).view(np.uint64)
+    factors = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
+    mixed = (bits ^ (bits >> np.uint64(29))) * factors
+    return np.asarray(np.bitwise_xor.reduce(mixed ^ (mixed >> np.uint64(32)), axis=1))
 
 
 def _with_only(grid: Any, wanted: set[str], is_tool: NDArray[np.bool_]) -> Any:
@@ -190,20 +241,18 @@ def _with_only(grid: Any, wanted: set[str], is_tool: NDArray[np.bool_]) -> Any:
     return kept if keep.all() else kept.extract_cells(np.flatnonzero(keep))
 
 
-def _solid(grid: Any, placement: Placement, section: Section) -> list[FlatMesh]:
-    if section is None:
-        raise SourceError(
-            "section: none for a solid mesh, expected where to cut it along "
-            f"{'xyz'[placement.depth]}, or facing for the surface that the camera sees"
-        )
-    if section == "facing":
-        return _polygons(_surface(grid))
+def _sections(grid: Any, placement: Placement, position: float) -> list[FlatMesh]:
+    """A cut through solid elements; position in the file's unit."""
     low, high = grid.bounds[2 * placement.depth :][:2]
     # A plane in the outermost face would cut the elements on one side of the mesh only.
     edge = _NUDGE * (high - low)
-    if low - edge <= section <= high + edge:
-        section = float(np.clip(section, low + edge, high - edge))
-    return _polygons(_cut(grid, placement.depth, section))
+    if low - edge <= position <= high + edge:
+        position = float(np.clip(position, low + edge, high - edge))
+    return _polygons(_cut(grid, placement.depth, position))
+
+
+def _seen(grid: Any) -> list[FlatMesh]:
+    return _polygons(_surface(grid)) if _is_solid(grid).any() else _flat(grid)
 
 
 def _surface(grid: Any) -> Any:

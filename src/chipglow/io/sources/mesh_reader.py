@@ -2,10 +2,11 @@
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from glob import glob, has_magic
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 
 from chipglow.io.sources.file_order import natural
 from chipglow.io.sources.mesh_block import Block
@@ -25,12 +26,15 @@ class MeshReader(ABC):
         Number of frames.
     assumed : tuple of str
         What had to be assumed, a sentence each.
+    known : mapping
+        Names that fields have in this format alone, by those of a scene.
     """
 
     kind: str
     times: tuple[float, ...] | None
     count: int
     assumed: tuple[str, ...] = ()
+    known: Mapping[str, str] = MappingProxyType({})
 
     @abstractmethod
     def read(self, number: int) -> tuple[Block, ...]:

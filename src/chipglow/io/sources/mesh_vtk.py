@@ -42,7 +42,12 @@ ALONE: Final = (
 )  # fmt: skip
 """Those whose files name no others."""
 
+_NAMES: Final[Mapping[str, Mapping[str, str]]] = {"OpenFOAM": {"velocity": "U"}}
+"""What fields are called in one format, though another thing is called so in others."""
+
 _AS: Final[Mapping[str, str]] = {".xmf": ".xdmf", ".encas": ".case"}
+_INSIDES: Final = ("Element Blocks", "internalMesh", "Internal")
+"""What VTK calls the elements of Exodus, OpenFOAM and CGNS; beside them lie sets and boundaries."""
 _HEAD: Final = 100_000
 _CLAIMS: Final = (
     rb'NumberOf(?:Points|Cells|Verts|Lines|Polys)="(\d+)"',
@@ -72,6 +77,7 @@ class VtkReader(MeshReader):
     def __init__(self, files: Sequence[Path]) -> None:
         self._files = files
         self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of {_kind(files[0])}"
+        self.known = _NAMES.get(_kind(files[0]), {})
         self._opened: Any = None
         self.times = None
         self.count = len(files)
@@ -166,7 +172,12 @@ def _opened(file: Path) -> Any:
             return _opened_xdmf(file)
         suffix = file.suffix.lower()
         reader_for: Any = pyvista.get_reader
-        return reader_for(str(file), force_ext=_AS.get(suffix, suffix))
+        reader = reader_for(str(file), force_ext=_AS.get(suffix, suffix))
+        if _kind(file) == "OpenFOAM":
+            reader.cell_to_point_creation = False  # the case has values of cells alone
+        if _kind(file) == "Exodus II":
+            reader.reader.SetGenerateGlobalNodeIdArray(True)
+        return reader
 
 
 def _check_head(file: Path) -> None:
@@ -230,11 +241,11 @@ def _times_inside(reader: Any, file: Path) -> tuple[float, ...] | None:
     with reading(file):
         if isinstance(reader, TimeReader):
             times = reader.time_values
-        elif hasattr(reader, "GetOutputInformation"):
-            information = reader.GetOutputInformation(0)
-            times = information.Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS())
         else:
-            return None
+            algorithm = getattr(reader, "reader", reader)
+            algorithm.UpdateInformation()
+            information = algorithm.GetOutputInformation(0)
+            times = information.Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS())
         return tuple(float(time) for time in times or ()) or None
 
 
@@ -266,15 +277,18 @@ def _time_in_head(file: Path) -> float | None:
 
 
 def _blocks(file: Path, data: Any, path: tuple[str, ...]) -> Iterator[Block]:
-    """All grids in a tree of blocks."""
+    """All grids in a tree of blocks, without surfaces of them that lie in it too."""
     import pyvista
 
     if data is None:
         return
     if isinstance(data, pyvista.MultiBlock):
-        for number in range(data.n_blocks):
-            name = data.get_block_name(number) or f"block {number}"
-            yield from _blocks(file, data[number], (*path, name))
+        parts = [
+            data.get_block_name(number) or f"block {number}" for number in range(data.n_blocks)
+        ]
+        inside = [number for number, name in enumerate(parts) if name in _INSIDES]
+        for number in inside or range(data.n_blocks):
+            yield from _blocks(file, data[number], path if inside else (*path, parts[number]))
     elif isinstance(data, pyvista.PartitionedDataSet):
         for number in range(data.n_partitions):
             yield from _blocks(file, data[number], (*path, str(number)))

@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from math import hypot, isfinite
+from dataclasses import dataclass, field, replace
+from math import hypot, isfinite, sqrt
 from pathlib import Path
+from statistics import fmean
 from typing import Any, Final
 
 import numpy as np
@@ -12,9 +13,16 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.colour_scale import ColourScale, ColourUncertainty, colour_uncertainty
 from chipglow.io.sources.conventions import Placement
-from chipglow.io.sources.legend import Box, find_legend, legend_pixels
+from chipglow.io.sources.legend import (
+    LEAST_EXPLAINED,
+    explained,
+    find_legend,
+    is_cut,
+    legend_pixels,
+)
 from chipglow.io.sources.moving_pictures import MovieIndex, index_movie, pictures
 from chipglow.io.sources.overlays import (
+    Box,
     Colour,
     FieldPicture,
     FieldReader,
@@ -35,6 +43,7 @@ OVERLAY_LIMIT: Final = 20.0
 _LEGEND_MARGIN: Final = 3
 _HALF: Final = 0.5
 _EARLY: Final = 100
+_ROUNDING: Final = 0.29
 
 
 @dataclass(frozen=True)
@@ -306,7 +315,7 @@ class MovieSource(Source):
                 background, also = self._background(cropped, scale)
                 readers[name] = FieldReader(
                     scale, background, self.tool_colour, tool,
-                    self._cropped(covered), self.overlay_limit,
+                    self._cropped(covered), self.overlay_limit, legend[0] if legend else None,
                 )  # fmt: skip
             assumed += [f"{name}: {text}" for text in (*said, *also)]
         return readers, tuple(assumed)
@@ -320,6 +329,12 @@ class MovieSource(Source):
         if self.tool_colour is not None:
             tool = np.array(self.tool_colour)
             found = tuple(colour for colour in found if np.abs(tool - colour).max() > 16)
+            refused = tuple(colour for colour in refused if np.abs(tool - colour).max() > 16)
+        if refused and not found:
+            raise SourceError(
+                f"background: {refused[0]} at the border is a colour of the scale too, expected "
+                "another background, or background: [] if it shows values"
+            )
         named = ", ".join(str(colour) for colour in found) or "none"
         said = [f"background colours at the border: {named}"]
         said += [f"{colour} at the border is taken for a value" for colour in refused]
@@ -394,16 +409,29 @@ class MovieSource(Source):
         result = {}
         for name, reader in readers.items():
             index = indices[name]
-            values, distance = [], []
+            values, distance, lines = [], [], []
             for number in _sample(index):
                 picture = next(pictures(self.movies[name].path, index, number))
                 read = self._read(name, reader, picture, number)
                 values.append(read.values[read.seen])
                 distance.append(read.distance[read.seen])
-            result[name] = colour_uncertainty(
-                reader.scale, np.concatenate(values), np.concatenate(distance)
+                lines.append(reader.error_of_filling(read))
+            result[name] = replace(
+                colour_uncertainty(reader.scale, np.concatenate(values), np.concatenate(distance)),
+                legend=self._of_legend(name, reader),
+                lines=sqrt(fmean(error**2 for error in lines)),
             )
         return result
+
+    def _of_legend(self, name: str, reader: FieldReader) -> float:
+        """Because a legend's ends are known to a pixel where it was found, to its rounding else."""
+        if reader.legend is None:
+            return 0.0
+        movie = self.movies[name]
+        given = isinstance(movie.colours, Legend) and movie.colours.box is not None
+        left, top, right, bottom = reader.legend
+        pixel = abs(movie.values[1] - movie.values[0]) / max(right - left, bottom - top)
+        return pixel * (_ROUNDING if given else 1.0)
 
 
 def metre_per_pixel(
@@ -438,16 +466,31 @@ def _scale(
         name, bands = movie.colours.name, movie.colours.bands
         return ColourScale.named(name, movie.values, bands), (), ()
     box = movie.colours.box or find_legend(picture)
+    if box is not None and movie.colours.box is None and is_cut(picture, box):
+        raise SourceError(
+            f"legend: an end of the one found at {box} cannot be told from what is beside it, "
+            "expected the box of the legend, or a named map"
+        )
     if box is None:
         raise SourceError(
             "no legend was found in the first picture, expected the box of one, or a named map"
         )
     scale = ColourScale.from_legend(legend_pixels(picture, box), movie.values)
+    _check_legend(picture, box, scale)
     kind = f"{len(scale.values)} bands" if scale.banded else "colours without steps"
     found = "" if movie.colours.box else f"legend found at {box} (left, top, right, bottom), "
     first, last = movie.values
     ends = f"{first:g} at its lower or left end, {last:g} at the other"
     return scale, (box,), (f"{found}legend of {kind}, {ends}",)
+
+
+def _check_legend(picture: NDArray[np.uint8], box: Box, scale: ColourScale) -> None:
+    share = explained(picture, box, scale)
+    if share < LEAST_EXPLAINED:
+        raise SourceError(
+            f"legend: the picture has the colours of {box} in {share:.0%} of what it shows, "
+            f"expected {LEAST_EXPLAINED:.0%} or more; give the box of the legend, or a named map"
+        )
 
 
 def _completed(
@@ -466,7 +509,10 @@ def _doubts(uncertainty: Mapping[str, ColourUncertainty]) -> Iterator[str]:
         unit = FIELD_UNITS[name].replace("1/s", "/s").removeprefix("1")
         yield (
             f"{name}: the colours leave a standard uncertainty of {doubt.total:.3g} {unit}".rstrip()
-            + f" ({doubt.colours:.3g} by their number, {doubt.noise:.3g} by their noise)"
+            + f" ({doubt.colours:.3g} by their number, {doubt.noise:.3g} by their noise"
+            + (f", {doubt.legend:.3g} by the ends of the legend" if doubt.legend else "")
+            + (f", {doubt.lines:.3g} by the lines drawn over them" if doubt.lines else "")
+            + ")"
         )
 
 

@@ -7,14 +7,16 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter, minimum_filter
+from scipy.ndimage import grey_closing, maximum_filter, minimum_filter
 
 from chipglow.io.sources.colour_scale import ColourScale, lab
-from chipglow.io.sources.legend import Box
 from chipglow.io.sources.source import SourceError
 from chipglow.scene import FILLED, Material
 from chipglow.scene.nearest import fill
 from chipglow.scene.polygon import in_polygon
+
+Box = tuple[int, int, int, int]
+"""Left, top, right and bottom edge in whole pixels from the upper left corner of a picture."""
 
 Colour = tuple[int, int, int]
 """Red, green and blue of 0 to 255."""
@@ -23,6 +25,13 @@ MARK_TOLERANCE: Final = 10.0
 """How far a colour may be from that of the background or the tool, in CIE L*a*b*."""
 
 _GREY: Final = 10.0
+_FEWEST_FILLED: Final = 0.01
+_SHIFTS: Final = ((2, 3), (5, -4), (-3, 6))
+_LUMA: Final = np.array([0.299, 0.587, 0.114])
+_VALLEY: Final = 0.2
+_NOISE: Final = 8.0
+_ONE_COLOUR: Final = 3.0
+_MESH_SHARE: Final = 0.03
 _BORDER_SHARE: Final = 0.1
 _COARSE: Final = 16
 
@@ -70,6 +79,8 @@ class FieldReader:
         Where something else is drawn, shape (y, x), bool.
     limit : float
         Distance from the scale in CIE L*a*b* beyond which a colour is a line or text.
+    legend : Box, optional
+        Where the scale was read.
 
     Raises
     ------
@@ -83,6 +94,7 @@ class FieldReader:
     tool: NDArray[np.bool_]
     covered: NDArray[np.bool_]
     limit: float
+    legend: Box | None = None
 
     def __post_init__(self) -> None:
         for name, colours in (("background", self.background), ("tool_colour", self._tools)):
@@ -102,7 +114,8 @@ class FieldReader:
         """
         values, distance = self.scale.invert(picture)
         void, tool = self._marked(picture, distance)
-        drawn = _grown((distance > self.limit) & ~void & ~tool) | self.covered
+        off_scale = (distance > self.limit) & ~void & ~tool
+        drawn = _grown(off_scale | (dark_lines(picture) & ~void & ~tool)) | self.covered
         seen = ~(drawn | void | tool)
         material = np.full(values.shape, Material.WORKPIECE, np.uint8)
         material[void], material[tool] = Material.VOID, Material.TOOL
@@ -117,6 +130,25 @@ class FieldReader:
         quality[material == Material.VOID] = 0
         values[material == Material.VOID] = np.nan
         return FieldPicture(values, material, quality, seen, distance)
+
+    def error_of_filling(self, read: FieldPicture) -> float:
+        """How far values under lines are off, as a root mean square over all that is shown.
+
+        It is tried on pixels that show values, as if the lines were drawn elsewhere.
+        """
+        shown = read.material == Material.WORKPIECE
+        filled = shown & ~read.seen & ~self.covered
+        if filled.sum() < _FEWEST_FILLED * shown.sum():
+            return 0.0
+        errors = []
+        for down, across in _SHIFTS:
+            tried = np.roll(filled, (down, across), (0, 1)) & read.seen & shown
+            values = np.where(tried, np.nan, read.values)
+            fill(values, read.seen & shown & ~tried, tried)
+            errors.append(values[tried] - read.values[tried])
+        error = np.concatenate(errors)
+        share = filled.sum() / shown.sum()
+        return float(np.sqrt(share * np.nanmean(error**2))) if error.size else 0.0
 
     @property
     def _tools(self) -> tuple[Colour, ...]:
@@ -145,10 +177,26 @@ class FieldReader:
         return void, _without_lines(marked & (number >= len(self.background)))
 
 
+def dark_lines(picture: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Pixels of dark lines up to 2 wide, if they are so many that a mesh is drawn; else none.
+
+    The colours of black lines may be of the scale, and a codec mixes them with those beside them.
+
+    Parameters
+    ----------
+    picture : ndarray
+        Red, green and blue, shape (y, x, 3), uint8.
+    """
+    light = picture @ _LUMA
+    around = grey_closing(light, 5)
+    lines = around - light > np.maximum(_VALLEY * around, _NOISE)
+    return lines if lines.mean() > _MESH_SHARE else np.zeros_like(lines)
+
+
 def find_background(
     picture: NDArray[np.uint8], scale: ColourScale
 ) -> tuple[tuple[Colour, ...], tuple[Colour, ...]]:
-    """Colours of the background: the greys, white and black that the border of a picture has.
+    """Colours of the background: those that a part of the border has, and the scale has not.
 
     Parameters
     ----------
@@ -160,24 +208,50 @@ def find_background(
     Returns
     -------
     found, refused : tuple of Colour
-        Colours that show nothing; and those that are left out because they are of the scale.
+        Colours that show nothing; and greys that may show nothing, but are of the scale.
     """
-    border = _border(picture)
-    labs = lab(border / 255.0)
-    grey = border[np.hypot(labs[:, 1], labs[:, 2]) < _GREY]
-    if not len(grey):
-        return (), ()
-    _, group, counts = np.unique(grey // _COARSE, axis=0, return_inverse=True, return_counts=True)
     found: list[Colour] = []
     refused: list[Colour] = []
-    for index in np.flatnonzero(counts >= _BORDER_SHARE * len(border)):
-        red, green, blue = np.median(grey[group.ravel() == index], axis=0).astype(int).tolist()
-        colour = (red, green, blue)
-        if _border(_without_lines(_like(picture, colour))).mean() < _BORDER_SHARE:
-            continue
-        on_scale = _place(scale, colour)[1] < MARK_TOLERANCE
-        (refused if on_scale else found).append(colour)
+    for colour in plain_colours(picture):
+        if _place(scale, colour)[1] >= MARK_TOLERANCE:
+            found.append(colour)
+        elif np.hypot(*lab(np.array(colour) / 255.0)[1:]) < _GREY:
+            refused.append(colour)
     return tuple(found), tuple(refused)
+
+
+def plain_colours(picture: NDArray[np.uint8]) -> tuple[Colour, ...]:
+    """Colours that cover a part of the border of a picture, not as lines, the most common first.
+
+    Parameters
+    ----------
+    picture : ndarray
+        Red, green and blue, shape (y, x, 3), uint8.
+    """
+    border = _border(picture)
+    rest = border
+    found: list[Colour] = []
+    while len(rest) >= _BORDER_SHARE * len(border):
+        _, group, counts = np.unique(
+            rest // _COARSE, axis=0, return_inverse=True, return_counts=True
+        )
+        if counts.max() < _BORDER_SHARE * len(border) / 2:
+            break
+        middle = np.median(rest[group.ravel() == counts.argmax()], axis=0).astype(int).tolist()
+        colour = (middle[0], middle[1], middle[2])
+        like = _like(rest[None], colour)[0]
+        wide = _border(_without_lines(_like(picture, colour))).mean() >= _BORDER_SHARE
+        if wide and _is_plain(rest[like], colour):
+            found.append(colour)
+        rest = rest[~like]
+    return tuple(found)
+
+
+def _is_plain(pixels: NDArray[np.uint8], colour: Colour) -> bool:
+    """Whether pixels have one colour; a shade of grey may run, others may be those of a field."""
+    place = lab(np.array(colour) / 255.0)
+    apart = np.linalg.norm(lab(pixels / 255.0) - place, axis=1)
+    return bool(np.hypot(*place[1:]) < _GREY or np.sqrt((apart**2).mean()) < _ONE_COLOUR)
 
 
 def box_mask(shape: tuple[int, int], boxes: Sequence[Box], margin: int = 0) -> NDArray[np.bool_]:
@@ -208,8 +282,8 @@ def _border(picture: NDArray[Any]) -> NDArray[Any]:
 
 def _like(picture: NDArray[np.uint8], colour: Colour) -> NDArray[np.bool_]:
     """Pixels of a colour."""
-    one = ColourScale(np.zeros(1), np.array([colour]) / 255, banded=True)
-    return np.asarray(one.invert(picture)[1] < MARK_TOLERANCE)
+    apart = lab(picture / 255.0) - lab(np.array(colour) / 255.0)
+    return np.asarray(np.linalg.norm(apart, axis=-1) < MARK_TOLERANCE)
 
 
 def _place(scale: ColourScale, colour: Colour) -> tuple[float, float]:

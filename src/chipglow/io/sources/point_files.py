@@ -1,4 +1,4 @@
-"""Tables of points over time: text, NumPy, HDF5, MATLAB and VTK files."""
+"""Tables of points over time: text, dumps of LAMMPS, NumPy, HDF5, MATLAB and VTK files."""
 
 import re
 from abc import ABC, abstractmethod
@@ -19,7 +19,8 @@ from chipglow.io.sources.arrays import (
     open_arrays,
     reading,
 )
-from chipglow.io.sources.conventions import simple
+from chipglow.io.sources.conventions import COMMON_NAMES, simple
+from chipglow.io.sources.lammps_dump import ENDINGS, LammpsDump, is_dump
 from chipglow.io.sources.source import SourceError, missing_extra
 from chipglow.io.sources.text_table import TextTable, line_of
 
@@ -29,6 +30,10 @@ MOST_POINTS: Final = 10_000_000
 
 _PLACES: Final = ("points", "positions", "position", "coordinates", "coords", "pos", "location")
 _TIMES: Final = ("time", "times", "t_s")
+_PERHAPS_TIME: Final = "t"
+_SURELY_TEMPERATURE: Final = tuple(
+    name for name in COMMON_NAMES["temperature"] if name != _PERHAPS_TIME
+)
 _LETTERS: Final = "xyz"
 _ROWS: Final = 200_000
 _HEAD: Final = 1_000_000
@@ -81,6 +86,9 @@ class PointFrames(ABC):
     time_unit: str | None = None
     """Unit of the times that the files say."""
 
+    time_label: str = ""
+    """Column or list that the times are from."""
+
     @property
     def times(self) -> NDArray[np.float64] | None:
         """Times as they are in the files; None if they say none."""
@@ -123,6 +131,8 @@ def open_points(pattern: str, time: str | None, stack: ExitStack) -> PointFrames
     for path in paths[:1]:
         if path.stat().st_size == 0:
             raise SourceError(f"{path}: is empty")
+    if _is_dump(paths[0]):
+        return _Dumps(paths)
     if len(paths) == 1 and paths[0].suffix.lower() in TEXT_SUFFIXES:
         table = _TimedTable(paths[0], time)
         return table if table.has_time else _FilePerFrame(paths)
@@ -160,6 +170,38 @@ def _read_file(path: Path) -> PointTable:
         return _Stacked(str(path), arrays, None).whole()
 
 
+# LAMMPS
+
+
+def _is_dump(path: Path) -> bool:
+    return path.suffix.lower() in (*ENDINGS, *TEXT_SUFFIXES) and is_dump(path)
+
+
+class _Dumps(PointFrames):
+    """Dumps with a frame or many in each file."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self._dumps = [LammpsDump(path) for path in paths]
+        self._frames = [
+            (dump, number) for dump in self._dumps for number in range(len(dump.snapshots))
+        ]
+        self.time_unit = self._dumps[0].units.get("time")
+
+    @property
+    def count(self) -> int:
+        return len(self._frames)
+
+    @property
+    def times(self) -> NDArray[np.float64] | None:
+        times = [dump.snapshots[number].time for dump, number in self._frames]
+        known = [time for time in times if time is not None]
+        return np.array(known) if len(known) == len(times) else None
+
+    def frames(self, start: int = 0) -> Iterator[tuple[str, PointTable]]:
+        for dump, number in self._frames[start:]:
+            yield str(dump.path), PointTable(dump.columns(number), dump.units)
+
+
 # Text
 
 
@@ -181,8 +223,7 @@ class _TimedTable(PointFrames):
             raise SourceError(f"{path}, line 1: two columns have one name")
         if time is not None and time not in self._labels:
             raise SourceError(f"{path}: there is no column {time!r} for time")
-        match = [label for label in self._labels if simple(label) in _TIMES]
-        self._time = time or (match[0] if match else "")
+        self._time = self.time_label = time or _time_in(self._labels)
         self.has_time = bool(self._time)
         self.time_unit = self._units.get(self._time)
 
@@ -277,6 +318,14 @@ class _TimedTable(PointFrames):
         return None
 
 
+def _time_in(labels: Sequence[str]) -> str:
+    """The column of times; ``t`` is one beside a column that surely is the temperature."""
+    match = [label for label in labels if simple(label) in _TIMES]
+    if not match and any(simple(label) in _SURELY_TEMPERATURE for label in labels):
+        match = [label for label in labels if simple(label) == _PERHAPS_TIME]
+    return match[0] if match else ""
+
+
 def _label(cell: str) -> str:
     return re.split(r"[\[(]", cell)[0].strip() or cell
 
@@ -314,9 +363,9 @@ class _Stacked(PointFrames):
         self._arrays = {_last(label): array for label, array in arrays.items()}
         if time is not None and time not in self._arrays:
             raise SourceError(f"{path}: there is no list {time!r} for time")
-        names = [time] if time else [name for name in self._arrays if simple(name) in _TIMES]
+        names = [time] if time else self._like_times()
         lists = [name for name in names if max(self._arrays[name].shape, default=0) > 0]
-        self._time = lists[0] if lists else ""
+        self._time = self.time_label = lists[0] if lists else ""
         depth = max((self._depth(name) for name in self._arrays if name != self._time), default=1)
         self.has_time = bool(self._time) and depth == 2
         self._times: NDArray[np.float64] | None = None
@@ -342,6 +391,13 @@ class _Stacked(PointFrames):
     def whole(self) -> PointTable:
         """The only frame."""
         return self._table(None)
+
+    def _like_times(self) -> list[str]:
+        """Arrays by the name of times; ``t`` only if others have more axes than it has."""
+        known = [name for name in self._arrays if simple(name) in _TIMES]
+        lists = [name for name, array in self._arrays.items() if len(array.shape) == 1]
+        deeper = any(self._depth(name) == 2 for name in self._arrays)
+        return known or [name for name in lists if deeper and simple(name) == _PERHAPS_TIME]
 
     def _check_lengths(self) -> None:
         for name in self._columns:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chipglow.scene import READABLE, Raster, SampledFrame
 
@@ -17,6 +17,7 @@ __all__ = [
     "SourceError",
     "Survey",
     "missing_extra",
+    "span_of",
 ]
 
 
@@ -68,6 +69,9 @@ class Survey:
         What had to be assumed, a sentence each.
     from_file : tuple of str
         What the file itself says or lacks, and how that is taken, a sentence each.
+    temperatures : tuple of float, optional
+        Least and greatest temperature in K of the frames that were looked at, as samples may have
+        them; NaN if there is none at all.
     """
 
     kind: str
@@ -78,6 +82,14 @@ class Survey:
     spacing: float | None = None
     assumed: tuple[str, ...] = ()
     from_file: tuple[str, ...] = ()
+    temperatures: tuple[float, float] | None = None
+
+
+def span_of(values: ArrayLike) -> tuple[float, float]:
+    """Least and greatest of what is a number; NaN if nothing is."""
+    numbers = np.asarray(values, np.float64)
+    known = numbers[np.isfinite(numbers)]
+    return (float(known.min()), float(known.max())) if known.size else (np.nan, np.nan)
 
 
 class Source(ABC):

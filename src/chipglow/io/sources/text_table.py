@@ -11,6 +11,9 @@ from chipglow.io.sources.source import SourceError
 _LARGEST_TABLE: Final = 1_000_000_000
 _LONGEST_LINE: Final = 4_000_000
 _MOST_COMMENTS: Final = 1000
+_LAST_LINES: Final = 100
+_FEWEST_ALIKE: Final = 10
+_FORM: Final = re.compile(r"[-+]?\d+(?:[.,](\d*))?(?:[eE][-+]?(\d*))?")
 _NUMBER: Final = r"[-+]?(?:\d++(?:[.,]\d*+)?|[.,]\d++)(?:[eE][-+]?\d++)?|nan"
 _NUMBERS: Final = re.compile(rf"(?:{_NUMBER})(?:[;,\s]\s*+(?:{_NUMBER}))*+[;,\s]*", re.IGNORECASE)
 
@@ -60,10 +63,18 @@ class TextTable:
         separator = next((mark for mark in ";\t," if mark in first), r"\s+")
         text = second or first
         decimal = "," if separator != "," and "," in text and "." not in text else "."
-        last, expected = (len(_split(one, separator)) for one in (_last_line(path), first))
+        lines, whole = _last_lines(path)
+        cells = [_split(line, separator) for line in lines]
+        last, expected = len(cells[-1]), len(_split(first, separator))
         if last != expected:
             raise SourceError(
                 f"{path}: its last line has {last} cells, expected {expected}: it is cut short"
+            )
+        others = [row[-1] for row in cells[:-1] if len(row) == expected]
+        if not whole and _is_part(cells[-1][-1], others):
+            raise SourceError(
+                f"{path}: ends with {cells[-1][-1].strip()!r} and no end of line, expected a "
+                f"number such as {others[-1].strip()!r}: it is cut short, or lacks its end of line"
             )
         options = {"sep": separator, "decimal": decimal, "comment": "#", "skipinitialspace": True}
         return cls(first, options)
@@ -84,13 +95,39 @@ def _split(line: str, separator: str) -> list[str]:
     return line.split() if separator == r"\s+" else line.split(separator)
 
 
-def _last_line(path: Path) -> str:
-    """The last line that is no comment; empty if it is too long to be looked at."""
+def _last_lines(path: Path) -> tuple[list[str], bool]:
+    """The last lines that are no comments, and whether the file ends with the end of a line.
+
+    An empty one if the last is too long to be looked at.
+    """
+    size = path.stat().st_size
     with path.open("rb") as stream:
-        stream.seek(max(0, path.stat().st_size - _LONGEST_LINE))
-        lines = stream.read().decode("utf-8", "replace").split("\n")
-    known = [line.split("#")[0].strip() for line in lines[1:]]
-    return next((line for line in reversed(known) if line), "")
+        stream.seek(max(0, size - _LONGEST_LINE))
+        text = stream.read().decode("utf-8-sig" if size <= _LONGEST_LINE else "utf-8", "replace")
+    lines = text.split("\n")
+    known = [line.split("#")[0].strip() for line in (lines if size <= _LONGEST_LINE else lines[1:])]
+    return [line for line in known if line][-_LAST_LINES:] or [""], text.endswith(("\n", "\r"))
+
+
+def _is_part(number: str, others: list[str]) -> bool:
+    """Whether a number may have lost digits that all the others have."""
+    decimals, exponent = _form(number)
+    forms = [form for form in map(_form, others) if form != (-1, -1)]
+    if not forms:
+        return False
+    same = len({exponent for _, exponent in forms}) == 1
+    if same and exponent < forms[-1][1]:
+        return True
+    alike = len({decimals for decimals, _ in forms}) == 1 and len(forms) >= _FEWEST_ALIKE
+    return same and alike and decimals < forms[-1][0] and exponent <= 0
+
+
+def _form(number: str) -> tuple[int, int]:
+    """How many decimals and digits of an exponent a number has; -1 each for what is none."""
+    found = _FORM.fullmatch(number.strip())
+    if found is None:
+        return -1, -1
+    return len(found[1] or ""), len(found[2]) if found[2] is not None else 0
 
 
 def lines_of_text(path: Path) -> int:
