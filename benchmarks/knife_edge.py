@@ -1,9 +1,11 @@
 """How often the knife edge's 95 % intervals hold the truth: the table of docs/knife-edge.md.
 
-python benchmarks/knife_edge.py
+python benchmarks/knife_edge.py [--repeats 60]
 """
 
+import argparse
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,17 +23,16 @@ from synthetic_edge import (
     image_of,
 )
 
-REPEATS = 60
 STEP = 5.0
 MIRROR = (0.28, 0.35)
 UP_TO_NYQUIST = np.arange(2, 33, 6)
 
 
-def coverage(name, edge, fwhm, noise, saturation=None, gaussian=False):
+def coverage(repeats, name, edge, fwhm, noise, saturation=None, gaussian=False):
     """Print the share of intervals of the width, and of the MTF, that hold the truth."""
     generator = np.random.default_rng(5)
     within, held, uncertainty = [], [], []
-    for seed in range(REPEATS):
+    for seed in range(repeats):
         normal = generator.uniform(3.0, 12.0) + generator.choice([0, 90, 180, 270])
         place = generator.uniform(-6e-6, 6e-6)
         radiance = edge_radiance(edge, normal, position=place, step=STEP)
@@ -50,14 +51,17 @@ def coverage(name, edge, fwhm, noise, saturation=None, gaussian=False):
 
 def main():
     """Print the table's rows."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--repeats", type=int, default=60, help="edges of each row")
+    row = partial(coverage, parser.parse_args().repeats)
     gauss = gaussian_edge(10e-6)
-    coverage("Gaussian", gauss, 10e-6, 0.01, gaussian=True)
-    coverage("Gaussian", gauss, 10e-6, 0.1, gaussian=True)
-    coverage("Gaussian, clipped at 90 %", gauss, 10e-6, 0.01, 6.5, gaussian=True)
+    row("Gaussian", gauss, 10e-6, 0.01, gaussian=True)
+    row("Gaussian", gauss, 10e-6, 0.1, gaussian=True)
+    row("Gaussian, clipped at 90 %", gauss, 10e-6, 0.01, 6.5, gaussian=True)
     mirror, fwhm = annular_edge(WAVELENGTH, *MIRROR), AnnularAperturePSF(WAVELENGTH, *MIRROR).fwhm
-    coverage("diffraction", mirror, fwhm, 0.01)
-    coverage("diffraction", mirror, fwhm, 0.03)
-    coverage("diffraction, clipped at 92 %", mirror, fwhm, 0.01, 6.6)
+    row("diffraction", mirror, fwhm, 0.01)
+    row("diffraction", mirror, fwhm, 0.03)
+    row("diffraction, clipped at 92 %", mirror, fwhm, 0.01, 6.6)
 
 
 if __name__ == "__main__":

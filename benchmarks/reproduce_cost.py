@@ -1,6 +1,6 @@
-"""Cost of the paper's study: time and peak memory of the whole command, nothing cached.
+"""Cost of the paper's study, or of any: time and peak memory of the whole command, nothing cached.
 
-    python benchmarks/reproduce_cost.py [quick] [full]
+    python benchmarks/reproduce_cost.py [quick] [full] [STUDY.yaml]
 
 The first run in a fresh environment compiles the kernels; the time of that is part of it.
 """
@@ -13,19 +13,20 @@ import tempfile
 from pathlib import Path
 from time import perf_counter
 
+COMMANDS = {"quick": ["reproduce", "--quick"], "full": ["reproduce"]}
 LIMITS = {"quick": 90.0, "full": 600.0}
 MEMORY_LIMIT = 4.0
 
 
 def cost(what: str) -> tuple[float, float]:
     """Seconds and peak memory in GB of one run."""
-    options = ["--quick"] if what == "quick" else []
+    arguments = COMMANDS.get(what, ["run", what])
     with tempfile.TemporaryDirectory() as folder:
         environment = {**os.environ, "CHIPGLOW_CACHE": str(Path(folder, "cache"))}
-        command = [sys.executable, "-c", "from chipglow.cli import main; main()", "reproduce"]
+        command = [sys.executable, "-c", "from chipglow.cli import main; main()", *arguments]
         start = perf_counter()
         subprocess.run(
-            [*command, *options, "--out", str(Path(folder, "run"))],
+            [*command, "--out", str(Path(folder, "run"))],
             env=environment,
             stdout=subprocess.DEVNULL,
             check=True,
@@ -38,12 +39,12 @@ def main() -> None:
     """Run what is asked for and print the table."""
     chosen = sys.argv[1:] or list(LIMITS)
     print(f"{os.cpu_count()} processors")
-    print(
-        f"{'reproduce':10} {'time / s':>9} {'limit / s':>10} {'peak / GB':>10} {'limit / GB':>11}"
-    )
+    print(f"{'study':10} {'time / s':>9} {'limit / s':>10} {'peak / GB':>10} {'limit / GB':>11}")
     for what in chosen:
         seconds, memory = cost(what)
-        print(f"{what:10} {seconds:9.0f} {LIMITS[what]:10.0f} {memory:10.2f} {MEMORY_LIMIT:11.1f}")
+        limit = f"{LIMITS[what]:.0f}" if what in LIMITS else "–"
+        name = Path(what).stem
+        print(f"{name:10} {seconds:9.0f} {limit:>10} {memory:10.2f} {MEMORY_LIMIT:11.1f}")
 
 
 if __name__ == "__main__":

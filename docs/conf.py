@@ -1,9 +1,16 @@
 """How the documentation is built: ``sphinx-build -W -b html docs FOLDER``."""
 
+import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
-from chipglow.study import (
+HERE = Path(__file__).parent
+GENERATED = HERE / "generated"
+sys.path.insert(0, str(HERE))  # for mathml and sample_files
+
+from sample_files import SAMPLES, write_archive  # noqa: E402
+
+from chipglow.study import (  # noqa: E402
     ImportDescription,
     MeasurementDescription,
     Study,
@@ -11,19 +18,16 @@ from chipglow.study import (
     study_text,
 )
 
-HERE = Path(__file__).parent
-GENERATED = HERE / "generated"
-
 project = "chipglow"
 author = "The chipglow developers"
 copyright = "The chipglow developers, Apache-2.0"
 release = version = installed_version("chipglow")
 
 extensions = [
+    "mathml",
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
 ]
 templates_path = ["_templates"]
@@ -36,7 +40,7 @@ exclude_patterns = [
 ]
 default_role = "py:obj"
 
-myst_enable_extensions = ["amsmath", "dollarmath"]
+myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
@@ -48,15 +52,15 @@ napoleon_use_rtype = False
 
 html_theme = "pydata_sphinx_theme"
 html_title = "chipglow"
-html_theme_options = {"show_toc_level": 2, "navigation_with_keys": False}
-html_sidebars = {
-    "index": [],
-    "tutorial": [],
-    "physics": [],
-    "cutting": [],
-    "study": [],
-    "files": [],
-    "import": [],
+html_math_renderer = "mathml"
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
+html_sidebars = {"**": ["all-pages"]}
+html_theme_options = {
+    "show_toc_level": 2,
+    "navigation_with_keys": False,
+    "navbar_center": [],
+    "secondary_sidebar_items": ["page-toc"],
 }
 
 # The page on files shows the paper's study as the program itself writes it.
@@ -75,3 +79,7 @@ GENERATED.mkdir(exist_ok=True)
 (GENERATED / "measurement-fields.md").write_text(
     field_tables(MeasurementDescription(), "measurement"), encoding="utf-8"
 )
+
+# Pages offer the files with which their commands can be tried.
+for page in SAMPLES:
+    write_archive(page, GENERATED / f"{page}.zip")

@@ -19,7 +19,7 @@ from chipglow.camera import Camera, Measurement
 from chipglow.radiometry import Band
 from chipglow.report.emissivity_figure import draw_emissivity
 from chipglow.scene import FIELD_UNITS, Raster, Scene
-from chipglow.surface import MapSurface, Texture
+from chipglow.surface import Emissivity, MapSurface, Texture
 
 HERE = Path(__file__).parent
 BAND = Band(3.8e-6, 5.1e-6)
@@ -49,8 +49,8 @@ def main() -> None:
 def chip_emissivity() -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Emissivity of chip 1 of the paper's Table 1 with leaning fissures, and where nothing is."""
     x, y = np.meshgrid(RASTER.x, -RASTER.y)
-    body = Texture.random(0.42, 0.07, 20e-6, np.random.default_rng(1), restore_deviation=True)
-    band = Texture.random(0.53, 0.05, 20e-6, np.random.default_rng(2), restore_deviation=True)
+    body = Texture.random(Emissivity(0.42, 0.07), 20e-6, np.random.default_rng(1), restore_deviation=True)
+    band = Texture.random(Emissivity(0.53, 0.05), 20e-6, np.random.default_rng(2), restore_deviation=True)
     leaning = x - LEAN * y
     values = np.where(in_fissure(48e-6), band.at(x, y), body.at(x, y))
     teeth = 40e-6 * np.abs(np.cos(np.pi * (leaning - FISSURES[0]) / (FISSURES[1] - FISSURES[0])))
@@ -69,19 +69,25 @@ def heated(
     background: NDArray[np.bool_],
     temperature: float,
     camera: Camera | None = None,
+    frames: int = FRAMES,
 ) -> Measurement:
     """Frames of the chip at one temperature, with noise and drift."""
-    fields = {name: np.zeros((11, *RASTER.shape), np.float32) for name in FIELD_UNITS}
-    fields["material"][:] = ~background
-    fields["temperature"][:] = np.where(background, LABORATORY, temperature)
-    scene = Scene.from_fields(RASTER, np.arange(11) * 1e-6, fields)
+    scene = heated_scene(background, temperature)
     camera = camera or Camera(pitch=PITCH, floor=473.15, reflected=LABORATORY)
     image = camera.measure(scene, MapSurface(emissivity, RASTER), 0.0)
     generator = np.random.default_rng(3)
-    radiance = image.radiance + NOISE * generator.standard_normal((FRAMES, *image.raster.shape))
-    radiance += DRIFT * generator.standard_normal((FRAMES, 1, 1))
-    times = np.arange(FRAMES) / camera.frame_rate
+    radiance = image.radiance + NOISE * generator.standard_normal((frames, *image.raster.shape))
+    radiance += DRIFT * generator.standard_normal((frames, 1, 1))
+    times = np.arange(frames) / camera.frame_rate
     return Measurement.from_radiance(radiance, BAND, times, image.raster, camera.floor)
+
+
+def heated_scene(background: NDArray[np.bool_], temperature: float) -> Scene:
+    """A scene as long as an exposure in which nothing happens."""
+    fields = {name: np.zeros((11, *RASTER.shape), np.float32) for name in FIELD_UNITS}
+    fields["material"][:] = ~background
+    fields["temperature"][:] = np.where(background, LABORATORY, temperature)
+    return Scene.from_fields(RASTER, np.arange(11) * 1e-6, fields)
 
 
 def table(found: EmissivityMap, chip: NDArray[np.float64]) -> None:

@@ -143,7 +143,7 @@ def test_run_writes_a_report_and_prints_the_comparison(folder, runs):
     result = chipglow("run", "study.yaml", "--out", "results")
     assert result.exit_code == 0, result.output
     assert "results/report.html" in result.output
-    for heading in ("quantity", "paper", "here", "difference", "−42", "90"):
+    for heading in ("quantity", "the paper", "here", "range of draws", "differs", "−42", "90"):
         assert heading in result.output
     names = {path.name for path in (folder / "results").iterdir()}
     assert {"report.html", "summary.json", "results.nc", "study.yaml", "figures"} <= names
@@ -163,7 +163,7 @@ def earlier_results(folder, runs):
 
 
 def test_a_second_run_finds_the_scene_and_replaces_the_results(earlier_results, runs, monkeypatch):
-    def write_report(result, folder, text, provenance):
+    def write_report(result, folder, title, text, provenance, remarks, settings):
         (folder / "summary.json").write_text(text)
         return folder / "summary.json"
 
@@ -390,14 +390,24 @@ def test_a_scene_that_is_cut_short_or_no_scene_is_refused(folder, scene):
 def test_a_disk_that_fills_up_during_the_cut_leaves_nothing(command, folder, runs, tmp_path):
     with full_disk(100_000):
         result = chipglow(command, "study.yaml", "--out", "out")
-    assert_refused(result)
+    assert_refused(result, f"{tmp_path / 'cache'}/scene-", "File too large")
     assert [path.name for path in folder.iterdir()] == ["study.yaml"]
     assert list((tmp_path / "cache").iterdir()) == []
 
 
+def test_a_disk_too_full_for_the_scene_is_not_the_caches(folder, runs):
+    assert chipglow("cut", "study.yaml", "--out", "first.nc").exit_code == 0
+    with full_disk(50_000):
+        result = chipglow("cut", "study.yaml", "--out", "second.nc")
+    assert_refused(result, "chipglow: second.nc: File too large")
+    assert len(runs) == 1
+    assert sorted(path.name for path in folder.iterdir()) == ["first.nc", "study.yaml"]
+
+
 def test_a_disk_that_fills_up_during_the_report_keeps_the_earlier_results(folder, earlier_results):
     with full_disk(20_000):
-        assert_refused(chipglow("run", "study.yaml", "--out", "results"))
+        result = chipglow("run", "study.yaml", "--out", "results")
+    assert_refused(result, "chipglow: results: File too large")
     assert (earlier_results / "report.html").read_text() == "earlier"
     assert len(list(earlier_results.iterdir())) == 3
     assert sorted(path.name for path in folder.iterdir()) == ["results", "study.yaml"]

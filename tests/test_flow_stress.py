@@ -33,15 +33,6 @@ TITANIUM = HyperbolicTangent(
 CUBIC = ZerilliArmstrong(150e6, 1500e6, 0.006, 0.0002, 700e6, 0.2, 1.0)
 
 
-@pytest.fixture
-def own_laws():
-    """Forget the laws that a test registers."""
-    before = dict(LAWS)
-    yield
-    LAWS.clear()
-    LAWS.update(before)
-
-
 @njit
 def slopes(strain, rate, temperature, law):
     return stress_and_slopes(strain, rate, temperature, law)

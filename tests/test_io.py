@@ -1,5 +1,6 @@
 """Files: what comes back, what is refused, and that nothing half-written stays."""
 
+import errno
 import shutil
 import subprocess
 import sys
@@ -352,6 +353,36 @@ def test_a_full_disk_is_one_clear_error(tmp_path, limit, count):
     assert int(index) <= count // 2
     assert message.strip().endswith("scene.nc: could not be written: File too large")
     assert leftovers(tmp_path) == []
+
+
+def test_a_full_disk_for_a_checkpoint_names_the_scene(tmp_path, monkeypatch):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    path = a_file(tmp_path)
+    monkeypatch.setattr(np, "savez", full)
+    with pytest.raises(OSError, match="No space") as raised, SceneWriter(path, RASTER) as writer:
+        writer.append(a_frame())
+        writer.checkpoint({}, 0.5)
+    assert raised.value.filename == str(path)
+
+
+@pytest.mark.parametrize(
+    "names", [(), ("{part}",), ("{part}/figure.png",), ("source.nc", None, "{part}/copy.nc")]
+)
+def test_errors_of_writing_bear_the_name_that_was_asked_for(tmp_path, names):
+    path = tmp_path / "results"
+    with pytest.raises(OSError, match="No space") as raised, atomic_folder(path) as part:
+        told = [name and name.format(part=part) for name in names]
+        raise OSError(errno.ENOSPC, "No space left on device", *told)
+    assert raised.value.filename == str(path)
+
+
+def test_errors_of_other_files_keep_their_names(tmp_path):
+    source = tmp_path / "source.nc"
+    with pytest.raises(FileNotFoundError) as raised, atomic_path(tmp_path / "copy.nc") as part:
+        shutil.copyfile(source, part)
+    assert raised.value.filename == str(source)
 
 
 def test_atomic_path_replaces_at_the_end(tmp_path):

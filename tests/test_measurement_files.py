@@ -236,6 +236,15 @@ def test_frames_are_chosen_as_in_python(text, chosen):
     assert MeasurementDescription(frames=text).chosen_frames() == chosen
 
 
+@pytest.mark.parametrize("text", ["4:8", "10:20", "100:200"])
+def test_frames_in_a_file_are_no_hours_and_minutes(text, tmp_path):
+    (tmp_path / "chip.yaml").write_text(f"file: chip.hcc\nframes: {text}\n")
+    first, end = map(int, text.split(":"))
+    assert load_description(tmp_path / "chip.yaml").chosen_frames() == slice(first, end)
+    again = load_description(tmp_path / "chip.yaml", [f"frames={text}"])
+    assert again.chosen_frames() == slice(first, end)
+
+
 def test_the_measurement_holds_the_truth_within_its_uncertainty(laboratory):
     measured = load_measurement("chip.yaml")
     assert measured.times == pytest.approx(2e-3 * np.arange(5))

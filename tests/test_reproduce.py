@@ -1,8 +1,6 @@
 """The quick study from the command line to its report, as a user runs it."""
 
 import json
-import subprocess
-import sys
 from html.parser import HTMLParser
 
 import pytest
@@ -37,21 +35,10 @@ class Page(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("reproduce")
-    command = [sys.executable, "-c", "from chipglow.cli import main; main()"]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("CHIPGLOW_CACHE", str(folder / "cache"))
-        run = subprocess.run(
-            [*command, "reproduce", "--quick", "--out", str(folder / "run")],
-            capture_output=True,
-            text=True,
-            timeout=1200,
-        )
-    assert run.returncode == 0, run.stderr
-    assert "report.html" in run.stdout
-    assert "the paper" in run.stdout
-    return folder / "run"
+def results(quick_study):
+    assert "report.html" in quick_study.printed
+    assert "the paper" in quick_study.printed
+    return quick_study.results
 
 
 def test_summary_holds_the_papers_figures_beside_ours(results):

@@ -1,5 +1,6 @@
 """Output that is there whole or not at all."""
 
+import errno
 import io
 import os
 import secrets
@@ -13,6 +14,8 @@ from chipglow.io.unfinished import hold
 
 RESULT_MARK: Final = "summary.json"
 """The file by which a folder of results is known."""
+
+_NO_ROOM: Final = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 @contextmanager
@@ -40,14 +43,17 @@ def atomic_path(
         If the folder does not exist.
     IsADirectoryError
         If `path` is a folder.
+    OSError
+        If nothing can be written there; the message names `path`.
     """
     path = Path(path)
     if path.is_dir():
         raise IsADirectoryError(f"{path}: is a folder, expected the name of a file")
     temporary = _temporary_beside(path)
     try:
-        yield temporary
-        temporary.replace(path)
+        with _errors_name(path, temporary):
+            yield temporary
+            temporary.replace(path)
     finally:
         if not keep(temporary):
             temporary.unlink(missing_ok=True)
@@ -73,13 +79,16 @@ def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
         If the folder in which it shall be does not exist.
     FileExistsError
         If `path` is there and is neither empty nor a folder of results.
+    OSError
+        If nothing can be written there; the message names `path`.
     """
     path = Path(path)
     _check_replaceable(path)
     temporary = _temporary_beside(path)
-    temporary.mkdir()
     try:
-        yield temporary
+        with _errors_name(path, temporary):
+            temporary.mkdir()
+            yield temporary
         _check_replaceable(path)
         _replace_folder(temporary, path)
     finally:
@@ -128,6 +137,22 @@ def check_folder(path: Path) -> None:
     """Raise FileNotFoundError unless the folder is there in which a file shall be written."""
     if not path.parent.is_dir():
         raise FileNotFoundError(f"{path}: there is no folder {path.parent}")
+
+
+@contextmanager
+def _errors_name(path: Path, temporary: Path) -> Iterator[None]:
+    """Let errors of writing under a temporary name bear the name that was asked for.
+
+    Those of `write` bear none, and those of `shutil.copyfile` first that of the file it read.
+    """
+    try:
+        yield
+    except OSError as error:
+        names = [name for name in (error.filename, error.filename2) if isinstance(name, str | Path)]
+        ours = any(Path(name).is_relative_to(temporary) for name in names)
+        if ours or (not names and error.errno in _NO_ROOM):
+            raise OSError(error.errno, error.strerror, str(path)) from error
+        raise
 
 
 def _temporary_beside(path: Path) -> Path:

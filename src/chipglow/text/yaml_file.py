@@ -2,11 +2,14 @@
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import yaml
 
 from chipglow.text.small_file import read_small_text
+
+_WHOLE: Final = "tag:yaml.org,2002:int"
+_FRACTION: Final = "tag:yaml.org,2002:float"
 
 
 def read_yaml(path: Path) -> Any:
@@ -46,7 +49,10 @@ def parse_yaml(text: str) -> Any:
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML with no key twice in a mapping, and with numbers such as 1e-3 as YAML 1.2 has them."""
+    """YAML with no key twice in a mapping, and with the numbers of YAML 1.2.
+
+    So 1e-3 is one, and 4:8 is not 248: YAML 1.1 reads it in base 60, as hours and minutes.
+    """
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
         seen: set[str] = set()
@@ -58,7 +64,13 @@ class _Loader(yaml.SafeLoader):
             seen.add(key.value)
         return super().construct_mapping(node, deep=deep)
 
+    def construct_number(self, node: Any) -> Any:
+        if ":" in node.value:
+            return node.value
+        whole = node.tag == _WHOLE
+        return self.construct_yaml_int(node) if whole else self.construct_yaml_float(node)
 
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"[-+]?\d+[eE][-+]?\d+$"), list("-+0123456789")
-)
+
+for _tag in (_WHOLE, _FRACTION):
+    _Loader.add_constructor(_tag, _Loader.construct_number)
+_Loader.add_implicit_resolver(_FRACTION, re.compile(r"[-+]?\d+[eE][-+]?\d+$"), list("-+0123456789"))

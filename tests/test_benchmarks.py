@@ -1,0 +1,111 @@
+"""Every program of benchmarks/ on as little as its arguments allow: it prints its table."""
+
+import os
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from math import isfinite
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).parents[1] / "benchmarks"
+COARSEST = "40"  # um: eight cells in the depth of the computed region
+STUDY = f"""
+cutting:
+  numerics: {{cell: {COARSEST} um}}
+  window: {{interval: 0.5 us}}
+  field_of_view: {{spacing: 1.5 um, rows: 360, columns: 400}}
+analysis: {{instants: 3, psf_widths: [8 um, 12 um]}}
+"""
+NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|\bnan\b|\binf\b")
+
+# What each program is called with, and rows of its table with the numbers that each holds at least.
+PROGRAMS = {
+    "band_width.py": (COARSEST, {f"| {COARSEST} |": 7}),
+    "camera_pass.py": ("--rounds 1", {"chipglow  ": 3, "NumPy, Figure 6, table": 4}),
+    "convergence.py": (COARSEST, {f"| {COARSEST} |": 11}),
+    "dot_target.py": ("300 1", {" 300 ": 6}),
+    "dual_spectrum.py": ("9000 1", {"9000 ": 8}),
+    "experiments.py": (
+        f"--cell {COARSEST} --length 0.6 paper",
+        {"paper  cutting force": 1, "paper  thickness": 1, "paper  contact": 1, "paper  250": 7},
+    ),
+    "fuzz/fuzz.py": ("--cases 30 --only .npz", {"| grid.npz |": 7, "| all |": 6, "30 cases": 2}),
+    "knife_edge.py": ("--repeats 2", {"Gaussian, noise 0.01": 4, "diffraction, noise 0.03": 3}),
+    "movie_codecs.py": ("--pictures 1", {"| jet | uncompressed": 6, "| rainbow, 12 bands": 7}),
+    "rasterise.py": (
+        "--file",
+        {"| rasterise, 5 fields": 5, "| VTK's probe": 5, "| SciPy": 5, "read ": 4},
+    ),
+    "reproduce_cost.py": ("tiny.yaml", {"tiny ": 3}),
+    "softening.py": (f"--cell {COARSEST} default", {"| default": 9}),
+    "solver_speed.py": ("--rounds 1 --sides 40 --threads 1", {"chipglow ": 6}),
+    "synthetic_laboratory.py": (
+        "--repeats 1",
+        {"black body": 4, "emissivity of the fissure": 4, "PSF, full width": 4, "MTF": 5},
+    ),
+    "titanium.py": (
+        f"--cell {COARSEST} 88.9-0.1",
+        {"Ff / Fc at 88.9": 7, "thickness / feed at 88.9": 7, "88.9             0.1        0 ": 9},
+    ),
+    "verification.py": ("momentum", {"| A free, spinning block": 4}),
+}
+NEEDED = {
+    "fuzz/fuzz.py": ("hypothesis", "lasso", "pyvista", "tifffile", "zarr"),
+    "movie_codecs.py": ("av",),
+    "rasterise.py": ("pyvista",),
+    "synthetic_laboratory.py": ("tifffile",),
+}
+PEERS = {"taichi": "Taichi", "warp": "Warp"}
+
+
+def run(program, folder):
+    """What a program prints in an empty folder; on one thread, for threads that wait cost time."""
+    arguments, _ = PROGRAMS[program]
+    (folder / "tiny.yaml").write_text(STUDY)
+    environment = {
+        **os.environ,
+        "CHIPGLOW_CACHE": str(folder / "cache"),
+        "NUMBA_NUM_THREADS": "1",
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+    }
+    done = subprocess.run(
+        [sys.executable, str(FOLDER / program), *arguments.split()],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        encoding="utf-8",
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def numbers(row):
+    return [float(text.replace("−", "-")) for text in NUMBER.findall(row)]
+
+
+def test_every_program_is_run():
+    scripts = (path for path in FOLDER.rglob("*.py") if "__main__" in path.read_text("utf-8"))
+    assert {path.relative_to(FOLDER).as_posix() for path in scripts} == set(PROGRAMS)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_program_prints_its_table(program, tmp_path):
+    for package in NEEDED.get(program, ()):
+        pytest.importorskip(package)
+    if program == "fuzz/fuzz.py" and sys.platform != "linux":
+        pytest.skip("fuzz.py limits its forks as Linux does")
+    printed = run(program, tmp_path)
+    for label, count in PROGRAMS[program][1].items():
+        rows = [line for line in printed.splitlines() if line.startswith(label)]
+        assert rows, f"no row {label!r} in:\n{printed}"
+        for row in rows:
+            assert len(numbers(row)) >= count, row
+            assert all(map(isfinite, numbers(row))), row
+    if program == "solver_speed.py":
+        for package, peer in PEERS.items():
+            there = re.search(rf"^{peer} +1 ", printed, re.MULTILINE)
+            assert there if find_spec(package) else f"{peer} is not installed" in printed
