@@ -24,6 +24,7 @@ NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|\bnan\b|\binf\b")
 # What each program is called with, and rows of its table with the numbers that each holds at least.
 PROGRAMS = {
     "band_width.py": (COARSEST, {f"| {COARSEST} |": 7}),
+    "calibration.py": ("--repeats 2", {"| none |": 5, "| 15 counts": 6, "| 3 points": 6}),
     "camera_pass.py": ("--rounds 1", {"chipglow  ": 3, "NumPy, Figure 6, table": 4}),
     "convergence.py": (COARSEST, {f"| {COARSEST} |": 11}),
     "dot_target.py": ("300 1", {" 300 ": 6}),

@@ -399,10 +399,27 @@ def test_calibrate_prints_fits_and_writes_the_preferred(laboratory, tmp_path):
 
 
 def test_calibrate_says_what_is_doubtful(laboratory):
-    code, said = run("calibrate", "points.csv", "--band", "2-2.5 um")
+    code, said = run("calibrate", "points.csv", "--band", "2-2.5 um", "--out", "wrong.yaml")
     assert code == 0, said
-    assert "Doubtful: The residuals of linear are larger" in said
+    assert "Doubtful: linear: the residuals are" in said
     assert "--common-uncertainty" in said
+    assert "Assumed: The blackbody's emissivity is 1" in said
+    assert "Assumed: The camera did not drift" in said
+    # It is in the file, and said wherever the calibration is used.
+    assert any("chi-squared" in one for one in load_calibration("wrong.yaml").warnings)
+    given = ["unit=counts", "interval=1 ms", "pitch=6 um", "calibration=wrong.yaml"]
+    code, said = run("convert", "chip.npy", *(part for one in given for part in ("--set", one)))
+    assert code == 0, said
+    assert "Doubtful: The calibration: the residuals are" in said
+    code, said = run(
+        "calibrate", "points.csv", "--band", "3.8-5.1 um", "--emissivity", "0.97",
+        "--emissivity-uncertainty", "0.005",
+    )  # fmt: skip
+    assert code == 0, said
+    assert "Assumed: The blackbody reflects 20 degC" in said
+    code, said = run("calibrate", "points.csv", "--band", "3.8-5.1 um", "--emissivity", "97")
+    assert code == 2
+    assert "--emissivity: is 97.0, expected over 0 to 1" in said
     (laboratory / "bare.csv").write_text("temperature_K,counts\n600,1000\n800,2500\n1000,5000\n")
     code, said = run("calibrate", "bare.csv", "--band", "3.8-5.1 um")
     assert code == 0, said

@@ -233,7 +233,7 @@ def _develop_frames(
     bad_pixels: NDArray[np.bool_] | None,
 ) -> _Developed:
     """Radiance in 32 bits, which hold more than counts can tell, with flags and uncertainty."""
-    signal, flags = _repaired(recording, non_uniformity, bad_pixels)
+    signal, flags = repaired_signal(recording, non_uniformity, bad_pixels)
     radiance = _radiance(recording, calibration, band, signal)
     if calibration is not None and calibration.highest < np.inf:
         flags[radiance > band.radiance(calibration.highest)] |= np.uint8(Flag.SATURATED)
@@ -241,12 +241,29 @@ def _develop_frames(
     return _Developed(radiance.astype(np.float32), flags, uncertainty)
 
 
-def _repaired(
+def repaired_signal(
     recording: Recording,
-    non_uniformity: NonUniformity | None,
-    bad_pixels: NDArray[np.bool_] | None,
+    non_uniformity: NonUniformity | None = None,
+    bad_pixels: NDArray[np.bool_] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    """Signal, NaN where there is none, and flags of what is wrong with it."""
+    """A recording's signal with its sensors corrected.
+
+    Parameters
+    ----------
+    recording : Recording
+        What the camera wrote.
+    non_uniformity : NonUniformity, optional
+        Correction of the signal.
+    bad_pixels : ndarray, optional
+        Which sensors are bad, shape (y, x).
+
+    Returns
+    -------
+    signal : ndarray
+        Shape (time, y, x), NaN where there is none.
+    flags : ndarray
+        What is wrong with it: sums of `Flag`, uint8, of the same shape.
+    """
     raw = recording.signal
     signal = raw.astype(np.float64)
     over = np.zeros(raw.shape, np.bool_)
@@ -316,13 +333,14 @@ def _attributes(
     attributes: dict[str, float | str | None] = {
         "camera": recording.camera,
         "quantity": recording.quantity,
+        "fill_factor": recording.fill_factor,
         "integration_time": _known(recording, calibration, "integration_time"),
         "range": _known(recording, calibration, "range_name"),
         "calibration": calibration.description if calibration else None,
         "object_parameters": _told(recording),
         "notes": "\n".join(recording.notes),
         "assumed": "\n".join(_assumed(recording, calibration, position)),
-        "doubtful": "\n".join(_doubtful(recording, uncertainty_known)),
+        "doubtful": "\n".join(_doubtful(recording, calibration, uncertainty_known)),
     }
     return {name: value for name, value in attributes.items() if value not in (None, "")}
 
@@ -377,8 +395,12 @@ def _assumed(
         yield "The origin of coordinates is the image's lower left corner: no tip was given."
 
 
-def _doubtful(recording: Recording, uncertainty_known: bool) -> Iterator[str]:
+def _doubtful(
+    recording: Recording, calibration: Calibration | None, uncertainty_known: bool
+) -> Iterator[str]:
     yield from recording.doubts
+    for warning in calibration.warnings if calibration else ():
+        yield f"The calibration: {warning[0].lower()}{warning[1:]}"
     if not uncertainty_known:
         yield "The uncertainty of the radiance from the calibration is not known."
     signal = recording.signal

@@ -62,7 +62,7 @@ def _draw_image(figure: Any, axes: Axes, edge: EdgeResult, fitted: FittedEdge) -
     usable = np.where(image.usable, image.radiance, np.nan)
     limits = float(np.nanmin(usable)), float(np.nanmax(usable))
     picture = drawing.show_image(axes, usable, raster, None, drawing.HEAT, limits)
-    drawing.colour_bar(figure, picture, axes, "radiance / (W/(m² sr))")
+    drawing.colour_bar(figure, picture, axes, _label(image.unit))
     c, s = cos(fitted.line.normal), sin(fitted.line.normal)
     middle = float(image.x.mean()) * 1e6, float(image.y.mean()) * 1e6
     along = np.array([-1.0, 1.0]) * hypot(right - left, top - bottom)
@@ -73,6 +73,10 @@ def _draw_image(figure: Any, axes: Axes, edge: EdgeResult, fitted: FittedEdge) -
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
     axes.set_title(image.name)
+
+
+def _label(unit: str) -> str:
+    return unit if unit == "counts" else f"radiance / ({unit})"
 
 
 def _draw_spread(axes: Axes, below: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:

@@ -1,7 +1,7 @@
 """Measurements as the laboratory's commands take them."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Final
@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis.edge_image import EdgeImage, counts_image, edge_image
 from chipglow.camera import (
     LEAST_FRAMES,
     BadPixels,
@@ -17,6 +18,7 @@ from chipglow.camera import (
     Recording,
     develop_recording,
     find_bad_pixels,
+    repaired_signal,
 )
 from chipglow.io import CAMERA_FORMATS, is_measurement, is_scene, read_measurement, read_recording
 from chipglow.io.cameras.formats import find_format
@@ -57,6 +59,50 @@ def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measur
         )
     described = load_description(source, settings)
     return measurement_of(described, load_recording(described), Path(source).name)
+
+
+def load_edge(
+    source: str | Path, settings: Iterable[str] = (), region: tuple[slice, slice] | None = None
+) -> EdgeImage:
+    """Read an image of an edge: a measurement, or a camera's file with or without a calibration.
+
+    Counts serve as they are, as an edge needs no more than a straight line over the radiance. A
+    calibration holds beyond its range, as the edge needs no temperature.
+
+    Parameters
+    ----------
+    source, settings
+        As `load_measurement` takes them.
+    region : tuple of slice, optional
+        Rows and columns that show the edge; all by default.
+
+    Raises
+    ------
+    ValueError
+        If it is no image of an edge; the message names the file.
+    OSError
+        If a file cannot be read.
+    """
+    settings, name = list(settings), Path(source).name
+    if is_measurement(source) or is_scene(source):
+        return edge_image(load_measurement(source, settings), name, region)
+    described = load_description(source, settings)
+    recording = load_recording(described)
+    if recording.quantity != "counts" or recording.conversion is not None:
+        return edge_image(measurement_of(described, recording, name), name, region)
+    if described.calibration is not None:
+        calibration = load_calibration(described.calibration)
+        recording = replace(recording, band=recording.band or calibration.band)
+    try:
+        uniform = UniformObjects().of(described, recording)
+        signal, flags = repaired_signal(
+            recording,
+            uniform.correction if uniform and described.uniform.correct else None,
+            _bad_pixels(described, recording, uniform),
+        )
+        return counts_image(recording, signal, flags, name, region)
+    except ValueError as error:
+        raise StudyError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from error
 
 
 def load_recording(description: MeasurementDescription) -> Recording:
