@@ -49,8 +49,12 @@ def main() -> None:
 def chip_emissivity() -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Emissivity of chip 1 of the paper's Table 1 with leaning fissures, and where nothing is."""
     x, y = np.meshgrid(RASTER.x, -RASTER.y)
-    body = Texture.random(Emissivity(0.42, 0.07), 20e-6, np.random.default_rng(1), restore_deviation=True)
-    band = Texture.random(Emissivity(0.53, 0.05), 20e-6, np.random.default_rng(2), restore_deviation=True)
+    body = Texture.random(
+        Emissivity(0.42, 0.07), 20e-6, np.random.default_rng(1), restore_deviation=True
+    )
+    band = Texture.random(
+        Emissivity(0.53, 0.05), 20e-6, np.random.default_rng(2), restore_deviation=True
+    )
     leaning = x - LEAN * y
     values = np.where(in_fissure(48e-6), band.at(x, y), body.at(x, y))
     teeth = 40e-6 * np.abs(np.cos(np.pi * (leaning - FISSURES[0]) / (FISSURES[1] - FISSURES[0])))

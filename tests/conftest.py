@@ -34,6 +34,13 @@ def quick_study(tmp_path_factory):
     return QuickStudy(folder / "run", folder / "cache", run.stdout)
 
 
+def pytest_collection_modifyitems(items):
+    """Tests of the quick study run in one process: it is computed once."""
+    for item in items:
+        if "quick_study" in item.fixturenames:
+            item.add_marker(pytest.mark.xdist_group("quick study"))
+
+
 @pytest.fixture
 def own_laws():
     """Forget the laws that a test registers."""

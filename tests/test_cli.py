@@ -18,6 +18,7 @@ from chipglow.cli import app
 from chipglow.cutting import CuttingSimulation, SolverError
 from chipglow.io import open_scene, read_measurement, write_emissivity, write_scene
 from chipglow.radiometry import Band
+from chipglow.report import QUICK
 from chipglow.scene import Material, Raster
 from chipglow.study import Study, cut, load_study
 from chipglow.surface import UniformSurface
@@ -179,13 +180,16 @@ def test_a_second_run_finds_the_scene_and_replaces_the_results(earlier_results, 
 def test_reproduce_runs_the_papers_study(folder, monkeypatch):
     seen = []
 
-    def note(study, out, resume):
-        seen.append((study, str(out), resume))
+    def note(study, out, resume, remarks=()):
+        seen.append((study, str(out), resume, list(remarks)))
 
     monkeypatch.setattr("chipglow.cli.results.write_results", note)
     assert chipglow("reproduce").exit_code == 0
     assert chipglow("reproduce", "--quick", "--out", "quick", "--resume").exit_code == 0
-    assert seen == [(Study(), "chipglow-paper", False), (Study.quick(), "quick", True)]
+    assert seen == [
+        (Study(), "chipglow-paper", False, []),
+        (Study.quick(), "quick", True, [QUICK]),
+    ]
 
 
 def test_a_foreign_folder_is_refused_before_anything_is_computed(folder, runs):

@@ -374,3 +374,12 @@ def test_where_there_is_no_light_there_is_none_after_the_blur():
     radiance = np.zeros((60, 60))
     radiance[:, 40:] = 1e4
     assert (blur(radiance, GaussianPSF(4e-6), 1e-6)[:, :20] == 0).all()
+
+
+def test_a_psf_says_in_words_what_it_is():
+    assert str(GaussianPSF(12e-6)) == "a Gaussian 12 µm wide at half maximum"
+    assert str(AnnularAperturePSF(4.5e-6, 0.28, 0.35)) == (
+        "diffraction of a round pupil of NA 0.28, obscured to 0.35 of its diameter, at 4.5 µm"
+    )
+    assert "obscured" not in str(AnnularAperturePSF(4.5e-6, 0.28, 0.0))
+    assert str(MeasuredPSF(np.ones((5, 5)), 2e-6)) == "measured, 5 x 5 values 2 µm apart"

@@ -1,10 +1,14 @@
 """The quick study from the command line to its report, as a user runs it."""
 
 import json
+import re
 from html.parser import HTMLParser
 
 import pytest
 import xarray as xr
+from documented import ROOT
+
+from chipglow.report import QUICK
 
 PAPER_ROWS = [
     "rake_error_degC",
@@ -54,6 +58,19 @@ def test_summary_holds_the_papers_figures_beside_ours(results):
     assert 0 < here["rake_psf_share_percent"] < 100
 
 
+def test_the_quick_studys_remark_states_its_own_errors_and_those_of_the_page(results):
+    page = (ROOT / "docs" / "paper-study.md").read_text(encoding="utf-8")
+    summary = json.loads((results / "summary.json").read_text(encoding="utf-8"))
+    stated = re.findall(r"−(\d+) °C in place of −(\d+) °C", QUICK)
+    names = ("rake_error_degC", "band_error_degC", "band_worst_error_degC")
+    for name, (quick, full) in zip(names, stated, strict=True):
+        # Another processor rounds another way, and the chip differs in detail: within the scatter.
+        scatter = summary["draws"][name]["standard_deviation"]
+        assert -summary["results"][name] == pytest.approx(float(quick), abs=scatter), name
+        assert re.search(rf"−{quick} ± \d+ \| −{full} ± ", page), name
+        assert re.search(rf"\| −{full} ± \d+ \| −\d+ to −\d+ \|", page), name
+
+
 def test_chip_is_segmented_as_the_study_needs(results):
     here = json.loads((results / "summary.json").read_text(encoding="utf-8"))["results"]
     # 30 000 /s is where the paper's emissivity map is wholly shear band.
@@ -70,7 +87,7 @@ def test_page_is_whole_and_stands_alone(results):
     assert len(page.images) >= 8
     assert all(image.startswith("data:image/") for image in page.images)
     assert not page.links
-    for word in ("−42", "−46", "−120", "90 µs", "seed"):
+    for word in ("−42", "−46", "−120", "90 µs", "seed", QUICK):
         assert word in page.words
 
 

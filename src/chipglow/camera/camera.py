@@ -418,7 +418,7 @@ def _border_doubt(
         "doubtful": (
             "The border of the scene: beyond it the surface is taken to be as at the edge. With "
             "the like of what each pixel sees within the scene there instead, "
-            f"{100 * changed.mean():.3g} % of the pixels (up to {1e6 * reach:.3g} um from the "
+            f"{100 * changed.mean():.3g} % of the pixels (up to {1e6 * reach:.3g} µm from the "
             f"border) would change by over {BORDER_TOLERANCE:g} K, by {np.nanmax(change):.3g} K at "
             "most."
         )

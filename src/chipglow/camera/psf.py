@@ -113,6 +113,9 @@ class GaussianPSF(PointSpreadFunction):
 
     fwhm: float
 
+    def __str__(self) -> str:
+        return f"a Gaussian {self.fwhm * 1e6:.3g} µm wide at half maximum"
+
     def __post_init__(self) -> None:
         _check_length("fwhm", self.fwhm)
 
@@ -165,6 +168,13 @@ class AnnularAperturePSF(PointSpreadFunction):
     numerical_aperture: float = 0.28
     obscuration: float = 0.35
     fwhm: float = field(init=False, repr=False, compare=False)
+
+    def __str__(self) -> str:
+        of = f", obscured to {self.obscuration:g} of its diameter" if self.obscuration else ""
+        return (
+            f"diffraction of a round pupil of NA {self.numerical_aperture:g}{of}, at "
+            f"{self.wavelength * 1e6:g} µm"
+        )
 
     def __post_init__(self) -> None:
         _check_length("wavelength", self.wavelength)
@@ -262,6 +272,10 @@ class MeasuredPSF(PointSpreadFunction):
     weights: NDArray[np.float64] = field(repr=False)
     spacing: float
     fwhm: float = field(init=False)
+
+    def __str__(self) -> str:
+        rows, columns = self.weights.shape
+        return f"measured, {rows} x {columns} values {self.spacing * 1e6:.3g} µm apart"
 
     def __post_init__(self) -> None:
         _check_length("spacing", self.spacing)

@@ -80,9 +80,13 @@ def reproduce(
 ) -> None:
     """Do the paper's study anew and set its figures beside the paper's."""
     from chipglow.cli.results import write_results
+    from chipglow.report import QUICK
     from chipglow.study import Study
 
-    write_results(Study.quick() if quick else Study(), out, resume)
+    if quick:
+        write_results(Study.quick(), out, resume, [QUICK])
+    else:
+        write_results(Study(), out, resume)
 
 
 @app.command()

@@ -60,9 +60,12 @@ def write_results(study: Study, folder: Path, resume: bool, remarks: Sequence[st
 
 
 def _warnings(result: StudyResult) -> list[str]:
-    """What to know of the images, each sentence once."""
-    found = [warning for surface in result.surfaces.values() for warning in surface.warnings]
-    return list(dict.fromkeys(found))
+    """What to know of the images."""
+    return [
+        f"Image of {name}. {warning}"
+        for name, surface in result.surfaces.items()
+        for warning in surface.warnings
+    ]
 
 
 def _provenance(study: Study) -> dict[str, str]:

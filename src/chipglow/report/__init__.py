@@ -9,7 +9,7 @@ from chipglow.report.knife_edge_figure import draw_knife_edge
 from chipglow.report.measurement_figure import draw_measurement
 from chipglow.report.measurement_summary import MeasurementSummary, measurement_summary
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
-from chipglow.report.paper import table_2
+from chipglow.report.paper import QUICK, table_2
 from chipglow.report.rake_figure import draw_rake_grid
 from chipglow.report.registration_figure import blink_pictures, draw_registration
 from chipglow.report.report import write_report
@@ -23,6 +23,7 @@ from chipglow.report.scene_summary import (
 )
 
 __all__ = [
+    "QUICK",
     "CutPicture",
     "FieldSummary",
     "MeasurementSummary",

@@ -448,7 +448,7 @@ def _draw_error_line(
         mean, deviation = lines.mean(axis=0), lines.std(axis=0)
         at = draws.distance * 1e6
         axes.plot(at, mean, color=colour, label=f"{name}, mean")
-        label = f"{name}, ± 1 standard deviation"
+        label = f"{name}, ± 1 sd"
         axes.fill_between(
             at,
             mean - deviation,
@@ -601,7 +601,7 @@ def _lines_caption(result: StudyResult) -> str:
 
 def _psf_caption(result: StudyResult) -> str:
     return (
-        f"The camera's point spread function on the scene's plane: {result.camera.psf!r}. White "
+        f"The camera's point spread function on the scene's plane: {result.camera.psf}. White "
         "square: one pixel. Different: the paper measured its own with a knife edge and gives it "
         "as a picture without numbers; ours is calculated."
     )
