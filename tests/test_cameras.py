@@ -436,6 +436,7 @@ def test_a_file_that_says_units_times_and_packing_needs_no_more(tmp_path):
         ({"interval": 1e-3}, "unit: is missing, the file says none"),
         ({"quantity": "temperature", "interval": 1e-3}, "unit: is missing, the file says none"),
         ({"quantity": "counts"}, "give the interval between frames"),
+        ({}, "unit: is missing, .*; give the interval between frames"),
         ({"quantity": "counts", "interval": 0.0}, "interval: is 0.0 s"),
         ({"quantity": "heat"}, "quantity: is 'heat'"),
         ({"unit": "degF"}, "unit: is 'degF'"),

@@ -655,3 +655,34 @@ def test_uniform_frames_of_another_format_say_themselves_what_they_are(tmp_path)
     )
     fields = [*CAMERA, "uniform.frames=even.hcc"]
     assert uniform_counts(tmp_path / "chip.npy", fields) == pytest.approx(np.median(counts), abs=1)
+
+
+def test_all_that_is_missing_is_said_at_once(laboratory):
+    code, said = run("convert", "chip.npy", "--out", "x.nc")
+    assert code == 2
+    for what in ("chip.npy", "unit: is missing", "give the interval", "pitch: is missing",
+                 "calibration (of counts) or band: is missing"):  # fmt: skip
+        assert what in said
+    assert said.count("\n") == 1
+    told = ["--set", "unit=counts", "--set", "interval=1 ms"]
+    code, said = run("convert", "chip.npy", "--out", "x.nc", *told)
+    assert code == 2
+    assert "calibration: is missing" in said
+    assert "pitch: is missing" in said
+
+
+def test_the_tip_may_be_two_numbers_with_a_comma(laboratory):
+    told = ["unit=counts", "interval=1 ms", "pitch=6 um", "calibration=calibration.yaml"]
+    plain = load_measurement("chip.npy", [*told, "tip=10.5,21"])
+    assert plain.raster == load_measurement("chip.npy", [*told, "tip=[10.5, 21]"]).raster
+    with pytest.raises(ValueError, match="tip"):
+        load_measurement("chip.npy", [*told, "tip=10.5,a"])
+
+
+def test_an_error_names_a_file_with_its_folder(laboratory):
+    (laboratory / "there").mkdir(exist_ok=True)
+    np.save(laboratory / "there" / "chip.npy", np.ones((2, 8, 8)))
+    code, said = run("convert", "there/chip.npy", "--out", "x.nc", "--set", "unit=counts",
+                     "--set", "interval=1 ms")  # fmt: skip
+    assert code == 2
+    assert "chipglow: there/chip.npy: calibration: is missing" in said

@@ -9,6 +9,7 @@ from scipy.stats import chi2, t
 
 _UNLIKELY: Final = 0.01
 _ALIKE: Final = 0.05
+_FAR_WITHIN: Final = 0.1
 _DRAWS: Final = 4000
 _SEED: Final = 1950
 _LEAST_FREEDOM: Final = 3
@@ -64,7 +65,9 @@ def alike(residuals: NDArray[np.float64], design: NDArray[np.float64]) -> bool:
 
     Parameters are those of `residual_warnings`.
     """
-    if residuals.size - design.shape[1] < _LEAST_FREEDOM:
+    free = residuals.size - design.shape[1]
+    # What is far within the uncertainties does no harm, however alike it is.
+    if free < _LEAST_FREEDOM or float(residuals @ residuals) < _FAR_WITHIN * free:
         return False
     tests = (_serial_probability, _drift_probability)
     # Two tests, each at half of the level.

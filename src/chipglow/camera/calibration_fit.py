@@ -21,6 +21,7 @@ Kind = TypeVar("Kind", bound=FittedCalibration)
 _QUANTILE: Final = 0.975
 _MOST_ROUNDS: Final = 50
 _SETTLED: Final = 1e-9
+_EXACT: Final = 1e-12
 _IDEAL: Final = Blackbody()
 
 
@@ -363,7 +364,7 @@ def _fit(
     residuals = points.counts - calibration.counts(points.temperatures)
     if not points.stated:
         free = points.counts.size - start.size
-        rounding = np.finfo(np.float64).eps * np.abs(points.counts).max()
+        rounding = _EXACT * np.abs(points.counts).max()
         deviations = np.full_like(residuals, max(np.sqrt(np.sum(residuals**2) / free), rounding))
     fit = CalibrationFit(
         calibration, points.temperatures, points.counts, residuals, deviations, points.stated

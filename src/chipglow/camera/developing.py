@@ -115,13 +115,10 @@ def develop_recording(
         If band, pitch or calibration is missing, or the calibration is for something else.
     """
     position = position or ImagePosition()
+    _check_known(recording, calibration)
     calibration = _calibration(recording, calibration)
     band = _band(recording, calibration)
-    if recording.pitch is None:
-        raise ValueError(
-            "pitch: is missing, the file does not say it, expected the distance between sensors "
-            "on the object such as 6 um"
-        )
+    assert recording.pitch is not None
     if non_uniformity is not None and recording.quantity == "temperature":
         raise ValueError(
             "uniform frames: the recording holds temperatures, which are not linear in light, "
@@ -156,6 +153,29 @@ class _Developed:
     uncertainty: NDArray[np.float32] | None
 
 
+def _check_known(recording: Recording, calibration: Calibration | None) -> None:
+    """Raise ValueError that names all that is missing for a measurement."""
+    missing = []
+    counts = recording.quantity == "counts" and recording.conversion is None
+    if calibration is None and counts:
+        missing.append(
+            "calibration: is missing, the recording holds counts and no conversion of its maker, "
+            "expected a calibration"
+        )
+    elif calibration is None and recording.band is None:
+        missing.append(
+            "band: is missing, the file does not say it, expected the camera's band such as "
+            "3.8-5.1 um"
+        )
+    if recording.pitch is None:
+        missing.append(
+            "pitch: is missing, the file does not say it, expected the distance between sensors "
+            "on the object such as 6 um"
+        )
+    if missing:
+        raise ValueError("; ".join(missing))
+
+
 def _calibration(recording: Recording, given: Calibration | None) -> Calibration | None:
     if recording.quantity != "counts":
         if given is not None:
@@ -166,11 +186,7 @@ def _calibration(recording: Recording, given: Calibration | None) -> Calibration
     if given is not None:
         _check_same(recording, given)
         return given
-    if recording.conversion is None:
-        raise ValueError(
-            "calibration: is missing, the recording holds counts and no conversion of its maker, "
-            "expected a calibration"
-        )
+    assert recording.conversion is not None
     return MakersCalibration(
         band=_band(recording, None),
         conversion=recording.conversion,
@@ -205,11 +221,7 @@ def _check_same(recording: Recording, calibration: Calibration) -> None:
 def _band(recording: Recording, calibration: Calibration | None) -> Band:
     if calibration is not None:
         return calibration.band
-    if recording.band is None:
-        raise ValueError(
-            "band: is missing, the file does not say it, expected the camera's band such as "
-            "3.8-5.1 um"
-        )
+    assert recording.band is not None
     return recording.band
 
 

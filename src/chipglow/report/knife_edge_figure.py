@@ -122,7 +122,8 @@ def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
     axes.set_ylim(-0.05, 1.05)
     axes.set_title("modulation transfer function")
     axes.set_xlabel("frequency / (1/mm)")
-    axes.legend(loc="upper right")
+    # The curves go from one corner to the other: beside them there is no place for it.
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
 
 
 def _draw_apertures(axes: Axes, found: KnifeEdge) -> None:

@@ -19,8 +19,13 @@ _FRAMES: Final = re.compile(r"(\d{0,9}):(\d{0,9})(?::(\d{1,9}))?")
 
 
 def _two_numbers(value: object) -> object:
-    """A text such as 36.5,41.6 as its parts; all else as it is."""
-    return tuple(value.split(",")) if isinstance(value, str) and "," in value else value
+    """A text such as 36.5,41.6 as its numbers; all else as it is."""
+    if not isinstance(value, str):
+        return value
+    try:
+        return tuple(float(part) for part in value.split(","))
+    except ValueError:
+        raise ValueError(f"{value!r}, expected two numbers such as 36.5,41.6") from None
 
 
 Pixels = Annotated[tuple[float, float], Strict(False), BeforeValidator(_two_numbers)]
