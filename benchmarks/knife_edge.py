@@ -1,30 +1,39 @@
-"""How often the knife edge's 95 % intervals hold the truth: the table of docs/knife-edge.md.
+"""How often the knife edge's 95 % intervals hold the truth: the tables of docs/knife-edge.md.
 
-python benchmarks/knife_edge.py [--repeats 60]
+python benchmarks/knife_edge.py [--repeats 60] [--only noise|optics]
 """
 
 import argparse
 import sys
+from collections import Counter
 from functools import partial
+from math import radians, sqrt
 from pathlib import Path
 
 import numpy as np
 
 from chipglow.analysis import knife_edge
+from chipglow.analysis.psf_models import DefocusedDiscModel, GaussianTailModel
 from chipglow.camera import AnnularAperturePSF
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from synthetic_edge import (
     WAVELENGTH,
     annular_edge,
+    blurred_disc_edge,
+    disc_edge,
     edge_radiance,
     gaussian_edge,
     gaussian_transfer,
     image_of,
+    moffat_edge,
+    ring_edge,
+    tailed_edge,
 )
 
 STEP = 5.0
 MIRROR = (0.28, 0.35)
+OVAL = (14e-6, 8e-6)  # widths along 45 degrees and across
 UP_TO_NYQUIST = np.arange(2, 33, 6)
 
 
@@ -34,9 +43,7 @@ def coverage(repeats, name, edge, fwhm, noise, saturation=None, gaussian=False):
     within, held, uncertainty = [], [], []
     for seed in range(repeats):
         normal = generator.uniform(3.0, 12.0) + generator.choice([0, 90, 180, 270])
-        place = generator.uniform(-6e-6, 6e-6)
-        radiance = edge_radiance(edge, normal, position=place, step=STEP)
-        found = knife_edge([image_of(radiance, noise * STEP, seed, saturation)])
+        found = knife_edge([image(generator, edge, normal, noise, seed, saturation)])
         within.append(abs(found.fwhm - fwhm) < 1.96 * found.fwhm_uncertainty)
         uncertainty.append(found.fwhm_uncertainty)
         if gaussian:
@@ -49,11 +56,72 @@ def coverage(repeats, name, edge, fwhm, noise, saturation=None, gaussian=False):
     print(f"{name}, noise {noise}: {width}, width {100 * np.mean(within):.0f} %{mtf}", flush=True)
 
 
-def main():
-    """Print the table's rows."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
-    parser.add_argument("--repeats", type=int, default=60, help="edges of each row")
-    row = partial(coverage, parser.parse_args().repeats)
+def image(generator, edge, normal, noise, seed, saturation=None):
+    """An edge at some place."""
+    place = generator.uniform(-6e-6, 6e-6)
+    radiance = edge_radiance(edge, normal, position=place, step=STEP)
+    return image_of(radiance, noise * STEP, seed, saturation)
+
+
+def optics():
+    """Kinds of optics: edge-spread function by the edge's normal, width, the edges' normals."""
+    tail = GaussianTailModel().fwhm(np.array([8e-6, 0.2, 2.5]))
+    blurred = DefocusedDiscModel().fwhm(np.array([16e-6, 8e-6]))
+    mirror = AnnularAperturePSF(WAVELENGTH, *MIRROR).fwhm
+    kinds = {
+        "Gaussian": (gaussian_edge(10e-6), 10e-6),
+        "Gaussian with tail": (tailed_edge(8e-6, 0.2, 20e-6), tail),
+        "diffraction": (annular_edge(WAVELENGTH, *MIRROR), mirror),
+        "Moffat, exponent 2": (moffat_edge(10e-6, 2.0), 10e-6),
+        "Moffat, exponent 3": (moffat_edge(10e-6, 3.0), 10e-6),
+        "disc out of focus": (disc_edge(12e-6), 24e-6),
+        "blurred disc": (blurred_disc_edge(16e-6, 8e-6), blurred),
+        "ring (mirror out of focus)": (ring_edge(6e-6, 12e-6), 24e-6),
+    }
+    for name, (edge, fwhm) in kinds.items():
+        yield name, lambda normal, edge=edge: edge, fwhm, (0.0,)
+    mean = sqrt(OVAL[0] * OVAL[1])
+    yield "astigmatism at 45 deg, two edges", oval, mean, (0.0, 90.0)
+    yield "astigmatism at 45 deg, three edges", oval, mean, (0.0, 90.0, 45.0)
+
+
+def oval(normal):
+    """Edge of an oval Gaussian whose long axis lies at 45 degrees."""
+    turned = radians(normal - 45.0)
+    return gaussian_edge(np.hypot(OVAL[0] * np.cos(turned), OVAL[1] * np.sin(turned)))
+
+
+def kinds_of_optics(repeats):
+    """Print, by kind of optics, how often the width is held, and what the program says of it."""
+    print("| optics | width / um | bias / um | u / um | held | said | model |")
+    print("|---|---|---|---|---|---|---|")
+    for name, edge_of, fwhm, normals in optics():
+        generator = np.random.default_rng(5)
+        errors, uncertainties, said, models = [], [], [], Counter()
+        for seed in range(repeats):
+            tilted = [normal + generator.uniform(3.0, 12.0) for normal in normals]
+            images = [
+                image(generator, edge_of(normal), normal, 0.01, 3 * seed + k)
+                for k, normal in enumerate(tilted)
+            ]
+            found = knife_edge(images)
+            errors.append(found.fwhm - fwhm)
+            uncertainties.append(found.fwhm_uncertainty)
+            oblique = any("lies oblique" in text for text in found.assumptions)
+            said.append(oblique or any("no model fits" in doubt for doubt in found.doubts))
+            models[found.best.model.name] += 1
+        held = np.abs(errors) < 1.96 * np.array(uncertainties)
+        print(
+            f"| {name} | {1e6 * fwhm:.2f} | {1e6 * np.mean(errors):+.2f} "
+            f"| {1e6 * np.mean(uncertainties):.2f} | {100 * np.mean(held):.0f} % "
+            f"| {100 * np.mean(said):.0f} % | {models.most_common(1)[0][0]} |",
+            flush=True,
+        )
+
+
+def levels_of_noise(repeats):
+    """Print rows by noise and clipping."""
+    row = partial(coverage, repeats)
     gauss = gaussian_edge(10e-6)
     row("Gaussian", gauss, 10e-6, 0.01, gaussian=True)
     row("Gaussian", gauss, 10e-6, 0.1, gaussian=True)
@@ -62,6 +130,18 @@ def main():
     row("diffraction", mirror, fwhm, 0.01)
     row("diffraction", mirror, fwhm, 0.03)
     row("diffraction, clipped at 92 %", mirror, fwhm, 0.01, 6.6)
+
+
+def main():
+    """Print the tables' rows."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--repeats", type=int, default=60, help="edges of each row")
+    parser.add_argument("--only", choices=("noise", "optics"), help="one of the tables")
+    chosen = parser.parse_args()
+    if chosen.only != "optics":
+        levels_of_noise(chosen.repeats)
+    if chosen.only != "noise":
+        kinds_of_optics(chosen.repeats)
 
 
 if __name__ == "__main__":

@@ -59,18 +59,19 @@ def flir_camera(order, stamp, planck=PLANCK, told=OBJECT, rate=30):
     return bytes(raw)
 
 
-def fff(image, stamp=0.0, pack=plain, order="<", sort=2, **camera):
-    """One frame: header, list of two records, counts, what the camera says."""
+def fff(image, stamp=0.0, pack=plain, order="<", sort=2, camera_first=False, **camera):
+    """One frame: header, list of two records, counts and what the camera says, in either order."""
     counts = struct.pack("<HHH", 2, image.shape[1], image.shape[0]).ljust(32, b"\0") + pack(image)
     said = flir_camera(order, stamp, **camera)
     start = 64 + 2 * 32
     header = b"FFF\0" + b"FLIR".ljust(16, b"\0") + struct.pack(order + "III", 100, 64, 2)
-    entries = [(1, sort, start, len(counts)), (32, 1, start + len(counts), len(said))]
+    places = (start + len(said), start) if camera_first else (start, start + len(counts))
+    entries = [(1, sort, places[0], len(counts)), (32, 1, places[1], len(said))]
     table = b"".join(
         struct.pack(order + "HHIIIIIII", kind, how, 100, 1, place, length, 0, 0, 0)
         for kind, how, place, length in entries
     )
-    return header.ljust(64, b"\0") + table + counts + said
+    return header.ljust(64, b"\0") + table + (said + counts if camera_first else counts + said)
 
 
 def seq(images, stamps=STAMPS, **options):
@@ -98,7 +99,8 @@ def flir_jpeg(image, part=1000, **options):
 # PTW
 
 
-def ptw(images, period=1 / 600, stamps=None, lock_in=False):
+def ptw(images, period=1 / 600, stamps=None, lock_in=False, words=False):
+    """A recording as Altair 5.60 writes it, with sizes in words of 16 bits, or in bytes."""
     count, rows, columns = images.shape
     extra = 2 * columns if lock_in else 0
     frame = 1016 + extra + 2 * rows * columns
@@ -107,8 +109,9 @@ def ptw(images, period=1 / 600, stamps=None, lock_in=False):
     def put(place, kind, *values):
         struct.pack_into("<" + kind, header, place, *values)
 
-    header[0:10] = b"CEDIP05.60"
-    put(11, "IIIII", len(header), 1016, frame, frame - 1016, count)
+    header[0:10] = b"CED\0\x005.60\0" if words else b"CEDIP05.60"
+    size = 2 if words else 1
+    put(11, "IIIII", len(header), 1016, frame // size, (frame - 1016) // size, count)
     put(35, "HBBBBBB", 2009, 17, 6, 42, 15, 7, 31)
     header[44:51] = b"JADE MW"
     header[64:70] = b"G1 1:1"

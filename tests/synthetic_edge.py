@@ -10,7 +10,7 @@ from math import cos, log, pi, radians, sin, sqrt
 import numpy as np
 from scipy.integrate import cumulative_simpson, trapezoid
 from scipy.interpolate import CubicSpline
-from scipy.special import j1, k1, ndtr
+from scipy.special import j1, k1, ndtr, stdtr
 
 from chipglow.analysis import ApertureImage, EdgeImage
 from chipglow.camera import Measurement
@@ -72,6 +72,28 @@ def disc_edge(radius):
         return 0.5 + (np.arcsin(t) + t * np.sqrt(1 - t**2)) / pi
 
     return edge
+
+
+def ring_edge(inner, outer):
+    """Of an even ring, as a mirror objective out of focus makes it."""
+    large, small, share = disc_edge(outer), disc_edge(inner), (inner / outer) ** 2
+    return lambda u: (large(u) - share * small(u)) / (1 - share)
+
+
+def moffat_edge(fwhm, exponent):
+    """Of Moffat's function, whose line-spread function is the density of Student's t."""
+    radius, freedom = fwhm / (2 * sqrt(2 ** (1 / exponent) - 1)), 2 * exponent - 2
+    return lambda u: stdtr(freedom, u * sqrt(freedom) / radius)
+
+
+def blurred_disc_edge(diameter, fwhm):
+    """Of an even disc behind a Gaussian, the mean of the disc's over the blur."""
+    sharp, sigma = disc_edge(diameter / 2), fwhm / FWHM_PER_SIGMA
+    far = diameter / 2 + 6 * sigma
+    u, blur = np.linspace(-far, far, 801), np.linspace(-6, 6, 1201)
+    weight = np.exp(-(blur**2) / 2)
+    curve = CubicSpline(u, sharp(u[:, None] + sigma * blur) @ weight / weight.sum())
+    return lambda v: curve(np.clip(v, -far, far))
 
 
 def edge_radiance(edge, normal, side=40, position=1e-6, background=2.0, step=5.0, fill=1.0):

@@ -423,3 +423,15 @@ def test_a_file_that_is_no_curve_is_one_error(tmp_path, text, message):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=message):
         read_curve(path)
+
+
+@pytest.mark.parametrize("depth", [5e-6, 10e-6, 20e-6])
+def test_a_cold_strip_below_the_edge_does_not_hide_a_band(depth):
+    """The border of the strip is bent more than the band of 110 K, and no ridge."""
+    image = BandImage(base=690.0)
+    shown = np.where(TOOL.edge_point[1] - depth > Y, 300.0, image.temperature())
+    line = find_band(ThermalImage.of(measured([shown], 1.0), 0), TOOL)
+    along, across = image.place(line.points)
+    middle = (along > 60e-6) & (along < 250e-6)
+    assert middle.sum() > 50
+    assert np.abs(across[middle]).max() < 0.5 * PITCH

@@ -24,6 +24,7 @@ NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|\bnan\b|\binf\b")
 # What each program is called with, and rows of its table with the numbers that each holds at least.
 PROGRAMS = {
     "band_width.py": (COARSEST, {f"| {COARSEST} |": 7}),
+    "calibration.py": ("--repeats 2", {"| none |": 5, "| 15 counts": 6, "| 3 points": 6}),
     "camera_pass.py": ("--rounds 1", {"chipglow  ": 3, "NumPy, Figure 6, table": 4}),
     "convergence.py": (COARSEST, {f"| {COARSEST} |": 11}),
     "dot_target.py": ("300 1", {" 300 ": 6}),
@@ -33,7 +34,10 @@ PROGRAMS = {
         {"paper  cutting force": 1, "paper  thickness": 1, "paper  contact": 1, "paper  250": 7},
     ),
     "fuzz/fuzz.py": ("--cases 30 --only .npz", {"| grid.npz |": 7, "| all |": 6, "30 cases": 2}),
-    "knife_edge.py": ("--repeats 2", {"Gaussian, noise 0.01": 4, "diffraction, noise 0.03": 3}),
+    "knife_edge.py": (
+        "--repeats 1",
+        {"Gaussian, noise 0.01": 4, "diffraction, noise 0.03": 3, "| disc out of focus": 5},
+    ),
     "movie_codecs.py": ("--pictures 1", {"| jet | uncompressed": 6, "| rainbow, 12 bands": 7}),
     "movie_matrix.py": (
         "--pictures 1 --maps jet --bands 0 12 --codecs GIF",

@@ -144,6 +144,18 @@ def test_stamps_that_do_not_ascend_give_way_to_the_frame_rate(tmp_path):
         read_recording(without)
 
 
+@pytest.mark.parametrize("pack", [files.plain, files.png, jpeg_ls])
+def test_a_picture_that_ends_before_the_missing_end_of_a_file_is_whole(tmp_path, pack):
+    # Thermimage's SampleCSQ.csq lacks the four last bytes that its list of records tells of.
+    content = files.seq(PICTURES, pack=lambda image: pack(image) + bytes(4), camera_first=True)
+    recording = read_recording(make(tmp_path, "a.csq", content[:-4]))
+    assert np.array_equal(recording.signal, PICTURES)
+    assert any("last 4 bytes of the file are missing" in note for note in recording.notes)
+    cut = read_recording(make(tmp_path, "b.csq", content[:-20]))
+    assert np.array_equal(cut.signal, PICTURES[:4])
+    assert any("its first 4 frames are whole" in doubt for doubt in cut.doubts)
+
+
 # PTW, CINE
 
 
@@ -161,6 +173,27 @@ def test_ptw(tmp_path, lock_in):
     )
     assert any("lock-in" in note for note in recording.notes) == lock_in
     assert not recording.doubts
+
+
+def test_ptw_as_altair_560_writes_it(tmp_path):
+    # Three letters and two zeros; the size of a frame in words; every third frame is kept.
+    stamps = 3 * np.arange(5) / 100
+    content = files.ptw(PICTURES, period=1 / 100, stamps=stamps, words=True)
+    path = make(tmp_path, "a.ptw", content)
+    assert find_format(path) == "ptw"
+    recording = read_recording(path)
+    assert np.array_equal(recording.signal, PICTURES)
+    assert recording.times == pytest.approx(stamps, rel=1e-6)
+    assert any("30000 us apart, as their stamps say" in one for one in recording.assumptions)
+    assert not recording.doubts
+    assert np.array_equal(read_recording(path, slice(2, 4)).times, recording.times[2:4])
+
+
+def test_stamps_that_no_multiple_of_the_period_explains_are_the_times(tmp_path):
+    stamps = 0.025 * np.arange(5)
+    recording = read_recording(make(tmp_path, "a.ptw", files.ptw(PICTURES, 1 / 100, stamps)))
+    assert recording.times == pytest.approx(stamps, rel=1e-6)
+    assert any("the period in the header is 10000 us" in one for one in recording.assumptions)
 
 
 def test_frames_missing_in_ptw_are_said(tmp_path):
@@ -403,6 +436,7 @@ def test_a_file_that_says_units_times_and_packing_needs_no_more(tmp_path):
         ({"interval": 1e-3}, "unit: is missing, the file says none"),
         ({"quantity": "temperature", "interval": 1e-3}, "unit: is missing, the file says none"),
         ({"quantity": "counts"}, "give the interval between frames"),
+        ({}, "unit: is missing, .*; give the interval between frames"),
         ({"quantity": "counts", "interval": 0.0}, "interval: is 0.0 s"),
         ({"quantity": "heat"}, "quantity: is 'heat'"),
         ({"unit": "degF"}, "unit: is 'degF'"),
@@ -458,13 +492,24 @@ def test_only_the_chosen_frames_are_read(tmp_path, kind, monkeypatch):
 
 
 @pytest.mark.parametrize("kind", OWN)
-def test_a_file_cut_anywhere_is_one_error(tmp_path, kind):
+def test_of_a_file_cut_anywhere_the_whole_frames_are_read_or_it_is_one_error(tmp_path, kind):
     content = OWN[kind](tmp_path)
+    known = []
     for length in np.linspace(1, len(content) - 1, 60).astype(int):
-        with pytest.raises(SourceError) as caught:
-            read_here(make(tmp_path, "a.bin", content[:length]), kind, None, Told())
-        assert "a.bin" in str(caught.value)
-        assert "\n" not in str(caught.value)
+        path = make(tmp_path, "a.bin", content[:length])
+        try:
+            recording = read_here(path, kind, None, Told())
+        except SourceError as error:
+            assert "a.bin" in str(error)
+            assert "\n" not in str(error)
+            assert not known
+            continue
+        known.append(len(recording.signal))
+        assert np.array_equal(recording.signal, PICTURES[: known[-1]])
+        # FLIR and Telops do not tell how many frames there should be.
+        ends_with_one = kind in ("flir", "hcc") and length == known[-1] * len(content) // 5
+        assert ends_with_one or any("cut short" in doubt for doubt in recording.doubts)
+    assert set(known) == {1, 2, 3, 4}
 
 
 @pytest.mark.parametrize("kind", OWN)
@@ -510,7 +555,7 @@ def test_absurd_dimensions_are_refused_before_memory_is_taken(tmp_path):
         read_here(make(tmp_path, "a.fff", bytes(one)), "flir", None, Told())
     cine = bytearray(files.cine(PICTURES))
     struct.pack_into("<ii", cine, 48, 65_000, -65_000)
-    with pytest.raises(SourceError, match="samples at once"):
+    with pytest.raises(SourceError, match="expected 8450000000"):
         read_recording(make(tmp_path, "a.cine", bytes(cine)))
 
 

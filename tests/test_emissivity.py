@@ -566,7 +566,9 @@ def test_what_is_assumed_and_doubtful_is_said(folder):
     assert result.exit_code == 0
     for sentence in (
         "Assumed: the true temperature is exact",
-        "Assumed: the environment's temperature is exact",
+        "Assumed: the object reflects just 19.85 degC; reflected apparent temperature 100 K higher "
+        "would make -",
+        "Assumed: the camera does not drift from one recording to the next",
         "Assumed: the camera's calibration is exact",
         "Assumed: nothing changes from frame to frame",
     ):

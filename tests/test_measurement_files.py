@@ -399,10 +399,27 @@ def test_calibrate_prints_fits_and_writes_the_preferred(laboratory, tmp_path):
 
 
 def test_calibrate_says_what_is_doubtful(laboratory):
-    code, said = run("calibrate", "points.csv", "--band", "2-2.5 um")
+    code, said = run("calibrate", "points.csv", "--band", "2-2.5 um", "--out", "wrong.yaml")
     assert code == 0, said
-    assert "Doubtful: The residuals of linear are larger" in said
+    assert "Doubtful: linear: the residuals are" in said
     assert "--common-uncertainty" in said
+    assert "Assumed: The blackbody's emissivity is 1" in said
+    assert "Assumed: The camera did not drift" in said
+    # It is in the file, and said wherever the calibration is used.
+    assert any("chi-squared" in one for one in load_calibration("wrong.yaml").warnings)
+    given = ["unit=counts", "interval=1 ms", "pitch=6 um", "calibration=wrong.yaml"]
+    code, said = run("convert", "chip.npy", *(part for one in given for part in ("--set", one)))
+    assert code == 0, said
+    assert "Doubtful: The calibration: the residuals are" in said
+    code, said = run(
+        "calibrate", "points.csv", "--band", "3.8-5.1 um", "--emissivity", "0.97",
+        "--emissivity-uncertainty", "0.005",
+    )  # fmt: skip
+    assert code == 0, said
+    assert "Assumed: The blackbody reflects 20 degC" in said
+    code, said = run("calibrate", "points.csv", "--band", "3.8-5.1 um", "--emissivity", "97")
+    assert code == 2
+    assert "--emissivity: is 97.0, expected over 0 to 1" in said
     (laboratory / "bare.csv").write_text("temperature_K,counts\n600,1000\n800,2500\n1000,5000\n")
     code, said = run("calibrate", "bare.csv", "--band", "3.8-5.1 um")
     assert code == 0, said
@@ -638,3 +655,34 @@ def test_uniform_frames_of_another_format_say_themselves_what_they_are(tmp_path)
     )
     fields = [*CAMERA, "uniform.frames=even.hcc"]
     assert uniform_counts(tmp_path / "chip.npy", fields) == pytest.approx(np.median(counts), abs=1)
+
+
+def test_all_that_is_missing_is_said_at_once(laboratory):
+    code, said = run("convert", "chip.npy", "--out", "x.nc")
+    assert code == 2
+    for what in ("chip.npy", "unit: is missing", "give the interval", "pitch: is missing",
+                 "calibration (of counts) or band: is missing"):  # fmt: skip
+        assert what in said
+    assert said.count("\n") == 1
+    told = ["--set", "unit=counts", "--set", "interval=1 ms"]
+    code, said = run("convert", "chip.npy", "--out", "x.nc", *told)
+    assert code == 2
+    assert "calibration: is missing" in said
+    assert "pitch: is missing" in said
+
+
+def test_the_tip_may_be_two_numbers_with_a_comma(laboratory):
+    told = ["unit=counts", "interval=1 ms", "pitch=6 um", "calibration=calibration.yaml"]
+    plain = load_measurement("chip.npy", [*told, "tip=10.5,21"])
+    assert plain.raster == load_measurement("chip.npy", [*told, "tip=[10.5, 21]"]).raster
+    with pytest.raises(ValueError, match="tip"):
+        load_measurement("chip.npy", [*told, "tip=10.5,a"])
+
+
+def test_an_error_names_a_file_with_its_folder(laboratory):
+    (laboratory / "there").mkdir(exist_ok=True)
+    np.save(laboratory / "there" / "chip.npy", np.ones((2, 8, 8)))
+    code, said = run("convert", "there/chip.npy", "--out", "x.nc", "--set", "unit=counts",
+                     "--set", "interval=1 ms")  # fmt: skip
+    assert code == 2
+    assert "chipglow: there/chip.npy: calibration: is missing" in said

@@ -167,3 +167,67 @@ def test_a_file_that_is_no_kernel_is_one_error(folder, section, text):
     with pytest.raises(ValueError, match="camera") as caught:
         Study(camera={"psf": {"kind": "measured", **section}})
     assert text in str(caught.value)
+
+
+def write_counts(folder, name, fwhm=10e-6, offset=300.0, gain=400.0, normal=5.0):
+    """Counts of an edge as a camera's file, cut off at 0 and 16 bits."""
+    radiance = edge_radiance(gaussian_edge(fwhm), normal, background=2.0, step=5.0)
+    noise = np.random.default_rng(7).normal(0.0, 0.05 * gain, (4, *radiance.shape))
+    counts = np.clip(np.round(offset + gain * radiance + noise), 0, 65_535).astype(np.uint16)
+    np.save(folder / name, counts)
+
+
+COUNTS = ("unit=counts", "interval=1 ms", "pitch=6 um", "band=3.8-5.1 um")
+
+
+def found_width(output):
+    return [float(n) for n in output.split("spread function is ")[1].split(" um")[0].split(" ± ")]
+
+
+@pytest.mark.parametrize("offset", [300.0, -1000.0])
+def test_counts_without_a_calibration_serve_for_an_edge(folder, offset):
+    # With -1000 counts the dark side is cut off at 0.
+    write_counts(folder, "edge.npy", offset=offset)
+    code, output = psf("edge.npy", *(f"--set={one}" for one in COUNTS), "--plot", "psf.png")
+    assert code == 0, output
+    width, uncertainty = found_width(output)
+    assert abs(width - 10.0) < 3 * uncertainty < 0.6
+    assert "Assumed: the counts are a straight line over the radiance" in output
+    assert ("below the camera's floor" in output) is (offset < 0)
+
+
+def test_a_blade_colder_than_the_calibration_serves_for_an_edge(folder):
+    write_counts(folder, "edge.npy")
+    lines = ["model: linear", "band: 3.8-5.1 um", "lowest: 290 degC", "highest: 310 degC"]
+    lines += ["parameters: {offset: 300, gain: 4}", "covariance: [[1, 0], [0, 0.01]]"]
+    (folder / "calibration.yaml").write_text("\n".join(lines))
+    given = [f"--set={one}" for one in (*COUNTS, "calibration=calibration.yaml")]
+    code, output = psf("edge.npy", *given)
+    assert code == 0, output
+    assert abs(found_width(output)[0] - 10.0) < 0.6
+    assert "Doubtful" not in output
+
+
+def test_a_measurement_under_the_cameras_range_serves_for_an_edge(folder):
+    flags = np.full((1, 40, 40), 0, np.uint8)
+    flags[0, :, :20] = Flag.BELOW_FLOOR
+    write_edge(folder / "cold.nc", flags=flags)
+    code, output = psf("cold.nc")
+    assert code == 0
+    assert found_width(output)[0] == pytest.approx(found_width(psf("edge.nc")[1])[0], abs=1e-3)
+    assert "Assumed: 50 % of the pixels of cold.nc are under the range" in output
+
+
+def test_the_fill_factor_of_a_cameras_file_is_taken(folder):
+    write_counts(folder, "edge.npy")
+    given = [f"--set={one}" for one in COUNTS]
+    whole, small = (
+        found_width(psf("edge.npy", *given, *more)[1])[0]
+        for more in ((), ("--set=fill_factor=0.36",))
+    )
+    # The optics are wider if the sensor adds less: squares of the sides, as of a box, over 12.
+    sides = (6.0**2 - 3.6**2) * 8 * np.log(2) / 12
+    assert small**2 - whole**2 == pytest.approx(sides, rel=0.1)
+    code, output = psf("edge.npy", *given, "--set=fill_factor=2")
+    assert code == 2
+    assert "fill_factor" in output

@@ -145,6 +145,48 @@ def test_few_images_widen_the_interval():
     assert np.isnan(alone.budget["repeatability"])
 
 
+@pytest.mark.parametrize(("stated", "least", "most"), [(None, 0.0, 0.8), (0.01, 0.9, 1.0)])
+def test_a_drift_between_recordings_is_held_if_it_is_stated(stated, least, most):
+    """1 % from the recording of the emissivity to that of the hot chip, of 60 repeats."""
+    generator, within = np.random.default_rng(1), 0
+    heating = replace(HEATING, drift=stated)
+    for seed in range(60):
+        ends = zip((HEATING.truth, HOT), 1 + 0.01 * generator.standard_normal(2), strict=True)
+        heated, hot = (
+            Measurement.from_radiance(
+                drifted * image(0.42, kelvins, noise=5.0, seed=seed).radiance,
+                BAND,
+                np.zeros(1),
+                RASTER,
+            )
+            for kelvins, drifted in ends
+        )
+        read = replace(heating, truth=HEATING.truth + 0.5 * generator.standard_normal(),
+                       truth_uncertainty=0.5, environment_uncertainty=0.0)  # fmt: skip
+        row = determine_emissivity([heated], read).of(WHOLE)
+        found = true_temperature([hot], WHOLE, row, drift=stated)
+        within += abs(found.value - HOT) < found.expanded_uncertainty
+    assert least <= within / 60 <= most
+    assert np.isnan(row.budget["drift"]) is np.bool_(stated is None)
+
+
+def test_several_recordings_show_the_drift_themselves():
+    images = [image(0.42, HEATING.truth, noise=1.0, seed=k) for k in range(4)]
+    shown = [
+        Measurement.from_radiance(f * one.radiance, BAND, np.zeros(1), RASTER)
+        for f, one in zip((0.97, 0.99, 1.01, 1.03), images, strict=True)
+    ]
+    row = determine_emissivity(shown, HEATING).of(WHOLE)
+    assert row.budget["drift"] == 0.0
+    assert row.budget["repeatability"] == pytest.approx(0.42 * 0.0258 / 2, rel=0.05)
+    more = determine_emissivity(shown, replace(HEATING, drift=0.1)).of(WHOLE)
+    # A tenth of the radiance over the root of four, of which the repeatability holds a part.
+    together = np.hypot(more.budget["drift"], more.budget["repeatability"])
+    assert together == pytest.approx(0.1 * 0.42 / 2, rel=0.02)
+    with pytest.raises(ValueError, match="drift: is 2, expected 0 to 1"):
+        replace(HEATING, drift=2)
+
+
 def test_the_emissivity_of_a_file_is_the_one_that_was_written(tmp_path):
     calibration = fitted(common=0.5)
     heated = developed(calibration, HEATING.truth, 0.42, 5, 20.0)
@@ -159,7 +201,7 @@ def test_the_emissivity_of_a_file_is_the_one_that_was_written(tmp_path):
         true_temperature([hot], WHOLE, one, calibration=calibration) for one in (row, stored)
     )
     assert second.value == pytest.approx(first.value, abs=1e-9)
-    assert second.budget == pytest.approx(first.budget)
+    assert second.budget == pytest.approx(first.budget, nan_ok=True)
     write_emissivity([found, found], [[row], [row]], tmp_path / "two.nc")
     with pytest.raises(ValueError, match=r"two.nc: .*2 true temperatures, expected 1"):
         read_region_emissivity(tmp_path / "two.nc")

@@ -18,7 +18,7 @@ from chipglow.analysis.comparison import (
 from chipglow.analysis.distribution import Cause, Distribution
 from chipglow.analysis.dots import DotFit, Dots, find_dots, fit_dots
 from chipglow.analysis.draws import Draws, Headline, LineDraws
-from chipglow.analysis.edge_image import EdgeImage, edge_image
+from chipglow.analysis.edge_image import EdgeImage, counts_image, edge_image
 from chipglow.analysis.edge_line import EdgeLine, NoEdgeError, find_edge
 from chipglow.analysis.emissivity import (
     EmissivityLine,
@@ -145,6 +145,7 @@ __all__ = [
     "chip_metrics",
     "compare",
     "contact_length",
+    "counts_image",
     "determine_emissivity",
     "edge_image",
     "emissivity_covariance",

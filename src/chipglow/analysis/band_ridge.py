@@ -1,6 +1,6 @@
 """The shear band in a measured image: the ridge of the radiance temperature."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import Final
 
@@ -136,11 +136,34 @@ def find_band(image: ThermalImage, tool: Tool) -> Line:
     edge a band has one angle at every radius: dynamic programming finds the path of the greatest
     sum of log(1 + response / 5 K). A band that begins at the edge comes first; without one, the
     best anywhere, such as a band that has left the edge with the chip. The path is moved to the
-    maximum across it, on a cubic spline, and smoothed by local parabolas.
+    maximum across it, on a cubic spline, and smoothed by local parabolas. Where that leads to no
+    band, a cold strip below the edge may have drawn the path onto its border, which is bent as a
+    ridge is: it is looked for again without what lies below the edge.
     """
-    pitch = image.raster.spacing
     _check_edge(image.raster, tool)
-    response = _response(image, tool)
+    try:
+        return _ridge(image, tool, _response(image, tool))
+    except NoShearBandError:
+        try:
+            return _ridge(image, tool, _response(_without_below(image, tool), tool))
+        except NoShearBandError:
+            pass
+        raise
+
+
+def _without_below(image: ThermalImage, tool: Tool) -> ThermalImage:
+    """The image with the pixels just over the cutting edge in the place of those below it."""
+    above = np.flatnonzero(image.raster.y > tool.edge_point[1])
+    if not above.size:
+        return image
+    temperature = image.temperature.copy()
+    temperature[above[-1] + 1 :] = temperature[above[-1]]
+    return replace(image, temperature=temperature)
+
+
+def _ridge(image: ThermalImage, tool: Tool, response: NDArray[np.float64]) -> Line:
+    """The ridge of the strongest path through a response."""
+    pitch = image.raster.spacing
     points = _path(image, response, tool)
     coefficients = spline_filter(image.temperature, order=3)
     for _ in range(3):

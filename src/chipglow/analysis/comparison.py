@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.band_profile import BandProfile, band_profile
 from chipglow.analysis.band_ridge import ThermalImage
+from chipglow.analysis.frame_scatter import FrameScatter
 from chipglow.analysis.lines import sample
 from chipglow.analysis.rake_grid import DEPTH, PIXELS, RakeGrid, rake_grid
 from chipglow.analysis.remarks import Remarks
@@ -50,6 +51,9 @@ class Reading:
     from_tool : tuple of ndarray
         What each independent standard uncertainty of the tool's place changes in K, with its sign:
         it changes all values together, up the one slope and down the other.
+    scatter : FrameScatter, optional
+        What of `random` comes from the mean over the frames, in which values change together. By
+        default every value changes by itself.
 
     Raises
     ------
@@ -61,6 +65,7 @@ class Reading:
     systematic: NDArray[np.float64]
     random: NDArray[np.float64]
     from_tool: tuple[NDArray[np.float64], ...] = ()
+    scatter: FrameScatter | None = None
 
     def __post_init__(self) -> None:
         fields = [("systematic", self.systematic), ("random", self.random)]
@@ -87,7 +92,21 @@ class Reading:
             self.systematic[where],
             self.random[where],
             tuple(part[where] for part in self.from_tool),
+            None if self.scatter is None else self.scatter.part(where),
         )
+
+    @property
+    def alone(self) -> NDArray[np.float64]:
+        """What of `random` differs from value to value by itself, in K."""
+        if self.scatter is None:
+            return self.random
+        return np.sqrt(np.maximum(self.random**2 - self.scatter.deviation**2, 0.0))
+
+    @property
+    def random_of_mean(self) -> float:
+        """Standard uncertainty in K that `random` makes of the mean of all values."""
+        alone = float(np.linalg.norm(self.alone)) / self.temperature.size
+        return hypot(alone, 0.0 if self.scatter is None else self.scatter.of_mean())
 
 
 def normalised_error(measured: Reading, simulated: Reading) -> NDArray[np.float64]:
@@ -427,7 +446,8 @@ def _compare_grid(
         grid = grids[label]
         mean = grid.frame_mean[:, :columns]
         emissivity = _of_the_emissivity(item, mean, stated)
-        readings.append(Reading(mean, emissivity, _of_the_mean(grid)[:, :columns]))
+        scatter = FrameScatter.of(grid.mean[:, :, :columns])
+        readings.append(Reading(mean, emissivity, scatter.deviation, scatter=scatter))
     return GridComparison(base.along[:columns], base.depth, readings[0], tuple(readings[1:]))
 
 
@@ -441,14 +461,16 @@ def _measured_squares(
     if measured.calibration_uncertainty is not None:
         share = sample(_relative_calibration(measured), measured.raster, middles)
         systematic = np.hypot(systematic, share * _relative_to_kelvin(measured, mean))
-    random = _of_the_mean(grid)[:, :columns]
+    scatter = FrameScatter.of(grid.mean[:, :, :columns])
+    random = scatter.deviation
     if stated.tool is None or stated.position is not None:
         images = [_image(measured, k) for k in range(measured.times.size)]
         image = np.mean([item.temperature for item in images if item is not None], axis=0)
         pitch = measured.raster.spacing
         slopes = [sample(slope, measured.raster, middles) for slope in np.gradient(image, pitch)]
         random = np.hypot(random, np.hypot(*slopes) * _position(measured, stated))
-    return Reading(mean, systematic, random, tuple(p[:, :columns] for p in grid.frame_from_tool))
+    from_tool = tuple(p[:, :columns] for p in grid.frame_from_tool)
+    return Reading(mean, systematic, random, from_tool, scatter)
 
 
 def _relative_calibration(measured: Measurement) -> NDArray[np.float64]:
@@ -469,11 +491,6 @@ def _image(measured: Measurement, frame: int) -> ThermalImage | None:
 
 def _position(measured: Measurement, stated: StatedUncertainties) -> float:
     return measured.raster.spacing / sqrt(12.0) if stated.position is None else stated.position
-
-
-def _of_the_mean(grid: RakeGrid) -> NDArray[np.float64]:
-    """Standard deviation of the mean over the frames in K; 0 for a single frame."""
-    return np.nan_to_num(grid.frame_deviation / np.sqrt(np.maximum(grid.frame_count, 1)))
 
 
 def _few_frames(name: str, count: int) -> str:
@@ -536,13 +553,14 @@ def _compare_band(
     distance = step * np.arange(1, int(last / step) + 1, dtype=np.float64)
     names = [name for name, *_ in files]
     parts = [_along(name, p, distance, remarks) for name, p in zip(names, profiles, strict=True)]
-    mean, calibration, off, between, *from_tool = parts[0]
+    (mean, calibration, off, *from_tool), scatter = parts[0]
     systematic = np.hypot(calibration, stated.temperature)
-    own = Reading(mean, systematic, np.hypot(off, between), tuple(from_tool))
+    random = np.hypot(off, scatter.deviation)
+    own = Reading(mean, systematic, random, tuple(from_tool), scatter)
     readings = []
-    for (_, item, *_), (mean, _, _, between, *_) in zip(files[1:], parts[1:], strict=True):
+    for (_, item, *_), ((mean, *_), scatter) in zip(files[1:], parts[1:], strict=True):
         emissivity = _of_the_emissivity(item, mean, stated)
-        readings.append(Reading(mean, emissivity, between))
+        readings.append(Reading(mean, emissivity, scatter.deviation, scatter=scatter))
     return BandComparison(distance, own, tuple(readings))
 
 
@@ -564,8 +582,8 @@ def _of_the_curve(
 
 def _along(
     name: str, profile: BandProfile, distance: NDArray[np.float64], remarks: Remarks
-) -> tuple[NDArray[np.float64], ...]:
-    """Means over the frames: temperature, calibration, position; that of the mean; of the tool.
+) -> tuple[tuple[NDArray[np.float64], ...], FrameScatter]:
+    """Means over the frames of temperature, calibration, position, tool; and how the frames differ.
 
     Where a single frame reaches, the variance between frames is the mean of it where several do.
     """
@@ -583,13 +601,13 @@ def _along(
     ]
     known = np.isfinite(read[0])
     count = known.sum(axis=0)
-    mean, calibration, position, *from_tool = (_mean(field, known) for field in read)
-    squares = np.where(known, (read[0] - mean) ** 2, 0.0).sum(axis=0)
+    scatter = FrameScatter.of(read[0])
     several = count > 1
-    variance = np.divide(squares, count - 1, out=np.zeros_like(squares), where=several)
-    if several.any():
-        variance[count == 1] = variance[several].mean()
-    return mean, calibration, position, np.sqrt(variance / np.maximum(count, 1)), *from_tool
+    if several.any() and (count == 1).any():
+        patterns = scatter.patterns.copy()
+        patterns[0, count == 1] = sqrt(float((count * scatter.deviation**2)[several].mean()))
+        scatter = replace(scatter, patterns=patterns)
+    return tuple(_mean(field, known) for field in read), scatter
 
 
 def _at(
@@ -653,7 +671,7 @@ def _fit(label: str, measured: Reading, simulated: Reading) -> Fit:
     away = simulated.temperature - measured.temperature
     systematic = hypot(float(measured.systematic.mean()), float(simulated.systematic.mean()))
     from_tool = hypot(*(float(part.mean()) for part in measured.from_tool))
-    random = sqrt(float((measured.random**2 + simulated.random**2).sum())) / away.size
+    random = hypot(measured.random_of_mean, simulated.random_of_mean)
     return Fit(
         label=label,
         bias=float(away.mean()),
@@ -675,6 +693,8 @@ def _confidence(measured: Reading, simulated: Sequence[Reading], best: int) -> f
 def _drawn(reading: Reading, generator: np.random.Generator) -> NDArray[np.float64]:
     """Values drawn anew from their uncertainties, shape (draws, n)."""
     common = generator.standard_normal((_DRAWS, 1)) * reading.systematic
-    each = generator.standard_normal((_DRAWS, reading.temperature.size)) * reading.random
+    each = generator.standard_normal((_DRAWS, reading.temperature.size)) * reading.alone
+    if reading.scatter is not None:
+        each += reading.scatter.drawn(_DRAWS, generator)
     parts = [generator.standard_normal((_DRAWS, 1)) * part for part in reading.from_tool]
     return np.asarray(sum(parts, reading.temperature + common + each))

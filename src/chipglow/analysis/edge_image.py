@@ -11,7 +11,8 @@ from scipy.ndimage import uniform_filter
 from chipglow.analysis.edge_line import EdgeLine, NoEdgeError, Straightness, find_edge
 from chipglow.analysis.psf_fit import EdgePixels, ModelFit, fit_model
 from chipglow.analysis.psf_models import GaussianModel
-from chipglow.camera import Flag, Measurement
+from chipglow.camera import Flag, Measurement, Recording
+from chipglow.scene import Raster
 
 _LEAST_STEP: Final = 7.0
 _OUTLIER: Final = 7.0
@@ -20,6 +21,7 @@ _BLOCK: Final = 5
 _ROUGHLY: Final = 1e-5
 _LEAST_PILE: Final = 10
 _CLIPPED_SHARE: Final = 0.02
+_WHOLE_SQUARE: Final = "the whole square of a sensor takes light (fill factor 1)."
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +31,7 @@ class EdgeImage:
     Parameters
     ----------
     radiance : ndarray
-        In W/(m² sr), shape (y, x).
+        In W/(m² sr), or counts that are a straight line over it, shape (y, x).
     x, y : ndarray
         Positions of columns and rows in m; x ascends, y descends.
     dead, saturated, below : ndarray
@@ -44,6 +46,8 @@ class EdgeImage:
         What is assumed of it, a sentence each.
     doubts : tuple of str
         Why it may not be trusted, a sentence each.
+    unit : str
+        Of the radiance: counts where no calibration is needed.
     """
 
     radiance: NDArray[np.float64]
@@ -57,6 +61,7 @@ class EdgeImage:
     name: str
     notes: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    unit: str = "W/(m² sr)"
 
     @property
     def pitch(self) -> float:
@@ -88,35 +93,114 @@ def edge_image(
     ValueError
         If the region is not within the image.
     """
+    attributes = measurement.data.attrs
+    band = measurement.band if "band_lower" in attributes else None
+    image = _mean_image(measurement.radiance, measurement.flags, measurement.raster, name, region)
+    notes, below = list(_notes(measurement)), image.below
+    if below.any() and np.isfinite(image.radiance[below]).all():
+        # An edge needs radiance, which the optics add up, and no temperature.
+        notes.append(
+            f"{100 * np.mean(below):.2g} % of the pixels of {name} are under the range of the "
+            "camera or its calibration; their radiance is used as it is."
+        )
+        below = np.zeros_like(below)
+    return replace(
+        image,
+        below=below,
+        footprint=image.pitch * sqrt(float(attributes.get("fill_factor", 1.0))),
+        wavelength=(band.lower + band.upper) / 2 if band else None,
+        notes=tuple(notes),
+        doubts=tuple(str(attributes.get("doubtful", "")).splitlines()),
+    )
+
+
+def counts_image(
+    recording: Recording,
+    signal: NDArray[np.float64],
+    flags: NDArray[np.uint8],
+    name: str,
+    region: tuple[slice, slice] | None = None,
+) -> EdgeImage:
+    """The mean of frames of counts, a straight line over radiance, as an image of an edge.
+
+    Parameters
+    ----------
+    recording : Recording
+        What the camera wrote; its pitch is needed.
+    signal, flags : ndarray
+        Its counts as they are to be used and what is wrong with them, as `repaired_signal` gives
+        them, shape (time, y, x).
+    name : str
+        What it is called in messages.
+    region : tuple of slice, optional
+        Rows and columns that show the edge; all by default.
+
+    Raises
+    ------
+    ValueError
+        If the pitch is missing, or the region is not within the image.
+    """
+    if recording.pitch is None:
+        raise ValueError(
+            "pitch: is missing, the file does not say it, expected the distance between sensors "
+            "on the object such as 6 um"
+        )
+    raster = Raster(0.0, 0.0, recording.pitch, *signal.shape[1:])
+    # No camera counts less than nothing: there, the dark side is cut off.
+    cut = np.where(recording.signal <= 0, Flag.BELOW_FLOOR, 0).astype(np.uint8)
+    image = _mean_image(signal, flags | cut, raster, name, region)
+    notes = [
+        *recording.assumptions,
+        "the counts are a straight line over the radiance: an edge needs no calibration.",
+    ]
+    if recording.fill_factor is None:
+        notes.append(_WHOLE_SQUARE)
+    if recording.saturation is None:
+        notes.append("no pixel is saturated: neither the file nor the description says from where.")
+    band = recording.band
+    return replace(
+        image,
+        footprint=image.pitch * sqrt(recording.fill_factor or 1.0),
+        wavelength=(band.lower + band.upper) / 2 if band else None,
+        notes=tuple(notes),
+        doubts=recording.doubts,
+        unit="counts",
+    )
+
+
+def _mean_image(
+    frames: NDArray[np.float64],
+    flags: NDArray[np.uint8],
+    raster: Raster,
+    name: str,
+    region: tuple[slice, slice] | None,
+) -> EdgeImage:
+    """Mean and flags of a region of frames."""
     part = region or np.s_[:, :]
-    raster, flags = measurement.raster, np.bitwise_or.reduce(measurement.flags, axis=0)[part]
-    radiance = measurement.radiance.mean(axis=0)[part]
+    told = np.bitwise_or.reduce(flags, axis=0)[part]
+    radiance = np.asarray(frames.mean(axis=0)[part], np.float64)
     if min(radiance.shape) < 8:
         raise ValueError(
             f"{name}: the region has {radiance.shape[0]} x {radiance.shape[1]} pixels, expected "
             f"8 x 8 or more of the image's {raster.rows} x {raster.columns}"
         )
-    attributes = measurement.data.attrs
-    band = measurement.band if "band_lower" in attributes else None
     return EdgeImage(
         radiance,
         raster.x[part[1]],
         raster.y[part[0]],
-        ((flags & (Flag.DEAD | Flag.REPLACED)) != 0) | ~np.isfinite(radiance),
-        (flags & Flag.SATURATED) != 0,
-        (flags & Flag.BELOW_FLOOR) != 0,
-        raster.spacing * sqrt(float(attributes.get("fill_factor", 1.0))),
-        (band.lower + band.upper) / 2 if band else None,
+        ((told & (Flag.DEAD | Flag.REPLACED)) != 0) | ~np.isfinite(radiance),
+        (told & Flag.SATURATED) != 0,
+        (told & Flag.BELOW_FLOOR) != 0,
+        raster.spacing,
+        None,
         name,
-        _notes(measurement),
-        tuple(str(attributes.get("doubtful", "")).splitlines()),
     )
 
 
 def _notes(measurement: Measurement) -> tuple[str, ...]:
     notes = str(measurement.data.attrs.get("assumed", "")).splitlines()
     if "fill_factor" not in measurement.data.attrs:
-        notes.append("the whole square of a sensor takes light (fill factor 1).")
+        notes.append(_WHOLE_SQUARE)
     if measurement.data.attrs.get("psf_order") == "sensor":
         notes.append(
             "each sensor's square acts once; this camera was simulated with psf_order sensor, "
@@ -201,7 +285,7 @@ def _check_edge(pixels: EdgePixels, quick: ModelFit) -> None:
     dark, bright = -float(distance.min()), float(distance.max())
     if edge.step < _LEAST_STEP * edge.step_uncertainty:
         raise NoEdgeError(
-            f"the step is {edge.step:.3g} W/m^2/sr with a standard uncertainty of "
+            f"the step is {edge.step:.3g} with a standard uncertainty of "
             f"{edge.step_uncertainty:.2g}, expected {_LEAST_STEP:g} times as much or more"
         )
     if min(dark, bright) < max(quick.fwhm, 2 * pixels.pitch):

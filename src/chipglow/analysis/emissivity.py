@@ -49,6 +49,10 @@ class Heating:
     camera_uncertainty : float, optional
         Standard uncertainty of the radiance temperature from the camera's calibration, common to
         all pixels; by default that which the measurement tells.
+    drift : float, optional
+        Relative standard uncertainty of the radiance from one recording to the next, such as 0.01
+        of a camera that warms up. By default it is what several recordings show; of one it is not
+        known, and not in the uncertainty.
 
     Raises
     ------
@@ -62,6 +66,7 @@ class Heating:
     truth_uncertainty: float = 0.0
     environment_uncertainty: float = 0.0
     camera_uncertainty: float | None = None
+    drift: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("truth", "environment"):
@@ -77,6 +82,8 @@ class Heating:
             value = getattr(self, name)
             if value is not None and not 0 <= value < inf:
                 raise ValueError(f"{name}: is {value!r} K, expected 0 K or more")
+        if self.drift is not None and not 0 <= self.drift < 1:
+            raise ValueError(f"drift: is {self.drift!r}, expected 0 to 1")
         spread = hypot(self.truth_uncertainty, self.environment_uncertainty)
         if self.truth - self.environment < _CLEARLY * spread:
             raise ValueError(
@@ -106,6 +113,8 @@ class EmissivityMap:
         Standard uncertainty of the radiance from the calibration in W/(m² sr), shape (y, x).
     floor : float
         Lowest radiance temperature in K that the camera measures; 0 if it has no floor.
+    recordings : int
+        From how many recordings the observations are.
     """
 
     heating: Heating
@@ -115,6 +124,7 @@ class EmissivityMap:
     flags: NDArray[np.uint8]
     calibration: NDArray[np.float64] | None
     floor: float = 0.0
+    recordings: int = 1
 
     @property
     def hidden(self) -> float:
@@ -156,6 +166,8 @@ class EmissivityMap:
         if self.observations > 1:
             noise = self.radiance.var(axis=0, ddof=1) / self.observations
             variance = variance + noise / self._contrast**2
+        if self.heating.drift is not None:
+            variance = variance + self._drift(self.mean_radiance) ** 2
         return np.sqrt(np.asarray(variance, np.float64))
 
     def of(self, area: Area) -> "RegionEmissivity":
@@ -180,6 +192,7 @@ class EmissivityMap:
                 f"({flag_text(flagged)}), expected 2 or more"
             )
         values = emissivity_of_radiance(self.radiance[:, usable], self.heating, self.band)
+        scatter = Scatter.of(values)
         mean_radiance = self.mean_radiance[usable].mean()
         calibration = None if self.calibration is None else self.calibration[usable].mean()
         pixels = values.mean(axis=0)
@@ -200,8 +213,22 @@ class EmissivityMap:
                 for cause in COMMON
             },
             observed=values.mean(axis=1),
-            scatter=Scatter.of(values),
+            scatter=scatter,
+            drift=self._beyond(float(self._drift(mean_radiance)), scatter),
         )
+
+    def _drift(self, radiance: Any) -> Any:
+        """Standard uncertainty of the emissivity by drift between recordings; NaN if unknown."""
+        if self.heating.drift is None:
+            return np.full_like(radiance, nan)
+        return self.heating.drift * radiance / self._contrast / sqrt(self.recordings)
+
+    def _beyond(self, drift: float, scatter: Scatter) -> float:
+        """What of the drift several recordings do not show already as their repeatability."""
+        if self.recordings == 1:
+            return drift
+        stated = drift if isfinite(drift) else 0.0
+        return sqrt(max(stated**2 - scatter.repeatability**2, 0.0))
 
     @property
     def _contrast(self) -> float:
@@ -257,6 +284,9 @@ class RegionEmissivity(AreaResult):
         Mean emissivity of each observation, shape (observation,).
     scatter : Scatter
         The contributions that are chance.
+    drift : float
+        Contribution of the drift from recording to recording over the repeatability: the same in
+        all areas of a recording. NaN if one recording is all there is and none is stated.
     """
 
     name: str
@@ -273,17 +303,19 @@ class RegionEmissivity(AreaResult):
     common: dict[str, float]
     observed: NDArray[np.float64]
     scatter: Scatter
+    drift: float = nan
 
     @property
     def budget(self) -> dict[str, float]:
         """Standard uncertainty of the mean by cause; NaN where it is not known."""
         parts = {cause: abs(part) for cause, part in self.common.items()}
-        return {**parts, "repeatability": self.scatter.repeatability, "noise": self.scatter.noise}
+        chance = {"repeatability": self.scatter.repeatability, "noise": self.scatter.noise}
+        return {**parts, "drift": self.drift, **chance}
 
     @property
     def standard_uncertainty(self) -> float:
         """Combined standard uncertainty of the mean (JCGM 100:2008, Equation 10)."""
-        return float(np.hypot(_root_sum(self.common), self.scatter.standard_uncertainty))
+        return hypot(_root_sum(self.common), _known(self.drift), self.scatter.standard_uncertainty)
 
     @property
     def degrees_of_freedom(self) -> float:
@@ -424,6 +456,7 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
         flags=observed_flags(measurements),
         calibration=_calibration(measurements, radiance.mean(axis=0), heating),
         floor=max(map(_floor, measurements)),
+        recordings=len(measurements),
     )
 
 
@@ -449,7 +482,8 @@ def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> NDArray[np.float6
     for cause in COMMON:
         effect = [row.common[cause] for row in rows]
         chance += np.outer(effect, effect)
-    return chance
+    drift = [_known(row.drift) for row in rows]
+    return chance + np.outer(drift, drift)
 
 
 def emissivity_line(rows: Sequence[RegionEmissivity]) -> EmissivityLine:
@@ -481,7 +515,7 @@ def emissivity_line(rows: Sequence[RegionEmissivity]) -> EmissivityLine:
     solve = np.linalg.pinv(design)
     at_middle, slope = (solve @ means).tolist()
     residual = _residual(means - design @ (at_middle, slope))
-    chance = np.array([row.scatter.standard_uncertainty for row in rows])
+    chance = np.array([hypot(row.scatter.standard_uncertainty, _known(row.drift)) for row in rows])
     if isfinite(residual):
         chance = np.maximum(chance, residual)
     covariance = (solve * chance**2) @ solve.T
@@ -529,6 +563,11 @@ def _calibration(
 def _residual(about_line: NDArray[np.float64]) -> float:
     freedom = about_line.size - 2
     return sqrt(float((about_line**2).sum()) / freedom) if freedom else nan
+
+
+def _known(part: float) -> float:
+    """A contribution, or 0 where it is not known."""
+    return part if isfinite(part) else 0.0
 
 
 def _root_sum(parts: dict[str, float]) -> float:

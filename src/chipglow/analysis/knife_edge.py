@@ -13,6 +13,7 @@ from typing import Final, Literal
 import numpy as np
 from scipy.ndimage import uniform_filter
 from scipy.optimize import brentq
+from scipy.stats import chi2
 
 from chipglow.analysis.edge_image import EdgeImage, usable_pixels
 from chipglow.analysis.edge_spread import (
@@ -34,9 +35,11 @@ from chipglow.analysis.psf_fit import (
 )
 from chipglow.analysis.psf_models import (
     AnnularModel,
+    DefocusedDiscModel,
     EllipticalModel,
     GaussianModel,
     GaussianTailModel,
+    MoffatModel,
     PSFModel,
 )
 from chipglow.analysis.radial_psf import RadialPSF, radial_psf
@@ -48,12 +51,14 @@ RADIAL: Final = "radial"
 
 _ROUGHLY: Final = 1e-6
 _MISFIT: Final = 1.6
+_BY_CHANCE: Final = 0.01
 _TRIES: Final = 6
 _APERTURE_MISFIT: Final = 4.0
 _NOTHING: Final = 5e-4
 _PLATEAU: Final = 3.0
 _UNRESOLVED: Final = 0.3
 _ALIGNED: Final = np.pi / 9
+_NUMBERS: Final = {1: "one orientation", 2: "two orientations"}
 _SEED: Final = 12233
 _SUBSAMPLES: Final = 9
 
@@ -147,10 +152,23 @@ class KnifeEdge:
 
     @property
     def fwhm_uncertainty(self) -> float:
-        """Its standard uncertainty in m, with the spread of the models by their weights."""
+        """Its standard uncertainty in m.
+
+        With the spread of the models by their weights and, where the best leaves more than noise
+        explains, with how much wider or narrower the point spread function is without a model.
+        """
         pairs = zip(self.weights, self.fits, strict=True)
         spread = sum(weight * (fit.fwhm - self.fwhm) ** 2 for weight, fit in pairs)
-        return sqrt(self.best.fwhm_uncertainty**2 + spread)
+        wider = self.radial.wider if self._unexplained else 0.0
+        return sqrt(self.best.fwhm_uncertainty**2 + spread + wider**2)
+
+    @property
+    def _unexplained(self) -> bool:
+        """Whether the best model leaves what noise does in less than one of a hundred edges."""
+        bins = sum(edge.spread.distance.size for edge in self.edges)
+        free = max(bins - self.best.free, 1)
+        chance = float(chi2.isf(_BY_CHANCE, free)) / free
+        return self.best.misfit > chance and max(map(_left, self.edges)) > _NOTHING
 
     def fit(self, name: str) -> ModelFit:
         """The fit of a model by its name.
@@ -252,7 +270,12 @@ def _models(
     images: Sequence[EdgeImage], edges: Sequence[EdgePixels]
 ) -> tuple[list[PSFModel], list[str]]:
     """Models that the images can tell apart, and what is assumed with them."""
-    models: list[PSFModel] = [GaussianModel(), GaussianTailModel()]
+    models: list[PSFModel] = [
+        GaussianModel(),
+        GaussianTailModel(),
+        MoffatModel(),
+        DefocusedDiscModel(),
+    ]
     assumptions = []
     wavelength = images[0].wavelength
     if wavelength is None:
@@ -266,13 +289,20 @@ def _models(
             "the wavelength to the numerical aperture can be seen."
         )
     directions = orientations(edges)
-    if len(directions) == 1:
-        assumptions.append("a round point spread function: edges of one orientation are given.")
     tilts = [abs((direction + np.pi / 4) % (np.pi / 2) - np.pi / 4) for direction in directions]
     if len(directions) >= 3:
         models.append(EllipticalModel(tilted=True))
     elif len(directions) == 2 and max(tilts) < _ALIGNED:
         models.append(EllipticalModel(tilted=False))
+        assumptions.append(
+            "an oval point spread function has its axes along rows and columns: edges of two "
+            "orientations do not show one that lies oblique; an edge at 45 deg would."
+        )
+    else:
+        assumptions.append(
+            f"a round point spread function: edges of {_NUMBERS[len(directions)]} are given, "
+            "which do not show an oval one; edges of three orientations would."
+        )
     return models, assumptions
 
 

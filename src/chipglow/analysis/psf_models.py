@@ -9,8 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
+from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
-from scipy.special import j0, j1
+from scipy.special import chndtr, gamma, j0, j1, kve, ndtr
 
 from chipglow.camera import AnnularAperturePSF, GaussianPSF, MeasuredPSF, PointSpreadFunction
 
@@ -25,6 +26,12 @@ which moves the width by a third of its standard uncertainty where noise is 1/20
 _TAIL_ENERGY: Final = 0.9999
 _KERNEL_NODES: Final = 3
 _MOST_SIDE: Final = 1025
+_LENGTHS: Final = ("fwhm", "diameter")
+_EVEN_DISC: Final = 30.0
+"""A disc of so many deviations of its blur is half as bright at its rim, within its 2000th."""
+_MOFFAT_NODES: Final = np.geomspace(1e-7, 60.0, 1000)
+"""Arguments of the transfer function: it is 1 under and 0 over them."""
+_MOST_WIDTHS: Final = 60.0
 
 
 class PSFModel(ABC):
@@ -35,7 +42,7 @@ class PSFModel(ABC):
     name : str
         How it is called.
     parameters : tuple of str
-        Names of its parameters; those with ``fwhm`` in them are in m, others are pure numbers.
+        Names of its parameters; `is_length` says which are in m, others are pure numbers.
     """
 
     name: str
@@ -81,7 +88,12 @@ class PSFModel(ABC):
 
     def scales(self, pitch: float) -> NDArray[np.float64]:
         """What a step of 1 in a fit means for each parameter."""
-        return np.array([pitch if "fwhm" in name else 1.0 for name in self.parameters])
+        return np.array([pitch if is_length(name) else 1.0 for name in self.parameters])
+
+
+def is_length(parameter: str) -> bool:
+    """Whether a parameter of a model is a length in m, by its name."""
+    return any(word in parameter for word in _LENGTHS)
 
 
 @dataclass(frozen=True)
@@ -216,6 +228,125 @@ class AnnularModel(PSFModel):
     def _aperture(self, values: NDArray[np.float64]) -> AnnularAperturePSF:
         aperture, area = min(float(values[0]), 1.0), float(np.clip(values[1], 0.0, 0.81))
         return AnnularAperturePSF(self.wavelength, aperture, sqrt(area))
+
+
+@dataclass(frozen=True)
+class MoffatModel(PSFModel):
+    """Light as (1 + (r / a)²)^(−exponent): a core with tails that fall as a power of the radius.
+
+    Notes
+    -----
+    A. F. J. Moffat, Astronomy and Astrophysics 3 (1969) 455. The transfer function is Hankel's
+    transform, 2 (π a f)^(β−1) K_(β−1)(2π a f) / Γ(β−1) of the exponent β (Basset's integral).
+    """
+
+    name = "moffat"
+    parameters = ("fwhm", "exponent")
+
+    def starts(self, fwhm: float) -> list[list[float]]:
+        """See `PSFModel.starts`."""
+        return [[fwhm, 1.8], [fwhm, 3.5]]
+
+    def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
+        """See `PSFModel.bounds`."""
+        return [0.02 * pitch, 1.2], [min(extent, 1e-3), 20.0]
+
+    def transfer(
+        self, values: NDArray[np.float64], frequency: NDArray[np.float64], angle: float
+    ) -> NDArray[np.float64]:
+        """That of the notes."""
+        cycles = 2 * pi * self._radius(values) * frequency
+        order = float(values[1]) - 1
+        bessel = kve(order, _MOFFAT_NODES) * np.exp(-_MOFFAT_NODES)
+        nodes = 2 * (_MOFFAT_NODES / 2) ** order * bessel / gamma(order)
+        # Bessel's function is slow, and smooth over the logarithm.
+        curve = CubicSpline(np.log(_MOFFAT_NODES), nodes)
+        result = np.where(cycles < _MOFFAT_NODES[0], 1.0, 0.0)
+        some = (cycles >= _MOFFAT_NODES[0]) & (cycles < _MOFFAT_NODES[-1])
+        result[some] = curve(np.log(cycles[some]))
+        return np.asarray(result)
+
+    def fwhm(self, values: NDArray[np.float64]) -> float:
+        """See `PSFModel.fwhm`."""
+        return float(values[0])
+
+    def psf(self, values: NDArray[np.float64]) -> PointSpreadFunction:
+        """See `PSFModel.psf`; the kernel ends where a ten-thousandth of the light is beyond."""
+        exponent, radius = float(values[1]), self._radius(values)
+        # (1 + (r / a)²)^(1 − exponent) of the light is beyond r.
+        reach = radius * sqrt((1 - _TAIL_ENERGY) ** (1 / (1 - exponent)) - 1)
+        reach = min(reach, _MOST_WIDTHS * float(values[0]))
+
+        def density(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.asarray((1 + (x**2 + y**2) / radius**2) ** -exponent)
+
+        return sampled_psf(density, max(reach, 2 * float(values[0])), float(values[0]) / 8)
+
+    def _radius(self, values: NDArray[np.float64]) -> float:
+        """The length a in m."""
+        return float(values[0]) / (2 * sqrt(2 ** (1 / float(values[1])) - 1))
+
+
+@dataclass(frozen=True)
+class DefocusedDiscModel(PSFModel):
+    """An even disc, as a lens out of focus makes it, blurred by a Gaussian.
+
+    Its transfer function is 2 J1(π d f) / (π d f) of the diameter d, times the Gaussian's
+    (P. A. Stokseth, Journal of the Optical Society of America 59 (1969) 1314).
+    """
+
+    name = "defocused disc"
+    parameters = ("disc_diameter", "blur_fwhm")
+
+    def starts(self, fwhm: float) -> list[list[float]]:
+        """See `PSFModel.starts`."""
+        return [[fwhm, 0.2 * fwhm], [fwhm, 0.6 * fwhm]]
+
+    def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
+        """See `PSFModel.bounds`."""
+        return [0.1 * pitch, 0.02 * pitch], [min(extent, 1e-3)] * 2
+
+    def transfer(
+        self, values: NDArray[np.float64], frequency: NDArray[np.float64], angle: float
+    ) -> NDArray[np.float64]:
+        """Product of the disc's and the Gaussian's."""
+        argument = pi * values[0] * frequency
+        safe = np.where(argument == 0.0, 1.0, argument)
+        disc = np.where(argument == 0.0, 1.0, 2 * j1(safe) / safe)
+        return np.asarray(disc * _gaussian_transfer(values[1], frequency))
+
+    def fwhm(self, values: NDArray[np.float64]) -> float:
+        """See `PSFModel.fwhm`."""
+        radius, sigma = self._lengths(values)
+        if radius > _EVEN_DISC * sigma:
+            return float(values[0])
+        half = self._density(values, np.array(0.0)) / 2
+        far = radius + 3 * sigma
+        found = brentq(lambda r: float(self._density(values, np.array(r)) - half), 0.0, far)
+        return 2 * float(found)
+
+    def psf(self, values: NDArray[np.float64]) -> PointSpreadFunction:
+        """See `PSFModel.psf`."""
+        radius, sigma = self._lengths(values)
+        fine = max(min(radius / 8, sigma), radius / 40)
+
+        def density(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+            return self._density(values, np.hypot(x, y))
+
+        return sampled_psf(density, radius + 5 * sigma, fine)
+
+    def _lengths(self, values: NDArray[np.float64]) -> tuple[float, float]:
+        """Radius of the disc and standard deviation of the blur in m."""
+        return float(values[0]) / 2, float(values[1]) / _FWHM_PER_SIGMA
+
+    def _density(
+        self, values: NDArray[np.float64], radius: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Light of the disc that the blur puts on a point: the noncentral chi-squared."""
+        disc, sigma = self._lengths(values)
+        if disc > _EVEN_DISC * sigma:
+            return np.asarray(ndtr((disc - radius) / sigma))
+        return np.asarray(chndtr((disc / sigma) ** 2, 2.0, (radius / sigma) ** 2))
 
 
 @dataclass(frozen=True)

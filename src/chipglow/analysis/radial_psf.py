@@ -47,6 +47,9 @@ class RadialPSF:
         The same of `encircled`, shape (n + 1,).
     smoothness : float
         Weight of the smoothness.
+    wider : float
+        By how much its full width at half maximum is over that of the best model in m. Both are
+        read from the rings, so that what these are too coarse for drops out.
     """
 
     edges: NDArray[np.float64]
@@ -54,6 +57,7 @@ class RadialPSF:
     uncertainty: NDArray[np.float64]
     encircled_uncertainty: NDArray[np.float64]
     smoothness: float
+    wider: float
 
     @property
     def radius(self) -> NDArray[np.float64]:
@@ -136,7 +140,19 @@ def radial_psf(
         _spread(all_shares),
         np.concatenate([[0.0], _spread(np.cumsum(all_shares, axis=1))]),
         weight,
+        _ring_width(radii, solutions[chosen]) - _ring_width(radii, model),
     )
+
+
+def _ring_width(edges: Values, shares: Values) -> float:
+    """Twice the greatest radius in m with half of the greatest density, by straight lines."""
+    radius, density = (edges[1:] + edges[:-1]) / 2, shares / np.diff(edges**2)
+    half = density.max() / 2
+    last = int(np.flatnonzero(density >= half)[-1])
+    if last + 1 == radius.size:
+        return 2 * float(radius[-1])
+    share = (density[last] - half) / (density[last] - density[last + 1])
+    return 2 * float(radius[last] + share * (radius[last + 1] - radius[last]))
 
 
 def _drawn(

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import hypot, inf, isfinite, nan, sqrt
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -46,6 +46,10 @@ class DeterminedEmissivity(Protocol):
     @property
     def scatter(self) -> Scatter:
         """The contributions that are chance."""
+
+    @property
+    def drift(self) -> float:
+        """Contribution of the drift between recordings; NaN if it is not known."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +138,8 @@ class TrueTemperature(AreaResult):
     budget : dict
         Standard uncertainty in K by cause: ``truth`` (of the heating with which the emissivity was
         determined), ``environment``, ``calibration``, ``emissivity`` (by chance, or as it is
-        known), ``repeatability`` and ``noise``; NaN where it is not known.
+        known), ``drift`` between recordings, that of the emissivity included, ``repeatability`` and
+        ``noise``; NaN where it is not known.
     chance : tuple of (float, float)
         Pairs of a standard uncertainty in K and its degrees of freedom.
     correlation : float or None
@@ -186,6 +191,7 @@ def true_temperature(
     emissivity: DeterminedEmissivity | KnownEmissivity,
     surroundings: Surroundings | None = None,
     calibration: FittedCalibration | None = None,
+    drift: float | None = None,
 ) -> TrueTemperature:
     """True temperature of an even area, of its mean radiance and emissivity.
 
@@ -203,6 +209,9 @@ def true_temperature(
     calibration : FittedCalibration, optional
         The camera's calibration with which both emissivity and area were measured: it tells how
         far its errors at the two radiances are the same.
+    drift : float, optional
+        Relative standard uncertainty of the radiance from one recording to the next; by default
+        what several recordings show. Of one it is not known, and not in the uncertainty.
 
     Raises
     ------
@@ -241,6 +250,11 @@ def true_temperature(
         sensitivity, emissivity, reflecting, surroundings is None, error, correlation or 0.0
     )
     scatter, seen = Scatter.of(values), sensitivity.radiance
+    drifts = [seen * _drift(drift, mean, len(measurements), scatter)]
+    if not isinstance(emissivity, KnownEmissivity):
+        drifts.append(sensitivity.emissivity * emissivity.drift)
+    known = [part for part in drifts if isfinite(part)]
+    budget["drift"] = hypot(*known) if known else nan
     budget |= {"repeatability": seen * scatter.repeatability, "noise": seen * scatter.noise}
     pixels = equation.temperature(values.mean(axis=0))
     return TrueTemperature(
@@ -257,6 +271,14 @@ def true_temperature(
         chance=(*chance, (seen * scatter.standard_uncertainty, scatter.degrees_of_freedom)),
         correlation=correlation,
     )
+
+
+def _drift(drift: float | None, radiance: float, recordings: int, scatter: Scatter) -> float:
+    """Standard uncertainty of the radiance by the drift over the repeatability; NaN if unknown."""
+    if recordings == 1:
+        return nan if drift is None else drift * radiance
+    stated = (drift or 0.0) * radiance / sqrt(recordings)
+    return sqrt(max(stated**2 - scatter.repeatability**2, 0.0))
 
 
 @dataclass(frozen=True)

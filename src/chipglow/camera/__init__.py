@@ -1,6 +1,7 @@
 """Cameras, virtual and real: optics, exposure, calibration, and the measurement that comes out."""
 
 from chipglow.camera.bad_pixels import LEAST_FRAMES, BadPixels, find_bad_pixels, replace_bad_pixels
+from chipglow.camera.blackbody import Blackbody
 from chipglow.camera.calibration import (
     Calibration,
     FittedCalibration,
@@ -12,7 +13,12 @@ from chipglow.camera.calibration_fit import CalibrationFit, fit_linear, fit_saku
 from chipglow.camera.camera import Camera
 from chipglow.camera.convolution import blur
 from chipglow.camera.detector import Detector
-from chipglow.camera.developing import ImagePosition, develop_recording, flag_shares
+from chipglow.camera.developing import (
+    ImagePosition,
+    develop_recording,
+    flag_shares,
+    repaired_signal,
+)
 from chipglow.camera.exposure import Exposure, expose, expose_all, frame_weights
 from chipglow.camera.measurement import UNUSABLE, Flag, Measurement
 from chipglow.camera.nonuniformity import NonUniformity
@@ -25,6 +31,7 @@ __all__ = [
     "UNUSABLE",
     "AnnularAperturePSF",
     "BadPixels",
+    "Blackbody",
     "Calibration",
     "CalibrationFit",
     "Camera",
@@ -53,5 +60,6 @@ __all__ = [
     "fit_sakuma_hattori",
     "flag_shares",
     "frame_weights",
+    "repaired_signal",
     "replace_bad_pixels",
 ]

@@ -30,6 +30,8 @@ class Calibration(ABC):
         Integration time in s for which it holds.
     range_name : str, optional
         The camera's measuring range for which it holds, as its maker calls it.
+    warnings : tuple of str
+        Why it may not be relied on, a sentence each.
 
     Raises
     ------
@@ -42,6 +44,7 @@ class Calibration(ABC):
     highest: float = inf
     integration_time: float | None = None
     range_name: str | None = None
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0 <= self.lowest < self.highest:

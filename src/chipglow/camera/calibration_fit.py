@@ -9,16 +9,20 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 from scipy.stats import chi2, norm, t
 
+from chipglow.camera.blackbody import Blackbody
 from chipglow.camera.calibration import FittedCalibration, LinearCalibration, SakumaHattori
+from chipglow.camera.calibration_checks import alike, drift_shift, residual_warnings
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT
 
 Kind = TypeVar("Kind", bound=FittedCalibration)
 
-_PROBABILITY: Final = 0.95
+_QUANTILE: Final = 0.975
 _MOST_ROUNDS: Final = 50
 _SETTLED: Final = 1e-9
+_EXACT: Final = 1e-12
+_IDEAL: Final = Blackbody()
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +34,7 @@ class CalibrationFit(Generic[Kind]):
     calibration : FittedCalibration
         The calibration.
     temperatures, counts : ndarray
-        The points: temperature of the black body in K and counts, shape (n,).
+        The points: radiance temperature of the blackbody in K and counts, shape (n,).
     residuals : ndarray
         Counts minus those of the calibration, shape (n,).
     deviations : ndarray
@@ -87,14 +91,23 @@ class CalibrationFit(Generic[Kind]):
         misfit = self.chi_squared if self.stated else points * np.log(max(scatter, 1e-300))
         return misfit + 2 * estimated * points / (points - estimated - 1)
 
-    def coverage_factor(self) -> float:
-        """Factor on the standard uncertainty that gives an interval of 95 %.
+    @property
+    def enlargement(self) -> float:
+        """Factor on the standard uncertainties of the fit, 1 or more.
 
-        Student's, with the degrees of freedom of the fit, if the scatter of the residuals is all
-        that is known of the uncertainty (JCGM 100, G.3); else that of the normal distribution.
+        Of stated ones the root of the reduced chi-squared where it is over 1 (R. T. Birge, Physical
+        Review 40 (1932) 207). Where the scatter of the points is all that is known, Student's
+        factor for 95 % over the normal distribution's (JCGM 100, G.3): with few points it is large,
+        and twice the standard uncertainty holds the truth as often as it says.
         """
-        share = 0.5 + _PROBABILITY / 2
-        return float(norm.ppf(share) if self.stated else t.ppf(share, self.degrees_of_freedom))
+        free = self.degrees_of_freedom
+        if not self.stated:
+            return float(t.ppf(_QUANTILE, free) / norm.ppf(_QUANTILE))
+        return max(float(np.sqrt(self.chi_squared / free)), 1.0) if free else 1.0
+
+    def coverage_factor(self) -> float:
+        """Factor on the standard uncertainty that gives an interval of 95 %: the normal one's."""
+        return float(norm.ppf(_QUANTILE))
 
 
 def fit_linear(
@@ -106,6 +119,7 @@ def fit_linear(
     common_uncertainty: float = 0.0,
     integration_time: float | None = None,
     range_name: str | None = None,
+    blackbody: Blackbody = _IDEAL,
 ) -> CalibrationFit[LinearCalibration]:
     """Fit counts = offset + gain L(T), L the integral over the band, to black bodies.
 
@@ -128,6 +142,8 @@ def fit_linear(
         In s.
     range_name : str, optional
         The camera's measuring range.
+    blackbody : Blackbody
+        Emissivity of the blackbody and what it reflects; an ideal one by default.
 
     Raises
     ------
@@ -139,12 +155,13 @@ def fit_linear(
     -----
     Weights are by the effective variance u²(S) + (dS/dT)² u²(T) at the fitted slope, iterated
     (J. Orear, Am. J. Phys. 50 (1982) 912). The covariance of the parameters is that of the weighted
-    fit; a common error of the temperatures moves all points at once, and what it does to the
-    parameters is added to their covariance as one more term (JCGM 100, Equation 13).
+    fit, times the square of `CalibrationFit.enlargement`; a common error of the temperatures or of
+    the blackbody's emissivity moves all points at once, and what it does to the parameters is
+    added to their covariance as one more term (JCGM 100, Equation 13).
     """
     points = _Points.checked(
         temperatures, counts, count_uncertainty, temperature_uncertainty, common_uncertainty, 2
-    )
+    ).seen_in(band, blackbody)
     radiance = np.asarray(band.radiance(points.temperatures), np.float64)
     gain, offset = np.polyfit(radiance, points.counts, 1)
     _expect_rising(gain > 0)
@@ -162,6 +179,7 @@ def fit_sakuma_hattori(
     common_uncertainty: float = 0.0,
     integration_time: float | None = None,
     range_name: str | None = None,
+    blackbody: Blackbody = _IDEAL,
 ) -> CalibrationFit[SakumaHattori]:
     """Fit counts = offset + C / (exp(c2/(A T + B)) − 1) to black bodies.
 
@@ -176,7 +194,7 @@ def fit_sakuma_hattori(
     """
     points = _Points.checked(
         temperatures, counts, count_uncertainty, temperature_uncertainty, common_uncertainty, 4
-    )
+    ).seen_in(band, blackbody)
 
     build = points.builder(SakumaHattori, band, integration_time, range_name)
     return _fit(points, _first_guess(points, band, build), build)
@@ -198,13 +216,17 @@ def _first_guess(
 
 @dataclass(frozen=True, eq=False)
 class _Points:
-    """Points of a calibration; an uncertainty is 0 where it is not stated."""
+    """Points of a calibration; an uncertainty is 0 where it is not stated.
+
+    What all points have in common is a list of errors in K by the point, each of one deviation.
+    """
 
     temperatures: NDArray[np.float64]
     counts: NDArray[np.float64]
     count_uncertainty: NDArray[np.float64]
     temperature_uncertainty: NDArray[np.float64]
-    common_uncertainty: float
+    common: tuple[NDArray[np.float64], ...]
+    stated: bool
 
     @classmethod
     def checked(
@@ -237,7 +259,8 @@ class _Points:
             signal,
             _uncertainty("count_uncertainty", count_uncertainty, kelvins.shape),
             _uncertainty("temperature_uncertainty", temperature_uncertainty, kelvins.shape),
-            float(_uncertainty("common_uncertainty", common_uncertainty, ())),
+            (_uncertainty("common_uncertainty", common_uncertainty, kelvins.shape),),
+            count_uncertainty is not None or temperature_uncertainty is not None,
         )
         needed = parameters if points.stated else parameters + 1
         different = np.unique(kelvins).size
@@ -266,10 +289,20 @@ class _Points:
 
         return build
 
-    @property
-    def stated(self) -> bool:
-        """Whether uncertainties are stated."""
-        return bool((self.count_uncertainty + self.temperature_uncertainty).any())
+    def seen_in(self, band: Band, blackbody: Blackbody) -> "_Points":
+        """The points with the radiance temperatures of a blackbody of this emissivity."""
+        if blackbody == _IDEAL:
+            return self
+        by_temperature, by_emissivity = blackbody.sensitivity(self.temperatures, band)
+        return replace(
+            self,
+            temperatures=blackbody.radiance_temperatures(self.temperatures, band),
+            temperature_uncertainty=by_temperature * self.temperature_uncertainty,
+            common=(
+                *(by_temperature * error for error in self.common),
+                by_emissivity * blackbody.emissivity_uncertainty,
+            ),
+        )
 
     def deviations(self, slope: NDArray[np.float64]) -> NDArray[np.float64]:
         """Effective standard uncertainties in counts; 1 if none are stated."""
@@ -331,16 +364,18 @@ def _fit(
     residuals = points.counts - calibration.counts(points.temperatures)
     if not points.stated:
         free = points.counts.size - start.size
-        rounding = np.finfo(np.float64).eps * np.abs(points.counts).max()
+        rounding = _EXACT * np.abs(points.counts).max()
         deviations = np.full_like(residuals, max(np.sqrt(np.sum(residuals**2) / free), rounding))
-    return CalibrationFit(
-        replace(calibration, covariance=_covariance(points, calibration, deviations)),
-        points.temperatures,
-        points.counts,
-        residuals,
-        deviations,
-        points.stated,
+    fit = CalibrationFit(
+        calibration, points.temperatures, points.counts, residuals, deviations, points.stated
     )
+    scaled, design = residuals / deviations, _design(points, calibration, deviations)
+    covariance = _covariance(points, calibration, deviations, fit.enlargement)
+    if alike(scaled, design):
+        shift = drift_shift(scaled, design)
+        covariance = covariance + np.outer(shift, shift)
+    warnings = tuple(residual_warnings(scaled, design, points.temperatures, points.stated))
+    return replace(fit, calibration=replace(calibration, covariance=covariance, warnings=warnings))
 
 
 def _least_squares(
@@ -380,14 +415,25 @@ def _least_squares(
     return np.asarray(found.x)
 
 
-def _covariance(
+def _design(
     points: _Points, calibration: FittedCalibration, deviations: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Covariance of the fit, and of what the temperatures have in common."""
-    design = (calibration.gradient(points.temperatures) / deviations).T
+    """Change of the points with the parameters over the deviations, shape (point, parameter)."""
+    return np.asarray((calibration.gradient(points.temperatures) / deviations).T)
+
+
+def _covariance(
+    points: _Points,
+    calibration: FittedCalibration,
+    deviations: NDArray[np.float64],
+    enlargement: float,
+) -> NDArray[np.float64]:
+    """Covariance of the fit, enlarged, and of what the points have in common."""
+    design = _design(points, calibration, deviations)
     lengths = np.linalg.norm(design, axis=0)
     # Columns of one length: parameters are of very different sizes.
     solution = np.linalg.pinv(design / lengths) / lengths[:, None]
-    moved = calibration.slope(points.temperatures) * points.common_uncertainty / deviations
-    common = solution @ moved
-    return np.asarray(solution @ solution.T + np.outer(common, common))
+    slope = calibration.slope(points.temperatures) / deviations
+    common = [solution @ (slope * error) for error in points.common]
+    random = enlargement**2 * solution @ solution.T
+    return np.asarray(random + sum(np.outer(moved, moved) for moved in common))

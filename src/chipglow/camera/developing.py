@@ -115,13 +115,10 @@ def develop_recording(
         If band, pitch or calibration is missing, or the calibration is for something else.
     """
     position = position or ImagePosition()
+    _check_known(recording, calibration)
     calibration = _calibration(recording, calibration)
     band = _band(recording, calibration)
-    if recording.pitch is None:
-        raise ValueError(
-            "pitch: is missing, the file does not say it, expected the distance between sensors "
-            "on the object such as 6 um"
-        )
+    assert recording.pitch is not None
     if non_uniformity is not None and recording.quantity == "temperature":
         raise ValueError(
             "uniform frames: the recording holds temperatures, which are not linear in light, "
@@ -156,6 +153,29 @@ class _Developed:
     uncertainty: NDArray[np.float32] | None
 
 
+def _check_known(recording: Recording, calibration: Calibration | None) -> None:
+    """Raise ValueError that names all that is missing for a measurement."""
+    missing = []
+    counts = recording.quantity == "counts" and recording.conversion is None
+    if calibration is None and counts:
+        missing.append(
+            "calibration: is missing, the recording holds counts and no conversion of its maker, "
+            "expected a calibration"
+        )
+    elif calibration is None and recording.band is None:
+        missing.append(
+            "band: is missing, the file does not say it, expected the camera's band such as "
+            "3.8-5.1 um"
+        )
+    if recording.pitch is None:
+        missing.append(
+            "pitch: is missing, the file does not say it, expected the distance between sensors "
+            "on the object such as 6 um"
+        )
+    if missing:
+        raise ValueError("; ".join(missing))
+
+
 def _calibration(recording: Recording, given: Calibration | None) -> Calibration | None:
     if recording.quantity != "counts":
         if given is not None:
@@ -166,11 +186,7 @@ def _calibration(recording: Recording, given: Calibration | None) -> Calibration
     if given is not None:
         _check_same(recording, given)
         return given
-    if recording.conversion is None:
-        raise ValueError(
-            "calibration: is missing, the recording holds counts and no conversion of its maker, "
-            "expected a calibration"
-        )
+    assert recording.conversion is not None
     return MakersCalibration(
         band=_band(recording, None),
         conversion=recording.conversion,
@@ -205,11 +221,7 @@ def _check_same(recording: Recording, calibration: Calibration) -> None:
 def _band(recording: Recording, calibration: Calibration | None) -> Band:
     if calibration is not None:
         return calibration.band
-    if recording.band is None:
-        raise ValueError(
-            "band: is missing, the file does not say it, expected the camera's band such as "
-            "3.8-5.1 um"
-        )
+    assert recording.band is not None
     return recording.band
 
 
@@ -233,7 +245,7 @@ def _develop_frames(
     bad_pixels: NDArray[np.bool_] | None,
 ) -> _Developed:
     """Radiance in 32 bits, which hold more than counts can tell, with flags and uncertainty."""
-    signal, flags = _repaired(recording, non_uniformity, bad_pixels)
+    signal, flags = repaired_signal(recording, non_uniformity, bad_pixels)
     radiance = _radiance(recording, calibration, band, signal)
     if calibration is not None and calibration.highest < np.inf:
         flags[radiance > band.radiance(calibration.highest)] |= np.uint8(Flag.SATURATED)
@@ -241,12 +253,29 @@ def _develop_frames(
     return _Developed(radiance.astype(np.float32), flags, uncertainty)
 
 
-def _repaired(
+def repaired_signal(
     recording: Recording,
-    non_uniformity: NonUniformity | None,
-    bad_pixels: NDArray[np.bool_] | None,
+    non_uniformity: NonUniformity | None = None,
+    bad_pixels: NDArray[np.bool_] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    """Signal, NaN where there is none, and flags of what is wrong with it."""
+    """A recording's signal with its sensors corrected.
+
+    Parameters
+    ----------
+    recording : Recording
+        What the camera wrote.
+    non_uniformity : NonUniformity, optional
+        Correction of the signal.
+    bad_pixels : ndarray, optional
+        Which sensors are bad, shape (y, x).
+
+    Returns
+    -------
+    signal : ndarray
+        Shape (time, y, x), NaN where there is none.
+    flags : ndarray
+        What is wrong with it: sums of `Flag`, uint8, of the same shape.
+    """
     raw = recording.signal
     signal = raw.astype(np.float64)
     over = np.zeros(raw.shape, np.bool_)
@@ -316,13 +345,14 @@ def _attributes(
     attributes: dict[str, float | str | None] = {
         "camera": recording.camera,
         "quantity": recording.quantity,
+        "fill_factor": recording.fill_factor,
         "integration_time": _known(recording, calibration, "integration_time"),
         "range": _known(recording, calibration, "range_name"),
         "calibration": calibration.description if calibration else None,
         "object_parameters": _told(recording),
         "notes": "\n".join(recording.notes),
         "assumed": "\n".join(_assumed(recording, calibration, position)),
-        "doubtful": "\n".join(_doubtful(recording, uncertainty_known)),
+        "doubtful": "\n".join(_doubtful(recording, calibration, uncertainty_known)),
     }
     return {name: value for name, value in attributes.items() if value not in (None, "")}
 
@@ -377,8 +407,12 @@ def _assumed(
         yield "The origin of coordinates is the image's lower left corner: no tip was given."
 
 
-def _doubtful(recording: Recording, uncertainty_known: bool) -> Iterator[str]:
+def _doubtful(
+    recording: Recording, calibration: Calibration | None, uncertainty_known: bool
+) -> Iterator[str]:
     yield from recording.doubts
+    for warning in calibration.warnings if calibration else ():
+        yield f"The calibration: {warning[0].lower()}{warning[1:]}"
     if not uncertainty_known:
         yield "The uncertainty of the radiance from the calibration is not known."
     signal = recording.signal

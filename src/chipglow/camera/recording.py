@@ -86,6 +86,8 @@ class Recording:
         What had to be assumed to read it, a sentence each.
     doubts : tuple of str
         Why the file may not be relied on, a sentence each.
+    fill_factor : float, optional
+        Portion of a sensor's square that takes light.
 
     Raises
     ------
@@ -107,6 +109,7 @@ class Recording:
     range_name: str | None = None
     assumptions: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    fill_factor: float | None = None
 
     def __post_init__(self) -> None:
         if self.signal.ndim != 3 or 0 in self.signal.shape:
@@ -126,3 +129,7 @@ class Recording:
             value = getattr(self, name)
             if value is not None and not 0 < value < np.inf:
                 raise ValueError(f"recording: {name} is {value!r}, expected over 0, or None")
+        if self.fill_factor is not None and not 0 < self.fill_factor <= 1:
+            raise ValueError(
+                f"recording: fill_factor is {self.fill_factor!r}, expected over 0 to 1, or None"
+            )

@@ -3,20 +3,20 @@
 from collections.abc import Callable, Iterator, Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
     from rich.console import Console
 
     from chipglow.camera import CalibrationFit, FittedCalibration
 
     Fits = Mapping[str, CalibrationFit[FittedCalibration]]
-
-_UNLIKELY: Final = 0.01
 
 
 class Model(StrEnum):
@@ -54,6 +54,20 @@ def calibrate(
             "common, such as '0.5 K': that of its certificate.",
         ),
     ] = None,
+    emissivity: Annotated[
+        float | None,
+        typer.Option(metavar="NUMBER", help="Emissivity of the blackbody; 1 is assumed."),
+    ] = None,
+    emissivity_uncertainty: Annotated[
+        float, typer.Option(metavar="NUMBER", help="Standard uncertainty of that emissivity.")
+    ] = 0.0,
+    surroundings: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TEMPERATURE",
+            help="What a blackbody of less than 1 reflects, such as '23 degC'; 20 degC is assumed.",
+        ),
+    ] = None,
     integration_time: Annotated[
         str | None, typer.Option(metavar="TIME", help="Integration time, such as '10 us'.")
     ] = None,
@@ -68,13 +82,13 @@ def calibrate(
     """
     from rich.console import Console
 
-    from chipglow.camera import fit_linear, fit_sakuma_hattori
-    from chipglow.cli.assumed import say_doubtful
+    from chipglow.camera import Blackbody, fit_linear, fit_sakuma_hattori
+    from chipglow.cli.assumed import say_assumed, say_doubtful
     from chipglow.cli.quantities import parse
     from chipglow.io.column_file import read_calibration_points
     from chipglow.study.measured import UniformObjects, uniform_counts
     from chipglow.study.measurement_schema import band_of
-    from chipglow.study.units import TEMPERATURE_DIFFERENCE, TIME
+    from chipglow.study.units import TEMPERATURE, TEMPERATURE_DIFFERENCE, TIME
 
     recordings, uniform = [], UniformObjects()
 
@@ -87,7 +101,17 @@ def calibrate(
         raise ValueError(
             f"--set: {settings[0]!r} describes nothing, as {points} names no recordings (file)"
         )
+    room = parse("--surroundings", TEMPERATURE, surroundings)
+    try:
+        blackbody = Blackbody(
+            1.0 if emissivity is None else emissivity,
+            emissivity_uncertainty,
+            293.15 if room is None else room,
+        )
+    except ValueError as error:
+        raise ValueError(f"--{str(error).replace('_', '-', 1)}") from None
     known: dict[str, Any] = {
+        "blackbody": blackbody,
         "count_uncertainty": table.get("count_uncertainty"),
         "temperature_uncertainty": table.get("temperature_uncertainty"),
         "common_uncertainty": parse(
@@ -119,6 +143,7 @@ def calibrate(
     chosen = min(fits, key=lambda name: fits[name].information_criterion)
     if len(fits) > 1:
         _print_comparison(console, fits, chosen)
+    say_assumed(_assumed(emissivity, surroundings, table["temperature"]))
     say_doubtful(_doubtful(chosen, fits[chosen], common_uncertainty is not None))
     if out is not None:
         _write(fits[chosen], out)
@@ -197,14 +222,32 @@ def _print_comparison(console: "Console", fits: "Fits", chosen: str) -> None:
     console.print(f"Preferred: {chosen}, which has the least.")
 
 
+def _assumed(
+    emissivity: float | None, surroundings: str | None, kelvins: "NDArray[np.float64]"
+) -> Iterator[str]:
+    import numpy as np
+
+    if emissivity is None:
+        yield (
+            "The blackbody's emissivity is 1 (--emissivity); 0.97 would make 5.4 K at 500 degC "
+            "between 3.8 um and 5.1 um."
+        )
+    elif emissivity < 1 and surroundings is None:
+        yield "The blackbody reflects 20 degC (--surroundings)."
+    steps = np.diff(kelvins)
+    if (steps > 0).all() or (steps < 0).all():
+        yield (
+            "The camera did not drift during the calibration: the points follow one another in the "
+            "order of their temperatures, in which a drift looks like a part of the curve. Some "
+            "points again, in another order, would show it."
+        )
+
+
 def _doubtful(
     name: str, fit: "CalibrationFit[FittedCalibration]", common_known: bool
 ) -> Iterator[str]:
-    if fit.probability is not None and fit.probability < _UNLIKELY:
-        yield (
-            f"The residuals of {name} are larger than the stated uncertainties explain: the form, "
-            "the band or the uncertainties are wrong, and the radiance is less certain than stated."
-        )
+    for warning in fit.calibration.warnings:
+        yield f"{name}: {warning[0].lower()}{warning[1:]}"
     if not fit.stated:
         yield (
             "The uncertainty is from the scatter of the points, as if all counts were equally "

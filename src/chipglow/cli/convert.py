@@ -44,7 +44,7 @@ def convert(
     console.print("The file, and what you said of it:" if told else "The file says:")
     console.print(listed(_facts(recording)))
     try:
-        measurement = measurement_of(description, recording, source.name)
+        measurement = measurement_of(description, recording, str(source))
     except ValueError as error:
         if out is not None:
             raise

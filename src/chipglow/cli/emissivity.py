@@ -54,6 +54,14 @@ def emissivity(
             "by default that which the measurement tells.",
         ),
     ] = None,
+    drift: Annotated[
+        float | None,
+        typer.Option(
+            metavar="NUMBER",
+            help="Relative standard uncertainty of the radiance from one recording to the next, "
+            "such as 0.01; by default what several images at one temperature show.",
+        ),
+    ] = None,
     out: Annotated[Path | None, file_option("Write maps and regions, NetCDF.")] = None,
     table: Annotated[Path | None, file_option("Write the table of regions, CSV.")] = None,
     plot: Annotated[Path | None, picture_option("Draw image, regions and map")] = None,
@@ -68,8 +76,9 @@ def emissivity(
     from chipglow.study.measured import load_measurement
 
     heatings = _heatings(
-        images, truth, environment, truth_uncertainty, environment_uncertainty, camera_uncertainty
-    )
+        images, truth, environment, truth_uncertainty, environment_uncertainty,
+        camera_uncertainty, drift,
+    )  # fmt: skip
     named = load_regions(regions)
     measurements = [load_measurement(image, settings or ()) for image in images]
     _check_same_pixels(images, measurements)
@@ -107,6 +116,7 @@ def _heatings(
     truth_uncertainty: str | None,
     environment_uncertainty: str | None,
     camera_uncertainty: str | None,
+    drift: float | None,
 ) -> "list[Heating]":
     """How the object was heated for each image."""
     from chipglow.analysis import Heating
@@ -129,6 +139,7 @@ def _heatings(
             spread("--truth-uncertainty", truth_uncertainty) or 0.0,
             spread("--environment-uncertainty", environment_uncertainty) or 0.0,
             spread("--camera-uncertainty", camera_uncertainty),
+            drift,
         )
         for text in (truths if len(truths) > 1 else truths * len(images))
     ]
@@ -152,9 +163,9 @@ def _print_tables(
         console.print(f"\nObject at {of[0].heating.truth - 273.15:.6g} °C")
         result = Table("region", "pixels", "mean", "sd of pixels", "u", "U 95 %", "k", box=None)
         budget = Table(
-            "parts of u", "truth", "environment", "calibration", "repeatability", "noise"
-        )
-        budget.box = None
+            "parts of u", "truth", "environment", "calibration", "drift", "repeatability", "noise",
+            box=None,
+        )  # fmt: skip
         for column in (*result.columns[1:], *budget.columns[1:]):
             column.justify = "right"
         for row in of:
@@ -194,7 +205,16 @@ def _assumptions(maps: "list[EmissivityMap]") -> "Iterator[str]":
     if not heating.truth_uncertainty:
         yield "the true temperature is exact (--truth-uncertainty)."
     if not heating.environment_uncertainty:
-        yield "the environment's temperature is exact (--environment-uncertainty)."
+        yield (
+            f"the object reflects just {heating.environment - 273.15:.4g} degC; reflected apparent "
+            f"temperature 100 K higher would make {_of_reflected(maps[0]):+.2g} of the emissivity "
+            "(--environment, --environment-uncertainty)."
+        )
+    if heating.drift is None and any(one.recordings == 1 for one in maps):
+        yield (
+            "the camera does not drift from one recording to the next: there is one image, which "
+            "does not show it, and u holds nothing of it (--drift)."
+        )
     if any(one.calibration is None for one in maps):
         yield (
             "the camera's calibration is exact, as the measurement tells no uncertainty of it "
@@ -205,6 +225,19 @@ def _assumptions(maps: "list[EmissivityMap]") -> "Iterator[str]":
             "nothing changes from frame to frame, as there is one only; noise is at most the "
             "spread over the pixels."
         )
+
+
+def _of_reflected(one: "EmissivityMap") -> float:
+    """Change of the mean emissivity if what is reflected is 100 K hotter."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    heating = one.heating
+    hotter = min(heating.environment + 100.0, (heating.environment + heating.truth) / 2)
+    other = replace(one, heating=replace(heating, environment=hotter, environment_uncertainty=0.0,
+                                         truth_uncertainty=0.0))  # fmt: skip
+    return float(np.nanmean(other.emissivity) - np.nanmean(one.emissivity))
 
 
 def _doubts(rows: "list[list[RegionEmissivity]]") -> "Iterator[str]":

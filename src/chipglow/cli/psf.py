@@ -37,8 +37,9 @@ def psf(
         str | None,
         typer.Option(
             metavar="NAME",
-            help="What to write: gaussian, 'gaussian with tail', 'annular aperture', 'elliptical "
-            "gaussian' or radial; by default the model that fits best.",
+            help="What to write: gaussian, 'gaussian with tail', moffat, 'defocused disc', "
+            "'annular aperture', 'elliptical gaussian' or radial; by default the model that fits "
+            "best.",
         ),
     ] = None,
     out: Annotated[
@@ -49,13 +50,13 @@ def psf(
     settings: Settings = None,
 ) -> None:
     """Determine a camera's point spread function and MTF from images of an edge."""
-    from chipglow.analysis import aperture_image, edge_image, knife_edge
+    from chipglow.analysis import aperture_image, knife_edge
     from chipglow.cli.pictures import write_picture
-    from chipglow.study import load_apertures, load_measurement
+    from chipglow.study import load_apertures, load_edge, load_measurement
 
     part = None if region is None else _region(region)
     given = settings or ()
-    images = [edge_image(load_measurement(path, given), path.name, part) for path in edges]
+    images = [load_edge(path, given, part) for path in edges]
     holes = [
         aperture_image(load_measurement(path, given), diameter, path.name)
         for path, diameter in (load_apertures(apertures) if apertures else ())

@@ -58,6 +58,14 @@ def temperature(
         str | None,
         typer.Option(metavar="KELVINS", help="Its standard uncertainty, such as '2 K'."),
     ] = None,
+    drift: Annotated[
+        float | None,
+        typer.Option(
+            metavar="NUMBER",
+            help="Relative standard uncertainty of the radiance from one recording to the next, "
+            "such as 0.01; by default what several images show.",
+        ),
+    ] = None,
     table: Annotated[Path | None, file_option("Write the table of regions, CSV.")] = None,
     settings: Settings = None,
 ) -> None:
@@ -79,13 +87,13 @@ def temperature(
     names = [area.name for area in found]
     emissivities = _emissivities(emissivity, emissivity_uncertainty, names)
     rows = [
-        true_temperature(measurements, area, emissivities[area.name], room, known)
+        true_temperature(measurements, area, emissivities[area.name], room, known, drift)
         for area in found
         if area.name in emissivities
     ]
     _print(Console(highlight=False, markup=False), rows)
     say_of_measurements(*measurements)
-    say_assumed(_assumptions(rows, emissivities, room))
+    say_assumed(_assumptions(rows, emissivities, room, drift is None and len(images) == 1))
     say_doubtful(f"{doubt}." for row in rows for doubt in row.doubts)
     if table is not None:
         write_temperature_table(rows, table)
@@ -165,6 +173,7 @@ def _assumptions(
     rows: "list[TrueTemperature]",
     emissivities: "Emissivities",
     room: "Surroundings | None",
+    drift_missing: bool,
 ) -> Iterator[str]:
     from chipglow.analysis import KnownEmissivity
 
@@ -182,6 +191,11 @@ def _assumptions(
         yield (
             "the calibration's errors in the emissivity and here are independent, which makes u "
             "too large rather than too small (--calibration)."
+        )
+    if drift_missing or any(isnan(getattr(one, "drift", 0.0)) for one in emissivities.values()):
+        yield (
+            "the camera does not drift from one recording to the next: there is one image here or "
+            "of the emissivity, which does not show it, and u holds nothing of it (--drift)."
         )
     if any(isnan(row.budget["repeatability"]) for row in rows):
         yield "nothing changes from frame to frame, as there is one only."

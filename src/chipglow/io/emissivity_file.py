@@ -27,7 +27,7 @@ from chipglow.surface import MapSurface
 
 _KIND: Final = "emissivity map"
 _HEATING: Final = ("environment", "truth_uncertainty", "environment_uncertainty")
-_BUDGET: Final = (*COMMON, "repeatability", "noise")
+_BUDGET: Final = (*COMMON, "drift", "repeatability", "noise")
 
 
 def write_emissivity(
@@ -91,6 +91,7 @@ class StoredEmissivity:
     heating: Heating
     common: dict[str, float]
     scatter: Scatter
+    drift: float
 
 
 def read_region_emissivity(path: str | os.PathLike[str]) -> dict[str, StoredEmissivity]:
@@ -140,7 +141,11 @@ def _stored(row: xr.Dataset, heating: Heating) -> StoredEmissivity:
     if share > 0 and np.isfinite(freedom):
         scatter = replace(scatter, degrees_of_freedom=freedom * share**4)
     return StoredEmissivity(
-        mean, heating, {cause: signs[cause] * parts[cause] for cause in COMMON}, scatter
+        mean,
+        heating,
+        {cause: signs[cause] * parts[cause] for cause in COMMON},
+        scatter,
+        parts["drift"],
     )
 
 
@@ -228,7 +233,7 @@ def write_temperature_table(rows: Sequence[TrueTemperature], path: str | os.Path
 
     def line(row: TrueTemperature) -> list[Any]:
         values = [getattr(row, name) for name in numbers]
-        values += [row.budget[name.removesuffix("_uncertainty")] for name in head[-6:]]
+        values += [row.budget[name.removesuffix("_uncertainty")] for name in head[-7:]]
         return [row.name, row.pixels, row.left_out, *(f"{value:.9g}" for value in values)]
 
     write_table(Path(path), head, map(line, rows))

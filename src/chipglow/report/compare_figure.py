@@ -1,18 +1,19 @@
 """Measured beside simulated, and their difference (the paper's Figures 7 and 9)."""
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.analysis import Comparison, Reading
+from chipglow.analysis import Comparison, GridComparison, Reading
 from chipglow.report import drawing
 from chipglow.report.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION
 
 _HEIGHT: Final = 5.2
+_ASIDE: Final = 0.2
 _COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
 
 
@@ -22,7 +23,9 @@ def draw_comparison(comparison: Comparison) -> Figure:
     Parameters
     ----------
     comparison : Comparison
-        The comparison; the squares nearest to the rake face are drawn, and the shear band.
+        The comparison. Of the squares at the rake face the nearest row is drawn with its
+        uncertainties, and the differences of the rows behind it, paler the deeper; and the shear
+        band.
     """
     columns = []
     if comparison.grid is not None:
@@ -46,6 +49,8 @@ def draw_comparison(comparison: Comparison) -> Figure:
             below.set_xlabel(label)
             _draw_values(above, place, readings, comparison.labels)
             _draw_differences(below, place, readings)
+            if comparison.grid is not None and place is comparison.grid.along:
+                _draw_deeper(below, comparison.grid)
         panels[0, 0].set_ylabel("radiance temperature / °C")
         panels[1, 0].set_ylabel("simulated − measured / K")
         handles, labels = panels[0, 0].get_legend_handles_labels()
@@ -90,12 +95,28 @@ def _draw_values(
         )
 
 
+def _draw_deeper(axes: Axes, grid: GridComparison) -> None:
+    """Differences of the rows behind the first, without bars."""
+    rows = grid.depth.size
+    for row in range(1, rows):
+        for i, reading in enumerate(grid.simulated):
+            away = reading.temperature[row] - grid.measured.temperature[row]
+            style: dict[str, Any] = {"color": _colour(i), "alpha": 0.6 * (1 - row / rows) + 0.1}
+            axes.plot(1e6 * grid.along, away, linewidth=0.8, linestyle="--", **style)
+    if rows > 1:
+        deepest = 1e6 * float(grid.depth[-1])
+        axes.set_title(f"dashed: deeper rows, to {deepest:.3g} µm", fontsize="small")
+
+
 def _draw_differences(axes: Axes, place: NDArray[np.float64], readings: Sequence[Reading]) -> None:
     measured, *simulated = readings
     axes.axhline(0.0, color="black", linewidth=0.8)
+    step = float(np.median(np.diff(1e6 * place))) if place.size > 1 else 0.0
     for i, reading in enumerate(simulated):
+        # Beside one another, so that no bar hides another.
+        aside = _ASIDE * step * (i - (len(simulated) - 1) / 2)
         axes.errorbar(
-            1e6 * place,
+            1e6 * place + aside,
             reading.temperature - measured.temperature,
             np.hypot(reading.expanded, measured.expanded),
             color=_colour(i),

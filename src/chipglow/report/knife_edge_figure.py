@@ -62,7 +62,7 @@ def _draw_image(figure: Any, axes: Axes, edge: EdgeResult, fitted: FittedEdge) -
     usable = np.where(image.usable, image.radiance, np.nan)
     limits = float(np.nanmin(usable)), float(np.nanmax(usable))
     picture = drawing.show_image(axes, usable, raster, None, drawing.HEAT, limits)
-    drawing.colour_bar(figure, picture, axes, "radiance / (W/(m² sr))")
+    drawing.colour_bar(figure, picture, axes, _label(image.unit))
     c, s = cos(fitted.line.normal), sin(fitted.line.normal)
     middle = float(image.x.mean()) * 1e6, float(image.y.mean()) * 1e6
     along = np.array([-1.0, 1.0]) * hypot(right - left, top - bottom)
@@ -73,6 +73,10 @@ def _draw_image(figure: Any, axes: Axes, edge: EdgeResult, fitted: FittedEdge) -
     axes.set_xlim(left, right)
     axes.set_ylim(bottom, top)
     axes.set_title(image.name)
+
+
+def _label(unit: str) -> str:
+    return unit if unit == "counts" else f"radiance / ({unit})"
 
 
 def _draw_spread(axes: Axes, below: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:
@@ -118,7 +122,8 @@ def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
     axes.set_ylim(-0.05, 1.05)
     axes.set_title("modulation transfer function")
     axes.set_xlabel("frequency / (1/mm)")
-    axes.legend(loc="upper right")
+    # The curves go from one corner to the other: beside them there is no place for it.
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
 
 
 def _draw_apertures(axes: Axes, found: KnifeEdge) -> None:

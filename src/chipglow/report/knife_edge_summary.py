@@ -7,6 +7,7 @@ from rich.table import Table
 
 from chipglow.analysis.knife_edge import KnifeEdge
 from chipglow.analysis.psf_fit import ModelFit
+from chipglow.analysis.psf_models import is_length
 from chipglow.camera import AnnularAperturePSF, GaussianPSF
 
 
@@ -84,7 +85,7 @@ def _parameters(fit: ModelFit) -> str:
     for name, value, deviation in zip(
         fit.model.parameters, fit.values, fit.uncertainties, strict=True
     ):
-        scale, unit = (1e6, " um") if "fwhm" in name else (1.0, "")
+        scale, unit = (1e6, " um") if is_length(name) else (1.0, "")
         number = with_uncertainty(float(value) * scale, float(deviation) * scale)
         texts.append(f"{name.replace('_', ' ')} {number}{unit}")
     return ", ".join(texts)

@@ -99,4 +99,4 @@ def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
     axes.set_xlabel("distance along the rake face / µm")
     axes.set_ylabel("radiance temperature / °C")
     over = f"between {grid.times.size} frames" if several else "in a square"
-    axes.set_title(f"b) profiles; bars: deviation {over}")
+    axes.set_title(f"b) profiles\nbars: deviation {over}")

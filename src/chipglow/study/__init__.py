@@ -17,6 +17,7 @@ from chipglow.study.fitting import Fitted, fit
 from chipglow.study.import_schema import ImportDescription
 from chipglow.study.measured import (
     UniformObjects,
+    load_edge,
     load_measurement,
     load_recording,
     measurement_of,
@@ -68,6 +69,7 @@ __all__ = [
     "load_apertures",
     "load_calibration",
     "load_description",
+    "load_edge",
     "load_import",
     "load_measurement",
     "load_recording",

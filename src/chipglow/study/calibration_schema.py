@@ -52,9 +52,12 @@ class CalibrationDescription(Part):
         description="Covariance of offset and gain, or of offset, A, B and C: of the fit, and of\n"
         "what the temperatures of the black body have in common."
     )
+    warnings: Annotated[tuple[str, ...], Strict(False)] = described(
+        [], "Why it may not be relied on, a sentence each; every measurement by it says so."
+    )
     points: Annotated[tuple[PointRow, ...], Strict(False)] = described(
         [],
-        "For readers only: temperature in degC, counts, residual in counts, residual in K.",
+        "For readers only: radiance temperature in degC, counts, residual in counts and in K.",
     )
 
     @classmethod
@@ -77,6 +80,7 @@ class CalibrationDescription(Part):
             range=calibration.range_name,
             parameters=dict(values),
             covariance=tuple(map(tuple, calibration.covariance.tolist())),
+            warnings=calibration.warnings,
             points=tuple(
                 tuple(float(f"{value:.9g}") for value in row) for row in zip(*points, strict=True)
             ),
@@ -99,6 +103,7 @@ class CalibrationDescription(Part):
             range_name=self.range,
             parameters=np.array([self.parameters[name] for name in kind.NAMES]),
             covariance=np.array(self.covariance),
+            warnings=self.warnings,
         )
         if not calibration.rises:
             raise ValueError("parameters: the counts fall with the temperature, expected a rise")

@@ -1,7 +1,7 @@
 """Measurements as the laboratory's commands take them."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Final
@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis.edge_image import EdgeImage, counts_image, edge_image
 from chipglow.camera import (
     LEAST_FRAMES,
     BadPixels,
@@ -17,9 +18,11 @@ from chipglow.camera import (
     Recording,
     develop_recording,
     find_bad_pixels,
+    repaired_signal,
 )
 from chipglow.io import CAMERA_FORMATS, is_measurement, is_scene, read_measurement, read_recording
 from chipglow.io.cameras.formats import find_format
+from chipglow.io.cameras.stacks import MissingError
 from chipglow.study.files import StudyError, load_calibration, load_description
 from chipglow.study.measurement_schema import MeasurementDescription
 
@@ -56,7 +59,51 @@ def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measur
             f"{source}: is a scene, expected a measurement; chipglow measure makes one of it"
         )
     described = load_description(source, settings)
-    return measurement_of(described, load_recording(described), Path(source).name)
+    return measurement_of(described, load_recording(described), str(source))
+
+
+def load_edge(
+    source: str | Path, settings: Iterable[str] = (), region: tuple[slice, slice] | None = None
+) -> EdgeImage:
+    """Read an image of an edge: a measurement, or a camera's file with or without a calibration.
+
+    Counts serve as they are, as an edge needs no more than a straight line over the radiance. A
+    calibration holds beyond its range, as the edge needs no temperature.
+
+    Parameters
+    ----------
+    source, settings
+        As `load_measurement` takes them.
+    region : tuple of slice, optional
+        Rows and columns that show the edge; all by default.
+
+    Raises
+    ------
+    ValueError
+        If it is no image of an edge; the message names the file.
+    OSError
+        If a file cannot be read.
+    """
+    settings, name = list(settings), Path(source).name
+    if is_measurement(source) or is_scene(source):
+        return edge_image(load_measurement(source, settings), name, region)
+    described = load_description(source, settings)
+    recording = load_recording(described)
+    if recording.quantity != "counts" or recording.conversion is not None:
+        return edge_image(measurement_of(described, recording, str(source)), name, region)
+    if described.calibration is not None:
+        calibration = load_calibration(described.calibration)
+        recording = replace(recording, band=recording.band or calibration.band)
+    try:
+        uniform = UniformObjects().of(described, recording)
+        signal, flags = repaired_signal(
+            recording,
+            uniform.correction if uniform and described.uniform.correct else None,
+            _bad_pixels(described, recording, uniform),
+        )
+        return counts_image(recording, signal, flags, name, region)
+    except ValueError as error:
+        raise StudyError(f"{source}: {str(error).removeprefix(f'{name}: ')}") from error
 
 
 def load_recording(description: MeasurementDescription) -> Recording:
@@ -71,7 +118,18 @@ def load_recording(description: MeasurementDescription) -> Recording:
     """
     if description.file is None:
         raise StudyError("file: is missing, expected a camera's file")
-    return description.applied_to(_read(description, description.file))
+    try:
+        return description.applied_to(_read(description, description.file))
+    except MissingError as error:
+        raise StudyError("; ".join([str(error), *_further(description)])) from None
+
+
+def _further(description: MeasurementDescription) -> Iterator[str]:
+    """What a measurement needs besides, and the description of a file of numbers lacks."""
+    if description.pitch is None:
+        yield "pitch: is missing, expected the distance between sensors such as 6 um"
+    if description.calibration is None and description.band is None:
+        yield "calibration (of counts) or band: is missing"
 
 
 def _read(description: MeasurementDescription, file: str, every: bool = False) -> Recording:
@@ -170,7 +228,7 @@ def uniform_counts(
             if share > 0:
                 raise ValueError(f"{share:.2%} of it is saturated, expected a darker object")
     except ValueError as error:
-        raise StudyError(f"{Path(source).name}: {error}") from error
+        raise StudyError(f"{source}: {error}") from error
     return float(signal[:, good].mean())
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Strict, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, Strict, ValidationInfo
 
 from chipglow.camera import ImagePosition, Recording
 from chipglow.io.column_file import read_bad_pixels, read_response
@@ -17,7 +17,18 @@ from chipglow.study.units import WAVELENGTHS, Length, Temperature, Time
 
 _FRAMES: Final = re.compile(r"(\d{0,9}):(\d{0,9})(?::(\d{1,9}))?")
 
-Pixels = Annotated[tuple[float, float], Strict(False)]
+
+def _two_numbers(value: object) -> object:
+    """A text such as 36.5,41.6 as its numbers; all else as it is."""
+    if not isinstance(value, str):
+        return value
+    try:
+        return tuple(float(part) for part in value.split(","))
+    except ValueError:
+        raise ValueError(f"{value!r}, expected two numbers such as 36.5,41.6") from None
+
+
+Pixels = Annotated[tuple[float, float], Strict(False), BeforeValidator(_two_numbers)]
 
 
 def _limits_or_file(text: str, info: ValidationInfo) -> str:
@@ -131,6 +142,11 @@ class MeasurementDescription(Section):
     pitch: Annotated[Length | None, *OR_NONE] = described(
         "none", "Distance between sensors on the object; none: as the file says."
     )
+    fill_factor: Annotated[float | None, *OR_NONE] = described(
+        "none",
+        "Portion of a sensor's square that takes light; none: not told, 1 is assumed for an edge.",
+        "none, or over 0 to 1",
+    )
     quarter_turns: int = described(
         0, "Quarter turns against the clock that put the image upright.", "0 to 3"
     )
@@ -143,7 +159,7 @@ class MeasurementDescription(Section):
         "none",
         "The tip of the tool, the origin of coordinates, in pixels right and down from the upper\n"
         "left corner of the image so turned; none: the lower left corner is the origin.",
-        "none, or [120.5, 88]",
+        "none, [120.5, 88], or 120.5,88",
     )
     integration_time: Annotated[Time | None, *OR_NONE] = described(
         "none", "Integration time; none: as the file says."
@@ -197,6 +213,7 @@ class MeasurementDescription(Section):
             "camera": self.camera,
             "band": self.known_band(),
             "pitch": self.pitch,
+            "fill_factor": self.fill_factor,
             "integration_time": self.integration_time,
             "range_name": self.range,
             "saturation": self.saturation,

@@ -21,6 +21,10 @@ MOST_FRAMES: Final = 10_000_000
 _CLOCK_WAS_SET: Final = 31_536_000.0 * 10
 
 
+class CutShortError(SourceError):
+    """A file that ends before what should be in it."""
+
+
 @dataclass(frozen=True)
 class Binary:
     """Bytes of a file, of which none is read that is not there.
@@ -51,11 +55,11 @@ class Binary:
 
         Raises
         ------
-        SourceError
+        CutShortError
             If the file has not so many.
         """
         if not (start >= 0 and count >= 0 and start + count <= self.size):
-            raise SourceError(
+            raise CutShortError(
                 f"{self.path}: is cut short or damaged, {what} should lie at bytes {start} to "
                 f"{start + count} of {self.size}"
             )
@@ -134,6 +138,41 @@ def chosen_frames(path: Path, frames: slice | None, count: int, samples: int) ->
         raise SourceError(f"{path}: has {count} frames, none of them is among frames={frames}")
     check_samples(str(path), len(numbers) * samples)
     return numbers
+
+
+def say_cut(remarks: FileRemarks, said: int, whole: int) -> None:
+    """Say that a file ends before its last frame, if it does.
+
+    Parameters
+    ----------
+    remarks : FileRemarks
+        Takes it as a doubt.
+    said, whole : int
+        How many frames the file should have, and how many of them are whole.
+    """
+    if whole < said:
+        remarks.doubts.append(
+            f"the file is cut short: of its {said} frames the first {whole} are whole, the others "
+            "are left out."
+        )
+
+
+def say_cut_behind(remarks: FileRemarks, whole: int, left: int) -> None:
+    """Say that a file, which does not tell its number of frames, ends within one.
+
+    Parameters
+    ----------
+    remarks : FileRemarks
+        Takes it as a doubt.
+    whole : int
+        How many frames are whole.
+    left : int
+        How many bytes lie behind them.
+    """
+    remarks.doubts.append(
+        f"the file is cut short: its first {whole} frames are whole, the {left} bytes behind them "
+        "are no whole frame and are left out."
+    )
 
 
 def check_picture(path: Path, rows: int, columns: int, most: int = 65_535) -> None:

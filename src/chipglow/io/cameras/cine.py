@@ -12,6 +12,7 @@ from chipglow.camera.recording import Recording
 from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
+    CutShortError,
     check_picture,
     chosen_frames,
     common_exposure,
@@ -19,6 +20,7 @@ from chipglow.io.cameras.binary import (
     first_moment,
     layout,
     opened,
+    say_cut,
     stamped_times,
 )
 from chipglow.io.cameras.remarks import FileRemarks
@@ -115,14 +117,15 @@ def read_cine(path: Path, frames: slice | None = None, interval: float | None = 
         count = header["count"]
         if not 0 < count <= MOST_FRAMES:
             raise SourceError(f"{path}: says {count} frames, expected 1 to {MOST_FRAMES}")
-        chosen = chosen_frames(path, frames, count, pictures.height * pictures.width)
         places = binary.numbers(header["places"], count, "<i8", "the places of the frames")
-        _image_start(binary, int(places[-1]), pictures, count - 1)
+        whole = _whole(binary, places, pictures)
+        chosen = chosen_frames(path, frames, whole, pictures.height * pictures.width)
         signal = np.empty((len(chosen), pictures.height, pictures.width), np.uint16)
         for position, number in enumerate(chosen):
             start = _image_start(binary, int(places[number]), pictures, number)
             signal[position] = pictures.image(binary.read(start, pictures.size, f"frame {number}"))
         remarks = FileRemarks(notes=[f"Frame 0 is number {header['first']} of the recording."])
+        say_cut(remarks, count, whole)
         blocks = _blocks(binary, header, setup)
         times = _times(binary, blocks, header, setup["rate"], chosen, interval, remarks)
         integration_time = _integration_time(binary, blocks, header, setup, chosen, remarks)
@@ -198,13 +201,34 @@ def _curve() -> NDArray[np.uint16]:
 _CURVE: Final = _curve()
 
 
+def _whole(binary: Binary, places: NDArray[np.int64], pictures: _Pictures) -> int:
+    """How many frames, from the first on, are whole: a cut file may lack the last ones.
+
+    Raises
+    ------
+    CutShortError
+        If none is.
+    """
+    _image_start(binary, int(places[0]), pictures, 0)
+    beyond = np.flatnonzero(places + pictures.size > binary.size)
+    count = int(beyond[0]) if beyond.size else places.size
+    while True:
+        try:
+            _image_start(binary, int(places[count - 1]), pictures, count - 1)
+        except CutShortError:
+            count -= 1
+        else:
+            return count
+
+
 def _image_start(binary: Binary, place: int, pictures: _Pictures, number: int) -> int:
     """Where the image of a frame begins, behind its annotation; refuses one that is not there."""
     what = f"frame {number}"
     length = int(binary.numbers(place, 1, "<u4", what)[0])
     size = int(binary.numbers(place + length - 4, 1, "<u4", what)[0]) if length >= 8 else 0
     if size != pictures.size or place + length + size > binary.size:
-        raise SourceError(
+        kind = SourceError if size != pictures.size else CutShortError
+        raise kind(
             f"{binary.path}: is cut short or damaged, {what} has {size} bytes from byte "
             f"{place + length} of {binary.size}, expected {pictures.size}"
         )

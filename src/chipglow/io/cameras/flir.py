@@ -16,12 +16,14 @@ from chipglow.camera.recording import PlanckConversion, Recording
 from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
+    CutShortError,
     check_picture,
     chosen_frames,
     even_times,
     first_moment,
     object_parameters,
     opened,
+    say_cut_behind,
     stamped_times,
     text_of,
 )
@@ -34,6 +36,8 @@ _MAGIC: Final = b"FFF\0"
 _JPEG: Final = b"\xff\xd8\xff"
 _JPEG_LS: Final = b"\xff\xf7"
 _PNG: Final = b"\x89PNG\r\n\x1a\n"
+_PNG_END: Final = b"IEND\xaeB`\x82"
+_JPEG_END: Final = b"\xff\xd9"
 _HEADER_LENGTH: Final = 64
 _ENTRY: Final = "HHIIIIIII"
 _ENTRY_LENGTH: Final = calcsize(">" + _ENTRY)
@@ -170,11 +174,17 @@ def _inside_jpeg(binary: Binary) -> bytes:
 
 
 def _frames(binary: Binary, remarks: FileRemarks) -> list[_Frame]:
-    """Where all frames are."""
+    """Where all frames are that are whole."""
     found: list[_Frame] = []
     place: int | None = 0
     while place is not None:
-        found.append(_frame(binary, place, len(found)))
+        try:
+            found.append(_frame(binary, place, len(found), remarks))
+        except CutShortError:
+            if not found:
+                raise
+            say_cut_behind(remarks, len(found), binary.size - place)
+            break
         if len(found) > MOST_FRAMES:
             raise SourceError(f"{binary.path}: has over {MOST_FRAMES} frames")
         place = _next(binary, found[-1].end, remarks)
@@ -189,14 +199,12 @@ def _next(binary: Binary, end: int, remarks: FileRemarks) -> int | None:
     begin = rest.find(_MAGIC)
     if begin >= 0:
         return end + begin
-    if rest and _MAGIC.startswith(rest):
-        raise SourceError(f"{binary.path}: is cut short, a frame begins at byte {end}, its last")
     if rest.strip(b"\0"):
         remarks.doubts.append(f"{binary.size - end} bytes behind the last frame are no frame.")
     return None
 
 
-def _frame(binary: Binary, start: int, number: int) -> _Frame:
+def _frame(binary: Binary, start: int, number: int, remarks: FileRemarks) -> _Frame:
     header = binary.read(start, _HEADER_LENGTH, f"the header of frame {number}")
     if header[:4] != _MAGIC:
         raise SourceError(f"{binary.path}: begins with {header[:4]!r}, expected 'FFF' (FLIR)")
@@ -216,10 +224,17 @@ def _frame(binary: Binary, start: int, number: int) -> _Frame:
         )
         if kind == 0:
             continue
-        if start + offset + size > binary.size:
-            raise SourceError(
-                f"{binary.path}: is cut short or damaged, a record of frame {number} ends at byte "
-                f"{start + offset + size} of {binary.size}"
+        missing = start + offset + size - binary.size
+        if missing > 0:
+            size -= missing
+            if kind != _RAW or not _whole_picture(binary, start + offset, size):
+                raise CutShortError(
+                    f"{binary.path}: is cut short or damaged, a record of frame {number} ends at "
+                    f"byte {binary.size + missing} of {binary.size}"
+                )
+            remarks.notes.append(
+                f"The last {missing} bytes of the file are missing; the picture of frame {number} "
+                "ends before them."
             )
         records.setdefault(kind, (start + offset, size))
         big_endian |= kind == _RAW and sort == _BIG_ENDIAN
@@ -227,6 +242,19 @@ def _frame(binary: Binary, start: int, number: int) -> _Frame:
     if _RAW not in records or records[_RAW][1] <= _RAW_HEADER:
         raise SourceError(f"{binary.path}: frame {number} has no counts (record 1)")
     return _Frame(records, big_endian, end)
+
+
+def _whole_picture(binary: Binary, place: int, length: int) -> bool:
+    """Whether a record of counts, of which the end is missing, has all of them."""
+    if length <= _RAW_HEADER:
+        return False
+    stored = binary.read(place, length, "counts")
+    counts = stored[_RAW_HEADER:]
+    packing = _packing(counts)
+    if packing:
+        return counts.rstrip(b"\0").endswith(_PNG_END if packing == "PNG" else _JPEG_END)
+    fields = _Fields(stored[:_RAW_HEADER])
+    return len(counts) >= 2 * int(fields.number(2, "H")) * int(fields.number(4, "H")) > 0
 
 
 # Counts
@@ -254,7 +282,7 @@ def packed_counts(path: Path) -> bool:
         If it is damaged, cut short or of another kind.
     """
     with _records(path) as binary:
-        place, length = _frame(binary, 0, 0).records[_RAW]
+        place, length = _frame(binary, 0, 0, FileRemarks()).records[_RAW]
         return _packing(binary.read(place, length, "counts of frame 0")[_RAW_HEADER:]) != ""
 
 

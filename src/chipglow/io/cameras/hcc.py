@@ -12,6 +12,7 @@ from chipglow.io.atomic import atomic_path
 from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
+    CutShortError,
     check_picture,
     chosen_frames,
     common_exposure,
@@ -19,6 +20,7 @@ from chipglow.io.cameras.binary import (
     first_moment,
     layout,
     opened,
+    say_cut_behind,
     stamped_times,
 )
 from chipglow.io.cameras.remarks import FileRemarks
@@ -103,7 +105,8 @@ def read_hcc(path: Path, frames: slice | None = None, interval: float | None = N
             )
         header_length = _header_length(binary, first, width, height)
         stride = header_length + 2 * height * width
-        chosen = chosen_frames(path, frames, binary.size // stride, height * width)
+        whole, rest = divmod(binary.size, stride)
+        chosen = chosen_frames(path, frames, whole, height * width)
         stored = np.empty(len(chosen), _frame(header_length, height, width))
         for position, number in enumerate(chosen):
             frame = binary.numbers(number * stride, 1, stored.dtype, f"frame {number}")
@@ -112,6 +115,8 @@ def read_hcc(path: Path, frames: slice | None = None, interval: float | None = N
     _check_alike(path, headers, first, chosen)
     version = f"Telops header {first['major']}.{first['minor']}"
     remarks = FileRemarks(notes=[f"The samples are {label} ({version})."])
+    if rest:
+        say_cut_behind(remarks, whole, rest)
     recording = Recording(
         signal=_signal(stored, quantity, path),
         quantity=quantity,
@@ -130,19 +135,23 @@ def _frame(header_length: int, height: int, width: int) -> np.dtype[Any]:
 
 def _header_length(binary: Binary, first: dict[str, Any], width: int, height: int) -> int:
     """Length of a frame's header: two lines of the picture, or what the header says."""
-    said = int(first["header_length"])
-    for length in dict.fromkeys((4 * width, said)):
-        stride = length + 2 * width * height
-        if length < _HEADER.itemsize or binary.size % stride:
+    said, pixels = int(first["header_length"]), 2 * width * height
+    lengths = [one for one in dict.fromkeys((4 * width, said)) if one >= _HEADER.itemsize]
+    # A file without a frame that is cut tells it by its size, else the second header does.
+    lengths.sort(key=lambda one: binary.size % (one + pixels) != 0)
+    for length in lengths:
+        stride = length + pixels
+        if binary.size < stride or (
+            binary.size >= stride + 2 and binary.read(stride, 2, "the second header") != b"TC"
+        ):
             continue
-        if binary.size == stride or binary.read(stride, 2, "the second header") == b"TC":
-            if binary.size // stride > MOST_FRAMES:
-                raise SourceError(f"{binary.path}: has over {MOST_FRAMES} frames")
-            return length
-    stride = max(4 * width, _HEADER.itemsize) + 2 * width * height
-    raise SourceError(
-        f"{binary.path}: is cut short or damaged, it has {binary.size} bytes, no whole number of "
-        f"frames of {stride} bytes ({width} columns, {height} rows)"
+        if binary.size // stride > MOST_FRAMES:
+            raise SourceError(f"{binary.path}: has over {MOST_FRAMES} frames")
+        return length
+    stride = max(4 * width, _HEADER.itemsize) + pixels
+    raise CutShortError(
+        f"{binary.path}: is cut short or damaged, it has {binary.size} bytes and no whole frame "
+        f"of {stride} bytes ({width} columns, {height} rows) with a second one behind it"
     )
 
 

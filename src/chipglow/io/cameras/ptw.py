@@ -10,12 +10,14 @@ from chipglow.camera.recording import Recording
 from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
+    CutShortError,
     check_picture,
     chosen_frames,
     even_times,
     layout,
     object_parameters,
     opened,
+    say_cut,
     stamped_times,
     text_of,
 )
@@ -25,7 +27,7 @@ from chipglow.io.sources.source import SourceError
 # Places as in the Altair Reference Guide DL002U-D, after pyradi's ryptw.
 _HEADER: Final = layout(
     1563,
-    signature=("S5", 0),
+    signature=("S3", 0),
     header_size=("<u4", 11),
     frame_header_size=("<u4", 15),
     frame_size=("<u4", 19),
@@ -66,11 +68,18 @@ _STAMP: Final = layout(
 _LOCK_IN: Final = (1220, 3907, 1204, 2382)
 _DAY: Final = 86_400.0
 _LONGEST_PERIOD: Final = 86_400.0
+_STAMPED: Final = 0.002
+"""Two stamps of whole milliseconds may be off by that much in s."""
+_CLOCK: Final = 2e-4
+"""Relative difference of the computer's clock, which stamps, and the camera's."""
 
 
 def is_ptw(head: bytes) -> bool:
-    """Whether a file begins like one of Cedip's or Agema's cameras."""
-    return head[:5] == b"CEDIP" or head[:3] == b"AIO"
+    """Whether a file begins like one of Cedip's or Agema's cameras.
+
+    Behind the three letters are IP or, in files of Altair 5.60, zeros.
+    """
+    return head[:3] in (b"CED", b"AIO")
 
 
 def read_ptw(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
@@ -93,14 +102,15 @@ def read_ptw(path: Path, frames: slice | None = None, interval: float | None = N
         If it is missing or not accessible.
     """
     with opened(path) as binary:
-        signature = binary.read(0, 5, "the signature")
-        if signature != b"CEDIP":
-            raise SourceError(f"{path}: begins with {signature!r}, expected 'CEDIP' (PTW)")
+        signature = binary.read(0, 3, "the signature")
+        if signature != b"CED":
+            raise SourceError(f"{path}: begins with {signature!r}, expected 'CED' (PTW)")
         header = binary.record(0, _HEADER, "the header")
         rows, columns = int(header["rows"]), int(header["columns"])
         check_picture(path, rows, columns)
         stride = _stride(binary, header, rows, columns)
-        chosen = chosen_frames(path, frames, header["frames"], rows * columns)
+        whole = min(header["frames"], (binary.size - header["header_size"]) // stride)
+        chosen = chosen_frames(path, frames, whole, rows * columns)
         skipped, rows = _lock_in(binary, header, stride, rows, columns)
         signal = np.empty((len(chosen), rows, columns), np.uint16)
         start = header["header_size"] + header["frame_header_size"] + 2 * columns * skipped
@@ -110,6 +120,7 @@ def read_ptw(path: Path, frames: slice | None = None, interval: float | None = N
                 start + number * stride, rows * columns, "<u2", what
             ).reshape(rows, columns)
         remarks = FileRemarks(notes=_notes(header, skipped))
+        say_cut(remarks, header["frames"], whole)
         times = _times(binary, header, stride, chosen, interval, remarks)
     recording = Recording(
         signal=signal,
@@ -131,19 +142,21 @@ def read_ptw(path: Path, frames: slice | None = None, interval: float | None = N
 
 def _stride(binary: Binary, header: dict[str, Any], rows: int, columns: int) -> int:
     """Bytes from frame to frame; refuses a header that does not fit the file."""
-    path, count = binary.path, header["frames"]
-    stride = int(header["frame_size"])
-    if stride < header["frame_header_size"] + 2 * rows * columns:
+    path, count, size = binary.path, header["frames"], header["frame_size"]
+    needed = header["frame_header_size"] + 2 * rows * columns
+    # Files of Altair 5.60 count words of 16 bits, others bytes.
+    stride = next((length for length in (size, 2 * size) if length >= needed), 0)
+    if not stride:
         raise SourceError(
-            f"{path}: a frame has {stride} bytes, {rows} rows of {columns} columns need "
-            f"{header['frame_header_size'] + 2 * rows * columns}"
+            f"{path}: a frame has {size} bytes or words, {rows} rows of {columns} columns need "
+            f"{needed} bytes"
         )
     if not 0 < count <= MOST_FRAMES:
         raise SourceError(f"{path}: says {count} frames, expected 1 to {MOST_FRAMES}")
-    end = header["header_size"] + count * stride
+    end = header["header_size"] + stride
     if header["header_size"] < _HEADER.itemsize or end > binary.size:
-        raise SourceError(
-            f"{path}: is cut short or damaged, its {count} frames end at byte {end}, it has "
+        raise CutShortError(
+            f"{path}: is cut short or damaged, its first frame ends at byte {end}, it has "
             f"{binary.size} bytes"
         )
     return stride
@@ -171,22 +184,61 @@ def _times(
 ) -> NDArray[np.float64]:
     if interval is not None:
         return even_times(chosen, interval)
-    start = header["header_size"]
-    has_stamps = header["frame_header_size"] >= _STAMP.itemsize
-    numbers = (0, *chosen) if has_stamps else ()
-    stamps = np.array([_stamp(binary, start + number * stride) for number in numbers])
-    since = np.mod(stamps[1:] - stamps[0], _DAY) if has_stamps else np.full(len(chosen), np.nan)
-    period = header["period"]
-    if not 0 < period < _LONGEST_PERIOD:
-        return stamped_times(binary.path, since, chosen, 0.0, remarks)
+    period = header["period"] if 0 < header["period"] < _LONGEST_PERIOD else None
+    if header["frame_header_size"] < _STAMP.itemsize:
+        nowhere = np.full(len(chosen), np.nan)
+        return stamped_times(binary.path, nowhere, chosen, 1 / period if period else 0.0, remarks)
+    last = (binary.size - header["header_size"]) // stride - 1
+    numbers = (0, *chosen, min(last, header["frames"] - 1))
+    stamps = np.array([_stamp(binary, header["header_size"] + n * stride) for n in numbers])
+    since = np.mod(stamps[1:] - stamps[0], _DAY)
+    since, mean = since[:-1], since[-1] / max(numbers[-1], 1)
+    if period is None or not since.any():
+        rate = 1 / period if period else 0.0
+        return stamped_times(binary.path, since, chosen, rate, remarks)
+    return _clocked_times(since, mean, period, chosen, remarks)
+
+
+def _clocked_times(
+    since: NDArray[np.float64],
+    mean: float,
+    period: float,
+    chosen: range,
+    remarks: FileRemarks,
+) -> NDArray[np.float64]:
+    """Times by the period, or by the frames' own stamps where these say something else.
+
+    Parameters
+    ----------
+    since : ndarray
+        Stamps of the frames in s after the first of the file, in whole milliseconds.
+    mean : float
+        Mean time from frame to frame in s by the stamps.
+    period : float
+        The period of the header in s.
+    chosen : range
+        Numbers of the frames.
+    remarks : FileRemarks
+        Takes what had to be assumed.
+    """
+    allowed = _STAMPED + _CLOCK * float(since.max())
     times = even_times(chosen, period)
-    # The stamps are whole milliseconds, so that the period is the finer measure.
-    apart = np.abs(times - since).max()
-    if has_stamps and since.any() and apart > 0.002 + 0.01 * period:
-        remarks.doubts.append(
-            f"the times are from the frame period, {period * 1e6:g} us; the frames' own "
-            f"stamps are up to {apart:.3g} s off: frames may be missing."
-        )
+    # The stamps are whole milliseconds, so that a period that fits them is the finer measure.
+    apart = float(np.abs(times - since).max())
+    if apart <= allowed:
+        return times
+    for own in (round(mean / period) * period, mean):
+        evenly = even_times(chosen, own)
+        if np.abs(evenly - since).max() <= allowed:
+            remarks.assumptions.append(
+                f"the frames are {own * 1e6:g} us apart, as their stamps say; the period in the "
+                f"header is {period * 1e6:g} us."
+            )
+            return evenly
+    remarks.doubts.append(
+        f"the times are from the frame period, {period * 1e6:g} us; the frames' own stamps are up "
+        f"to {apart:.3g} s off: frames may be missing."
+    )
     return times
 
 

@@ -60,6 +60,10 @@ _SPELLINGS: Final = {
 }
 
 
+class MissingError(SourceError):
+    """What neither a file nor the user says, and is needed."""
+
+
 @dataclass(frozen=True)
 class Told:
     """What the user says of a file that does not say it itself; see `read_recording`."""
@@ -116,9 +120,10 @@ def read_stack(path: Path, kind: str, frames: slice | None, told: Told) -> Recor
         axes = axes_of(one, told.axes, remarks)
         lengths = dict(zip(axes, one.array.shape, strict=True))
         check_picture(path, lengths["y"], lengths["x"], MOST_ON_A_SIDE)
-        unit = _unit(one, told)
         chosen = chosen_frames(path, frames, lengths.get("time", 1), lengths["y"] * lengths["x"])
-        times = _times(one, arrays, axes, chosen, told, remarks)
+        unit, times = _unit(one, told), _times(one, arrays, axes, chosen, told, remarks)
+        if unit is None or times is None:
+            raise MissingError(f"{one}: {_missing(one, unit, times)}")
         signal = _signal(one, axes, chosen)
     said = FileRemarks(
         notes=[f"From the file: {sentence}." for sentence in remarks.from_file],
@@ -163,8 +168,21 @@ def _listed(arrays: Mapping[str, StoredArray]) -> str:
     return ", ".join(f"{name!r} of shape {arrays[name].shape}" for name in sorted(arrays)[:10])
 
 
-def _unit(one: Chosen, told: Told) -> str:
-    """Unit of the samples, as the user or the file says."""
+def _missing(one: Chosen, unit: str | None, times: NDArray[np.float64] | None) -> str:
+    """What neither the file nor the user says."""
+    parts = []
+    if unit is None:
+        parts.append(
+            f"unit: is missing, the file says {one.unit or 'none'}, expected one of "
+            f"{', '.join(RECORDING_UNITS)}"
+        )
+    if times is None:
+        parts.append("give the interval between frames, the file says no times")
+    return "; ".join(parts)
+
+
+def _unit(one: Chosen, told: Told) -> str | None:
+    """Unit of the samples, as the user or the file says; None if neither does."""
     if told.unit is not None:
         return told.unit
     said = one.unit if isinstance(one.unit, str) else ""
@@ -172,10 +190,7 @@ def _unit(one: Chosen, told: Told) -> str:
     if unit is None and told.quantity in ("counts", "radiance"):
         unit = "counts" if told.quantity == "counts" else "W/m2/sr"
     if unit is None:
-        raise SourceError(
-            f"{one}: unit: is missing, the file says {said or 'none'}, expected one of "
-            f"{', '.join(RECORDING_UNITS)}"
-        )
+        return None
     if told.quantity is not None and RECORDING_UNITS[unit][0] != told.quantity:
         raise SourceError(f"{one}: is in {said}, which is no unit of {told.quantity}")
     return unit
@@ -188,7 +203,8 @@ def _times(
     chosen: range,
     told: Told,
     remarks: Remarks,
-) -> NDArray[np.float64]:
+) -> NDArray[np.float64] | None:
+    """Times of the chosen frames in s; None if neither the user nor the file says them."""
     if told.interval is not None:
         return even_times(chosen, told.interval)
     count = one.array.shape[axes.index("time")] if "time" in axes else 1
@@ -197,7 +213,7 @@ def _times(
     dim = one.array.dims[axes.index("time")] if one.array.dims else ""
     found = coordinate("time", {one.path: arrays}, None, dim, count)
     if found is None or found.label == one.label:
-        raise SourceError(f"{one}: give the interval between frames, the file says no times")
+        return None
     unit = unit_of("time", str(found), found.unit, SI, remarks)
     times = check_times(str(found), read_list(found, unit))
     if not isfinite(times[-1] - times[0]):

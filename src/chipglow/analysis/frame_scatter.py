@@ -1,0 +1,85 @@
+"""What frames tell of the uncertainty of their mean, if they and their places are alike."""
+
+from dataclasses import dataclass
+from math import inf
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+_LEAST: Final = 8
+"""Frames from which on it is asked how alike successive ones are."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameScatter:
+    """Errors of a mean over frames, as the frames themselves show them.
+
+    Parameters
+    ----------
+    patterns : ndarray
+        Independent errors of the mean, each of one standard deviation, shape (frames, ...): how
+        each frame is away from the mean. Places that change together do so in them.
+    freedom : float
+        Degrees of freedom; infinite without frames.
+    """
+
+    patterns: NDArray[np.float64]
+    freedom: float = inf
+
+    @classmethod
+    def of(cls, frames: NDArray[np.float64]) -> "FrameScatter":
+        """What frames of shape (frames, ...), NaN where there is nothing, tell.
+
+        Notes
+        -----
+        Successive frames that are alike count as fewer: the variance of the mean grows by
+        1 + 2 Σ (1 − k/n) ρ_k of the correlations ρ_k of all places together, up to the first that
+        is not positive (C. J. Geyer, Statistical Science 7 (1992) 473).
+        """
+        known = np.isfinite(frames)
+        count = known.sum(axis=0)
+        total = np.where(known, frames, 0.0).sum(axis=0)
+        mean = np.divide(total, count, out=np.zeros(total.shape), where=count > 0)
+        away = np.where(known, frames - mean, 0.0)
+        longer = _longer(away)
+        pairs = np.maximum(count * (count - 1), 1)
+        freedom = max((len(frames) - 1) / longer, 1.0)
+        return cls(away * np.sqrt(longer / pairs), freedom if len(frames) > 1 else inf)
+
+    @property
+    def deviation(self) -> NDArray[np.float64]:
+        """Standard uncertainty of the mean, shape (...)."""
+        return np.asarray(np.sqrt(np.sum(self.patterns**2, axis=0)))
+
+    def part(self, where: NDArray[np.bool_]) -> "FrameScatter":
+        """At some places, flat."""
+        return FrameScatter(self.patterns[:, where], self.freedom)
+
+    def of_mean(self) -> float:
+        """Standard uncertainty of the mean over all places."""
+        return float(np.linalg.norm(self.patterns.reshape(len(self.patterns), -1).mean(axis=1)))
+
+    def drawn(self, count: int, generator: np.random.Generator) -> NDArray[np.float64]:
+        """Errors of flat places, shape (count, n), by Student's distribution."""
+        deviates = generator.standard_normal((count, len(self.patterns)))
+        if np.isfinite(self.freedom):
+            deviates /= np.sqrt(generator.chisquare(self.freedom, (count, 1)) / self.freedom)
+        return np.asarray(deviates @ self.patterns)
+
+
+def _longer(away: NDArray[np.float64]) -> float:
+    """By how much the variance of the mean is larger than of independent frames, 1 or more."""
+    frames = away.reshape(len(away), -1)
+    count, square = len(frames), float(np.sum(frames**2))
+    if count < _LEAST or square <= 0:
+        return 1.0
+    total, weight = 0.0, 0.0
+    for lag in range(1, count // 2 + 1):
+        share = float(np.sum(frames[lag:] * frames[:-lag])) / square * count / (count - lag)
+        # That the mean is taken off makes all correlations smaller by about 1 / count.
+        if share + 1 / count <= 0:
+            break
+        total += (1 - lag / count) * share
+        weight += (1 - lag / count) / count
+    return float(np.clip((1 + 2 * total) / max(1 - 2 * weight, 1 / count), 1.0, count))

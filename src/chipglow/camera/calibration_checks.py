@@ -1,0 +1,148 @@
+"""Whether the residuals of a calibration look as the stated uncertainties say."""
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, t
+
+_UNLIKELY: Final = 0.01
+_ALIKE: Final = 0.05
+_FAR_WITHIN: Final = 0.1
+_DRAWS: Final = 4000
+_SEED: Final = 1950
+_LEAST_FREEDOM: Final = 3
+_LEAST_FALL: Final = 0.5
+"""Portion of chi-squared that a point must take with it to be called an outlier."""
+
+
+def residual_warnings(
+    residuals: NDArray[np.float64],
+    design: NDArray[np.float64],
+    kelvins: NDArray[np.float64],
+    stated: bool,
+) -> Iterator[str]:
+    """What residuals say against a calibration, a sentence each.
+
+    Parameters
+    ----------
+    residuals : ndarray
+        Over their standard uncertainties, in the order of the measurement, shape (n,).
+    design : ndarray
+        Change of the points with the parameters over the same uncertainties, shape (n, p).
+    kelvins : ndarray
+        Radiance temperatures of the points in K, shape (n,).
+    stated : bool
+        Whether the uncertainties were stated; if not, only the order of the residuals tells.
+    """
+    free = residuals.size - design.shape[1]
+    total = float(residuals @ residuals)
+    if stated and free > 0 and chi2.sf(total, free) < _UNLIKELY:
+        yield (
+            f"The residuals are {np.sqrt(total / free):.3g} times as large as the stated "
+            f"uncertainties explain (chi-squared {total:.4g} with {free} degrees of freedom): the "
+            "form, the band, a point or the uncertainties are wrong. The uncertainty is enlarged "
+            "by that factor."
+        )
+    if free >= 2 and (point := _outlier(residuals, design, stated)) is not None:
+        yield (
+            f"The point at {kelvins[point] - 273.15:.5g} °C lies "
+            f"{abs(residuals[point]):.3g} standard uncertainties from the others' curve; without "
+            "it they agree far better. Check it."
+        )
+    if alike(residuals, design):
+        yield (
+            "Residuals of successive points are alike, as by a drift or by the self-heating of the "
+            "camera during the calibration, or by a wrong band. The uncertainty is enlarged by "
+            "what a drift that is even from point to point would do. Take the points again, in "
+            "random order."
+        )
+
+
+def alike(residuals: NDArray[np.float64], design: NDArray[np.float64]) -> bool:
+    """Whether residuals of successive points are more alike than chance makes them.
+
+    Parameters are those of `residual_warnings`.
+    """
+    free = residuals.size - design.shape[1]
+    # What is far within the uncertainties does no harm, however alike it is.
+    if free < _LEAST_FREEDOM or float(residuals @ residuals) < _FAR_WITHIN * free:
+        return False
+    tests = (_serial_probability, _drift_probability)
+    # Two tests, each at half of the level.
+    return min(test(residuals, design) for test in tests) < _ALIKE / len(tests)
+
+
+def drift_shift(residuals: NDArray[np.float64], design: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far an even drift of the counts, fitted with the rest, moves the parameters.
+
+    Parameters are those of `residual_warnings`; the drift is 0 at the first point.
+    """
+    lengths = np.linalg.norm(design, axis=0)
+    columns = np.column_stack([design / lengths, _drift(design)])
+    with_drift = np.linalg.lstsq(columns, residuals, rcond=None)[0]
+    return np.asarray(with_drift[:-1] / lengths)
+
+
+def _outlier(
+    residuals: NDArray[np.float64], design: NDArray[np.float64], stated: bool
+) -> int | None:
+    """The point without which chi-squared falls most, if it is far from what the others say.
+
+    By the residual that is studentised with the others' scatter (Cook and Weisberg, Residuals and
+    Influence in Regression, 1982); its square is chi-squared's fall.
+    """
+    orthogonal = np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
+    left = np.maximum(1 - np.sum(orthogonal**2, axis=1), 1e-9)
+    total, fall = float(residuals @ residuals), residuals**2 / left
+    point = int(np.argmax(fall))
+    free = residuals.size - design.shape[1] - 1
+    rest = max(total - float(fall[point]), 1e-300)
+    scatter = max(rest / free, 1.0) if stated else rest / free
+    limit = float(chi2.isf(_UNLIKELY / residuals.size, 1)) if stated else _student_limit(free)
+    far = fall[point] > limit * scatter and fall[point] > _LEAST_FALL * total
+    return point if far and (stated or free >= _LEAST_FREEDOM) else None
+
+
+def _student_limit(free: int) -> float:
+    return float(t.isf(_UNLIKELY / (2 * (free + 2)), free)) ** 2
+
+
+def _serial_probability(residuals: NDArray[np.float64], design: NDArray[np.float64]) -> float:
+    """How often independent errors leave residuals that are so much alike from point to point.
+
+    The statistic of J. Durbin and G. S. Watson, Biometrika 37 (1950) 409, with its distribution by
+    draws of independent errors that the same fit is subtracted from.
+    """
+    orthogonal = np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
+    draws = np.random.default_rng(_SEED).standard_normal((_DRAWS, residuals.size))
+    draws -= (draws @ orthogonal) @ orthogonal.T
+
+    def ratio(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        squares = np.maximum(np.sum(values**2, axis=-1), 1e-300)
+        return np.asarray(np.sum(np.diff(values, axis=-1) ** 2, axis=-1) / squares)
+
+    return float(np.mean(ratio(draws) <= ratio(residuals)))
+
+
+def _drift_probability(residuals: NDArray[np.float64], design: NDArray[np.float64]) -> float:
+    """How often independent errors look as much like a drift, even from point to point.
+
+    Student's t of one more parameter, the number of the point, with the scatter that is left.
+    """
+    orthogonal = np.linalg.qr(design / np.linalg.norm(design, axis=0))[0]
+    drift = _drift(design)
+    drift = drift - orthogonal @ (orthogonal.T @ drift)
+    length = float(drift @ drift)
+    if length <= 0:
+        return 1.0
+    square = float(drift @ residuals) ** 2 / length
+    free = residuals.size - design.shape[1] - 1
+    rest = max((float(residuals @ residuals) - square) / free, 1e-300)
+    return float(2 * t.sf(np.sqrt(square / rest), free))
+
+
+def _drift(design: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Counts that rise from point to point, over the deviations; all forms begin with an offset."""
+    return np.asarray(np.linspace(0.0, 1.0, len(design)) * design[:, 0])
