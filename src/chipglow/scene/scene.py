@@ -276,7 +276,7 @@ class Scene:
 
     @property
     def blocks(self) -> list[range]:
-        """Numbers of the frames between gaps: ranges of frames that follow one another."""
+        """Ranges of the numbers of frames that follow one another without a gap."""
         gaps = np.flatnonzero(is_gap(np.diff(self.times), self.frame_spacing)) + 1
         bounds = [0, *gaps.tolist(), len(self.times)]
         return [range(first, last) for first, last in pairwise(bounds)]
