@@ -221,7 +221,7 @@ def load(text, folder):
     [
         ("sede: 3", "", "unknown key 'sede', did you mean 'seed'?"),
         ("camera: {integration_tme: 10 us}", "camera", "did you mean 'integration_time'?"),
-        ("camera: {zoom: 3}", "camera", "unknown key 'zoom', expected one of band, pitch"),
+        ("camera: {zoom: 3}", "camera", "unknown key 'zoom', expected one of band, response, pitch"),
         (
             "camera: {integration_time: 10}",
             "camera.integration_time",
@@ -289,7 +289,8 @@ def load(text, folder):
         ("camera: {band: 5.1-3.8 um}", "camera.band", "5.1-3.8 um is reversed"),
         ("camera: {band: 3.8-5.1}", "camera.band", "3.8-5.1 has no unit"),
         (
-            "camera: {integration_time: 200 us}",
+            "{camera: {integration_time: 200 us}, cutting: {window: {start: 1.579 mm, "
+            "end: 1.958 mm}}}",
             "camera.integration_time",
             "200 us is longer than the scene, expected up to the 90.96 us",
         ),
@@ -304,7 +305,7 @@ def load(text, folder):
         (
             "camera: {psf: {kind: lens}}",
             "camera.psf",
-            "expected kind: annular-aperture, gaussian, measured, or none",
+            "expected kind: annular-aperture, airy, gaussian, measured, or none",
         ),
         ("camera: {psf: {kind: gaussian}}", "camera.psf.fwhm", "is missing"),
         ("camera: {psf: {kind: gaussian, fwhm: 8}}", "camera.psf.fwhm", "8 has no unit"),
@@ -407,7 +408,7 @@ def test_a_mark_of_the_order_of_bytes_is_no_part_of_the_study(tmp_path):
 
 
 def test_an_empty_study_or_section_means_the_defaults(tmp_path):
-    assert load("", tmp_path) == Study()
+    assert load("surface:\n", tmp_path) == Study()
     assert load("camera:\nanalysis:\n", tmp_path) == Study()
 
 
