@@ -221,7 +221,7 @@ def load(text, folder):
     [
         ("sede: 3", "", "unknown key 'sede', did you mean 'seed'?"),
         ("camera: {integration_tme: 10 us}", "camera", "did you mean 'integration_time'?"),
-        ("camera: {zoom: 3}", "camera", "unknown key 'zoom', expected one of band, response, pitch"),
+        ("camera: {zoom: 3}", "camera", "unknown key 'zoom', expected one of band, response"),
         (
             "camera: {integration_time: 10}",
             "camera.integration_time",
