@@ -172,7 +172,7 @@ class AnnularAperturePSF(PointSpreadFunction):
     def __str__(self) -> str:
         of = f", obscured to {self.obscuration:g} of its diameter" if self.obscuration else ""
         return (
-            f"diffraction of a round pupil of NA {self.numerical_aperture:g}{of}, at "
+            f"diffraction of a round pupil of NA {self.numerical_aperture:.3g}{of}, at "
             f"{self.wavelength * 1e6:g} µm"
         )
 

@@ -214,10 +214,12 @@ def period(result: StudyResult, segments: Segmentation) -> str:
         if isfinite(segments.period_uncertainty)
         else "too few to say how uncertain"
     )
+    correlated = segments.correlation_period * 1e6
+    correlation = f"{correlated:.0f} µs" if isfinite(correlated) else "none"
     return beside(
         result,
         f"Mean of the intervals between {segments.segments} force peaks, {uncertain}; the "
-        f"autocorrelation gives {segments.correlation_period * 1e6:.0f} µs.",
+        f"autocorrelation gives {correlation}.",
         "The camera has no part in it: the flow stress and its softening set the period, and the "
         "paper's simulation has other ones than ours.",
     )

@@ -511,11 +511,11 @@ def _heated_caption(result: StudyResult) -> str:
         result,
         "Radiance temperature of evenly heated chips, and the regions whose mean is taken: a "
         "virtual strip with straight shear bands as wide and as far apart as those of the cut, of "
-        "known emissivity, so that what the procedure finds can be held against the truth "
-        "(Table 1). The camera's lower limit is left out.",
-        "Same as the paper: temperatures, reflected laboratory of 20 °C, Equation 2. Different: "
-        "the strip is not a chip; at the limit of 300 °C emissivities under 0.46 of chip 1 would "
-        "be hidden.",
+        "known emissivity, so that what the procedure finds can be held against the truth. The "
+        "camera's lower limit is left out.",
+        "Table 1 has the numbers. Same as the paper: temperatures, reflected laboratory of 20 °C, "
+        "Equation 2. Different: the strip is not a chip; at the limit of 300 °C emissivities under "
+        "0.46 of chip 1 would be hidden.",
     )
 
 
