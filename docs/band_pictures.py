@@ -25,7 +25,8 @@ def main() -> None:
     """Measure, draw both pictures, print what the commands say."""
     study = chipglow.Study.quick()
     scene, camera = chipglow.open_scene(chipglow.cut(study)), study.camera.build()
-    starts = np.linspace(scene.times[0], scene.times[-1] - camera.integration_time, FRAMES)
+    whole = scene.times[scene.longest_block]
+    starts = np.linspace(whole[0], whole[-1] - camera.integration_time, FRAMES)
     measured = experiment(camera, scene, starts)
     assert measured.tool is not None
     profile = band_profile(measured, measured.tool)
