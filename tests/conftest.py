@@ -34,6 +34,7 @@ def quick_study(tmp_path_factory):
     return QuickStudy(folder / "run", folder / "cache", run.stdout)
 
 
+@pytest.hookimpl(tryfirst=True)  # before the groups are read
 def pytest_collection_modifyitems(items):
     """Tests of the quick study run in one process: it is computed once."""
     for item in items:
