@@ -1,12 +1,16 @@
 """What several files of tests share: the quick study, computed once, and the registry of laws."""
 
+import os
 import subprocess
 import sys
+import time
 from typing import NamedTuple
 
 import pytest
 
 from chipglow.cutting.flow_stress import LAWS
+
+MOST_SECONDS = 1200
 
 
 class QuickStudy(NamedTuple):
@@ -18,28 +22,42 @@ class QuickStudy(NamedTuple):
 
 
 @pytest.fixture(scope="session")
-def quick_study(tmp_path_factory):
-    """What ``chipglow reproduce --quick`` writes, as a user runs it."""
-    folder = tmp_path_factory.mktemp("reproduce")
+def quick_study(tmp_path_factory, worker_id):
+    """What ``chipglow reproduce --quick`` writes, as a user runs it: once for all processes."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base if worker_id == "master" else base.parent) / "quick-study"
+    done = folder / "printed.txt"
+    try:
+        folder.mkdir()
+    except FileExistsError:
+        wait_for(done)
+    else:
+        printed = reproduce_quick(folder)
+        (folder / "printing").write_text(printed, encoding="utf-8")
+        (folder / "printing").rename(done)
+    return QuickStudy(folder / "run", folder / "cache", done.read_text(encoding="utf-8"))
+
+
+def reproduce_quick(folder):
+    """Run the command with its cache and its results in a folder; what it prints."""
     command = [sys.executable, "-c", "from chipglow.cli import main; main()"]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("CHIPGLOW_CACHE", str(folder / "cache"))
-        run = subprocess.run(
-            [*command, "reproduce", "--quick", "--out", str(folder / "run")],
-            capture_output=True,
-            text=True,
-            timeout=1200,
-        )
+    run = subprocess.run(
+        [*command, "reproduce", "--quick", "--out", str(folder / "run")],
+        env={**os.environ, "CHIPGLOW_CACHE": str(folder / "cache")},
+        capture_output=True,
+        text=True,
+        timeout=MOST_SECONDS,
+    )
     assert run.returncode == 0, run.stderr
-    return QuickStudy(folder / "run", folder / "cache", run.stdout)
+    return run.stdout
 
 
-@pytest.hookimpl(tryfirst=True)  # before the groups are read
-def pytest_collection_modifyitems(items):
-    """Tests of the quick study run in one process: it is computed once."""
-    for item in items:
-        if "quick_study" in item.fixturenames:
-            item.add_marker(pytest.mark.xdist_group("quick study"))
+def wait_for(file):
+    """Wait until another process has made a file."""
+    end = time.monotonic() + MOST_SECONDS
+    while not file.exists():
+        assert time.monotonic() < end, "the quick study failed in another process"
+        time.sleep(0.2)
 
 
 @pytest.fixture
