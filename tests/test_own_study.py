@@ -9,12 +9,14 @@ import pytest
 import typer
 from analytic_chip import AnalyticChip
 
+from chipglow.analysis import Distribution
+from chipglow.analysis.draws import Headline
 from chipglow.analysis.paper import Plan, analyse
 from chipglow.camera import AnnularAperturePSF, Camera
 from chipglow.cli import progress
 from chipglow.report import comparison_rows, write_report
 from chipglow.scene import Raster
-from chipglow.study import Study, StudyError, expected_cost, load_study, study_text
+from chipglow.study import Study, StudyError, expected_cost, fit, load_study, study_text
 from chipglow.study.assumed import left_to_the_paper
 from chipglow.surface import CHIP_1, CHIP_2
 
@@ -196,3 +198,32 @@ def test_the_package_runs_as_a_module():
     command = [sys.executable, "-m", "chipglow", "--version"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout.startswith("chipglow ")
+
+
+def test_what_is_too_coarse_is_said():
+    coarse = Study(cutting={"feed": "0.05 mm", "numerics": {"cell": "10 um"}})
+    scene = AnalyticChip(frames=10, frame_spacing=8e-6).scene()
+    told = " ".join(fit(coarse, scene).assumed)
+    assert "The feed is 5 cells: too coarse" in told
+    assert "one of them stands for 8 us of the exposure's 10 us" in told
+    fine = AnalyticChip(frames=10, frame_spacing=1e-6).scene()
+    assert fit(Study(), fine).assumed == ()
+
+
+def test_the_reference_true_needs_no_quotes(tmp_path):
+    (tmp_path / "s.yaml").write_text("analysis: {reference: true}\n")
+    assert load_study(tmp_path / "s.yaml").analysis.reference == "true"
+
+
+def test_an_f_number_needs_the_magnification():
+    with pytest.raises(ValueError, match=r"magnification: is missing, expected it with psf"):
+        Study(camera={"psf": {"kind": "airy", "f_number": 2.5}})
+
+
+def test_a_part_of_an_error_of_unknown_sign_is_not_told():
+    causes = ("segment", "texture", "pixel phase")
+    error = Distribution(np.array([[[-30.0, 1.0, -20.0]]]), causes)
+    portion = Distribution(np.array([[[-10.0, -10.0, -10.0]]]), causes)
+    assert Headline(error, portion).psf_share is None
+    known = Distribution(np.array([[[-30.0, -10.0, -20.0]]]), causes)
+    assert Headline(known, portion).psf_share.mean == pytest.approx((1 / 3 + 1 + 1 / 2) / 3)

@@ -203,7 +203,7 @@ def test_the_emissivity_of_a_file_is_the_one_that_was_written(tmp_path):
     assert second.value == pytest.approx(first.value, abs=1e-9)
     assert second.budget == pytest.approx(first.budget, nan_ok=True)
     write_emissivity([found, found], [[row], [row]], tmp_path / "two.nc")
-    with pytest.raises(ValueError, match=r"two.nc: .*2 true temperatures, expected 1"):
+    with pytest.raises(ValueError, match=r"two.nc: has emissivities at 2 true temperatures"):
         read_region_emissivity(tmp_path / "two.nc")
     (tmp_path / "none.nc").write_bytes(b"")
     with pytest.raises(ValueError, match=r"none.nc: not an emissivity map"):
@@ -275,6 +275,21 @@ def test_the_command_prints_what_it_found_and_assumed(folder):
     assert "exact (--emissivity" not in output
     assert "reflects" not in output
     assert (folder / "table.csv").read_text().count("\n") == 5
+
+
+def test_an_emissivity_of_another_temperature_is_doubtful(folder):
+    """The samples' chip at 570 °C with the emissivity of 391 °C is read 18 K too hot."""
+    for truth, doubtful in ((HEATING.truth, True), (HOT - 20.0, False)):
+        heating = replace(HEATING, truth=truth)
+        found = determine_emissivity([image(kelvins=truth)], heating)
+        names = ("body left", "body right", "fissure 1", "fissure 2")
+        rows = [replace(found.of(WHOLE), name=name) for name in names]
+        write_emissivity([found], [rows], folder / "e.nc")
+        code, output = run("hot.nc", "--regions", "regions.yaml", "--emissivity", "e.nc")
+        assert code == 0, output
+        assert "Assumed: the emissivity is the same at all temperatures" in output
+        far = "°C at which its emissivity was determined"
+        assert (f"K from the {truth - 273.15:.0f} {far}" in output) == doubtful, output
 
 
 @pytest.mark.parametrize(

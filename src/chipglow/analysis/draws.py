@@ -60,8 +60,13 @@ class Headline:
 
     @property
     def psf_share(self) -> Distribution | None:
-        """The point spread function's part, of 1, draw by draw; None where an error is 0."""
-        return ratio(self.psf_portion, self.error)
+        """The point spread function's part, of 1, draw by draw.
+
+        None where some draws of the error are negative and some are not: near 0 a part of it says
+        nothing.
+        """
+        low, high = self.error.range
+        return None if low <= 0 <= high else ratio(self.psf_portion, self.error)
 
 
 @dataclass(frozen=True, eq=False)

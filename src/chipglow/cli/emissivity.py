@@ -197,7 +197,7 @@ def _print_tables(
 
 def _spread(value: float) -> str:
     """Two digits that count, or a dash where nothing is known."""
-    return f"{value:#.2g}" if value == value else "–"
+    return f"{value:#.2g}".removesuffix(".") if value == value else "–"
 
 
 def _assumptions(maps: "list[EmissivityMap]") -> "Iterator[str]":

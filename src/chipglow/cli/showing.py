@@ -150,7 +150,7 @@ def _state(summary: SceneSummary) -> _Rows:
 
 def _field_table(summary: SceneSummary) -> Table:
     everywhere = f"in {len(summary.sampled)} frames"
-    table = Table("over the workpiece", "unit", "least", "median", "greatest", everywhere, box=None)
+    table = Table("over the material", "unit", "least", "median", "greatest", everywhere, box=None)
     table.columns[0].no_wrap = True
     for column in table.columns[2:]:
         column.justify = "right"

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from chipglow.analysis.temperature import DeterminedEmissivity
 
     Emissivities = Mapping[str, DeterminedEmissivity | KnownEmissivity]
+
+
+FAR: Final = 50.0
+"""Difference of temperature in K from which on an emissivity may well be another."""
 
 
 def temperature(
@@ -95,6 +99,7 @@ def temperature(
     say_of_measurements(*measurements)
     say_assumed(_assumptions(rows, emissivities, room, drift is None and len(images) == 1))
     say_doubtful(f"{doubt}." for row in rows for doubt in row.doubts)
+    say_doubtful(_far_from_the_heating(rows, emissivities))
     if table is not None:
         write_temperature_table(rows, table)
         print(table)
@@ -136,6 +141,25 @@ def _room(environment: str | None, spread: str | None) -> "Surroundings | None":
     )
 
 
+def _far_from_the_heating(
+    rows: "list[TrueTemperature]", emissivities: "Emissivities"
+) -> Iterator[str]:
+    """Regions whose temperature is another than that at which their emissivity was determined."""
+    from chipglow.analysis import KnownEmissivity
+
+    for row in rows:
+        known = emissivities[row.name]
+        if isinstance(known, KnownEmissivity):
+            continue
+        difference = abs(row.value - known.heating.truth)
+        if difference > FAR:
+            yield (
+                f"{row.name}: is {difference:.0f} K from the {known.heating.truth - 273.15:.0f} °C "
+                "at which its emissivity was determined; what the temperature changes in the "
+                "emissivity is not in u."
+            )
+
+
 def _print(console: "Console", rows: "list[TrueTemperature]") -> None:
     from rich.table import Table
 
@@ -154,8 +178,8 @@ def _print(console: "Console", rows: "list[TrueTemperature]") -> None:
             f"{row.radiance_temperature - 273.15:.2f} °C",
             f"{row.emissivity:.4f}",
             f"{row.value - 273.15:.2f} °C",
-            f"{row.standard_uncertainty:#.2g} K",
-            f"{row.expanded_uncertainty:#.2g} K",
+            f"{_spread(row.standard_uncertainty)} K",
+            f"{_spread(row.expanded_uncertainty)} K",
             f"{row.coverage_factor:.2f}",
         )
         budget.add_row(row.name, *map(_spread, row.budget.values()))
@@ -166,7 +190,7 @@ def _print(console: "Console", rows: "list[TrueTemperature]") -> None:
 
 def _spread(value: float) -> str:
     """Two digits that count, or a dash where nothing is known."""
-    return "–" if isnan(value) else f"{value:#.2g}"
+    return "–" if isnan(value) else f"{value:#.2g}".removesuffix(".")
 
 
 def _assumptions(
@@ -179,6 +203,8 @@ def _assumptions(
 
     known = any(isinstance(one, KnownEmissivity) for one in emissivities.values())
     yield "every region is of even temperature and emissivity."
+    if not known:
+        yield "the emissivity is the same at all temperatures."
     if known and not any(row.budget["emissivity"] for row in rows):
         yield "the emissivity is exact (--emissivity-uncertainty)."
     if known and room is None:

@@ -115,12 +115,19 @@ def read_region_emissivity(path: str | os.PathLike[str]) -> dict[str, StoredEmis
         If the file is cut short, no emissivity map, or of several true temperatures; the message
         names the file.
     """
-    return _read(Path(path), _regions)
+    found = _read(Path(path), _regions)
+    if isinstance(found, int):
+        raise ValueError(
+            f"{path}: has emissivities at {found} true temperatures, expected those at one "
+            "(chipglow emissivity with the images of that temperature alone)"
+        )
+    return found
 
 
-def _regions(data: xr.Dataset) -> dict[str, StoredEmissivity]:
+def _regions(data: xr.Dataset) -> dict[str, StoredEmissivity] | int:
+    """Emissivities at one true temperature, or how many there are."""
     if data.sizes["truth"] != 1:
-        raise ValueError(f"it has {data.sizes['truth']} true temperatures, expected 1")
+        return int(data.sizes["truth"])
     one = data.isel(truth=0)
     environment, *spreads = (float(one[name]) for name in _HEATING)
     heating = Heating(float(one["truth"]), environment, *spreads)

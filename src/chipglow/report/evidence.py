@@ -71,10 +71,12 @@ def _answer_text(result: StudyResult, name: str, begin: str, end: str) -> str:
     psf = ""
     if share is not None and share.mean > 0:  # beside the band the blur may bring light
         psf = f", of which the point spread function makes {_spread(share, 100)} %"
+    unknown = " Its sign is not known." if low <= 0 <= high and headline.error.draws > 1 else ""
+    least, most = (f"{-end:.0f}".replace("-", "−") for end in (high, low))
     return (
-        f"{begin} {_spread(headline.error, -1)} °C too little radiance temperature ({-high:.0f} to "
-        f"{-low:.0f} °C in {headline.error.draws} draws of segment, texture and pixel phase)"
-        f"{psf}. {end}"
+        f"{begin} {_spread(headline.error, -1)} °C too little radiance temperature ({least} to "
+        f"{most} °C in {headline.error.draws} draws of segment, texture and pixel phase)"
+        f"{psf}.{unknown} {end}"
     ).strip()
 
 

@@ -263,9 +263,11 @@ def _measurement_caption(result: SceneErrors) -> str:
 
 
 def _errors_caption(result: SceneErrors) -> str:
+    floor = result.camera.floor
+    paler = "" if floor is None else " Paler: under the lower limit of the camera's range."
     return (
         f"{definition_of(result.plan.reference)} On the right the part that the point spread "
-        "function makes. Green: the places. Paler: under the lower limit of the camera's range."
+        f"function makes. Green: the places.{paler}"
     )
 
 

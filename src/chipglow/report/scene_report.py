@@ -152,7 +152,7 @@ def _told(one: PlaceErrors) -> str:
 def _places(result: SceneErrors) -> str:
     text = (
         f"{definition_of(result.plan.reference)} PSF: point spread function. Mean ± standard "
-        f"deviation over {len(result.starts)} exposures, textures and pixel phases."
+        f"deviation over the draws of {len(result.starts)} exposures, of textures and pixel phases."
     )
     body = (
         f"<tr><td>{escape(row.place)}</td>{number_cells(row[1:], _HEADS[1:])}</tr>"

@@ -10,8 +10,8 @@ from chipglow.study.section import Section
 
 _HOW_FINELY: Final = {
     "cutting": {"numerics", "window", "field_of_view", "length_of_cut", "surroundings"},
-    "camera": {"offset_right", "offset_down", "fill_factor", "psf_order", "reflected"},
-    "surface": {"kind", "maps", "grain", "follow", "restore_deviation"},
+    "camera": {"offset_right", "offset_down"},
+    "surface": {"kind", "maps", "follow", "restore_deviation"},
 }
 """Fields whose defaults are no property of the paper's experiment."""
 

@@ -20,6 +20,9 @@ _BYTES_A_SAMPLE: Final = 3.9
 _ANALYSIS_SECONDS: Final = 210e-9
 """Analysis, for each sample of each frame of each exposure that it reads."""
 
+_ALWAYS: Final = 45.0
+"""Seconds of any study: libraries, tables of the radiance, pictures."""
+
 _MEMORY, _MEMORY_A_SAMPLE = 0.3e9, 1100.0
 """Memory in bytes: of the libraries, and of a frame's samples in all that is computed of them."""
 
@@ -60,7 +63,8 @@ def expected_cost(study: Study) -> Cost:
     exposed = ceil(camera.integration_time / window.interval)
     exposures = study.analysis.instants + window.later_bands + 1
     return Cost(
-        seconds=solver
+        seconds=_ALWAYS
+        + solver
         + _SECONDS_A_SAMPLE * frames * samples
         + _ANALYSIS_SECONDS * exposures * exposed * samples,
         disk=_BYTES_A_SAMPLE * frames * samples,

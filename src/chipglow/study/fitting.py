@@ -2,11 +2,14 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Final, Literal
 
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study.schema import Study
 from chipglow.surface import FeatureSurface, MapSurface, Surface
+
+_FEW_FRAMES: Final = 5
+_FEW_CELLS: Final = 10
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,26 @@ def fit(study: Study, scene: Scene) -> Fitted:
             f"(surface.follow: {follow})."
         )
     assumed.extend(uncovered(surfaces, scene.raster))
+    assumed.extend(_too_coarse(study, scene))
     return Fitted(scene, surfaces, tuple(assumed))
+
+
+def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
+    """Where frames or cells are too coarse for what is asked, a sentence each."""
+    exposure, spacing = study.camera.integration_time, scene.frame_spacing
+    if len(scene.times) > 1 and exposure < _FEW_FRAMES * spacing * (1 - 1e-9):
+        yield (
+            f"Nothing moves between the scene's frames: one of them stands for "
+            f"{spacing * 1e6:.3g} us of the exposure's {exposure * 1e6:.3g} us. Motion in that "
+            "time makes no error here."
+        )
+    cutting = study.cutting
+    cells = cutting.feed / cutting.numerics.cell
+    if study.scene is None and cells < _FEW_CELLS * (1 - 1e-9):
+        yield (
+            f"The feed is {cells:.3g} cells: too coarse for the forces and shear bands of this "
+            f"cut, {_FEW_CELLS} or more are not (cutting.numerics.cell)."
+        )
 
 
 def uncovered(surfaces: Mapping[str, Surface], scene: Raster) -> Iterator[str]:

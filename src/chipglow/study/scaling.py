@@ -40,8 +40,11 @@ def scaled(study: Mapping[str, Any]) -> dict[str, Any]:
         Sections as a YAML file gives them.
     """
     cutting, camera = (_section(study, name) for name in ("cutting", "camera"))
-    if camera is not None and isinstance(camera.get("magnification"), int | float):
-        camera = with_pitch(camera)
+    if camera is not None:
+        try:
+            camera = with_pitch(camera)
+        except ValueError:  # said by the section itself, with its name
+            return dict(study)
     if cutting is None or camera is None or study.get("scene", "none") not in ("none", None):
         return dict(study)
     feed, speed, pitch, exposure = (

@@ -780,6 +780,8 @@ class CameraSection(Part):
 
     def _psf(self) -> PointSpreadFunction | None:
         if isinstance(self.psf, AirySection):
+            if self.psf.f_number is not None and self.magnification is None:
+                raise ValueError("magnification: is missing, expected it with psf.f_number")
             return self.psf.psf(sum(self.band) / 2, self.magnification or 1.0)
         return None if self.psf is None else self.psf.build()
 
@@ -833,6 +835,11 @@ class AnalysisSection(Part):
         "{} or {pad: {rectangle: [[0 um, 0 um], [100 um, -50 um]]}}; also\n"
         "{circle: {centre: [0 um, 0 um], radius: 20 um}}",
     )
+
+    @field_validator("reference", mode="before")
+    @classmethod
+    def _true_is_a_word(cls, reference: object) -> object:
+        return "true" if reference is True else reference  # YAML reads it as a truth value
 
     @property
     def places(self) -> tuple[Place, ...]:
