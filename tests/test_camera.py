@@ -405,7 +405,7 @@ def test_it_is_said_where_the_border_of_the_scene_matters(order):
     assert abs(wrong[3, -1]) < ROUNDING
     (said,) = measured.data.attrs["doubtful"].splitlines()
     found = re.search(
-        r"The border of the scene: .* ([\d.]+) % .*up to ([\d.]+) um .* 1 K, by ([\d.]+) K", said
+        r"The border of the scene: .* ([\d.]+) % .*up to ([\d.]+) µm .* 1 K, by ([\d.]+) K", said
     )
     share, reach, most = (float(number) for number in found.groups())
     # Two pixels of 6 um and a part of a third are within the Gaussian's 12 um of it.

@@ -185,8 +185,9 @@ def test_stated_intervals_hold_the_truth():
         covered.append(np.abs(transfer.value[some] - true) < 1.96 * transfer.uncertainty[some])
     assert within >= 0.9 * repeats
     assert np.mean(covered) >= 0.9
-    # An uncertainty that is much too large would hold the truth as well.
-    assert found.fwhm_uncertainty < 0.02 * FWHM
+    # An uncertainty that is much too large would hold the truth as well: of the noise it is 1.5 %,
+    # with the misfit that the noise alone makes 2.2 %.
+    assert found.fwhm_uncertainty < 0.025 * FWHM
 
 
 def test_edge_line_and_mtf_of_the_bins_are_those_that_made_the_edge(clean):

@@ -123,7 +123,8 @@ def test_a_preview_has_samples_where_the_scene_has_but_fewer():
 def frame_of(temperature=800.0, strain=1.0, rate=1e4, time=100e-6, material=Material.WORKPIECE):
     shape = RASTER.shape
     values = [np.full(shape, value, np.float32) for value in (temperature, strain, rate, 0, 0)]
-    return Frame(time, *values, material=np.full(shape, material, np.uint8))
+    temperature, *others = values
+    return Frame(time, temperature, np.full(shape, material, np.uint8), *others)
 
 
 def panel_colour(picture, drawn, panel):

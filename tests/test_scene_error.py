@@ -177,6 +177,9 @@ def test_a_place_that_some_pixels_do_not_hold_is_told_of():
 STUDY = """
 surface: {kind: uniform, emissivity: 0.6}
 camera:
+  band: 3.8-5.1 um
+  fill_factor: 1.0
+  frame_rate: 600 Hz
   pitch: 4 um
   integration_time: 2 us
   floor: none
