@@ -212,7 +212,7 @@ def scene_errors(
         cannot be laid on the scene.
     """
     tell = progress or (lambda label, part: None)
-    laid = {name: surface.on(scene) for name, surface in surfaces.items()}
+    fields = [_textures(surface, scene, plan.textures) for surface in surfaces.values()]
     starts = spread_starts(scene, camera.integration_time, plan.instants)
     frames = [_middle(scene, float(start), camera.integration_time) for start in starts]
     hottest = [float(scene.field("temperature", index).max()) for index in frames]
@@ -221,10 +221,10 @@ def scene_errors(
     places = _places(scene, frame, plan)
     for place in plan.places:
         place.check_within(camera.sensors(scene.raster))
-    collected = _collect(scene, surfaces, camera, plan, starts, shown, places, tell)
+    collected = _collect(scene, fields, camera, plan, starts, shown, places, tell)
     results = {
-        name: one.finish(emissivity, scene, frame, camera, starts, places)
-        for (name, emissivity), one in zip(laid.items(), collected, strict=True)
+        name: one.finish(textures[0], scene, frame, camera, starts, places)
+        for name, textures, one in zip(surfaces, fields, collected, strict=True)
     }
     return SceneErrors(
         plan=plan,
@@ -238,6 +238,12 @@ def scene_errors(
         surfaces=results,
         missing=(*missing, *_unread(results, places)),
     )
+
+
+def _textures(surface: Surface, scene: Scene, count: int) -> list[EmissivityField]:
+    """The surface on the scene, then its other textures if it has any."""
+    draws = count if surface.redrawn(1) is not surface else 1
+    return [surface.redrawn(number).on(scene) for number in range(draws)]
 
 
 def _unread(results: Mapping[str, SurfaceErrors], places: Sequence[Place]) -> Iterator[str]:
@@ -330,7 +336,7 @@ class _Collected:
 
 def _collect(
     scene: Scene,
-    surfaces: Mapping[str, Surface],
+    fields: Sequence[Sequence[EmissivityField]],
     camera: Camera,
     plan: ScenePlan,
     starts: NDArray[np.float64],
@@ -339,14 +345,6 @@ def _collect(
     tell: Progress,
 ) -> list[_Collected]:
     """Images and readings of every exposure, texture and pixel phase; frames are read once each."""
-    redrawn = [
-        [
-            surface.redrawn(k)
-            for k in range(plan.textures if surface.redrawn(1) is not surface else 1)
-        ]
-        for surface in surfaces.values()
-    ]
-    fields = [[one.on(scene) for one in textures] for textures in redrawn]
     cameras = pixel_phases(camera, plan.phases)
     collected = [_Collected((len(starts), len(textures), len(cameras))) for textures in fields]
     flat = [one for textures in fields for one in textures]
