@@ -313,6 +313,26 @@ def test_the_budget_is_a_table():
     assert several.standard_uncertainty.dims == ("cause", "dim_0")
 
 
+def test_parts_of_a_component_share_its_degrees_of_freedom():
+    """A mean of 3 with u² = 0.3² + 0.4²: one analysis of variance, two lines of the budget."""
+    cause = Cause("random", "image", 2, 2, parts=("repeatability", "noise"))
+    one = Estimate(3.0, (Component(cause, np.array([[0.3, 0.4]])),)).with_unevaluated("drift")
+    assert one.names == ("repeatability", "noise", "drift")
+    assert one.contribution("noise") == pytest.approx(0.4)
+    assert one.budget().fraction.sel(cause="noise") == pytest.approx(0.64)
+    assert one.degrees_of_freedom == pytest.approx(2.0)
+    other = one.renamed("random", "emissivity")
+    assert other.names == ("emissivity", "drift")
+    assert other.contribution("emissivity") == pytest.approx(0.5)
+    assert one.without("random").standard_uncertainty == 0.0
+    assert (one.only("random") - one).standard_uncertainty == 0.0
+    back = from_xarray(to_xarray(one.reshape(1), "t"), "t")
+    assert back.names == one.names
+    assert (back - one).standard_uncertainty == pytest.approx(0.0, abs=1e-12)
+    with pytest.raises(ValueError, match="has 1 parts, expected 2"):
+        replace(cause, parts=("noise",))
+
+
 # Derivatives
 
 

@@ -1,6 +1,6 @@
 """Components of uncertainty: the independent errors of a cause, and their effects."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Any, Final, Literal, get_args
 
@@ -36,6 +36,9 @@ class Cause:
     pooled : bool
         Whether one estimate with these degrees of freedom serves all errors, as the residuals of
         a fit do (JCGM 100:2008, H.3); otherwise every error has its own.
+    parts : tuple of str
+        Names of the errors in budgets, if each is to have its own line; by default all have that
+        of the cause.
     distribution : str
         Of an error: normal (Student's with finite degrees of freedom), rectangular, triangular or
         arcsine (JCGM 101:2008, 6.4).
@@ -52,6 +55,7 @@ class Cause:
     degrees_of_freedom: float = inf
     pooled: bool = True
     distribution: Distribution = "normal"
+    parts: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.name.strip():
@@ -63,11 +67,20 @@ class Cause:
                 f"component {self.name}: degrees of freedom are {self.degrees_of_freedom!r}, "
                 "expected over 0"
             )
+        if len(self.parts) not in (0, self.errors):
+            raise ValueError(
+                f"component {self.name}: has {len(self.parts)} parts, expected {self.errors}"
+            )
         if self.distribution not in get_args(Distribution):
             raise ValueError(
                 f"component {self.name}: distribution is {self.distribution!r}, expected one of "
                 f"{', '.join(get_args(Distribution))}"
             )
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Names of its lines in a budget, each once."""
+        return tuple(dict.fromkeys(self.parts or (self.name,)))
 
     @property
     def key(self) -> tuple[str, str]:
@@ -126,6 +139,16 @@ class Component:
         if not sparse.issparse(self.effects) or size != errors or self.effects.nnz != size:
             return False
         return bool((self.effects.indices == np.arange(size)).all())
+
+    def of_line(self, name: str) -> "Component | None":
+        """What of it counts in a line of a budget; None if nothing does."""
+        if name not in self.cause.lines:
+            return None
+        if not self.cause.parts:
+            return self
+        errors = [index for index, part in enumerate(self.cause.parts) if part == name]
+        cause = replace(self.cause, errors=len(errors), parts=())
+        return Component(cause, self.effects[:, errors])
 
     def scaled(self, factors: NDArray[np.float64]) -> Any:
         """Effects on values that are multiplied by factors of shape (values,)."""

@@ -26,6 +26,12 @@ _SHAPES: Final[Mapping[str, str]] = {
     "triangular": "triangle",
     "arcsine": "arcsine",
 }
+_FEW: Final = 32
+"""Errors of one component that are all kept, also where there are fewer values."""
+
+_MANY: Final = 1000
+"""Values from which on their covariance is not decomposed."""
+
 _RANDOM, _SYSTEMATIC, _MATRIX = "random", "systematic", "err_corr_matrix"
 
 
@@ -59,8 +65,8 @@ def to_xarray(
 
     Notes
     -----
-    A component of more errors than values is kept by as many errors as there are values: with the
-    same covariance, but no longer the same as the errors of other estimates.
+    A component of more errors than values, and more than 32, is kept by as many errors as there
+    are values: with the same covariance, but no longer the same as the errors of other estimates.
     """
     dims = [f"dim_{n}" for n in range(estimate.values.ndim)] if dims is None else list(dims)
     if len(dims) != estimate.values.ndim:
@@ -130,14 +136,14 @@ def _parts(component: Component, name: str) -> Iterator[tuple[NDArray[np.float64
 def _compact(component: Component, name: str) -> Component:
     """The component with at most as many errors as values."""
     size, errors = component.effects.shape
-    if errors > size > _MANY:
+    if errors > max(size, _FEW) and size > _MANY:
         raise ValueError(
             f"component {component.cause.name}: {errors} errors in {size} values, expected "
             f"{_MANY} values or fewer where values share errors of their own"
         )
     effects = component.effects
     effects = effects.toarray() if sparse.issparse(effects) else effects
-    if errors <= size:
+    if errors <= max(size, _FEW):
         return Component(component.cause, effects)
     with np.errstate(divide="ignore", invalid="ignore"):
         freedom = np.nanmin(component.variance**2 / component.fourth_moment)
@@ -147,11 +153,9 @@ def _compact(component: Component, name: str) -> Component:
         errors=size,
         degrees_of_freedom=float(freedom) if freedom > 0 else np.inf,
         pooled=True,
+        parts=(),
     )
     return Component(cause, np.asarray(np.linalg.qr(effects.T, mode="r")).T.copy())
-
-
-_MANY: Final = 1000
 
 
 def _attributes(cause: Cause, error: int) -> dict[str, Any]:
@@ -163,6 +167,7 @@ def _attributes(cause: Cause, error: int) -> dict[str, Any]:
         "errors": cause.errors,
         "degrees_of_freedom": cause.degrees_of_freedom,
         "pooled": int(cause.pooled),
+        **({"parts": list(cause.parts)} if cause.parts else {}),
     }
 
 
@@ -199,6 +204,7 @@ def _read(data: xr.Dataset, variable: xr.DataArray, label: str) -> tuple[Cause, 
         float(attributes.get("degrees_of_freedom", np.inf)),
         bool(attributes.get("pooled", not own)),
         shapes.get(attributes.get("pdf_shape", ""), "normal"),  # type: ignore[arg-type]
+        _texts(attributes.get("parts", ())),
     )
     return cause, int(attributes.get("error", 0)), effects
 

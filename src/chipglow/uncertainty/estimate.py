@@ -220,8 +220,8 @@ class Estimate:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of all causes, each once; those without a number last."""
-        known = (component.cause.name for component in self.components)
+        """Lines of the budget, each once; those without a number last."""
+        known = (name for component in self.components for name in component.cause.lines)
         return tuple(dict.fromkeys((*known, *self.unevaluated)))
 
     @cached_property
@@ -258,14 +258,39 @@ class Estimate:
         return self.coverage_factor(level) * self.standard_uncertainty
 
     def contribution(self, name: str) -> NDArray[np.float64]:
-        """Standard uncertainty by the causes of one name, of the shape of the values.
+        """Standard uncertainty of one line of the budget, of the shape of the values.
 
         It is 0 of a cause that plays no part, and NaN of one of which nothing is known.
         """
-        found = [one.variance for one in self.components if one.cause.name == name]
-        if not found and name in self.unevaluated:
+        found = self.of_line(name)
+        if not found.components and name in self.unevaluated:
             return np.full(self.shape, np.nan)
-        return np.sqrt(self._summed(found))
+        return found.standard_uncertainty
+
+    def of_line(self, name: str) -> "Estimate":
+        """The same, uncertain by one line of the budget alone."""
+        parts = (component.of_line(name) for component in self.components)
+        return replace(self, components=tuple(part for part in parts if part is not None))
+
+    def renamed(self, name: str, new: str) -> "Estimate":
+        """The same, with a component under another name: a line of its own in budgets."""
+        components = tuple(
+            Component(replace(one.cause, name=new, parts=()), one.effects)
+            if one.cause.name == name
+            else one
+            for one in self.components
+        )
+        return replace(self, components=components)
+
+    def only(self, name: str) -> "Estimate":
+        """The same with the components of a name alone."""
+        kept = tuple(one for one in self.components if one.cause.name == name)
+        return replace(self, components=kept)
+
+    def without(self, name: str) -> "Estimate":
+        """The same without the components of a name."""
+        kept = tuple(one for one in self.components if one.cause.name != name)
+        return replace(self, components=kept)
 
     def effect(self, name: str) -> NDArray[np.float64]:
         """Signed effect of the systematic component of a name, of the shape of the values.
@@ -300,9 +325,7 @@ class Estimate:
         )
 
     def _line(self, name: str) -> tuple[NDArray[np.float64], ...]:
-        part = replace(
-            self, components=tuple(one for one in self.components if one.cause.name == name)
-        )
+        part = self.of_line(name)
         spread = self.contribution(name)
         with np.errstate(divide="ignore", invalid="ignore"):
             fraction = np.where(spread == 0, 0.0, (spread / self.standard_uncertainty) ** 2)
