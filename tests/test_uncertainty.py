@@ -364,6 +364,16 @@ def test_draws_are_those_of_the_seed():
     np.testing.assert_allclose(np.ptp(first[1] - first[0], axis=1), 0.0, atol=1e-12)
 
 
+def test_of_a_part_of_an_image_only_that_is_drawn():
+    image = Estimate(np.zeros((400, 500))).with_component("noise", 1.0, independent="per element")
+    part = image[10, :3]
+    (drawn,) = draw([part], 20_000, np.random.default_rng(4))
+    expected = np.random.default_rng(4).standard_normal((20_000, 3))
+    np.testing.assert_array_equal(drawn, expected)
+    other, whole = draw([part, image], 2, np.random.default_rng(4))
+    np.testing.assert_array_equal(whole[:, 10, :3], other)
+
+
 @pytest.mark.parametrize(
     ("shape", "half"),
     [("normal", 1.95996), ("rectangular", 0.95 * 3**0.5), ("arcsine", 2**0.5 * np.sin(1.49226)),

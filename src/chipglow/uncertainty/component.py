@@ -153,7 +153,9 @@ class Component:
     def scaled(self, factors: NDArray[np.float64]) -> Any:
         """Effects on values that are multiplied by factors of shape (values,)."""
         if sparse.issparse(self.effects):
-            return (sparse.diags_array(factors) @ self.effects).tocsr()
+            found = self.effects.copy()
+            found.data *= np.repeat(factors, np.diff(found.indptr))
+            return found
         return self.effects * factors[:, None]
 
     def taken(self, rows: NDArray[np.intp]) -> "Component":

@@ -1,11 +1,13 @@
 """Monte Carlo: errors drawn from the components of estimates."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from math import isfinite, pi, sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
 
 from chipglow.uncertainty.component import Cause
 from chipglow.uncertainty.estimate import Estimate, check_same
@@ -53,18 +55,36 @@ def draw(
     pooled errors have one χ² together. Degrees of freedom of other distributions
     play no part.
     """
-    errors: dict[tuple[str, str], tuple[Cause, NDArray[np.float64]]] = {}
+    causes: dict[tuple[str, str], Cause] = {}
+    used: dict[tuple[str, str], list[NDArray[np.intp]]] = {}
+    for one in estimates:
+        for component in one.components:
+            cause = component.cause
+            check_same(causes.setdefault(cause.key, cause), cause)
+            used.setdefault(cause.key, []).append(_used(component.effects))
+    # Of an image's noise, only that of the pixels which are there is drawn.
+    numbers = {key: np.unique(np.concatenate(parts)) for key, parts in used.items()}
+    errors = {
+        key: _errors(replace(cause, errors=numbers[key].size, parts=()), count, generator)
+        for key, cause in causes.items()
+        if numbers[key].size
+    }
     drawn = []
     for one in estimates:
         values = np.broadcast_to(one.values.ravel(), (count, one.values.size)).copy()
         for component in one.components:
-            cause = component.cause
-            if cause.key not in errors:
-                errors[cause.key] = cause, _errors(cause, count, generator)
-            check_same(errors[cause.key][0], cause)
-            values += (component.effects @ errors[cause.key][1].T).T
+            key = component.cause.key
+            if key in errors:
+                values += (component.effects[:, numbers[key]] @ errors[key].T).T
         drawn.append(values.reshape(count, *one.shape))
     return tuple(drawn)
+
+
+def _used(effects: Any) -> NDArray[np.intp]:
+    """Errors that have an effect."""
+    if sparse.issparse(effects):
+        return np.unique(effects.indices).astype(np.intp)
+    return np.arange(effects.shape[1])
 
 
 def coverage_interval(

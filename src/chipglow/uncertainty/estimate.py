@@ -129,7 +129,7 @@ class Estimate:
             raise ValueError(f"component {name}: has an identity, expected independent with it")
         errors = signed.size if per_element else 1
         cause = Cause(name, identity, errors, degrees_of_freedom, pooled, distribution)
-        effects = sparse.diags_array(signed).tocsr() if per_element else signed[:, None]
+        effects = _diagonal(signed) if per_element else signed[:, None]
         return replace(self, components=(*self.components, Component(cause, effects)))
 
     @classmethod
@@ -536,6 +536,11 @@ def check_same(one: Cause, other: Cause) -> None:
             f"component {one.name}: is {one} and {other}, expected the same errors wherever "
             "its name appears; name it otherwise, or make it independent"
         )
+
+
+def _diagonal(values: NDArray[np.float64]) -> Any:
+    """A sparse array with values on its diagonal, those that are 0 too."""
+    return sparse.csr_array((values, np.arange(values.size), np.arange(values.size + 1)))
 
 
 def _stacked(parts: Sequence[Any], shape: tuple[int, int]) -> Any:
