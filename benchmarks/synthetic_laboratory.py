@@ -66,6 +66,7 @@ from chipglow.study import (
     uniform_counts,
 )
 from chipglow.study.files import load_regions
+from chipglow.uncertainty import Estimate
 
 RESULTS: Final = Path("build/synthetic-laboratory")
 BAND: Final = Band(3.8e-6, 5.1e-6)
@@ -112,6 +113,10 @@ class Found:
 
     value: float
     expanded: float
+
+    @classmethod
+    def of(cls, estimate: Estimate) -> "Found":
+        return cls(float(estimate.values), float(estimate.expanded_uncertainty()))
 
 
 @dataclass(frozen=True)
@@ -412,11 +417,11 @@ class Evaluation:
             Surroundings(293.0, ROOM),
         )
         return {
-            "black body": Found(unknown.value, unknown.expanded_uncertainty),
-            "emissivity of the body": Found(body.mean, body.expanded_uncertainty),
-            "emissivity of the fissure": Found(fissure.mean, fissure.expanded_uncertainty),
+            "black body": Found.of(unknown.estimate),
+            "emissivity of the body": Found.of(body.estimate),
+            "emissivity of the fissure": Found.of(fissure.estimate),
             **self._spread(),
-            "temperature of the fissure": Found(hot.value, hot.expanded_uncertainty),
+            "temperature of the fissure": Found.of(hot.estimate),
         }
 
     def _spread(self) -> dict[str, Found]:

@@ -100,10 +100,12 @@ def table(found: EmissivityMap, chip: NDArray[np.float64]) -> None:
     for area in areas(REGIONS, found.raster):
         row, put_in = found.of(area), chip[samples[area.name]]
         print(f"{row.name}: put in {put_in.mean():.4f}, sd {put_in.std():.4f}")
-        budget = ", ".join(f"{cause} {part:.2g}" for cause, part in row.budget.items())
+        parts = row.estimate.budget().standard_uncertainty.to_series()
+        budget = ", ".join(f"{cause} {part:.2g}" for cause, part in parts.items())
         print(
             f"{row.name}: n {row.pixels}, mean {row.mean:.4f}, sd {row.deviation:.4f}, "
-            f"u {row.standard_uncertainty:.2g}, U {row.expanded_uncertainty:.2g}; {budget}"
+            f"u {row.estimate.standard_uncertainty:.2g}, "
+            f"U {row.estimate.expanded_uncertainty():.2g}; {budget}"
         )
 
 
@@ -129,9 +131,11 @@ def over_temperature(chip: NDArray[np.float64], background: NDArray[np.bool_]) -
     found = [area for area in areas(REGIONS, maps[0].raster) if area.whole]
     lines = [emissivity_line([one.of(area) for one in maps]) for area in found]
     for line in lines:
+        middle, slope = line.estimate.values
+        of_middle, of_slope = line.estimate.standard_uncertainty
         print(
-            f"{line.name}: {100 * line.slope:.4f} ± {100 * line.slope_uncertainty:.4f} in 100 K, "
-            f"{line.at_middle:.4f} ± {line.middle_uncertainty:.4f} at {line.middle - 273.15:.0f} °C"
+            f"{line.name}: {100 * slope:.4f} ± {100 * of_slope:.4f} in 100 K, "
+            f"{middle:.4f} ± {of_middle:.4f} at {line.middle - 273.15:.0f} °C"
         )
     draw_emissivity(maps[0], REGIONS, lines).savefig(HERE / "emissivity-temperature.png", dpi=150)
 

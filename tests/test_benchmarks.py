@@ -58,6 +58,7 @@ PROGRAMS = {
         f"--cell {COARSEST} 88.9-0.1",
         {"Ff / Fc at 88.9": 7, "thickness / feed at 88.9": 7, "88.9             0.1        0 ": 9},
     ),
+    "uncertainty.py": ("--size 64 51 --peer-size 8 8", {"| chipglow, ": 5}),
     "verification.py": ("momentum", {"| A free, spinning block": 4}),
 }
 NEEDED = {

@@ -22,6 +22,7 @@ from chipglow.analysis import (
     emissivity_covariance,
     emissivity_line,
 )
+from chipglow.analysis.emissivity import COMMON
 from chipglow.camera import Camera, Flag
 from chipglow.cli import app
 from chipglow.io import (
@@ -101,7 +102,9 @@ def test_the_spread_over_pixels_is_no_uncertainty_of_the_mean():
     ]
     assert rows[1].deviation > 50 * rows[0].deviation
     # The mean itself differs by 0.07 / sqrt(960) = 0.5 % and so does what is proportional to it.
-    assert rows[1].standard_uncertainty == pytest.approx(rows[0].standard_uncertainty, rel=0.02)
+    assert rows[1].estimate.standard_uncertainty == pytest.approx(
+        rows[0].estimate.standard_uncertainty, rel=0.02
+    )
 
 
 # Uncertainty
@@ -116,13 +119,17 @@ def test_the_budget_is_that_of_the_derivatives():
     temperature = BAND.temperature(seen)
     slope = BAND.radiance(temperature + 0.5) - BAND.radiance(temperature - 0.5)
     # Second-order terms of 2 K in 664 K are 1e-4 of the first.
-    assert row.common["truth"] == pytest.approx(-0.5 * hot_slope / contrast * 2.0, rel=1e-3)
-    assert row.common["environment"] == pytest.approx(-0.5 * cold_slope / contrast * 1.5, rel=1e-3)
-    assert row.common["calibration"] == pytest.approx(slope * 0.8 / contrast, rel=1e-3)
-    assert row.standard_uncertainty == pytest.approx(
-        np.linalg.norm(list(row.common.values())), rel=1e-9
+    assert row.estimate.effect("truth") == pytest.approx(
+        -0.5 * hot_slope / contrast * 2.0, rel=1e-3
     )
-    assert row.coverage_factor == pytest.approx(1.959964, abs=1e-6)
+    assert row.estimate.effect("environment") == pytest.approx(
+        -0.5 * cold_slope / contrast * 1.5, rel=1e-3
+    )
+    assert row.estimate.effect("calibration") == pytest.approx(slope * 0.8 / contrast, rel=1e-3)
+    assert row.estimate.standard_uncertainty == pytest.approx(
+        np.linalg.norm([row.estimate.effect(cause) for cause in COMMON]), rel=1e-9
+    )
+    assert row.estimate.coverage_factor() == pytest.approx(1.959964, abs=1e-6)
 
 
 def test_propagation_is_that_of_monte_carlo():
@@ -138,9 +145,9 @@ def test_propagation_is_that_of_monte_carlo():
     found = (seen - cold) / (hot - cold)
     # The standard deviation of 200 000 draws is known to 0.16 %; terms of higher order and the
     # camera's error at the mean radiance in the place of each pixel's take 1 %.
-    assert row.standard_uncertainty == pytest.approx(found.std(), rel=0.015)
+    assert row.estimate.standard_uncertainty == pytest.approx(found.std(), rel=0.015)
     low, high = np.quantile(found, (0.025, 0.975))
-    assert high - low == pytest.approx(2 * row.expanded_uncertainty, rel=0.02)
+    assert high - low == pytest.approx(2 * row.estimate.expanded_uncertainty(), rel=0.02)
 
 
 def coverage(observe, repeats=200):
@@ -150,7 +157,7 @@ def coverage(observe, repeats=200):
     held = 0
     for seed in range(repeats):
         row = observe(put_in, np.random.default_rng(seed)).of(area)
-        held += abs(row.mean - put_in[area.mask].mean()) <= row.expanded_uncertainty
+        held += abs(row.mean - put_in[area.mask].mean()) <= row.estimate.expanded_uncertainty()
     return held
 
 
@@ -196,8 +203,8 @@ def test_drift_and_noise_are_told_apart():
     contrast = hot - cold
     # The standard deviation of 400 frames is known to 3.5 %, that of 480 000 pixels to 0.1 %.
     expected = drift / frames**0.5 / contrast
-    assert row.budget["repeatability"] == pytest.approx(expected, rel=0.15)
-    assert row.budget["noise"] == pytest.approx(
+    assert row.estimate.contribution("repeatability") == pytest.approx(expected, rel=0.15)
+    assert row.estimate.contribution("noise") == pytest.approx(
         noise / (frames * RASTER.rows * RASTER.columns) ** 0.5 / contrast, rel=0.005
     )
 
@@ -207,9 +214,11 @@ def test_images_are_the_repetitions_where_there_are_several():
     images = [measured(put_in * (1 + step), frames=50, noise=0.1) for step in (-0.01, 0.0, 0.01)]
     row = determine_emissivity(images, HEATING).of(WHOLE)
     # Means of 0.495, 0.5 and 0.505: s = 0.005, and s / sqrt(3) with 2 degrees of freedom.
-    assert row.scatter.standard_uncertainty == pytest.approx(0.005 / 3**0.5, rel=1e-3)
-    assert row.degrees_of_freedom == pytest.approx(2.0, rel=1e-6)
-    assert row.coverage_factor == pytest.approx(4.302653, rel=1e-6)
+    assert row.estimate.only("random").standard_uncertainty == pytest.approx(
+        0.005 / 3**0.5, rel=1e-3
+    )
+    assert row.estimate.degrees_of_freedom == pytest.approx(2.0, rel=1e-6)
+    assert row.estimate.coverage_factor() == pytest.approx(4.302653, rel=1e-6)
 
 
 def test_the_uncertainty_of_the_calibration_comes_from_the_measurement():
@@ -218,9 +227,9 @@ def test_the_uncertainty_of_the_calibration_comes_from_the_measurement():
     (hot, cold), _ = slopes()
     row = determine_emissivity([image], HEATING).of(WHOLE)
     # It is common to all pixels: a mean over them does not lessen it.
-    assert row.budget["calibration"] == pytest.approx(5.0 / (hot - cold), rel=1e-12)
+    assert row.estimate.contribution("calibration") == pytest.approx(5.0 / (hot - cold), rel=1e-12)
     own = determine_emissivity([image], replace(HEATING, camera_uncertainty=0.0)).of(WHOLE)
-    assert own.budget["calibration"] == 0.0
+    assert own.estimate.contribution("calibration") == 0.0
 
 
 def test_the_difference_of_two_regions_is_known_better_than_either():
@@ -238,7 +247,7 @@ def test_the_difference_of_two_regions_is_known_better_than_either():
     stated = np.sqrt(a - 2 * b + d)
     # 400 differences: the standard deviation is known to 3.5 %; three of them.
     assert np.std(differences) == pytest.approx(stated, rel=0.11)
-    assert stated < 0.25 * rows["fissure"].standard_uncertainty
+    assert stated < 0.25 * rows["fissure"].estimate.standard_uncertainty
 
 
 def test_the_uncertainty_of_a_pixel_has_its_noise():
@@ -246,10 +255,10 @@ def test_the_uncertainty_of_a_pixel_has_its_noise():
     image = measured(np.full(RASTER.shape, 0.5), frames=200, noise=20.0)
     found = determine_emissivity([image], heating)
     (hot, cold), _ = slopes()
-    common = found.of(WHOLE).common["truth"]
+    common = found.of(WHOLE).estimate.effect("truth")
     expected = np.hypot(common, 20.0 / 200**0.5 / (hot - cold))
     # Each pixel's own noise is known to 5 % from 200 frames; of 1200 pixels, well within 1 %.
-    assert found.standard_uncertainty.mean() == pytest.approx(expected, rel=0.01)
+    assert found.estimate.standard_uncertainty.mean() == pytest.approx(expected, rel=0.01)
 
 
 # Over the temperature
@@ -271,9 +280,8 @@ def heated_series(generator, temperatures, errors=(0.0, 0.0), frames=4):
 def test_a_straight_line_comes_back():
     line = heated_series(np.random.default_rng(1), (600.0, 700.0, 850.0), frames=2000)
     # Frames drift by 1 W/(m² sr), of which 2000 leave 0.02: 1e-5 of the contrast at 600 K or more.
-    assert line.slope == pytest.approx(2e-4, abs=1e-6)
-    value, _ = line.at(700.0)
-    assert value == pytest.approx(0.4, abs=1e-4)
+    assert line.estimate.values[1] == pytest.approx(2e-4, abs=1e-6)
+    assert line.at(700.0).values == pytest.approx(0.4, abs=1e-4)
 
 
 @pytest.mark.parametrize("temperatures", [(600.0, 800.0), (600.0, 700.0, 800.0, 900.0)])
@@ -283,12 +291,14 @@ def test_the_line_is_as_uncertain_as_it_says(temperatures):
         heated_series(generator, temperatures, generator.normal((0.0, 0.0), (2.0, 1.0)))
         for _ in range(150)
     ]
-    for name, truth in (("slope", 2e-4), ("at_middle", None)):
+    for index, truth in ((1, 2e-4), (0, None)):
         off = np.array(
-            [getattr(line, name) - (truth or 0.4 + 2e-4 * (line.middle - 700.0)) for line in lines]
+            [
+                line.estimate.values[index] - (truth or 0.4 + 2e-4 * (line.middle - 700.0))
+                for line in lines
+            ]
         )
-        index = 1 if name == "slope" else 0
-        stated = np.sqrt(np.mean([line.covariance[index, index] for line in lines]))
+        stated = np.sqrt(np.mean([line.estimate.covariance()[index, index] for line in lines]))
         # 150 standard deviations: 5.8 % of one; three of them.
         assert off.std() == pytest.approx(stated, rel=0.18)
         assert abs(off.mean()) < 3 * stated / 150**0.5
@@ -302,8 +312,10 @@ def test_scatter_about_the_line_counts():
     line = emissivity_line(rows)
     # Sum of squares about the mean 13/30: 0.02/3; one degree of freedom.
     assert line.residual == pytest.approx((0.02 / 3) ** 0.5, rel=1e-6)
-    assert line.middle_uncertainty == pytest.approx(line.residual / 3**0.5, rel=1e-6)
-    assert line.slope_uncertainty == pytest.approx(line.residual / 20000**0.5, rel=1e-6)
+    assert line.estimate.standard_uncertainty[0] == pytest.approx(line.residual / 3**0.5, rel=1e-6)
+    assert line.estimate.standard_uncertainty[1] == pytest.approx(
+        line.residual / 20000**0.5, rel=1e-6
+    )
 
 
 # Doubtful and impossible
@@ -322,12 +334,12 @@ def test_flagged_pixels_are_left_out_counted_and_doubted():
     assert (row.pixels, row.left_out) == (1150, 50)
     assert row.flagged == {Flag.BELOW_FLOOR: 0, Flag.SATURATED: 40, Flag.DEAD: 10}
     assert row.mean == pytest.approx(put_in[~out].mean(), rel=1e-12)
-    assert row.doubts == ()
+    assert row.estimate.warnings == ()
     flags[0, 5, :20] = Flag.SATURATED
     row = determine_emissivity([measured(put_in, frames=3, flags=flags)], HEATING).of(WHOLE)
-    assert row.doubts == (
+    assert row.estimate.warnings == (
         "all: 70 of 1200 pixels are left out (60 saturated, 10 dead); "
-        "what is left is darker than the region",
+        "what is left is darker than the region.",
     )
 
 
@@ -337,8 +349,8 @@ def test_a_region_that_the_floor_cuts_says_that_it_is_too_bright():
     image = measured(put_in, floor=floor)
     row = determine_emissivity([image], HEATING).of(WHOLE)
     assert row.mean > put_in.mean() + 0.01
-    assert "under the floor); what is left is brighter than the region" in row.doubts[0]
-    assert row.doubts[0].endswith("the camera's floor hides emissivities under 0.38")
+    assert "under the floor); what is left is brighter than the region" in row.estimate.warnings[0]
+    assert row.estimate.warnings[0].endswith("the camera's floor hides emissivities under 0.38.")
 
 
 def test_a_region_without_usable_pixels_is_refused():
@@ -354,10 +366,10 @@ def test_impossible_emissivities_are_told():
     put_in[1, :7] = -0.0005
     row = determine_emissivity([measured(put_in)], HEATING).of(WHOLE)
     assert row.outside == (7, 40)
-    assert "7 of 1200 pixels have an emissivity under 0" in row.doubts[0]
-    assert "40 of 1200 pixels have an emissivity over 1" in row.doubts[1]
+    assert "7 of 1200 pixels have an emissivity under 0" in row.estimate.warnings[0]
+    assert "40 of 1200 pixels have an emissivity over 1" in row.estimate.warnings[1]
     bright = determine_emissivity([measured(np.full(RASTER.shape, 1.2))], HEATING).of(WHOLE)
-    assert bright.doubts[-1] == "all: the mean emissivity is not within 0 to 1"
+    assert bright.estimate.warnings[-1] == "all: the mean emissivity is not within 0 to 1."
 
 
 @pytest.mark.parametrize(
@@ -506,7 +518,7 @@ def test_the_command_writes_table_map_and_picture(folder):
     for name, row in rows_of(found).items():
         assert float(lines[name]["mean"]) == pytest.approx(row.mean, rel=1e-6)
         assert float(lines[name]["expanded_uncertainty"]) == pytest.approx(
-            row.expanded_uncertainty, rel=1e-6
+            row.estimate.expanded_uncertainty(), rel=1e-6
         )
     text = result.stdout.split("For a study:")[1].split("e.nc")[0]
     assert Study(**yaml.safe_load(text)).surface.chips["measured chip"].body.mean == pytest.approx(

@@ -8,7 +8,7 @@ import xarray as xr
 from seen_chip import BAND, FLOOR, look, noisy
 from typer.testing import CliRunner
 
-from chipglow.analysis import Reading, find_tool, normalised_error, rake_grid
+from chipglow.analysis import find_tool, normalised_error, rake_grid, reading
 from chipglow.camera import Measurement
 from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
@@ -65,8 +65,8 @@ def test_squares_of_a_found_tool_are_within_the_uncertainty_of_its_place(found_i
         columns = min(grid.along.size, true.along.size)
         here, there = (item.frame_mean[:, :columns] for item in (grid, true))
         none, parts = np.zeros(here.shape), [part[:, :columns] for part in grid.frame_from_tool]
-        own = Reading(here, none, none, tuple(parts))
-        values = normalised_error(own, Reading(there, none, none))
+        own = reading(here, none, none, tuple(parts))
+        values = normalised_error(own, reading(there, none, none))
         e_n.append(values[np.isfinite(values)])
     assert min(values.size for values in e_n) >= 2
     together = np.concatenate(e_n)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
 from typer.testing import CliRunner
 
@@ -15,9 +16,11 @@ from chipglow.analysis import (
     determine_emissivity,
     true_temperature,
 )
+from chipglow.analysis.temperature import TEMPERATURE_BUDGET
 from chipglow.camera import Flag, Measurement, fit_linear
 from chipglow.cli import app
 from chipglow.io import read_region_emissivity, write_emissivity, write_measurement
+from chipglow.uncertainty import Estimate, from_xarray
 
 ROOM = 293.0
 WHOLE = Area("chip", "chip", np.ones(RASTER.shape, dtype=bool), True)
@@ -59,9 +62,9 @@ def test_an_object_of_known_emissivity_shows_its_temperature(emissivity, celsius
     found = true_temperature(
         [image(emissivity, celsius + CELSIUS)], WHOLE, KnownEmissivity(emissivity)
     )
-    assert found.value == pytest.approx(celsius + CELSIUS, abs=1e-3)
-    assert found.mean_of_pixels == pytest.approx(found.value, abs=1e-6)
-    assert found.standard_uncertainty == pytest.approx(0.0, abs=1e-9)
+    assert found.estimate.values == pytest.approx(celsius + CELSIUS, abs=1e-3)
+    assert found.mean_of_pixels == pytest.approx(found.estimate.values, abs=1e-6)
+    assert found.estimate.standard_uncertainty == pytest.approx(0.0, abs=1e-9)
 
 
 def test_parts_of_the_uncertainty_are_those_of_small_changes():
@@ -70,15 +73,19 @@ def test_parts_of_the_uncertainty_are_those_of_small_changes():
     found = true_temperature(seen, WHOLE, known, Surroundings(ROOM, 0.01))
     more = true_temperature(seen, WHOLE, KnownEmissivity(0.4201), Surroundings(ROOM))
     warmer = true_temperature(seen, WHOLE, KnownEmissivity(0.42), Surroundings(ROOM + 0.01))
-    assert found.budget["emissivity"] == pytest.approx(found.value - more.value, rel=1e-2)
-    assert found.budget["environment"] == pytest.approx(found.value - warmer.value, rel=1e-2)
+    assert found.estimate.contribution("emissivity") == pytest.approx(
+        found.estimate.values - more.estimate.values, rel=1e-2
+    )
+    assert found.estimate.contribution("environment") == pytest.approx(
+        found.estimate.values - warmer.estimate.values, rel=1e-2
+    )
     radiance = seen[0].radiance
     seen[0].data["calibration_uncertainty"] = (("time", "y", "x"), 1e-4 * radiance)
     brighter = image(gain=1.0001)
     found = true_temperature(seen, WHOLE, KnownEmissivity(0.42))
     shifted = true_temperature([brighter], WHOLE, KnownEmissivity(0.42))
-    expected = shifted.value - found.value
-    assert found.budget["calibration"] == pytest.approx(expected, rel=1e-2)
+    expected = shifted.estimate.values - found.estimate.values
+    assert found.estimate.contribution("calibration") == pytest.approx(expected, rel=1e-2)
 
 
 def test_errors_that_emissivity_and_image_share_cancel():
@@ -87,16 +94,18 @@ def test_errors_that_emissivity_and_image_share_cancel():
     heated = developed(calibration, HEATING.truth, 0.42)
     emissivity = determine_emissivity([heated], HEATING).of(WHOLE)
     found = true_temperature([heated], WHOLE, emissivity, calibration=calibration)
-    assert found.value == pytest.approx(HEATING.truth, abs=1e-4)
+    assert found.estimate.values == pytest.approx(HEATING.truth, abs=1e-4)
     assert found.correlation == pytest.approx(1.0)
-    assert found.budget["calibration"] == pytest.approx(0.0, abs=1e-3)
-    assert found.budget["environment"] == pytest.approx(0.0, abs=1e-3)
-    assert found.budget["truth"] == pytest.approx(HEATING.truth_uncertainty, rel=1e-3)
+    assert found.estimate.contribution("calibration") == pytest.approx(0.0, abs=1e-3)
+    assert found.estimate.contribution("environment") == pytest.approx(0.0, abs=1e-3)
+    assert found.estimate.contribution("truth") == pytest.approx(
+        HEATING.truth_uncertainty, rel=1e-3
+    )
     apart = true_temperature([heated], WHOLE, emissivity)
     assert apart.correlation is None
-    assert apart.budget["calibration"] > 0.5
+    assert apart.estimate.contribution("calibration") > 0.5
     elsewhere = true_temperature([heated], WHOLE, emissivity, Surroundings(ROOM, 5.0), calibration)
-    assert elsewhere.budget["environment"] > 0.01
+    assert elsewhere.estimate.contribution("environment") > 0.01
 
 
 def test_stated_intervals_hold_the_truth():
@@ -116,8 +125,8 @@ def test_stated_intervals_hold_the_truth():
         hot = developed(calibration, HOT, 0.42, 4, 5.0, seed + 1, room)
         emissivity = determine_emissivity([heated], HEATING).of(WHOLE)
         found = true_temperature([hot], WHOLE, emissivity, calibration=calibration)
-        within += abs(found.value - HOT) <= found.expanded_uncertainty
-        scores.append((found.value - HOT) / found.standard_uncertainty)
+        within += abs(found.estimate.values - HOT) <= found.estimate.expanded_uncertainty()
+        scores.append((found.estimate.values - HOT) / found.estimate.standard_uncertainty)
     assert 181 <= within <= 199
     # The standard deviation of 200 standard normal numbers is within 0.85 to 1.15 (3 sigma).
     assert 0.85 < np.std(scores) < 1.15
@@ -129,9 +138,13 @@ def test_cold_surroundings_are_part_of_the_uncertainty():
     seen = [image(0.05, 330.0, environment=190.0)]
     found = true_temperature(seen, WHOLE, KnownEmissivity(0.05), cold)
     warmer = true_temperature(seen, WHOLE, KnownEmissivity(0.05), Surroundings(191.0))
-    assert found.value == pytest.approx(330.0, abs=1e-3)
-    assert found.budget["environment"] == pytest.approx(found.value - warmer.value, rel=0.1)
-    assert found.standard_uncertainty == pytest.approx(found.budget["environment"])
+    assert found.estimate.values == pytest.approx(330.0, abs=1e-3)
+    assert found.estimate.contribution("environment") == pytest.approx(
+        found.estimate.values - warmer.estimate.values, rel=0.1
+    )
+    assert found.estimate.standard_uncertainty == pytest.approx(
+        found.estimate.contribution("environment")
+    )
 
 
 def test_few_images_widen_the_interval():
@@ -139,10 +152,10 @@ def test_few_images_widen_the_interval():
     images = [image(drift=2.0, seed=seed) for seed in range(3)]
     found = true_temperature(images, WHOLE, emissivity)
     # Three repetitions, two degrees of freedom: Student's 4.3.
-    assert found.degrees_of_freedom == pytest.approx(2.0)
-    assert found.coverage_factor == pytest.approx(4.303, abs=0.01)
+    assert found.estimate.degrees_of_freedom == pytest.approx(2.0)
+    assert found.estimate.coverage_factor() == pytest.approx(4.303, abs=0.01)
     alone = true_temperature(images[:1], WHOLE, emissivity)
-    assert np.isnan(alone.budget["repeatability"])
+    assert np.isnan(alone.estimate.contribution("repeatability"))
 
 
 @pytest.mark.parametrize(("stated", "least", "most"), [(None, 0.0, 0.8), (0.01, 0.9, 1.0)])
@@ -165,9 +178,9 @@ def test_a_drift_between_recordings_is_held_if_it_is_stated(stated, least, most)
                        truth_uncertainty=0.5, environment_uncertainty=0.0)  # fmt: skip
         row = determine_emissivity([heated], read).of(WHOLE)
         found = true_temperature([hot], WHOLE, row, drift=stated)
-        within += abs(found.value - HOT) < found.expanded_uncertainty
+        within += abs(found.estimate.values - HOT) < found.estimate.expanded_uncertainty()
     assert least <= within / 60 <= most
-    assert np.isnan(row.budget["drift"]) is np.bool_(stated is None)
+    assert np.isnan(row.estimate.contribution("drift")) is np.bool_(stated is None)
 
 
 def test_several_recordings_show_the_drift_themselves():
@@ -177,11 +190,13 @@ def test_several_recordings_show_the_drift_themselves():
         for f, one in zip((0.97, 0.99, 1.01, 1.03), images, strict=True)
     ]
     row = determine_emissivity(shown, HEATING).of(WHOLE)
-    assert row.budget["drift"] == 0.0
-    assert row.budget["repeatability"] == pytest.approx(0.42 * 0.0258 / 2, rel=0.05)
+    assert row.estimate.contribution("drift") == 0.0
+    assert row.estimate.contribution("repeatability") == pytest.approx(0.42 * 0.0258 / 2, rel=0.05)
     more = determine_emissivity(shown, replace(HEATING, drift=0.1)).of(WHOLE)
     # A tenth of the radiance over the root of four, of which the repeatability holds a part.
-    together = np.hypot(more.budget["drift"], more.budget["repeatability"])
+    together = np.hypot(
+        more.estimate.contribution("drift"), more.estimate.contribution("repeatability")
+    )
     assert together == pytest.approx(0.1 * 0.42 / 2, rel=0.02)
     with pytest.raises(ValueError, match="drift: is 2, expected 0 to 1"):
         replace(HEATING, drift=2)
@@ -196,12 +211,18 @@ def test_the_emissivity_of_a_file_is_the_one_that_was_written(tmp_path):
     write_emissivity([found], [[row]], tmp_path / "emissivity.nc")
     stored = read_region_emissivity(tmp_path / "emissivity.nc")["chip"]
     assert stored.heating == replace(HEATING, camera_uncertainty=None)
-    assert stored.common == pytest.approx(row.common)
+    for cause in ("truth", "environment", "calibration"):
+        # Signs are kept, also where Equation 2 would have them otherwise.
+        assert stored.estimate.effect(cause) == pytest.approx(row.estimate.effect(cause))
+    assert stored.estimate.warnings == row.estimate.warnings
     first, second = (
         true_temperature([hot], WHOLE, one, calibration=calibration) for one in (row, stored)
     )
-    assert second.value == pytest.approx(first.value, abs=1e-9)
-    assert second.budget == pytest.approx(first.budget, nan_ok=True)
+    assert second.estimate.values == pytest.approx(first.estimate.values, abs=1e-9)
+    for cause in TEMPERATURE_BUDGET:
+        assert second.estimate.contribution(cause) == pytest.approx(
+            first.estimate.contribution(cause), nan_ok=True
+        )
     write_emissivity([found, found], [[row], [row]], tmp_path / "two.nc")
     with pytest.raises(ValueError, match=r"two.nc: has emissivities at 2 true temperatures"):
         read_region_emissivity(tmp_path / "two.nc")
@@ -210,18 +231,74 @@ def test_the_emissivity_of_a_file_is_the_one_that_was_written(tmp_path):
         read_region_emissivity(tmp_path / "none.nc")
 
 
+def test_regions_in_a_file_correlate_as_obsarray_says(tmp_path):
+    """Means of two regions, as anyone reads them who knows obsarray's attributes."""
+    halves = [
+        Area(
+            name,
+            name,
+            np.arange(RASTER.columns)[None, :] // 20 == half + np.zeros((RASTER.rows, 1)),
+            True,
+        )
+        for half, name in enumerate(("left", "right"))
+    ]
+    values = np.where(halves[0].mask, 0.42, 1.05)
+    heating = replace(HEATING, drift=0.01, camera_uncertainty=1.0)
+    found = determine_emissivity([measured(values, HEATING.truth, ROOM, frames=5)], heating)
+    rows = [found.of(area) for area in halves]
+    write_emissivity([found], [rows], tmp_path / "e.nc")
+    with xr.open_dataset(tmp_path / "e.nc", engine="h5netcdf") as data:
+        estimate = from_xarray(data.load(), "region_mean")
+    expected = Estimate.stack([row.estimate for row in rows])
+    np.testing.assert_allclose(estimate.covariance(), expected.covariance(), rtol=1e-9, atol=1e-18)
+    # A hotter room makes a grey surface darker, and one that is over 1 brighter.
+    stored = read_region_emissivity(tmp_path / "e.nc")
+    signs = [np.sign(one.estimate.effect("environment")) for one in stored.values()]
+    assert signs == [-1.0, 1.0]
+    both = stored["left"].estimate - rows[0].estimate
+    assert both.standard_uncertainty == pytest.approx(0.0, abs=1e-12)
+
+
+def test_warnings_of_the_emissivity_travel_to_the_temperature(tmp_path):
+    flags = np.zeros((1, *RASTER.shape), np.uint8)
+    flags[:, :, :10] = Flag.SATURATED
+    found = determine_emissivity([image(kelvins=HEATING.truth, flags=flags)], HEATING)
+    write_emissivity([found], [[found.of(WHOLE)]], tmp_path / "e.nc")
+    stored = read_region_emissivity(tmp_path / "e.nc")["chip"]
+    for emissivity in (found.of(WHOLE), stored):
+        (warning,) = true_temperature([image()], WHOLE, emissivity).estimate.warnings
+        assert warning.startswith("emissivity of chip: 300 of 1200 pixels are left out")
+
+
+def test_two_temperatures_by_one_emissivity_have_its_errors_in_common():
+    emissivity = KnownEmissivity(0.42, 0.05)
+    one, other = (true_temperature([image(seed=n)], WHOLE, emissivity).estimate for n in range(2))
+    assert (one - other).standard_uncertainty < 1e-6 * one.standard_uncertainty
+
+
+def test_a_file_of_an_earlier_version_is_refused(tmp_path):
+    found = determine_emissivity([image(kelvins=HEATING.truth)], HEATING)
+    write_emissivity([found], [[found.of(WHOLE)]], tmp_path / "e.nc")
+    with xr.open_dataset(tmp_path / "e.nc", engine="h5netcdf") as data:
+        data.load().drop_vars("observations").to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
+    with pytest.raises(ValueError, match="of an earlier version"):
+        read_region_emissivity(tmp_path / "old.nc")
+
+
 def test_what_cannot_be_trusted_is_said():
     half = np.where(np.arange(RASTER.columns) < 20, HOT, HOT + 300.0)
     uneven = measured(np.full(RASTER.shape, 0.42), truth=HOT)
     uneven.data["radiance"].values[:] = 0.42 * BAND.radiance(half) + 0.58 * BAND.radiance(ROOM)
     found = true_temperature([uneven], WHOLE, KnownEmissivity(0.42, 0.01))
-    assert any("is uneven" in doubt for doubt in found.doubts)
+    assert any("is uneven" in doubt for doubt in found.estimate.warnings)
     flags = np.zeros((1, *RASTER.shape), np.uint8)
     flags[:, :, :10] = Flag.SATURATED
     found = true_temperature([image(flags=flags)], WHOLE, KnownEmissivity(0.42))
     assert found.left_out == 300
-    assert any("300 of 1200 pixels are left out (300 saturated)" in one for one in found.doubts)
-    assert true_temperature([image()], WHOLE, KnownEmissivity(0.42)).doubts == ()
+    assert any(
+        "300 of 1200 pixels are left out (300 saturated)" in one for one in found.estimate.warnings
+    )
+    assert true_temperature([image()], WHOLE, KnownEmissivity(0.42)).estimate.warnings == ()
 
 
 def test_impossible_input_is_one_clear_error():

@@ -14,7 +14,6 @@ from seen_chip import look, noisy
 from typer.testing import CliRunner
 
 from chipglow.analysis import (
-    Reading,
     StatedUncertainties,
     ToolUncertainty,
     band_profile,
@@ -22,6 +21,7 @@ from chipglow.analysis import (
     find_tool,
     normalised_error,
     rake_grid,
+    reading,
 )
 from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
@@ -126,18 +126,20 @@ def test_a_comparison_has_the_uncertainty_of_the_tool_s_place():
     result = compare(linear(), {"same": linear()}, TOOL, CURVE, stated)
     grid = rake_grid(linear(), TOOL, uncertainty=FOUND)
     assert result.grid is not None and result.band is not None
-    known = np.isfinite(result.grid.measured.temperature)
+    known = np.isfinite(result.grid.measured.values)
     expected = np.hypot(3.0, grid.frame_tool_uncertainty)
     # Frames that are alike: nothing else, not the pixel's position either.
-    np.testing.assert_allclose(result.grid.measured.uncertainty[known], expected[known], rtol=1e-3)
+    np.testing.assert_allclose(
+        result.grid.measured.standard_uncertainty[known], expected[known], rtol=1e-3
+    )
     # The curve is laid on the simulation by the edge, so that it is off with it in any direction.
     moves = FOUND.displacements(TOOL, TOOL.edge_point) @ SLOPE
     pixel = RASTER.spacing / np.sqrt(12.0) * np.hypot(*SLOPE)
-    known = np.isfinite(result.band.measured.temperature)
+    known = np.isfinite(result.band.measured.values)
     np.testing.assert_allclose(
-        result.band.measured.uncertainty[known], hypot(3.0, pixel, *moves), rtol=1e-3
+        result.band.measured.standard_uncertainty[known], hypot(3.0, pixel, *moves), rtol=1e-3
     )
-    assert result.grid.simulated[0].from_tool == ()
+    assert not result.grid.simulated[0].contribution("tool").any()
 
 
 def test_a_tool_that_is_off_moves_all_squares_together():
@@ -189,7 +191,7 @@ def test_the_uncertainty_holds_for_tools_that_are_off_at_random():
         here, there = (g.frame_mean[:, :columns] for g in (grid, true))
         none = np.zeros(here.shape)
         parts = tuple(part[:, :columns] for part in grid.frame_from_tool)
-        e_n = normalised_error(Reading(here, none, none, parts), Reading(there, none, none))
+        e_n = normalised_error(reading(here, none, none, parts), reading(there, none, none))
         within += int((e_n <= 1).sum())
         count += int(np.isfinite(e_n).sum())
     # 120 tools whose squares go together: a standard deviation of 2 %.
@@ -314,7 +316,7 @@ def test_shapes_of_what_the_tool_makes_must_fit():
     with pytest.raises(ValueError, match=r"from_tool has shape \(2,\)"):
         replace(grid, from_tool=(np.zeros(2),))
     with pytest.raises(ValueError, match=r"from_tool has shape \(2,\), expected \(3,\)"):
-        Reading(np.zeros(3), np.zeros(3), np.zeros(3), (np.zeros(2),))
+        reading(np.zeros(3), np.zeros(3), np.zeros(3), (np.zeros(2),))
     profile = band_profile(linear(1), TOOL, curve=CURVE)
     with pytest.raises(ValueError, match=r"band profile: from_tool has shape \(2,\)"):
         replace(profile, from_tool=(np.zeros(2),))

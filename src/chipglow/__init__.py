@@ -4,6 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from chipglow import uncertainty
     from chipglow.analysis import (
         Heating,
         Plan,
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
         MapSurface,
         UniformSurface,
     )
+    from chipglow.uncertainty import Estimate
 
 __all__ = [
     "AISI_1045",
@@ -85,6 +87,7 @@ __all__ = [
     "CuttingSimulation",
     "Detector",
     "Emissivity",
+    "Estimate",
     "FeatureSurface",
     "FlowStress",
     "GaussianPSF",
@@ -129,6 +132,7 @@ __all__ = [
     "run",
     "simultaneous_frames",
     "true_temperature",
+    "uncertainty",
     "write_hcc",
     "write_measurement",
     "write_psf",
@@ -200,6 +204,7 @@ _ROOMS: Final = {
         "run",
     ),
     "surface": ("CHIP_1", "CHIP_2", "Emissivity", "FeatureSurface", "MapSurface", "UniformSurface"),
+    "uncertainty": ("Estimate",),
 }
 _ROOM_OF: Final = {name: room for room, names in _ROOMS.items() for name in names}
 
@@ -208,6 +213,8 @@ def __getattr__(name: str) -> Any:
     """Import a room when one of its names is first used: the command line starts at once."""
     if name in _ROOM_OF:
         return getattr(import_module(f"chipglow.{_ROOM_OF[name]}"), name)
+    if name in _ROOMS:
+        return import_module(f"chipglow.{name}")
     raise AttributeError(f"module 'chipglow' has no attribute {name!r}")
 
 

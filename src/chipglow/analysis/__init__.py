@@ -10,10 +10,10 @@ from chipglow.analysis.comparison import (
     Fit,
     GridComparison,
     PlaceResult,
-    Reading,
     StatedUncertainties,
     compare,
     normalised_error,
+    reading,
 )
 from chipglow.analysis.distribution import Cause, Distribution
 from chipglow.analysis.dots import DotFit, Dots, find_dots, fit_dots
@@ -116,7 +116,6 @@ __all__ = [
     "RadialPSF",
     "RakeErrors",
     "RakeGrid",
-    "Reading",
     "ReferenceKind",
     "Region",
     "RegionEmissivity",
@@ -164,6 +163,7 @@ __all__ = [
     "normalised_error",
     "rake_errors",
     "rake_grid",
+    "reading",
     "reference_temperature",
     "sample",
     "scene_errors",

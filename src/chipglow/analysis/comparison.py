@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import degrees, hypot, isfinite, radians, sqrt
+from math import degrees, isfinite, radians, sqrt
 from typing import Final
 
 import numpy as np
@@ -15,9 +15,10 @@ from chipglow.analysis.lines import sample
 from chipglow.analysis.rake_grid import DEPTH, PIXELS, RakeGrid, rake_grid
 from chipglow.analysis.remarks import Remarks
 from chipglow.analysis.ridge import NoShearBandError
-from chipglow.analysis.tool_position import ToolUncertainty, combined, contribution
+from chipglow.analysis.tool_position import ToolUncertainty, contribution
 from chipglow.camera import Measurement
 from chipglow.scene import Tool
+from chipglow.uncertainty import Estimate, draw
 
 COVERAGE: Final = 2.0
 """Factor between standard and expanded uncertainty: about 95 %."""
@@ -34,8 +35,13 @@ _FEW: Final = 3
 _SAME_ANGLE: Final = radians(0.1)
 
 
-@dataclass(frozen=True)
-class Reading:
+def reading(
+    temperature: NDArray[np.float64],
+    systematic: NDArray[np.float64],
+    random: NDArray[np.float64],
+    from_tool: Sequence[NDArray[np.float64]] = (),
+    scatter: FrameScatter | None = None,
+) -> Estimate:
     """Radiance temperatures with their standard uncertainties, all of one shape.
 
     Parameters
@@ -48,76 +54,51 @@ class Reading:
     random : ndarray
         Standard uncertainty in K of what differs from value to value: position, and the mean over
         the frames.
-    from_tool : tuple of ndarray
+    from_tool : sequence of ndarray
         What each independent standard uncertainty of the tool's place changes in K, with its sign:
         it changes all values together, up the one slope and down the other.
     scatter : FrameScatter, optional
         What of `random` comes from the mean over the frames, in which values change together. By
         default every value changes by itself.
 
+    Returns
+    -------
+    Estimate
+        With the components ``systematic``, ``position``, ``frames`` and ``tool``, independent of
+        those of other readings.
+
     Raises
     ------
     ValueError
         If the shapes differ.
     """
-
-    temperature: NDArray[np.float64]
-    systematic: NDArray[np.float64]
-    random: NDArray[np.float64]
-    from_tool: tuple[NDArray[np.float64], ...] = ()
-    scatter: FrameScatter | None = None
-
-    def __post_init__(self) -> None:
-        fields = [("systematic", self.systematic), ("random", self.random)]
-        for name, values in (*fields, *(("from_tool", part) for part in self.from_tool)):
-            if values.shape != self.temperature.shape:
-                raise ValueError(
-                    f"reading: {name} has shape {values.shape}, expected {self.temperature.shape}"
-                )
-
-    @property
-    def uncertainty(self) -> NDArray[np.float64]:
-        """Standard uncertainty in K."""
-        return combined((self.systematic, self.random, *self.from_tool), self.temperature.shape)
-
-    @property
-    def expanded(self) -> NDArray[np.float64]:
-        """Expanded uncertainty in K, by the factor `COVERAGE`."""
-        return COVERAGE * self.uncertainty
-
-    def part(self, where: NDArray[np.bool_]) -> "Reading":
-        """The values at some places, flat."""
-        return Reading(
-            self.temperature[where],
-            self.systematic[where],
-            self.random[where],
-            tuple(part[where] for part in self.from_tool),
-            None if self.scatter is None else self.scatter.part(where),
-        )
-
-    @property
-    def alone(self) -> NDArray[np.float64]:
-        """What of `random` differs from value to value by itself, in K."""
-        if self.scatter is None:
-            return self.random
-        return np.sqrt(np.maximum(self.random**2 - self.scatter.deviation**2, 0.0))
-
-    @property
-    def random_of_mean(self) -> float:
-        """Standard uncertainty in K that `random` makes of the mean of all values."""
-        alone = float(np.linalg.norm(self.alone)) / self.temperature.size
-        return hypot(alone, 0.0 if self.scatter is None else self.scatter.of_mean())
+    fields = [("systematic", systematic), ("random", random)]
+    for name, values in (*fields, *(("from_tool", part) for part in from_tool)):
+        if values.shape != temperature.shape:
+            raise ValueError(
+                f"reading: {name} has shape {values.shape}, expected {temperature.shape}"
+            )
+    alone = random
+    if scatter is not None:
+        alone = np.sqrt(np.maximum(random**2 - scatter.deviation**2, 0.0))
+    found = Estimate(temperature).with_component("systematic", systematic, independent="common")
+    found = found.with_component("position", alone, independent="per element")
+    if scatter is not None:
+        found = replace(found, components=(*found.components, scatter.component()))
+    for part in from_tool:
+        found = found.with_component("tool", part, independent="common")
+    return found
 
 
-def normalised_error(measured: Reading, simulated: Reading) -> NDArray[np.float64]:
+def normalised_error(measured: Estimate, simulated: Estimate) -> NDArray[np.float64]:
     """E_n number: magnitude of the difference over the expanded uncertainty of the difference.
 
-    E_n = abs(T_sim − T_meas) / sqrt(U_meas² + U_sim²) (ISO/IEC 17043). Up to 1 the two agree.
+    E_n = abs(T_sim − T_meas) / sqrt(U_meas² + U_sim²) (ISO/IEC 17043), k = `COVERAGE`. Up to 1 the
+    two agree. What both have in common is not in the uncertainty of their difference.
     """
-    away = np.abs(simulated.temperature - measured.temperature)
-    expanded = np.hypot(measured.expanded, simulated.expanded)
+    away = simulated - measured
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(away / expanded)
+        return np.asarray(np.abs(away.values) / (COVERAGE * away.standard_uncertainty))
 
 
 @dataclass(frozen=True)
@@ -216,16 +197,16 @@ class GridComparison:
     ----------
     along, depth : ndarray
         Middles of the squares up the face and into the chip in m, shapes (n,) and (m,).
-    measured : Reading
+    measured : Estimate
         Shape (m, n).
-    simulated : tuple of Reading
+    simulated : tuple of Estimate
         One for each simulation.
     """
 
     along: NDArray[np.float64]
     depth: NDArray[np.float64]
-    measured: Reading
-    simulated: tuple[Reading, ...]
+    measured: Estimate
+    simulated: tuple[Estimate, ...]
 
 
 @dataclass(frozen=True)
@@ -236,15 +217,15 @@ class BandComparison:
     ----------
     distance : ndarray
         Distance from the cutting edge in m, at steps of a measured pixel, shape (n,).
-    measured : Reading
+    measured : Estimate
         Shape (n,).
-    simulated : tuple of Reading
+    simulated : tuple of Estimate
         One for each simulation.
     """
 
     distance: NDArray[np.float64]
-    measured: Reading
-    simulated: tuple[Reading, ...]
+    measured: Estimate
+    simulated: tuple[Estimate, ...]
 
 
 @dataclass(frozen=True)
@@ -447,13 +428,13 @@ def _compare_grid(
         mean = grid.frame_mean[:, :columns]
         emissivity = _of_the_emissivity(item, mean, stated)
         scatter = FrameScatter.of(grid.mean[:, :, :columns])
-        readings.append(Reading(mean, emissivity, scatter.deviation, scatter=scatter))
+        readings.append(reading(mean, emissivity, scatter.deviation, scatter=scatter))
     return GridComparison(base.along[:columns], base.depth, readings[0], tuple(readings[1:]))
 
 
 def _measured_squares(
     measured: Measurement, grid: RakeGrid, columns: int, stated: StatedUncertainties
-) -> Reading:
+) -> Estimate:
     mean = grid.frame_mean[:, :columns]
     corners = grid.corners()[:, : columns + 1]
     middles = (corners[1:, 1:] + corners[:-1, :-1]) / 2
@@ -470,7 +451,7 @@ def _measured_squares(
         slopes = [sample(slope, measured.raster, middles) for slope in np.gradient(image, pitch)]
         random = np.hypot(random, np.hypot(*slopes) * _position(measured, stated))
     from_tool = tuple(p[:, :columns] for p in grid.frame_from_tool)
-    return Reading(mean, systematic, random, from_tool, scatter)
+    return reading(mean, systematic, random, from_tool, scatter)
 
 
 def _relative_calibration(measured: Measurement) -> NDArray[np.float64]:
@@ -556,11 +537,11 @@ def _compare_band(
     (mean, calibration, off, *from_tool), scatter = parts[0]
     systematic = np.hypot(calibration, stated.temperature)
     random = np.hypot(off, scatter.deviation)
-    own = Reading(mean, systematic, random, tuple(from_tool), scatter)
+    own = reading(mean, systematic, random, tuple(from_tool), scatter)
     readings = []
     for (_, item, *_), ((mean, *_), scatter) in zip(files[1:], parts[1:], strict=True):
         emissivity = _of_the_emissivity(item, mean, stated)
-        readings.append(Reading(mean, emissivity, scatter.deviation, scatter=scatter))
+        readings.append(reading(mean, emissivity, scatter.deviation, scatter=scatter))
     return BandComparison(distance, own, tuple(readings))
 
 
@@ -630,7 +611,7 @@ def _places(
     """Which simulation fits where both have values."""
     results: list[PlaceResult | None] = []
     if grid is not None:
-        face = np.zeros(grid.measured.temperature.shape, dtype=np.bool_)
+        face = np.zeros(grid.measured.values.shape, dtype=np.bool_)
         face[0] = True
         reach = grid.depth[0] * 2e6
         results.append(_judged(f"at the rake face, up to {reach:.3g} µm deep,", labels, grid, face))
@@ -655,46 +636,33 @@ def _judged(
     where: NDArray[np.bool_],
 ) -> PlaceResult | None:
     """The fits at one place; None where not all files have a value together."""
-    common = where & np.isfinite(pair.measured.temperature)
+    common = where & np.isfinite(pair.measured.values)
     for item in pair.simulated:
-        common &= np.isfinite(item.temperature)
+        common &= np.isfinite(item.values)
     if not common.any():
         return None
-    measured = pair.measured.part(common)
-    simulated = [item.part(common) for item in pair.simulated]
+    measured = pair.measured[common]
+    simulated = [item[common] for item in pair.simulated]
     fits = tuple(_fit(label, measured, item) for label, item in zip(labels, simulated, strict=True))
     best = int(np.argmin([fit.rms for fit in fits]))
     return PlaceResult(place, fits, best, _confidence(measured, simulated, best))
 
 
-def _fit(label: str, measured: Reading, simulated: Reading) -> Fit:
-    away = simulated.temperature - measured.temperature
-    systematic = hypot(float(measured.systematic.mean()), float(simulated.systematic.mean()))
-    from_tool = hypot(*(float(part.mean()) for part in measured.from_tool))
-    random = hypot(measured.random_of_mean, simulated.random_of_mean)
+def _fit(label: str, measured: Estimate, simulated: Estimate) -> Fit:
+    away = simulated - measured
+    bias = away.mean()
     return Fit(
         label=label,
-        bias=float(away.mean()),
-        bias_uncertainty=hypot(systematic, from_tool, random),
-        rms=float(np.sqrt((away**2).mean())),
+        bias=float(away.values.mean()),
+        bias_uncertainty=float(bias.standard_uncertainty),
+        rms=float(np.sqrt((away.values**2).mean())),
         agreeing=int((normalised_error(measured, simulated) <= 1).sum()),
-        count=away.size,
+        count=away.values.size,
     )
 
 
-def _confidence(measured: Reading, simulated: Sequence[Reading], best: int) -> float:
+def _confidence(measured: Estimate, simulated: Sequence[Estimate], best: int) -> float:
     """Share of draws of all uncertainties in which the best set stays the best."""
-    generator = np.random.default_rng(_SEED)
-    base = _drawn(measured, generator)
-    rms = [((_drawn(item, generator) - base) ** 2).mean(axis=1) for item in simulated]
+    base, *others = draw([measured, *simulated], _DRAWS, np.random.default_rng(_SEED))
+    rms = [((other - base) ** 2).mean(axis=1) for other in others]
     return float((np.argmin(rms, axis=0) == best).mean())
-
-
-def _drawn(reading: Reading, generator: np.random.Generator) -> NDArray[np.float64]:
-    """Values drawn anew from their uncertainties, shape (draws, n)."""
-    common = generator.standard_normal((_DRAWS, 1)) * reading.systematic
-    each = generator.standard_normal((_DRAWS, reading.temperature.size)) * reading.alone
-    if reading.scatter is not None:
-        each += reading.scatter.drawn(_DRAWS, generator)
-    parts = [generator.standard_normal((_DRAWS, 1)) * part for part in reading.from_tool]
-    return np.asarray(sum(parts, reading.temperature + common + each))

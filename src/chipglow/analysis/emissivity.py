@@ -1,7 +1,8 @@
 """Emissivity from images of an object whose temperature is known, with its uncertainty."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import hypot, inf, isfinite, nan, sqrt
 from typing import Any, Final
@@ -10,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.analysis.observations import (
-    AreaResult,
-    Scatter,
+    RANDOM,
+    area_estimate,
     check_same_pixels,
     count_flags,
     flag_text,
+    left_out_warning,
     observed_flags,
     observed_radiance,
     told_calibration,
@@ -23,9 +25,13 @@ from chipglow.analysis.regions import Area
 from chipglow.camera import Flag, Measurement
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
+from chipglow.uncertainty import Estimate, propagate
 
 COMMON: Final = ("truth", "environment", "calibration")
 """Causes of error that are the same for all pixels, frames and images."""
+
+BUDGET: Final = (*COMMON, "drift", "repeatability", "noise")
+"""Lines of the budget of an emissivity."""
 
 LABORATORY: Final = 293.0
 """Temperature in K of the paper's laboratory, which surfaces reflect."""
@@ -140,6 +146,11 @@ class EmissivityMap:
         return len(self.radiance)
 
     @cached_property
+    def identity(self) -> str:
+        """Tells these observations from others, and is the same in another run."""
+        return hashlib.sha256(self.radiance.tobytes()).hexdigest()[:16]
+
+    @cached_property
     def emissivity(self) -> NDArray[np.float64]:
         """Emissivity, shape (y, x); NaN where flagged. Noise can take it out of 0 to 1."""
         return emissivity_of_radiance(self.mean_radiance, self.heating, self.band)
@@ -155,20 +166,30 @@ class EmissivityMap:
         return np.asarray(self.band.temperature(self.mean_radiance), np.float64)
 
     @cached_property
-    def standard_uncertainty(self) -> NDArray[np.float64]:
-        """Standard uncertainty of every pixel's own emissivity, shape (y, x).
+    def estimate(self) -> Estimate:
+        """Emissivity with its uncertainty, shape (y, x); NaN where flagged.
 
-        Of one observation it is without the pixel's noise, which then nothing tells.
+        Of one observation it is without the pixel's noise, of which then nothing is known.
         """
-        variance = sum(
-            self._contribution(cause, self.mean_radiance, self.calibration) ** 2 for cause in COMMON
+        found = self._systematic(self.emissivity, self.mean_radiance, self.calibration)
+        drift = self._drift(self.mean_radiance)
+        if drift is None:
+            found = found.with_unevaluated("drift")
+        else:
+            found = found.with_component(
+                "drift", drift, independent="common", identity=self.identity
+            )
+        if self.observations == 1:
+            return found.with_unevaluated("noise")
+        noise = self.radiance.std(axis=0, ddof=1) / sqrt(self.observations) / self._contrast
+        return found.with_component(
+            "noise",
+            noise,
+            independent="per element",
+            identity=self.identity,
+            degrees_of_freedom=self.observations - 1.0,
+            pooled=False,
         )
-        if self.observations > 1:
-            noise = self.radiance.var(axis=0, ddof=1) / self.observations
-            variance = variance + noise / self._contrast**2
-        if self.heating.drift is not None:
-            variance = variance + self._drift(self.mean_radiance) ** 2
-        return np.sqrt(np.asarray(variance, np.float64))
 
     def of(self, area: Area) -> "RegionEmissivity":
         """Mean emissivity of an area, and what makes it uncertain.
@@ -192,11 +213,24 @@ class EmissivityMap:
                 f"({flag_text(flagged)}), expected 2 or more"
             )
         values = emissivity_of_radiance(self.radiance[:, usable], self.heating, self.band)
-        scatter = Scatter.of(values)
-        mean_radiance = self.mean_radiance[usable].mean()
+        mean_radiance = float(self.mean_radiance[usable].mean())
         calibration = None if self.calibration is None else self.calibration[usable].mean()
         pixels = values.mean(axis=0)
-        return RegionEmissivity(
+        mean = float(pixels.mean())
+        random = area_estimate(mean, values, f"{self.identity} {area.name}")
+        estimate = self._systematic(np.array(mean), mean_radiance, calibration)
+        drift = self._drift(mean_radiance)
+        if self.recordings > 1:
+            # What of the drift the recordings do not show already as their repeatability.
+            shown = float(random.contribution("repeatability"))
+            drift = sqrt(max((drift or 0.0) ** 2 - shown**2, 0.0))
+        if drift is None:
+            estimate = estimate.with_unevaluated("drift")
+        else:
+            estimate = estimate.with_component(
+                "drift", drift, independent="common", identity=self.identity
+            )
+        found = RegionEmissivity(
             name=area.name,
             feature=area.feature,
             whole=area.whole,
@@ -205,30 +239,36 @@ class EmissivityMap:
             left_out=int(area.mask.sum()) - count,
             flagged=flagged,
             hidden=self.hidden,
-            mean=float(pixels.mean()),
             deviation=float(pixels.std(ddof=1)),
             outside=(int((pixels < 0).sum()), int((pixels > 1).sum())),
-            common={
-                cause: float(self._contribution(cause, mean_radiance, calibration))
-                for cause in COMMON
-            },
             observed=values.mean(axis=1),
-            scatter=scatter,
-            drift=self._beyond(float(self._drift(mean_radiance)), scatter),
+            estimate=estimate + (random - mean),
         )
+        return replace(found, estimate=found.estimate.with_warnings(*found._warnings()))
+
+    def _systematic(self, values: NDArray[np.float64], radiance: Any, calibration: Any) -> Estimate:
+        """Emissivities with what is common to all pixels, frames and images."""
+
+        def found(truth: Any, environment: Any) -> Any:
+            ends = (self.band.radiance(np.asarray(one)) for one in (truth, environment))
+            return _emissivity(radiance, *ends)
+
+        heating = self.heating
+        known = propagate(
+            found,
+            Estimate(np.array(heating.truth)).with_component("truth", heating.truth_uncertainty),
+            Estimate(np.array(heating.environment)).with_component(
+                "environment", heating.environment_uncertainty
+            ),
+        )
+        effect = 0.0 if calibration is None else calibration / self._contrast
+        return replace(known.with_component("calibration", effect), values=values)
 
     def _drift(self, radiance: Any) -> Any:
-        """Standard uncertainty of the emissivity by drift between recordings; NaN if unknown."""
+        """Effect on the emissivity of drift between recordings; None if that is not stated."""
         if self.heating.drift is None:
-            return np.full_like(radiance, nan)
+            return None
         return self.heating.drift * radiance / self._contrast / sqrt(self.recordings)
-
-    def _beyond(self, drift: float, scatter: Scatter) -> float:
-        """What of the drift several recordings do not show already as their repeatability."""
-        if self.recordings == 1:
-            return drift
-        stated = drift if isfinite(drift) else 0.0
-        return sqrt(max(stated**2 - scatter.repeatability**2, 0.0))
 
     @property
     def _contrast(self) -> float:
@@ -236,22 +276,9 @@ class EmissivityMap:
         radiance = self.band.radiance(np.array([self.heating.truth, self.heating.environment]))
         return float(radiance[0] - radiance[1])
 
-    def _contribution(self, cause: str, radiance: Any, calibration: Any) -> Any:
-        """Half the change of emissivity when one cause goes from −u to +u, with its sign."""
-        heating, band = self.heating, self.band
-        if cause == "calibration":
-            return np.zeros_like(radiance) if calibration is None else calibration / self._contrast
-        value, spread = getattr(heating, cause), getattr(heating, f"{cause}_uncertainty")
-        ends = []
-        for shifted in (value - spread, value + spread):
-            truth = shifted if cause == "truth" else heating.truth
-            environment = shifted if cause == "environment" else heating.environment
-            ends.append(_emissivity(radiance, *band.radiance(np.array([truth, environment]))))
-        return (ends[1] - ends[0]) / 2
-
 
 @dataclass(frozen=True, eq=False)
-class RegionEmissivity(AreaResult):
+class RegionEmissivity:
     """Emissivity of an area: a row of the table; made by `EmissivityMap.of`.
 
     Parameters
@@ -270,23 +297,17 @@ class RegionEmissivity(AreaResult):
         How many have each `Flag`.
     hidden : float
         Emissivity under which the camera's floor hides a pixel; 0 without a floor.
-    mean : float
-        Mean emissivity.
     deviation : float
         Standard deviation over the pixels: how much the surface varies from place to place, with
         the pixels' noise. It is no uncertainty of the mean.
     outside : tuple of int
         How many pixels have an emissivity under 0, and over 1.
-    common : dict
-        Contributions to the standard uncertainty of the mean by the causes of `COMMON`, each with
-        the sign of its effect: between areas and images they are fully correlated.
     observed : ndarray
         Mean emissivity of each observation, shape (observation,).
-    scatter : Scatter
-        The contributions that are chance.
-    drift : float
-        Contribution of the drift from recording to recording over the repeatability: the same in
-        all areas of a recording. NaN if one recording is all there is and none is stated.
+    estimate : Estimate
+        Mean emissivity, with the components of `COMMON`, the same in all areas and images;
+        ``drift`` from recording to recording over the repeatability, the same in all areas of a
+        map; and ``random``, of which ``repeatability`` and ``noise`` are parts.
     """
 
     name: str
@@ -297,43 +318,18 @@ class RegionEmissivity(AreaResult):
     left_out: int
     flagged: dict[Flag, int]
     hidden: float
-    mean: float
     deviation: float
     outside: tuple[int, int]
-    common: dict[str, float]
     observed: NDArray[np.float64]
-    scatter: Scatter
-    drift: float = nan
+    estimate: Estimate
 
     @property
-    def budget(self) -> dict[str, float]:
-        """Standard uncertainty of the mean by cause; NaN where it is not known."""
-        parts = {cause: abs(part) for cause, part in self.common.items()}
-        chance = {"repeatability": self.scatter.repeatability, "noise": self.scatter.noise}
-        return {**parts, "drift": self.drift, **chance}
+    def mean(self) -> float:
+        """Mean emissivity."""
+        return float(self.estimate.values)
 
-    @property
-    def standard_uncertainty(self) -> float:
-        """Combined standard uncertainty of the mean (JCGM 100:2008, Equation 10)."""
-        return hypot(_root_sum(self.common), _known(self.drift), self.scatter.standard_uncertainty)
-
-    @property
-    def degrees_of_freedom(self) -> float:
-        """Effective number by Welch and Satterthwaite (JCGM 100:2008, Equation G.2b)."""
-        chance = self.scatter.standard_uncertainty
-        if chance == 0.0:
-            return inf
-        ratio = self.standard_uncertainty / chance
-        return float(self.scatter.degrees_of_freedom * ratio**4)
-
-    @property
-    def doubts(self) -> tuple[str, ...]:
-        """Why the result may be wrong beyond its uncertainty, a sentence each."""
-        return tuple(self._doubts())
-
-    def _doubts(self) -> list[str]:
-        doubts = []
-        text = self.left_out_doubt()
+    def _warnings(self) -> Iterator[str]:
+        text = left_out_warning(self.name, self.pixels, self.left_out, self.flagged)
         if text is not None:
             if self.flagged[Flag.BELOW_FLOOR]:
                 text += (
@@ -342,21 +338,20 @@ class RegionEmissivity(AreaResult):
                 )
             elif self.flagged[Flag.SATURATED]:
                 text += "; what is left is darker than the region"
-            doubts.append(text)
+            yield f"{text}."
         under, over = self.outside
         if under:
-            doubts.append(
+            yield (
                 f"{self.name}: {under} of {self.pixels} pixels have an emissivity under 0: they "
-                "are darker than the environment is said to be"
+                "are darker than the environment is said to be."
             )
         if over:
-            doubts.append(
+            yield (
                 f"{self.name}: {over} of {self.pixels} pixels have an emissivity over 1: they "
-                "are brighter than a black body of the true temperature"
+                "are brighter than a black body of the true temperature."
             )
         if not 0 <= self.mean <= 1:
-            doubts.append(f"{self.name}: the mean emissivity is not within 0 to 1")
-        return doubts
+            yield f"{self.name}: the mean emissivity is not within 0 to 1."
 
 
 @dataclass(frozen=True)
@@ -371,12 +366,8 @@ class EmissivityLine:
         True temperatures in K, mean emissivities, and their standard uncertainties.
     middle : float
         Mean of the temperatures in K.
-    at_middle : float
-        Emissivity of the line there.
-    slope : float
-        Change of emissivity with temperature in 1/K.
-    covariance : ndarray
-        Of `at_middle` and `slope`, shape (2, 2).
+    estimate : Estimate
+        Emissivity of the line there, and its change with temperature in 1/K; shape (2,).
     residual : float
         Standard deviation about the line; NaN of two temperatures.
     """
@@ -387,27 +378,14 @@ class EmissivityLine:
     means: tuple[float, ...]
     uncertainties: tuple[float, ...]
     middle: float
-    at_middle: float
-    slope: float
-    covariance: NDArray[np.float64]
+    estimate: Estimate
     residual: float
 
-    @property
-    def slope_uncertainty(self) -> float:
-        """Standard uncertainty of the slope in 1/K."""
-        return sqrt(self.covariance[1, 1])
-
-    @property
-    def middle_uncertainty(self) -> float:
-        """Standard uncertainty of the emissivity in the middle."""
-        return sqrt(self.covariance[0, 0])
-
-    def at(self, temperature: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Emissivity of the line and its standard uncertainty at temperatures in K."""
+    def at(self, temperature: Any) -> Estimate:
+        """Emissivity of the line at temperatures in K, of any shape."""
         away = np.asarray(temperature, np.float64) - self.middle
-        value = self.at_middle + self.slope * away
-        (a, b), (_, c) = self.covariance
-        return value, np.sqrt(a + 2 * b * away + c * away**2)
+        design = np.stack([np.ones(away.size), away.ravel()], axis=1)
+        return self.estimate.linear(design).reshape(*away.shape)
 
 
 def emissivity_of_radiance(
@@ -478,12 +456,9 @@ def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> NDArray[np.float6
     chance = np.zeros((len(rows), len(rows)))
     if observed.shape[1] > 1:
         chance = np.atleast_2d(np.cov(observed)) / observed.shape[1]
-    np.fill_diagonal(chance, [row.scatter.standard_uncertainty**2 for row in rows])
-    for cause in COMMON:
-        effect = [row.common[cause] for row in rows]
-        chance += np.outer(effect, effect)
-    drift = [_known(row.drift) for row in rows]
-    return chance + np.outer(drift, drift)
+    own = [row.estimate.only(RANDOM).standard_uncertainty for row in rows]
+    np.fill_diagonal(chance, np.square(own))
+    return chance + Estimate.stack([row.estimate.without(RANDOM) for row in rows]).covariance()
 
 
 def emissivity_line(rows: Sequence[RegionEmissivity]) -> EmissivityLine:
@@ -515,29 +490,33 @@ def emissivity_line(rows: Sequence[RegionEmissivity]) -> EmissivityLine:
     solve = np.linalg.pinv(design)
     at_middle, slope = (solve @ means).tolist()
     residual = _residual(means - design @ (at_middle, slope))
-    chance = np.array([hypot(row.scatter.standard_uncertainty, _known(row.drift)) for row in rows])
+    chance = np.array([_of_one_image(row.estimate) for row in rows])
     if isfinite(residual):
         chance = np.maximum(chance, residual)
-    covariance = (solve * chance**2) @ solve.T
+    observed = Estimate(means).with_component(RANDOM, chance, independent="per element")
     for cause in COMMON:
-        shift = np.array([row.common[cause] for row in rows])
+        shift = np.array([row.estimate.effect(cause) for row in rows])
         if cause == "truth":
             # An error of the temperature moves the points along the line too.
             shift = shift - slope * np.array([row.heating.truth_uncertainty for row in rows])
-        effect = solve @ shift
-        covariance = covariance + np.outer(effect, effect)
+        observed = observed.with_component(cause, shift)
     return EmissivityLine(
         name=rows[0].name,
         feature=rows[0].feature,
         temperatures=tuple(temperature.tolist()),
         means=tuple(means.tolist()),
-        uncertainties=tuple(row.standard_uncertainty for row in rows),
+        uncertainties=tuple(float(row.estimate.standard_uncertainty) for row in rows),
         middle=middle,
-        at_middle=at_middle,
-        slope=slope,
-        covariance=covariance,
+        estimate=observed.linear(solve),
         residual=residual,
     )
+
+
+def _of_one_image(estimate: Estimate) -> float:
+    """Standard uncertainty by what is not the same at another temperature."""
+    for cause in COMMON:
+        estimate = estimate.without(cause)
+    return float(estimate.standard_uncertainty)
 
 
 def _emissivity(radiance: Any, truth: Any, environment: Any) -> Any:
@@ -563,15 +542,6 @@ def _calibration(
 def _residual(about_line: NDArray[np.float64]) -> float:
     freedom = about_line.size - 2
     return sqrt(float((about_line**2).sum()) / freedom) if freedom else nan
-
-
-def _known(part: float) -> float:
-    """A contribution, or 0 where it is not known."""
-    return part if isfinite(part) else 0.0
-
-
-def _root_sum(parts: dict[str, float]) -> float:
-    return float(np.linalg.norm(list(parts.values())))
 
 
 def _celsius(temperature: float) -> str:

@@ -3,9 +3,12 @@
 from dataclasses import dataclass
 from math import inf
 from typing import Final
+from uuid import uuid4
 
 import numpy as np
 from numpy.typing import NDArray
+
+from chipglow.uncertainty import Cause, Component
 
 _LEAST: Final = 8
 """Frames from which on it is asked how alike successive ones are."""
@@ -52,20 +55,10 @@ class FrameScatter:
         """Standard uncertainty of the mean, shape (...)."""
         return np.asarray(np.sqrt(np.sum(self.patterns**2, axis=0)))
 
-    def part(self, where: NDArray[np.bool_]) -> "FrameScatter":
-        """At some places, flat."""
-        return FrameScatter(self.patterns[:, where], self.freedom)
-
-    def of_mean(self) -> float:
-        """Standard uncertainty of the mean over all places."""
-        return float(np.linalg.norm(self.patterns.reshape(len(self.patterns), -1).mean(axis=1)))
-
-    def drawn(self, count: int, generator: np.random.Generator) -> NDArray[np.float64]:
-        """Errors of flat places, shape (count, n), by Student's distribution."""
-        deviates = generator.standard_normal((count, len(self.patterns)))
-        if np.isfinite(self.freedom):
-            deviates /= np.sqrt(generator.chisquare(self.freedom, (count, 1)) / self.freedom)
-        return np.asarray(deviates @ self.patterns)
+    def component(self) -> Component:
+        """The errors as a component ``frames``, independent of that of other frames."""
+        cause = Cause("frames", uuid4().hex, len(self.patterns), self.freedom)
+        return Component(cause, self.patterns.reshape(len(self.patterns), -1).T.copy())
 
 
 def _longer(away: NDArray[np.float64]) -> float:

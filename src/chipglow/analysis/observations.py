@@ -1,112 +1,68 @@
 """Images of one place as observations: what they have in common, and what chance does to them."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import isfinite, nan, sqrt
+from math import sqrt
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from chipglow.camera import Flag, Measurement
+from chipglow.uncertainty import Cause, Component, Estimate
+
+RANDOM: Final = "random"
+"""Name of the component of what observations show of chance."""
 
 _DOUBTFUL_SHARE: Final = 0.05
 """Share of an area's pixels that may be left out before its result is doubtful."""
 
-_COVERAGE: Final = 0.975
 
-
-class AreaResult(ABC):
-    """What is determined of an area: the interval that holds it, and whether enough pixels count.
-
-    Attributes
-    ----------
-    name : str
-        The area's name.
-    pixels, left_out : int
-        Number of pixels that count, and of those that do not, because they are flagged.
-    flagged : dict
-        How many have each `Flag`.
-    """
-
-    name: str
-    pixels: int
-    left_out: int
-    flagged: dict[Flag, int]
-
-    @property
-    @abstractmethod
-    def standard_uncertainty(self) -> float:
-        """Combined standard uncertainty."""
-
-    @property
-    @abstractmethod
-    def degrees_of_freedom(self) -> float:
-        """Effective number of the standard uncertainty."""
-
-    @property
-    def coverage_factor(self) -> float:
-        """Student's t for 95 %: 1.96 where chance plays no part."""
-        return float(stdtrit(self.degrees_of_freedom, _COVERAGE))
-
-    @property
-    def expanded_uncertainty(self) -> float:
-        """Half the width of the interval that holds what is determined with 95 %, in its unit."""
-        return self.coverage_factor * self.standard_uncertainty
-
-    def left_out_doubt(self) -> str | None:
-        """A sentence if many pixels are left out."""
-        total = self.pixels + self.left_out
-        if self.left_out <= _DOUBTFUL_SHARE * total:
-            return None
-        return (
-            f"{self.name}: {self.left_out} of {total} pixels are left out "
-            f"({flag_text(self.flagged)})"
-        )
-
-
-@dataclass(frozen=True)
-class Scatter:
-    """What the observations of an area tell of chance; standard uncertainties of its mean.
+def area_estimate(mean: float, values: NDArray[np.float64], identity: str) -> Estimate:
+    """The mean of an area with its random component: an analysis of variance.
 
     Parameters
     ----------
-    repeatability : float
-        Of what changes from one observation to the next in the whole area, over what noise
-        explains; NaN of one observation.
-    noise : float
-        Of the pixels' noise. Of one observation, an upper limit: the spread over the pixels, of
-        which noise is a part, divided by the root of their number.
-    degrees_of_freedom : float
-        Of both together.
+    mean : float
+        The mean.
+    values : ndarray
+        What it is the mean of, shape (observation, pixel).
+    identity : str
+        Tells this area's observations from others.
+
+    Returns
+    -------
+    Estimate
+        With the component ``random``. Its parts are ``repeatability``, which changes from one
+        observation to the next in the whole area, over what noise explains; and the ``noise`` of
+        the pixels. Of one observation repeatability is unevaluated, and noise an upper limit: the
+        standard deviation over the pixels, of which noise is a part, by the root of their number.
     """
+    observations, pixels = values.shape
+    if observations == 1:
+        noise = float(values[0].std(ddof=1)) / sqrt(pixels)
+        alone = _random(mean, {"noise": noise}, pixels - 1.0, identity)
+        return alone.with_unevaluated("repeatability")
+    means = values.mean(axis=1)
+    total = float(means.var(ddof=1)) / observations
+    residual = values - means[:, None] - values.mean(axis=0) + means.mean()
+    freedom = (observations - 1.0) * (pixels - 1.0)
+    noise = float((residual**2).sum()) / freedom / values.size
+    # One standard deviation is known, that of the means: its parts share its degrees of freedom.
+    parts = {"repeatability": sqrt(max(total - noise, 0.0)), "noise": sqrt(noise)}
+    return _random(mean, parts, observations - 1.0 if total > noise else freedom, identity)
 
-    repeatability: float
-    noise: float
-    degrees_of_freedom: float
 
-    @classmethod
-    def of(cls, values: NDArray[np.float64]) -> "Scatter":
-        """What values of shape (observation, pixel) tell of chance: an analysis of variance."""
-        observations, pixels = values.shape
-        if observations == 1:
-            return cls(nan, float(values[0].std(ddof=1)) / sqrt(pixels), pixels - 1.0)
-        means = values.mean(axis=1)
-        total = float(means.var(ddof=1)) / observations
-        residual = values - means[:, None] - values.mean(axis=0) + means.mean()
-        freedom = (observations - 1.0) * (pixels - 1.0)
-        noise = float((residual**2).sum()) / freedom / values.size
-        if total > noise:
-            return cls(sqrt(total - noise), sqrt(noise), observations - 1.0)
-        return cls(0.0, sqrt(noise), freedom)
+def _random(mean: float, parts: dict[str, float], freedom: float, identity: str) -> Estimate:
+    cause = Cause(RANDOM, identity, len(parts), freedom, parts=tuple(parts))
+    return Estimate(np.array(mean), (Component(cause, np.array([list(parts.values())])),))
 
-    @property
-    def standard_uncertainty(self) -> float:
-        """Of both together."""
-        repeatability = self.repeatability if isfinite(self.repeatability) else 0.0
-        return float(np.hypot(repeatability, self.noise))
+
+def left_out_warning(name: str, pixels: int, left_out: int, flagged: dict[Flag, int]) -> str | None:
+    """A sentence, without its full stop, if many of an area's pixels are left out."""
+    total = pixels + left_out
+    if left_out <= _DOUBTFUL_SHARE * total:
+        return None
+    return f"{name}: {left_out} of {total} pixels are left out ({flag_text(flagged)})"
 
 
 def check_same_pixels(measurements: Sequence[Measurement], purpose: str) -> None:

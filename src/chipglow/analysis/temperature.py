@@ -1,20 +1,23 @@
 """True temperature of an area whose emissivity is known, with its uncertainty."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from math import hypot, inf, isfinite, nan, sqrt
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf, sqrt
 from typing import Any, Final, Protocol
+from uuid import uuid4
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.analysis.emissivity import LABORATORY, Heating
 from chipglow.analysis.observations import (
-    AreaResult,
-    Scatter,
+    RANDOM,
+    area_estimate,
     check_same_pixels,
     count_flags,
     flag_text,
+    left_out_warning,
     observed_flags,
     observed_radiance,
     told_calibration,
@@ -22,6 +25,13 @@ from chipglow.analysis.observations import (
 from chipglow.analysis.regions import Area
 from chipglow.camera import FittedCalibration, Flag, Measurement
 from chipglow.radiometry import Band
+from chipglow.uncertainty import Estimate, propagate
+
+TEMPERATURE_BUDGET: Final = (
+    *("truth", "environment", "calibration", "emissivity"),
+    *("drift", "repeatability", "noise"),
+)
+"""Lines of the budget of a true temperature."""
 
 _UNEVEN: Final = 0.5
 _NO_MATTER: Final = 0.01
@@ -32,24 +42,12 @@ class DeterminedEmissivity(Protocol):
     """An area's emissivity that was determined with the same camera: a `RegionEmissivity`."""
 
     @property
-    def mean(self) -> float:
-        """Mean emissivity."""
-
-    @property
     def heating(self) -> Heating:
         """How the object was heated."""
 
     @property
-    def common(self) -> dict[str, float]:
-        """Contributions to the standard uncertainty by the causes of `COMMON`, with signs."""
-
-    @property
-    def scatter(self) -> Scatter:
-        """The contributions that are chance."""
-
-    @property
-    def drift(self) -> float:
-        """Contribution of the drift between recordings; NaN if it is not known."""
+    def estimate(self) -> Estimate:
+        """Mean emissivity, with the components of `COMMON`, ``drift`` and ``random``."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +79,11 @@ class KnownEmissivity:
                 "expected 0 or more"
             )
 
+    @property
+    def estimate(self) -> Estimate:
+        """The emissivity with the component ``emissivity``."""
+        return Estimate(np.array(self.mean)).with_component("emissivity", self.standard_uncertainty)
+
 
 @dataclass(frozen=True)
 class Surroundings:
@@ -111,9 +114,16 @@ class Surroundings:
                 "expected 0 K or more"
             )
 
+    @cached_property
+    def estimate(self) -> Estimate:
+        """The temperature, with the component ``environment``: the same wherever these are."""
+        return Estimate(np.array(self.temperature)).with_component(
+            "environment", self.standard_uncertainty, independent="common"
+        )
+
 
 @dataclass(frozen=True, eq=False)
-class TrueTemperature(AreaResult):
+class TrueTemperature:
     """True temperature of an area; made by `true_temperature`.
 
     Parameters
@@ -130,18 +140,14 @@ class TrueTemperature(AreaResult):
         Standard deviation over the pixels of the temperatures in K that each would have by
         itself: how uneven the area is in temperature and emissivity, with the pixels' noise.
     mean_of_pixels : float
-        Mean of these temperatures in K: under `value` where the area is uneven.
+        Mean of these temperatures in K: under the estimate where the area is uneven.
     emissivity : float
         Emissivity that was taken.
-    value : float
-        True temperature in K.
-    budget : dict
-        Standard uncertainty in K by cause: ``truth`` (of the heating with which the emissivity was
-        determined), ``environment``, ``calibration``, ``emissivity`` (by chance, or as it is
-        known), ``drift`` between recordings, that of the emissivity included, ``repeatability`` and
-        ``noise``; NaN where it is not known.
-    chance : tuple of (float, float)
-        Pairs of a standard uncertainty in K and its degrees of freedom.
+    estimate : Estimate
+        True temperature in K, with the components ``truth`` (of the heating with which the
+        emissivity was determined), ``environment``, ``calibration``, ``emissivity`` (by chance, or
+        as it is known), ``drift`` between recordings, that of the emissivity included, and
+        ``random``, of which ``repeatability`` and ``noise`` are parts.
     correlation : float or None
         Correlation of the calibration's errors at the radiances of area and emissivity; None if it
         plays no part or is not known.
@@ -155,34 +161,8 @@ class TrueTemperature(AreaResult):
     deviation: float
     mean_of_pixels: float
     emissivity: float
-    value: float
-    budget: dict[str, float]
-    chance: tuple[tuple[float, float], ...]
+    estimate: Estimate
     correlation: float | None
-
-    @property
-    def standard_uncertainty(self) -> float:
-        """Combined standard uncertainty in K (JCGM 100:2008, Equation 13)."""
-        return float(np.linalg.norm([part for part in self.budget.values() if isfinite(part)]))
-
-    @property
-    def degrees_of_freedom(self) -> float:
-        """Effective number by Welch and Satterthwaite (JCGM 100:2008, Equation G.2b)."""
-        parts = sum(part**4 / freedom for part, freedom in self.chance)
-        return self.standard_uncertainty**4 / parts if parts > 0 else inf
-
-    @property
-    def doubts(self) -> tuple[str, ...]:
-        """Why the result may be wrong beyond its uncertainty, a sentence each."""
-        left_out = self.left_out_doubt()
-        doubts = [] if left_out is None else [left_out]
-        uneven = abs(self.value - self.mean_of_pixels)
-        if uneven > max(_UNEVEN * self.standard_uncertainty, _NO_MATTER):
-            doubts.append(
-                f"{self.name}: is uneven, the mean of its pixels' temperatures is "
-                f"{uneven:.3g} K from the temperature of its mean radiance"
-            )
-        return tuple(doubts)
 
 
 def true_temperature(
@@ -241,44 +221,91 @@ def true_temperature(
     values = radiance[:, usable]
     mean = float(values.mean())
     reflecting = _surroundings(emissivity, surroundings)
-    equation = _Equation(emissivity.mean, reflecting.temperature, band)
+    room = float(reflecting.values)
+    equation = _Equation(float(emissivity.estimate.values), room, band)
     sensitivity = equation.sensitivity(area.name, mean)
+    correlation = _correlation(emissivity, mean, calibration, band)
+    determined = not isinstance(emissivity, KnownEmissivity)
+    shared = (correlation or 0.0) if determined else 1.0
     told = told_calibration(measurements)
     error = 0.0 if told is None else float(told[usable].mean())
-    correlation = _correlation(emissivity, mean, calibration, band)
-    budget, chance = _budget(
-        sensitivity, emissivity, reflecting, surroundings is None, error, correlation or 0.0
+    seen = _seen(values, error, shared, drift, len(measurements))
+    found = propagate(
+        lambda _, seen, __: equation.temperature(seen),
+        emissivity.estimate.renamed(RANDOM, "emissivity"),
+        seen,
+        reflecting,
+        derivatives=sensitivity.partials,
     )
-    scatter, seen = Scatter.of(values), sensitivity.radiance
-    drifts = [seen * _drift(drift, mean, len(measurements), scatter)]
-    if not isinstance(emissivity, KnownEmissivity):
-        drifts.append(sensitivity.emissivity * emissivity.drift)
-    known = [part for part in drifts if isfinite(part)]
-    budget["drift"] = hypot(*known) if known else nan
-    budget |= {"repeatability": seen * scatter.repeatability, "noise": seen * scatter.noise}
     pixels = equation.temperature(values.mean(axis=0))
+    count_out, mean_of_pixels = int(area.mask.sum()) - count, float(pixels.mean())
+    warnings = [f"emissivity of {warning}" for warning in found.warnings]
+    warnings += _warnings(area.name, found, mean_of_pixels)
+    left_out = left_out_warning(area.name, count, count_out, flagged)
+    if left_out is not None:
+        warnings = [f"{left_out}.", *warnings]
     return TrueTemperature(
         name=area.name,
         pixels=count,
-        left_out=int(area.mask.sum()) - count,
+        left_out=count_out,
         flagged=flagged,
         radiance_temperature=float(band.temperature(np.array(mean))),
         deviation=float(pixels.std(ddof=1)),
-        mean_of_pixels=float(pixels.mean()),
-        emissivity=emissivity.mean,
-        value=float(equation.temperature(np.array(mean))),
-        budget=budget,
-        chance=(*chance, (seen * scatter.standard_uncertainty, scatter.degrees_of_freedom)),
+        mean_of_pixels=mean_of_pixels,
+        emissivity=float(emissivity.estimate.values),
+        estimate=replace(found, warnings=tuple(warnings)),
         correlation=correlation,
     )
 
 
-def _drift(drift: float | None, radiance: float, recordings: int, scatter: Scatter) -> float:
-    """Standard uncertainty of the radiance by the drift over the repeatability; NaN if unknown."""
+def _seen(
+    values: NDArray[np.float64],
+    calibration: float,
+    shared: float,
+    drift: float | None,
+    recordings: int,
+) -> Estimate:
+    """Mean radiance of observations of shape (observation, pixel) in W/(m² sr).
+
+    Its calibration's errors have a correlation with those of the emissivity: they are the sum of
+    the same error and of another.
+    """
+    mean = float(values.mean())
+    # That which an image shows of chance has nothing to do with any other image.
+    random = area_estimate(mean, values, uuid4().hex)
+    spread = _drift(drift, mean, recordings, float(random.contribution("repeatability")))
+    found = Estimate(np.array(mean)).with_component("calibration", shared * calibration)
+    found = found.with_component(
+        "calibration",
+        sqrt(max(1 - shared**2, 0.0)) * calibration,
+        independent="common",
+        identity="measurement",
+    )
+    if spread is None:
+        found = found.with_unevaluated("drift")
+    else:
+        found = found.with_component("drift", spread, independent="common")
+    return found + (random - mean)
+
+
+def _warnings(name: str, found: Estimate, mean_of_pixels: float) -> list[str]:
+    uneven = abs(float(found.values) - mean_of_pixels)
+    if uneven <= max(_UNEVEN * float(found.standard_uncertainty), _NO_MATTER):
+        return []
+    return [
+        f"{name}: is uneven, the mean of its pixels' temperatures is {uneven:.3g} K from the "
+        "temperature of its mean radiance."
+    ]
+
+
+def _drift(
+    drift: float | None, radiance: float, recordings: int, repeatability: float
+) -> float | None:
+    """Standard uncertainty of the radiance by the drift over the repeatability, if known."""
     if recordings == 1:
-        return nan if drift is None else drift * radiance
+        return None if drift is None else drift * radiance
     stated = (drift or 0.0) * radiance / sqrt(recordings)
-    return sqrt(max(stated**2 - scatter.repeatability**2, 0.0))
+    return sqrt(max(stated**2 - repeatability**2, 0.0))
 
 
 @dataclass(frozen=True)
@@ -292,6 +319,14 @@ class _Sensitivity:
     radiance: float
     emissivity: float
     environment: float
+
+    @property
+    def partials(self) -> tuple[Callable[..., Any], ...]:
+        """By emissivity, radiance and surroundings, as `propagate` takes them."""
+        return tuple(
+            lambda *_, value=value: np.array(value)
+            for value in (self.emissivity, self.radiance, self.environment)
+        )
 
 
 @dataclass(frozen=True)
@@ -336,13 +371,16 @@ class _Equation:
 
 def _surroundings(
     emissivity: DeterminedEmissivity | KnownEmissivity, given: Surroundings | None
-) -> Surroundings:
+) -> Estimate:
+    """Temperature in K of what is reflected; by default with the error that the emissivity has."""
     if given is not None:
-        return given
+        return given.estimate
     if isinstance(emissivity, KnownEmissivity):
-        return Surroundings()
+        return Surroundings().estimate
     heating = emissivity.heating
-    return Surroundings(heating.environment, heating.environment_uncertainty)
+    return Estimate(np.array(heating.environment)).with_component(
+        "environment", heating.environment_uncertainty
+    )
 
 
 def _correlation(
@@ -356,37 +394,7 @@ def _correlation(
         return None
     heating = emissivity.heating
     hot, cold = band.radiance(np.array([heating.truth, heating.environment])).tolist()
-    then = cold + emissivity.mean * (hot - cold)
+    then = cold + float(emissivity.estimate.values) * (hot - cold)
     covariance = calibration.radiance_covariance(band.temperature(np.array([then, radiance])))
     scale = float(np.sqrt(covariance[0, 0] * covariance[1, 1]))
     return float(covariance[0, 1]) / scale if scale > 0 else 0.0
-
-
-def _budget(
-    sensitivity: _Sensitivity,
-    emissivity: DeterminedEmissivity | KnownEmissivity,
-    reflecting: Surroundings,
-    same_room: bool,
-    error: float,
-    correlation: float,
-) -> tuple[dict[str, float], tuple[tuple[float, float], ...]]:
-    """Parts of the uncertainty but for this image's chance, and those that are chance."""
-    own = {
-        "truth": 0.0,
-        "environment": sensitivity.environment * reflecting.standard_uncertainty,
-        "calibration": sensitivity.radiance * error,
-    }
-    if isinstance(emissivity, KnownEmissivity):
-        known = abs(sensitivity.emissivity) * emissivity.standard_uncertainty
-        return {**{cause: abs(part) for cause, part in own.items()}, "emissivity": known}, ()
-    together = {"truth": 0.0, "environment": float(same_room), "calibration": correlation}
-    through = {cause: sensitivity.emissivity * part for cause, part in emissivity.common.items()}
-    budget = {cause: _joined(own[cause], through[cause], together[cause]) for cause in own}
-    scatter = emissivity.scatter
-    budget["emissivity"] = abs(sensitivity.emissivity) * scatter.standard_uncertainty
-    return budget, ((budget["emissivity"], scatter.degrees_of_freedom),)
-
-
-def _joined(one: float, other: float, correlation: float) -> float:
-    """Standard uncertainty of the sum of two errors."""
-    return float(np.sqrt(max(one**2 + other**2 + 2 * correlation * one * other, 0.0)))

@@ -1,7 +1,7 @@
 """The command ``chipglow emissivity``: emissivity from images of heated objects."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -159,25 +159,27 @@ def _print_tables(
 ) -> None:
     from rich.table import Table
 
+    from chipglow.analysis.emissivity import BUDGET
+
     for of in rows:
         console.print(f"\nObject at {of[0].heating.truth - 273.15:.6g} °C")
         result = Table("region", "pixels", "mean", "sd of pixels", "u", "U 95 %", "k", box=None)
         budget = Table(
-            "parts of u", "truth", "environment", "calibration", "drift", "repeatability", "noise",
-            box=None,
+            "parts of u", *BUDGET, box=None,
         )  # fmt: skip
         for column in (*result.columns[1:], *budget.columns[1:]):
             column.justify = "right"
         for row in of:
-            spread = row.standard_uncertainty, row.expanded_uncertainty
+            found = row.estimate
+            spread = found.standard_uncertainty, found.expanded_uncertainty()
             result.add_row(
                 row.name,
                 str(row.pixels),
                 f"{row.mean:.4f}",
                 *map(_spread, (row.deviation, *spread)),
-                f"{row.coverage_factor:.2f}",
+                f"{found.coverage_factor():.2f}",
             )
-            budget.add_row(row.name, *map(_spread, row.budget.values()))
+            budget.add_row(row.name, *(_spread(found.contribution(cause)) for cause in BUDGET))
         console.print(result)
         console.print()
         console.print(budget)
@@ -185,17 +187,19 @@ def _print_tables(
         console.print("\nOver the temperature, with standard uncertainties")
         table = Table("region", "emissivity", "at", "change in 100 K", "sd about line", box=None)
         for line in lines:
+            middle, slope = line.estimate.values
+            of_middle, of_slope = line.estimate.standard_uncertainty
             table.add_row(
                 line.name,
-                f"{line.at_middle:.4f} ± {_spread(line.middle_uncertainty)}",
+                f"{middle:.4f} ± {_spread(of_middle)}",
                 f"{line.middle - 273.15:.6g} °C",
-                f"{100 * line.slope:+.4f} ± {_spread(100 * line.slope_uncertainty)}",
+                f"{100 * slope:+.4f} ± {_spread(100 * of_slope)}",
                 _spread(line.residual),
             )
         console.print(table)
 
 
-def _spread(value: float) -> str:
+def _spread(value: Any) -> str:
     """Two digits that count, or a dash where nothing is known."""
     return f"{value:#.2g}".removesuffix(".") if value == value else "–"
 
@@ -243,8 +247,8 @@ def _of_reflected(one: "EmissivityMap") -> float:
 def _doubts(rows: "list[list[RegionEmissivity]]") -> "Iterator[str]":
     for of in rows:
         at = f" (object at {of[0].heating.truth - 273.15:.6g} °C)" if len(rows) > 1 else ""
-        for doubt in (doubt for row in of for doubt in row.doubts):
-            yield f"{doubt}{at}."
+        for warning in (warning for row in of for warning in row.estimate.warnings):
+            yield f"{warning.removesuffix('.')}{at}."
 
 
 def _print_study(console: "Console", rows: "list[list[RegionEmissivity]]") -> None:

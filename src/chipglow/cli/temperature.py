@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -98,7 +98,7 @@ def temperature(
     _print(Console(highlight=False, markup=False), rows)
     say_of_measurements(*measurements)
     say_assumed(_assumptions(rows, emissivities, room, drift is None and len(images) == 1))
-    say_doubtful(f"{doubt}." for row in rows for doubt in row.doubts)
+    say_doubtful(warning for row in rows for warning in row.estimate.warnings)
     say_doubtful(_far_from_the_heating(rows, emissivities))
     if table is not None:
         write_temperature_table(rows, table)
@@ -151,7 +151,7 @@ def _far_from_the_heating(
         known = emissivities[row.name]
         if isinstance(known, KnownEmissivity):
             continue
-        difference = abs(row.value - known.heating.truth)
+        difference = abs(float(row.estimate.values) - known.heating.truth)
         if difference > FAR:
             yield (
                 f"{row.name}: is {difference:.0f} K from the {known.heating.truth - 273.15:.0f} °C "
@@ -163,32 +163,35 @@ def _far_from_the_heating(
 def _print(console: "Console", rows: "list[TrueTemperature]") -> None:
     from rich.table import Table
 
+    from chipglow.analysis.temperature import TEMPERATURE_BUDGET
+
     result = Table(
         "region", "pixels", "radiance temperature", "emissivity", "true temperature", "u", "U 95 %",
         "k", box=None,
     )  # fmt: skip
-    causes = list(rows[0].budget)
-    budget = Table("parts of u / K", *causes, box=None)
+    budget = Table("parts of u / K", *TEMPERATURE_BUDGET, box=None)
     for column in (*result.columns[1:], *budget.columns[1:]):
         column.justify = "right"
     for row in rows:
+        found = row.estimate
         result.add_row(
             row.name,
             str(row.pixels),
             f"{row.radiance_temperature - 273.15:.2f} °C",
             f"{row.emissivity:.4f}",
-            f"{row.value - 273.15:.2f} °C",
-            f"{_spread(row.standard_uncertainty)} K",
-            f"{_spread(row.expanded_uncertainty)} K",
-            f"{row.coverage_factor:.2f}",
+            f"{found.values - 273.15:.2f} °C",
+            f"{_spread(found.standard_uncertainty)} K",
+            f"{_spread(found.expanded_uncertainty())} K",
+            f"{found.coverage_factor():.2f}",
         )
-        budget.add_row(row.name, *map(_spread, row.budget.values()))
+        parts = (_spread(found.contribution(cause)) for cause in TEMPERATURE_BUDGET)
+        budget.add_row(row.name, *parts)
     console.print(result)
     console.print()
     console.print(budget)
 
 
-def _spread(value: float) -> str:
+def _spread(value: Any) -> str:
     """Two digits that count, or a dash where nothing is known."""
     return "–" if isnan(value) else f"{value:#.2g}".removesuffix(".")
 
@@ -205,23 +208,25 @@ def _assumptions(
     yield "every region is of even temperature and emissivity."
     if not known:
         yield "the emissivity is the same at all temperatures."
-    if known and not any(row.budget["emissivity"] for row in rows):
+    if known and not any(row.estimate.contribution("emissivity") for row in rows):
         yield "the emissivity is exact (--emissivity-uncertainty)."
     if known and room is None:
         yield "the object reflects 293 K exactly (--environment, --environment-uncertainty)."
     if not known and room is None:
         yield "the object reflects what it did when its emissivity was determined."
-    if not any(row.budget["calibration"] for row in rows):
+    if not any(row.estimate.contribution("calibration") for row in rows):
         yield "the camera's calibration is exact, as the measurement tells no uncertainty of it."
     elif not known and rows[0].correlation is None:
         yield (
             "the calibration's errors in the emissivity and here are independent, which makes u "
             "too large rather than too small (--calibration)."
         )
-    if drift_missing or any(isnan(getattr(one, "drift", 0.0)) for one in emissivities.values()):
+    if drift_missing or any(
+        isnan(one.estimate.contribution("drift")) for one in emissivities.values()
+    ):
         yield (
             "the camera does not drift from one recording to the next: there is one image here or "
             "of the emissivity, which does not show it, and u holds nothing of it (--drift)."
         )
-    if any(isnan(row.budget["repeatability"]) for row in rows):
+    if any(isnan(row.estimate.contribution("repeatability")) for row in rows):
         yield "nothing changes from frame to frame, as there is one only."

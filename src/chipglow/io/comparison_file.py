@@ -7,9 +7,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from chipglow.analysis import Comparison, PlaceResult, Reading, normalised_error
+from chipglow.analysis import Comparison, PlaceResult, normalised_error
+from chipglow.analysis.comparison import COVERAGE
 from chipglow.io.atomic import RESULT_MARK
 from chipglow.io.table_file import celsius_text, number_text, write_table
+from chipglow.uncertainty import Estimate
 
 _TABLE: Final = "comparison.csv"
 _COLUMNS: Final = (
@@ -55,7 +57,7 @@ def _rows(comparison: Comparison) -> Iterator[tuple[Any, ...]]:
     grid, band = comparison.grid, comparison.band
     if grid is not None:
         for label, simulated in zip(comparison.labels, grid.simulated, strict=True):
-            for m, n in np.ndindex(grid.measured.temperature.shape):
+            for m, n in np.ndindex(grid.measured.values.shape):
                 middle = float(grid.along[n]), float(grid.depth[m])
                 place = ("rake face", *_micro(*middle), "")
                 yield (*place, *_values(grid.measured, label, simulated, (m, n)))
@@ -71,15 +73,15 @@ def _micro(*lengths: float) -> list[str]:
 
 
 def _values(
-    measured: Reading, label: str, simulated: Reading, at: tuple[int, ...]
+    measured: Estimate, label: str, simulated: Estimate, at: tuple[int, ...]
 ) -> tuple[str, ...]:
-    own, other = measured.temperature[at], simulated.temperature[at]
+    own, other = measured.values[at], simulated.values[at]
     return (
         celsius_text(own),
-        number_text(measured.expanded[at]),
+        number_text(COVERAGE * measured.standard_uncertainty[at]),
         label,
         celsius_text(other),
-        number_text(simulated.expanded[at]),
+        number_text(COVERAGE * simulated.standard_uncertainty[at]),
         number_text(other - own),
         number_text(normalised_error(measured, simulated)[at]),
     )

@@ -10,24 +10,25 @@ import numpy as np
 import xarray as xr
 
 from chipglow.analysis.emissivity import (
+    BUDGET,
     COMMON,
     EmissivityMap,
     Heating,
     RegionEmissivity,
     emissivity_covariance,
 )
-from chipglow.analysis.observations import Scatter
-from chipglow.analysis.temperature import TrueTemperature
+from chipglow.analysis.observations import RANDOM
+from chipglow.analysis.temperature import TEMPERATURE_BUDGET, TrueTemperature
 from chipglow.camera import Flag
 from chipglow.io.measurement_file import Made, read_dataset, write_dataset
 from chipglow.io.table_file import write_table
 from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
 from chipglow.surface import MapSurface
+from chipglow.uncertainty import Cause, Component, Estimate
 
 _KIND: Final = "emissivity map"
 _HEATING: Final = ("environment", "truth_uncertainty", "environment_uncertainty")
-_BUDGET: Final = (*COMMON, "drift", "repeatability", "noise")
 
 
 def write_emissivity(
@@ -49,12 +50,18 @@ def write_emissivity(
     raster = maps[0].raster
     images: dict[str, Any] = {
         "emissivity": np.stack([one.emissivity for one in maps]),
-        "standard_uncertainty": np.stack([one.standard_uncertainty for one in maps]),
+        "standard_uncertainty": np.stack([one.estimate.standard_uncertainty for one in maps]),
         "flags": np.stack([one.flags for one in maps]),
     }
     tables = {f"region_{name}": _column(rows, name) for name in _COLUMNS}
-    for cause in _BUDGET:
-        tables[f"region_{cause}_uncertainty"] = [[row.budget[cause] for row in of] for of in rows]
+    for cause in BUDGET:
+        effect = _effect if cause in COMMON else Estimate.contribution
+        tables[f"region_{cause}_uncertainty"] = [
+            [float(effect(row.estimate, cause)) for row in of] for of in rows
+        ]
+    tables["region_random_degrees_of_freedom"] = [
+        [float(row.estimate.only(RANDOM).degrees_of_freedom) for row in of] for of in rows
+    ]
     names = np.array([row.name for row in rows[0]], dtype=object)
     data = xr.Dataset(
         {
@@ -68,6 +75,11 @@ def write_emissivity(
                 name: ("truth", [getattr(one.heating, name) for one in maps], {"units": "K"})
                 for name in _HEATING
             },
+            "region_warnings": (
+                ("truth", "region"),
+                np.array([["\n".join(row.estimate.warnings) for row in of] for of in rows], object),
+            ),
+            "observations": ("truth", np.array([one.identity for one in maps], dtype=object)),
             "feature": ("region", np.array([row.feature for row in rows[0]], dtype=object)),
         },
         coords={
@@ -78,20 +90,46 @@ def write_emissivity(
         },
         attrs={"kind": _KIND, "pitch": raster.spacing},
     ).drop_vars("time")
+    _say_correlations(data)
     for variable in data.data_vars.values():
         variable.attrs.setdefault("units", "1")
     write_dataset(data, path)
+
+
+_FORMS: Final = {
+    **dict.fromkeys(COMMON, ("systematic", "systematic")),
+    "drift": ("random", "systematic"),
+    "repeatability": ("random", "random"),
+    "noise": ("random", "random"),
+}
+"""How errors of the regions correlate along truth and region, as obsarray names it."""
+
+
+def _say_correlations(data: xr.Dataset) -> None:
+    """Give the regions' means the attributes of obsarray."""
+    known = []
+    for cause, forms in _FORMS.items():
+        part = data[f"region_{cause}_uncertainty"]
+        part.attrs["pdf_shape"] = "gaussian"
+        for number, (dim, form) in enumerate(zip(("truth", "region"), forms, strict=True), 1):
+            start = f"err_corr_{number}"
+            part.attrs |= {f"{start}_dim": dim, f"{start}_form": form}
+            part.attrs |= {f"{start}_params": [], f"{start}_units": []}
+        if np.isfinite(part.values).all():
+            known.append(part.name)
+    data["region_mean"].attrs["unc_comps"] = known
+
+
+def _effect(estimate: Estimate, cause: str) -> Any:
+    return estimate.effect(cause)
 
 
 @dataclass(frozen=True)
 class StoredEmissivity:
     """An area's emissivity as a file keeps it; fields as `RegionEmissivity` has them."""
 
-    mean: float
     heating: Heating
-    common: dict[str, float]
-    scatter: Scatter
-    drift: float
+    estimate: Estimate
 
 
 def read_region_emissivity(path: str | os.PathLike[str]) -> dict[str, StoredEmissivity]:
@@ -128,6 +166,8 @@ def _regions(data: xr.Dataset) -> dict[str, StoredEmissivity] | int:
     """Emissivities at one true temperature, or how many there are."""
     if data.sizes["truth"] != 1:
         return int(data.sizes["truth"])
+    if "observations" not in data:
+        raise ValueError("it is of an earlier version, expected one that is written anew")
     one = data.isel(truth=0)
     environment, *spreads = (float(one[name]) for name in _HEATING)
     heating = Heating(float(one["truth"]), environment, *spreads)
@@ -138,21 +178,28 @@ def _regions(data: xr.Dataset) -> dict[str, StoredEmissivity] | int:
 
 
 def _stored(row: xr.Dataset, heating: Heating) -> StoredEmissivity:
-    parts = {cause: float(row[f"region_{cause}_uncertainty"]) for cause in _BUDGET}
-    mean = float(row["region_mean"])
-    # A hotter object or room than thought makes the emissivity smaller: Equation 2.
-    signs = {"truth": -1.0, "environment": -1.0 if mean < 1 else 1.0, "calibration": 1.0}
-    scatter = Scatter(parts["repeatability"], parts["noise"], np.inf)
-    share = scatter.standard_uncertainty / max(float(row["region_standard_uncertainty"]), 1e-300)
-    freedom = float(row["region_degrees_of_freedom"])
-    if share > 0 and np.isfinite(freedom):
-        scatter = replace(scatter, degrees_of_freedom=freedom * share**4)
+    parts = {cause: float(row[f"region_{cause}_uncertainty"]) for cause in BUDGET}
+    observations = str(row["observations"].values)
+    estimate = Estimate(np.array(float(row["region_mean"])))
+    for cause in COMMON:
+        estimate = estimate.with_component(cause, parts[cause])
+    if np.isfinite(parts["drift"]):
+        estimate = estimate.with_component(
+            "drift", parts["drift"], independent="common", identity=observations
+        )
+    names = [cause for cause in ("repeatability", "noise") if np.isfinite(parts[cause])]
+    freedom = float(row["region_random_degrees_of_freedom"])
+    identity = f"{observations} {row['region'].values}"
+    random = Cause(RANDOM, identity, len(names), freedom, parts=tuple(names))
+    effects = np.array([[parts[name] for name in names]])
     return StoredEmissivity(
-        mean,
         heating,
-        {cause: signs[cause] * parts[cause] for cause in COMMON},
-        scatter,
-        parts["drift"],
+        replace(
+            estimate,
+            components=(*estimate.components, Component(random, effects)),
+            unevaluated=tuple(cause for cause in BUDGET if np.isnan(parts[cause])),
+            warnings=tuple(str(row["region_warnings"].values).splitlines()),
+        ),
     )
 
 
@@ -209,14 +256,14 @@ def write_emissivity_table(rows: Sequence[RegionEmissivity], path: str | os.Path
         The file to write; one that is there is replaced at the end.
     """
     head = ["region", "feature", "truth_K", "environment_K", *_COLUMNS]
-    head += [f"{cause}_uncertainty" for cause in _BUDGET]
+    head += [f"{cause}_uncertainty" for cause in BUDGET]
     write_table(Path(path), head, map(_line, rows))
 
 
 def _line(row: RegionEmissivity) -> list[str]:
     numbers = [row.heating.truth, row.heating.environment]
     numbers += [_value(row, name) for name in _COLUMNS]
-    numbers += [row.budget[cause] for cause in _BUDGET]
+    numbers += [float(row.estimate.contribution(cause)) for cause in BUDGET]
     return [row.name, row.feature, *(f"{number:.9g}" for number in numbers)]
 
 
@@ -231,17 +278,19 @@ def write_temperature_table(rows: Sequence[TrueTemperature], path: str | os.Path
         The file to write; one that is there is replaced at the end.
     """
     numbers = (
-        "emissivity", "radiance_temperature", "value", "deviation", "standard_uncertainty",
-        "degrees_of_freedom", "coverage_factor", "expanded_uncertainty",
+        "emissivity", "radiance_temperature", "true_temperature", "deviation",
+        "standard_uncertainty", "degrees_of_freedom", "coverage_factor", "expanded_uncertainty",
     )  # fmt: skip
     head = ["region", "pixels", "left_out", *numbers]
-    head[head.index("value")] = "true_temperature"
-    head += [f"{cause}_uncertainty" for cause in (*_BUDGET[:3], "emissivity", *_BUDGET[3:])]
+    head += [f"{cause}_uncertainty" for cause in TEMPERATURE_BUDGET]
 
     def line(row: TrueTemperature) -> list[Any]:
-        values = [getattr(row, name) for name in numbers]
-        values += [row.budget[name.removesuffix("_uncertainty")] for name in head[-7:]]
-        return [row.name, row.pixels, row.left_out, *(f"{value:.9g}" for value in values)]
+        found = row.estimate
+        values = [row.emissivity, row.radiance_temperature, found.values, row.deviation]
+        values += _stated(found).values()
+        values += [found.contribution(cause) for cause in TEMPERATURE_BUDGET]
+        texts = (f"{np.asarray(value).item():.9g}" for value in values)
+        return [row.name, row.pixels, row.left_out, *texts]
 
     write_table(Path(path), head, map(line, rows))
 
@@ -270,7 +319,20 @@ def _value(row: RegionEmissivity, name: str) -> float:
         "under_0": row.outside[0],
         "over_1": row.outside[1],
     }
+    stated = _stated(row.estimate)
+    if name in stated:
+        return stated[name]
     return float(special[name] if name in special else getattr(row, name))
+
+
+def _stated(estimate: Estimate) -> dict[str, float]:
+    """What a table says of the uncertainty."""
+    return {
+        "standard_uncertainty": float(estimate.standard_uncertainty),
+        "degrees_of_freedom": float(estimate.degrees_of_freedom),
+        "coverage_factor": float(estimate.coverage_factor()),
+        "expanded_uncertainty": float(estimate.expanded_uncertainty()),
+    }
 
 
 def _column(rows: Sequence[Sequence[RegionEmissivity]], name: str) -> list[list[float]]:

@@ -8,9 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.analysis import Comparison, GridComparison, Reading
+from chipglow.analysis import Comparison, GridComparison
+from chipglow.analysis.comparison import COVERAGE
 from chipglow.report import drawing
 from chipglow.report.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.uncertainty import Estimate
 
 _HEIGHT: Final = 5.2
 _ASIDE: Final = 0.2
@@ -31,7 +33,7 @@ def draw_comparison(comparison: Comparison) -> Figure:
     if comparison.grid is not None:
         grid = comparison.grid
         title = f"at the rake face, {1e6 * grid.depth[0]:.3g} µm deep"
-        readings = [_row(item) for item in (grid.measured, *grid.simulated)]
+        readings = [item[0] for item in (grid.measured, *grid.simulated)]
         columns.append((title, "along the rake face / µm", grid.along, readings))
     if comparison.band is not None:
         band = comparison.band
@@ -58,37 +60,32 @@ def draw_comparison(comparison: Comparison) -> Figure:
     return figure
 
 
-def _row(reading: Reading) -> Reading:
-    """What is nearest to the rake face."""
-    return Reading(reading.temperature[0], reading.systematic[0], reading.random[0])
-
-
 def _colour(number: int) -> str:
     return _COLOURS[number % len(_COLOURS)]
 
 
 def _draw_values(
-    axes: Axes, place: NDArray[np.float64], readings: Sequence[Reading], labels: Sequence[str]
+    axes: Axes, place: NDArray[np.float64], readings: Sequence[Estimate], labels: Sequence[str]
 ) -> None:
     measured, *simulated = readings
-    x, values = 1e6 * place, measured.temperature - KELVIN
+    x, values = 1e6 * place, measured.values - KELVIN
     axes.plot(x, values, "k.", markersize=4, label="measured")
     axes.fill_between(
         x,
-        values - measured.expanded,
-        values + measured.expanded,
+        values - COVERAGE * measured.standard_uncertainty,
+        values + COVERAGE * measured.standard_uncertainty,
         color=GREY,
         alpha=0.3,
         linewidth=0,
         label="expanded uncertainty, k = 2",
     )
     for i, (reading, label) in enumerate(zip(simulated, labels, strict=True)):
-        values = reading.temperature - KELVIN
+        values = reading.values - KELVIN
         axes.plot(x, values, color=_colour(i), label=label)
         axes.fill_between(
             x,
-            values - reading.expanded,
-            values + reading.expanded,
+            values - COVERAGE * reading.standard_uncertainty,
+            values + COVERAGE * reading.standard_uncertainty,
             color=_colour(i),
             alpha=0.15,
             linewidth=0,
@@ -100,7 +97,7 @@ def _draw_deeper(axes: Axes, grid: GridComparison) -> None:
     rows = grid.depth.size
     for row in range(1, rows):
         for i, reading in enumerate(grid.simulated):
-            away = reading.temperature[row] - grid.measured.temperature[row]
+            away = reading.values[row] - grid.measured.values[row]
             style: dict[str, Any] = {"color": _colour(i), "alpha": 0.6 * (1 - row / rows) + 0.1}
             axes.plot(1e6 * grid.along, away, linewidth=0.8, linestyle="--", **style)
     if rows > 1:
@@ -108,7 +105,7 @@ def _draw_deeper(axes: Axes, grid: GridComparison) -> None:
         axes.set_title(f"dashed: deeper rows, to {deepest:.3g} µm", fontsize="small")
 
 
-def _draw_differences(axes: Axes, place: NDArray[np.float64], readings: Sequence[Reading]) -> None:
+def _draw_differences(axes: Axes, place: NDArray[np.float64], readings: Sequence[Estimate]) -> None:
     measured, *simulated = readings
     axes.axhline(0.0, color="black", linewidth=0.8)
     step = float(np.median(np.diff(1e6 * place))) if place.size > 1 else 0.0
@@ -117,8 +114,8 @@ def _draw_differences(axes: Axes, place: NDArray[np.float64], readings: Sequence
         aside = _ASIDE * step * (i - (len(simulated) - 1) / 2)
         axes.errorbar(
             1e6 * place + aside,
-            reading.temperature - measured.temperature,
-            np.hypot(reading.expanded, measured.expanded),
+            reading.values - measured.values,
+            COVERAGE * (reading - measured).standard_uncertainty,
             color=_colour(i),
             marker=".",
             markersize=4,

@@ -121,7 +121,8 @@ def _draw_lines(axes: Axes, lines: Sequence[EmissivityLine], colours: Mapping[st
             label=line.name,
         )
         along = np.linspace(celsius.min(), celsius.max(), 50)
-        value, spread = line.at(along + KELVIN)
+        found = line.at(along + KELVIN)
+        value, spread = found.values, found.standard_uncertainty
         axes.plot(along, value, color=colour)
         axes.fill_between(along, value - 2 * spread, value + 2 * spread, color=colour, alpha=0.15)
     axes.set_xlabel("true temperature / °C")

@@ -68,7 +68,7 @@ def table_1(result: StudyResult) -> list[EmissivityTexts]:
                 feature=row.feature,
                 paper=_both(paper.mean, paper.deviation) if paper else "–",
                 true=_both(row.true.mean, row.true.deviation),
-                mean=f"{row.found.mean:.3f} ± {row.found.standard_uncertainty:.3f}",
+                mean=f"{row.found.mean:.3f} ± {row.found.estimate.standard_uncertainty:.3f}",
                 deviation=f"{row.found.deviation:.3f}",
                 textures=(
                     f"{row.means.mean():.3f} ± {row.means.std(ddof=1):.3f}" if several else "–"

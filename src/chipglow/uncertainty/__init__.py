@@ -1,0 +1,21 @@
+"""Estimates with the components of their uncertainty, and what is computed of them.
+
+Numerics only: nothing here knows of cameras, files or screens.
+"""
+
+from chipglow.uncertainty.component import Cause, Component
+from chipglow.uncertainty.dataset import from_xarray, to_xarray
+from chipglow.uncertainty.draws import coverage_interval, draw
+from chipglow.uncertainty.estimate import Estimate
+from chipglow.uncertainty.propagation import propagate
+
+__all__ = [
+    "Cause",
+    "Component",
+    "Estimate",
+    "coverage_interval",
+    "draw",
+    "from_xarray",
+    "propagate",
+    "to_xarray",
+]

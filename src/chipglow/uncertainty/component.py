@@ -1,0 +1,183 @@
+"""Components of uncertainty: the independent errors of a cause, and their effects."""
+
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+Distribution = Literal["normal", "rectangular", "triangular", "arcsine"]
+
+_MOST: Final = 200_000_000
+"""Numbers that the effects of one component may take: 1.6 GB."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A cause of errors: an input quantity of the GUM, with one or several independent errors.
+
+    Two causes are the same, and their errors fully correlated, if they have the same name and the
+    same identity.
+
+    Parameters
+    ----------
+    name : str
+        What it is, such as ``"calibration"``. Budgets have a line for each name.
+    identity : str
+        Tells causes of one name apart whose errors are independent. Empty for the one that is the
+        same wherever its name appears.
+    errors : int
+        How many independent errors it has: 1 of a systematic component, the number of pixels of
+        their noise, the number of observations that show how several quantities vary together.
+    degrees_of_freedom : float
+        Of the standard uncertainty of these errors; infinite if it is exactly known.
+    pooled : bool
+        Whether one estimate with these degrees of freedom serves all errors, as the residuals of
+        a fit do (JCGM 100:2008, H.3); otherwise every error has its own.
+    parts : tuple of str
+        Names of the errors in budgets, if each is to have its own line; by default all have that
+        of the cause.
+    distribution : str
+        Of an error: normal (Student's with finite degrees of freedom), rectangular, triangular or
+        arcsine (JCGM 101:2008, 6.4).
+
+    Raises
+    ------
+    ValueError
+        If a value is impossible.
+    """
+
+    name: str
+    identity: str = ""
+    errors: int = 1
+    degrees_of_freedom: float = inf
+    pooled: bool = True
+    distribution: Distribution = "normal"
+    parts: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.name.strip():
+            raise ValueError(f"component: its name is {self.name!r}, expected one")
+        if self.errors < 1:
+            raise ValueError(f"component {self.name}: has {self.errors} errors, expected 1 or more")
+        if not self.degrees_of_freedom > 0:
+            raise ValueError(
+                f"component {self.name}: degrees of freedom are {self.degrees_of_freedom!r}, "
+                "expected over 0"
+            )
+        if len(self.parts) not in (0, self.errors):
+            raise ValueError(
+                f"component {self.name}: has {len(self.parts)} parts, expected {self.errors}"
+            )
+        if self.distribution not in get_args(Distribution):
+            raise ValueError(
+                f"component {self.name}: distribution is {self.distribution!r}, expected one of "
+                f"{', '.join(get_args(Distribution))}"
+            )
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Names of its lines in a budget, each once."""
+        return tuple(dict.fromkeys(self.parts or (self.name,)))
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Name and identity: what makes the cause."""
+        return self.name, self.identity
+
+
+@dataclass(frozen=True, eq=False)
+class Component:
+    """What the errors of one cause do to an estimate.
+
+    Parameters
+    ----------
+    cause : Cause
+        The cause.
+    effects : ndarray or scipy.sparse.csr_array
+        Change of each value by an error of one standard uncertainty, with its sign, shape
+        (values, errors): the sensitivity coefficient times the standard uncertainty of
+        JCGM 100:2008, 5.1.3.
+
+    Raises
+    ------
+    ValueError
+        If the shape is not that of the cause.
+    """
+
+    cause: Cause
+    effects: Any
+
+    def __post_init__(self) -> None:
+        if self.effects.ndim != 2 or self.effects.shape[1] != self.cause.errors:
+            raise ValueError(
+                f"component {self.cause.name}: effects have shape {self.effects.shape}, "
+                f"expected (values, {self.cause.errors})"
+            )
+        if not sparse.issparse(self.effects):
+            self.effects.setflags(write=False)
+
+    @property
+    def variance(self) -> NDArray[np.float64]:
+        """Contribution to the variance of each value, shape (values,)."""
+        return np.asarray(_squared(self.effects).sum(axis=1), np.float64).ravel()
+
+    @property
+    def fourth_moment(self) -> NDArray[np.float64]:
+        """Sum of u⁴/ν in the formula of Welch and Satterthwaite, shape (values,)."""
+        if self.cause.pooled or self.cause.errors == 1:
+            return self.variance**2 / self.cause.degrees_of_freedom
+        fourth = _squared(_squared(self.effects)).sum(axis=1)
+        return np.asarray(fourth, np.float64).ravel() / self.cause.degrees_of_freedom
+
+    @property
+    def per_element(self) -> bool:
+        """Whether every value has an error of its own, and that alone."""
+        size, errors = self.effects.shape
+        if not sparse.issparse(self.effects) or size != errors or self.effects.nnz != size:
+            return False
+        return bool((self.effects.indices == np.arange(size)).all())
+
+    def of_line(self, name: str) -> "Component | None":
+        """What of it counts in a line of a budget; None if nothing does."""
+        if name not in self.cause.lines:
+            return None
+        if not self.cause.parts:
+            return self
+        errors = [index for index, part in enumerate(self.cause.parts) if part == name]
+        cause = replace(self.cause, errors=len(errors), parts=())
+        return Component(cause, self.effects[:, errors])
+
+    def scaled(self, factors: NDArray[np.float64]) -> Any:
+        """Effects on values that are multiplied by factors of shape (values,)."""
+        if sparse.issparse(self.effects):
+            found = self.effects.copy()
+            found.data *= np.repeat(factors, np.diff(found.indptr))
+            return found
+        return self.effects * factors[:, None]
+
+    def taken(self, rows: NDArray[np.intp]) -> "Component":
+        """The component of some of the values, some of them several times."""
+        if sparse.issparse(self.effects):
+            count = int(np.diff(self.effects.indptr)[rows].sum())
+        else:
+            count = rows.size * self.cause.errors
+        self._check_size(count)
+        return Component(self.cause, self.effects[rows])
+
+    def through(self, matrix: Any) -> "Component":
+        """The component of linear combinations of the values, matrix of shape (m, values)."""
+        return Component(self.cause, matrix @ self.effects)
+
+    def _check_size(self, count: int) -> None:
+        if count > _MOST:
+            raise ValueError(
+                f"component {self.cause.name}: {count:.1e} effects of single errors on single "
+                f"values, expected {_MOST:.0e} at most: use chipglow.uncertainty.draw"
+            )
+
+
+def _squared(effects: Any) -> Any:
+    return effects.power(2) if sparse.issparse(effects) else np.square(effects)

@@ -1,0 +1,241 @@
+"""Estimates as datasets with the attributes of obsarray, which punpy reads.
+
+Conventions: obsarray's user guide, "Storing uncertainties" (https://obsarray.readthedocs.io). A
+variable names its uncertainty variables in ``unc_comps``; each of these says for every dimension
+whether its errors are ``random`` or ``systematic``. Values of an uncertainty variable keep the sign
+of the effect: the covariance of a systematic one is the product of its values. What obsarray has no
+attribute for (cause, identity, degrees of freedom, warnings) stands beside in attributes of ours.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy import sparse
+
+from chipglow.uncertainty.component import Cause, Component
+from chipglow.uncertainty.estimate import Estimate, factor
+
+_SHAPES: Final[Mapping[str, str]] = {
+    "normal": "gaussian",
+    "rectangular": "rectangle",
+    "triangular": "triangle",
+    "arcsine": "arcsine",
+}
+_FEW: Final = 32
+"""Errors of one component that are all kept, also where there are fewer values."""
+
+_MANY: Final = 1000
+"""Values from which on their covariance is not decomposed."""
+
+_RANDOM, _SYSTEMATIC, _MATRIX = "random", "systematic", "err_corr_matrix"
+
+
+def to_xarray(
+    estimate: Estimate, name: str, dims: Sequence[str] | None = None, units: str = "1"
+) -> xr.Dataset:
+    """Values and components as variables of a dataset.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        What is kept.
+    name : str
+        Name of the variable of the values.
+    dims : sequence of str, optional
+        Its dimensions; ``dim_0`` and so on by default.
+    units : str
+        Of values and uncertainties.
+
+    Returns
+    -------
+    xarray.Dataset
+        The variable, and an uncertainty variable for each component, or for each error of one
+        that makes several values vary together. Datasets of several estimates can be merged.
+
+    Raises
+    ------
+    ValueError
+        If the number of dimensions is wrong, or a component is of more errors than there are
+        values, with more than a thousand values.
+
+    Notes
+    -----
+    A component of more errors than values, and more than 32, is kept by as many errors as there
+    are values: with the same covariance, but no longer the same as the errors of other estimates.
+    """
+    dims = [f"dim_{n}" for n in range(estimate.values.ndim)] if dims is None else list(dims)
+    if len(dims) != estimate.values.ndim:
+        raise ValueError(
+            f"{name}: has {len(dims)} dimensions named, expected {estimate.values.ndim}"
+        )
+    variables: dict[str, Any] = {}
+    for component in estimate.components:
+        for values, attributes in _parts(component, name):
+            values = values.reshape(estimate.shape)
+            label = _label(attributes, name, variables)
+            forms = _forms(attributes.pop("form"), dims)
+            variables[label] = (dims, values, {"units": units, **attributes, **forms})
+    attributes = {"units": units, "unc_comps": list(variables)}
+    for key in ("unevaluated", "warnings"):
+        if getattr(estimate, key):
+            attributes[key] = list(getattr(estimate, key))
+    return xr.Dataset({name: (dims, estimate.values, attributes), **variables})
+
+
+def from_xarray(data: xr.Dataset, name: str) -> Estimate:
+    """Read an estimate from a dataset of `to_xarray` or of obsarray.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        What holds the variable.
+    name : str
+        Name of the variable of the values.
+
+    Raises
+    ------
+    ValueError
+        If there is no such variable, an uncertainty variable is missing, or its correlation has a
+        form other than random, systematic or, along all dimensions together, a matrix.
+    """
+    if name not in data:
+        raise ValueError(f"{name}: there is no such variable, expected one of {list(data)}")
+    variable = data[name]
+    causes: dict[Cause, dict[int, Any]] = {}
+    for label in _texts(variable.attrs.get("unc_comps", ())):
+        if label not in data:
+            raise ValueError(f"{name}: its uncertainty {label} is not there, expected it")
+        cause, error, effects = _read(data, variable, label)
+        causes.setdefault(cause, {})[error] = effects
+    components = [
+        Component(cause, np.concatenate([parts[n] for n in sorted(parts)], axis=1))
+        if len(parts) > 1
+        else Component(cause, *parts.values())
+        for cause, parts in causes.items()
+    ]
+    remarks = (_texts(variable.attrs.get(key, ())) for key in ("unevaluated", "warnings"))
+    return Estimate(variable.values, tuple(components), *remarks)
+
+
+def _parts(component: Component, name: str) -> Iterator[tuple[NDArray[np.float64], dict[str, Any]]]:
+    """Values and attributes of the uncertainty variables of a component."""
+    if component.per_element:
+        yield component.effects.diagonal(), {**_attributes(component.cause, 0), "form": _RANDOM}
+        return
+    component = _compact(component, name)
+    for error in range(component.cause.errors):
+        attributes = {**_attributes(component.cause, error), "form": _SYSTEMATIC}
+        yield component.effects[:, error], attributes
+
+
+def _compact(component: Component, name: str) -> Component:
+    """The component with at most as many errors as values."""
+    size, errors = component.effects.shape
+    if errors > max(size, _FEW) and size > _MANY:
+        raise ValueError(
+            f"component {component.cause.name}: {errors} errors in {size} values, expected "
+            f"{_MANY} values or fewer where values share errors of their own"
+        )
+    effects = component.effects
+    effects = effects.toarray() if sparse.issparse(effects) else effects
+    if errors <= max(size, _FEW):
+        return Component(component.cause, effects)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        freedom = np.nanmin(component.variance**2 / component.fourth_moment)
+    cause = replace(
+        component.cause,
+        identity=f"{component.cause.identity} of {name}",
+        errors=size,
+        degrees_of_freedom=float(freedom) if freedom > 0 else np.inf,
+        pooled=True,
+        parts=(),
+    )
+    return Component(cause, np.asarray(np.linalg.qr(effects.T, mode="r")).T.copy())
+
+
+def _attributes(cause: Cause, error: int) -> dict[str, Any]:
+    return {
+        "pdf_shape": _SHAPES[cause.distribution],
+        "cause": cause.name,
+        "identity": cause.identity,
+        "error": error,
+        "errors": cause.errors,
+        "degrees_of_freedom": cause.degrees_of_freedom,
+        "pooled": int(cause.pooled),
+        **({"parts": list(cause.parts)} if cause.parts else {}),
+    }
+
+
+def _label(attributes: Mapping[str, Any], name: str, others: Mapping[str, Any]) -> str:
+    """Name of an uncertainty variable that no other has."""
+    label = f"u_{re.sub(r'[^0-9A-Za-z]+', '_', attributes['cause'])}_{name}"
+    count = sum(other == label or other.startswith(f"{label}_") for other in others)
+    return f"{label}_{count + 1}" if count else label
+
+
+def _forms(form: str, dims: Sequence[str]) -> dict[str, Any]:
+    forms: dict[str, Any] = {}
+    for number, dim in enumerate(dims, 1):
+        start = f"err_corr_{number}"
+        forms |= {f"{start}_dim": dim, f"{start}_form": form}
+        forms |= {f"{start}_params": [], f"{start}_units": []}
+    return forms
+
+
+def _read(data: xr.Dataset, variable: xr.DataArray, label: str) -> tuple[Cause, int, Any]:
+    """Cause, number of the error, and effects of an uncertainty variable."""
+    part = data[label]
+    values = np.broadcast_to(part.values, variable.shape).astype(np.float64)
+    if part.attrs.get("units") == "%":
+        values = values / 100 * variable.values
+    effects, own = _effects(data, part, label, values.ravel())
+    attributes = part.attrs
+    shapes = {text: name for name, text in _SHAPES.items()}
+    cause = Cause(
+        str(attributes.get("cause", label)),
+        # A dataset of obsarray says nothing of other variables: its errors are its own.
+        str(attributes.get("identity", f"{label} of {variable.name}")),
+        int(attributes.get("errors", effects.shape[1])),
+        float(attributes.get("degrees_of_freedom", np.inf)),
+        bool(attributes.get("pooled", not own)),
+        shapes.get(attributes.get("pdf_shape", ""), "normal"),  # type: ignore[arg-type]
+        _texts(attributes.get("parts", ())),
+    )
+    return cause, int(attributes.get("error", 0)), effects
+
+
+def _effects(
+    data: xr.Dataset, part: xr.DataArray, label: str, values: NDArray[np.float64]
+) -> tuple[Any, bool]:
+    """Effects of an uncertainty variable, and whether they are random."""
+    form = dict.fromkeys(part.dims, _RANDOM)
+    params: tuple[str, ...] = ()
+    for key, dims in part.attrs.items():
+        if re.fullmatch(r"err_corr_\w+_dim", key):
+            start = key.removesuffix("_dim")
+            form |= dict.fromkeys(_texts(dims), part.attrs[f"{start}_form"])
+            params += _texts(part.attrs.get(f"{start}_params", ()))
+    forms = set(form.values())
+    if forms == {_MATRIX} and len(params) == 1:
+        return values[:, None] * factor(data[params[0]].values, label), False
+    if not forms <= {_RANDOM, _SYSTEMATIC}:
+        raise ValueError(
+            f"{label}: its errors correlate as {', '.join(sorted(forms))}, expected random or "
+            "systematic along each dimension, or one matrix along all"
+        )
+    if _RANDOM not in forms:
+        return values[:, None], False
+    sizes = [part.sizes[dim] if form[dim] == _RANDOM else 1 for dim in part.dims]
+    numbers = np.broadcast_to(np.arange(np.prod(sizes)).reshape(sizes), part.shape).ravel()
+    places = (values, numbers, np.arange(values.size + 1))
+    return sparse.csr_array(places, shape=(values.size, int(np.prod(sizes)))), True
+
+
+def _texts(value: Any) -> tuple[str, ...]:
+    """Texts of an attribute: a list of one comes back from a file as a text."""
+    return (value,) if isinstance(value, str) else tuple(str(text) for text in value)

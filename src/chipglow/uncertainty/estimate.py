@@ -1,0 +1,550 @@
+"""The one type of a result with its uncertainty."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal, cast
+from uuid import uuid4
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from scipy.special import stdtrit
+
+from chipglow.uncertainty.component import Cause, Component, Distribution
+
+Partial = Callable[..., Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Values with the components of their uncertainty.
+
+    An estimate is made of its values alone and gets its components from `with_component`,
+    `from_observations` or `from_covariance`. Sums, products and `propagate` keep the effect of
+    every single error, with its sign, so what two results have in common is known: the difference
+    of an estimate and itself is exact.
+
+    Parameters
+    ----------
+    values : array_like
+        Of any shape; NaN where there is none.
+    components : iterable of Component
+        Independent of each other.
+    unevaluated : iterable of str
+        Causes that play a part, but of which nothing is known here: they are in the budget without
+        a number and not in the uncertainty.
+    warnings : iterable of str
+        Why the values may be wrong beyond their uncertainty, a sentence each. Whatever is
+        computed of the estimate has them too.
+
+    Raises
+    ------
+    ValueError
+        If a component is there twice, has effects on another number of values, or has an effect
+        that is not finite on a value that is.
+
+    Notes
+    -----
+    The law of propagation of uncertainty (JCGM 100:2008, 5.1.2 and 5.2.2), written with
+    independent errors of unit variance: y = f(x) + Σ cᵢ eᵢ. Covariances are then never stored:
+    they are the products of effects.
+    """
+
+    values: NDArray[np.float64]
+    components: tuple[Component, ...] = ()
+    unevaluated: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    __array_ufunc__ = None
+    """NumPy leaves arithmetic with arrays to this class."""
+
+    def __post_init__(self) -> None:
+        values = np.array(self.values, np.float64)
+        values.setflags(write=False)
+        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "components", tuple(self.components))
+        for name in ("unevaluated", "warnings"):
+            object.__setattr__(self, name, tuple(dict.fromkeys(getattr(self, name))))
+        keys = [component.cause.key for component in self.components]
+        if len(set(keys)) < len(keys):
+            raise ValueError(f"estimate: a component is there twice: {keys}, expected each once")
+        known = np.isfinite(values).ravel()
+        for component in self.components:
+            self._check(component, known)
+
+    def _check(self, component: Component, known: NDArray[np.bool_]) -> None:
+        name, effects = component.cause.name, component.effects
+        if effects.shape[0] != self.values.size:
+            raise ValueError(
+                f"component {name}: has effects on {effects.shape[0]} values, "
+                f"expected {self.values.size}"
+            )
+        numbers = effects.data if sparse.issparse(effects) else effects
+        if not np.isfinite(numbers).all() and not np.isfinite(component.variance[known]).all():
+            raise ValueError(f"component {name}: an effect is not finite, expected finite ones")
+
+    # How it is made
+
+    def with_component(
+        self,
+        name: str,
+        effect: ArrayLike,
+        *,
+        independent: Literal["common", "per element"] | None = None,
+        identity: str | None = None,
+        degrees_of_freedom: float = np.inf,
+        pooled: bool = True,
+        distribution: Distribution = "normal",
+    ) -> "Estimate":
+        """The same with one more component.
+
+        Parameters
+        ----------
+        name : str
+            Its cause.
+        effect : array_like
+            Its standard uncertainty, with the sign of its effect on each value; one number for
+            all values or one for each.
+        independent : str, optional
+            By default the error is one, and the same wherever the name appears. ``"common"``: it
+            is one for all values, and independent of any other of that name. ``"per element"``:
+            every value has its own.
+        identity : str, optional
+            Tells an independent component apart from others of its name; by default a new one.
+        degrees_of_freedom, pooled, distribution
+            As in `Cause`.
+
+        Raises
+        ------
+        ValueError
+            If a value is impossible.
+        """
+        signed = np.broadcast_to(np.asarray(effect, np.float64), self.values.shape).flatten()
+        per_element = independent == "per element"
+        if identity is None:
+            identity = "" if independent is None else uuid4().hex
+        elif independent is None:
+            raise ValueError(f"component {name}: has an identity, expected independent with it")
+        errors = signed.size if per_element else 1
+        cause = Cause(name, identity, errors, degrees_of_freedom, pooled, distribution)
+        effects = _diagonal(signed) if per_element else signed[:, None]
+        return replace(self, components=(*self.components, Component(cause, effects)))
+
+    @classmethod
+    def from_observations(
+        cls, observations: ArrayLike, name: str, identity: str | None = None
+    ) -> "Estimate":
+        """Means of repeated observations, of one quantity or of several observed together.
+
+        Parameters
+        ----------
+        observations : array_like
+            Shape (n, ...), n of 2 or more.
+        name : str
+            Name of the component.
+        identity : str, optional
+            As in `with_component`; a new one by default.
+
+        Raises
+        ------
+        ValueError
+            If there are fewer than two observations.
+
+        Notes
+        -----
+        Type A evaluation, JCGM 100:2008, 4.2.3 and 5.2.3: variances and covariances of the means,
+        with n − 1 degrees of freedom.
+        """
+        values = np.asarray(observations, np.float64)
+        count = len(values)
+        if count < 2:
+            raise ValueError(f"component {name}: {count} observations, expected 2 or more")
+        mean = values.mean(axis=0)
+        effects = ((values - mean) / np.sqrt(count * (count - 1.0))).reshape(count, -1).T.copy()
+        cause = Cause(name, uuid4().hex if identity is None else identity, count, count - 1.0)
+        return cls(mean, (Component(cause, effects),))
+
+    @classmethod
+    def from_covariance(
+        cls,
+        values: ArrayLike,
+        covariance: ArrayLike,
+        name: str,
+        identity: str | None = None,
+        degrees_of_freedom: float = np.inf,
+    ) -> "Estimate":
+        """Values whose covariance matrix is known, as of the parameters of a fit.
+
+        Parameters
+        ----------
+        values : array_like
+            Of any shape.
+        covariance : array_like
+            Shape (values, values), symmetric, without negative variances.
+        name, identity, degrees_of_freedom
+            As in `with_component`; the identity is a new one by default.
+
+        Raises
+        ------
+        ValueError
+            If the matrix is no covariance of the values.
+        """
+        center = np.asarray(values, np.float64)
+        matrix = np.asarray(covariance, np.float64)
+        if matrix.shape != (center.size, center.size):
+            raise ValueError(
+                f"component {name}: covariance has shape {matrix.shape}, "
+                f"expected {(center.size, center.size)}"
+            )
+        effects = factor(matrix, name)
+        identity = uuid4().hex if identity is None else identity
+        cause = Cause(name, identity, effects.shape[1], degrees_of_freedom)
+        return cls(center, (Component(cause, effects),))
+
+    def with_warnings(self, *warnings: str) -> "Estimate":
+        """The same with more warnings."""
+        return replace(self, warnings=(*self.warnings, *warnings))
+
+    def with_unevaluated(self, *names: str) -> "Estimate":
+        """The same with more causes of which nothing is known."""
+        return replace(self, unevaluated=(*self.unevaluated, *names))
+
+    # What it says
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the values."""
+        return self.values.shape
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Lines of the budget, each once; those without a number last."""
+        known = (name for component in self.components for name in component.cause.lines)
+        return tuple(dict.fromkeys((*known, *self.unevaluated)))
+
+    @cached_property
+    def standard_uncertainty(self) -> NDArray[np.float64]:
+        """Combined standard uncertainty (JCGM 100:2008, 5.1.2), of the shape of the values."""
+        return np.sqrt(self._summed(component.variance for component in self.components))
+
+    @cached_property
+    def degrees_of_freedom(self) -> NDArray[np.float64]:
+        """Effective number by Welch and Satterthwaite (JCGM 100:2008, G.4.1), of that shape."""
+        parts = self._summed(component.fourth_moment for component in self.components)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(parts > 0, self.standard_uncertainty**4 / parts, np.inf)
+
+    def coverage_factor(self, level: float = 0.95) -> NDArray[np.float64]:
+        """Student's t of a level of confidence (JCGM 100:2008, G.3), of the shape of the values.
+
+        Parameters
+        ----------
+        level : float
+            Between 0 and 1.
+
+        Raises
+        ------
+        ValueError
+            If the level is not between 0 and 1.
+        """
+        if not 0 < level < 1:
+            raise ValueError(f"level of confidence: is {level!r}, expected between 0 and 1")
+        return np.asarray(stdtrit(self.degrees_of_freedom, (1 + level) / 2), np.float64)
+
+    def expanded_uncertainty(self, level: float = 0.95) -> NDArray[np.float64]:
+        """Coverage factor times standard uncertainty (JCGM 100:2008, 6.2.1)."""
+        return self.coverage_factor(level) * self.standard_uncertainty
+
+    def contribution(self, name: str) -> NDArray[np.float64]:
+        """Standard uncertainty of one line of the budget, of the shape of the values.
+
+        It is 0 of a cause that plays no part, and NaN of one of which nothing is known.
+        """
+        found = self.of_line(name)
+        if not found.components and name in self.unevaluated:
+            return np.full(self.shape, np.nan)
+        return found.standard_uncertainty
+
+    def of_line(self, name: str) -> "Estimate":
+        """The same, uncertain by one line of the budget alone."""
+        parts = (component.of_line(name) for component in self.components)
+        return replace(self, components=tuple(part for part in parts if part is not None))
+
+    def renamed(self, name: str, new: str) -> "Estimate":
+        """The same, with a component under another name: a line of its own in budgets."""
+        components = tuple(
+            Component(replace(one.cause, name=new, parts=()), one.effects)
+            if one.cause.name == name
+            else one
+            for one in self.components
+        )
+        return replace(self, components=components)
+
+    def only(self, name: str) -> "Estimate":
+        """The same with the components of a name alone."""
+        kept = tuple(one for one in self.components if one.cause.name == name)
+        return replace(self, components=kept)
+
+    def without(self, name: str) -> "Estimate":
+        """The same without the components of a name."""
+        kept = tuple(one for one in self.components if one.cause.name != name)
+        return replace(self, components=kept)
+
+    def effect(self, name: str) -> NDArray[np.float64]:
+        """Signed effect of the systematic component of a name, of the shape of the values.
+
+        It is 0 if there is none.
+        """
+        for component in self.components:
+            if component.cause.key == (name, "") and component.cause.errors == 1:
+                return np.asarray(component.effects, np.float64).reshape(self.shape)
+        return np.zeros(self.shape)
+
+    def budget(self) -> xr.Dataset:
+        """The uncertainty budget: a line for each cause.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``standard_uncertainty``, ``fraction`` of the variance and ``degrees_of_freedom`` by
+            ``cause``, and by value unless there is just one. Its `to_dataframe` is a table. NaN
+            where nothing is known.
+        """
+        lines = [self._line(name) for name in self.names]
+        dims = ("cause", *(f"dim_{axis}" for axis in range(self.values.ndim)))
+        columns = ("standard_uncertainty", "fraction", "degrees_of_freedom")
+        shape = (len(lines), *self.shape)
+        return xr.Dataset(
+            {
+                column: (dims, np.reshape([line[index] for line in lines], shape))
+                for index, column in enumerate(columns)
+            },
+            {"cause": np.array(self.names, dtype=object)},
+        )
+
+    def _line(self, name: str) -> tuple[NDArray[np.float64], ...]:
+        part = self.of_line(name)
+        spread = self.contribution(name)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            fraction = np.where(spread == 0, 0.0, (spread / self.standard_uncertainty) ** 2)
+        freedom = np.where(np.isnan(spread), np.nan, part.degrees_of_freedom)
+        return spread, fraction, freedom
+
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of all values, flat, shape (values, values): JCGM 100:2008, H.2.3."""
+        total = np.zeros((self.values.size, self.values.size))
+        for component in self.components:
+            product = component.effects @ component.effects.T
+            total += product.toarray() if sparse.issparse(product) else product
+        return total
+
+    def correlation(self) -> NDArray[np.float64]:
+        """Correlation of all values, flat; NaN with an exact one (JCGM 100:2008, 5.2.2)."""
+        covariance = self.covariance()
+        spread = np.sqrt(np.diag(covariance))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(covariance / np.outer(spread, spread))
+
+    def _summed(self, parts: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
+        return sum(parts, np.zeros(self.values.size)).reshape(self.shape)
+
+    # What is computed of it
+
+    def __getitem__(self, index: Any) -> "Estimate":
+        numbers = np.arange(self.values.size).reshape(self.shape)[index]
+        return self._of_rows(self.values[index], np.asarray(numbers))
+
+    def reshape(self, *shape: int) -> "Estimate":
+        """The same values in another shape."""
+        return replace(self, values=self.values.reshape(shape))
+
+    def _of_rows(self, values: Any, numbers: NDArray[np.intp]) -> "Estimate":
+        rows = numbers.ravel()
+        components = tuple(one.taken(rows) for one in self.components)
+        return replace(self, values=values, components=components)
+
+    def _broadcast(self, shape: tuple[int, ...]) -> "Estimate":
+        if shape == self.shape:
+            return self
+        numbers = np.arange(self.values.size).reshape(self.shape)
+        return self._of_rows(np.broadcast_to(self.values, shape), np.broadcast_to(numbers, shape))
+
+    def linear(self, matrix: Any) -> "Estimate":
+        """Linear combinations of the flat values.
+
+        Parameters
+        ----------
+        matrix : ndarray or sparse array
+            Shape (m, values).
+
+        Returns
+        -------
+        Estimate
+            Of shape (m,): y = A x, with the covariance A V Aᵀ.
+        """
+        components = tuple(component.through(matrix) for component in self.components)
+        return replace(self, values=matrix @ self.values.ravel(), components=components)
+
+    def mean(self) -> "Estimate":
+        """Mean of all values."""
+        size = self.values.size
+        return self.linear(np.full((1, size), 1 / size)).reshape()
+
+    def sum(self) -> "Estimate":
+        """Sum of all values."""
+        return self.linear(np.ones((1, self.values.size))).reshape()
+
+    @classmethod
+    def stack(cls, estimates: Sequence["Estimate"]) -> "Estimate":
+        """Several estimates of one shape as one, along a new first axis.
+
+        Parameters
+        ----------
+        estimates : sequence of Estimate
+            One or more. Their components of the same cause stay the same.
+        """
+        blocks: dict[Cause, list[Any]] = {}
+        for number, one in enumerate(estimates):
+            for component in one.components:
+                blocks.setdefault(component.cause, [None] * len(estimates))
+                blocks[component.cause][number] = component.effects
+        size = estimates[0].values.size
+        components = [
+            Component(cause, _stacked(parts, (size, cause.errors)))
+            for cause, parts in blocks.items()
+        ]
+        return cls(
+            np.stack([one.values for one in estimates]), tuple(components), *remarks(estimates)
+        )
+
+    def __neg__(self) -> "Estimate":
+        return chain(-self.values, (self,), (np.array(-1.0),))
+
+    def __pos__(self) -> "Estimate":
+        return self
+
+    def __add__(self, other: Any) -> "Estimate":
+        one, two = self, as_estimate(other)
+        return chain(one.values + two.values, (one, two), (np.array(1.0), np.array(1.0)))
+
+    def __sub__(self, other: Any) -> "Estimate":
+        one, two = self, as_estimate(other)
+        return chain(one.values - two.values, (one, two), (np.array(1.0), np.array(-1.0)))
+
+    def __mul__(self, other: Any) -> "Estimate":
+        one, two = self, as_estimate(other)
+        return chain(one.values * two.values, (one, two), (two.values, one.values))
+
+    def __truediv__(self, other: Any) -> "Estimate":
+        one, two = self, as_estimate(other)
+        values = one.values / two.values
+        return chain(values, (one, two), (1 / two.values, -values / two.values))
+
+    def __pow__(self, power: float) -> "Estimate":
+        partial = power * self.values ** (power - 1)
+        return chain(self.values**power, (self,), (partial,))
+
+    def __radd__(self, other: Any) -> "Estimate":
+        return self.__add__(other)
+
+    def __rsub__(self, other: Any) -> "Estimate":
+        return chain(other - self.values, (self,), (np.array(-1.0),))
+
+    def __rmul__(self, other: Any) -> "Estimate":
+        return self.__mul__(other)
+
+    def __rtruediv__(self, other: Any) -> "Estimate":
+        values = other / self.values
+        return chain(values, (self,), (-values / self.values,))
+
+
+def as_estimate(value: Any) -> Estimate:
+    """An estimate as it is; numbers as exact ones."""
+    return value if isinstance(value, Estimate) else Estimate(value)
+
+
+def chain(
+    values: NDArray[np.float64],
+    inputs: Sequence[Estimate],
+    partials: Sequence[NDArray[np.float64]],
+) -> Estimate:
+    """The estimate of values that were computed from inputs, element by element.
+
+    Parameters
+    ----------
+    values : ndarray
+        The result, of the shape to which the inputs broadcast.
+    inputs : sequence of Estimate
+        What it was computed from.
+    partials : sequence of ndarray
+        Partial derivatives by each input, of shapes that broadcast to that of the result.
+
+    Raises
+    ------
+    ValueError
+        If two inputs have components of one name that cannot be the same.
+    """
+    shape = np.shape(values)
+    found: dict[tuple[str, str], Component] = {}
+    for one, partial in zip(inputs, partials, strict=True):
+        factors = np.broadcast_to(partial, shape).ravel()
+        for component in one._broadcast(shape).components:
+            cause, effects = component.cause, component.scaled(factors)
+            before = found.get(cause.key)
+            if before is not None:
+                check_same(before.cause, cause)
+                effects = before.effects + effects
+            found[cause.key] = Component(cause, effects)
+    return Estimate(values, tuple(found.values()), *remarks(inputs))
+
+
+def remarks(estimates: Iterable[Estimate]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Unevaluated causes and warnings of several estimates."""
+    several = list(estimates)
+    return (
+        tuple(name for one in several for name in one.unevaluated),
+        tuple(warning for one in several for warning in one.warnings),
+    )
+
+
+def factor(covariance: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    """Effects of independent errors that have a covariance, shape (values, errors).
+
+    Raises
+    ------
+    ValueError
+        If the matrix is not symmetric, or has a negative variance beyond rounding.
+    """
+    scale = float(np.abs(covariance).max(initial=0.0))
+    if not np.allclose(covariance, covariance.T, rtol=0.0, atol=1e-9 * scale):
+        raise ValueError(f"component {name}: covariance is not symmetric, expected it so")
+    variances, directions = np.linalg.eigh(covariance)
+    if variances.min(initial=0.0) < -1e-9 * scale:
+        raise ValueError(
+            f"component {name}: covariance has a variance of {variances.min():.3g} in one "
+            "direction, expected 0 or more"
+        )
+    return cast(NDArray[np.float64], directions * np.sqrt(np.maximum(variances, 0.0)))
+
+
+def check_same(one: Cause, other: Cause) -> None:
+    """Raise ValueError if two causes of one name and identity are not the same."""
+    if one != other:
+        raise ValueError(
+            f"component {one.name}: is {one} and {other}, expected the same errors wherever "
+            "its name appears; name it otherwise, or make it independent"
+        )
+
+
+def _diagonal(values: NDArray[np.float64]) -> Any:
+    """A sparse array with values on its diagonal, those that are 0 too."""
+    return sparse.csr_array((values, np.arange(values.size), np.arange(values.size + 1)))
+
+
+def _stacked(parts: Sequence[Any], shape: tuple[int, int]) -> Any:
+    if any(sparse.issparse(part) for part in parts):
+        empty = sparse.csr_array(shape)
+        return sparse.vstack([empty if part is None else part for part in parts], format="csr")
+    return np.concatenate([np.zeros(shape) if part is None else part for part in parts])

@@ -1,0 +1,593 @@
+"""Estimates: the GUM's own examples, exact bookkeeping of errors, draws, files, speed."""
+
+import time
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import stdtrit
+
+from chipglow.uncertainty import (
+    Cause,
+    Component,
+    Estimate,
+    coverage_interval,
+    draw,
+    from_xarray,
+    propagate,
+    to_xarray,
+)
+
+# JCGM 100:2008, annex H, as printed
+
+NM = 1e-6
+"""Nanometres in mm."""
+
+
+def exact(value, name, spread, freedom=np.inf, **more):
+    return Estimate(value).with_component(name, spread, degrees_of_freedom=freedom, **more)
+
+
+def end_gauge():
+    """H.1: the inputs of Table H.1, and the length in mm by Equation H.3."""
+    standard = exact(50.000623, "calibration of the standard", 25 * NM, 18)
+    difference = (
+        exact(215 * NM, "repeated observations", 5.8 * NM, 24)
+        .with_component("random effects of comparator", 3.9 * NM, degrees_of_freedom=5)
+        .with_component("systematic effects of comparator", 6.7 * NM, degrees_of_freedom=8)
+    )
+    away = exact(-0.1, "mean temperature of bed", 0.2).with_component(
+        "cyclic variation", 0.35, distribution="arcsine"
+    )
+    shape = {"distribution": "rectangular"}
+    expansion = exact(11.5e-6, "expansion of standard", 1.2e-6, **shape)
+    of_expansion = exact(0.0, "difference of expansions", 0.58e-6, 50, **shape)
+    of_temperature = exact(0.0, "difference of temperatures", 0.029, 2, **shape)
+    return standard, difference, expansion, away, of_expansion, of_temperature
+
+
+def length(standard, difference, expansion, away, of_expansion, of_temperature):
+    return standard + difference - standard * (of_expansion * away + expansion * of_temperature)
+
+
+def test_h1_the_end_gauge():
+    inputs = end_gauge()
+    found = length(*inputs)
+    assert found.values == pytest.approx(50.000838, abs=5e-7)
+    assert inputs[1].standard_uncertainty / NM == pytest.approx(9.7, abs=0.05)
+    # Printed from the rounded 9.7 nm: 25.6; 25.4 without rounding.
+    assert inputs[1].degrees_of_freedom == pytest.approx(25.6, abs=0.2)
+    # Table H.1, column of |c u(x)| in nm.
+    for name, expected in (
+        ("calibration of the standard", 25.0),
+        ("difference of expansions", 2.9),
+        ("difference of temperatures", 16.6),
+        ("expansion of standard", 0.0),
+        ("mean temperature of bed", 0.0),
+    ):
+        # The difference of temperatures is printed from the rounded 0.029 °C: 16.7.
+        assert found.contribution(name) / NM == pytest.approx(expected, abs=0.1)
+    assert found.standard_uncertainty / NM == pytest.approx(32, abs=0.5)
+    assert found.degrees_of_freedom == pytest.approx(16.7, abs=0.3)
+    # H.1.6: t for 99 % and 16 degrees of freedom is 2.92, and U 93 nm.
+    assert np.floor(found.degrees_of_freedom) == 16
+    assert stdtrit(16, 0.995) * found.standard_uncertainty / NM == pytest.approx(93, abs=0.5)
+    assert found.coverage_factor(0.99) == pytest.approx(2.92, abs=0.03)
+
+
+def test_h1_terms_of_second_order_appear_in_draws():
+    """H.1.7: with terms of second order u is 34 nm. As there, by standard deviations alone."""
+    inputs = [
+        replace(one, components=tuple(
+            Component(replace(part.cause, degrees_of_freedom=np.inf), part.effects)
+            for part in one.components
+        ))
+        for one in end_gauge()
+    ]  # fmt: skip
+    drawn = length(*draw(inputs, 400_000, np.random.default_rng(1)))
+    assert drawn.std() / NM == pytest.approx(34, abs=0.5)
+
+
+VOLTS = [5.007, 4.994, 5.005, 4.990, 4.999]
+AMPERES = [19.663e-3, 19.639e-3, 19.640e-3, 19.685e-3, 19.678e-3]
+RADIANS = [1.0456, 1.0438, 1.0468, 1.0428, 1.0433]
+
+
+def impedance(observed):
+    """H.2: R, X and Z of Equation H.7 from means that were observed together."""
+    volts, amperes, phase = observed
+    ratio = volts / amperes
+    resistance = propagate(lambda z, a: z * np.cos(a), ratio, phase)
+    reactance = propagate(lambda z, a: z * np.sin(a), ratio, phase)
+    return Estimate.stack([resistance, reactance, ratio])
+
+
+def test_h2_resistance_and_reactance():
+    observed = Estimate.from_observations(np.transpose([VOLTS, AMPERES, RADIANS]), "repeated")
+    # Table H.2
+    np.testing.assert_allclose(observed.values, [4.9990, 19.6610e-3, 1.04446], rtol=1e-7)
+    # Printed with two digits: 0.75e-3 may be 0.745e-3.
+    np.testing.assert_allclose(
+        observed.standard_uncertainty, [0.0032, 0.0095e-3, 0.00075], rtol=0.016
+    )
+    among = observed.correlation()
+    assert among[[0, 0, 1], [1, 2, 2]] == pytest.approx([-0.36, 0.86, -0.65], abs=0.005)
+    # Table H.3
+    found = impedance([observed[0], observed[1], observed[2]])
+    np.testing.assert_allclose(found.values, [127.732, 219.847, 254.260], atol=5e-4)
+    np.testing.assert_allclose(found.standard_uncertainty, [0.071, 0.295, 0.236], atol=6e-4)
+    among = found.correlation()
+    assert among[[0, 0, 1], [1, 2, 2]] == pytest.approx([-0.588, -0.485, 0.993], abs=6e-4)
+    np.testing.assert_allclose(found.degrees_of_freedom, 4.0)
+
+
+def test_h2_from_the_covariance_is_the_same():
+    observed = Estimate.from_observations(np.transpose([VOLTS, AMPERES, RADIANS]), "repeated")
+    known = Estimate.from_covariance(observed.values, observed.covariance(), "repeated", "", 4)
+    one, two = (impedance([each[n] for n in range(3)]) for each in (observed, known))
+    np.testing.assert_allclose(two.covariance(), one.covariance(), rtol=1e-6)
+    np.testing.assert_allclose(two.degrees_of_freedom, 4.0)
+
+    def joint(three):
+        volts, amperes, phase = three
+        ratio = volts / amperes
+        return np.array([ratio * np.cos(phase), ratio * np.sin(phase), ratio])
+
+    whole = propagate(joint, known, elementwise=False)
+    # Both differ from the derivatives by terms of third order of uncertainties of 0.1 %.
+    np.testing.assert_allclose(whole.covariance(), one.covariance(), rtol=1e-4)
+
+
+CELSIUS = [21.521, 22.012, 22.512, 23.003, 23.507, 23.999, 24.513, 25.002, 25.503, 26.010, 26.511]
+CORRECTIONS = [
+    -0.171, -0.169, -0.166, -0.159, -0.164, -0.165, -0.156, -0.157, -0.159, -0.161, -0.160,
+]  # fmt: skip
+
+
+def test_h3_calibration_of_a_thermometer():
+    design = np.stack([np.ones(11), np.array(CELSIUS) - 20.0], axis=1)
+    solve = np.linalg.pinv(design)
+    residual = np.array(CORRECTIONS) - design @ (solve @ CORRECTIONS)
+    scatter = np.sqrt(residual @ residual / 9)
+    assert scatter == pytest.approx(0.0035, abs=5e-5)
+    observed = Estimate(CORRECTIONS).with_component(
+        "scatter about the line", scatter, independent="per element", degrees_of_freedom=9
+    )
+    line = observed.linear(solve)
+    np.testing.assert_allclose(line.values, [-0.1712, 0.00218], atol=(5e-5))
+    assert line.values[1] == pytest.approx(0.00218, abs=5e-6)
+    assert line.standard_uncertainty[0] == pytest.approx(0.0029, abs=5e-5)
+    assert line.standard_uncertainty[1] == pytest.approx(0.00067, abs=5e-6)
+    assert line.correlation()[0, 1] == pytest.approx(-0.930, abs=5e-4)
+    # H.3.4: the correction at 30 °C, 0.0041 with nine degrees of freedom.
+    at_30 = line[0] + line[1] * 10.0
+    assert at_30.values == pytest.approx(-0.1494, abs=5e-5)
+    assert at_30.standard_uncertainty == pytest.approx(0.0041, abs=5e-5)
+    assert at_30.degrees_of_freedom == pytest.approx(9.0)
+
+
+def test_gtc_gives_the_same():
+    gtc = pytest.importorskip("GTC")
+    with_gtc = [
+        gtc.ureal(50.000623, 25 * NM, 18),
+        gtc.ureal(215 * NM, 5.8 * NM, 24) + gtc.ureal(0, 3.9 * NM, 5) + gtc.ureal(0, 6.7 * NM, 8),
+        gtc.ureal(11.5e-6, 1.2e-6),
+        gtc.ureal(-0.1, 0.2) + gtc.ureal(0, 0.35),
+        gtc.ureal(0, 0.58e-6, 50),
+        gtc.ureal(0, 0.029, 2),
+    ]
+    one, two = length(*with_gtc), length(*end_gauge())
+    assert two.standard_uncertainty == pytest.approx(one.u, rel=1e-12)
+    assert two.degrees_of_freedom == pytest.approx(one.df, rel=1e-9)
+    volts, amperes, phase = gtc.ta.multi_estimate_real((VOLTS, AMPERES, RADIANS))
+    ratio = volts / amperes
+    parts = [ratio * gtc.cos(phase), ratio * gtc.sin(phase), ratio]
+    observed = Estimate.from_observations(np.transpose([VOLTS, AMPERES, RADIANS]), "repeated")
+    found = impedance([observed[n] for n in range(3)])
+    expected = [[gtc.get_covariance(one, two) for two in parts] for one in parts]
+    # Derivatives over one standard uncertainty of 0.1 %: their square.
+    np.testing.assert_allclose(found.covariance(), expected, rtol=1e-5)
+    np.testing.assert_allclose(found.degrees_of_freedom, [one.df for one in parts], rtol=1e-9)
+    line = gtc.ta.line_fit([t - 20.0 for t in CELSIUS], CORRECTIONS).a_b
+    assert (line[0] + 10 * line[1]).u == pytest.approx(0.0041, abs=5e-5)
+
+
+# Errors that are the same, and errors that are not
+
+ESTIMATES = st.builds(
+    lambda values, spreads, shares: (
+        Estimate(values)
+        .with_component("calibration", spreads)
+        .with_component("noise", shares, independent="per element")
+        .with_component("place", shares[0], independent="common")
+    ),
+    *(
+        st.lists(st.floats(low, 100.0), min_size=4, max_size=4).map(np.array)
+        for low in (0.5, -100.0, 0.0)
+    ),
+)
+
+
+@given(ESTIMATES)
+@settings(max_examples=50, deadline=None)
+def test_what_is_equal_has_no_difference(one):
+    for difference in (one - one, one + one - 2 * one, one / one, one[::-1] - one[[3, 2, 1, 0]]):
+        np.testing.assert_allclose(difference.standard_uncertainty, 0.0, atol=1e-9)
+    total = one[0] + one[1] + one[2] + one[3] - one.sum()
+    assert total.standard_uncertainty == pytest.approx(0.0, abs=1e-9)
+
+
+@given(ESTIMATES, st.integers(0, 1000))
+@settings(max_examples=15, deadline=None)
+def test_linear_propagation_is_that_of_draws(one, seed):
+    other = Estimate([1.0, 2.0]).with_component("calibration", [-3.0, 4.0])
+    weights = np.array([[1.0, -2.0, 0.5, 0.0], [0.0, 1.0, 1.0, 1.0]])
+    drawn = draw([one, other], 20_000, np.random.default_rng(seed))
+    found = one.linear(weights) - 3 * other
+    shown = np.cov((drawn[0] @ weights.T - 3 * drawn[1]).T)
+    scale = np.sqrt(np.outer(*2 * [np.diag(found.covariance())])) + 1e-12
+    # A covariance of 20 000 draws is known to 1/√20000 = 0.7 % of its scale, at most √2 of that:
+    # six standard deviations.
+    assert np.abs((shown - found.covariance()) / scale).max() < 0.06
+
+
+def test_per_element_errors_of_different_elements_do_not_cancel():
+    one = Estimate([1.0, 1.0]).with_component("noise", 0.3, independent="per element")
+    assert (one[0] - one[1]).standard_uncertainty == pytest.approx(0.3 * 2**0.5)
+    assert (one - one.mean()).standard_uncertainty == pytest.approx(0.3 / 2**0.5)
+    assert one.mean().standard_uncertainty == pytest.approx(0.3 / 2**0.5)
+
+
+def test_independent_components_of_one_name_add_in_quadrature():
+    for kind in ("common", "per element"):
+        one, two = (
+            Estimate([1.0, 2.0]).with_component("drift", 3.0, independent=kind) for _ in range(2)
+        )
+        total = one + two
+        np.testing.assert_allclose(total.standard_uncertainty, 3 * 2**0.5)
+        assert total.names == ("drift",)
+        np.testing.assert_allclose(total.contribution("drift"), 3 * 2**0.5)
+    again = Estimate(1.0).with_component("drift", 3.0, independent="common", identity="day 2")
+    same = Estimate(5.0).with_component("drift", 4.0, independent="common", identity="day 2")
+    assert (again - same).standard_uncertainty == pytest.approx(1.0)
+
+
+def test_signs_decide_what_is_left():
+    one = Estimate(10.0).with_component("temperature", 2.0)
+    other = Estimate(20.0).with_component("temperature", -1.5)
+    assert (one + other).standard_uncertainty == pytest.approx(0.5)
+    assert (one - other).standard_uncertainty == pytest.approx(3.5)
+    assert (one + other).effect("temperature") == pytest.approx(0.5)
+    assert (one * other).effect("temperature") == pytest.approx(20 * 2.0 - 10 * 1.5)
+    assert (one / other).effect("temperature") == pytest.approx(2 / 20 + 10 * 1.5 / 400)
+    assert (4 / one).effect("temperature") == pytest.approx(-8 / 100)
+    assert (1 - one**2).effect("temperature") == pytest.approx(-40)
+    assert (-one).effect("temperature") == -2.0
+    assert one.effect("something else") == 0.0
+
+
+def test_shapes_broadcast():
+    rows = Estimate(np.zeros((3, 1))).with_component("noise", 1.0, independent="per element")
+    columns = Estimate(np.zeros(2)).with_component("noise", 1.0, independent="per element")
+    total = (rows + columns).reshape(6)
+    np.testing.assert_allclose(total.standard_uncertainty, 2**0.5)
+    # Neighbours in a row share the error of the row: half of the variance.
+    assert total.correlation()[0, 1] == pytest.approx(0.5)
+    assert total.correlation()[0, 3] == pytest.approx(0.0)
+    np.testing.assert_allclose((np.arange(3.0) + rows[:, 0]).values, np.arange(3.0))
+
+
+def test_degrees_of_freedom_are_of_each_error_or_of_all():
+    values = Estimate(np.zeros(10))
+    more = {"independent": "per element", "degrees_of_freedom": 4}
+    together = values.with_component("noise", 1.0, **more).mean()
+    apart = values.with_component("noise", 1.0, pooled=False, **more).mean()
+    assert together.degrees_of_freedom == pytest.approx(4.0)
+    assert apart.degrees_of_freedom == pytest.approx(40.0)
+    assert Estimate(1.0).coverage_factor() == pytest.approx(1.959964, abs=1e-6)
+
+
+def test_remarks_travel():
+    one = Estimate(1.0).with_unevaluated("drift").with_warnings("The left half is hidden.")
+    two = exact(2.0, "place", 0.1).with_unevaluated("drift", "noise")
+    for found in (one + two, two / one, Estimate.stack([one, two]), propagate(np.hypot, one, two),
+                  propagate(np.hypot, one, two, elementwise=False)):  # fmt: skip
+        assert found.warnings == ("The left half is hidden.",)
+        assert found.unevaluated == ("drift", "noise")
+    assert np.isnan(found.contribution("drift"))
+    assert found.standard_uncertainty > 0
+
+
+def test_the_budget_is_a_table():
+    found = length(*end_gauge()).with_unevaluated("form of the surfaces")
+    table = found.budget().to_dataframe()
+    assert table.fraction.sum() == pytest.approx(1.0)
+    assert table.standard_uncertainty["calibration of the standard"] == pytest.approx(25 * NM)
+    assert table.degrees_of_freedom["calibration of the standard"] == pytest.approx(18)
+    assert np.isnan(table.standard_uncertainty["form of the surfaces"])
+    several = Estimate([1.0, 2.0]).with_component("truth", [1.0, -1.0]).budget()
+    assert several.standard_uncertainty.dims == ("cause", "dim_0")
+
+
+def test_parts_of_a_component_share_its_degrees_of_freedom():
+    """A mean of 3 with u² = 0.3² + 0.4²: one analysis of variance, two lines of the budget."""
+    cause = Cause("random", "image", 2, 2, parts=("repeatability", "noise"))
+    one = Estimate(3.0, (Component(cause, np.array([[0.3, 0.4]])),)).with_unevaluated("drift")
+    assert one.names == ("repeatability", "noise", "drift")
+    assert one.contribution("noise") == pytest.approx(0.4)
+    assert one.budget().fraction.sel(cause="noise") == pytest.approx(0.64)
+    assert one.degrees_of_freedom == pytest.approx(2.0)
+    other = one.renamed("random", "emissivity")
+    assert other.names == ("emissivity", "drift")
+    assert other.contribution("emissivity") == pytest.approx(0.5)
+    assert one.without("random").standard_uncertainty == 0.0
+    assert (one.only("random") - one).standard_uncertainty == 0.0
+    back = from_xarray(to_xarray(one.reshape(1), "t"), "t")
+    assert back.names == one.names
+    assert (back - one).standard_uncertainty == pytest.approx(0.0, abs=1e-12)
+    with pytest.raises(ValueError, match="has 1 parts, expected 2"):
+        replace(cause, parts=("noise",))
+
+
+# Derivatives
+
+
+def test_derivatives_of_any_function():
+    one = Estimate([1.0, 2.0]).with_component("truth", [1e-4, -2e-4])
+    two = exact(3.0, "place", 1e-3)
+    analytic = propagate(
+        np.power, one, two,
+        derivatives=[lambda x, p: p * x ** (p - 1), lambda x, p: x**p * np.log(x)],
+    )  # fmt: skip
+    # Slopes over one standard uncertainty err by its square, 1e-7.
+    for found in (propagate(np.power, one, two), propagate(np.power, one, two, elementwise=False)):
+        np.testing.assert_allclose(found.covariance(), analytic.covariance(), rtol=1e-5)
+    unknown = propagate(np.add, Estimate([1.0, np.nan]), two)
+    np.testing.assert_array_equal(unknown.values, [4.0, np.nan])
+    with pytest.raises(ValueError, match="derivatives: 1 of a function of 2 inputs"):
+        propagate(np.add, one, two, derivatives=[np.exp])
+
+
+# Draws
+
+
+def test_draws_are_those_of_the_seed():
+    one = Estimate([1.0, 2.0]).with_component("noise", 0.1, independent="per element")
+    two = one + exact(0.0, "gain", 0.2)
+    first, second = (draw([one, two], 50, np.random.default_rng(4)) for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+    # What both have in common is the same in each draw.
+    np.testing.assert_allclose(np.ptp(first[1] - first[0], axis=1), 0.0, atol=1e-12)
+
+
+def test_of_a_part_of_an_image_only_that_is_drawn():
+    image = Estimate(np.zeros((400, 500))).with_component("noise", 1.0, independent="per element")
+    part = image[10, :3]
+    (drawn,) = draw([part], 20_000, np.random.default_rng(4))
+    expected = np.random.default_rng(4).standard_normal((20_000, 3))
+    np.testing.assert_array_equal(drawn, expected)
+    other, whole = draw([part, image], 2, np.random.default_rng(4))
+    np.testing.assert_array_equal(whole[:, 10, :3], other)
+
+
+@pytest.mark.parametrize(
+    ("shape", "half"),
+    [("normal", 1.95996), ("rectangular", 0.95 * 3**0.5), ("arcsine", 2**0.5 * np.sin(1.49226)),
+     ("triangular", 6**0.5 * (1 - 0.05**0.5))],
+)  # fmt: skip
+def test_draws_have_their_distribution(shape, half):
+    one = exact(0.0, "cause", 1.0, distribution=shape)
+    (drawn,) = draw([one], 200_000, np.random.default_rng(2))
+    assert drawn.std() == pytest.approx(1.0, rel=0.01)
+    for shortest in (False, True):
+        low, high = coverage_interval(drawn, shortest=shortest)
+        # The ends of 200 000 draws are known to about 0.005; a shortest one is a little shorter.
+        assert (high - low) / 2 == pytest.approx(half, abs=0.02)
+
+
+def test_few_degrees_of_freedom_are_drawn_by_student():
+    one = exact(0.0, "cause", 1.0, 5)
+    (drawn,) = draw([one], 200_000, np.random.default_rng(2))
+    low, high = coverage_interval(drawn)
+    assert (high - low) / 2 == pytest.approx(one.coverage_factor(), rel=0.02)
+    with pytest.raises(ValueError, match="10 draws, expected more"):
+        coverage_interval(np.zeros(10), 0.99)
+
+
+# Files
+
+
+def read_back(estimate, tmp_path):
+    to_xarray(estimate, "t", units="K").to_netcdf(tmp_path / "t.nc", engine="h5netcdf")
+    with xr.open_dataset(tmp_path / "t.nc", engine="h5netcdf") as data:
+        return from_xarray(data.load(), "t")
+
+
+@given(ESTIMATES, st.booleans())
+@settings(max_examples=20, deadline=None)
+def test_files_keep_all(tmp_path_factory, one, square):
+    one = one.with_component("mean", 1.0, degrees_of_freedom=3, independent="common")
+    one = one.with_warnings("It is far away.").with_unevaluated("drift", "noise")
+    one = one + Estimate.from_observations(np.vander(np.arange(1.0, 4.0), 4), "repeated")
+    one = one.reshape(2, 2) if square else one
+    found = read_back(one, tmp_path_factory.mktemp("file"))
+    np.testing.assert_array_equal(found.values, one.values)
+    np.testing.assert_allclose((found - one).standard_uncertainty, 0.0, atol=1e-12)
+    np.testing.assert_allclose(found.degrees_of_freedom, one.degrees_of_freedom)
+    assert (found.warnings, found.unevaluated) == (one.warnings, one.unevaluated)
+    assert [part.cause for part in found.components] == [part.cause for part in one.components]
+
+
+def test_a_mean_of_many_errors_is_kept_as_one(tmp_path):
+    many = Estimate(np.zeros(400)).with_component("noise", 1.0, independent="per element")
+    found = read_back(many.mean(), tmp_path)
+    assert found.standard_uncertainty == pytest.approx(0.05)
+    shared = many.linear(np.tri(3, 400))
+    np.testing.assert_allclose(
+        read_back(shared, tmp_path).covariance(), shared.covariance(), atol=1e-12
+    )
+
+
+def test_attributes_are_those_of_obsarray():
+    one = (
+        Estimate(np.zeros((2, 3)))
+        .with_component("calibration", -2.0)
+        .with_component("noise", 0.5, independent="per element")
+    )
+    data = to_xarray(one, "temperature", ["y", "x"], "K")
+    assert data.temperature.attrs["unc_comps"] == ["u_calibration_temperature",
+                                                   "u_noise_temperature"]  # fmt: skip
+    for label, form in (("calibration", "systematic"), ("noise", "random")):
+        attributes = data[f"u_{label}_temperature"].attrs
+        assert attributes["units"] == "K"
+        assert attributes["pdf_shape"] == "gaussian"
+        for number, dim in enumerate(("y", "x"), 1):
+            start = f"err_corr_{number}"
+            assert [attributes[f"{start}_{key}"] for key in ("dim", "form", "params", "units")] == [
+                dim, form, [], [],
+            ]  # fmt: skip
+
+
+def test_datasets_of_obsarray_are_read():
+    """Random along time, systematic along place, in per cent; and a matrix."""
+    random = {"err_corr_1_dim": "time", "err_corr_1_form": "random", "units": "%"}
+    mixed = random | {"err_corr_2_dim": ["x"], "err_corr_2_form": "systematic"}
+    values = xr.Dataset(
+        {
+            "t": (("time", "x"), [[100.0, 200.0], [100.0, 100.0]], {"unc_comps": "u_t"}),
+            "u_t": (("time", "x"), np.ones((2, 2)), mixed),
+        }
+    )
+    found = from_xarray(values, "t").covariance()
+    np.testing.assert_allclose(found[:2, :2], [[1.0, 2.0], [2.0, 4.0]])
+    np.testing.assert_allclose(found[:2, 2:], 0.0)
+    matrix = {"err_corr_1_dim": "x", "err_corr_1_form": "err_corr_matrix",
+              "err_corr_1_params": ["r"]}  # fmt: skip
+    values = xr.Dataset(
+        {
+            "t": ("x", [1.0, 2.0], {"unc_comps": ["u_t"]}),
+            "u_t": ("x", [3.0, 4.0], matrix),
+            "r": (("x", "x2"), [[1.0, -0.5], [-0.5, 1.0]]),
+        }
+    )
+    np.testing.assert_allclose(from_xarray(values, "t").covariance(), [[9.0, -6.0], [-6.0, 16.0]])
+    values["u_t"].attrs["err_corr_1_form"] = "ensemble"
+    with pytest.raises(ValueError, match="u_t: its errors correlate as ensemble"):
+        from_xarray(values, "t")
+    with pytest.raises(ValueError, match="u_t is not there"):
+        from_xarray(values.drop_vars("u_t"), "t")
+    with pytest.raises(ValueError, match="q: there is no such variable"):
+        from_xarray(values, "q")
+
+
+def test_obsarray_and_punpy_read_our_datasets():
+    pytest.importorskip("obsarray")
+    punpy = pytest.importorskip("punpy")
+    kelvins = (
+        Estimate([600.0, 700.0, 800.0])
+        .with_component("truth", [1.0, -2.0, 3.0])
+        .with_component("noise", [0.5, 1.0, 2.0], independent="per element")
+    )
+    gain = Estimate([1.0, 1.0, 2.0]).with_component("gain", [0.01, -0.01, 0.02])
+    data = xr.merge([to_xarray(kelvins, "t", ["x"], "K"), to_xarray(gain, "g", ["x"])])
+    np.testing.assert_allclose(
+        data.unc["t"].total_err_cov_matrix().values, kelvins.covariance(), rtol=1e-12
+    )
+
+    class Product(punpy.MeasurementFunction):
+        def meas_function(self, t, g):
+            return t * g
+
+    product = Product(
+        prop=punpy.MCPropagation(100_000), xvariables=["t", "g"], yvariable="y", yunit="K",
+        ydims=["x"],
+    )  # fmt: skip
+    found = product.propagate_ds_total(data, store_unc_percent=False)
+    # 100 000 draws: standard deviations to 0.22 %.
+    np.testing.assert_allclose(found.u_tot_y, (kelvins * gain).standard_uncertainty, rtol=0.01)
+
+
+# Speed
+
+
+def test_an_image_takes_less_than_a_second_and_a_gigabyte():
+    """640 × 512 pixels with 12 correlated components, through Planck's law; usually 0.2 s."""
+    shape, generator = (512, 640), np.random.default_rng(0)
+    tracemalloc.start()
+    image = Estimate(generator.uniform(600.0, 1500.0, shape))
+    for number in range(12):
+        image = image.with_component(f"cause {number}", generator.normal(0.0, 1.0, shape))
+    emissivity = exact(0.5, "cause 3", 0.01)
+
+    start = time.perf_counter()
+    found = propagate(lambda t, e: e / np.expm1(2877.0 / t), image, emissivity)
+    spread = found.standard_uncertainty
+    taken = time.perf_counter() - start
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert np.isfinite(spread).all()
+    # The machine of the tests may be busy.
+    assert taken < 1.0
+    assert peak < 1e9
+
+
+# What is impossible
+
+
+def test_impossible_estimates_are_refused():
+    one = Estimate([1.0, 2.0])
+    with pytest.raises(ValueError, match="noise: an effect is not finite"):
+        one.with_component("noise", [1.0, np.nan])
+    with pytest.raises(ValueError, match="a component is there twice"):
+        one.with_component("noise", 1.0).with_component("noise", 2.0)
+    with pytest.raises(ValueError, match="has an identity, expected independent"):
+        one.with_component("noise", 1.0, identity="day 2")
+    with pytest.raises(ValueError, match="has effects on 3 values, expected 2"):
+        Estimate(one.values, (Component(Cause("noise"), np.ones((3, 1))),))
+    with pytest.raises(ValueError, match=r"effects have shape \(2,\)"):
+        Component(Cause("noise"), np.ones(2))
+    for settings_, message in (
+        ({"name": " "}, "its name is ' '"),
+        ({"errors": 0}, "has 0 errors"),
+        ({"degrees_of_freedom": 0.0}, "degrees of freedom are 0.0"),
+        ({"distribution": "flat"}, "distribution is 'flat', expected one of normal"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            Cause(**{"name": "noise", **settings_})
+    pixels = Estimate(np.zeros(2)).with_component("noise", 1.0, degrees_of_freedom=3)
+    other = Estimate(np.zeros(2)).with_component("noise", 1.0)
+    generator = np.random.default_rng(1)
+    for together in (
+        lambda: pixels + other,
+        lambda: draw([pixels, other], 2, generator),
+        lambda: propagate(np.add, pixels, other, elementwise=False),
+    ):
+        with pytest.raises(ValueError, match="expected the same errors wherever its name"):
+            together()
+    with pytest.raises(ValueError, match="1 observations, expected 2 or more"):
+        Estimate.from_observations([1.0], "noise")
+    for matrix, message in (
+        (np.eye(3), r"covariance has shape \(3, 3\), expected \(2, 2\)"),
+        ([[1.0, 0.5], [0.0, 1.0]], "covariance is not symmetric"),
+        ([[1.0, 2.0], [2.0, 1.0]], "has a variance of -1 in one direction"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            Estimate.from_covariance([1.0, 2.0], matrix, "noise")
+    with pytest.raises(ValueError, match="level of confidence: is 95"):
+        one.coverage_factor(95)
+    with pytest.raises(ValueError, match="t: has 2 dimensions named, expected 1"):
+        to_xarray(one, "t", ["y", "x"])
+    with pytest.raises(ValueError, match="read-only"):
+        one.values[0] = 3.0
+
+
+def test_a_table_of_all_pairs_of_pixels_is_refused():
+    image = Estimate(np.zeros(30_000)).with_component("noise", 1.0, independent="per element")
+    with pytest.raises(ValueError, match=r"9\.0e\+08 effects of single errors"):
+        image - image.mean()
+    with pytest.raises(ValueError, match="expected 1000 values or fewer"):
+        to_xarray(image[1:] - image[:-1], "t")
