@@ -12,8 +12,8 @@ from time import perf_counter
 
 import numpy as np
 
-from chipglow.analysis import NoShearBandError, find_shear_band, segmentation
 from chipglow.cutting import CuttingSimulation, Numerics, OutputWindow
+from chipglow.laboratory.chip import NoShearBandError, find_shear_band, segmentation
 from chipglow.scene import Material, Raster, ToolGeometry
 
 CELLS = (20.0, 14.0, 10.0, 7.0, 5.0)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from scipy.stats import f as f_distribution
 
-from chipglow.analysis import fit_dots
+from chipglow.laboratory.registration import fit_dots
 from chipglow.scene import Raster
 
 RASTER = Raster(left=-480e-6, top=360e-6, spacing=6e-6, rows=120, columns=160)

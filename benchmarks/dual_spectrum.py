@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from chipglow.analysis import Registration, fit_images
 from chipglow.camera import Camera, GaussianPSF, Measurement
+from chipglow.laboratory.registration import Registration, fit_images
 from chipglow.scene import Material, Raster, Scene, Tool, ToolGeometry
 from chipglow.surface import CHIP_1
 

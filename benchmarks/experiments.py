@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 import yaml
 
-from chipglow.analysis import ChipMetrics, chip_metrics, contact_length, segmentation
 from chipglow.cutting import (
     SOLVER_VERSION,
     CuttingConditions,
@@ -33,8 +32,9 @@ from chipglow.cutting import (
     tool_material,
 )
 from chipglow.io import atomic_path
+from chipglow.laboratory.chip import ChipMetrics, chip_metrics, contact_length, segmentation
+from chipglow.quantities.units import Quantity
 from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene, ToolGeometry
-from chipglow.study.units import Quantity
 
 DATA = Path(__file__).with_name("experiments.yaml")
 RESULTS = Path("build/experiments")

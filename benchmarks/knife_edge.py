@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from chipglow.analysis import knife_edge
-from chipglow.analysis.psf_models import DefocusedDiscModel, GaussianTailModel
 from chipglow.camera import AnnularAperturePSF
+from chipglow.laboratory.psf import knife_edge
+from chipglow.laboratory.psf.psf_models import DefocusedDiscModel, GaussianTailModel
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from synthetic_edge import (

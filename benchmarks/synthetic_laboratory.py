@@ -31,16 +31,6 @@ from scipy.ndimage import gaussian_filter
 from scipy.optimize import brentq
 from scipy.special import j1, k1, ndtr
 
-from chipglow.analysis import (
-    KnownEmissivity,
-    Surroundings,
-    areas,
-    determine_emissivity,
-    edge_image,
-    knife_edge,
-    true_temperature,
-)
-from chipglow.analysis.emissivity import Heating
 from chipglow.camera import (
     AnnularAperturePSF,
     Camera,
@@ -54,18 +44,26 @@ from chipglow.camera import (
     fit_linear,
 )
 from chipglow.camera.exposure import Exposure
-from chipglow.io import write_hcc
+from chipglow.cutting import Surroundings
+from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import read_calibration_points
-from chipglow.radiometry import Band
-from chipglow.scene import Raster
-from chipglow.study import (
+from chipglow.laboratory.emissivity import (
+    KnownEmissivity,
+    determine_emissivity,
+    load_regions,
+    true_temperature,
+)
+from chipglow.laboratory.emissivity.emissivity import Heating
+from chipglow.laboratory.measurement import (
     CalibrationDescription,
     calibration_text,
     load_calibration,
     load_measurement,
     uniform_counts,
 )
-from chipglow.study.files import load_regions
+from chipglow.laboratory.psf import edge_image, knife_edge
+from chipglow.radiometry import Band
+from chipglow.scene import Raster, areas
 from chipglow.uncertainty import Estimate
 
 RESULTS: Final = Path("build/synthetic-laboratory")

@@ -30,8 +30,8 @@ from chipglow.cutting import (
     tool_material,
     workpiece,
 )
+from chipglow.quantities.units import Quantity
 from chipglow.scene import ToolGeometry
-from chipglow.study.units import Quantity
 
 DATA = Path(__file__).with_name("titanium.yaml")
 RESULTS = Path("build/titanium")

@@ -13,7 +13,7 @@ from time import perf_counter
 
 from cases import cylinder, expansion, heat, motion, plasticity, taylor, upsetting
 
-from chipglow.report.drawing import new_figure, style
+from chipglow.drawing.drawing import new_figure, style
 
 CASES = {
     "momentum": motion.momentum,

@@ -9,9 +9,17 @@ from pathlib import Path
 import numpy as np
 
 import chipglow
-from chipglow.analysis import Comparison, StatedUncertainties, band_profile, compare
 from chipglow.camera import Camera, Measurement
-from chipglow.report import draw_band_profile, draw_comparison
+from chipglow.laboratory.chip import (
+    band_profile,
+)
+from chipglow.laboratory.chip.band_figure import draw_band_profile
+from chipglow.laboratory.comparison import (
+    Comparison,
+    StatedUncertainties,
+    compare,
+)
+from chipglow.laboratory.comparison.figure import draw_comparison
 from chipglow.scene import Scene
 
 HERE = Path(__file__).parent

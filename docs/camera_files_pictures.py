@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.camera import Detector, Recording
-from chipglow.io import read_recording, write_hcc
+from chipglow.drawing.drawing import HEAT, KELVIN, PLAIN, new_figure, style
+from chipglow.io.cameras import read_recording, write_hcc
 from chipglow.radiometry import Band
-from chipglow.report.drawing import HEAT, KELVIN, PLAIN, new_figure, style
 
 HERE = Path(__file__).parent
 FLIR = HERE.parent / "tests" / "reference" / "flir" / "t420.fff.xz"

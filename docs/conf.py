@@ -10,13 +10,10 @@ sys.path.insert(0, str(HERE))  # for mathml and sample_files
 
 from sample_files import SAMPLES, write_archive  # noqa: E402
 
-from chipglow.study import (  # noqa: E402
-    ImportDescription,
-    MeasurementDescription,
-    Study,
-    field_tables,
-    study_text,
-)
+from chipglow.io import ImportDescription  # noqa: E402
+from chipglow.laboratory.measurement import MeasurementDescription  # noqa: E402
+from chipglow.quantities import field_tables  # noqa: E402
+from chipglow.study import Study, study_text  # noqa: E402
 
 project = "chipglow"
 author = "The chipglow developers"

@@ -6,19 +6,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis import (
+from chipglow.camera import Camera, Measurement
+from chipglow.laboratory.emissivity import (
     EmissivityMap,
     Heating,
-    Polygon,
-    Region,
-    areas,
     determine_emissivity,
     emissivity_line,
 )
-from chipglow.camera import Camera, Measurement
+from chipglow.laboratory.emissivity.figure import draw_emissivity
 from chipglow.radiometry import Band
-from chipglow.report.emissivity_figure import draw_emissivity
-from chipglow.scene import FIELD_UNITS, Raster, Scene
+from chipglow.scene import FIELD_UNITS, Polygon, Raster, Region, Scene, areas
 from chipglow.surface import Emissivity, MapSurface, Texture
 
 HERE = Path(__file__).parent

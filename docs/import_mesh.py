@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 from pyvista import examples
 
+from chipglow.drawing.drawing import new_figure, style
 from chipglow.io.sources import Placement
 from chipglow.io.sources.mesh import MeshSource
-from chipglow.report.drawing import new_figure, style
 from chipglow.scene import Raster
 
 RASTER = Raster(left=-0.1, top=5.1, spacing=0.01, rows=520, columns=120)

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.cbook import get_sample_data
 from numpy.typing import NDArray
 
+from chipglow.drawing.drawing import VOID, new_figure, style
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.grid import GridSource
-from chipglow.report.drawing import VOID, new_figure, style
 from chipglow.scene import Raster
 
 HERE = Path(__file__).parent

@@ -10,12 +10,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis import KnifeEdge, aperture_image, edge_image, knife_edge
 from chipglow.camera import AnnularAperturePSF, GaussianPSF, Measurement, PointSpreadFunction
-from chipglow.camera.convolution import blur
+from chipglow.camera.optics.convolution import blur
+from chipglow.laboratory.psf import (
+    KnifeEdge,
+    aperture_image,
+    edge_image,
+    knife_edge,
+)
+from chipglow.laboratory.psf.figure import draw_knife_edge
+from chipglow.laboratory.psf.summary import sentences, with_uncertainty
 from chipglow.radiometry import Band
-from chipglow.report import draw_knife_edge
-from chipglow.report.knife_edge_summary import sentences, with_uncertainty
 from chipglow.scene import Raster
 
 BAND: Final = Band(3.8e-6, 5.1e-6)

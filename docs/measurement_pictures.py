@@ -16,14 +16,16 @@ from chipglow.camera import (
     Measurement,
     NonUniformity,
     Recording,
-    develop_recording,
     find_bad_pixels,
     fit_linear,
     fit_sakuma_hattori,
 )
+from chipglow.drawing.drawing import HEAT, KELVIN, new_figure, show_image, style
+from chipglow.laboratory.measurement import (
+    develop_recording,
+)
+from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
 from chipglow.radiometry import Band
-from chipglow.report import draw_calibrations
-from chipglow.report.drawing import HEAT, KELVIN, new_figure, show_image, style
 
 HERE = Path(__file__).parent
 BAND = Band(3.8e-6, 5.1e-6)

@@ -5,10 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from chipglow.analysis import find_tool, rake_grid
 from chipglow.camera import Measurement
 from chipglow.io import open_scene
-from chipglow.report import draw_rake_grid
+from chipglow.laboratory.chip import (
+    find_tool,
+    rake_grid,
+)
+from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
 from chipglow.study import Study, cut
 
 HERE = Path(__file__).parent

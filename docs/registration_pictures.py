@@ -9,11 +9,14 @@ sys.path.insert(0, str(HERE.parent / "benchmarks"))
 from dot_target import RASTER, DotTarget  # noqa: E402
 from dual_spectrum import DualSpectrum  # noqa: E402
 
-from chipglow.analysis import fit_dots, fit_images  # noqa: E402
 from chipglow.camera import Measurement  # noqa: E402
-from chipglow.io.picture_file import write_blink  # noqa: E402
+from chipglow.laboratory.registration import (  # noqa: E402
+    fit_dots,
+    fit_images,
+)
+from chipglow.laboratory.registration.figure import blink_pictures, draw_registration  # noqa: E402
+from chipglow.laboratory.registration.picture_file import write_blink  # noqa: E402
 from chipglow.radiometry import Band  # noqa: E402
-from chipglow.report import blink_pictures, draw_registration  # noqa: E402
 
 
 def main() -> None:

@@ -37,7 +37,8 @@ from PIL import Image  # noqa: E402
 
 import chipglow  # noqa: E402
 from chipglow.camera import AnnularAperturePSF, Camera, Detector, Measurement, Recording  # noqa: E402
-from chipglow.io import write_hcc, write_measurement, write_scene  # noqa: E402
+from chipglow.io import write_measurement, write_scene  # noqa: E402
+from chipglow.io.cameras import write_hcc  # noqa: E402
 from chipglow.radiometry import Band  # noqa: E402
 from chipglow.scene import Raster, Scene  # noqa: E402
 

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chipglow.cli import app
-from chipglow.report.drawing import BLUE, GREEN, GREY, VERMILLION, new_figure, style
+from chipglow.drawing.drawing import BLUE, GREEN, GREY, VERMILLION, new_figure, style
 
 HERE = Path(__file__).parent.resolve()
 sys.path.insert(0, str(HERE.parent / "benchmarks"))

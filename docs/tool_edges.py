@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from chipglow.report.drawing import BLUE, GREY, VERMILLION, VOID, new_figure, style
+from chipglow.drawing.drawing import BLUE, GREY, VERMILLION, VOID, new_figure, style
 from chipglow.scene import Chamfer, Hone, Tool, ToolGeometry, ToolOutline
 
 FACE = 600e-6

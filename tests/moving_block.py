@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from chipglow.io.sources import SampledFrame, Source, SourceError, Survey
-from chipglow.scene import Material
+from chipglow.io.sources import Source, SourceError, Survey
+from chipglow.scene import Material, SampledFrame
 
 SPEED, UP = 3.0, 0.5
 RATE = 2e4

@@ -12,8 +12,8 @@ from scipy.integrate import cumulative_simpson, trapezoid
 from scipy.interpolate import CubicSpline
 from scipy.special import j1, k1, ndtr, stdtr
 
-from chipglow.analysis import ApertureImage, EdgeImage
 from chipglow.camera import Measurement
+from chipglow.laboratory.psf import ApertureImage, EdgeImage
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 

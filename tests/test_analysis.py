@@ -12,23 +12,18 @@ from hypothesis import strategies as st
 from measured_band import BandImage
 from scipy.interpolate import RegularGridInterpolator
 
-from chipglow.analysis import (
-    NoShearBandError,
+from chipglow.camera import Camera, Exposure, GaussianPSF
+from chipglow.errors import (
     Plan,
     analyse,
-    contact_length,
     error_images,
-    find_shear_band,
     rake_errors,
     reference_temperature,
-    sample,
-    segmentation,
-    straight_line,
 )
-from chipglow.analysis.error import LEAST_COVERED, ErrorImages
-from chipglow.camera import Camera, Exposure, GaussianPSF
+from chipglow.errors.error_images import LEAST_COVERED, ErrorImages
+from chipglow.laboratory.chip import NoShearBandError, contact_length, find_shear_band, segmentation
 from chipglow.radiometry import Band
-from chipglow.scene import Material, Raster, Scene, ToolGeometry
+from chipglow.scene import Material, Raster, Scene, ToolGeometry, sample, straight_line
 from chipglow.study import Study
 from chipglow.surface import CHIP_1, CHIP_2
 

@@ -12,20 +12,20 @@ from measured_band import BAND, LENGTH, RASTER, TOOL, BandImage, measured
 from PIL import Image
 from typer.testing import CliRunner
 
-from chipglow.analysis import (
+from chipglow.camera import Flag, Measurement
+from chipglow.cli import app
+from chipglow.io import write_measurement
+from chipglow.laboratory.chip import (
     BandProfile,
-    Line,
     NoShearBandError,
     Stage,
     ThermalImage,
     band_profile,
     find_band,
+    read_curve,
 )
-from chipglow.camera import Flag, Measurement
-from chipglow.cli import app
-from chipglow.io import read_curve, write_measurement
-from chipglow.report import draw_band_profile
-from chipglow.scene import PlacedTool
+from chipglow.laboratory.chip.band_figure import draw_band_profile
+from chipglow.scene import Line, PlacedTool
 
 PITCH = RASTER.spacing
 X, Y = np.meshgrid(RASTER.x, RASTER.y)

@@ -25,7 +25,7 @@ from chipglow.camera import (
     Measurement,
 )
 from chipglow.camera.exposure import expose, expose_all, frame_weights
-from chipglow.camera.sampling import integrate, overlap_lengths, sensor_raster
+from chipglow.camera.optics.sampling import integrate, overlap_lengths, sensor_raster
 from chipglow.io import read_measurement, write_measurement
 from chipglow.radiometry import Band
 from chipglow.scene import FIELD_UNITS, Raster, Scene

@@ -17,8 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chipglow.camera import PlanckConversion, Recording
-from chipglow.io import CAMERA_FORMATS, read_recording, write_hcc
-from chipglow.io.cameras import apart
+from chipglow.io.cameras import CAMERA_FORMATS, apart, read_recording, write_hcc
 from chipglow.io.cameras.cine import _CURVE
 from chipglow.io.cameras.formats import find_format, read_here
 from chipglow.io.cameras.stacks import Told

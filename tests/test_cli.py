@@ -12,14 +12,14 @@ import typer
 from analytic_chip import AnalyticChip
 from typer.testing import CliRunner
 
-from chipglow.analysis import Area, Heating, determine_emissivity
 from chipglow.camera import Camera, Measurement
 from chipglow.cli import app
 from chipglow.cutting import CuttingSimulation, SolverError
-from chipglow.io import open_scene, read_measurement, write_emissivity, write_scene
+from chipglow.io import open_scene, read_measurement, write_scene
+from chipglow.laboratory.emissivity import Heating, determine_emissivity, write_emissivity
 from chipglow.radiometry import Band
 from chipglow.report import QUICK
-from chipglow.scene import Material, Raster
+from chipglow.scene import Area, Material, Raster
 from chipglow.study import Study, cut, load_study
 from chipglow.surface import UniformSurface
 

@@ -14,12 +14,12 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter
 from typer.testing import CliRunner
 
-from chipglow.analysis import StatedUncertainties, compare, normalised_error, reading
-from chipglow.analysis.comparison import SURE, _confidence
-from chipglow.analysis.frame_scatter import FrameScatter
 from chipglow.camera import Flag, Measurement
 from chipglow.cli import app
 from chipglow.io import write_measurement
+from chipglow.laboratory.comparison import StatedUncertainties, compare, normalised_error, reading
+from chipglow.laboratory.comparison.comparison import SURE, _confidence
+from chipglow.laboratory.comparison.frame_scatter import FrameScatter
 from chipglow.scene import PlacedTool, ToolGeometry
 
 X, Y = np.meshgrid(RASTER.x, RASTER.y)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chipglow.analysis.distribution import COVERAGE, TOGETHER, Distribution, ratio
+from chipglow.errors.distribution import COVERAGE, TOGETHER, Distribution, ratio
 
 CAUSES = ("segment", "texture", "pixel phase")
 

@@ -13,14 +13,13 @@ from scipy.ndimage import gaussian_filter
 from scipy.stats import f
 from typer.testing import CliRunner
 
-from chipglow.analysis import find_dots, fit_dots
-from chipglow.analysis.dot_matching import Arrangement, match_dots
 from chipglow.camera import Measurement
 from chipglow.cli import app
 from chipglow.io import write_measurement
+from chipglow.laboratory.registration import find_dots, fit_dots, load_registration
+from chipglow.laboratory.registration.dot_matching import Arrangement, match_dots
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
-from chipglow.study import load_registration
 
 RASTER = Raster(left=-240e-6, top=180e-6, spacing=6e-6, rows=60, columns=80)
 SMALL = DotTarget(

@@ -12,28 +12,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from chipglow.analysis import (
-    Area,
+from chipglow.camera import Camera, Flag
+from chipglow.cli import app
+from chipglow.io import write_measurement
+from chipglow.laboratory.emissivity import (
     Heating,
-    Polygon,
-    Region,
-    areas,
     determine_emissivity,
     emissivity_covariance,
     emissivity_line,
-)
-from chipglow.analysis.emissivity import COMMON
-from chipglow.camera import Camera, Flag
-from chipglow.cli import app
-from chipglow.io import (
+    load_regions,
     read_emissivity_map,
     write_emissivity,
-    write_measurement,
 )
-from chipglow.scene import FIELD_UNITS, Raster, Scene
-from chipglow.study import Study, load_regions
-from chipglow.study.emissivity import surface_text
-from chipglow.study.units import TEMPERATURE_DIFFERENCE
+from chipglow.laboratory.emissivity.emissivity import COMMON
+from chipglow.laboratory.emissivity.study_sections import surface_text
+from chipglow.quantities.units import TEMPERATURE_DIFFERENCE
+from chipglow.scene import FIELD_UNITS, Area, Polygon, Raster, Region, Scene, areas
+from chipglow.study import Study
 from chipglow.surface import MapSurface
 
 TRUTH = 391.0 + CELSIUS

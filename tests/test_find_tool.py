@@ -8,10 +8,11 @@ import xarray as xr
 from seen_chip import BAND, FLOOR, look, noisy
 from typer.testing import CliRunner
 
-from chipglow.analysis import find_tool, normalised_error, rake_grid, reading
 from chipglow.camera import Measurement
 from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
+from chipglow.laboratory.chip import find_tool, rake_grid
+from chipglow.laboratory.comparison import normalised_error, reading
 from chipglow.scene import PlacedTool, Raster, ToolGeometry
 from chipglow.surface import CHIP_1, CHIP_2
 

@@ -6,11 +6,11 @@ import pytest
 from typer.testing import CliRunner
 
 from chipglow.cli.app import app
-from chipglow.io import open_scene, prospect, read_measurement
+from chipglow.io import ImportDescription, load_import, open_scene, prospect, read_measurement
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.movie import Legend, MovieSource, NamedMap
 from chipglow.scene import Material, ToolGeometry
-from chipglow.study import ImportDescription, StudyError, load_import
+from chipglow.text import DescriptionError
 
 RUNNER = CliRunner()
 
@@ -258,7 +258,7 @@ def test_what_is_no_source_is_one_line(tmp_path, name, content, wrong):
 
 
 def test_a_setting_is_no_python(arrays):
-    with pytest.raises(StudyError, match="could not determine a constructor"):
+    with pytest.raises(DescriptionError, match="could not determine a constructor"):
         load_import(arrays, ["grid=!!python/object/apply:os.getcwd []"])
 
 

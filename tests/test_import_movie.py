@@ -18,13 +18,7 @@ from chipglow.io.sources import SourceError
 from chipglow.io.sources.colour_scale import ColourScale, colour_uncertainty, lab
 from chipglow.io.sources.conventions import Placement
 from chipglow.io.sources.legend import find_legend, is_cut, legend_pixels
-from chipglow.io.sources.movie import (
-    FieldMovie,
-    Legend,
-    MovieSource,
-    NamedMap,
-    metre_per_pixel,
-)
+from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap, metre_per_pixel
 from chipglow.io.sources.moving_pictures import index_movie, pictures
 from chipglow.io.sources.overlays import dark_lines, find_background
 from chipglow.io.sources.picture_sampling import PictureSampling

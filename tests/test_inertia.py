@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis import Inertia, inertia
-from chipglow.analysis.paper import _unaccounted
 from chipglow.cli.inertia import say_inertia
 from chipglow.cutting import (
     AISI_1045,
@@ -16,6 +14,8 @@ from chipglow.cutting import (
     EnergyHistory,
     Numerics,
 )
+from chipglow.errors.cut_error import _unaccounted
+from chipglow.laboratory.chip import Inertia, inertia
 from chipglow.scene import ENERGY_UNITS, Scene
 
 CHIP = AnalyticChip(frames=3)

@@ -25,8 +25,10 @@ from synthetic_edge import (
     tailed_edge,
 )
 
-from chipglow.analysis import NoEdgeError, aperture_image, edge_image, find_edge, knife_edge
-from chipglow.analysis.psf_models import (
+from chipglow.camera import AnnularAperturePSF, Flag, GaussianPSF, MeasuredPSF
+from chipglow.camera.optics.convolution import blur
+from chipglow.laboratory.psf import NoEdgeError, aperture_image, edge_image, find_edge, knife_edge
+from chipglow.laboratory.psf.psf_models import (
     AnnularModel,
     DefocusedDiscModel,
     GaussianModel,
@@ -36,8 +38,6 @@ from chipglow.analysis.psf_models import (
     disc_response,
     edge_response,
 )
-from chipglow.camera import AnnularAperturePSF, Flag, GaussianPSF, MeasuredPSF
-from chipglow.camera.convolution import blur
 
 FWHM = 10e-6
 GAUSSIAN = gaussian_edge(FWHM)

@@ -14,30 +14,26 @@ from typer.testing import CliRunner
 
 from chipglow.camera import Detector, Flag, Recording, fit_linear, fit_sakuma_hattori
 from chipglow.cli import app
-from chipglow.io import (
-    is_measurement,
-    read_measurement,
-    read_recording,
-    write_hcc,
-    write_measurement,
-    write_scene,
-)
+from chipglow.io import is_measurement, read_measurement, write_measurement, write_scene
+from chipglow.io.cameras import read_recording, write_hcc
 from chipglow.io.column_file import POINT_COLUMNS, read_bad_pixels, read_columns, read_response
-from chipglow.radiometry import Band, TabulatedResponse
-from chipglow.scene import ToolGeometry
-from chipglow.study import (
+from chipglow.laboratory.measurement import (
     CalibrationDescription,
     MeasurementDescription,
-    StudyError,
     UniformObjects,
     calibration_text,
     load_calibration,
     load_description,
     load_measurement,
-    measured,
     measurement_text,
     uniform_counts,
 )
+from chipglow.laboratory.measurement import (
+    camera_file as measured,
+)
+from chipglow.radiometry import Band, TabulatedResponse
+from chipglow.scene import ToolGeometry
+from chipglow.text import DescriptionError
 
 BAND = Band(3.8e-6, 5.1e-6)
 SHAPE = (30, 40)
@@ -154,7 +150,7 @@ def test_an_impossible_calibration_file_is_one_clear_error(
 ):
     described = yaml.safe_load((laboratory / "calibration.yaml").read_text())
     (tmp_path / "bad.yaml").write_text(yaml.safe_dump({**described, field: value}))
-    with pytest.raises(StudyError, match=message) as caught:
+    with pytest.raises(DescriptionError, match=message) as caught:
         load_calibration(tmp_path / "bad.yaml")
     assert str(caught.value).startswith("bad.yaml: ")
     assert "\n" not in str(caught.value)
@@ -167,7 +163,7 @@ def test_counts_that_fall_are_no_calibration(tmp_path):
         "covariance": np.eye(4).tolist(),
     }  # fmt: skip
     (tmp_path / "falls.yaml").write_text(yaml.safe_dump(described))
-    with pytest.raises(StudyError, match="counts fall with the temperature"):
+    with pytest.raises(DescriptionError, match="counts fall with the temperature"):
         load_calibration(tmp_path / "falls.yaml")
 
 
@@ -503,7 +499,9 @@ def test_what_the_camera_s_file_leaves_in_doubt_is_said_once(laboratory, tmp_pat
 
 def test_a_scene_is_no_measurement(tmp_path):
     write_scene(AnalyticChip(frames=2).scene(), tmp_path / "scene.nc")
-    with pytest.raises(StudyError, match=r"scene\.nc: is a scene, .* chipglow measure makes one"):
+    with pytest.raises(
+        DescriptionError, match=r"scene\.nc: is a scene, .* chipglow measure makes one"
+    ):
         load_measurement(tmp_path / "scene.nc")
 
 

@@ -9,16 +9,17 @@ import pytest
 import typer
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis import Distribution
-from chipglow.analysis.draws import Headline
-from chipglow.analysis.paper import Plan, analyse
 from chipglow.camera import AnnularAperturePSF, Camera
 from chipglow.cli import progress
+from chipglow.errors import Distribution
+from chipglow.errors.cut_error import Plan, analyse
+from chipglow.errors.draws import Headline
 from chipglow.report import comparison_rows, write_report
 from chipglow.scene import Raster
-from chipglow.study import Study, StudyError, expected_cost, fit, load_study, study_text
+from chipglow.study import Study, expected_cost, fit, load_study, study_text
 from chipglow.study.assumed import left_to_the_paper
 from chipglow.surface import CHIP_1, CHIP_2
+from chipglow.text import DescriptionError
 
 TITANIUM = {
     "cutting": {"workpiece": "ti-6al-4v", "speed": "60 m/min", "feed": "0.1 mm"},
@@ -190,7 +191,7 @@ def test_a_dear_cut_is_begun_only_if_the_user_says_so(agreed, asked, monkeypatch
 
 def test_an_empty_file_is_no_study(tmp_path):
     (tmp_path / "empty.yaml").write_text("")
-    with pytest.raises(StudyError, match=r"empty.yaml: is empty, expected a study"):
+    with pytest.raises(DescriptionError, match=r"empty.yaml: is empty, expected a study"):
         load_study(tmp_path / "empty.yaml")
 
 

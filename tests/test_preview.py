@@ -20,8 +20,8 @@ from chipglow.cutting import (
     Preview,
     workpiece,
 )
+from chipglow.drawing.drawing import HEAT, VOID
 from chipglow.io import check_movie_path, movie_writer, open_scene
-from chipglow.report.drawing import HEAT, VOID
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
 from chipglow.scene import Frame, Material, Raster, ToolGeometry
 from chipglow.study import Study, cut, load_study, preview_raster

@@ -10,8 +10,8 @@ from scipy.ndimage import convolve
 from scipy.special import erf, j0, j1
 
 from chipglow.camera import AnnularAperturePSF, GaussianPSF, MeasuredPSF
-from chipglow.camera.convolution import blur, blur_of_like, light_from_beyond
-from chipglow.camera.psf import ANNULAR_ENERGY, GAUSSIAN_ENERGY
+from chipglow.camera.optics.convolution import blur, blur_of_like, light_from_beyond
+from chipglow.camera.optics.psf import ANNULAR_ENERGY, GAUSSIAN_ENERGY
 
 FWHM_PER_SIGMA = 2 * sqrt(2 * log(2))
 LOPSIDED = np.array([[0, 1, 2], [3, 8, 1], [0, 2, 1]], dtype=float)

@@ -17,7 +17,9 @@ from typer.testing import CliRunner
 from chipglow.camera import Flag, MeasuredPSF
 from chipglow.cli import app
 from chipglow.io import write_measurement
-from chipglow.study import Study, StudyError, load_apertures
+from chipglow.laboratory.psf import load_apertures
+from chipglow.study import Study
+from chipglow.text import DescriptionError
 
 COLD, HOT = BAND.radiance(np.array([600.0, 900.0]))
 STEP = HOT - COLD
@@ -101,7 +103,7 @@ def test_apertures_come_from_a_list(folder):
     assert (folder / "psf.png").read_bytes().startswith(b"\x89PNG")
     assert load_apertures("apertures.yaml")[1][1] == pytest.approx(80e-6)
     (folder / "apertures.yaml").write_text("apertures: [{file: d40.nc, diameter: 40}]")
-    with pytest.raises(StudyError, match=r"apertures\.0\.diameter: 40 has no unit"):
+    with pytest.raises(DescriptionError, match=r"apertures\.0\.diameter: 40 has no unit"):
         load_apertures("apertures.yaml")
 
 

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chipglow import Band
-from chipglow.radiometry import ObjectParameters
+from chipglow.radiometry import Band, ObjectParameters
 from chipglow.radiometry.planck import FIRST_RADIATION_CONSTANT, SECOND_RADIATION_CONSTANT
 
 REFERENCE = Path(__file__).parent / "reference" / "inband_radiance.csv"

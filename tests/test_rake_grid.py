@@ -9,13 +9,13 @@ from analytic_chip import AnalyticChip
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chipglow.analysis import rake_grid
 from chipglow.camera import Camera, Flag, Measurement
 from chipglow.io import read_measurement, write_measurement
+from chipglow.laboratory.chip import load_tool, rake_grid, tool_of
 from chipglow.radiometry import Band
 from chipglow.scene import PlacedTool, Raster, ToolGeometry, ToolOutline
-from chipglow.study import StudyError, load_tool, tool_of
 from chipglow.surface import CHIP_2
+from chipglow.text import DescriptionError
 
 BAND = Band(3.8e-6, 5.1e-6)
 RASTER = Raster(left=-400e-6, top=400e-6, spacing=6e-6, rows=70, columns=80)
@@ -238,7 +238,7 @@ def test_a_tool_is_read_from_its_file(tmp_path):
 )
 def test_a_file_that_is_no_tool_is_one_error(tmp_path, text, message):
     (tmp_path / "tool.yaml").write_text(text)
-    with pytest.raises(StudyError, match=message):
+    with pytest.raises(DescriptionError, match=message):
         load_tool(tmp_path / "tool.yaml")
 
 

@@ -9,16 +9,14 @@ from hypothesis import strategies as st
 
 from chipglow.camera import (
     Flag,
-    ImagePosition,
     NonUniformity,
     PlanckConversion,
     Recording,
-    develop_recording,
     find_bad_pixels,
     fit_linear,
-    flag_shares,
     replace_bad_pixels,
 )
+from chipglow.laboratory.measurement import ImagePosition, develop_recording, flag_shares
 from chipglow.radiometry import Band, ObjectParameters
 
 BAND = Band(3.8e-6, 5.1e-6)
@@ -179,7 +177,9 @@ def test_many_frames_are_as_single_ones(monkeypatch):
     bad = np.zeros((6, 8), bool)
     bad[2, 3] = True
     whole = develop_recording(recording(counts, saturation=8000), LINE, bad_pixels=bad)
-    monkeypatch.setattr("chipglow.camera.developing._PIXELS_AT_ONCE", 100)
+    monkeypatch.setattr(
+        "chipglow.laboratory.measurement.radiometric_calibration._PIXELS_AT_ONCE", 100
+    )
     parts = develop_recording(recording(counts, saturation=8000), LINE, bad_pixels=bad)
     assert whole.data.identical(parts.data)
 

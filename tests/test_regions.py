@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chipglow.analysis import Circle, Polygon, Region, areas, shared_pixels
-from chipglow.scene import Raster
-from chipglow.study import StudyError, load_regions
+from chipglow.laboratory.emissivity import load_regions
+from chipglow.scene import Circle, Polygon, Raster, Region, areas, shared_pixels
+from chipglow.text import DescriptionError
 
 RASTER = Raster(left=-120e-6, top=90e-6, spacing=6e-6, rows=30, columns=40)
 
@@ -121,7 +121,7 @@ regions:
     ],
 )
 def test_a_bad_file_of_regions_is_one_line(tmp_path, text, message):
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(DescriptionError) as caught:
         load_regions(written(tmp_path, text))
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)

@@ -13,20 +13,23 @@ from PIL import Image
 from scipy.stats import chi2, f, t
 from typer.testing import CliRunner
 
-from chipglow.analysis import (
+from chipglow.camera import Measurement
+from chipglow.cli import app
+from chipglow.io import read_measurement, write_measurement
+from chipglow.laboratory.measurement.camera_file import load_measurement
+from chipglow.laboratory.registration import (
     Registration,
     align_times,
     fit_images,
     fit_points,
+    load_registration,
+    read_pictures,
+    read_points,
     simultaneous_frames,
+    write_registration,
 )
-from chipglow.camera import Measurement
-from chipglow.cli import app
-from chipglow.io import read_measurement, read_pictures, read_points, write_measurement
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
-from chipglow.study import load_registration, write_registration
-from chipglow.study.measured import load_measurement
 
 RASTER = Raster(left=-620e-6, top=520e-6, spacing=6e-6, rows=120, columns=160)
 SHAPE = (480, 640)

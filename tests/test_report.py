@@ -10,16 +10,17 @@ import pytest
 import xarray as xr
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis import PAPER, Distribution, Inertia, Line, Plan, analyse, rake_grid
-from chipglow.analysis.draws import CAUSES
 from chipglow.camera import Camera
+from chipglow.errors import Distribution, Plan, analyse
+from chipglow.errors.draws import CAUSES
+from chipglow.laboratory.chip import Inertia, rake_grid
+from chipglow.laboratory.chip.metrics_table import chip_rows
 from chipglow.report import Row, comparison_rows, write_report
-from chipglow.report.chip import chip_rows
 from chipglow.report.comparison import cause_rows
 from chipglow.report.evidence import answer, crossing, place
-from chipglow.report.paper import TABLE_1, table_1, table_2
+from chipglow.report.paper import PAPER, TABLE_1, table_1, table_2
 from chipglow.report.visible import visible_picture
-from chipglow.scene import Material
+from chipglow.scene import Line, Material
 from chipglow.study import Study
 from chipglow.surface import CHIP_1, CHIP_2
 

@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 from chipglow.cli import app
 from chipglow.io import StoredScene, open_scene, write_scene
+from chipglow.quantities.format import rounded_text
 from chipglow.report import draw_scene, scene_summary
-from chipglow.report.quantity import rounded_text
 from chipglow.scene import FILLED, Material, Raster, Scene
 
 RASTER = Raster(left=-100e-6, top=50e-6, spacing=2e-6, rows=30, columns=40)

@@ -11,21 +11,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from chipglow.analysis.paper import Plan
 from chipglow.camera import Camera, GaussianPSF, MeasuredPSF
-from chipglow.cutting import (
-    CuttingConditions,
-    CuttingSimulation,
-    Friction,
-    Numerics,
-    OutputWindow,
-)
+from chipglow.cutting import CuttingConditions, CuttingSimulation, Friction, Numerics, OutputWindow
+from chipglow.errors.cut_error import Plan
 from chipglow.io import open_scene, read_tool_outline
 from chipglow.io.atomic import KeptErrorFile
+from chipglow.quantities import units
+from chipglow.quantities.section import Section
 from chipglow.scene import FIELD_UNITS, Chamfer, Hone, Material, Raster, Scene, ToolGeometry
 from chipglow.study import (
     Study,
-    StudyError,
     cached_scenes,
     clear_cache,
     cut,
@@ -33,11 +28,10 @@ from chipglow.study import (
     is_cut,
     load_study,
     study_text,
-    units,
 )
 from chipglow.study.fitting import uncovered
-from chipglow.study.section import Section
 from chipglow.surface import CHIP_1, CHIP_2, MapSurface
+from chipglow.text import DescriptionError
 
 
 def quantity(annotation):
@@ -364,7 +358,7 @@ def load(text, folder):
 def test_bad_input_is_one_line_with_file_field_value_and_expectation(
     text, field, message, tmp_path
 ):
-    with pytest.raises(StudyError) as caught:
+    with pytest.raises(DescriptionError) as caught:
         load(text, tmp_path)
     line = str(caught.value)
     assert "\n" not in line
@@ -386,19 +380,19 @@ def test_a_study_with_a_garbled_line_is_read_or_refused_in_one_line(number, text
     line = f"{TEMPLATE[number].split(':')[0]}: {text}" if value else text
     try:
         load("\n".join([*TEMPLATE[:number], line, *TEMPLATE[number + 1 :]]), tmp_path)
-    except StudyError as error:
+    except DescriptionError as error:
         assert len(str(error).splitlines()) == 1
 
 
 def test_a_file_that_is_not_text_is_refused(tmp_path):
     (tmp_path / "study.yaml").write_bytes(b"\x89HDF\r\n\x1a\n\xff\xfe")
-    with pytest.raises(StudyError, match=r"study\.yaml: expected text in UTF-8"):
+    with pytest.raises(DescriptionError, match=r"study\.yaml: expected text in UTF-8"):
         load_study(tmp_path / "study.yaml")
 
 
 def test_a_file_that_nobody_writes_by_hand_is_refused_unread(tmp_path):
     (tmp_path / "study.yaml").write_text("seed: 1\n" + 1_000_000 * "#")
-    with pytest.raises(StudyError, match=r"study\.yaml: expected a file of up to 1000 kB"):
+    with pytest.raises(DescriptionError, match=r"study\.yaml: expected a file of up to 1000 kB"):
         load_study(tmp_path / "study.yaml")
 
 
@@ -546,7 +540,7 @@ def test_a_tool_with_a_prepared_edge_is_built_and_written(tmp_path):
     assert measured.cutting.simulation().tool == read_tool_outline(tmp_path / "edge.csv")
     for study in (chamfered, honed, measured):
         assert load(study_text(study), tmp_path) == study
-    with pytest.raises(StudyError, match="rake_angle: is not used beside outline"):
+    with pytest.raises(DescriptionError, match="rake_angle: is not used beside outline"):
         load("cutting: {tool: {outline: edge.csv, rake_angle: 5 deg}}", tmp_path)
 
 

@@ -6,8 +6,9 @@ import pytest
 from pydantic import ValidationError
 
 from chipglow.cutting import material_names
-from chipglow.study import Study, field_entries, field_tables, study_text
-from chipglow.study.section import Section, allowed
+from chipglow.quantities import field_entries, field_tables
+from chipglow.quantities.section import Section, allowed
+from chipglow.study import Study, study_text
 
 _VALUE = r"(-?[\d.]+)(?: ([A-Za-z/^2]+))?"
 _RANGE = re.compile(rf"{_VALUE} to {_VALUE}")

@@ -8,18 +8,20 @@ import xarray as xr
 from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
 from typer.testing import CliRunner
 
-from chipglow.analysis import (
-    Area,
-    Heating,
-    KnownEmissivity,
-    Surroundings,
-    determine_emissivity,
-    true_temperature,
-)
-from chipglow.analysis.temperature import TEMPERATURE_BUDGET
 from chipglow.camera import Flag, Measurement, fit_linear
 from chipglow.cli import app
-from chipglow.io import read_region_emissivity, write_emissivity, write_measurement
+from chipglow.io import write_measurement
+from chipglow.laboratory.emissivity import (
+    Heating,
+    KnownEmissivity,
+    ReflectedTemperature,
+    determine_emissivity,
+    read_region_emissivity,
+    true_temperature,
+    write_emissivity,
+)
+from chipglow.laboratory.emissivity.temperature import TEMPERATURE_BUDGET
+from chipglow.scene import Area
 from chipglow.uncertainty import Estimate, from_xarray
 
 ROOM = 293.0
@@ -70,9 +72,9 @@ def test_an_object_of_known_emissivity_shows_its_temperature(emissivity, celsius
 def test_parts_of_the_uncertainty_are_those_of_small_changes():
     """Each part is the change of the result when its cause changes by its uncertainty."""
     seen, known = [image()], KnownEmissivity(0.42, 1e-4)
-    found = true_temperature(seen, WHOLE, known, Surroundings(ROOM, 0.01))
-    more = true_temperature(seen, WHOLE, KnownEmissivity(0.4201), Surroundings(ROOM))
-    warmer = true_temperature(seen, WHOLE, KnownEmissivity(0.42), Surroundings(ROOM + 0.01))
+    found = true_temperature(seen, WHOLE, known, ReflectedTemperature(ROOM, 0.01))
+    more = true_temperature(seen, WHOLE, KnownEmissivity(0.4201), ReflectedTemperature(ROOM))
+    warmer = true_temperature(seen, WHOLE, KnownEmissivity(0.42), ReflectedTemperature(ROOM + 0.01))
     assert found.estimate.contribution("emissivity") == pytest.approx(
         found.estimate.values - more.estimate.values, rel=1e-2
     )
@@ -104,7 +106,9 @@ def test_errors_that_emissivity_and_image_share_cancel():
     apart = true_temperature([heated], WHOLE, emissivity)
     assert apart.correlation is None
     assert apart.estimate.contribution("calibration") > 0.5
-    elsewhere = true_temperature([heated], WHOLE, emissivity, Surroundings(ROOM, 5.0), calibration)
+    elsewhere = true_temperature(
+        [heated], WHOLE, emissivity, ReflectedTemperature(ROOM, 5.0), calibration
+    )
     assert elsewhere.estimate.contribution("environment") > 0.01
 
 
@@ -134,10 +138,10 @@ def test_stated_intervals_hold_the_truth():
 
 def test_cold_surroundings_are_part_of_the_uncertainty():
     """Below 200 K a band has no table; what is reflected there counts as elsewhere."""
-    cold = Surroundings(190.0, 1.0)
+    cold = ReflectedTemperature(190.0, 1.0)
     seen = [image(0.05, 330.0, environment=190.0)]
     found = true_temperature(seen, WHOLE, KnownEmissivity(0.05), cold)
-    warmer = true_temperature(seen, WHOLE, KnownEmissivity(0.05), Surroundings(191.0))
+    warmer = true_temperature(seen, WHOLE, KnownEmissivity(0.05), ReflectedTemperature(191.0))
     assert found.estimate.values == pytest.approx(330.0, abs=1e-3)
     assert found.estimate.contribution("environment") == pytest.approx(
         found.estimate.values - warmer.estimate.values, rel=0.1
@@ -306,7 +310,7 @@ def test_impossible_input_is_one_clear_error():
     with pytest.raises(ValueError, match="temperature: there is no image"):
         true_temperature([], WHOLE, known)
     with pytest.raises(ValueError, match=r"darker than what it reflects at 626\.85 °C"):
-        true_temperature([image()], WHOLE, known, Surroundings(900.0))
+        true_temperature([image()], WHOLE, known, ReflectedTemperature(900.0))
     flags = np.full((1, *RASTER.shape), Flag.DEAD, np.uint8)
     with pytest.raises(ValueError, match="0 of its 1200 pixels can be used"):
         true_temperature([image(flags=flags)], WHOLE, known)
@@ -316,9 +320,9 @@ def test_impossible_input_is_one_clear_error():
     with pytest.raises(ValueError, match="standard uncertainty is -1"):
         KnownEmissivity(0.5, -1.0)
     with pytest.raises(ValueError, match="environment: is 0"):
-        Surroundings(0.0)
+        ReflectedTemperature(0.0)
     with pytest.raises(ValueError, match="environment: standard uncertainty"):
-        Surroundings(293.0, -1.0)
+        ReflectedTemperature(293.0, -1.0)
 
 
 # The command

@@ -22,8 +22,8 @@ from chipglow.scene import (
     ToolOutline,
     ToolOutlineError,
 )
-from chipglow.scene.surface import surface_bound, surface_distance
 from chipglow.scene.tool_attributes import tool_attributes
+from chipglow.scene.tool_surface import surface_bound, surface_distance
 
 CHAMFERED = ToolGeometry(chamfer=Chamfer(100e-6, radians(20.0)))
 WATERFALL = ToolGeometry(hone=Hone(80e-6, 40e-6))

@@ -13,18 +13,10 @@ from measured_band import RASTER, TOOL, measured
 from seen_chip import look, noisy
 from typer.testing import CliRunner
 
-from chipglow.analysis import (
-    StatedUncertainties,
-    ToolUncertainty,
-    band_profile,
-    compare,
-    find_tool,
-    normalised_error,
-    rake_grid,
-    reading,
-)
 from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
+from chipglow.laboratory.chip import ToolUncertainty, band_profile, find_tool, rake_grid
+from chipglow.laboratory.comparison import StatedUncertainties, compare, normalised_error, reading
 from chipglow.scene import PlacedTool, ToolGeometry
 from chipglow.surface import CHIP_2
 

@@ -1,28 +1,32 @@
 """Cameras, virtual and real: optics, exposure, calibration, and the measurement that comes out."""
 
-from chipglow.camera.bad_pixels import LEAST_FRAMES, BadPixels, find_bad_pixels, replace_bad_pixels
-from chipglow.camera.blackbody import Blackbody
-from chipglow.camera.calibration import (
+from chipglow.camera.calibration.blackbody import Blackbody
+from chipglow.camera.calibration.calibration import (
     Calibration,
     FittedCalibration,
     LinearCalibration,
     MakersCalibration,
     SakumaHattori,
 )
-from chipglow.camera.calibration_fit import CalibrationFit, fit_linear, fit_sakuma_hattori
+from chipglow.camera.calibration.fit import CalibrationFit, fit_linear, fit_sakuma_hattori
 from chipglow.camera.camera import Camera
-from chipglow.camera.convolution import blur
-from chipglow.camera.detector import Detector
-from chipglow.camera.developing import (
-    ImagePosition,
-    develop_recording,
-    flag_shares,
-    repaired_signal,
+from chipglow.camera.detector.bad_pixels import (
+    LEAST_FRAMES,
+    BadPixels,
+    find_bad_pixels,
+    replace_bad_pixels,
 )
+from chipglow.camera.detector.detector import Detector
+from chipglow.camera.detector.nonuniformity import NonUniformity
 from chipglow.camera.exposure import Exposure, expose, expose_all, frame_weights
 from chipglow.camera.measurement import UNUSABLE, Flag, Measurement
-from chipglow.camera.nonuniformity import NonUniformity
-from chipglow.camera.psf import AnnularAperturePSF, GaussianPSF, MeasuredPSF, PointSpreadFunction
+from chipglow.camera.optics.convolution import blur
+from chipglow.camera.optics.psf import (
+    AnnularAperturePSF,
+    GaussianPSF,
+    MeasuredPSF,
+    PointSpreadFunction,
+)
 from chipglow.camera.recording import PlanckConversion, Recording
 from chipglow.camera.warning import ChipglowWarning
 
@@ -41,7 +45,6 @@ __all__ = [
     "FittedCalibration",
     "Flag",
     "GaussianPSF",
-    "ImagePosition",
     "LinearCalibration",
     "MakersCalibration",
     "MeasuredPSF",
@@ -52,14 +55,11 @@ __all__ = [
     "Recording",
     "SakumaHattori",
     "blur",
-    "develop_recording",
     "expose",
     "expose_all",
     "find_bad_pixels",
     "fit_linear",
     "fit_sakuma_hattori",
-    "flag_shares",
     "frame_weights",
-    "repaired_signal",
     "replace_bad_pixels",
 ]

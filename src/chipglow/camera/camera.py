@@ -11,11 +11,11 @@ from warnings import warn
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.convolution import blur, blur_of_like, light_from_beyond
 from chipglow.camera.exposure import Exposure, expose
 from chipglow.camera.measurement import Measurement
-from chipglow.camera.psf import AnnularAperturePSF, PointSpreadFunction
-from chipglow.camera.sampling import integrate, sensor_raster, whole_raster
+from chipglow.camera.optics import AnnularAperturePSF, PointSpreadFunction, blur
+from chipglow.camera.optics.convolution import blur_of_like, light_from_beyond
+from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
 from chipglow.camera.warning import ChipglowWarning
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST

@@ -109,15 +109,9 @@ def init(
     ] = False,
 ) -> None:
     """Write the paper's study as a commented YAML file."""
-    from chipglow.io import atomic_path
-    from chipglow.study import (
-        ImportDescription,
-        MeasurementDescription,
-        Study,
-        import_text,
-        measurement_text,
-        study_text,
-    )
+    from chipglow.io import ImportDescription, atomic_path, import_text
+    from chipglow.laboratory.measurement import MeasurementDescription, measurement_text
+    from chipglow.study import Study, study_text
 
     if of_import and of_measurement:
         raise ValueError("--measurement: expected only one of --import and --measurement")
@@ -219,7 +213,7 @@ def import_source(
 ) -> None:
     """Make a scene of someone else's fields."""
     from chipglow.cli.importing import import_fields
-    from chipglow.study import load_import
+    from chipglow.io import load_import
 
     import_fields(load_import(source, settings or ()), out, resume)
 
@@ -308,7 +302,7 @@ def list_cache() -> None:
     """Show the cached scenes, the latest first, and their size."""
     from datetime import datetime
 
-    from chipglow.study.cache import cache_folder, cached_scenes
+    from chipglow.study import cache_folder, cached_scenes
 
     scenes = cached_scenes()
     for scene in scenes:
@@ -321,7 +315,7 @@ def list_cache() -> None:
 @cache_app.command("clear")
 def clear() -> None:
     """Delete the cached scenes."""
-    from chipglow.study.cache import cache_folder, clear_cache
+    from chipglow.study import cache_folder, clear_cache
 
     print(f"{_megabytes(clear_cache())} freed in {cache_folder()}")
 

@@ -84,11 +84,11 @@ def calibrate(
 
     from chipglow.camera import Blackbody, fit_linear, fit_sakuma_hattori
     from chipglow.cli.assumed import say_assumed, say_doubtful
-    from chipglow.cli.quantities import parse
     from chipglow.io.column_file import read_calibration_points
-    from chipglow.study.measured import UniformObjects, uniform_counts
-    from chipglow.study.measurement_schema import band_of
-    from chipglow.study.units import TEMPERATURE, TEMPERATURE_DIFFERENCE, TIME
+    from chipglow.laboratory.measurement import UniformObjects, uniform_counts
+    from chipglow.laboratory.measurement.description import band_of
+    from chipglow.quantities.option import parse
+    from chipglow.quantities.units import TEMPERATURE, TEMPERATURE_DIFFERENCE, TIME
 
     recordings, uniform = [], UniformObjects()
 
@@ -150,14 +150,14 @@ def calibrate(
         print(out)
     if plot is not None:
         from chipglow.cli.pictures import write_picture
-        from chipglow.report import draw_calibrations
+        from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
 
         write_picture(draw_calibrations(fits), plot)
 
 
 def _write(fit: "CalibrationFit[FittedCalibration]", out: Path) -> None:
     from chipglow.io import atomic_path
-    from chipglow.study import CalibrationDescription, calibration_text
+    from chipglow.laboratory.measurement import CalibrationDescription, calibration_text
 
     with atomic_path(out) as temporary:
         text = calibration_text(CalibrationDescription.of(fit))

@@ -10,8 +10,8 @@ from chipglow.cli.options import Settings, ToolChoice, picture_option
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from chipglow.analysis import Comparison, StatedUncertainties
     from chipglow.camera import Measurement
+    from chipglow.laboratory.comparison import Comparison, StatedUncertainties
 
 
 def compare(
@@ -79,14 +79,14 @@ def compare(
 
     from rich.console import Console
 
-    from chipglow.analysis import compare as compare_all
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.cli.pictures import write_picture
     from chipglow.cli.times import frame_at
     from chipglow.cli.tools import chosen_tool
-    from chipglow.io import read_curve
-    from chipglow.report import draw_comparison
-    from chipglow.study.measured import load_measurement
+    from chipglow.laboratory.chip import read_curve
+    from chipglow.laboratory.comparison import compare as compare_all
+    from chipglow.laboratory.comparison.figure import draw_comparison
+    from chipglow.laboratory.measurement import load_measurement
 
     stated = _stated(uncertainty, emissivity_uncertainty, position)
     whole = load_measurement(measured, settings or ())
@@ -125,9 +125,9 @@ def compare(
 def _stated(
     uncertainty: str | None, emissivity: float, position: str | None
 ) -> "StatedUncertainties":
-    from chipglow.analysis import StatedUncertainties
-    from chipglow.cli.quantities import parse
-    from chipglow.study.units import LENGTH, TEMPERATURE_DIFFERENCE
+    from chipglow.laboratory.comparison import StatedUncertainties
+    from chipglow.quantities.option import parse
+    from chipglow.quantities.units import LENGTH, TEMPERATURE_DIFFERENCE
 
     if not 0.0 <= emissivity < 1.0:
         raise ValueError(f"--emissivity-uncertainty: {emissivity:g}, expected 0 to under 1")
@@ -138,7 +138,7 @@ def _stated(
 
 
 def _labelled(paths: list[Path]) -> "dict[str, Measurement]":
-    from chipglow.study.measured import load_measurement
+    from chipglow.laboratory.measurement import load_measurement
 
     found: dict[str, Measurement] = {}
     for path in paths:
@@ -155,7 +155,7 @@ def _labelled(paths: list[Path]) -> "dict[str, Measurement]":
 def _table(result: "Comparison") -> "Table":
     from rich.table import Table
 
-    from chipglow.analysis.comparison import COVERAGE
+    from chipglow.laboratory.comparison.comparison import COVERAGE
 
     table = Table(
         "place",
@@ -181,8 +181,12 @@ def _table(result: "Comparison") -> "Table":
 
 
 def _write(result: "Comparison", out: Path) -> None:
-    from chipglow.io import atomic_folder, write_comparison
-    from chipglow.report import draw_comparison, drawing
+    from chipglow.drawing import drawing
+    from chipglow.io import atomic_folder
+    from chipglow.laboratory.comparison import (
+        write_comparison,
+    )
+    from chipglow.laboratory.comparison.figure import draw_comparison
 
     with atomic_folder(out) as folder:
         write_comparison(result, folder)

@@ -32,8 +32,7 @@ def convert(
     from chipglow.cli.showing import listed
     from chipglow.cli.showing_measurement import say_measurement
     from chipglow.io import is_measurement, write_measurement
-    from chipglow.study import load_description
-    from chipglow.study.measured import load_recording, measurement_of
+    from chipglow.laboratory.measurement import load_description, load_recording, measurement_of
 
     if is_measurement(source):
         raise ValueError(f"{source}: is a measurement already, expected a camera's file")

@@ -7,10 +7,10 @@ from shutil import copyfile
 
 from rich.console import Console
 
-from chipglow.analysis import inertia
 from chipglow.cli.inertia import say_inertia
 from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.io import atomic_path, open_scene
+from chipglow.laboratory.chip import inertia
 from chipglow.scene import Frame
 from chipglow.study import Study, cut, is_cut, kept_progress, preview_raster
 
@@ -54,7 +54,7 @@ def _movie(study: Study, path: Path | None) -> Iterator[Callable[[Frame], None] 
         check_movie_path(path)
     except ValueError as error:
         raise ValueError(f"--preview: {error}") from None
-    from chipglow.report.movie import cut_movie
+    from chipglow.report import cut_movie
 
     with cut_movie(path, preview_raster(study), study.cutting.simulation()) as on_preview:
         yield on_preview

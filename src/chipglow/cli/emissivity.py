@@ -12,8 +12,13 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from chipglow.analysis import EmissivityLine, EmissivityMap, Heating, RegionEmissivity
     from chipglow.camera import Measurement
+    from chipglow.laboratory.emissivity import (
+        EmissivityLine,
+        EmissivityMap,
+        Heating,
+        RegionEmissivity,
+    )
 
 
 def emissivity(
@@ -70,10 +75,10 @@ def emissivity(
     """Determine emissivity from images of an object of known temperature."""
     from rich.console import Console
 
-    from chipglow.analysis import areas, determine_emissivity, emissivity_line, shared_pixels
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
-    from chipglow.study.files import load_regions
-    from chipglow.study.measured import load_measurement
+    from chipglow.laboratory.emissivity import determine_emissivity, emissivity_line, load_regions
+    from chipglow.laboratory.measurement import load_measurement
+    from chipglow.scene import areas, shared_pixels
 
     heatings = _heatings(
         images, truth, environment, truth_uncertainty, environment_uncertainty,
@@ -103,7 +108,7 @@ def emissivity(
     _write(maps, rows, out, table)
     if plot is not None:
         from chipglow.cli.pictures import write_picture
-        from chipglow.report.emissivity_figure import draw_emissivity
+        from chipglow.laboratory.emissivity.figure import draw_emissivity
 
         whole = [line for line, area in zip(lines, found, strict=False) if area.whole]
         write_picture(draw_emissivity(maps[0], named, whole), plot)
@@ -119,9 +124,9 @@ def _heatings(
     drift: float | None,
 ) -> "list[Heating]":
     """How the object was heated for each image."""
-    from chipglow.analysis import Heating
-    from chipglow.cli.quantities import parse
-    from chipglow.study.units import TEMPERATURE, TEMPERATURE_DIFFERENCE
+    from chipglow.laboratory.emissivity import Heating
+    from chipglow.quantities.option import parse
+    from chipglow.quantities.units import TEMPERATURE, TEMPERATURE_DIFFERENCE
 
     if len(truths) not in (1, len(images)):
         raise ValueError(
@@ -159,7 +164,7 @@ def _print_tables(
 ) -> None:
     from rich.table import Table
 
-    from chipglow.analysis.emissivity import BUDGET
+    from chipglow.laboratory.emissivity.emissivity import BUDGET
 
     for of in rows:
         console.print(f"\nObject at {of[0].heating.truth - 273.15:.6g} °C")
@@ -252,7 +257,7 @@ def _doubts(rows: "list[list[RegionEmissivity]]") -> "Iterator[str]":
 
 
 def _print_study(console: "Console", rows: "list[list[RegionEmissivity]]") -> None:
-    from chipglow.study.emissivity import surface_text
+    from chipglow.laboratory.emissivity import surface_text
 
     text = surface_text(rows[0])
     if text:
@@ -266,7 +271,7 @@ def _write(
     out: Path | None,
     table: Path | None,
 ) -> None:
-    from chipglow.io import write_emissivity, write_emissivity_table
+    from chipglow.laboratory.emissivity import write_emissivity, write_emissivity_table
 
     if out is not None:
         write_emissivity(maps, rows, out)

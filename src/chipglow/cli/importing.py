@@ -7,9 +7,8 @@ from rich.table import Table
 
 from chipglow.cli.assumed import say_assumed
 from chipglow.cli.progress import progress_bars
-from chipglow.io import import_scene, prospect
+from chipglow.io import ImportDescription, import_scene, prospect
 from chipglow.io.importing import Prospect, kept_import
-from chipglow.study import ImportDescription
 
 
 def import_fields(description: ImportDescription, out: Path | None, resume: bool) -> None:

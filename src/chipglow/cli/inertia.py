@@ -4,7 +4,7 @@ from math import isfinite
 
 from rich.console import Console
 
-from chipglow.analysis.inertia import Inertia
+from chipglow.laboratory.chip import Inertia
 
 
 def say_inertia(inertia: Inertia | None) -> None:

@@ -8,7 +8,7 @@ import typer
 from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
-    from chipglow.analysis import KnifeEdge
+    from chipglow.laboratory.psf import KnifeEdge
 
 
 def psf(
@@ -50,9 +50,9 @@ def psf(
     settings: Settings = None,
 ) -> None:
     """Determine a camera's point spread function and MTF from images of an edge."""
-    from chipglow.analysis import aperture_image, knife_edge
     from chipglow.cli.pictures import write_picture
-    from chipglow.study import load_apertures, load_edge, load_measurement
+    from chipglow.laboratory.measurement import load_measurement
+    from chipglow.laboratory.psf import aperture_image, knife_edge, load_apertures, load_edge
 
     part = None if region is None else _region(region)
     given = settings or ()
@@ -65,12 +65,12 @@ def psf(
     chosen = found.psf(model=model)
     _print(found)
     if out is not None:
-        from chipglow.io import write_psf
+        from chipglow.laboratory.psf import write_psf
 
         write_psf(found, out, chosen)
         print(out)
     if plot is not None:
-        from chipglow.report import draw_knife_edge
+        from chipglow.laboratory.psf.figure import draw_knife_edge
 
         write_picture(draw_knife_edge(found), plot)
 
@@ -93,7 +93,7 @@ def _print(found: "KnifeEdge") -> None:
     from rich.console import Console
 
     from chipglow.cli.assumed import say_assumed, say_doubtful
-    from chipglow.report.knife_edge_summary import edge_table, model_table, sentences
+    from chipglow.laboratory.psf.summary import edge_table, model_table, sentences
 
     console = Console(highlight=False, markup=False)
     console.print(model_table(found))

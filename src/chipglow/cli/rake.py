@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from chipglow.analysis import RakeGrid
     from chipglow.camera import Measurement
+    from chipglow.laboratory.chip import RakeGrid
 
 
 def rake(
@@ -49,15 +49,18 @@ def rake(
     """Average radiance temperature in squares along the rake face, as the paper's Figure 7."""
     from rich.console import Console
 
-    from chipglow.analysis import ToolUncertainty, rake_grid
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.cli.pictures import write_picture
-    from chipglow.cli.quantities import parse
     from chipglow.cli.tools import chosen_tool
-    from chipglow.io import write_rake_grid
-    from chipglow.report import draw_rake_grid
-    from chipglow.study.measured import load_measurement
-    from chipglow.study.units import LENGTH
+    from chipglow.laboratory.chip import (
+        ToolUncertainty,
+        rake_grid,
+        write_rake_grid,
+    )
+    from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
+    from chipglow.laboratory.measurement import load_measurement
+    from chipglow.quantities.option import parse
+    from chipglow.quantities.units import LENGTH
 
     reach = parse("--depth", LENGTH, depth)
     stated = parse("--position", LENGTH, position)

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from rich.console import Console
 
-    from chipglow.analysis import DotFit, ImageFit, PointFit, Registration
     from chipglow.camera import Measurement, Recording
+    from chipglow.laboratory.registration import DotFit, ImageFit, PointFit, Registration
 
     Points = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -113,13 +113,18 @@ def register(
 
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.cli.pictures import write_picture
-    from chipglow.cli.quantities import parse
-    from chipglow.io import read_pictures, read_points
-    from chipglow.io.picture_file import write_blink
-    from chipglow.report import blink_pictures, draw_registration
-    from chipglow.study import load_registration, tool_of, write_registration
-    from chipglow.study.measured import load_measurement
-    from chipglow.study.units import TIME
+    from chipglow.laboratory.chip import tool_of
+    from chipglow.laboratory.measurement import load_measurement
+    from chipglow.laboratory.registration import (
+        load_registration,
+        read_pictures,
+        read_points,
+        write_registration,
+    )
+    from chipglow.laboratory.registration.figure import blink_pictures, draw_registration
+    from chipglow.laboratory.registration.picture_file import write_blink
+    from chipglow.quantities.option import parse
+    from chipglow.quantities.units import TIME
 
     if pairs is not None and align is None:
         raise ValueError(f"--pairs: {pairs} without --align, expected both")
@@ -169,7 +174,7 @@ def _check_method(method: MethodName | None, points: Path | None, known: Path | 
 
 
 def _region(text: str) -> tuple[float, float, float, float]:
-    from chipglow.study.units import POSITION
+    from chipglow.quantities.units import POSITION
 
     try:
         left, bottom, right, top = (POSITION.parse(part.strip()) for part in text.split(","))
@@ -191,7 +196,7 @@ def _check_frame(option: str, number: int, count: int) -> None:
 def _check_times(
     path: Path, measured: "Measurement", seen: "Recording", interval: float | None
 ) -> None:
-    from chipglow.io.picture_file import PICTURE_SUFFIXES
+    from chipglow.laboratory.registration.picture_file import PICTURE_SUFFIXES
 
     if path.suffix.lower() in PICTURE_SUFFIXES and interval is None:
         raise ValueError(f"--align: {path} tells no times, expected --visible-interval")
@@ -200,7 +205,7 @@ def _check_times(
 
 
 def _by_points(console: "Console", given: "Points", model: ModelName) -> "Registration":
-    from chipglow.analysis import fit_points
+    from chipglow.laboratory.registration import fit_points
 
     fit = fit_points(*given, model.value)
     _print_points(console, fit, given)
@@ -224,8 +229,8 @@ def _by_images(
     """The registration, its numbers printed, and the dots that gave it."""
     import numpy as np
 
-    from chipglow.analysis import fit_dots, fit_images
     from chipglow.camera import Flag
+    from chipglow.laboratory.registration import fit_dots, fit_images
 
     dead = measured.flags[frame] & Flag.DEAD > 0
     radiance = np.where(dead, np.nan, measured.radiance[frame])
@@ -322,9 +327,9 @@ def _align(
 ) -> None:
     import numpy as np
 
-    from chipglow.analysis import align_times, simultaneous_frames
-    from chipglow.analysis.time_alignment import region_signals
     from chipglow.cli.assumed import say_assumed, say_doubtful
+    from chipglow.laboratory.registration import align_times, simultaneous_frames
+    from chipglow.laboratory.registration.time_alignment import region_signals
 
     integration = float(measured.data.attrs["integration_time"])
     frames, pictures = region_signals(

@@ -9,19 +9,13 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from chipglow.analysis import SceneErrors, StudyResult
 from chipglow.cli.assumed import say_assumed, say_missing
 from chipglow.cli.inertia import say_inertia
 from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.cutting import SOLVER_VERSION
+from chipglow.errors import SceneErrors, StudyResult
 from chipglow.io import atomic_folder
-from chipglow.report import (
-    comparison_rows,
-    place_rows,
-    table_2,
-    write_report,
-    write_scene_report,
-)
+from chipglow.report import comparison_rows, place_rows, table_2, write_report, write_scene_report
 from chipglow.study import Study, errors, run, study_text
 
 

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-from chipglow.study import Study, StudyError, load_study
+from chipglow.study import Study, load_study
 from chipglow.study.schema import UniformSection
+from chipglow.text import DescriptionError
 
 
 def study_of(scene: Path, study: Path | None, emissivity: float | None) -> Study:
@@ -20,14 +21,14 @@ def study_of(scene: Path, study: Path | None, emissivity: float | None) -> Study
 
     Raises
     ------
-    StudyError
+    DescriptionError
         If the emissivity is not from 0 to 1.
     """
     if not scene.is_file():
-        raise StudyError(f"{scene}: there is no such file, expected a scene")
+        raise DescriptionError(f"{scene}: there is no such file, expected a scene")
     known = Study(scene=str(scene.resolve())) if study is None else load_study(study, scene)
     if emissivity is None:
         return known
     if not 0 <= emissivity <= 1:
-        raise StudyError(f"--emissivity: {emissivity:g}, expected 0 to 1")
+        raise DescriptionError(f"--emissivity: {emissivity:g}, expected 0 to 1")
     return known.model_copy(update={"surface": UniformSection(emissivity=emissivity)})

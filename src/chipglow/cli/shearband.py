@@ -10,7 +10,7 @@ from chipglow.cli.options import MeasurementFile, Settings, ToolChoice, picture_
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from chipglow.analysis import BandProfile
+    from chipglow.laboratory.chip import BandProfile
 
 
 def shearband(
@@ -63,16 +63,19 @@ def shearband(
     """Read the radiance temperature along the shear band, as the paper's Figure 9."""
     from rich.console import Console
 
-    from chipglow.analysis import band_profile
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.cli.pictures import write_picture
-    from chipglow.cli.quantities import parse
     from chipglow.cli.times import frame_at
     from chipglow.cli.tools import chosen_tool
-    from chipglow.io import read_curve, write_band_profile
-    from chipglow.report import draw_band_profile
-    from chipglow.study.measured import load_measurement
-    from chipglow.study.units import LENGTH
+    from chipglow.laboratory.chip import (
+        band_profile,
+        read_curve,
+        write_band_profile,
+    )
+    from chipglow.laboratory.chip.band_figure import draw_band_profile
+    from chipglow.laboratory.measurement import load_measurement
+    from chipglow.quantities.option import parse
+    from chipglow.quantities.units import LENGTH
 
     measured = load_measurement(measurement, settings or ())
     times = measured.times

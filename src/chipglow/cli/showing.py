@@ -13,11 +13,11 @@ from rich.table import Table
 
 from chipglow.cli.pictures import write_picture
 from chipglow.cli.times import parse_instant
+from chipglow.drawing.frames import shown_frame
 from chipglow.io import StoredScene, open_scene
 from chipglow.io.contents import holds
+from chipglow.quantities.format import rounded_text
 from chipglow.report import SceneSummary, draw_scene, scene_summary
-from chipglow.report.frames import shown_frame
-from chipglow.report.quantity import rounded_text
 from chipglow.scene import ENERGY_UNITS, Raster, Scene, Tool, ToolGeometry
 
 _LONGEST: Final = 800

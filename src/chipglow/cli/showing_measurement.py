@@ -13,7 +13,11 @@ from chipglow.cli.pictures import write_picture
 from chipglow.cli.showing import attribute_rows, listed, microseconds, where_and_when
 from chipglow.cli.times import parse_instant
 from chipglow.io import read_measurement
-from chipglow.report import MeasurementSummary, draw_measurement, measurement_summary
+from chipglow.laboratory.measurement import (
+    MeasurementSummary,
+    measurement_summary,
+)
+from chipglow.laboratory.measurement.figure import draw_measurement
 
 _FLAG_NAMES: Final = {
     Flag.BELOW_FLOOR: "below the floor or the calibration",

@@ -12,8 +12,12 @@ from chipglow.cli.options import Settings, file_option
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from chipglow.analysis import KnownEmissivity, Surroundings, TrueTemperature
-    from chipglow.analysis.temperature import DeterminedEmissivity
+    from chipglow.laboratory.emissivity import (
+        KnownEmissivity,
+        ReflectedTemperature,
+        TrueTemperature,
+    )
+    from chipglow.laboratory.emissivity.temperature import DeterminedEmissivity
 
     Emissivities = Mapping[str, DeterminedEmissivity | KnownEmissivity]
 
@@ -76,12 +80,14 @@ def temperature(
     """Determine the true temperature of regions whose emissivity is known."""
     from rich.console import Console
 
-    from chipglow.analysis import areas, true_temperature
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
-    from chipglow.io import write_temperature_table
-    from chipglow.study import load_calibration
-    from chipglow.study.files import load_regions
-    from chipglow.study.measured import load_measurement
+    from chipglow.laboratory.emissivity import (
+        load_regions,
+        true_temperature,
+        write_temperature_table,
+    )
+    from chipglow.laboratory.measurement import load_calibration, load_measurement
+    from chipglow.scene import areas
 
     named = load_regions(regions)
     room = _room(environment, environment_uncertainty)
@@ -107,8 +113,7 @@ def temperature(
 
 def _emissivities(text: str, spread: float | None, names: Sequence[str]) -> "Emissivities":
     """Emissivities by the names of regions."""
-    from chipglow.analysis import KnownEmissivity
-    from chipglow.io import read_region_emissivity
+    from chipglow.laboratory.emissivity import KnownEmissivity, read_region_emissivity
 
     try:
         number = float(text)
@@ -127,15 +132,15 @@ def _emissivities(text: str, spread: float | None, names: Sequence[str]) -> "Emi
     return dict.fromkeys(names, KnownEmissivity(number, spread or 0.0))
 
 
-def _room(environment: str | None, spread: str | None) -> "Surroundings | None":
+def _room(environment: str | None, spread: str | None) -> "ReflectedTemperature | None":
     """What the object reflects, if that is said."""
-    from chipglow.analysis import Surroundings
-    from chipglow.cli.quantities import parse
-    from chipglow.study.units import TEMPERATURE, TEMPERATURE_DIFFERENCE
+    from chipglow.laboratory.emissivity import ReflectedTemperature
+    from chipglow.quantities.option import parse
+    from chipglow.quantities.units import TEMPERATURE, TEMPERATURE_DIFFERENCE
 
     if environment is None and spread is None:
         return None
-    return Surroundings(
+    return ReflectedTemperature(
         parse("--environment", TEMPERATURE, environment or "293 K"),
         parse("--environment-uncertainty", TEMPERATURE_DIFFERENCE, spread or "0 K"),
     )
@@ -145,7 +150,7 @@ def _far_from_the_heating(
     rows: "list[TrueTemperature]", emissivities: "Emissivities"
 ) -> Iterator[str]:
     """Regions whose temperature is another than that at which their emissivity was determined."""
-    from chipglow.analysis import KnownEmissivity
+    from chipglow.laboratory.emissivity import KnownEmissivity
 
     for row in rows:
         known = emissivities[row.name]
@@ -163,7 +168,7 @@ def _far_from_the_heating(
 def _print(console: "Console", rows: "list[TrueTemperature]") -> None:
     from rich.table import Table
 
-    from chipglow.analysis.temperature import TEMPERATURE_BUDGET
+    from chipglow.laboratory.emissivity.temperature import TEMPERATURE_BUDGET
 
     result = Table(
         "region", "pixels", "radiance temperature", "emissivity", "true temperature", "u", "U 95 %",
@@ -199,10 +204,10 @@ def _spread(value: Any) -> str:
 def _assumptions(
     rows: "list[TrueTemperature]",
     emissivities: "Emissivities",
-    room: "Surroundings | None",
+    room: "ReflectedTemperature | None",
     drift_missing: bool,
 ) -> Iterator[str]:
-    from chipglow.analysis import KnownEmissivity
+    from chipglow.laboratory.emissivity import KnownEmissivity
 
     known = any(isinstance(one, KnownEmissivity) for one in emissivities.values())
     yield "every region is of even temperature and emissivity."

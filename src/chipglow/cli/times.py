@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.cli.quantities import parse
-from chipglow.study.units import INSTANT
+from chipglow.quantities.option import parse
+from chipglow.quantities.units import INSTANT
 
 
 def parse_instant(option: str, text: str) -> float:

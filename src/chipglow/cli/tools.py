@@ -6,10 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from chipglow.analysis import FoundTool, ToolUncertainty, find_tool
 from chipglow.camera import Measurement
+from chipglow.laboratory.chip import FoundTool, ToolUncertainty, find_tool, tool_of
 from chipglow.scene import Tool
-from chipglow.study import tool_of
 
 _FACE: Final = 200e-6
 """Length of the face in m on which a tool that was told is compared with one that is seen."""

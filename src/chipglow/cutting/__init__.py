@@ -11,12 +11,7 @@ from chipglow.cutting.conditions import (
 from chipglow.cutting.damage import JohnsonCookDamage
 from chipglow.cutting.energy import EnergyHistory
 from chipglow.cutting.flow_stress import FlowStress, flow_stress_law
-from chipglow.cutting.laws import (
-    HyperbolicTangent,
-    JohnsonCook,
-    MarusichOrtiz,
-    ZerilliArmstrong,
-)
+from chipglow.cutting.laws import HyperbolicTangent, JohnsonCook, MarusichOrtiz, ZerilliArmstrong
 from chipglow.cutting.library import (
     AISI_1045,
     CARBIDE,
@@ -28,19 +23,9 @@ from chipglow.cutting.library import (
     tool_material,
     workpiece,
 )
-from chipglow.cutting.material import (
-    RateTable,
-    TemperatureTable,
-    ToolMaterial,
-    WorkpieceMaterial,
-)
+from chipglow.cutting.material import RateTable, TemperatureTable, ToolMaterial, WorkpieceMaterial
 from chipglow.cutting.preview import Preview
-from chipglow.cutting.simulation import (
-    SOLVER_VERSION,
-    CuttingSimulation,
-    ForceHistory,
-    SolverError,
-)
+from chipglow.cutting.simulation import SOLVER_VERSION, CuttingSimulation, ForceHistory, SolverError
 
 __all__ = [
     "AISI_1045",

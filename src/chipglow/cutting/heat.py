@@ -7,7 +7,7 @@ from numba import njit
 
 from chipglow.cutting.momentum import spline, spline_weights
 from chipglow.cutting.stress import property_at
-from chipglow.scene.surface import surface_distance
+from chipglow.scene.tool_surface import surface_distance
 
 
 class ToolHeat(NamedTuple):

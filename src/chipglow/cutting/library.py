@@ -11,12 +11,7 @@ from typing import Any, Final, NamedTuple
 from chipglow.cutting import laws as _laws  # noqa: F401  (registers the laws)
 from chipglow.cutting.damage import JohnsonCookDamage
 from chipglow.cutting.flow_stress import LAWS, comes_with_chipglow
-from chipglow.cutting.material import (
-    RateTable,
-    TemperatureTable,
-    ToolMaterial,
-    WorkpieceMaterial,
-)
+from chipglow.cutting.material import RateTable, TemperatureTable, ToolMaterial, WorkpieceMaterial
 from chipglow.text import read_yaml
 
 FOLDER: Final = Path(__file__).with_name("materials")

@@ -30,7 +30,7 @@ from chipglow.cutting.stress import (
     kelvin_index,
     update_stresses,
 )
-from chipglow.scene.surface import surface_bound, surface_distance
+from chipglow.scene.tool_surface import surface_bound, surface_distance
 
 BLOCK_COLUMNS = 6
 """Points of a block reach two columns beyond it, three if they drift by a cell before the next

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from chipglow.cutting.momentum import spline, spline_weights
 from chipglow.cutting.points import Grid, Points
 from chipglow.scene import Frame, Material, Raster, Tool
-from chipglow.scene.surface import surface_distance
+from chipglow.scene.tool_surface import surface_distance
 
 _FIELDS: Final = (
     "temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y",

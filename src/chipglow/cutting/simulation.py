@@ -55,7 +55,7 @@ from chipglow.cutting.recording import Recorder
 from chipglow.cutting.tool_border import CELLS, border_nodes, conduct_beyond
 from chipglow.cutting.watch import Trouble, fastest_point, find_lost, find_off_grid, find_trouble
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
-from chipglow.scene.surface import Surface, surface_distance
+from chipglow.scene.tool_surface import ToolSurface, surface_distance
 
 SOLVER_VERSION: Final = "9"
 """Changes whenever the same input gives another result."""
@@ -604,7 +604,7 @@ def _tool_heat(simulation: CuttingSimulation, spacing: float) -> ToolHeat:
     )
 
 
-def _touching(tool: Surface, heights: NDArray[np.float64]) -> float:
+def _touching(tool: ToolSurface, heights: NDArray[np.float64]) -> float:
     """Place of a vertical face that touches the tool from the left."""
     low, high = -1e-2, 0.0
     for _ in range(60):

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.conventions import Unit
+from chipglow.io.sources import Unit
 from chipglow.io.sources.unit_text import parse_unit
 from chipglow.radiometry import TabulatedResponse
 from chipglow.text import read_small_text

@@ -8,7 +8,8 @@ from typing import TypeVar
 import numpy as np
 import xarray as xr
 
-from chipglow.camera.measurement import MEASUREMENT_UNITS, Measurement
+from chipglow.camera import Measurement
+from chipglow.camera.measurement import MEASUREMENT_UNITS
 from chipglow.io.atomic import KeptErrorFile, atomic_path
 from chipglow.io.contents import holds
 

@@ -27,6 +27,7 @@ from chipglow.io.unfinished import (
     write_checkpoint,
 )
 from chipglow.scene import (
+    ENERGY_UNITS,
     FIELD_UNITS,
     MATERIAL_COORDINATE_UNITS,
     QUALITY,
@@ -36,16 +37,10 @@ from chipglow.scene import (
     SceneError,
     Tool,
 )
-from chipglow.scene.scene import (
-    ENERGY_UNITS,
-    FORCE_UNITS,
-    HOTTEST_PLAUSIBLE,
-    check_frame,
-    raster_coordinates,
-)
+from chipglow.scene.scene import FORCE_UNITS, HOTTEST_PLAUSIBLE, check_frame, raster_coordinates
 from chipglow.scene.tool_attributes import tool_attributes
 
-FORMAT_VERSION: Final = 1
+SCENE_FORMAT: Final = 3
 """Changes when the same scene is written to a file in another way."""
 
 _LONG_NAMES: Final[Mapping[str, str]] = {
@@ -312,7 +307,7 @@ class SceneWriter:
             self._file.attrs[name] = value
         self._file.attrs["Conventions"] = "CF-1.11"
         self._file.attrs["chipglow_version"] = version("chipglow")
-        self._file.attrs["chipglow_format"] = FORMAT_VERSION
+        self._file.attrs["chipglow_format"] = SCENE_FORMAT
         coordinates = raster_coordinates(self.raster, np.empty(0))
         for name, (dimension, values, attributes) in coordinates.items():
             variable = self._file.create_variable(name, (dimension,), np.float64)

@@ -5,4 +5,9 @@ from chipglow.radiometry.object_parameters import ObjectParameters
 from chipglow.radiometry.planck import spectral_radiance
 from chipglow.radiometry.response import TabulatedResponse
 
-__all__ = ["Band", "ObjectParameters", "TabulatedResponse", "spectral_radiance"]
+__all__ = [
+    "Band",
+    "ObjectParameters",
+    "TabulatedResponse",
+    "spectral_radiance",
+]

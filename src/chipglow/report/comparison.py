@@ -7,10 +7,10 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis import PAPER, Distribution, LocalError, StudyResult
-from chipglow.analysis.paper import PaperValue
+from chipglow.errors import Distribution, LocalError, StudyResult
+from chipglow.quantities.format import quantity_text
 from chipglow.report import evidence
-from chipglow.report.quantity import quantity_text
+from chipglow.report.paper import PAPER, PaperValue
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis import PAPER, Distribution, Segmentation, Sensitivity, StudyResult
-from chipglow.analysis.distribution import COVERAGE
-from chipglow.analysis.error import ReferenceKind
+from chipglow.errors import Distribution, ReferenceKind, Sensitivity, StudyResult
+from chipglow.errors.distribution import COVERAGE
+from chipglow.laboratory.chip import Segmentation
+from chipglow.report.paper import PAPER
 
 ORDER_TEXT: Final = {
     "sensor": "from pixel to pixel",

@@ -11,19 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.analysis import PAPER, LineDraws, Sensitivity, StudyResult
-from chipglow.analysis.paper import SurfaceResult
 from chipglow.camera import PointSpreadFunction
-from chipglow.report import drawing
-from chipglow.report.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
-    KELVIN,
-    VERMILLION,
-    FigureFile,
-    ImagePanel,
-)
+from chipglow.drawing import drawing
+from chipglow.drawing.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, FigureFile, ImagePanel
+from chipglow.errors import LineDraws, Sensitivity, StudyResult
+from chipglow.errors.cut_error import SurfaceResult
 from chipglow.report.evidence import beside, error_definition
 from chipglow.report.laboratory_figures import (
     dual_spectrum,
@@ -31,6 +23,7 @@ from chipglow.report.laboratory_figures import (
     heated_tool,
     rake_profiles,
 )
+from chipglow.report.paper import PAPER
 from chipglow.scene import Material
 
 _ORDER_STYLE: Final = {

@@ -6,9 +6,9 @@ from html import escape
 from typing import Final
 
 from chipglow import __version__
-from chipglow.report.chip import ChipRow
+from chipglow.drawing.drawing import FigureFile
+from chipglow.laboratory.chip.metrics_table import ChipRow
 from chipglow.report.comparison import CauseRow, Row
-from chipglow.report.drawing import FigureFile
 from chipglow.report.page import (
     answer_part,
     definition_list,

@@ -7,9 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chipglow.analysis import HeatedObject, RakeGrid, StudyResult
-from chipglow.report import drawing
-from chipglow.report.drawing import BLUE, GREY, KELVIN, VERMILLION
+from chipglow.drawing import drawing
+from chipglow.drawing.drawing import BLUE, GREY, KELVIN, VERMILLION
+from chipglow.errors import StudyResult
+from chipglow.laboratory.chip import RakeGrid
+from chipglow.laboratory.emissivity import HeatedObject
 from chipglow.report.visible import visible_picture
 
 _COLOURS: Final = (BLUE, VERMILLION)

@@ -17,8 +17,9 @@ from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
 from chipglow.cutting import CuttingSimulation
-from chipglow.io.movie_file import PALETTE_SIZE, movie_writer
-from chipglow.report import drawing
+from chipglow.drawing import drawing
+from chipglow.io import movie_writer
+from chipglow.io.movie_file import PALETTE_SIZE
 from chipglow.scene import Frame, Material, Raster
 
 _DPI: Final = 100

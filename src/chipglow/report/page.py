@@ -6,7 +6,7 @@ from html import escape
 from importlib.resources import files
 
 from chipglow import __version__
-from chipglow.report.drawing import FigureFile
+from chipglow.drawing.drawing import FigureFile
 
 
 def document(title: str, sections: Sequence[tuple[str, str, str]]) -> str:

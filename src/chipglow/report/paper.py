@@ -1,12 +1,38 @@
-"""Tables 1 and 2 of Heigel and Whitenton (2010) beside the study's."""
+"""What Heigel and Whitenton (2010) found and set: their figures, their Tables 1 and 2."""
 
 from dataclasses import dataclass
 from math import degrees
 from typing import Final
 
-from chipglow.analysis import StudyResult
+from chipglow.errors import StudyResult
 from chipglow.study import Study
 from chipglow.surface import Emissivity
+
+
+@dataclass(frozen=True)
+class PaperValue:
+    """A figure of the paper: value in SI units (shares of 1), and where it stands."""
+
+    value: float
+    where: str
+
+
+@dataclass(frozen=True)
+class PaperValues:
+    """The figures of Heigel and Whitenton (2010) that a study can be set beside.
+
+    Errors in K of radiance temperature, shares of 1, the period in s.
+    """
+
+    rake_error: PaperValue = PaperValue(-42.0, "abstract; Figure 11a shows about -40")
+    rake_psf_share: PaperValue = PaperValue(0.45, "abstract; the conclusion says half")
+    band_error: PaperValue = PaperValue(-46.0, "abstract, Figure 11b")
+    band_psf_share: PaperValue = PaperValue(0.15, "abstract; -7 of -46 in Figure 11b")
+    band_worst: PaperValue = PaperValue(-120.0, "Simulation measurement error, Figure 11b")
+    segment_period: PaperValue = PaperValue(90e-6, "Finite element analysis simulation")
+
+
+PAPER: Final = PaperValues()
 
 TABLE_1: Final = {
     "chip 1 chip body": Emissivity(0.42, 0.07),

@@ -4,8 +4,8 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from chipglow.analysis import StudyResult
-from chipglow.report.chip import chip_rows
+from chipglow.errors import StudyResult
+from chipglow.laboratory.chip.metrics_table import chip_rows
 from chipglow.report.comparison import cause_rows, comparison_rows
 from chipglow.report.evidence import answer, error_definition
 from chipglow.report.figures import draw_figures

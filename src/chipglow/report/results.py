@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chipglow.analysis import Distribution, StudyResult
-from chipglow.report.chip import ChipRow
+from chipglow.errors import Distribution, StudyResult
+from chipglow.laboratory.chip.metrics_table import ChipRow
 from chipglow.report.comparison import CauseRow, Row
 from chipglow.scene import FIELD_UNITS
 from chipglow.scene.tool_attributes import tool_attributes

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.analysis import SceneErrors
-from chipglow.analysis.scene_error import PlaceErrors, Profile, SurfaceErrors
-from chipglow.report import drawing
-from chipglow.report.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, FigureFile, ImagePanel
+from chipglow.drawing import drawing
+from chipglow.drawing.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, FigureFile, ImagePanel
+from chipglow.errors import SceneErrors
+from chipglow.errors.scene_error import PlaceErrors, Profile, SurfaceErrors
 from chipglow.report.evidence import definition_of
 from chipglow.scene import Material
 

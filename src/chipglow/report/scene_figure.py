@@ -9,9 +9,9 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.report import drawing
-from chipglow.report.drawing import BLUE, GREY, VERMILLION, VOID, ImagePanel
-from chipglow.report.frames import shown_frame
+from chipglow.drawing import drawing
+from chipglow.drawing.drawing import BLUE, GREY, VERMILLION, VOID, ImagePanel
+from chipglow.drawing.frames import shown_frame
 from chipglow.report.scene_summary import RATE, STRAIN, TEMPERATURE
 from chipglow.scene import FILLED, Frame, Material, Raster, Scene, Tool
 

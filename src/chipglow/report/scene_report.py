@@ -9,10 +9,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import xarray as xr
 
-from chipglow.analysis import Distribution, SceneErrors
-from chipglow.analysis.distribution import TOGETHER
-from chipglow.analysis.scene_error import PlaceErrors
-from chipglow.report.drawing import KELVIN
+from chipglow.drawing.drawing import KELVIN
+from chipglow.errors import Distribution, SceneErrors
+from chipglow.errors.distribution import TOGETHER
+from chipglow.errors.scene_error import PlaceErrors
 from chipglow.report.evidence import definition_of
 from chipglow.report.page import (
     answer_part,

@@ -7,7 +7,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.report.frames import shown_frame
+from chipglow.drawing.frames import shown_frame
 from chipglow.scene import FILLED, Frame, Material, Raster, Scene
 
 _SAMPLED: Final = 5

@@ -1,7 +1,9 @@
 """The scene: fields on a regular grid over time, and the tool in it."""
 
+from chipglow.scene.lines import Line, sample, straight_line
 from chipglow.scene.placed_tool import PlacedTool
 from chipglow.scene.raster import Raster
+from chipglow.scene.regions import Area, Circle, Polygon, Region, areas, shared_pixels
 from chipglow.scene.sampled import READABLE, SampledFrame
 from chipglow.scene.scene import (
     ENERGY_UNITS,
@@ -25,12 +27,17 @@ __all__ = [
     "MATERIAL_COORDINATE_UNITS",
     "QUALITY",
     "READABLE",
+    "Area",
     "Chamfer",
+    "Circle",
     "Frame",
     "Hone",
+    "Line",
     "Material",
     "PlacedTool",
+    "Polygon",
     "Raster",
+    "Region",
     "SampledFrame",
     "Scene",
     "SceneError",
@@ -38,5 +45,9 @@ __all__ = [
     "ToolGeometry",
     "ToolOutline",
     "ToolOutlineError",
+    "areas",
     "is_gap",
+    "sample",
+    "shared_pixels",
+    "straight_line",
 ]

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.scene.surface import Surface, surface_distance, surface_distances, surface_of
+from chipglow.scene.tool_surface import ToolSurface, surface_distance, surface_distances, surface_of
 
 SMALLEST_WEDGE: Final = radians(5.0)
 STEEPEST_RAKE: Final = radians(60.0)
@@ -76,7 +76,7 @@ class Tool(ABC):
         return np.array([-distance * part for part in normal])
 
     @cached_property
-    def surface(self) -> Surface:
+    def surface(self) -> ToolSurface:
         """The surface as kernels take it."""
         return surface_of(
             self.corners, self.corner_radius, self.rake_direction, self.clearance_direction

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.scene.surface import FACE_LENGTH
 from chipglow.scene.tool import SMALLEST_WEDGE, Tool, check_angles
+from chipglow.scene.tool_surface import FACE_LENGTH
 
 MOST_POINTS: Final = 1000
 

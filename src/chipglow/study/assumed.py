@@ -5,8 +5,8 @@ from typing import Any, Final
 
 import yaml
 
+from chipglow.quantities.section import Section
 from chipglow.study.schema import FeaturesSection, Study
-from chipglow.study.section import Section
 
 _HOW_FINELY: Final = {
     "cutting": {"numerics", "window", "field_of_view", "length_of_cut", "surroundings"},

@@ -8,10 +8,6 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, Final, TypeAlias
 
-from chipglow.analysis.paper import StudyResult, analyse
-from chipglow.analysis.rake import NoContactError
-from chipglow.analysis.ridge import NoShearBandError
-from chipglow.analysis.scene_error import SceneErrors, scene_errors
 from chipglow.cutting import (
     SOLVER_VERSION,
     Checkpoint,
@@ -19,9 +15,11 @@ from chipglow.cutting import (
     ToolMaterial,
     WorkpieceMaterial,
 )
-from chipglow.io import SceneWriter, open_scene, unfinished_scenes
+from chipglow.errors import SceneErrors, StudyResult, analyse, scene_errors
+from chipglow.io import SCENE_FORMAT, SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.interrupts import uninterrupted
 from chipglow.io.packing import CUT
+from chipglow.laboratory.chip import NoContactError, NoShearBandError
 from chipglow.scene import Frame, Scene, SceneError, ToolOutline
 from chipglow.study.assumed import left_to_the_paper
 from chipglow.study.cache import scene_path
@@ -34,9 +32,6 @@ Progress: TypeAlias = Callable[[str, float], None]
 
 CUTTING_STEP: Final = "cutting simulation"
 PREVIEW_STEP: Final = "preview"
-SCENE_FORMAT: Final = 3
-"""Changes whenever the same frames are written as another file."""
-
 CHECKPOINT_INTERVAL: Final = 30.0
 """Time in s between checkpoints of a simulation, if they are cheap."""
 

@@ -4,14 +4,7 @@ from collections.abc import Mapping
 from math import ceil
 from typing import Any, Final
 
-from chipglow.study.units import (
-    CUT_LENGTH,
-    LENGTH,
-    POSITION,
-    SPEED,
-    TIME,
-    Quantity,
-)
+from chipglow.quantities.units import CUT_LENGTH, LENGTH, POSITION, SPEED, TIME, Quantity
 
 _PAPERS: Final = {"feed": 0.3e-3, "speed": 250 / 60, "pitch": 6e-6, "integration_time": 10e-6}
 _START, _END, _LENGTH = 1.579e-3, 1.958e-3, 2.6e-3

@@ -1,6 +1,28 @@
-"""Small text files that people write: their limits, and YAML."""
+"""Small text files that people write: their limits, YAML, and what a YAML file describes."""
 
+from chipglow.text.description import (
+    DescriptionError,
+    described_by,
+    placed,
+    problem,
+    read_description,
+    validated,
+)
+from chipglow.text.remarks import Remarks
 from chipglow.text.small_file import read_small_text
+from chipglow.text.template import commented_yaml
 from chipglow.text.yaml_file import parse_yaml, read_yaml
 
-__all__ = ["parse_yaml", "read_small_text", "read_yaml"]
+__all__ = [
+    "DescriptionError",
+    "Remarks",
+    "commented_yaml",
+    "described_by",
+    "parse_yaml",
+    "placed",
+    "problem",
+    "read_description",
+    "read_small_text",
+    "read_yaml",
+    "validated",
+]

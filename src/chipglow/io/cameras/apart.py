@@ -12,12 +12,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from chipglow.camera.recording import PlanckConversion, Recording
+from chipglow.camera import PlanckConversion, Recording
 from chipglow.io.cameras.formats import read_here
 from chipglow.io.cameras.stacks import Told
+from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import MOST_SAMPLES
 from chipglow.io.sources.isolated import MEMORY, patience_for
-from chipglow.io.sources.source import SourceError
 from chipglow.io.sources.worker import limit_memory
 from chipglow.radiometry import ObjectParameters
 

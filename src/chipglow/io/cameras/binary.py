@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from chipglow.io.cameras.remarks import FileRemarks
+from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import check_samples
-from chipglow.io.sources.source import SourceError
 from chipglow.radiometry import ObjectParameters
 
 MOST_FRAMES: Final = 10_000_000

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.recording import Recording
+from chipglow.camera import Recording
 from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
@@ -24,7 +24,7 @@ from chipglow.io.cameras.binary import (
     stamped_times,
 )
 from chipglow.io.cameras.remarks import FileRemarks
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources import SourceError
 
 _FILE: Final = layout(
     44,

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.recording import PlanckConversion, Recording
+from chipglow.camera import PlanckConversion, Recording
 from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
@@ -28,8 +28,8 @@ from chipglow.io.cameras.binary import (
     text_of,
 )
 from chipglow.io.cameras.remarks import FileRemarks
+from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import reading
-from chipglow.io.sources.source import SourceError
 from chipglow.radiometry import ObjectParameters
 
 _MAGIC: Final = b"FFF\0"

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from chipglow.camera.recording import Recording
+from chipglow.camera import Recording
 from chipglow.io.cameras.cine import is_cine, read_cine
 from chipglow.io.cameras.flir import is_flir, packed_counts, read_flir
 from chipglow.io.cameras.hcc import is_hcc, read_hcc
 from chipglow.io.cameras.ptw import is_ptw, read_ptw
 from chipglow.io.cameras.stacks import Told, read_stack
+from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import matching_files
-from chipglow.io.sources.source import SourceError
 
 _HEAD: Final = 520
 """Bytes from which a kind of file is told: those of HDF5 may follow 512 of the user's."""

@@ -7,8 +7,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.recording import Quantity, Recording
-from chipglow.io.atomic import atomic_path
+from chipglow.camera import Recording
+from chipglow.camera.recording import Quantity
+from chipglow.io import atomic_path
 from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
@@ -24,7 +25,7 @@ from chipglow.io.cameras.binary import (
     stamped_times,
 )
 from chipglow.io.cameras.remarks import FileRemarks
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources import SourceError
 
 _HEADER: Final = layout(
     256,

@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.recording import Recording
+from chipglow.camera import Recording
 from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
@@ -22,7 +22,7 @@ from chipglow.io.cameras.binary import (
     text_of,
 )
 from chipglow.io.cameras.remarks import FileRemarks
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources import SourceError
 
 # Places as in the Altair Reference Guide DL002U-D, after pyradi's ryptw.
 _HEADER: Final = layout(

@@ -3,14 +3,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from chipglow.camera.recording import Recording
+from chipglow.camera import Recording
 from chipglow.io.cameras.apart import read_apart
-from chipglow.io.cameras.formats import (
-    CAMERA_FORMATS,
-    find_format,
-    read_here,
-    through_libraries,
-)
+from chipglow.io.cameras.formats import CAMERA_FORMATS, find_format, read_here, through_libraries
 from chipglow.io.cameras.stacks import Told
 
 

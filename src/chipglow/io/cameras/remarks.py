@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field, replace
 
-from chipglow.analysis.remarks import Remarks
-from chipglow.camera.recording import Recording
+from chipglow.camera import Recording
+from chipglow.text.remarks import Remarks
 
 
 @dataclass(frozen=True)

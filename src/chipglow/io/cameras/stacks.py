@@ -10,9 +10,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.recording import QUANTITIES, Quantity, Recording
+from chipglow.camera import Recording
+from chipglow.camera.recording import QUANTITIES, Quantity
 from chipglow.io.cameras.binary import check_picture, chosen_frames, even_times
 from chipglow.io.cameras.remarks import FileRemarks
+from chipglow.io.sources import SI, SourceError
 from chipglow.io.sources.arrays import (
     ARRAY_READERS,
     MOST_ON_A_SIDE,
@@ -21,7 +23,6 @@ from chipglow.io.sources.arrays import (
     open_arrays,
     reading,
 )
-from chipglow.io.sources.conventions import SI
 from chipglow.io.sources.layout import (
     AXES,
     Chosen,
@@ -32,7 +33,7 @@ from chipglow.io.sources.layout import (
     unit_of,
     unpacked,
 )
-from chipglow.io.sources.source import Remarks, SourceError
+from chipglow.io.sources.source import SourceRemarks
 
 RECORDING_UNITS: Final[Mapping[str, tuple[Quantity, float]]] = {
     "counts": ("counts", 0.0),
@@ -116,7 +117,7 @@ def read_stack(path: Path, kind: str, frames: slice | None, told: Told) -> Recor
         reader = exported_table if kind == ".csv" else ARRAY_READERS[kind]
         arrays = open_arrays(str(path), stack, reader)
         one = _dataset(path, arrays, told.dataset)
-        remarks = Remarks()
+        remarks = SourceRemarks()
         axes = axes_of(one, told.axes, remarks)
         lengths = dict(zip(axes, one.array.shape, strict=True))
         check_picture(path, lengths["y"], lengths["x"], MOST_ON_A_SIDE)
@@ -202,7 +203,7 @@ def _times(
     axes: tuple[str, ...],
     chosen: range,
     told: Told,
-    remarks: Remarks,
+    remarks: SourceRemarks,
 ) -> NDArray[np.float64] | None:
     """Times of the chosen frames in s; None if neither the user nor the file says them."""
     if told.interval is not None:

@@ -9,15 +9,13 @@ from chipglow.io.sources.conventions import (
     Units,
     match_names,
 )
-from chipglow.io.sources.source import READABLE, SampledFrame, Source, SourceError, Survey
+from chipglow.io.sources.source import Source, SourceError, Survey
 
 __all__ = [
     "CELSIUS",
     "COMMON_NAMES",
-    "READABLE",
     "SI",
     "Placement",
-    "SampledFrame",
     "Source",
     "SourceError",
     "Survey",

@@ -19,16 +19,8 @@ from chipglow.io.sources.conventions import (
 )
 from chipglow.io.sources.layout import check_times, unit_of
 from chipglow.io.sources.point_files import MOST_POINTS, PointFrames, PointTable, open_points
-from chipglow.io.sources.source import (
-    READABLE,
-    Remarks,
-    SampledFrame,
-    Source,
-    SourceError,
-    Survey,
-    span_of,
-)
-from chipglow.scene import Material, Raster
+from chipglow.io.sources.source import Source, SourceError, SourceRemarks, Survey, span_of
+from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.cloud import Cloud, neighbour_distance, sample_cloud
 
 _AXES: Final = "xyz"
@@ -161,7 +153,7 @@ class _Points:
 
     def __init__(self, source: CloudSource, stack: ExitStack) -> None:
         self._source = source
-        self.remarks = Remarks()
+        self.remarks = SourceRemarks()
         self.files: PointFrames = open_points(source.files, source.names.get("time"), stack)
         if self.files.count < 1:
             raise SourceError(f"{source.files}: has no frame")

@@ -8,7 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.io.sources.source import READABLE, SourceError
+from chipglow.io.sources.source import SourceError
+from chipglow.scene import READABLE
 
 COMMON_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
     "temperature": (

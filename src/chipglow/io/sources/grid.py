@@ -32,16 +32,8 @@ from chipglow.io.sources.layout import (
     unpacked,
     unused_names,
 )
-from chipglow.io.sources.source import (
-    READABLE,
-    Remarks,
-    SampledFrame,
-    Source,
-    SourceError,
-    Survey,
-    span_of,
-)
-from chipglow.scene import Material, Raster
+from chipglow.io.sources.source import Source, SourceError, SourceRemarks, Survey, span_of
+from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.regrid import regrid, taps
 
 Arrays = Mapping[str, StoredArray]
@@ -242,7 +234,7 @@ class _Grid:
     y: NDArray[np.float64]
     turned: tuple[bool, bool, bool]
     unused: tuple[str, ...]
-    remarks: Remarks
+    remarks: SourceRemarks
 
     @property
     def steps(self) -> tuple[float, float]:
@@ -334,7 +326,7 @@ def _turn(values: NDArray[Any], turned: tuple[bool, bool, bool]) -> NDArray[Any]
 
 
 def _open(source: GridSource, stack: ExitStack) -> _Grid:
-    remarks = Remarks()
+    remarks = SourceRemarks()
     files, chosen = _choose(source, stack, remarks)
     layers: dict[str, _Layer] = {}
     for name, one in chosen.items():
@@ -370,7 +362,7 @@ def _open(source: GridSource, stack: ExitStack) -> _Grid:
 
 
 def _choose(
-    source: GridSource, stack: ExitStack, remarks: Remarks
+    source: GridSource, stack: ExitStack, remarks: SourceRemarks
 ) -> tuple[dict[str, Arrays], dict[str, Chosen]]:
     """Open the files and find every field: arrays by file, and fields by name."""
     given = {name: label for name, label in source.names.items() if name not in COORDINATES}
@@ -409,7 +401,7 @@ def _positions(
     axis: str,
     files: Mapping[str, Arrays],
     layer: _Layer,
-    remarks: Remarks,
+    remarks: SourceRemarks,
 ) -> NDArray[np.float64]:
     """Centres of the columns or rows in m, as they follow in the file."""
     count = layer.length(axis)
@@ -433,7 +425,7 @@ def _positions(
 
 
 def _times(
-    source: GridSource, files: Mapping[str, Arrays], layer: _Layer, remarks: Remarks
+    source: GridSource, files: Mapping[str, Arrays], layer: _Layer, remarks: SourceRemarks
 ) -> NDArray[np.float64]:
     count = layer.frames
     if source.interval is not None:

@@ -19,9 +19,9 @@ from typing import Any, Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.source import READABLE, SampledFrame, Source, SourceError, Survey
+from chipglow.io.sources.source import Source, SourceError, Survey
 from chipglow.io.sources.worker import Message, read_message
-from chipglow.scene import Raster
+from chipglow.scene import READABLE, Raster, SampledFrame
 
 MEMORY: Final = 2 * 1024**3
 """What a reader may take for itself, in bytes."""

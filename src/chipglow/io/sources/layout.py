@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.arrays import StoredArray, check_samples, reading
 from chipglow.io.sources.conventions import SI, Unit, match_names, simple
-from chipglow.io.sources.source import Remarks, SourceError
+from chipglow.io.sources.source import SourceError, SourceRemarks
 from chipglow.io.sources.unit_text import SI_UNITS, parse_unit
 
 AXES: Final = ("time", "y", "x")
@@ -48,7 +48,7 @@ def find_fields(
     arrays: Mapping[str, StoredArray],
     given: Mapping[str, str],
     known: Sequence[str],
-    remarks: Remarks,
+    remarks: SourceRemarks,
 ) -> dict[str, Chosen]:
     """Which of a file's arrays are which fields.
 
@@ -63,7 +63,7 @@ def find_fields(
     known : sequence of str
         Fields to look for, ``material`` among them if it may be there. If the file has one array
         only, it is the first of them.
-    remarks : Remarks
+    remarks : SourceRemarks
         Takes what had to be assumed.
 
     Raises
@@ -113,7 +113,7 @@ def _short_names(labels: Collection[str]) -> dict[str, str]:
     }
 
 
-def axes_of(chosen: Chosen, given: Sequence[str] | None, remarks: Remarks) -> tuple[str, ...]:
+def axes_of(chosen: Chosen, given: Sequence[str] | None, remarks: SourceRemarks) -> tuple[str, ...]:
     """What the axes of an array are: ``time``, ``y`` and ``x`` in their order.
 
     Parameters
@@ -122,7 +122,7 @@ def axes_of(chosen: Chosen, given: Sequence[str] | None, remarks: Remarks) -> tu
         The array.
     given : sequence of str, optional
         What the user says.
-    remarks : Remarks
+    remarks : SourceRemarks
         Takes what had to be assumed.
 
     Raises
@@ -148,7 +148,7 @@ def _axis(dim: str) -> str:
     return next((axis for axis, names in COORDINATES.items() if simple(dim) in names), "")
 
 
-def unit_of(name: str, label: str, text: object, own: Unit, remarks: Remarks) -> Unit:
+def unit_of(name: str, label: str, text: object, own: Unit, remarks: SourceRemarks) -> Unit:
     """Unit of a field or coordinate: as given if that is not SI, else as the file says.
 
     Parameters
@@ -161,7 +161,7 @@ def unit_of(name: str, label: str, text: object, own: Unit, remarks: Remarks) ->
         What the file says; anything but text is nothing said.
     own : Unit
         What the user says.
-    remarks : Remarks
+    remarks : SourceRemarks
         Takes what had to be assumed, and which unit the file says.
 
     Raises

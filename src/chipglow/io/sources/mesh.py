@@ -17,16 +17,8 @@ from chipglow.io.sources.mesh_block import Block, FlatMesh, check_grid, fields_o
 from chipglow.io.sources.mesh_dyna import DynaReader
 from chipglow.io.sources.mesh_reader import MeshReader, files_of
 from chipglow.io.sources.mesh_restricted import RestrictedFields
-from chipglow.io.sources.source import (
-    READABLE,
-    SampledFrame,
-    Source,
-    SourceError,
-    Survey,
-    missing_extra,
-    span_of,
-)
-from chipglow.scene import Material, Raster
+from chipglow.io.sources.source import Source, SourceError, Survey, missing_extra, span_of
+from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.rasterise import NOTHING, rasterise
 
 _PART_FIELDS: Final = (

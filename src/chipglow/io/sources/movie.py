@@ -31,8 +31,8 @@ from chipglow.io.sources.overlays import (
     polygon_mask,
 )
 from chipglow.io.sources.picture_sampling import PictureSampling
-from chipglow.io.sources.source import SampledFrame, Source, SourceError, Survey
-from chipglow.scene import FIELD_UNITS, FILLED, Material, Raster
+from chipglow.io.sources.source import Source, SourceError, Survey
+from chipglow.scene import FIELD_UNITS, FILLED, Material, Raster, SampledFrame
 from chipglow.scene.nearest import fill
 
 MOVIE_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate")

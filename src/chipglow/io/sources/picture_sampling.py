@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from chipglow.camera.sampling import overlap_lengths
+from chipglow.camera.optics.sampling import overlap_lengths
 from chipglow.scene import Material, Raster
 
 _HALF: Final = 0.5 - 1e-6

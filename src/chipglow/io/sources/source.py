@@ -11,10 +11,10 @@ from chipglow.scene import READABLE, Raster, SampledFrame
 
 __all__ = [
     "READABLE",
-    "Remarks",
     "SampledFrame",
     "Source",
     "SourceError",
+    "SourceRemarks",
     "Survey",
     "missing_extra",
     "span_of",
@@ -31,7 +31,7 @@ def missing_extra(file: object, needs: str, extra: str) -> SourceError:
 
 
 @dataclass
-class Remarks:
+class SourceRemarks:
     """Takes what there is to say of a source while it is looked at, a sentence each.
 
     Parameters

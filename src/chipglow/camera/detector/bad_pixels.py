@@ -1,0 +1,143 @@
+"""Sensors that do not answer to light as others do: finding them, and standing in for them."""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import label
+
+from chipglow.camera.detector.nonuniformity import mean_frame, response, size_text
+
+LEAST_FRAMES: Final = 8
+"""Frames from which the noise of a sensor can be told."""
+
+NOISE_LIMIT: Final = 5.0
+"""Multiple of the median standard deviation over time from which on a sensor is noisy."""
+
+GAIN_LIMITS: Final = (0.5, 1.5)
+"""Gains relative to the median gain that are still good."""
+
+LEVEL_LIMIT: Final = 8.0
+"""Multiple of the sensors' spread (1.4826 times the median absolute deviation) by which the mean of
+a good sensor is from the median at most, of one uniform object."""
+
+LARGEST_CLUSTER: Final = 4
+"""Sensors of the largest cluster, neighbours over corner included, that is replaced."""
+
+_FEWEST_NEIGHBOURS: Final = 3
+
+
+@dataclass(frozen=True, eq=False)
+class BadPixels:
+    """Sensors that do not answer to light as others do, each an array of bool of shape (y, x).
+
+    Parameters
+    ----------
+    stuck : ndarray
+        The value never changes, while that of others does.
+    noisy : ndarray
+        The value changes much more than that of others.
+    unresponsive : ndarray
+        The gain is out of limits, or, of one uniform object, the value is far from all others.
+    """
+
+    stuck: NDArray[np.bool_]
+    noisy: NDArray[np.bool_]
+    unresponsive: NDArray[np.bool_]
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """All of them."""
+        return self.stuck | self.noisy | self.unresponsive
+
+
+def find_bad_pixels(frames: NDArray[Any], hot: NDArray[Any] | None = None) -> BadPixels:
+    """Find sensors that do not answer to light as others do.
+
+    Noise is judged by `NOISE_LIMIT`, from `LEAST_FRAMES` frames on; of two objects the gain by
+    `GAIN_LIMITS`, of one the level by `LEVEL_LIMIT`.
+
+    Parameters
+    ----------
+    frames : ndarray
+        Signal of a uniform object, shape (time, y, x).
+    hot : ndarray, optional
+        Signal of a brighter uniform object: tells the gain of every sensor.
+
+    Raises
+    ------
+    ValueError
+        If frames are of different sizes, or the second are not brighter.
+    """
+    level = mean_frame(frames)
+    stuck, noisy = _by_noise(frames)
+    if hot is None:
+        return BadPixels(stuck, noisy, _far_off(level))
+    stuck_hot, noisy_hot = _by_noise(hot)
+    rise = response(level, mean_frame(hot))
+    gain = rise / np.median(rise)
+    unresponsive = ~((gain >= GAIN_LIMITS[0]) & (gain <= GAIN_LIMITS[1]))
+    return BadPixels(stuck | stuck_hot, noisy | noisy_hot, unresponsive)
+
+
+def _by_noise(frames: NDArray[Any]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Sensors without any noise, and with too much."""
+    none = np.zeros(frames.shape[1:], np.bool_)
+    if len(frames) < LEAST_FRAMES:
+        return none, none
+    noise = frames.std(axis=0, dtype=np.float64)
+    usual = float(np.median(noise))
+    if not usual > 0:
+        return none, none
+    return noise == 0, noise > NOISE_LIMIT * usual
+
+
+def _far_off(level: NDArray[np.float64]) -> NDArray[np.bool_]:
+    distance = np.abs(level - np.median(level))
+    spread = 1.4826 * float(np.median(distance))
+    return ~(distance <= LEVEL_LIMIT * spread) if spread > 0 else distance > 0
+
+
+def replace_bad_pixels(
+    signal: NDArray[np.float64], bad: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Put the median of the good neighbours in the place of bad sensors.
+
+    Parameters
+    ----------
+    signal : ndarray
+        Frames, shape (time, y, x).
+    bad : ndarray
+        Which sensors are bad, shape (y, x).
+
+    Returns
+    -------
+    signal : ndarray
+        The frames; NaN where a sensor is bad and not replaced: in clusters of more than
+        `LARGEST_CLUSTER`, and where less than three of the eight neighbours are good.
+    replaced : ndarray
+        Which sensors were replaced, shape (y, x).
+
+    Raises
+    ------
+    ValueError
+        If `bad` is of another size.
+    """
+    if bad.shape != signal.shape[1:]:
+        raise ValueError(
+            f"bad pixels: are of {size_text(bad.shape)} sensors, the frames of "
+            f"{size_text(signal.shape[1:])}, expected the same"
+        )
+    result = np.array(signal, np.float64)
+    result[:, bad] = np.nan
+    clusters, _ = label(bad, np.ones((3, 3)))
+    small = bad & (np.bincount(clusters.ravel())[clusters] <= LARGEST_CLUSTER)
+    replaced = np.zeros_like(bad)
+    for y, x in np.argwhere(small):
+        around = np.s_[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]
+        good = ~bad[around]
+        if np.count_nonzero(good) >= _FEWEST_NEIGHBOURS:
+            result[:, y, x] = np.median(signal[(slice(None), *around)][:, good], axis=1)
+            replaced[y, x] = True
+    return result, replaced

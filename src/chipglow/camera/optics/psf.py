@@ -1,0 +1,441 @@
+"""Point spread functions of an infrared camera."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from errno import ENOENT
+from math import ceil, inf, log, pi, sqrt
+from numbers import Real
+from pathlib import Path
+from typing import Any, Final, final
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import cumulative_simpson
+from scipy.optimize import brentq
+from scipy.special import erf, erfinv, j1
+
+from chipglow.camera.optics.sampling import overlap_lengths
+
+GAUSSIAN_ENERGY: Final = 1.0 - 1e-12
+"""Fraction of a Gaussian's light that its kernel holds: all but rounding.
+
+With 0.9999 a surface at 573 K beside one at 1300 K lacked, in a band of 1.0 to 1.7 um, all of the
+light that it gets from there: the hot one sends 10 000 times as much.
+"""
+
+ANNULAR_ENERGY: Final = 0.99
+"""The same for diffraction, whose light beyond a radius r falls only as 1/r.
+
+The camera's blur has no use for it: `PointSpreadFunction.view_kernel` leaves out nothing.
+"""
+
+_LARGEST_KERNEL: Final = 4097
+_FWHM_PER_SIGMA: Final = 2 * sqrt(2 * log(2))
+_EQUAL: Final = 1e-9
+_FAR: Final = 30.0
+"""Radius, as v, from which on the mean of diffraction's rings falls as 1/r³: within 2 %."""
+
+
+class PointSpreadFunction(ABC):
+    """How the light of a point is spread over the scene's plane.
+
+    Attributes
+    ----------
+    fwhm : float
+        Full width at half maximum in m.
+    """
+
+    fwhm: float
+
+    @abstractmethod
+    def kernel(self, spacing: float) -> NDArray[np.float64]:
+        """Shares of a point's light on a grid of squares.
+
+        Parameters
+        ----------
+        spacing : float
+            Side of a square in m. The point is in the middle of the middle square.
+
+        Returns
+        -------
+        ndarray
+            The fraction that falls on each square; a square array of odd side, first row on top.
+            What its sum lacks of 1 falls outside: `GAUSSIAN_ENERGY`, `ANNULAR_ENERGY`.
+
+        Raises
+        ------
+        ValueError
+            If the spacing is not positive, or so fine that the kernel would be too large.
+        """
+
+    def view_kernel(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
+        """Fractions of a point's light in a view, of which none is left out.
+
+        Parameters
+        ----------
+        spacing : float
+            Side of a square in m. The point is in the middle of the middle square.
+        rows, columns : int
+            Squares of the view, 1 or more.
+
+        Returns
+        -------
+        ndarray
+            The fraction that falls on each square, of sum 1: up to `rows` squares up and down from
+            the middle one and `columns` to either side, shape (2 m + 1, 2 n + 1). The outermost
+            ones hold, besides their own, the light that goes farther in their direction. From no
+            square of the view are they in it.
+
+        Raises
+        ------
+        ValueError
+            As `kernel`.
+        """
+        return _folded(_normalised(self.kernel(spacing)), rows, columns)
+
+
+@final
+@dataclass(frozen=True)
+class GaussianPSF(PointSpreadFunction):
+    """A round Gaussian.
+
+    Parameters
+    ----------
+    fwhm : float
+        Full width at half maximum in m.
+
+    Raises
+    ------
+    ValueError
+        If the width is not positive, or longer than 0.1 m.
+    """
+
+    fwhm: float
+
+    def __str__(self) -> str:
+        return f"a Gaussian {self.fwhm * 1e6:.3g} µm wide at half maximum"
+
+    def __post_init__(self) -> None:
+        _check_length("fwhm", self.fwhm)
+
+    def kernel(self, spacing: float) -> NDArray[np.float64]:
+        """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
+        deviation = self.fwhm / _FWHM_PER_SIGMA
+        reach = sqrt(2) * deviation * float(erfinv(sqrt(GAUSSIAN_ENERGY)))
+        half = _half_size(reach, spacing)
+        edges = spacing * (np.arange(-half, half + 2) - 0.5)
+        line = np.diff(erf(edges / (sqrt(2) * deviation))) / 2
+        return np.outer(line, line)
+
+
+@final
+@dataclass(frozen=True)
+class AnnularAperturePSF(PointSpreadFunction):
+    """Diffraction of a round pupil with a round obstruction in its middle.
+
+    Parameters
+    ----------
+    wavelength : float
+        Wavelength in m; by default about the middle of the paper's band.
+    numerical_aperture : float
+        Sine of the half angle of the light that the objective takes in.
+    obscuration : float
+        Diameter of the obstruction over that of the pupil, 0 for none.
+
+    Attributes
+    ----------
+    fwhm : float
+        Full width at half maximum in m.
+
+    Raises
+    ------
+    ValueError
+        If a number is outside its range.
+
+    Notes
+    -----
+    The closed form, with v = 2π NA r / λ and the obscuration o, is
+    [2 J1(v)/v − o² 2 J1(ov)/(ov)]² / (1 − o²)² (Born and Wolf, Principles of Optics, 8.6.2).
+    It holds no aberration and nothing of the sensor.
+
+    The paper prints the point spread function of its camera as a picture only (Figure 2). The
+    default values are an assumption: those usual for a reflecting (Schwarzschild) microscope
+    objective of 15 times.
+    """
+
+    wavelength: float = 4.5e-6
+    numerical_aperture: float = 0.28
+    obscuration: float = 0.35
+    fwhm: float = field(init=False, repr=False, compare=False)
+
+    def __str__(self) -> str:
+        of = f", obscured to {self.obscuration:g} of its diameter" if self.obscuration else ""
+        return (
+            f"diffraction of a round pupil of NA {self.numerical_aperture:.3g}{of}, at "
+            f"{self.wavelength * 1e6:g} µm"
+        )
+
+    def __post_init__(self) -> None:
+        _check_length("wavelength", self.wavelength)
+        aperture = self.numerical_aperture
+        if not (isinstance(aperture, Real) and 0.0 < aperture <= 1.0):
+            raise ValueError(f"psf: numerical_aperture is {aperture!r}, expected over 0 to 1")
+        if not (isinstance(self.obscuration, Real) and 0.0 <= self.obscuration <= 0.9):
+            raise ValueError(f"psf: obscuration is {self.obscuration!r}, expected 0 to 0.9")
+        half = brentq(lambda v: float(self._profile(np.array(v))) - 0.5, 0.1, 3.0)
+        object.__setattr__(self, "fwhm", 2 * float(half) * self._unit)
+
+    def kernel(self, spacing: float) -> NDArray[np.float64]:
+        """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
+        half = _half_size(self._reach * self._unit, spacing)
+        return self._fractions(spacing, half, half)
+
+    def view_kernel(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
+        """Integrate over all squares of the view; see `PointSpreadFunction.view_kernel`."""
+        _check_length("spacing", spacing)
+        far = ceil(_FAR * self._unit / spacing)
+        kernel = self._fractions(spacing, max(rows, far), max(columns, far))
+        return _folded(_with_the_rest(kernel, spacing), rows, columns)
+
+    def _fractions(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
+        """Fractions of the light on squares, so many up and down and to either side."""
+        # Gauss nodes: two, and three more for every ring (π in v) that a square spans.
+        count = 2 + ceil(3 * spacing / (pi * self._unit))
+        node, weight = np.polynomial.legendre.leggauss(count)
+        side = spacing / self._unit
+        down = (np.arange(rows + 1)[:, None] + node / 2) * side
+        across = ((np.arange(columns + 1)[:, None] + node / 2) * side).ravel()
+        weights = np.tile(weight, columns + 1)
+        quadrant = np.empty((rows + 1, columns + 1))
+        for row, v in enumerate(down):
+            value = self._profile(np.hypot(v[:, None], across)) * weights
+            quadrant[row] = weight @ value.reshape(count, columns + 1, count).sum(axis=2)
+        # The integral of the profile over the plane is 4π / (1 − o²), by Parseval.
+        quadrant *= (side / 2) ** 2 * (1 - self.obscuration**2) / (4 * pi)
+        return np.pad(quadrant, ((rows, 0), (columns, 0)), mode="reflect")
+
+    @property
+    def _unit(self) -> float:
+        """Radius in m where v is 1."""
+        return self.wavelength / (2 * pi * self.numerical_aperture)
+
+    @property
+    def _reach(self) -> float:
+        """Radius, as v, that encircles `ANNULAR_ENERGY`."""
+        # Beyond the rings' first few, the share outside is 2 / (π v (1 − o)).
+        far = 4 / (pi * (1 - self.obscuration) * (1 - ANNULAR_ENERGY))
+        v = np.linspace(0.0, far, ceil(20 * far))
+        clear = 1 - self.obscuration**2
+        inside = cumulative_simpson(clear / 2 * self._profile(v) * v, x=v, initial=0.0)
+        return float(v[np.searchsorted(inside, ANNULAR_ENERGY)])
+
+    def _profile(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Irradiance over that in the middle."""
+        inner = self.obscuration**2
+        amplitude = (_jinc(v) - inner * _jinc(self.obscuration * v)) / (1 - inner)
+        return np.asarray(amplitude**2)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class MeasuredPSF(PointSpreadFunction):
+    """A measured kernel, such as one found with a knife edge.
+
+    Parameters
+    ----------
+    weights : array_like
+        Share of a point's light on each square of a grid, in any unit; a square array of odd
+        side, first row on top, the point in the middle of the middle square.
+    spacing : float
+        Side of those squares in m, on the scene.
+
+    Attributes
+    ----------
+    fwhm : float
+        Full width at half maximum in m: the mean of the widths along the row and the column through
+        the greatest value, wherever in the kernel it is; of equal ones, through the one nearest to
+        the middle of them all.
+
+    Raises
+    ------
+    ValueError
+        If the array is not such a kernel, or the spacing is not a length.
+
+    Notes
+    -----
+    At another spacing the light is taken as even within each measured square and shared among
+    the new squares by area: nothing is lost and nothing is made up between the measured values.
+    The weights are scaled to a sum of 1: what the measurement did not reach is not there.
+    """
+
+    weights: NDArray[np.float64] = field(repr=False)
+    spacing: float
+    fwhm: float = field(init=False)
+
+    def __str__(self) -> str:
+        rows, columns = self.weights.shape
+        return f"measured, {rows} x {columns} values {self.spacing * 1e6:.3g} µm apart"
+
+    def __post_init__(self) -> None:
+        _check_length("spacing", self.spacing)
+        weights = _normalised(_checked_weights(self.weights))
+        weights.flags.writeable = False
+        object.__setattr__(self, "weights", weights)
+        row, column = _peak(weights)
+        widths = [_half_maximum_width(line) for line in (weights[row], weights[:, column])]
+        object.__setattr__(self, "fwhm", float(np.mean(widths)) * self.spacing)
+
+    @classmethod
+    def from_file(cls, path: str | Path, spacing: float | None = None) -> "MeasuredPSF":
+        """Read a kernel.
+
+        Parameters
+        ----------
+        path : str or Path
+            A NumPy array (``.npy``), a table of numbers, separated by commas (``.csv``), or what
+            ``chipglow psf`` writes (``.nc``).
+        spacing : float, optional
+            Side of the kernel's squares in m, on the scene; None for a ``.nc``, which tells it.
+
+        Raises
+        ------
+        ValueError
+            If the file is of another kind, or does not hold a kernel; the message names it.
+        OSError
+            If it can't be read.
+        """
+        path = Path(path)
+        readers = {".npy": _read_npy, ".csv": _read_csv}
+        kind = path.suffix.lower()
+        if kind not in (*readers, ".nc"):
+            raise ValueError(f"psf: {path} is of kind {path.suffix!r}, expected .npy, .csv or .nc")
+        if (spacing is None) != (kind == ".nc"):
+            raise ValueError(
+                f"psf: spacing is {spacing!r} for {path}, expected "
+                + ("none: the file tells it" if kind == ".nc" else "a length such as 1e-6 m")
+            )
+        try:
+            if spacing is None:
+                return cls(*_read_netcdf(path))
+            return cls(readers[kind](path), spacing)
+        except (ValueError, EOFError, MemoryError, KeyError, RuntimeError) as error:
+            raise ValueError(f"psf: {path} is not a kernel: {error}") from error
+
+    def kernel(self, spacing: float) -> NDArray[np.float64]:
+        """Share the measured light among squares of side `spacing`."""
+        samples = self.weights.shape[0]
+        width = samples * self.spacing
+        half = _half_size(width / 2, spacing)
+        left = width / 2 + spacing * (np.arange(-half, half + 1) - 0.5)
+        share = overlap_lengths(left, spacing, samples, self.spacing) / self.spacing
+        return _normalised(np.einsum("ij,jk,lk->il", share, self.weights, share, optimize=True))
+
+
+def _jinc(v: NDArray[np.float64]) -> NDArray[np.float64]:
+    """2 J1(v) / v."""
+    safe = np.where(v == 0.0, 1.0, v)
+    return np.where(v == 0.0, 1.0, 2 * j1(safe) / safe)
+
+
+def _normalised(kernel: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(kernel / kernel.sum())
+
+
+def _with_the_rest(kernel: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
+    """A kernel with a ring of squares more that holds all that it lacks of 1.
+
+    Far away the mean of diffraction's rings falls as 1/r³. The integral of that over all x > X and
+    y > Y is (X + Y − R) / XY, and over all x > X and y of 0 to Y it is (R − X) / XY, with
+    R² = X² + Y².
+    """
+    y, x = (spacing * (np.arange(n + 1) - n / 2) for n in kernel.shape)
+    corner = np.hypot(x[-1], y[-1])
+    ring = np.zeros((kernel.shape[0] + 2, kernel.shape[1] + 2))
+    ring[1:-1, [0, -1]] = np.diff((np.hypot(x[-1], y) - x[-1]) / (x[-1] * y))[:, None]
+    ring[[0, -1], 1:-1] = np.diff((np.hypot(y[-1], x) - y[-1]) / (y[-1] * x))
+    ring[np.ix_([0, -1], [0, -1])] = (x[-1] + y[-1] - corner) / (x[-1] * y[-1])
+    return np.asarray(np.pad(kernel, 1) + ring * (1 - kernel.sum()) / ring.sum())
+
+
+def _folded(kernel: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.float64]:
+    """A kernel no larger than this on each side; its outermost squares hold what was beyond."""
+    for axis, reach in enumerate((rows, columns)):
+        line = np.moveaxis(kernel, axis, 0)
+        beyond = line.shape[0] // 2 - reach
+        if beyond > 0:
+            kept = line[beyond:-beyond].copy()
+            kept[0] += line[:beyond].sum(axis=0)
+            kept[-1] += line[-beyond:].sum(axis=0)
+            kernel = np.moveaxis(kept, 0, axis)
+    return kernel
+
+
+def _half_size(reach: float, spacing: float) -> int:
+    """Number of squares on each side of the middle one that hold what is within `reach`."""
+    _check_length("spacing", spacing)
+    # A kernel that ends on a square's edge but for rounding needs no square more.
+    half = max(0, ceil(reach / spacing - 0.5 - 1e-9))
+    if 2 * half + 1 > _LARGEST_KERNEL:
+        raise ValueError(
+            f"psf: spacing is {spacing:g} m, expected {2 * reach / _LARGEST_KERNEL:.3g} m or more "
+            f"for a kernel of {2 * reach:.3g} m"
+        )
+    return half
+
+
+def _peak(weights: NDArray[np.float64]) -> tuple[int, int]:
+    """Row and column of the greatest value; of equal ones, of that nearest to their middle."""
+    # What differs by rounding alone is equal: the top of a disc is flat.
+    places = np.argwhere(weights >= weights.max() * (1 - _EQUAL))
+    from_middle = np.hypot(*(places - places.mean(axis=0)).T)
+    row, column = places[int(np.argmin(from_middle))].tolist()
+    return row, column
+
+
+def _half_maximum_width(line: NDArray[np.float64]) -> float:
+    """Full width at half maximum of a line of samples, in samples."""
+    padded = np.pad(line, 1)
+    level = padded.max() / 2
+    above = np.flatnonzero(padded >= level)
+    first, last = int(above[0]), int(above[-1])
+    rise = (padded[first] - level) / (padded[first] - padded[first - 1])
+    fall = (padded[last] - level) / (padded[last] - padded[last + 1])
+    return float(last - first + rise + fall)
+
+
+def _check_length(name: str, value: float) -> None:
+    if not (isinstance(value, Real) and 0.0 < value <= 0.1):
+        raise ValueError(f"psf: {name} is {value!r}, expected over 0 to 0.1 m; 8 um is 8e-6")
+
+
+def _checked_weights(weights: ArrayLike) -> NDArray[np.float64]:
+    array = np.asarray(weights, dtype=np.float64)
+    if array.ndim != 2 or array.shape[0] != array.shape[1] or array.shape[0] % 2 == 0:
+        raise ValueError(f"psf: kernel has shape {array.shape}, expected a square of odd side")
+    if not (array >= 0.0).all() or not 0.0 < array.sum() < inf:
+        raise ValueError("psf: kernel must be finite, 0 or more, and not 0 everywhere")
+    return array
+
+
+def _read_npy(path: Path) -> NDArray[Any]:
+    with path.open("rb") as file:
+        return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
+
+
+def _read_csv(path: Path) -> NDArray[np.float64]:
+    lines = path.read_text(encoding="utf-8-sig").splitlines()
+    rows = [[float(cell) for cell in line.split(",")] for line in lines if line.strip()]
+    return np.array(rows, dtype=np.float64)
+
+
+def _read_netcdf(path: Path) -> tuple[NDArray[np.float64], float]:
+    """Kernel and its spacing."""
+    if not path.is_file():
+        raise FileNotFoundError(ENOENT, "there is no such file", str(path))
+    try:
+        with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as data:
+            kernel = data["kernel"]
+            return np.asarray(kernel.values, np.float64), float(kernel.attrs["spacing"])
+    except OSError as error:
+        raise ValueError(f"cut short, or no NetCDF-4 file: {error}") from error

@@ -1,0 +1,1 @@
+"""How figures look, and which frame they show."""

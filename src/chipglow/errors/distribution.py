@@ -1,0 +1,173 @@
+"""A figure of merit over its draws: how it scatters, what makes it scatter, where a value lies."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf, nan, sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t
+
+TOGETHER: Final = "causes together"
+"""What no cause makes by itself: it needs two or three of them."""
+
+COVERAGE: Final = 0.95
+"""Probability with which one more draw lies within `Distribution.interval`."""
+
+
+@dataclass(frozen=True, eq=False)
+class VarianceComponent:
+    """What one cause contributes to the scatter of a distribution.
+
+    Parameters
+    ----------
+    draws : int
+        How many values the cause took.
+    standard_deviation : float
+        Of the means over all other causes; NaN for a single draw.
+    fraction : float
+        Its part of the sum of squares of the scatter, 0 to 1; 0 without any scatter.
+    """
+
+    draws: int
+    standard_deviation: float
+    fraction: float
+
+
+@dataclass(frozen=True, eq=False)
+class Distribution:
+    """One number, drawn anew for each combination of its causes.
+
+    Parameters
+    ----------
+    values : ndarray
+        The draws; one axis a cause, all combinations.
+    causes : tuple of str
+        What the axes are.
+
+    Raises
+    ------
+    ValueError
+        If there is no draw, a value is not finite, or the causes are not as many as the axes.
+    """
+
+    values: NDArray[np.float64]
+    causes: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        if self.values.ndim != len(self.causes) or self.values.size == 0:
+            raise ValueError(
+                f"distribution: values have shape {self.values.shape}, expected one or more draws "
+                f"of each of {', '.join(self.causes)}"
+            )
+        if not np.isfinite(self.values).all():
+            raise ValueError("distribution: a value is not finite, expected numbers alone")
+
+    @property
+    def draws(self) -> int:
+        """Number of draws."""
+        return int(self.values.size)
+
+    @property
+    def mean(self) -> float:
+        """Mean of the draws."""
+        return float(self.values.mean())
+
+    @property
+    def standard_deviation(self) -> float:
+        """Sample standard deviation of the draws; NaN for a single one."""
+        return float(self.values.std(ddof=1)) if self.draws > 1 else nan
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Least and greatest draw."""
+        return float(self.values.min()), float(self.values.max())
+
+    @cached_property
+    def parts(self) -> Mapping[str, VarianceComponent]:
+        """What each cause and, last, their combinations contribute; the fractions sum to 1.
+
+        Notes
+        -----
+        Analysis of variance of a complete design: the sum of squares about the mean is that of
+        the means of each cause, and a rest that only combinations of causes make.
+        """
+        total = float(((self.values - self.mean) ** 2).sum())
+        parts = {}
+        for axis, name in enumerate(self.causes):
+            means = self._means(axis)
+            squares = self.draws / means.size * float(((means - self.mean) ** 2).sum())
+            deviation = float(means.std(ddof=1)) if means.size > 1 else nan
+            parts[name] = VarianceComponent(
+                means.size, deviation, squares / total if total else 0.0
+            )
+        rest = max(1.0 - sum(part.fraction for part in parts.values()), 0.0) if total else 0.0
+        freedom = self._freedom_together
+        deviation = sqrt(rest * total / freedom) if freedom else nan
+        parts[TOGETHER] = VarianceComponent(self.draws, deviation, rest)
+        return parts
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Where one more draw, of other values of all causes, lies with probability `COVERAGE`.
+
+        Infinite where a single draw says nothing of the scatter.
+
+        Notes
+        -----
+        A prediction interval about the mean. Its variance is the sum of those of the causes, each
+        with the uncertainty of its own mean; its degrees of freedom are those of Welch and
+        Satterthwaite (JCGM 100, G.4), so that three draws of a cause that dominates count as
+        three, however many draws there are of the others. Causes of a single value do not count.
+        """
+        terms = [
+            (part.standard_deviation**2 * (1 + 1 / part.draws), freedom)
+            for part, freedom in zip(self.parts.values(), self._freedoms, strict=True)
+            if freedom > 0
+        ]
+        variance = sum(term for term, _ in terms)
+        if not terms:
+            return -inf, inf
+        if variance == 0.0:
+            return self.mean, self.mean
+        freedom = variance**2 / sum(term**2 / degrees for term, degrees in terms)
+        half = float(t.ppf((1 + COVERAGE) / 2, freedom)) * sqrt(variance)
+        return self.mean - half, self.mean + half
+
+    def differs_from(self, value: float) -> bool:
+        """Whether a value is too far away for one more draw."""
+        low, high = self.interval
+        return not low <= value <= high
+
+    def fraction_below(self, value: float) -> float:
+        """Part of the draws under a value, 0 to 1; draws that equal it count half."""
+        below = np.count_nonzero(self.values < value) + 0.5 * np.count_nonzero(self.values == value)
+        return float(below / self.draws)
+
+    def _means(self, axis: int) -> NDArray[np.float64]:
+        others = tuple(other for other in range(self.values.ndim) if other != axis)
+        return np.asarray(self.values.mean(axis=others))
+
+    @property
+    def _freedoms(self) -> list[int]:
+        """Degrees of freedom of the causes, and of their combinations."""
+        return [*(count - 1 for count in self.values.shape), self._freedom_together]
+
+    @property
+    def _freedom_together(self) -> int:
+        return self.draws - 1 - sum(int(count) - 1 for count in self.values.shape)
+
+
+def ratio(part: Distribution, whole: Distribution) -> Distribution | None:
+    """Draw by draw, a part of a whole; None where a draw of the whole is 0.
+
+    Parameters
+    ----------
+    part, whole : Distribution
+        Of the same draws.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        values = part.values / whole.values
+    return Distribution(values, whole.causes) if np.isfinite(values).all() else None

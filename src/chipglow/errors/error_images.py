@@ -1,0 +1,199 @@
+"""Measurement error: measured radiance temperature minus what was there (the paper's Figure 10)."""
+
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import Final, Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.camera import Camera, Exposure
+from chipglow.camera.optics.sampling import integrate, overlap_lengths
+from chipglow.scene import Raster
+from chipglow.scene.lines import nearest
+
+ReferenceKind: TypeAlias = Literal["maximum", "mean", "centre", "true"]
+"""What the measured radiance temperature is compared with.
+
+``maximum`` (the paper's): the greatest radiance temperature, emissivity included, of any scene
+sample in the sensor's square during the exposure; ``mean``: that of the mean radiance over square
+and exposure; ``centre``: that of the sample under the sensor's centre in the middle of the
+exposure; ``true``: the greatest true temperature in the square during the exposure.
+"""
+
+LEAST_COVERED: Final = 0.05
+"""Part of a sample's width that a pixel must cover for the sample to count in its maximum.
+
+Where a whole number of samples makes a pixel, a pitch that was rounded adds up to slivers of the
+neighbours' samples. A single hot one would be the reference of the whole pixel.
+"""
+
+
+@dataclass(frozen=True)
+class ErrorImages:
+    """Measurement error of every sensor in one exposure, in K of radiance temperature.
+
+    Parameters
+    ----------
+    raster : Raster
+        The sensors' places.
+    reference : ndarray
+        What the measured temperature is compared with in K, shape (y, x); NaN where nothing
+        radiates.
+    case_1 : ndarray
+        Error with everything: emissivity, exposure, size of source, point spread function.
+    case_2 : ndarray
+        Error with all but the point spread function.
+    flagged : ndarray of bool
+        Sensors whose measurement (case 1) the camera marks as unusable, such as below its floor.
+        Their errors are given nevertheless: they follow from the radiance.
+    """
+
+    raster: Raster
+    reference: NDArray[np.float64]
+    case_1: NDArray[np.float64]
+    case_2: NDArray[np.float64]
+    flagged: NDArray[np.bool_]
+
+    @property
+    def measured(self) -> NDArray[np.float64]:
+        """Measured radiance temperature in K, with everything, whether flagged or not."""
+        return self.reference + self.case_1
+
+    @property
+    def psf_portion(self) -> NDArray[np.float64]:
+        """The part of the error that the point spread function makes: case 1 − case 2, in K."""
+        return self.case_1 - self.case_2
+
+
+def error_images(
+    camera: Camera, exposure: Exposure, reference: ReferenceKind = "maximum"
+) -> ErrorImages:
+    """Error images of one exposure, with and without the point spread function.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera, with its point spread function.
+    exposure : Exposure
+        What reached it.
+    reference : ReferenceKind
+        What to compare with; the paper's is the maximum.
+    """
+    return Unblurred.of(camera, exposure, reference).errors(camera.form_image(exposure))
+
+
+@dataclass(frozen=True)
+class Unblurred:
+    """What cameras that differ in their point spread function alone make of one exposure alike.
+
+    Parameters
+    ----------
+    camera : Camera
+        Any of them.
+    raster : Raster
+        The pixels' places.
+    reference : ndarray
+        As in `ErrorImages`.
+    ideal : ndarray
+        Radiance of the pixels without point spread function in W/(m² sr), shape (y, x).
+    """
+
+    camera: Camera
+    raster: Raster
+    reference: NDArray[np.float64]
+    ideal: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, camera: Camera, exposure: Exposure, reference: ReferenceKind) -> "Unblurred":
+        """Compute it for one exposure."""
+        return cls(
+            camera,
+            camera.sensors(exposure.raster),
+            reference_temperature(camera, exposure, reference),
+            replace(camera, psf=None).form_image(exposure),
+        )
+
+    def errors(self, radiance: NDArray[np.float64]) -> ErrorImages:
+        """Error images of what a camera measured.
+
+        Parameters
+        ----------
+        radiance : ndarray
+            Radiance of its pixels, as `Camera.form_image` gives it.
+        """
+        band, floor = self.camera.band, self.camera.floor
+        measured = np.asarray(band.temperature(radiance), dtype=np.float64)
+        ideal = np.asarray(band.temperature(self.ideal), dtype=np.float64)
+        return ErrorImages(
+            raster=self.raster,
+            reference=self.reference,
+            case_1=measured - self.reference,
+            case_2=ideal - self.reference,
+            flagged=~(measured >= (floor or 0.0)),
+        )
+
+
+def reference_temperature(
+    camera: Camera, exposure: Exposure, kind: ReferenceKind = "maximum"
+) -> NDArray[np.float64]:
+    """What a sensor without error would say, by the chosen meaning.
+
+    Parameters
+    ----------
+    camera : Camera
+        Its band and the places and sensitive squares of its sensors are used.
+    exposure : Exposure
+        Radiance and temperature of the scene's samples during the exposure.
+    kind : ReferenceKind
+        The meaning.
+
+    Returns
+    -------
+    ndarray
+        Temperature in K, shape (y, x); NaN where nothing radiates.
+
+    Raises
+    ------
+    ValueError
+        If the meaning is unknown.
+    """
+    sensors = camera.sensors(exposure.raster)
+    if kind == "maximum":
+        return _temperature(camera, _maximum(exposure.peak_radiance, camera, exposure, sensors))
+    if kind == "mean":
+        mean = integrate(exposure.mean_radiance, exposure.raster, sensors, camera.fill_factor)
+        return _temperature(camera, mean)
+    if kind == "centre":
+        points = np.stack(np.meshgrid(sensors.x, sensors.y), axis=-1)
+        return _temperature(camera, nearest(exposure.centre_radiance, exposure.raster, points))
+    if kind == "true":
+        return _maximum(exposure.peak_temperature, camera, exposure, sensors)
+    raise ValueError(f"reference: unknown {kind!r}, expected one of {get_args(ReferenceKind)}")
+
+
+def _maximum(
+    values: NDArray[np.floating], camera: Camera, exposure: Exposure, sensors: Raster
+) -> NDArray[np.float64]:
+    """Greatest value of the samples in every sensor's sensitive square; NaN for none."""
+    grid, side = exposure.raster, camera.pitch * sqrt(camera.fill_factor)
+    known = np.where(np.isnan(values), -np.inf, values).astype(np.float64)
+    columns = _covered(sensors.x - grid.left, side, grid.columns, grid.spacing)
+    rows = _covered(grid.top - sensors.y, side, grid.rows, grid.spacing)
+    across = np.stack([known[:, part].max(axis=1) for part in columns], axis=1)
+    greatest = np.stack([across[part].max(axis=0) for part in rows])
+    return np.where(np.isfinite(greatest), greatest, np.nan)
+
+
+def _covered(
+    centres: NDArray[np.float64], side: float, samples: int, spacing: float
+) -> list[slice]:
+    """Samples under each sensor along a line; slivers under `LEAST_COVERED` do not count."""
+    least = LEAST_COVERED * min(spacing, side)
+    covered = overlap_lengths(centres - side / 2, side, samples, spacing) > least
+    first = covered.argmax(axis=1)
+    return [slice(i, i + n) for i, n in zip(first, covered.sum(axis=1), strict=True)]
+
+
+def _temperature(camera: Camera, radiance: NDArray[np.floating]) -> NDArray[np.float64]:
+    return np.asarray(camera.band.temperature(radiance.astype(np.float64)), dtype=np.float64)

@@ -1,0 +1,535 @@
+"""What the description of an import says: where fields are, what they mean, where to sample."""
+
+import re
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import Strict, model_validator
+
+from chipglow.io.importing import Import, View
+from chipglow.io.sources import (
+    Placement,
+    Source,
+    Unit,
+    Units,
+    lammps_dump,
+    mesh_meshio,
+    mesh_tecplot,
+    mesh_vtk,
+)
+from chipglow.io.sources.cloud import CloudSource
+from chipglow.io.sources.grid import GridSource
+from chipglow.io.sources.isolated import Isolated
+from chipglow.io.sources.mesh import MeshSource
+from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap, metre_per_pixel
+from chipglow.io.sources.unit_text import parse_unit
+from chipglow.io.tool_section import ToolSection
+from chipglow.quantities.section import OR_NONE, FileBeside, Part, Section, described
+from chipglow.quantities.units import Length, Position, Speed, Temperature, Time
+from chipglow.scene.completion import Completion
+from chipglow.text import commented_yaml, described_by
+
+KINDS: Final[Mapping[str, tuple[str, ...]]] = {
+    "movie": (".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif"),
+    "mesh": (*mesh_vtk.KINDS, *mesh_meshio.KINDS, *mesh_tecplot.ENDINGS, ".inp", "d3plot"),
+    "points": lammps_dump.ENDINGS,
+    "grid": (
+        ".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr", ".npy", ".npz", ".mat", ".tif", ".tiff",
+        ".csv", ".txt", ".hdf", ".he5", ".zip",
+    ),
+}  # fmt: skip
+"""Kinds of sources by how the file's name ends; most sources of points have to be called so."""
+
+Pixels = Annotated[tuple[float, float], Strict(False)]
+Corners = Annotated[tuple[tuple[Position, Position], ...], Strict(False)]
+ColourSection = Annotated[tuple[int, int, int], Strict(False)]
+BoxSection = Annotated[tuple[int, int, int, int], Strict(False)]
+
+
+class UnitsSection(Part):
+    """Units of the source."""
+
+    length: str = described("m", "Unit of positions and lengths.", "m, mm, um, in, ...")
+    time: str = described("s", "Unit of times.", "s, ms, us, ...")
+    temperature: str = described("K", "Unit of temperatures.", "K, degC, degF")
+    velocity: Annotated[str | None, *OR_NONE] = described(
+        "none", "Unit of velocities; none: made of length and time.", "none, m/s, mm/s, m/min, ..."
+    )
+    strain_rate: Annotated[str | None, *OR_NONE] = described(
+        "none", "Unit of strain rates; none: made of the time.", "none, 1/s, 1/ms, ..."
+    )
+
+    def build(self) -> Units:
+        """The units."""
+        return Units(
+            length=_unit("x", "length", self.length),
+            time=_unit("time", "time", self.time),
+            temperature=_unit("temperature", "temperature", self.temperature),
+            velocity=_maybe(self.velocity, "velocity", "velocity"),
+            strain_rate=_maybe(self.strain_rate, "plastic_strain_rate", "strain_rate"),
+        )
+
+
+def _maybe(text: str | None, quantity: str, name: str) -> Unit | None:
+    return None if text is None else _unit(quantity, name, text)
+
+
+def _unit(quantity: str, name: str, text: str) -> Unit:
+    try:
+        return parse_unit(quantity, text)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
+class PlacementSection(Part):
+    """How the source's axes lie in the scene, whose x runs along the cut and whose y goes up."""
+
+    horizontal: str = described(
+        "x",
+        "The source's axis along the workpiece's motion toward the tool.",
+        "x, y, z, -x, -y, -z",
+    )
+    vertical: str = described(
+        "y", "The source's axis from the cut surface into the chip.", "x, y, z, -x, -y, -z"
+    )
+    origin_horizontal: Position = described(
+        "0 um", "Where the tip of the tool is on the horizontal axis, in the source's coordinates."
+    )
+    origin_vertical: Position = described("0 um", "The same on the vertical axis.")
+
+    def build(self) -> Placement:
+        """The placement."""
+        origin = self.origin_horizontal, self.origin_vertical
+        return Placement(self.horizontal, self.vertical, origin)
+
+
+class ViewSection(Part):
+    """Where the scene is sampled; what is not said is as in the source."""
+
+    left: Annotated[Position | None, *OR_NONE] = described("none", "Left edge.")
+    right: Annotated[Position | None, *OR_NONE] = described("none", "Right edge.")
+    bottom: Annotated[Position | None, *OR_NONE] = described("none", "Lower edge.")
+    top: Annotated[Position | None, *OR_NONE] = described("none", "Upper edge.")
+    spacing: Annotated[Length | None, *OR_NONE] = described(
+        "none",
+        "Side of a sample; none: the source's own, or 900 samples along the longer side.",
+        "none, or over 0 um",
+    )
+
+    def build(self) -> View:
+        """The view."""
+        return View(self.left, self.right, self.bottom, self.top, self.spacing)
+
+
+class CompletionSection(Part):
+    """What stands in for what the source does not have."""
+
+    surroundings: Temperature = described(
+        "20 degC", "Temperature where there is no material, and of a tool that has none."
+    )
+    cutting_speed: Annotated[Speed | None, *OR_NONE] = described(
+        "none", "Speed of the workpiece, for a source without velocity.", "none, or over 0 m/min"
+    )
+    chip: Annotated[Corners | None, *OR_NONE] = described(
+        "none",
+        "Corners of the chip, for a source without plastic strain.",
+        "none, or [[-300 um, 0 um], [-50 um, 0 um], [-50 um, 400 um]]",
+    )
+    motion: Literal["auto", "flow", "none"] = described(
+        "auto",
+        "Velocity of a source that has none: flow (the optical flow), none, or auto: the flow\n"
+        "where there is a strain, a chip or a cutting speed.",
+    )
+    rate_frames: int = described(
+        1, "Frames over which a missing strain rate is taken: more are smoother.", "1 to 20"
+    )
+
+    def build(self) -> Completion:
+        """The completion."""
+        return Completion(
+            surroundings=self.surroundings,
+            cutting_speed=self.cutting_speed,
+            chip=self.chip,
+            motion=self.motion,
+            rate_frames=self.rate_frames,
+        )
+
+
+class SourceSection(Section):
+    """What is said of one kind of source."""
+
+    @abstractmethod
+    def source(self, whole: "ImportDescription") -> Source:
+        """The source that the whole describes."""
+
+
+class FieldMovieSection(Section):
+    """A movie of one field."""
+
+    file: Annotated[FileBeside | None, *OR_NONE] = described("none", "The movie.")
+    first: str | int | float = described(
+        "", "Value of the first colour, or at the bottom or left of the legend."
+    )
+    last: str | int | float = described(
+        "", "Value of the last colour, or at the top or right of the legend."
+    )
+    colours: Annotated[str | None, *OR_NONE] = described(
+        "none",
+        "Name of the colour map; none: the legend in the picture is read.",
+        "none, rainbow, jet, viridis, ... of matplotlib",
+    )
+    bands: int = described(0, "Number of the map's bands; 0: it runs without steps.", "0, 2 to 256")
+    legend: Annotated[BoxSection | None, *OR_NONE] = described(
+        "none",
+        "Left, top, right and bottom pixel of the legend's colours; none: it is looked for.",
+        "none, or [600, 40, 620, 400]",
+    )
+
+
+class MovieSection(SourceSection):
+    """Movies of fields with a colour scale, a movie a field."""
+
+    temperature: FieldMovieSection = described({}, "The movie of the temperature.")
+    plastic_strain: Annotated[FieldMovieSection | None, *OR_NONE] = described(
+        "none", "The movie of the plastic strain."
+    )
+    plastic_strain_rate: Annotated[FieldMovieSection | None, *OR_NONE] = described(
+        "none", "The movie of the plastic strain rate."
+    )
+    pixel: Annotated[Length | None, *OR_NONE] = described("none", "Side of a pixel.")
+    scale_from: Annotated[Pixels | None, *OR_NONE] = described(
+        "none", "A point whose distance from another is known, in pixels right and down.",
+        "none, or [120, 400]",
+    )  # fmt: skip
+    scale_to: Annotated[Pixels | None, *OR_NONE] = described("none", "The other point.")
+    scale_length: Annotated[Length | None, *OR_NONE] = described("none", "Their distance.")
+    origin: Pixels = described(
+        [0.0, 0.0], "The tip of the tool, in pixels right and down from the upper left corner."
+    )
+    crop: Annotated[BoxSection | None, *OR_NONE] = described(
+        "none", "Left, top, right and bottom pixel of what shows the field; none: all."
+    )
+    every: int = described(1, "Take one picture of so many.", "1 or more")
+    background: Annotated[tuple[ColourSection, ...] | None, Strict(False), *OR_NONE] = described(
+        "none",
+        "Colours of where nothing is; none: looked for at the border.",
+        "none, or [[255, 255, 255]]",
+    )
+    covered: Annotated[tuple[BoxSection, ...], Strict(False)] = described(
+        [], "Boxes where something else is drawn, such as text."
+    )
+    overlay_limit: float = described(
+        20.0, "Distance from the scale in CIE L*a*b* beyond which a colour is a line or text."
+    )
+    tool_polygon: Annotated[tuple[Pixels, ...], Strict(False)] = described(
+        [], "Corners of the tool in pixels; two are the corners of a box."
+    )
+    tool_colour: Annotated[ColourSection | None, *OR_NONE] = described(
+        "none", "Colour of a tool that shows no values."
+    )
+
+    def source(self, whole: "ImportDescription") -> MovieSource:
+        """The source that this section describes."""
+        movies = {}
+        for name in ("temperature", "plastic_strain", "plastic_strain_rate"):
+            section = getattr(self, name)
+            if section is not None:
+                movies[name] = _field_movie(name, section, whole)
+        return MovieSource(
+            movies=movies,
+            metre_per_pixel=self._metre_per_pixel(),
+            origin=self.origin,
+            crop=self.crop,
+            frame_interval=whole.interval,
+            every=self.every,
+            placement=whole.placement.build(),
+            background=self.background,
+            covered=self.covered,
+            overlay_limit=self.overlay_limit,
+            tool_polygon=self.tool_polygon,
+            tool_colour=self.tool_colour,
+        )
+
+    def _metre_per_pixel(self) -> float:
+        if self.pixel is not None:
+            return self.pixel
+        if self.scale_from is None or self.scale_to is None or self.scale_length is None:
+            raise ValueError(
+                "movie.pixel: is missing, expected the side of a pixel such as 1 um, "
+                "or scale_from, scale_to and scale_length"
+            )
+        return metre_per_pixel(self.scale_from, self.scale_to, self.scale_length)
+
+
+def _field_movie(name: str, section: FieldMovieSection, whole: "ImportDescription") -> FieldMovie:
+    file = section.file or (whole.source if name == "temperature" else None)
+    if file is None:
+        raise ValueError(f"movie.{name}.file: is missing, expected the name of a movie")
+    ends = [_value(f"movie.{name}.{end}", name, getattr(section, end)) for end in ("first", "last")]
+    colours = (
+        NamedMap(section.colours, section.bands) if section.colours else Legend(section.legend)
+    )
+    return FieldMovie(Path(file), (ends[0], ends[1]), colours)
+
+
+def _value(place: str, field: str, value: str | int | float) -> float:
+    """SI number of a value of a field with its unit, such as ``1127 degC`` or ``4``."""
+    text = str(value)
+    if not text.strip():
+        raise ValueError(f"{place}: is missing, expected a value such as {_EXAMPLES[field]}")
+    number, _, unit = text.strip().partition(" ")
+    if not unit and field != "plastic_strain":
+        raise ValueError(f"{place}: {text!r} has no unit, expected one such as {_EXAMPLES[field]}")
+    try:
+        return float(parse_unit(field, unit).to_si(float(number)))
+    except ValueError:
+        raise ValueError(
+            f"{place}: {text!r}, expected a value such as {_EXAMPLES[field]}"
+        ) from None
+
+
+def _has_header(path: Path) -> bool:
+    """Whether a table of text begins with a line of names."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        first = file.readline(10_000).decode("utf-8", "replace").lower()
+    words = re.findall(r"[a-z_]+", first)
+    return any(word not in ("e", "nan", "inf") for word in words)
+
+
+_EXAMPLES: Final = {
+    "temperature": "1127 degC",
+    "plastic_strain": "4",
+    "plastic_strain_rate": "1e5 1/s",
+}
+
+
+class MeshSection(SourceSection):
+    """Finite-element results."""
+
+    section: Annotated[Position | Literal["facing"] | None, *OR_NONE] = described(
+        "none",
+        "Of solid elements: where to cut along the axis of depth, or the surface that faces the\n"
+        "camera.",
+        "none, 0 mm, facing",
+    )
+    tool_parts: Annotated[tuple[str | int, ...], Strict(False)] = described(
+        [], "Names of the blocks, parts or sets that are tool, or their numbers.", "[TOOL], [2]"
+    )
+    part_field: Annotated[str | None, *OR_NONE] = described(
+        "none", "Field of elements that numbers the parts; none: it is guessed."
+    )
+    displacement: Annotated[str | None, *OR_NONE] = described(
+        "none", "Field of node vectors to be added to the positions."
+    )
+
+    def source(self, whole: "ImportDescription") -> MeshSource:
+        """The source that this section describes."""
+        return MeshSource(
+            path=Path(whole.file),
+            names=whole.fields,
+            units=whole.units.build(),
+            placement=whole.placement.build(),
+            interval=whole.interval,
+            section=self.section,
+            tool_parts=tuple(str(part) for part in self.tool_parts),
+            part_field=self.part_field,
+            displacement=self.displacement,
+        )
+
+
+class PointsSection(SourceSection):
+    """Points, as of smoothed particles or material points."""
+
+    spacing: Annotated[Length | None, *OR_NONE] = described(
+        "none", "Distance of neighbours before the cut; none: from volumes or the first frame."
+    )
+    tool_parts: Annotated[tuple[int, ...], Strict(False)] = described(
+        [], "Numbers of the part field that are tool.", "[], [2]"
+    )
+    depth: Position = described("0 um", "Middle of the slab that is seen of points in space.")
+    thickness: Annotated[Length | None, *OR_NONE] = described(
+        "none", "Thickness of that slab; none: all points."
+    )
+
+    def source(self, whole: "ImportDescription") -> CloudSource:
+        """The source that this section describes."""
+        return CloudSource(
+            files=whole.file,
+            names=whole.fields,
+            spacing=self.spacing,
+            tool_parts=self.tool_parts,
+            depth=self.depth,
+            thickness=self.thickness,
+            interval=whole.interval,
+            units=whole.units.build(),
+            placement=whole.placement.build(),
+        )
+
+
+class GridSection(SourceSection):
+    """Arrays on a regular grid."""
+
+    files: Annotated[dict[str, FileBeside] | None, *OR_NONE] = described(
+        "none",
+        "Files by the names of fields, in the place of source.",
+        "none, or {temperature: T.npy, plastic_strain: strain.npy}",
+    )
+    axes: Annotated[tuple[str, ...] | None, Strict(False), *OR_NONE] = described(
+        "none", "Order of the arrays' axes; none: as the file says, or [time, y, x]."
+    )
+    top_first: bool = described(True, "Whether row 0 is the top one, without a coordinate y.")
+    spacing: Annotated[Length | None, *OR_NONE] = described(
+        "none", "Distance of the columns; none: as the file says."
+    )
+    row_spacing: Annotated[Length | None, *OR_NONE] = described(
+        "none", "Distance of the rows; none: that of the columns."
+    )
+    left: Position = described("0 um", "Left edge of the grid, with spacing.")
+    top: Position = described("0 um", "Upper edge of the grid, with spacing.")
+    void_value: Annotated[float | None, *OR_NONE] = described(
+        "none", "Number that stands for no material; NaN always does."
+    )
+
+    def source(self, whole: "ImportDescription") -> GridSource:
+        """The source that this section describes."""
+        across, down = self.spacing, self.row_spacing or self.spacing
+        return GridSource(
+            files=self.files or whole.file,
+            names=whole.fields,
+            axes=self.axes,
+            top_first=self.top_first,
+            spacing=None if across is None or down is None else (across, down),
+            left=self.left,
+            top=self.top,
+            interval=whole.interval,
+            void_value=self.void_value,
+            units=whole.units.build(),
+            placement=whole.placement.build(),
+        )
+
+
+class ImportDescription(Section):
+    """An import: which source, what its fields mean, where they are sampled."""
+
+    source: Annotated[FileBeside | None, *OR_NONE] = described(
+        "none", "The file, or a pattern for several: chip_*.vtu."
+    )
+    kind: Annotated[Literal["movie", "mesh", "points", "grid"] | None, *OR_NONE] = described(
+        "none", "What the source is; none: told by the file's name.", "movie, mesh, points, grid"
+    )
+    fields: dict[str, str] = described(
+        {},
+        "Names in the source by names of a scene; the usual names are known.",
+        "{temperature: NT11, plastic_strain: PEEQ, plastic_strain_rate: ..., velocity: V}",
+    )
+    units: UnitsSection = described({}, "Units of the source: SI if nothing is said.")
+    interval: Annotated[Time | None, *OR_NONE] = described(
+        "none", "Time from frame to frame; none: as the source says."
+    )
+    placement: PlacementSection = described({}, "How the source's axes lie in the scene.")
+    field_of_view: ViewSection = described({}, "Where the scene is sampled.")
+    tool: Annotated[ToolSection | None, *OR_NONE] = described(
+        "none", "The tool's outline with its tip at the origin: what is in it is tool."
+    )
+    completion: CompletionSection = described({}, "What stands in for what the source lacks.")
+    mesh: MeshSection = described({}, "More of a mesh.")
+    movie: MovieSection = described({}, "More of a movie.")
+    points: PointsSection = described({}, "More of points.")
+    grid: GridSection = described({}, "More of a grid.")
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        if self.source or self.kind:
+            self.build()
+        return self
+
+    @property
+    def file(self) -> str:
+        """The source's file or pattern."""
+        if self.source is None:
+            raise ValueError("source: is missing, expected a file")
+        return self.source
+
+    def kind_of_source(self) -> str:
+        """What the source is, as said or by the file's name."""
+        if self.kind is not None:
+            return self.kind
+        name = Path(self.file).name.lower()
+        if name.endswith((".csv", ".tsv")) and _has_header(Path(self.file)):
+            return "points"
+        for kind, suffixes in KINDS.items():
+            if name.endswith(suffixes):
+                return kind
+        raise ValueError(f"kind: {name!r} says none, expected movie, mesh, points or grid")
+
+    def build(self) -> Import:
+        """The import that is described."""
+        sections: Mapping[str, SourceSection] = {
+            "mesh": self.mesh,
+            "movie": self.movie,
+            "points": self.points,
+            "grid": self.grid,
+        }
+        source = sections[self.kind_of_source()].source(self)
+        completion = self.completion.build()
+        tool = self.tool.build() if self.tool else None
+        return Import(
+            Isolated(source, Path(self.source or "movie").name),
+            self.field_of_view.build(),
+            replace(completion, tool=tool),
+            self.model_dump(mode="json"),
+            self._notes(),
+        )
+
+    def _notes(self) -> dict[str, str]:
+        """What has to be assumed of a field if the source has it."""
+        notes: dict[str, str] = {}
+        units = self.units
+        if units.velocity is None and (units.length, units.time) != ("m", "s"):
+            text = f"velocities are in {units.length}/{units.time}, made of units.length and time"
+            notes |= {"velocity_x": text, "velocity_y": text}
+        if units.strain_rate is None and units.time != "s":
+            notes["plastic_strain_rate"] = f"strain rates are in 1/{units.time}, as units.time says"
+        if self.tool is not None or self.movie.tool_colour is not None:
+            notes["temperature"] = (
+                "temperature of the tool, where the source has none: "
+                f"{self.completion.surroundings - 273.15:g} °C (completion.surroundings)"
+            )
+        return notes
+
+
+def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescription:
+    """Read the description of an import from a YAML file, or make one of a source.
+
+    Parameters
+    ----------
+    source : str or Path
+        A YAML file (.yaml, .yml) that describes an import, or the source itself.
+    settings : iterable of str
+        Fields that come before those of the file: ``units.length=mm``.
+
+    Raises
+    ------
+    DescriptionError
+        If the file is no YAML or the import is not possible.
+    OSError
+        If the file cannot be read.
+    """
+    return described_by(ImportDescription, Path(source), "source", settings)
+
+
+def import_text(description: ImportDescription) -> str:
+    """A description of an import as YAML, every field with a comment."""
+    return commented_yaml(_IMPORT_HEADER, description)
+
+
+_IMPORT_HEADER: Final = """\
+# An import of chipglow. Run it with: chipglow import FILE --out scene.nc
+# Quantities carry their unit, in any unit of their kind: 10 us, 0.3 mm, 250 m/min, 391 degC.
+# Of movie, mesh, points and grid only the one of the source's kind counts.
+"""

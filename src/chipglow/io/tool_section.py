@@ -1,0 +1,108 @@
+"""The cutting tool as a section of YAML files."""
+
+from typing import Annotated, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from chipglow.cutting import material_names, tool_material
+from chipglow.io.tool_file import read_tool_outline
+from chipglow.quantities import OR_NONE, FileBeside, Part, described
+from chipglow.quantities.units import Angle, Length
+from chipglow.scene import Chamfer, Hone, Tool, ToolGeometry
+
+
+class ChamferSection(Part):
+    """A chamfer of the cutting edge."""
+
+    width: Length = Field(description="Width of the land, between its sharp corners.")
+    angle: Angle = Field(description="Angle between the land and the rake face.")
+
+    def build(self) -> Chamfer:
+        """The chamfer."""
+        return Chamfer(self.width, self.angle)
+
+
+class HoneSection(Part):
+    """A hone of the cutting edge."""
+
+    rake: Length = Field(description="Where it begins on the rake face, from the sharp edge.")
+    clearance: Length = Field(description="The same on the clearance face.")
+
+    def build(self) -> Hone:
+        """The hone."""
+        return Hone(self.rake, self.clearance)
+
+
+class ToolSection(Part):
+    """The cutting tool."""
+
+    rake_angle: Angle = described(
+        "-7 deg",
+        "Rake angle; negative: the rake face leans over the chip.",
+        "over -60 deg, under 60 deg; a wedge of 5 deg or more must be left",
+    )
+    clearance_angle: Angle = described(
+        "7 deg",
+        "Angle between the tool's flank and the cut surface.",
+        "over 0 deg, under 45 deg",
+    )
+    edge_radius: Length = described(
+        "20 um", "Radius of the cutting edge, or of a chamfer's corners.", "over 0 um"
+    )
+    chamfer: Annotated[ChamferSection | None, *OR_NONE] = described(
+        "none",
+        "Chamfer of the edge: the width between sharp corners, the angle from the rake face.",
+        "none, or {width: 100 um, angle: 20 deg}",
+    )
+    hone: Annotated[HoneSection | None, *OR_NONE] = described(
+        "none",
+        "Hone in the place of the edge's radius: how far from the sharp edge it begins on\n"
+        "either face.",
+        "none, or {rake: 40 um, clearance: 20 um}",
+    )
+    outline: Annotated[FileBeside | None, *OR_NONE] = described(
+        "none",
+        "File of an outline in the place of all these: its first line x_um,y_um, then a point a\n"
+        "line, from the rake face round the edge to the clearance face.",
+        "none, or a file such as edge.csv",
+    )
+    material: str = described("carbide", "Material of the tool.", ", ".join(material_names("tool")))
+
+    @field_validator("material")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        tool_material(name)
+        return name
+
+    @model_validator(mode="after")
+    def _nothing_unused(self) -> Self:
+        if self.outline:
+            self._refuse_beside("outline", set(ToolSection.model_fields) - {"outline", "material"})
+        elif self.hone:
+            self._refuse_beside("hone", {"edge_radius"})
+        return self
+
+    def _refuse_beside(self, given: str, unused: set[str]) -> None:
+        default = type(self)()
+        for name in type(self).model_fields:
+            if name in unused and getattr(self, name) != getattr(default, name):
+                raise ValueError(f"{name}: is not used beside {given}, expected one or the other")
+
+    def build(self) -> Tool:
+        """The tool's outline."""
+        if self.outline:
+            try:
+                return read_tool_outline(self.outline)
+            except OSError as error:
+                raise ValueError(
+                    f"outline: {self.outline}: {error.strerror}, expected an outline's file"
+                ) from None
+            except ValueError as error:
+                raise ValueError(f"outline: {error}") from None
+        return ToolGeometry(
+            self.rake_angle,
+            self.clearance_angle,
+            self.edge_radius,
+            self.chamfer.build() if self.chamfer else None,
+            self.hone.build() if self.hone else None,
+        )

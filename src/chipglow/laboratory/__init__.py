@@ -1,0 +1,1 @@
+"""The instruments of the laboratory, a room each: computation, description, file and figure."""

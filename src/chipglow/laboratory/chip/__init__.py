@@ -1,0 +1,49 @@
+"""The chip: rake face, shear band and segments, in scenes and in measurements."""
+
+from chipglow.laboratory.chip.band_file import read_curve, write_band_profile
+from chipglow.laboratory.chip.band_profile import BandProfile, Stage, band_profile
+from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
+from chipglow.laboratory.chip.contact import NoContactError, contact_length
+from chipglow.laboratory.chip.find_tool import FoundTool, find_tool
+from chipglow.laboratory.chip.inertia import Inertia, inertia
+from chipglow.laboratory.chip.metrics import ChipMetrics, ChipScan, chip_metrics
+from chipglow.laboratory.chip.rake_grid import RakeGrid, rake_grid
+from chipglow.laboratory.chip.rake_grid_file import write_rake_grid
+from chipglow.laboratory.chip.ridge import NoShearBandError
+from chipglow.laboratory.chip.segment import Instant, Segment
+from chipglow.laboratory.chip.segmentation import Segmentation, segmentation
+from chipglow.laboratory.chip.shear_band import ShearBand, find_shear_band
+from chipglow.laboratory.chip.tool_description import load_tool, tool_of
+from chipglow.laboratory.chip.tool_position import ToolUncertainty
+
+__all__ = [
+    "BandProfile",
+    "ChipMetrics",
+    "ChipScan",
+    "FoundTool",
+    "Inertia",
+    "Instant",
+    "NoContactError",
+    "NoShearBandError",
+    "RakeGrid",
+    "Segment",
+    "Segmentation",
+    "ShearBand",
+    "Stage",
+    "ThermalImage",
+    "ToolUncertainty",
+    "band_profile",
+    "chip_metrics",
+    "contact_length",
+    "find_band",
+    "find_shear_band",
+    "find_tool",
+    "inertia",
+    "load_tool",
+    "rake_grid",
+    "read_curve",
+    "segmentation",
+    "tool_of",
+    "write_band_profile",
+    "write_rake_grid",
+]

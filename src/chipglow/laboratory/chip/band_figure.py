@@ -1,0 +1,117 @@
+"""The shear band on the image, and the temperature along it (the paper's Figure 9)."""
+
+from typing import Final
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from chipglow.camera import Measurement
+from chipglow.drawing import drawing
+from chipglow.drawing.drawing import KELVIN
+from chipglow.laboratory.chip.band_profile import BandProfile, Stage
+from chipglow.scene import Tool
+
+_HEIGHT: Final = 4.2
+_AROUND: Final = 60.0
+_LEGEND_COLUMNS: Final = 3
+_MOST_NAMES: Final = 12
+_COLOURS: Final = matplotlib.colors.ListedColormap(
+    matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, 256))
+)
+_LINES: Final = {
+    Stage.DEVELOPING: (0, (4, 2)),
+    Stage.DEVELOPED: "solid",
+    Stage.MOVED: (0, (1, 1.5)),
+    Stage.NONE: "solid",
+}
+
+
+def draw_band_profile(measurement: Measurement, tool: Tool, profile: BandProfile) -> Figure:
+    """Draw the curves on the image of the reference, and the temperature along them.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        What the profile was read from.
+    tool : Tool
+        The tool, in the measurement's coordinates.
+    profile : BandProfile
+        The profile. The image is that of the frame nearest to the reference, and of the first one
+        if no frame has a band.
+    """
+    first, last = profile.times[[0, -1]]
+    colours = _COLOURS((profile.times - first) / max(last - first, 1e-12))
+    with drawing.style():
+        figure = drawing.new_figure(_HEIGHT)
+        left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
+        _draw_image(figure, left, measurement, tool, profile, colours)
+        for frame, colour in enumerate(colours):
+            _draw_profile(right, profile, frame, colour)
+        right.set_xlabel("distance from the cutting edge / µm")
+        right.set_ylabel("radiance temperature / °C")
+        right.set_title("b) along the band, ± 1 standard uncertainty")
+        if profile.times.size > _MOST_NAMES:
+            handles = [
+                right.plot([], [], color="black", linestyle=_LINES[s], label=s)[0]
+                for s in Stage
+                if s in profile.stage and s is not Stage.NONE
+            ]
+            _draw_times(figure, right, profile.times)
+        else:
+            handles = right.get_legend_handles_labels()[0]
+        figure.legend(handles=handles, loc="outside lower center", ncols=_LEGEND_COLUMNS)
+    return figure
+
+
+def _draw_times(figure: Figure, axes: Axes, times: NDArray[np.float64]) -> None:
+    """Which colour is which time, where there are too many curves to name each."""
+    span = matplotlib.colors.Normalize(1e6 * times[0], 1e6 * times[-1])
+    key = matplotlib.cm.ScalarMappable(span, _COLOURS)
+    figure.colorbar(key, ax=axes, label="time / µs", aspect=25)
+
+
+def _draw_image(
+    figure: Figure,
+    axes: Axes,
+    measurement: Measurement,
+    tool: Tool,
+    profile: BandProfile,
+    colours: NDArray[np.float64],
+) -> None:
+    away = np.abs(profile.offset)
+    frame = int(np.nanargmin(away)) if np.isfinite(away).any() else 0
+    number = int(np.flatnonzero(measurement.times == profile.times[frame])[0])
+    image = measurement.data["radiance_temperature"][number].values - KELVIN
+    known = image[np.isfinite(image)]
+    limits = (float(known.min()), float(np.percentile(known, 99.9)) + 1.0)
+    picture = drawing.show_image(axes, image, measurement.raster, tool, drawing.HEAT, limits)
+    for points, colour in zip(profile.points, colours, strict=True):
+        axes.plot(*(1e6 * points).T, color=colour, linewidth=1.4)
+    drawing.draw_line(axes, profile.reference.points, drawing.BLUE)
+    left, right, bottom, top = (1e6 * edge for edge in measurement.raster.extent)
+    shown = 1e6 * profile.points[np.isfinite(profile.points[..., 0])]
+    (x_least, y_least), (x_most, y_most) = shown.min(axis=0), shown.max(axis=0)
+    axes.set_xlim(max(left, x_least - _AROUND), min(right, x_most + _AROUND))
+    axes.set_ylim(max(bottom, y_least - _AROUND), min(top, y_most + _AROUND))
+    axes.set_title(f"a) {1e6 * profile.times[frame]:.4g} µs; blue: the reference")
+    figure.colorbar(
+        picture, ax=axes, label="radiance temperature / °C", location="bottom", aspect=25
+    )
+
+
+def _draw_profile(
+    axes: Axes, profile: BandProfile, frame: int, colour: NDArray[np.float64]
+) -> None:
+    values = profile.temperature[frame] - KELVIN
+    if not np.isfinite(values).any():
+        return
+    along, uncertainty = 1e6 * profile.distance, profile.uncertainty[frame]
+    stage = profile.stage[frame]
+    label = f"{1e6 * profile.times[frame]:.4g} µs, {stage}"
+    axes.plot(along, values, color=colour, linestyle=_LINES[stage], label=label)
+    axes.fill_between(
+        along, values - uncertainty, values + uncertainty, color=colour, alpha=0.15, linewidth=0
+    )

@@ -1,0 +1,506 @@
+"""Temperature along the shear band of a measurement, and how far the band has developed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from math import isfinite, nan, sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import trapezoid
+from scipy.ndimage import map_coordinates
+
+from chipglow.camera import Measurement
+from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
+from chipglow.laboratory.chip.frames import frame_numbers
+from chipglow.laboratory.chip.ridge import NoShearBandError, arc_length, normals_of
+from chipglow.laboratory.chip.tool_position import (
+    ToolUncertainty,
+    combined,
+    contribution,
+    tool_in,
+)
+from chipglow.scene import Line, Tool, sample
+from chipglow.text.remarks import Remarks
+
+NEAR_THE_EDGE: Final = 15.0
+"""Distance from the edge in pixels within which a band has not left it."""
+
+MOVED: Final = 1.0
+"""Offset in pixels beyond which a band is not where the reference is."""
+
+_DEEP: Final = 40.0
+"""A valley along one band is less deep in K: on bands of a simulated chip it was under 30 K."""
+
+_DEEP_SHARE: Final = 1.0 / 3.0
+"""Nor is it as large a share of the range of the temperature along the band."""
+
+_STEP: Final = 0.5
+_FINE: Final = 4
+
+
+class Stage(StrEnum):
+    """How far a shear band has developed, by where it is (Heigel and Whitenton 2010, Figure 8)."""
+
+    DEVELOPING = "developing"
+    """It has not come to the reference."""
+    DEVELOPED = "fully developed"
+    """It is where the reference is."""
+    MOVED = "moved"
+    """The next segment has moved it on."""
+    NONE = "no band"
+    """No band is found in the frame."""
+
+
+@dataclass(frozen=True)
+class BandProfile:
+    """Radiance temperature along the shear band in several frames.
+
+    Parameters
+    ----------
+    reference : Line
+        The curve of the fully developed band, with distances as below.
+    distance : ndarray
+        Distances in m, common to all frames, shape (n,): from the cutting edge straight to the
+        curve's first point, then along the curve.
+    points : ndarray
+        Where they are in each frame, x and y in m, shape (frames, n, 2); NaN where the frame's
+        band does not reach.
+    temperature : ndarray
+        Mean radiance temperature in K over the width, shape (frames, n); NaN where a pixel in it
+        is not usable.
+    calibration : ndarray
+        Its standard uncertainty in K from the calibration, common to all, of the same shape; 0
+        where the measurement tells none.
+    position : ndarray
+        Its standard uncertainty in K from the position of the curve, of the same shape.
+    offset : ndarray
+        Median distance in m of each frame's band from the reference, shape (frames,): positive
+        toward the chip, negative toward the workpiece; NaN without a band.
+    stage : tuple of Stage
+        How far each frame's band has developed.
+    times : ndarray
+        When each frame's integration began in s, shape (frames,).
+    width : float
+        Width of the mean across the curve in m.
+    assumptions : tuple of str
+        What had to be assumed, a sentence each.
+    doubts : tuple of str
+        Why it may not be relied on, a sentence each.
+    from_tool : tuple of ndarray
+        What each independent standard uncertainty of the tool's place changes in `temperature` in
+        K, with its sign, each of shape (frames, n): it moves the edge from which the distance
+        counts. None if the place is known.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit.
+    """
+
+    reference: Line
+    distance: NDArray[np.float64]
+    points: NDArray[np.float64]
+    temperature: NDArray[np.float64]
+    calibration: NDArray[np.float64]
+    position: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    stage: tuple[Stage, ...]
+    times: NDArray[np.float64]
+    width: float
+    assumptions: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+    from_tool: tuple[NDArray[np.float64], ...] = ()
+
+    def __post_init__(self) -> None:
+        shape = (self.times.size, self.distance.size)
+        expected = {"points": (*shape, 2), "offset": shape[:1]} | dict.fromkeys(
+            ("temperature", "calibration", "position"), shape
+        )
+        fields = [(name, getattr(self, name), size) for name, size in expected.items()]
+        for name, values, size in (*fields, *(("from_tool", p, shape) for p in self.from_tool)):
+            if values.shape != size:
+                raise ValueError(f"band profile: {name} has shape {values.shape}, expected {size}")
+        if len(self.stage) != self.times.size:
+            raise ValueError(
+                f"band profile: {len(self.stage)} stages for {self.times.size} frames, "
+                "expected as many"
+            )
+
+    @property
+    def uncertainty(self) -> NDArray[np.float64]:
+        """Standard uncertainty of `temperature` in K, shape (frames, n)."""
+        parts = (self.calibration, self.position, *self.from_tool)
+        return combined(parts, self.temperature.shape)
+
+    @property
+    def tool_uncertainty(self) -> NDArray[np.float64]:
+        """Its part from the tool's place in K, shape (frames, n)."""
+        return combined(self.from_tool, self.temperature.shape)
+
+    @property
+    def in_place(self) -> NDArray[np.bool_]:
+        """Which frames have a band that has not moved, as the paper compares, shape (frames,)."""
+        kept = (Stage.DEVELOPING, Stage.DEVELOPED)
+        return np.array([stage in kept for stage in self.stage], dtype=np.bool_)
+
+
+def band_profile(
+    measurement: Measurement,
+    tool: Tool | None = None,
+    frames: Sequence[int] | None = None,
+    curve: NDArray[np.float64] | None = None,
+    reference: int | None = None,
+    width: float | None = None,
+    position: float | None = None,
+    uncertainty: ToolUncertainty | None = None,
+) -> BandProfile:
+    """Read the radiance temperature along the shear band.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Frames of a camera.
+    tool : Tool, optional
+        The tool, in the measurement's coordinates; the measurement's own by default.
+    frames : sequence of int, optional
+        Numbers of the frames; all by default.
+    curve : ndarray, optional
+        Corners of a polyline along which to read all frames, from the cutting edge outward, x and
+        y in m, shape (k, 2). By default the ridge that `find_band` finds in each frame.
+    reference : int, optional
+        Number of the frame whose band is fully developed. By default the given curve is its place;
+        without a curve, the frame in which the band that begins near the edge has the greatest
+        integral of its temperature over the camera's floor.
+    width : float, optional
+        Width across the curve in m over which to average; a pixel by default.
+    position : float, optional
+        Standard uncertainty of the curve's position in m, the same in x and y. By default that of
+        one pixel: its side over the root of 12.
+    uncertainty : ToolUncertainty, optional
+        How well the place of the tool is known, such as that of a `FoundTool`.
+
+    Raises
+    ------
+    NoShearBandError
+        If no frame has a band; of a single frame with the reason.
+    ValueError
+        If there is no tool, a number is impossible, or nothing on a given curve is usable.
+
+    Notes
+    -----
+    The stage is judged as in the paper, "by the location of the shear band in the images compared
+    to the reference fully developed shear band": a band within one pixel of the reference is fully
+    developed, one on the workpiece's side is developing, one on the chip's side has moved.
+
+    A curve that is off by a small random vector of standard uncertainty u reads a temperature of
+    the mean square error (grad T)² u² + 3/4 (d²T/dn²)² u⁴, with n across the curve: on a ridge,
+    where the gradient across vanishes, the bend is what counts.
+
+    The curve itself is where the image shows it, or where it was given. The distance along it
+    counts from the edge of the tool: what is uncertain about the edge's place, in the direction to
+    the curve's first point, contributes half the difference of the temperatures so far up and down
+    the curve.
+    """
+    tool, pitch = tool_in(measurement, tool), measurement.raster.spacing
+    width = pitch if width is None else width
+    position = pitch / sqrt(12.0) if position is None else position
+    for name, value in (("width", width), ("position", position)):
+        if not (isfinite(value) and value >= 0):
+            raise ValueError(f"band profile: {name} is {value!r} m, expected 0 m or more")
+    numbers = frame_numbers(frames, measurement.times.size)
+    images = _Images(measurement)
+    given = None if curve is None else _given(curve, tool, pitch)
+    found, reason = _found(images, tool, numbers)
+    remarks = Remarks()
+    if given is None and not any(found):
+        raise NoShearBandError(reason if numbers.size == 1 else _none(numbers.size, reason))
+    base = _reference(measurement, images, tool, found, numbers, given, reference, remarks)
+    lines = found if given is None else [given] * numbers.size
+    distance = _common(lines, pitch) if given is None else given.distance
+    points = np.stack([_laid(line, distance) for line in lines])
+    reader = _Reader(measurement, images, width, position)
+    moves = np.zeros((0, 2))
+    if uncertainty is not None:
+        moves = uncertainty.displacements(tool, tool.edge_point)
+    read = [
+        reader(int(k), p, _toward(moves, line, tool))
+        for k, p, line in zip(numbers, points, lines, strict=True)
+    ]
+    temperature, calibration, from_position, *from_tool = (
+        np.stack(part) for part in zip(*read, strict=True)
+    )
+    if not np.isfinite(temperature).any():
+        raise ValueError(
+            "shear band: no point of the curve is on usable pixels in any frame, expected a curve "
+            "in the image where the chip is hotter than the camera's floor"
+        )
+    if given is None:
+        remarks.doubts.extend(_joined(temperature, measurement.times[numbers]))
+    offset = np.array([_offset(line, base) for line in found])
+    return BandProfile(
+        reference=base,
+        distance=distance,
+        points=points,
+        temperature=temperature,
+        calibration=calibration,
+        position=from_position,
+        offset=offset,
+        stage=tuple(_stage(value, pitch) for value in offset),
+        times=measurement.times[numbers],
+        width=width,
+        assumptions=tuple(remarks.assumptions),
+        doubts=tuple(remarks.doubts),
+        from_tool=tuple(from_tool),
+    )
+
+
+class _Images:
+    """Frames of a measurement with a temperature everywhere, made when they are asked for."""
+
+    def __init__(self, measurement: Measurement) -> None:
+        self._measurement = measurement
+        self._made: dict[int, ThermalImage] = {}
+
+    def __getitem__(self, frame: int) -> ThermalImage:
+        if frame not in self._made:
+            self._made[frame] = ThermalImage.of(self._measurement, frame)
+        return self._made[frame]
+
+
+def _given(curve: NDArray[np.float64], tool: Tool, pitch: float) -> Line:
+    """A given polyline at steps of half a pixel."""
+    if curve.ndim != 2 or curve.shape[1] != 2 or len(curve) < 2 or not np.isfinite(curve).all():
+        raise ValueError(
+            f"curve: points of shape {curve.shape}, expected 2 or more of x and y, all finite"
+        )
+    first, last = np.hypot(*(curve[[0, -1]] - tool.edge_point).T).tolist()
+    if first > last:
+        raise ValueError(
+            f"curve: it begins {first * 1e6:.4g} µm from the cutting edge and ends "
+            f"{last * 1e6:.4g} µm from it, expected from the edge outward"
+        )
+    corners = first + arc_length(curve)
+    if (np.diff(corners) <= 0).any():
+        raise ValueError("curve: two points are the same, expected each apart from the one before")
+    steps = max(round((corners[-1] - first) / (_STEP * pitch)), 2)
+    distance = np.linspace(first, corners[-1], steps + 1)
+    columns = [np.interp(distance, corners, curve[:, axis]) for axis in (0, 1)]
+    return Line(distance, np.stack(columns, axis=1))
+
+
+def _found(
+    images: _Images, tool: Tool, numbers: NDArray[np.int64]
+) -> tuple[list[Line | None], str]:
+    """The ridge of every frame, and why the last one without has none."""
+    lines: list[Line | None] = []
+    reason = ""
+    for number in numbers.tolist():
+        try:
+            lines.append(find_band(images[number], tool))
+        except NoShearBandError as error:
+            lines.append(None)
+            reason = str(error)
+    return lines, reason
+
+
+def _none(count: int, reason: str) -> str:
+    return f"shear band: none is found in any of {count} frames; in the last: {reason}"
+
+
+def _reference(
+    measurement: Measurement,
+    images: _Images,
+    tool: Tool,
+    found: list[Line | None],
+    numbers: NDArray[np.int64],
+    given: Line | None,
+    reference: int | None,
+    remarks: Remarks,
+) -> Line:
+    """The curve of the fully developed band."""
+    if reference is not None:
+        frame_numbers([reference], measurement.times.size)
+        return find_band(images[reference], tool)
+    if given is not None:
+        remarks.assumptions.append("the given curve is the place of the fully developed band.")
+        return given
+    pitch = measurement.raster.spacing
+    bands = [(line, k) for line, k in zip(found, numbers.tolist(), strict=True) if line]
+    near = [(line, k) for line, k in bands if line.distance[0] < NEAR_THE_EDGE * pitch]
+    if not near:
+        remarks.doubts.append(
+            "no band begins near the cutting edge, so that all may have moved; the "
+            "stages are judged against the hottest and longest one."
+        )
+    line, number = max(near or bands, key=lambda band: _heat(measurement, *band))
+    if len(bands) == 1:
+        remarks.doubts.append("one frame has a band; without another its stage says nothing.")
+    elif near:
+        remarks.assumptions.append(
+            f"the band at {measurement.times[number] * 1e6:.6g} µs is fully developed: "
+            "it is the hottest and longest of those that begin near the cutting edge."
+        )
+    return line
+
+
+def _joined(temperature: NDArray[np.float64], times: NDArray[np.float64]) -> tuple[str, ...]:
+    """A doubt of found curves that cross a deep valley between two hot places."""
+    valleys = [_valley(values[np.isfinite(values)]) for values in temperature]
+    doubted = [
+        (depth, time)
+        for (depth, share), time in zip(valleys, times, strict=True)
+        if depth > _DEEP and share > _DEEP_SHARE
+    ]
+    if not doubted:
+        return ()
+    when = ", ".join(f"{time * 1e6:.6g}" for _, time in doubted)
+    return (
+        f"the curve at {when} µs crosses a valley, up to {max(doubted)[0]:.0f} K deep: "
+        "it may join two bands, or a band that has moved and the heat at the edge.",
+    )
+
+
+def _valley(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Depth of the deepest valley along a curve in K, and its share of the curve's range."""
+    if values.size == 0:
+        return 0.0, 0.0
+    before = np.maximum.accumulate(values)
+    after = np.maximum.accumulate(values[::-1])[::-1]
+    depth = float((np.minimum(before, after) - values).max())
+    return depth, depth / max(float(np.ptp(values)), 1e-9)
+
+
+def _heat(measurement: Measurement, line: Line, number: int) -> float:
+    """Integral along a line of a frame of the temperature over the camera's floor in K m."""
+    frame = measurement.data["radiance_temperature"][number].values
+    floor = float(measurement.data.attrs.get("floor", np.nanmin(frame)))
+    values = np.nan_to_num(sample(frame, measurement.raster, line.points) - floor)
+    return float(trapezoid(values, line.distance))
+
+
+def _common(lines: Sequence[Line | None], pitch: float) -> NDArray[np.float64]:
+    """Distances that cover all lines, at steps of half a pixel."""
+    first = min(float(line.distance[0]) for line in lines if line)
+    last = max(float(line.distance[-1]) for line in lines if line)
+    step = _STEP * pitch
+    return step * np.arange(np.ceil(first / step - 1e-6), np.floor(last / step + 1e-6) + 1)
+
+
+def _laid(line: Line | None, distance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points of a line at these distances, NaN beyond its ends."""
+    if line is None:
+        return np.full((distance.size, 2), nan)
+    slack = 1e-9 * float(line.distance[-1])
+    beyond = (distance < line.distance[0] - slack) | (distance > line.distance[-1] + slack)
+    columns = [np.interp(distance, line.distance, line.points[:, axis]) for axis in (0, 1)]
+    return np.where(beyond[:, None], nan, np.stack(columns, axis=1))
+
+
+def _toward(moves: NDArray[np.float64], line: Line | None, tool: Tool) -> NDArray[np.float64]:
+    """How far the edge moves toward a line's first point in m, shape (k,)."""
+    if line is None:
+        return np.zeros(len(moves))
+    way = line.points[0] - tool.edge_point
+    if not way.any():
+        way = line.points[1] - line.points[0]
+    return np.asarray(moves @ way / np.hypot(*way))
+
+
+class _Reader:
+    """Reads means across a curve, and what makes them uncertain, in one frame after another."""
+
+    def __init__(
+        self, measurement: Measurement, images: _Images, width: float, position: float
+    ) -> None:
+        self.measurement, self.images = measurement, images
+        self.pitch = measurement.raster.spacing
+        self.position = position
+        count = max(round(width / self.pitch * _FINE), 1)
+        self.offsets = width * ((np.arange(count) + 0.5) / count - 0.5)
+
+    def __call__(
+        self, number: int, points: NDArray[np.float64], nearer: NDArray[np.float64]
+    ) -> list[NDArray[np.float64]]:
+        """Temperature, its uncertainty from the calibration, the position and the tool, in K.
+
+        The edge of the tool may be nearer to the curve's first point by each of `nearer` in m.
+        """
+        empty = np.full(len(points), nan)
+        there = np.isfinite(points[:, 0])
+        if there.sum() < 2:
+            return [empty.copy() for _ in range(3 + nearer.size)]
+        curve = points[there]
+        across = self.offsets[:, None] * normals_of(curve)[:, None]
+        places = curve[:, None] + across
+        results = []
+        for part in (
+            self._mean("radiance_temperature", number, places),
+            self._calibration(number, places),
+            self._position(number, curve),
+            *self._tool(number, curve, nearer),
+        ):
+            whole = empty.copy()
+            whole[there] = part
+            results.append(whole)
+        known = np.isfinite(results[0])
+        for part in results[1:]:
+            part[~known] = nan
+        return results
+
+    def _mean(self, name: str, number: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        frame = self.measurement.data[name][number].values
+        return np.asarray(sample(frame, self.measurement.raster, places).mean(axis=-1))
+
+    def _calibration(self, number: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        if "calibration_uncertainty" not in self.measurement.data:
+            return np.zeros(len(places))
+        temperature = self._mean("radiance_temperature", number, places)
+        radiance = self._mean("calibration_uncertainty", number, places)
+        return radiance / self.measurement.band.slope(temperature)
+
+    def _position(self, number: int, curve: NDArray[np.float64]) -> NDArray[np.float64]:
+        image = self.images[number]
+        slopes = (
+            map_coordinates(slope, image.index(curve), order=1, mode="nearest")
+            for slope in np.gradient(image.temperature, self.pitch)
+        )
+        squared = sum(slope**2 for slope in slopes)
+        ahead, here, behind = (
+            map_coordinates(image.temperature, image.index(place), order=1, mode="nearest")
+            for place in (curve + self.pitch * k * normals_of(curve) for k in (-1, 0, 1))
+        )
+        bend = (ahead - 2 * here + behind) / self.pitch**2
+        u = self.position
+        return np.asarray(np.sqrt(squared * u**2 + 0.75 * bend**2 * u**4))
+
+    def _tool(
+        self, number: int, curve: NDArray[np.float64], nearer: NDArray[np.float64]
+    ) -> list[NDArray[np.float64]]:
+        """Changes in K of what is read at a distance from an edge that is nearer to the curve."""
+        normal = normals_of(curve)
+        tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+        return [contribution(self.images[number], curve, step * tangent) for step in nearer]
+
+
+def _offset(line: Line | None, reference: Line) -> float:
+    """Median distance of a band from the reference in m, positive toward the chip."""
+    if line is None:
+        return nan
+    away = line.points[:, None] - reference.points[None]
+    nearest = (away**2).sum(axis=-1).argmin(axis=1)
+    beside = (nearest > 0) & (nearest < reference.distance.size - 1)
+    if not beside.any():
+        beside[:] = True
+    index = np.arange(nearest.size)
+    distance = (away[index, nearest] * normals_of(reference.points)[nearest]).sum(axis=1)
+    return float(np.median(distance[beside]))
+
+
+def _stage(offset: float, pitch: float) -> Stage:
+    if not isfinite(offset):
+        return Stage.NONE
+    if abs(offset) <= MOVED * pitch:
+        return Stage.DEVELOPED
+    return Stage.MOVED if offset > 0 else Stage.DEVELOPING

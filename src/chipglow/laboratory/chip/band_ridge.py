@@ -1,0 +1,287 @@
+"""The shear band in a measured image: the ridge of the radiance temperature."""
+
+from dataclasses import dataclass, replace
+from math import ceil
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates, spline_filter
+
+from chipglow.camera import Flag, Measurement
+from chipglow.laboratory.chip.ridge import (
+    NoShearBandError,
+    PolarGrid,
+    arc_length,
+    even_steps,
+    highest,
+    normals_of,
+    strongest_part,
+)
+from chipglow.scene import Line, Raster, Tool
+
+LEAST_PROMINENCE: Final = 10.0
+"""Height in K of a ridge over the higher of its two sides under which it is no band."""
+
+SHORTEST: Final = 15.0
+"""Length in pixels under which a ridge is no band."""
+
+_SCALES: Final = (6e-6, 12e-6, 18e-6)
+_ALONG_THE_FACE: Final = (10.0, 30.0)
+_STRENGTH: Final = 5.0
+_TOLL: Final = 0.8
+_STEP: Final = 0.5
+_GAP: Final = 10.0
+_SEARCH: Final = 1.5
+_SIDES: Final = 10.0
+_FINE: Final = 4
+_CLIMB_BLUR: Final = (2.0, 4.0)
+_NOISE_FACTOR: Final = 3.0
+_NO_RIDGE: Final = "shear band: no ridge of the radiance temperature is there"
+
+
+@dataclass(frozen=True)
+class ThermalImage:
+    """A frame in which every pixel has a temperature, so that slopes and bends exist.
+
+    Parameters
+    ----------
+    temperature : ndarray
+        Radiance temperature in K, shape (y, x). Pixels under the camera's floor have the floor, or
+        the lowest temperature of the frame where no floor is told; saturated and dead ones have
+        that of their nearest usable neighbour.
+    usable : ndarray of bool
+        Which pixels are measured.
+    raster : Raster
+        Where the pixels are.
+    """
+
+    temperature: NDArray[np.float64]
+    usable: NDArray[np.bool_]
+    raster: Raster
+
+    @classmethod
+    def of(cls, measurement: Measurement, frame: int) -> "ThermalImage":
+        """A frame of a measurement.
+
+        Raises
+        ------
+        NoShearBandError
+            If no pixel is usable.
+        """
+        known = np.asarray(measurement.data["radiance_temperature"][frame].values, dtype=np.float64)
+        flags = np.asarray(measurement.data["flags"][frame].values)
+        usable = np.isfinite(known)
+        if not usable.any():
+            raise NoShearBandError("shear band: no pixel of the frame has a radiance temperature")
+        floor = float(measurement.data.attrs.get("floor", known[usable].min()))
+        nearest = distance_transform_edt(~usable, return_distances=False, return_indices=True)
+        filled = np.where(usable, known, known[tuple(nearest)])
+        filled[flags & Flag.BELOW_FLOOR > 0] = floor
+        return cls(filled, usable, measurement.raster)
+
+    def index(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Row and column of points in m, shape (2, ...)."""
+        column = (points[..., 0] - self.raster.left) / self.raster.spacing - 0.5
+        row = (self.raster.top - points[..., 1]) / self.raster.spacing - 0.5
+        return np.stack([row, column])
+
+    def noise(self) -> float:
+        """Standard deviation in K of what differs from pixel to pixel.
+
+        Notes
+        -----
+        Immerkaer (1996): the difference of two Laplacians takes away what is linear or bent; its
+        mean magnitude over the usable pixels is that of the noise. An edge that is one pixel sharp
+        counts as noise.
+        """
+        t = self.temperature
+        rows = t[:-2] - 2 * t[1:-1] + t[2:]
+        both = rows[:, :-2] - 2 * rows[:, 1:-1] + rows[:, 2:]
+        inner = self.usable[1:-1, 1:-1]
+        if not inner.any():
+            return 0.0
+        return float(np.sqrt(np.pi / 2) / 6 * np.abs(both[inner]).mean())
+
+
+def find_band(image: ThermalImage, tool: Tool) -> Line:
+    """Find the shear band in a measured image.
+
+    Parameters
+    ----------
+    image : ThermalImage
+        A frame.
+    tool : Tool
+        The tool, in the image's coordinates.
+
+    Returns
+    -------
+    Line
+        The ridge, away from the cutting edge, at steps of half a pixel. The distance in m counts
+        from the edge: straight to the ridge's first point, then along it.
+
+    Raises
+    ------
+    NoShearBandError
+        If no ridge is long and prominent enough to be a band.
+    ValueError
+        If the cutting edge is farther from the image than the image is wide or high.
+
+    Notes
+    -----
+    A ridge is where the second derivative across it is negative (Lindeberg 1998: eigenvalues of
+    the Hessian after Gaussians of several widths, times the square of the width). What runs along
+    the rake face is left out, for there friction heats the chip. In polar coordinates about the
+    edge a band has one angle at every radius: dynamic programming finds the path of the greatest
+    sum of log(1 + response / 5 K). A band that begins at the edge comes first; without one, the
+    best anywhere, such as a band that has left the edge with the chip. The path is moved to the
+    maximum across it, on a cubic spline, and smoothed by local parabolas. Where that leads to no
+    band, a cold strip below the edge may have drawn the path onto its border, which is bent as a
+    ridge is: it is looked for again without what lies below the edge.
+    """
+    _check_edge(image.raster, tool)
+    try:
+        return _ridge(image, tool, _response(image, tool))
+    except NoShearBandError:
+        try:
+            return _ridge(image, tool, _response(_without_below(image, tool), tool))
+        except NoShearBandError:
+            pass
+        raise
+
+
+def _without_below(image: ThermalImage, tool: Tool) -> ThermalImage:
+    """The image with the pixels just over the cutting edge in the place of those below it."""
+    above = np.flatnonzero(image.raster.y > tool.edge_point[1])
+    if not above.size:
+        return image
+    temperature = image.temperature.copy()
+    temperature[above[-1] + 1 :] = temperature[above[-1]]
+    return replace(image, temperature=temperature)
+
+
+def _ridge(image: ThermalImage, tool: Tool, response: NDArray[np.float64]) -> Line:
+    """The ridge of the strongest path through a response."""
+    pitch = image.raster.spacing
+    points = _path(image, response, tool)
+    coefficients = spline_filter(image.temperature, order=3)
+    for _ in range(3):
+        points = even_steps(_climbed(points, image, coefficients), _STEP * pitch)
+    points = _within(points, image)
+    _check(points, image, coefficients)
+    return Line(arc_length(points) + float(np.hypot(*(points[0] - tool.edge_point))), points)
+
+
+def _check_edge(raster: Raster, tool: Tool) -> None:
+    x, y = tool.edge_point
+    left, right, bottom, top = raster.extent
+    away = max(left - x, x - right, bottom - y, y - top)
+    if away > max(right - left, top - bottom):
+        raise ValueError(
+            f"tool: its edge at x {x * 1e6:.4g} µm, y {y * 1e6:.4g} µm is {away * 1e6:.4g} µm "
+            "outside the image, expected in it or near it"
+        )
+
+
+def _response(image: ThermalImage, tool: Tool) -> NDArray[np.float64]:
+    """Height in K of ridges that do not run along the rake face, shape (y, x)."""
+    x, y = tool.rake_direction
+    best = np.zeros(image.temperature.shape)
+    for scale in _SCALES:
+        width = max(scale / image.raster.spacing, 1.0)
+        across, down, both = (
+            gaussian_filter(image.temperature, width, order=order, mode="nearest")
+            for order in ((0, 2), (2, 0), (1, 1))
+        )
+        # Rows go down: the mixed derivative changes its sign.
+        mean, half = (across + down) / 2, (across - down) / 2
+        least = mean - np.hypot(half, both)
+        turn = 0.5 * np.arctan2(-both, half) + np.pi / 2
+        off_face = np.degrees(np.arcsin(np.clip(abs(np.cos(turn) * x + np.sin(turn) * y), 0, 1)))
+        share = np.clip(
+            (off_face - _ALONG_THE_FACE[0]) / (_ALONG_THE_FACE[1] - _ALONG_THE_FACE[0]), 0, 1
+        )
+        best = np.maximum(best, share * width**2 * np.maximum(-least, 0.0))
+    return best
+
+
+def _path(image: ThermalImage, response: NDArray[np.float64], tool: Tool) -> NDArray[np.float64]:
+    polar = PolarGrid.about(tool, image.raster)
+    allowed = map_coordinates(image.usable.astype(np.uint8), polar.index, order=0) > 0
+    allowed &= polar.on_raster & polar.off_face
+    if not allowed.any():
+        raise NoShearBandError("shear band: no usable pixel is beside the tool")
+    score = np.log1p(map_coordinates(response, polar.index, order=1) / _STRENGTH)
+    if allowed[0].any():
+        i, j = polar.best_path(score, allowed, allowed, _TOLL)
+        points = polar.points[i, j]
+        # It begins where the ridge does: near the edge the heat of the rake face may hide it.
+        points = points[strongest_part(points, score[i, j], _GAP * image.raster.spacing)]
+        if arc_length(points)[-1] >= SHORTEST * image.raster.spacing:
+            return points
+    i, j = polar.best_path(score, allowed, allowed, _TOLL, anywhere=True)
+    if i.size < 2:
+        raise NoShearBandError(_NO_RIDGE)
+    return polar.points[i, j]
+
+
+def _climbed(
+    points: NDArray[np.float64], image: ThermalImage, coefficients: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Each point moved to the maximum across the curve, if there is one."""
+    pitch = image.raster.spacing
+    offsets, profiles = _profiles(points, image, coefficients, _SEARCH)
+    place, inside = highest(profiles, offsets)
+    # A parabola of nearly equal values may leave its interval.
+    moved = np.where(inside, np.clip(place, -_SEARCH * pitch, _SEARCH * pitch), 0.0)
+    return np.asarray(points + moved[:, None] * normals_of(points))
+
+
+def _profiles(
+    points: NDArray[np.float64],
+    image: ThermalImage,
+    coefficients: NDArray[np.float64],
+    reach: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Offsets in m up to a reach in pixels, and the smoothed temperature across every point."""
+    count = ceil(reach * _FINE)
+    offsets = image.raster.spacing / _FINE * np.arange(-count, count + 1, dtype=np.float64)
+    across = points[:, None] + offsets[:, None] * normals_of(points)[:, None]
+    values = map_coordinates(
+        coefficients, image.index(across), order=3, mode="nearest", prefilter=False
+    )
+    return offsets, gaussian_filter(values, _CLIMB_BLUR, mode="nearest")
+
+
+def _within(points: NDArray[np.float64], image: ThermalImage) -> NDArray[np.float64]:
+    """The points whose pixel is usable, from the first to the last of them."""
+    row, column = np.rint(image.index(points)).astype(np.int64)
+    rows, columns = image.usable.shape
+    inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+    inside[inside] = image.usable[row[inside], column[inside]]
+    if inside.sum() < 5:
+        raise NoShearBandError(_NO_RIDGE)
+    kept = np.flatnonzero(inside)
+    return points[kept[0] : kept[-1] + 1]
+
+
+def _check(
+    points: NDArray[np.float64], image: ThermalImage, coefficients: NDArray[np.float64]
+) -> None:
+    pitch = image.raster.spacing
+    length = float(arc_length(points)[-1]) / pitch
+    if length < SHORTEST:
+        raise NoShearBandError(
+            f"shear band: the longest ridge of the radiance temperature is {length:.3g} pixels "
+            f"long, expected {SHORTEST:g} or more"
+        )
+    _, profiles = _profiles(points, image, coefficients, _SIDES)
+    middle = profiles.shape[1] // 2
+    sides = np.maximum(profiles[:, : middle + 1].min(axis=1), profiles[:, middle:].min(axis=1))
+    height = float(np.median(profiles[:, middle] - sides))
+    least = max(LEAST_PROMINENCE, _NOISE_FACTOR * image.noise())
+    if height < least:
+        raise NoShearBandError(
+            f"shear band: the best ridge stands {height:.3g} K over its sides, "
+            f"expected {least:.3g} K or more"
+        )

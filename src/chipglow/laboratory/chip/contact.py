@@ -1,0 +1,52 @@
+"""The contact of chip and tool: how far up the rake face the chip touches it."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.scene import Raster, Tool
+from chipglow.scene.lines import nearest
+
+_LONGEST_GAP: Final = 12e-6
+
+
+class NoContactError(ValueError):
+    """The chip does not touch the rake face."""
+
+
+def contact_length(
+    raster: Raster, workpiece: NDArray[np.bool_], tool: Tool, touching: float
+) -> float:
+    """Length over which the chip touches the rake face.
+
+    Parameters
+    ----------
+    raster : Raster
+        Where the samples are.
+    workpiece : ndarray of bool
+        Where there is workpiece or chip, shape (y, x).
+    tool : Tool
+        The tool.
+    touching : float
+        Distance from the rake face in m within which chip counts as touching it.
+
+    Returns
+    -------
+    float
+        Length in m from the end of the edge up to the first gap that is longer than two of
+        the paper's sensors; 0 if the chip does not touch the rake face there.
+    """
+    step = raster.spacing / 2
+    along = np.arange(0.0, np.hypot(raster.rows, raster.columns) * raster.spacing, step)
+    foot = tool.rake_point(along)
+    touches = np.zeros(along.size, dtype=np.bool_)
+    for height in np.arange(raster.spacing / 4, touching + step, step):
+        places = foot + height * np.array(tool.rake_normal)
+        touches |= nearest(workpiece, raster, places) == 1
+    contacts = along[touches]
+    if contacts.size == 0 or contacts[0] > _LONGEST_GAP:
+        return 0.0
+    gaps = np.diff(contacts) > _LONGEST_GAP
+    last = int(gaps.argmax()) if gaps.any() else contacts.size - 1
+    return float(contacts[last])

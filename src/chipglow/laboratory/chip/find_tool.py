@@ -1,0 +1,388 @@
+"""The rake face in an image: the line where the chip's radiance ends and the tool's begins."""
+
+from dataclasses import dataclass, replace
+from math import atan, cos, degrees, radians, sqrt, tan
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates, maximum_filter
+from scipy.optimize import least_squares
+from scipy.special import ndtr
+
+from chipglow.camera import Measurement
+from chipglow.laboratory.chip.tool_position import ToolUncertainty
+from chipglow.scene import PlacedTool, Raster, ToolGeometry
+
+_REACH: Final = 6
+_SEARCH: Final = radians(20.0)
+_STEP: Final = radians(1.0)
+_ROOM: Final = tan(radians(4.0))
+_COARSE_BLUR: Final = 1.0
+_DECAYS: Final = (2.0, 6.0)
+_CONTRAST_LIMIT: Final = 0.3
+_DARK: Final = 0.02
+_NOT_NOISE: Final = 8.0
+_SURE: Final = 10.0
+_AS_GOOD: Final = 0.7
+_HAS_FACE: Final = 0.5
+_APART: Final = (7, 9)
+_FEWEST_ROWS: Final = 12
+_BLOCKS: Final = 8
+_WORST_ROWS: Final = 3.0
+_WORST_ANGLE: Final = radians(1.0)
+_TIP_PIXELS: Final = 2.0
+_SHIFT: Final = 0.5 / sqrt(3.0)
+
+
+@dataclass(frozen=True)
+class FoundTool:
+    """A tool that was found in an image.
+
+    Parameters
+    ----------
+    tool : PlacedTool
+        The tool in the measurement's coordinates.
+    uncertainty : ToolUncertainty
+        Standard uncertainties of its place and its rake angle.
+    doubts : tuple of str
+        Why it may not be the rake face, a sentence each.
+    """
+
+    tool: PlacedTool
+    uncertainty: ToolUncertainty
+    doubts: tuple[str, ...]
+
+
+def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> FoundTool:
+    """Find the rake face in a measurement.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Frames in which the tool stands still; their mean is looked at.
+    shape : ToolGeometry, optional
+        What the tool is thought to be. Its rake angle is looked for within 20 degrees; its edge and
+        its clearance angle are taken as they are. The paper's tool by default.
+
+    Raises
+    ------
+    ValueError
+        If there is no straight edge in the image that stands out from its noise.
+
+    Notes
+    -----
+    Along each row, the mean radiance beside the rake face follows one smooth course in the chip and
+    another one in the tool, blurred by the camera: emissivity, temperature gradient, or both,
+    change where the tool begins. First, for every straight line, the part of the image is summed
+    over the rows that a break between two parabolas on the line explains beyond one polynomial. Of
+    the lines that explain about as much as the best, the rightmost is the rake face: the chip's
+    back is further left. Then the line and the width of the blur are fitted to all rows at once by
+    least squares, with courses that fall with the distance from the face as heat does, over 2 and
+    6 pixels and a constant, of any strength in each row and on either side. Radiance is used, not
+    temperature, because the camera blurs radiance.
+
+    The uncertainties are those of the jackknife over blocks of rows (JCGM 100 type A) and, as no
+    row tells how far the courses are from those of the model, of limits of a rectangular
+    distribution (type B): half a pixel for the position as a whole, a pixel for either end of the
+    face. The tip is where the radiance along the face has fallen to half of its greatest value; its
+    uncertainty is set to 2 pixels and half the edge radius.
+    """
+    shape = shape or ToolGeometry()
+    raster = measurement.raster
+    image = _mean_radiance(measurement)
+    angles = shape.rake_angle + np.arange(-_SEARCH, _SEARCH + _STEP / 2, _STEP)
+    coarse = _best_line(image, angles)
+    start = np.array([coarse.place, tan(coarse.angle), _COARSE_BLUR])
+    rows = _rows_with_face(image, start)
+    if rows.size < _FEWEST_ROWS:
+        raise _not_found(f"only {rows.size} rows of the image show one")
+    fit = _fit(image, rows, _best_start(image, rows, start))
+    rows = rows[_good_rows(_Strip.along(fit, image, rows).residuals(fit))]
+    fit = _fit(image, rows, fit)
+    angle_error, place_error = _jackknife(image, rows, fit)
+    angle = atan(fit[1])
+    tip_row, tip_seen = _tip_row(image, fit, rows)
+    doubts = _doubts(angle, angle_error, place_error, angles, coarse.prominence, tip_seen)
+    pitch = raster.spacing
+    tool = _placed(replace(shape, rake_angle=angle), raster, fit, tip_row)
+    uncertainty = ToolUncertainty(
+        along=sqrt((_TIP_PIXELS * pitch) ** 2 + (shape.edge_radius / 2) ** 2),
+        across=pitch * sqrt(place_error**2 + _SHIFT**2),
+        angle=sqrt(angle_error**2 + 2 * (2 * _SHIFT / rows.size) ** 2),
+        pivot=_up_the_face(tool, raster, float(rows.mean())),
+    )
+    return FoundTool(tool, uncertainty, doubts)
+
+
+@dataclass(frozen=True)
+class _CoarseLine:
+    """A line through an image: column in the middle row, rake angle in rad, score over noise."""
+
+    place: float
+    angle: float
+    prominence: float
+
+
+def _not_found(reason: str) -> ValueError:
+    return ValueError(
+        f"find tool: no rake face is found, {reason}; expected an image of a chip on a tool whose "
+        "radiance differs from the chip's"
+    )
+
+
+def _mean_radiance(measurement: Measurement) -> NDArray[np.float64]:
+    """Mean over the frames, shape (y, x); 0 where nothing was received."""
+    radiance = measurement.radiance
+    return np.asarray(np.where(np.isfinite(radiance), radiance, 0.0).mean(axis=0))
+
+
+def _best_line(image: NDArray[np.float64], angles: NDArray[np.float64]) -> _CoarseLine:
+    """The rightmost line that explains about as much of the image as the best."""
+    if image.shape[1] < 2 * _REACH + 2:
+        raise _not_found(f"the image is {image.shape[1]} pixels wide")
+    scores = np.stack([_scores(image, tan(angle)) for angle in angles])
+    middle = float(np.median(scores))
+    spread = float(np.median(np.abs(scores - middle)))
+    best = float(scores.max())
+    prominence = (best - middle) / max(spread, 1e-12)
+    if not prominence > _NOT_NOISE:
+        raise _not_found("nothing stands out from the noise")
+    peaks = (scores == maximum_filter(scores, size=_APART)) & (scores >= _AS_GOOD * best)
+    at_angle, at_place = np.nonzero(peaks)
+    right = int(at_place.argmax())
+    return _CoarseLine(float(at_place[right] + _REACH), float(angles[at_angle[right]]), prominence)
+
+
+def _scores(image: NDArray[np.float64], slope: float) -> NDArray[np.float64]:
+    """How much a break explains on lines of one slope, by the column in the middle row."""
+    indices = np.indices(image.shape, dtype=np.float64)
+    rows, columns = indices[0], indices[1]
+    shift = _up(image, rows) * slope
+    turned = map_coordinates(image, [rows, columns + shift], order=1, mode="nearest")
+    windows = np.lib.stride_tricks.sliding_window_view(turned, 2 * _REACH + 1, axis=1)
+    gain = _gain(windows, np.zeros(windows.shape[:2]), _COARSE_BLUR, image)
+    inside = (columns + shift)[:, _REACH:-_REACH]
+    there = (inside > _REACH) & (inside < image.shape[1] - 1 - _REACH)
+    return np.asarray(np.where(there, np.minimum(gain, _CONTRAST_LIMIT), 0.0).mean(axis=0))
+
+
+def _up(image: NDArray[np.float64], rows: NDArray[Any]) -> NDArray[np.float64]:
+    """Rows counted up from the middle one."""
+    return np.asarray((image.shape[0] - 1) / 2 - rows, dtype=np.float64)
+
+
+def _gain(
+    windows: NDArray[np.float64],
+    place: NDArray[np.float64],
+    blur: float,
+    image: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Root mean square that a break explains beyond a smooth course, as a share of the level."""
+    steps = np.arange(-_REACH, _REACH + 1.0)
+    basis = _parabolas(steps - place[..., None] if np.any(place) else steps, blur)
+    smooth = np.stack([steps**power for power in range(5)], axis=-1)
+    explained = _left(windows, smooth) - _left(windows, basis)
+    level = windows.mean(axis=-1) + _DARK * np.percentile(image, 99.0) + 1e-300
+    return np.asarray(np.sqrt(np.maximum(explained, 0.0) / steps.size) / level)
+
+
+def _parabolas(offset: NDArray[np.float64], blur: float) -> NDArray[np.float64]:
+    """Parabola, and another one that begins at offset 0, blurred by a Gaussian; shape (..., 6)."""
+    step = ndtr(offset / blur)
+    bell = blur * np.exp(-0.5 * (offset / blur) ** 2) / sqrt(2 * np.pi)
+    begun = (step, offset * step + bell, (offset**2 + blur**2) * step + offset * bell)
+    return np.stack([np.ones_like(offset), offset, offset**2, *begun], axis=-1)
+
+
+def _decays(offset: NDArray[np.float64], blur: float) -> NDArray[np.float64]:
+    """Courses that fall with the distance from offset 0, on either side; shape (..., 6)."""
+    courses = []
+    for away in (offset, -offset):
+        courses.append(ndtr(away / blur))
+        for length in _DECAYS:
+            fall = np.exp(blur**2 / (2 * length**2) - away / length)
+            courses.append(fall * ndtr(away / blur - blur / length))
+    return np.stack(courses, axis=-1)
+
+
+def _left(windows: NDArray[np.float64], basis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sum of squares that a linear model leaves, of each window."""
+    return np.asarray((_remainder(windows, basis) ** 2).sum(axis=-1))
+
+
+def _remainder(windows: NDArray[np.float64], basis: NDArray[np.float64]) -> NDArray[np.float64]:
+    frame, _ = np.linalg.qr(basis)
+    if frame.ndim == 2:
+        return np.asarray(windows - windows @ frame @ frame.T)
+    parts = np.einsum("...sk,...s->...k", frame, windows)
+    return np.asarray(windows - np.einsum("...sk,...k->...s", frame, parts))
+
+
+@dataclass(frozen=True)
+class _Strip:
+    """Pixels of rows beside a line; nothing is resampled.
+
+    Parameters
+    ----------
+    windows : ndarray
+        Radiance, shape (rows, pixels).
+    middle : ndarray
+        Column of each window's middle pixel, shape (rows,).
+    up : ndarray
+        Rows counted up from the image's middle one, shape (rows,).
+    level : ndarray
+        Level of each window's radiance, shape (rows,).
+    """
+
+    windows: NDArray[np.float64]
+    middle: NDArray[np.float64]
+    up: NDArray[np.float64]
+    level: NDArray[np.float64]
+
+    @classmethod
+    def along(
+        cls, line: NDArray[np.float64], image: NDArray[np.float64], rows: NDArray[np.int64]
+    ) -> "_Strip":
+        up = _up(image, rows)
+        nearest = np.rint(line[0] + line[1] * up).astype(np.int64)
+        middle = np.clip(nearest, _REACH, image.shape[1] - 1 - _REACH)
+        windows = image[rows[:, None], middle[:, None] + np.arange(-_REACH, _REACH + 1)]
+        level = windows.mean(axis=-1) + _DARK * np.percentile(image, 99.0)
+        return cls(windows, middle.astype(np.float64), up, level)
+
+    def place(self, line: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where a line is in each window, from its middle pixel."""
+        return np.asarray(line[0] + line[1] * self.up - self.middle, dtype=np.float64)
+
+    def residuals(self, line: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What the model leaves of each row, as a share of its level, shape (rows, pixels)."""
+        steps = np.arange(-_REACH, _REACH + 1.0) - self.place(line)[:, None]
+        left = _remainder(self.windows, _decays(steps, float(line[2])))
+        return np.asarray(left / self.level[:, None])
+
+
+def _rows_with_face(image: NDArray[np.float64], line: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Rows in which a break on the line explains something."""
+    every = np.arange(image.shape[0], dtype=np.int64)
+    place = line[0] + line[1] * _up(image, every)
+    rows = every[(place > _REACH) & (place < image.shape[1] - 1 - _REACH)]
+    strip = _Strip.along(line, image, rows)
+    gain = _gain(strip.windows, strip.place(line), line[2], image)
+    typical = np.median(np.sort(gain)[-rows.size // 2 :])
+    return np.asarray(rows[gain > _HAS_FACE * typical], dtype=np.int64)
+
+
+def _best_start(
+    image: NDArray[np.float64], rows: NDArray[np.int64], start: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Of the lines around one, that which leaves least: the least squares have several minima."""
+    lines = [
+        start + np.array([place, slope, 0.0])
+        for place in np.linspace(-4.0, 4.0, 17)
+        for slope in np.linspace(-_ROOM, _ROOM, 9)
+    ]
+    left = [np.abs(_Strip.along(line, image, rows).residuals(line)).sum() for line in lines]
+    return np.asarray(lines[int(np.argmin(left))], dtype=np.float64)
+
+
+def _fit(
+    image: NDArray[np.float64], rows: NDArray[np.int64], start: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Column in the middle row, slope and width of the blur in pixels."""
+    # Windows that moved with the line would make the sum of squares jump.
+    strip = _Strip.along(start, image, rows)
+    room = np.array([3.0, _ROOM])
+    lower, upper = start[:2] - room, start[:2] + room
+    middle = float(np.clip(start[2], 0.5, 2.9))
+    found = least_squares(
+        lambda line: strip.residuals(line).ravel(),
+        [start[0], start[1], middle],
+        bounds=([*lower, 0.4], [*upper, 3.0]),
+        x_scale=[1.0, 0.05, 1.0],
+        loss="soft_l1",
+        f_scale=0.02,
+    )
+    return np.asarray(found.x, dtype=np.float64)
+
+
+def _good_rows(residuals: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Rows that the model fits about as well as most."""
+    left = np.sqrt((residuals**2).mean(axis=-1))
+    return np.asarray(left <= _WORST_ROWS * np.median(left))
+
+
+def _jackknife(
+    image: NDArray[np.float64], rows: NDArray[np.int64], fit: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Standard uncertainties of the angle in rad, and of the place in pixels, across the face."""
+    middle = float(_up(image, rows).mean())
+    fits = np.array(
+        [
+            _fit(image, np.setdiff1d(rows, block), fit)
+            for block in np.array_split(rows, min(_BLOCKS, rows.size))
+        ]
+    )
+    place = (fits[:, 0] + middle * fits[:, 1]) * cos(atan(fit[1]))
+    spread = np.stack([np.arctan(fits[:, 1]), place])
+    left = len(fits) - 1
+    angle_error, place_error = np.sqrt(left * spread.var(axis=1)).tolist()
+    return angle_error, place_error
+
+
+def _tip_row(
+    image: NDArray[np.float64], line: NDArray[np.float64], rows: NDArray[np.int64]
+) -> tuple[float, bool]:
+    """Row in which the radiance on the face has fallen to half, and whether it is seen to."""
+    every = np.arange(image.shape[0])
+    windows = _Strip.along(line, image, every).windows
+    level = windows[:, _REACH - 1 : _REACH + 2].mean(axis=-1)
+    hottest = int(rows[level[rows].argmax()])
+    below = np.flatnonzero(level[hottest:] < level[hottest] / 2)
+    if below.size == 0:
+        return float(image.shape[0] - 1), False
+    row = hottest + int(below[0])
+    upper, lower = level[row - 1], level[row]
+    return row - 1 + float((upper - level[hottest] / 2) / (upper - lower)), True
+
+
+def _placed(
+    tool: ToolGeometry, raster: Raster, line: NDArray[np.float64], tip_row: float
+) -> PlacedTool:
+    """The tool with its lowest point at the tip's row and its face on the line."""
+    tip_y = raster.top - raster.spacing * (tip_row + 0.5)
+    foot = tool.rake_foot + np.array([0.0, tip_y])
+    row = (raster.top - foot[1]) / raster.spacing - 0.5
+    column = line[0] + line[1] * ((raster.rows - 1) / 2 - row)
+    on_line = raster.left + raster.spacing * (column + 0.5)
+    return PlacedTool(tool, (float(on_line - foot[0]), float(tip_y)))
+
+
+def _up_the_face(tool: PlacedTool, raster: Raster, row: float) -> float:
+    """Distance in m up the straight face from its lower end to where it crosses a row."""
+    y = raster.top - raster.spacing * (row + 0.5)
+    return (y - float(tool.rake_foot[1])) / cos(tool.rake_angle)
+
+
+def _doubts(
+    angle: float,
+    angle_error: float,
+    place_error: float,
+    angles: NDArray[np.float64],
+    prominence: float,
+    tip_seen: bool,
+) -> tuple[str, ...]:
+    doubts = []
+    if prominence < _SURE:
+        doubts.append("the rake face hardly stands out from the noise of the image.")
+    if angle_error > _WORST_ANGLE:
+        doubts.append("the rows of the image do not agree on the rake angle.")
+    if place_error > 1.0:
+        doubts.append("the rows of the image do not agree on a line within a pixel.")
+    if not angles[0] < angle < angles[-1]:
+        doubts.append(
+            f"the rake angle of {degrees(angle):.1f} degrees is at the end of what was looked for."
+        )
+    if not tip_seen:
+        doubts.append("the tip is not in the image: lengths count from its lower end.")
+    return tuple(doubts)

@@ -1,0 +1,83 @@
+"""How much the scaled mass of a cutting simulation can matter."""
+
+from dataclasses import dataclass
+from math import nan
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.laboratory.chip.segmentation import end_of_build_up
+from chipglow.scene import Scene
+
+LARGEST_SHARE: Final = 0.01
+"""Share of work or force from which inertia counts as too much."""
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Inertia of the scaled mass in a cut, after the first build-up of the chip.
+
+    Parameters
+    ----------
+    kinetic_share : float
+        Greatest change of the kinetic energy since the start over the work of the drive till then;
+        NaN where the scene has no energy account.
+    force_share : float
+        Momentum that the scaled mass brings to the tool per time, ρV² times uncut chip thickness,
+        over the mean cutting force; NaN where the scene does not tell it. By the balance of
+        momentum a chip that leaves at v makes a share abs(V − v)/V of it a force.
+    mass_scaling : float
+        Factor on the density: the true mass has this much less of both.
+    """
+
+    kinetic_share: float
+    force_share: float
+    mass_scaling: float
+
+    @property
+    def warning(self) -> str:
+        """What is too much, and what to do; empty if nothing is."""
+        shares = (
+            (self.kinetic_share, "kinetic energy reaches {} of the work"),
+            (self.force_share, "momentum is worth {} of the cutting force"),
+        )
+        over = [text.format(f"{s:.1%}") for s, text in shares if s > LARGEST_SHARE]
+        if not over:
+            return ""
+        return (
+            f"The scaled mass's {' and its '.join(over)}, expected up to {LARGEST_SHARE:.0%}: "
+            f"lower mass_scaling, now {self.mass_scaling:g}."
+        )
+
+
+def inertia(scene: Scene) -> Inertia | None:
+    """Inertia of the cut that a scene is of; None without a force history.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene with its force history, as the cutting simulation's file has it.
+    """
+    if "cutting_force" not in scene.data:
+        return None
+    cutting = _values(scene, "cutting_force")
+    first = end_of_build_up(cutting)
+    kinetic_share = nan
+    if "drive_work" in scene.data:
+        kinetic, work = (_values(scene, n)[first:] for n in ("kinetic_energy", "drive_work"))
+        kinetic_share = np.fmax.reduce(_ratio(np.abs(kinetic), work))
+    flow = float(scene.data.attrs.get("momentum_flow", nan))
+    scaling = float(scene.data.attrs.get("mass_scaling", nan))
+    force_share = _ratio(np.array(flow), cutting[first:].mean())
+    return Inertia(float(kinetic_share), float(force_share), scaling)
+
+
+def _ratio(part: NDArray[np.float64], whole: NDArray[np.float64]) -> NDArray[np.float64]:
+    """NaN where there is no whole, as before the tool touches."""
+    unknown = np.full(np.shape(whole), nan)
+    return np.asarray(np.divide(part, whole, out=unknown, where=whole > 0.0))
+
+
+def _values(scene: Scene, name: str) -> NDArray[np.float64]:
+    return np.asarray(scene.data[name].values, dtype=np.float64)

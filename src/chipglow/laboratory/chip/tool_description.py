@@ -1,0 +1,84 @@
+"""A tool as a file of its own, for the commands that need to know where the rake face is."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Strict
+
+from chipglow.camera import Measurement
+from chipglow.io import ToolSection
+from chipglow.quantities.section import OR_NONE, described
+from chipglow.quantities.units import Position
+from chipglow.scene import PlacedTool, Tool
+from chipglow.text import read_description, validated
+
+_Tip = Annotated[tuple[Position, Position] | None, Strict(False), *OR_NONE]
+
+
+class ToolDescription(ToolSection):
+    """A cutting tool and where it is."""
+
+    tip: _Tip = described(
+        "none",
+        "Where the tip is in the measurement's coordinates: x of the edge's leftmost point, y of\n"
+        "its lowest one; at the origin by default.",
+        "none, or [-12 um, 3.5 um]",
+    )
+
+    def build(self) -> Tool:
+        """The tool in the measurement's coordinates."""
+        tool = super().build()
+        return tool if self.tip is None else PlacedTool(tool, self.tip)
+
+
+def load_tool(path: str | Path) -> Tool:
+    """Read a tool from a YAML file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file: keys of a study's section ``cutting.tool``, and ``tip``. An outline that it
+        names is looked up beside it.
+
+    Returns
+    -------
+    Tool
+        In the measurement's coordinates.
+
+    Raises
+    ------
+    DescriptionError
+        If the file is no YAML or the tool is not possible.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    return validated(ToolDescription, read_description(path), path.name, path.parent).build()
+
+
+def tool_of(measurement: Measurement, path: str | Path | None) -> Tool:
+    """Tool of a file or, without one, the tool that a measurement tells.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        A simulated measurement tells its scene's tool.
+    path : str or Path, optional
+        A tool's YAML file; see `load_tool`.
+
+    Raises
+    ------
+    ValueError
+        If there is no file and the measurement tells no tool, or as `load_tool`.
+    OSError
+        If the file cannot be read.
+    """
+    if path is not None:
+        return load_tool(path)
+    tool = measurement.tool
+    if tool is None:
+        raise ValueError(
+            "--tool: the measurement tells no tool, expected a tool's YAML file, or 'found' to "
+            "look for the rake face in the image"
+        )
+    return tool

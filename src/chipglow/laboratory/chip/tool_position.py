@@ -1,0 +1,144 @@
+"""How uncertain the place of a tool is, and what that makes uncertain."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from chipglow.camera import Measurement
+from chipglow.laboratory.chip.band_ridge import ThermalImage
+from chipglow.scene import Tool
+
+
+def tool_in(measurement: Measurement, given: Tool | None) -> Tool:
+    """The given tool, or else the measurement's own.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Frames of a camera.
+    given : Tool, optional
+        A tool, in the measurement's coordinates.
+
+    Raises
+    ------
+    ValueError
+        If there is neither.
+    """
+    tool = measurement.tool if given is None else given
+    if tool is None:
+        raise ValueError(
+            "tool: none is given and the measurement has none, expected one; find_tool looks for "
+            "it in the image"
+        )
+    return tool
+
+
+@dataclass(frozen=True)
+class ToolUncertainty:
+    """Standard uncertainties of the place of a tool, independent of each other.
+
+    Parameters
+    ----------
+    along : float
+        Of the tip along the rake face in m.
+    across : float
+        Of the rake face across itself in m, where `pivot` is.
+    angle : float
+        Of the rake angle in rad.
+    pivot : float
+        Where on the rake face its place and its angle are independent: the distance in m up the
+        straight face from its lower end.
+
+    Raises
+    ------
+    ValueError
+        If one is not finite, or an uncertainty is negative.
+    """
+
+    along: float
+    across: float
+    angle: float = 0.0
+    pivot: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("along", "across", "angle"):
+            value = getattr(self, name)
+            if not (isfinite(value) and value >= 0):
+                raise ValueError(f"tool uncertainty: {name} is {value!r}, expected 0 or more")
+        if not isfinite(self.pivot):
+            raise ValueError(f"tool uncertainty: pivot is {self.pivot!r} m, expected a finite one")
+
+    def displacements(self, tool: Tool, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far points that are fixed to the tool move, one standard uncertainty at a time.
+
+        Parameters
+        ----------
+        tool : Tool
+            The tool.
+        points : ndarray
+            x and y in m, shape (..., 2).
+
+        Returns
+        -------
+        ndarray
+            In m, shape (3, ..., 2): the tool moved up along the face, moved across it into the
+            chip, and turned to a greater rake angle about `pivot`.
+        """
+        direction, normal = np.array(tool.rake_direction), np.array(tool.rake_normal)
+        offset = points - tool.rake_point(self.pivot)
+        up, out = offset @ direction, offset @ normal
+        turned = out[..., None] * direction - up[..., None] * normal
+        moved = np.broadcast_to(self.along * direction, points.shape)
+        return np.stack(
+            [moved, np.broadcast_to(self.across * normal, points.shape), self.angle * turned]
+        )
+
+
+def contribution(
+    image: ThermalImage, points: NDArray[np.float64], displacement: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """What a displacement by one standard uncertainty changes in what is read.
+
+    Half the difference between the temperatures on either side: the uncertainty of the position
+    times the slope, taken over just that length (JCGM 100, 5.1.3, note 2). Where one side is
+    outside the image, the difference from the other.
+
+    Parameters
+    ----------
+    image : ThermalImage
+        The image.
+    points, displacement : ndarray
+        x and y in m, shape (..., 2).
+
+    Returns
+    -------
+    ndarray
+        In K with its sign, shape (...).
+    """
+    (behind, no_behind), (here, _), (ahead, no_ahead) = (
+        _read(image, points + side * displacement) for side in (-1, 0, 1)
+    )
+    one_side = np.where(no_ahead, here - behind, ahead - here)
+    return np.where(no_ahead ^ no_behind, one_side, (ahead - behind) / 2)
+
+
+def _read(
+    image: ThermalImage, points: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Temperatures in K, of the nearest pixel outside the image, and which are outside."""
+    row, column = image.index(points)
+    rows, columns = image.temperature.shape
+    outside = (row < 0) | (row > rows - 1) | (column < 0) | (column > columns - 1)
+    values = map_coordinates(image.temperature, [row, column], order=1, mode="nearest")
+    return values, outside
+
+
+def combined(
+    contributions: Sequence[NDArray[np.float64]], shape: tuple[int, ...]
+) -> NDArray[np.float64]:
+    """Root of the sum of the squares of independent contributions in K; 0 without any."""
+    return np.sqrt(sum((part**2 for part in contributions), np.zeros(shape)))

@@ -1,0 +1,27 @@
+"""Measured beside simulated: whether they agree within their uncertainty."""
+
+from chipglow.laboratory.comparison.comparison import (
+    BandComparison,
+    Comparison,
+    Fit,
+    GridComparison,
+    PlaceResult,
+    StatedUncertainties,
+    compare,
+    normalised_error,
+    reading,
+)
+from chipglow.laboratory.comparison.file import write_comparison
+
+__all__ = [
+    "BandComparison",
+    "Comparison",
+    "Fit",
+    "GridComparison",
+    "PlaceResult",
+    "StatedUncertainties",
+    "compare",
+    "normalised_error",
+    "reading",
+    "write_comparison",
+]

@@ -1,0 +1,123 @@
+"""Measured beside simulated, and their difference (the paper's Figures 7 and 9)."""
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from chipglow.drawing import drawing
+from chipglow.drawing.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.laboratory.comparison.comparison import COVERAGE, Comparison, GridComparison
+from chipglow.uncertainty import Estimate
+
+_HEIGHT: Final = 5.2
+_ASIDE: Final = 0.2
+_COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
+
+
+def draw_comparison(comparison: Comparison) -> Figure:
+    """Draw what was measured and simulated, and the differences with expanded uncertainties.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        The comparison. Of the squares at the rake face the nearest row is drawn with its
+        uncertainties, and the differences of the rows behind it, paler the deeper; and the shear
+        band.
+    """
+    columns = []
+    if comparison.grid is not None:
+        grid = comparison.grid
+        title = f"at the rake face, {1e6 * grid.depth[0]:.3g} µm deep"
+        readings = [item[0] for item in (grid.measured, *grid.simulated)]
+        columns.append((title, "along the rake face / µm", grid.along, readings))
+    if comparison.band is not None:
+        band = comparison.band
+        label = "distance from the cutting edge / µm"
+        readings = [band.measured, *band.simulated]
+        columns.append(("along the shear band", label, band.distance, readings))
+    with drawing.style():
+        figure = drawing.new_figure(_HEIGHT)
+        panels = figure.subplots(
+            2, len(columns), squeeze=False, sharex="col", sharey="row", height_ratios=(1.4, 1)
+        )
+        for (above, below), column in zip(panels.T, columns, strict=True):
+            title, label, place, readings = column
+            above.set_title(title)
+            below.set_xlabel(label)
+            _draw_values(above, place, readings, comparison.labels)
+            _draw_differences(below, place, readings)
+            if comparison.grid is not None and place is comparison.grid.along:
+                _draw_deeper(below, comparison.grid)
+        panels[0, 0].set_ylabel("radiance temperature / °C")
+        panels[1, 0].set_ylabel("simulated − measured / K")
+        handles, labels = panels[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _colour(number: int) -> str:
+    return _COLOURS[number % len(_COLOURS)]
+
+
+def _draw_values(
+    axes: Axes, place: NDArray[np.float64], readings: Sequence[Estimate], labels: Sequence[str]
+) -> None:
+    measured, *simulated = readings
+    x, values = 1e6 * place, measured.values - KELVIN
+    axes.plot(x, values, "k.", markersize=4, label="measured")
+    axes.fill_between(
+        x,
+        values - COVERAGE * measured.standard_uncertainty,
+        values + COVERAGE * measured.standard_uncertainty,
+        color=GREY,
+        alpha=0.3,
+        linewidth=0,
+        label="expanded uncertainty, k = 2",
+    )
+    for i, (reading, label) in enumerate(zip(simulated, labels, strict=True)):
+        values = reading.values - KELVIN
+        axes.plot(x, values, color=_colour(i), label=label)
+        axes.fill_between(
+            x,
+            values - COVERAGE * reading.standard_uncertainty,
+            values + COVERAGE * reading.standard_uncertainty,
+            color=_colour(i),
+            alpha=0.15,
+            linewidth=0,
+        )
+
+
+def _draw_deeper(axes: Axes, grid: GridComparison) -> None:
+    """Differences of the rows behind the first, without bars."""
+    rows = grid.depth.size
+    for row in range(1, rows):
+        for i, reading in enumerate(grid.simulated):
+            away = reading.values[row] - grid.measured.values[row]
+            style: dict[str, Any] = {"color": _colour(i), "alpha": 0.6 * (1 - row / rows) + 0.1}
+            axes.plot(1e6 * grid.along, away, linewidth=0.8, linestyle="--", **style)
+    if rows > 1:
+        deepest = 1e6 * float(grid.depth[-1])
+        axes.set_title(f"dashed: deeper rows, to {deepest:.3g} µm", fontsize="small")
+
+
+def _draw_differences(axes: Axes, place: NDArray[np.float64], readings: Sequence[Estimate]) -> None:
+    measured, *simulated = readings
+    axes.axhline(0.0, color="black", linewidth=0.8)
+    step = float(np.median(np.diff(1e6 * place))) if place.size > 1 else 0.0
+    for i, reading in enumerate(simulated):
+        # Beside one another, so that no bar hides another.
+        aside = _ASIDE * step * (i - (len(simulated) - 1) / 2)
+        axes.errorbar(
+            1e6 * place + aside,
+            reading.values - measured.values,
+            COVERAGE * (reading - measured).standard_uncertainty,
+            color=_colour(i),
+            marker=".",
+            markersize=4,
+            linewidth=0.8,
+            elinewidth=0.5,
+        )

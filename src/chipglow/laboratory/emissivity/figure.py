@@ -1,0 +1,130 @@
+"""The picture of an emissivity determination: what was seen, where, and what came out."""
+
+from collections.abc import Mapping, Sequence
+from itertools import cycle
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
+
+from chipglow.drawing import drawing
+from chipglow.drawing.drawing import BLUE, GREEN, KELVIN, VERMILLION, ImagePanel
+from chipglow.laboratory.emissivity.emissivity import EmissivityLine, EmissivityMap
+from chipglow.scene import Raster, Region
+
+_COLOURS: Final = (BLUE, VERMILLION, GREEN, "#CC79A7", "#E69F00", "#56B4E9")
+_PANEL_WIDTH: Final = 2.7
+_AROUND: Final = 0.75
+_LINES: Final = 2.6
+_SLENDER: Final = 3.0
+
+
+def draw_emissivity(
+    found: EmissivityMap, regions: Sequence[Region], lines: Sequence[EmissivityLine] = ()
+) -> Figure:
+    """Draw the radiance temperature with the regions, and the emissivity beside it.
+
+    Parameters
+    ----------
+    found : EmissivityMap
+        The map to draw.
+    regions : sequence of Region
+        Regions to draw on both, those of one feature in one colour, named on the first.
+    lines : sequence of EmissivityLine
+        Emissivity of features over the temperature, drawn below if there is any.
+    """
+    raster = found.raster
+    temperature = found.radiance_temperature - KELVIN
+    panels = (
+        ImagePanel(
+            "radiance temperature",
+            "°C",
+            temperature,
+            _ends(temperature),
+            drawing.HEAT,
+        ),
+        ImagePanel(
+            f"emissivity, object at {found.heating.truth - KELVIN:.4g} °C",
+            "emissivity",
+            found.emissivity,
+            _ends(found.emissivity),
+        ),
+    )
+    height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, 1.0), 5.0) + _AROUND
+    with drawing.style():
+        total = height + (_LINES if lines else 0.0)
+        figure = drawing.new_figure(total)
+        parts: Any = figure.subfigures(2, 1, height_ratios=(height, _LINES)) if lines else (figure,)
+        for axes, panel in zip(parts[0].subplots(1, 2, sharey=True), panels, strict=True):
+            panel.draw(parts[0], axes, raster, None)
+            _draw_regions(axes, regions, raster, named=panel is panels[0])
+        if lines:
+            _draw_lines(parts[1].subplots(), lines, _colours(regions))
+    return figure
+
+
+def _ends(image: NDArray[np.float64]) -> tuple[float, float]:
+    known = image[np.isfinite(image)]
+    low, high = map(float, np.percentile(known, (0.5, 99.5))) if known.size else (0.0, 1.0)
+    return low, high if high > low else low + 1.0
+
+
+def _draw_regions(axes: Axes, regions: Sequence[Region], raster: Raster, named: bool) -> None:
+    colours = _colours(regions)
+    for region in regions:
+        outline = region.outline(raster)
+        colour = colours[region.feature]
+        drawing.draw_line(axes, np.concatenate([outline, outline[:1]]), colour)
+        if named:
+            _draw_name(axes, region.name, outline * 1e6, colour)
+
+
+def _draw_name(axes: Axes, name: str, outline: NDArray[np.float64], colour: str) -> None:
+    """A region's name in its middle, upright where the region is slender."""
+    width, height = np.ptp(outline, axis=0)
+    x, y = (outline.min(axis=0) + outline.max(axis=0)) / 2
+    axes.text(
+        x,
+        y,
+        name,
+        rotation=90 if height > _SLENDER * width else 0,
+        ha="center",
+        va="center",
+        fontsize=8,
+        color=colour,
+        path_effects=[withStroke(linewidth=2.5, foreground="white")],
+    )
+
+
+def _colours(regions: Sequence[Region]) -> dict[str, str]:
+    """A colour for each feature."""
+    features = dict.fromkeys(region.feature for region in regions)
+    return dict(zip(features, cycle(_COLOURS), strict=False))
+
+
+def _draw_lines(axes: Axes, lines: Sequence[EmissivityLine], colours: Mapping[str, str]) -> None:
+    for line in lines:
+        colour = colours[line.feature]
+        celsius = np.array(line.temperatures) - KELVIN
+        axes.errorbar(
+            celsius,
+            line.means,
+            yerr=2 * np.array(line.uncertainties),
+            fmt="o",
+            markersize=4,
+            capsize=3,
+            color=colour,
+            label=line.name,
+        )
+        along = np.linspace(celsius.min(), celsius.max(), 50)
+        found = line.at(along + KELVIN)
+        value, spread = found.values, found.standard_uncertainty
+        axes.plot(along, value, color=colour)
+        axes.fill_between(along, value - 2 * spread, value + 2 * spread, color=colour, alpha=0.15)
+    axes.set_xlabel("true temperature / °C")
+    axes.set_ylabel("emissivity")
+    axes.set_title("means over the pixels; bars and bands: 2 standard uncertainties")
+    axes.legend()

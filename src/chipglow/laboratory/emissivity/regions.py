@@ -1,0 +1,143 @@
+"""What a file of regions says: named polygons, rectangles and circles of an image."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+from pydantic import PlainSerializer, PlainValidator, Strict, field_validator, model_validator
+
+from chipglow.quantities.section import OR_NONE, Part, Section, described
+from chipglow.quantities.units import POSITION
+from chipglow.scene import Circle, Polygon, Region
+from chipglow.scene.regions import Point
+from chipglow.text import read_description, validated
+
+_SHAPES: Final = ("polygon", "rectangle", "circle")
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A coordinate or a length of a region.
+
+    Parameters
+    ----------
+    value : float
+        In pixels or in m.
+    unit : {"pixel", "m"}
+        Which of them.
+    """
+
+    value: float
+    unit: Literal["pixel", "m"]
+
+
+def _coordinate(value: object) -> Coordinate:
+    """A number of pixels, or a text with a unit of length."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return Coordinate(float(value), "pixel")
+    try:
+        return Coordinate(POSITION.parse(value), "m")
+    except ValueError:
+        raise ValueError(
+            f"{value!r}, expected a number of pixels, or a position such as 120 um"
+        ) from None
+
+
+def _as_written(coordinate: Coordinate) -> float | str:
+    return coordinate.value if coordinate.unit == "pixel" else POSITION.text(coordinate.value)
+
+
+CoordinateField = Annotated[
+    Coordinate, PlainValidator(_coordinate), PlainSerializer(_as_written, when_used="json")
+]
+PointField = Annotated[tuple[CoordinateField, CoordinateField], Strict(False)]
+
+
+class CircleSection(Section):
+    """A circle."""
+
+    centre: PointField = described([0, 0], "Its middle.")
+    radius: CoordinateField = described(0, "Its radius.")
+
+
+class RegionSection(Section):
+    """One region: a polygon, a rectangle or a circle."""
+
+    polygon: Annotated[tuple[PointField, ...] | None, Strict(False), *OR_NONE] = described(
+        "none", "Corners in order."
+    )
+    rectangle: Annotated[tuple[PointField, PointField] | None, Strict(False), *OR_NONE] = described(
+        "none", "Two opposite corners."
+    )
+    circle: Annotated[CircleSection | None, *OR_NONE] = described("none", "Centre and radius.")
+    feature: str = described("", "What it is a part of; by default its own name.")
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> "RegionSection":
+        given = [name for name in _SHAPES if getattr(self, name) is not None]
+        if len(given) != 1:
+            found = " and ".join(given) or "no shape"
+            raise ValueError(f"{found}, expected one of {', '.join(_SHAPES)}")
+        self.region("region")
+        return self
+
+    def region(self, name: str) -> Region:
+        """The region that this section describes."""
+        if self.circle is not None:
+            places, radius = (self.circle.centre,), self.circle.radius
+            unit = _unit([*places[0], radius])
+            return Region(name, Circle(_point(places[0]), radius.value), self.feature, unit)
+        corners = self.polygon if self.rectangle is None else self.rectangle
+        assert corners is not None
+        points = tuple(_point(corner) for corner in corners)
+        shape = Polygon(points) if self.rectangle is None else Polygon.rectangle(*points)
+        unit = _unit(coordinate for corner in corners for coordinate in corner)
+        return Region(name, shape, self.feature, unit)
+
+
+class RegionsDescription(Part):
+    """A file of regions."""
+
+    regions: dict[str, RegionSection] = described({}, "Regions by name.")
+
+    @field_validator("regions")
+    @classmethod
+    def _at_least_one(cls, regions: dict[str, RegionSection]) -> dict[str, RegionSection]:
+        if not regions:
+            raise ValueError("there are none, expected 1 region or more")
+        return regions
+
+    def build(self) -> tuple[Region, ...]:
+        """The regions."""
+        return tuple(section.region(name) for name, section in self.regions.items())
+
+
+def _point(place: tuple[Coordinate, Coordinate]) -> Point:
+    return place[0].value, place[1].value
+
+
+def _unit(coordinates: Iterable[Coordinate]) -> Literal["pixel", "m"]:
+    units = {coordinate.unit for coordinate in coordinates}
+    if len(units) > 1:
+        raise ValueError("pixels and lengths are mixed, expected all of one kind")
+    return units.pop() if units else "pixel"
+
+
+def load_regions(path: str | Path) -> tuple[Region, ...]:
+    """Read named regions of an image from a YAML file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Raises
+    ------
+    DescriptionError
+        If the file is no YAML or a region is not possible.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    return validated(RegionsDescription, read_description(path), path.name, path.parent).build()

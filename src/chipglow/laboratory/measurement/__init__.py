@@ -1,0 +1,48 @@
+"""From a file of a camera to a measurement in radiance temperature."""
+
+from chipglow.laboratory.measurement.calibration_file import (
+    CalibrationDescription,
+    calibration_text,
+    load_calibration,
+)
+from chipglow.laboratory.measurement.camera_file import (
+    UniformObjects,
+    bad_pixels_of,
+    load_measurement,
+    load_recording,
+    measurement_of,
+    uniform_counts,
+)
+from chipglow.laboratory.measurement.description import (
+    MeasurementDescription,
+    load_description,
+    measurement_text,
+)
+from chipglow.laboratory.measurement.radiometric_calibration import (
+    ImagePosition,
+    develop_recording,
+    flag_shares,
+    repaired_signal,
+)
+from chipglow.laboratory.measurement.summary import MeasurementSummary, measurement_summary
+
+__all__ = [
+    "CalibrationDescription",
+    "ImagePosition",
+    "MeasurementDescription",
+    "MeasurementSummary",
+    "UniformObjects",
+    "bad_pixels_of",
+    "calibration_text",
+    "develop_recording",
+    "flag_shares",
+    "load_calibration",
+    "load_description",
+    "load_measurement",
+    "load_recording",
+    "measurement_of",
+    "measurement_summary",
+    "measurement_text",
+    "repaired_signal",
+    "uniform_counts",
+]

@@ -1,0 +1,145 @@
+"""A calibration as a YAML file holds it."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field, Strict
+
+from chipglow.camera import CalibrationFit, FittedCalibration, LinearCalibration, SakumaHattori
+from chipglow.quantities.section import OR_NONE, Part, described
+from chipglow.quantities.units import Temperature, Time, WavelengthRange
+from chipglow.radiometry import Band, TabulatedResponse
+from chipglow.text import commented_yaml, read_description, validated
+
+MODELS: Final[Mapping[str, type[FittedCalibration]]] = {
+    "linear": LinearCalibration,
+    "sakuma-hattori": SakumaHattori,
+}
+"""Forms of a calibration by the names of a file."""
+
+Rows = Annotated[tuple[Annotated[tuple[float, ...], Strict(False)], ...], Strict(False)]
+PointRow = Annotated[tuple[float, float, float, float], Strict(False)]
+
+
+class CalibrationDescription(Part):
+    """A calibration of a camera's counts by black bodies."""
+
+    model: Literal["linear", "sakuma-hattori"] = Field(
+        description="linear: counts = offset + gain L(T), L the radiance in the band;\n"
+        "sakuma-hattori: counts = offset + C / (exp(c2/(A T + B)) - 1)."
+    )
+    band: WavelengthRange = Field(description="The camera's spectral band.")
+    response: Annotated[Rows | None, *OR_NONE] = described(
+        "none", "Pairs of wavelength in um and relative response; none: 1 in the band."
+    )
+    lowest: Temperature = Field(description="Coldest black body: colder pixels are flagged.")
+    highest: Temperature = Field(description="Hottest black body: hotter pixels are flagged.")
+    integration_time: Annotated[Time | None, *OR_NONE] = described(
+        "none", "Integration time for which it holds; none: not told, not checked."
+    )
+    range: Annotated[str | None, *OR_NONE] = described(
+        "none", "The camera's measuring range for which it holds; none: not told, not checked."
+    )
+    parameters: dict[str, float] = Field(
+        description="offset and C in counts, gain in counts per W/(m^2 sr), A in m, B in m K."
+    )
+    covariance: Rows = Field(
+        description="Covariance of offset and gain, or of offset, A, B and C: of the fit, and of\n"
+        "what the temperatures of the black body have in common."
+    )
+    warnings: Annotated[tuple[str, ...], Strict(False)] = described(
+        [], "Why it may not be relied on, a sentence each; every measurement by it says so."
+    )
+    points: Annotated[tuple[PointRow, ...], Strict(False)] = described(
+        [],
+        "For readers only: radiance temperature in degC, counts, residual in counts and in K.",
+    )
+
+    @classmethod
+    def of(cls, fit: CalibrationFit[FittedCalibration]) -> "CalibrationDescription":
+        """What a file shall hold of a fit."""
+        calibration = fit.calibration
+        band, response = calibration.band, calibration.band.response
+        names = {kind: name for name, kind in MODELS.items()}
+        values = zip(calibration.NAMES, calibration.parameters.tolist(), strict=True)
+        points = (
+            fit.temperatures - 273.15, fit.counts, fit.residuals, fit.residuals_temperature
+        )  # fmt: skip
+        return cls.model_construct(
+            model=names[type(calibration)],
+            band=(band.lower, band.upper),
+            response=_pairs(response) if isinstance(response, TabulatedResponse) else None,
+            lowest=calibration.lowest,
+            highest=calibration.highest,
+            integration_time=calibration.integration_time,
+            range=calibration.range_name,
+            parameters=dict(values),
+            covariance=tuple(map(tuple, calibration.covariance.tolist())),
+            warnings=calibration.warnings,
+            points=tuple(
+                tuple(float(f"{value:.9g}") for value in row) for row in zip(*points, strict=True)
+            ),
+        )
+
+    def build(self) -> FittedCalibration:
+        """The calibration."""
+        kind = MODELS[self.model]
+        if set(self.parameters) != set(kind.NAMES):
+            raise ValueError(
+                f"parameters: {', '.join(self.parameters)}, expected {', '.join(kind.NAMES)}"
+            )
+        if len({len(row) for row in self.covariance}) > 1:
+            raise ValueError("covariance: rows are of different lengths, expected a square")
+        calibration = kind(
+            band=Band(*self.band, self._response()),
+            lowest=self.lowest,
+            highest=self.highest,
+            integration_time=self.integration_time,
+            range_name=self.range,
+            parameters=np.array([self.parameters[name] for name in kind.NAMES]),
+            covariance=np.array(self.covariance),
+            warnings=self.warnings,
+        )
+        if not calibration.rises:
+            raise ValueError("parameters: the counts fall with the temperature, expected a rise")
+        return calibration
+
+    def _response(self) -> TabulatedResponse | None:
+        if self.response is None:
+            return None
+        if any(len(row) != 2 for row in self.response):
+            raise ValueError("response: expected pairs of wavelength in um and response")
+        wavelengths, values = zip(*self.response, strict=True)
+        return TabulatedResponse(tuple(1e-6 * wavelength for wavelength in wavelengths), values)
+
+
+def _pairs(response: TabulatedResponse) -> tuple[tuple[float, ...], ...]:
+    microns = (float(f"{1e6 * wavelength:.12g}") for wavelength in response.wavelengths)
+    return tuple(zip(microns, response.values, strict=True))
+
+
+def load_calibration(path: str | Path) -> FittedCalibration:
+    """Read a calibration from a YAML file, as ``chipglow calibrate`` writes it.
+
+    Raises
+    ------
+    DescriptionError
+        If the file is no YAML or no calibration; the message names the file.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    return validated(CalibrationDescription, read_description(path), path.name, path.parent).build()
+
+
+def calibration_text(description: CalibrationDescription) -> str:
+    """A calibration as YAML, every field with a comment; `load_calibration` reads it."""
+    return commented_yaml(_HEADER, description)
+
+
+_HEADER: Final = """\
+# A calibration of a camera, written by chipglow calibrate.
+# It holds from the coldest to the hottest black body, for one integration time and range.
+"""

@@ -1,0 +1,289 @@
+"""Measurements as the laboratory's commands take them."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.camera import (
+    LEAST_FRAMES,
+    BadPixels,
+    Measurement,
+    NonUniformity,
+    Recording,
+    find_bad_pixels,
+)
+from chipglow.io import is_measurement, is_scene, read_measurement
+from chipglow.io.cameras import CAMERA_FORMATS, read_recording
+from chipglow.io.cameras.formats import find_format
+from chipglow.io.cameras.stacks import MissingError
+from chipglow.laboratory.measurement.calibration_file import load_calibration
+from chipglow.laboratory.measurement.description import MeasurementDescription, load_description
+from chipglow.laboratory.measurement.radiometric_calibration import (
+    develop_recording,
+)
+from chipglow.text import DescriptionError
+
+_MOST_SATURATED: Final = 0.05
+"""Share of frames of a uniform object that may be saturated, as bad pixels are."""
+
+
+def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measurement:
+    """Read a measurement, or make one of a camera's file.
+
+    Parameters
+    ----------
+    source : str or Path
+        A measurement's NetCDF file; a camera's file; or a YAML file (.yaml, .yml) that describes a
+        camera's file.
+    settings : iterable of str
+        Fields of the description of a camera's file: ``band=3.8-5.1 um``. They come before those
+        of a YAML file.
+
+    Raises
+    ------
+    ValueError
+        If it is not a measurement, or cannot become one; the message names the file.
+    OSError
+        If a file cannot be read.
+    """
+    settings = list(settings)
+    if is_measurement(source):
+        for setting in settings:
+            raise ValueError(f"--set: {setting!r} describes nothing of a measurement's own file")
+        return read_measurement(source)
+    if is_scene(source):
+        raise DescriptionError(
+            f"{source}: is a scene, expected a measurement; chipglow measure makes one of it"
+        )
+    described = load_description(source, settings)
+    return measurement_of(described, load_recording(described), str(source))
+
+
+def load_recording(description: MeasurementDescription) -> Recording:
+    """Read what a camera wrote, with what a description says of it.
+
+    Raises
+    ------
+    ValueError
+        If the file is damaged, or what is said does not fit; the message names the file.
+    OSError
+        If the file cannot be read.
+    """
+    if description.file is None:
+        raise DescriptionError("file: is missing, expected a camera's file")
+    try:
+        return description.applied_to(_read(description, description.file))
+    except MissingError as error:
+        raise DescriptionError("; ".join([str(error), *_further(description)])) from None
+
+
+def _further(description: MeasurementDescription) -> Iterator[str]:
+    """What a measurement needs besides, and the description of a file of numbers lacks."""
+    if description.pitch is None:
+        yield "pitch: is missing, expected the distance between sensors such as 6 um"
+    if description.calibration is None and description.band is None:
+        yield "calibration (of counts) or band: is missing"
+
+
+def _read(description: MeasurementDescription, file: str, every: bool = False) -> Recording:
+    return read_recording(
+        file,
+        None if every else description.chosen_frames(),
+        description.format,
+        quantity=description.quantity,
+        unit=description.unit,
+        interval=description.interval,
+        dataset=description.dataset,
+        axes=description.axes,
+    )
+
+
+def measurement_of(
+    description: MeasurementDescription, recording: Recording, name: str
+) -> Measurement:
+    """Make a measurement of a recording as its description says.
+
+    Parameters
+    ----------
+    description : MeasurementDescription
+        What is done with it.
+    recording : Recording
+        As `load_recording` gives it for this description.
+    name : str
+        Name of the file, for errors.
+
+    Raises
+    ------
+    ValueError
+        If something is missing or does not fit; the message names the file.
+    OSError
+        If a file that the description names cannot be read.
+    """
+    try:
+        uniform = UniformObjects().of(description, recording)
+        calibration = description.calibration
+        return develop_recording(
+            recording,
+            None if calibration is None else load_calibration(calibration),
+            uniform.correction if uniform and description.uniform.correct else None,
+            bad_pixels_of(description, recording, uniform),
+            description.floor,
+            description.position(),
+        )
+    except ValueError as error:
+        raise DescriptionError(f"{name}: {error}") from error
+
+
+def uniform_counts(
+    source: str | Path, settings: Iterable[str] = (), objects: "UniformObjects | None" = None
+) -> float:
+    """Mean counts of a recording of a uniform object, such as a black body.
+
+    Its sensors are corrected as those of a measurement with the same description: the counts are
+    those that a calibration for such measurements needs.
+
+    Parameters
+    ----------
+    source : str or Path
+        A camera's file, or a YAML file (.yaml, .yml) that describes one.
+    settings : iterable of str
+        Fields of the description.
+    objects : UniformObjects, optional
+        What was read for the recording before, where several are corrected by the same frames.
+
+    Returns
+    -------
+    float
+        Mean over all frames and all pixels that are not bad.
+
+    Raises
+    ------
+    ValueError
+        If it holds no counts, is saturated, or something does not fit; the message names the file.
+    OSError
+        If a file cannot be read.
+    """
+    description = load_description(source, settings)
+    recording = load_recording(description)
+    try:
+        if recording.quantity != "counts":
+            raise ValueError(f"holds {recording.quantity}, expected counts")
+        uniform = (objects or UniformObjects()).of(description, recording)
+        bad = bad_pixels_of(description, recording, uniform)
+        signal = recording.signal.astype(np.float64)
+        if uniform is not None and description.uniform.correct:
+            signal = uniform.correction.apply(signal)
+        good = np.isfinite(signal).all(axis=0) & (True if bad is None else ~bad)
+        if not good.any():
+            raise ValueError("all pixels are bad, expected some that are not")
+        if recording.saturation is not None:
+            share = float(np.mean(recording.signal[:, good] > recording.saturation))
+            if share > 0:
+                raise ValueError(f"{share:.2%} of it is saturated, expected a darker object")
+    except ValueError as error:
+        raise DescriptionError(f"{source}: {error}") from error
+    return float(signal[:, good].mean())
+
+
+class UniformObjects:
+    """Frames of uniform objects, read and judged once for recordings that have them in common.
+
+    Those of the last description are kept.
+    """
+
+    def __init__(self) -> None:
+        self._read = lru_cache(maxsize=1)(_read_uniform)
+
+    def of(self, description: MeasurementDescription, recording: Recording) -> "Uniform | None":
+        """Those that a recording's description names, if it does.
+
+        Raises
+        ------
+        ValueError
+            If some are missing, or are of no use for the recording; the message names the field.
+        OSError
+            If a file cannot be read.
+        """
+        section = description.uniform
+        if section.frames is None:
+            if section.brighter is not None or description.bad_pixels == "find":
+                raise ValueError("uniform.frames: is missing, expected frames of a uniform object")
+            return None
+        # Which frames of which file are corrected makes no difference to what corrects them.
+        uniform = self._read(description.model_copy(update={"file": None, "frames": None}))
+        for name, found in (("brighter", uniform.brighter), ("frames", uniform.frames)):
+            problem = None if found is None else _misfit(found, recording)
+            if problem is not None:
+                raise ValueError(f"uniform.{name}: {problem}")
+        return uniform
+
+
+@dataclass(frozen=True, eq=False)
+class Uniform:
+    """Frames of one or two uniform objects."""
+
+    frames: Recording
+    brighter: Recording | None
+
+    @cached_property
+    def correction(self) -> NonUniformity:
+        """What makes all detector elements answer alike."""
+        if self.brighter is None:
+            return NonUniformity.one_point(self.frames.signal)
+        return NonUniformity.two_point(self.frames.signal, self.brighter.signal)
+
+    @cached_property
+    def bad_pixels(self) -> BadPixels:
+        """Detector elements that answer unlike the others."""
+        frames = self.frames.signal
+        if len(frames) < LEAST_FRAMES:
+            raise ValueError(
+                f"uniform.frames: {len(frames)} frames, expected {LEAST_FRAMES} or more to find "
+                "bad pixels in"
+            )
+        return find_bad_pixels(frames, None if self.brighter is None else self.brighter.signal)
+
+
+def _read_uniform(description: MeasurementDescription) -> Uniform:
+    section = description.uniform
+    brighter = None if section.brighter is None else _uniform(description, section.brighter)
+    return Uniform(_uniform(description, str(section.frames)), brighter)
+
+
+def _uniform(description: MeasurementDescription, file: str) -> Recording:
+    if CAMERA_FORMATS[find_format(Path(file))].tells_quantity:
+        # What the description says of the recording's file, this file says itself.
+        return read_recording(file)
+    return _read(description, file, every=True)
+
+
+def _misfit(uniform: Recording, recording: Recording) -> str | None:
+    """Why frames of a uniform object are of no use for a recording."""
+    if uniform.quantity != recording.quantity:
+        return f"holds {uniform.quantity}, expected {recording.quantity} as the recording"
+    theirs, ours = uniform.integration_time, recording.integration_time
+    if theirs is not None and ours is not None and not np.isclose(theirs, ours, rtol=0.01):
+        return (
+            f"has an integration time of {1e6 * theirs:g} us, the recording {1e6 * ours:g} us, "
+            "expected the same"
+        )
+    if recording.saturation is not None:
+        share = float(np.mean(uniform.signal > recording.saturation))
+        if share > _MOST_SATURATED:
+            return f"{share:.0%} of it is saturated, expected a darker uniform object"
+    return None
+
+
+def bad_pixels_of(
+    description: MeasurementDescription, recording: Recording, uniform: "Uniform | None"
+) -> NDArray[np.bool_] | None:
+    """Bad pixels by the frames of uniform objects or by a list, shape (y, x); None for neither."""
+    if description.bad_pixels == "find" and uniform is not None:
+        return uniform.bad_pixels.mask
+    rows, columns = recording.signal.shape[1:]
+    return description.listed_bad_pixels((rows, columns))

@@ -1,0 +1,51 @@
+"""What a list of images of apertures says."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, Strict
+
+from chipglow.quantities.section import FileBeside, Section
+from chipglow.quantities.units import Length
+from chipglow.text import read_description, validated
+
+
+class ApertureSection(Section):
+    """An image of a round aperture."""
+
+    file: FileBeside = Field(description="The measurement.")
+    diameter: Length = Field(description="Diameter of the aperture on the object.")
+
+
+class ApertureList(Section):
+    """Images of apertures of several diameters before one source."""
+
+    apertures: Annotated[tuple[ApertureSection, ...], Strict(False)] = Field(
+        description="The images."
+    )
+
+
+def load_apertures(path: str | Path) -> list[tuple[Path, float]]:
+    """Read a list of images of apertures from a YAML file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file: ``apertures: [{file: small.nc, diameter: 50 um}, ...]``. Images are looked up
+        beside it.
+
+    Returns
+    -------
+    list of tuple
+        Each image's file and the aperture's diameter in m.
+
+    Raises
+    ------
+    DescriptionError
+        If the file is no YAML or no such list.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    found = validated(ApertureList, read_description(path), path.name, path.parent)
+    return [(Path(aperture.file), aperture.diameter) for aperture in found.apertures]

@@ -1,0 +1,63 @@
+"""Images of an edge as the laboratory's commands take them."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from chipglow.io import is_measurement, is_scene
+from chipglow.laboratory.measurement import (
+    UniformObjects,
+    bad_pixels_of,
+    load_calibration,
+    load_description,
+    load_measurement,
+    load_recording,
+    measurement_of,
+    repaired_signal,
+)
+from chipglow.laboratory.psf.edge_image import EdgeImage, counts_image, edge_image
+from chipglow.text import DescriptionError
+
+
+def load_edge(
+    source: str | Path, settings: Iterable[str] = (), region: tuple[slice, slice] | None = None
+) -> EdgeImage:
+    """Read an image of an edge: a measurement, or a camera's file with or without a calibration.
+
+    Counts serve as they are, as an edge needs no more than a straight line over the radiance. A
+    calibration holds beyond its range, as the edge needs no temperature.
+
+    Parameters
+    ----------
+    source, settings
+        As `load_measurement` takes them.
+    region : tuple of slice, optional
+        Rows and columns that show the edge; all by default.
+
+    Raises
+    ------
+    ValueError
+        If it is no image of an edge; the message names the file.
+    OSError
+        If a file cannot be read.
+    """
+    settings, name = list(settings), Path(source).name
+    if is_measurement(source) or is_scene(source):
+        return edge_image(load_measurement(source, settings), name, region)
+    described = load_description(source, settings)
+    recording = load_recording(described)
+    if recording.quantity != "counts" or recording.conversion is not None:
+        return edge_image(measurement_of(described, recording, str(source)), name, region)
+    if described.calibration is not None:
+        calibration = load_calibration(described.calibration)
+        recording = replace(recording, band=recording.band or calibration.band)
+    try:
+        uniform = UniformObjects().of(described, recording)
+        signal, flags = repaired_signal(
+            recording,
+            uniform.correction if uniform and described.uniform.correct else None,
+            bad_pixels_of(described, recording, uniform),
+        )
+        return counts_image(recording, signal, flags, name, region)
+    except ValueError as error:
+        raise DescriptionError(f"{source}: {str(error).removeprefix(f'{name}: ')}") from error

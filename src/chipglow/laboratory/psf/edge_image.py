@@ -1,0 +1,408 @@
+"""Images of edges, and which of their pixels can be used."""
+
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
+
+from chipglow.camera import Flag, Measurement, Recording
+from chipglow.laboratory.psf.edge_line import EdgeLine, NoEdgeError, Straightness, find_edge
+from chipglow.laboratory.psf.psf_fit import EdgePixels, ModelFit, fit_model
+from chipglow.laboratory.psf.psf_models import GaussianModel
+from chipglow.scene import Raster
+
+_LEAST_STEP: Final = 7.0
+_OUTLIER: Final = 7.0
+_SECOND_EDGE: Final = 0.12
+_BLOCK: Final = 5
+_ROUGHLY: Final = 1e-5
+_LEAST_PILE: Final = 10
+_CLIPPED_SHARE: Final = 0.02
+_WHOLE_SQUARE: Final = "the whole square of a sensor takes light (fill factor 1)."
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeImage:
+    """An image of an edge.
+
+    Parameters
+    ----------
+    radiance : ndarray
+        In W/(m² sr), or counts that are a straight line over it, shape (y, x).
+    x, y : ndarray
+        Positions of columns and rows in m; x ascends, y descends.
+    dead, saturated, below : ndarray
+        Which pixels have no value, are too bright or are too dark for the camera, shape (y, x).
+    footprint : float
+        Side of a sensor's sensitive square in m.
+    wavelength : float, optional
+        Middle of the camera's band in m.
+    name : str
+        What it is called in messages.
+    notes : tuple of str
+        What is assumed of it, a sentence each.
+    doubts : tuple of str
+        Why it may not be trusted, a sentence each.
+    unit : str
+        Of the radiance: counts where no calibration is needed.
+    """
+
+    radiance: NDArray[np.float64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    dead: NDArray[np.bool_]
+    saturated: NDArray[np.bool_]
+    below: NDArray[np.bool_]
+    footprint: float
+    wavelength: float | None
+    name: str
+    notes: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+    unit: str = "W/(m² sr)"
+
+    @property
+    def pitch(self) -> float:
+        """Distance between sensors in m."""
+        return float(self.x[1] - self.x[0])
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """Which pixels can be trusted, shape (y, x)."""
+        return ~(self.dead | self.saturated | self.below)
+
+
+def edge_image(
+    measurement: Measurement, name: str, region: tuple[slice, slice] | None = None
+) -> EdgeImage:
+    """The mean of a measurement's frames as an image of an edge.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        One frame or several of the same edge.
+    name : str
+        What it is called in messages.
+    region : tuple of slice, optional
+        Rows and columns that show the edge; all by default.
+
+    Raises
+    ------
+    ValueError
+        If the region is not within the image.
+    """
+    attributes = measurement.data.attrs
+    band = measurement.band if "band_lower" in attributes else None
+    image = _mean_image(measurement.radiance, measurement.flags, measurement.raster, name, region)
+    notes, below = list(_notes(measurement)), image.below
+    if below.any() and np.isfinite(image.radiance[below]).all():
+        # An edge needs radiance, which the optics add up, and no temperature.
+        notes.append(
+            f"{100 * np.mean(below):.2g} % of the pixels of {name} are under the range of the "
+            "camera or its calibration; their radiance is used as it is."
+        )
+        below = np.zeros_like(below)
+    return replace(
+        image,
+        below=below,
+        footprint=image.pitch * sqrt(float(attributes.get("fill_factor", 1.0))),
+        wavelength=(band.lower + band.upper) / 2 if band else None,
+        notes=tuple(notes),
+        doubts=tuple(str(attributes.get("doubtful", "")).splitlines()),
+    )
+
+
+def counts_image(
+    recording: Recording,
+    signal: NDArray[np.float64],
+    flags: NDArray[np.uint8],
+    name: str,
+    region: tuple[slice, slice] | None = None,
+) -> EdgeImage:
+    """The mean of frames of counts, a straight line over radiance, as an image of an edge.
+
+    Parameters
+    ----------
+    recording : Recording
+        What the camera wrote; its pitch is needed.
+    signal, flags : ndarray
+        Its counts as they are to be used and what is wrong with them, as `repaired_signal` gives
+        them, shape (time, y, x).
+    name : str
+        What it is called in messages.
+    region : tuple of slice, optional
+        Rows and columns that show the edge; all by default.
+
+    Raises
+    ------
+    ValueError
+        If the pitch is missing, or the region is not within the image.
+    """
+    if recording.pitch is None:
+        raise ValueError(
+            "pitch: is missing, the file does not say it, expected the distance between sensors "
+            "on the object such as 6 um"
+        )
+    raster = Raster(0.0, 0.0, recording.pitch, *signal.shape[1:])
+    # No camera counts less than nothing: there, the dark side is cut off.
+    cut = np.where(recording.signal <= 0, Flag.BELOW_FLOOR, 0).astype(np.uint8)
+    image = _mean_image(signal, flags | cut, raster, name, region)
+    notes = [
+        *recording.assumptions,
+        "the counts are a straight line over the radiance: an edge needs no calibration.",
+    ]
+    if recording.fill_factor is None:
+        notes.append(_WHOLE_SQUARE)
+    if recording.saturation is None:
+        notes.append("no pixel is saturated: neither the file nor the description says from where.")
+    band = recording.band
+    return replace(
+        image,
+        footprint=image.pitch * sqrt(recording.fill_factor or 1.0),
+        wavelength=(band.lower + band.upper) / 2 if band else None,
+        notes=tuple(notes),
+        doubts=recording.doubts,
+        unit="counts",
+    )
+
+
+def _mean_image(
+    frames: NDArray[np.float64],
+    flags: NDArray[np.uint8],
+    raster: Raster,
+    name: str,
+    region: tuple[slice, slice] | None,
+) -> EdgeImage:
+    """Mean and flags of a region of frames."""
+    part = region or np.s_[:, :]
+    told = np.bitwise_or.reduce(flags, axis=0)[part]
+    radiance = np.asarray(frames.mean(axis=0)[part], np.float64)
+    if min(radiance.shape) < 8:
+        raise ValueError(
+            f"{name}: the region has {radiance.shape[0]} x {radiance.shape[1]} pixels, expected "
+            f"8 x 8 or more of the image's {raster.rows} x {raster.columns}"
+        )
+    return EdgeImage(
+        radiance,
+        raster.x[part[1]],
+        raster.y[part[0]],
+        ((told & (Flag.DEAD | Flag.REPLACED)) != 0) | ~np.isfinite(radiance),
+        (told & Flag.SATURATED) != 0,
+        (told & Flag.BELOW_FLOOR) != 0,
+        raster.spacing,
+        None,
+        name,
+    )
+
+
+def _notes(measurement: Measurement) -> tuple[str, ...]:
+    notes = str(measurement.data.attrs.get("assumed", "")).splitlines()
+    if "fill_factor" not in measurement.data.attrs:
+        notes.append(_WHOLE_SQUARE)
+    if measurement.data.attrs.get("psf_order") == "sensor":
+        notes.append(
+            "each sensor's square acts once; this camera was simulated with psf_order sensor, "
+            "where it acts twice, and the second time is counted as optics."
+        )
+    return tuple(notes)
+
+
+def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
+    """Find the edge in an image, and the pixels that tell of it.
+
+    Where pixels are saturated or below the floor, all pixels from there on outward are left out:
+    to leave out only those whose noise goes over the limit would shift the mean of the others.
+
+    Parameters
+    ----------
+    image : EdgeImage
+        The image.
+
+    Returns
+    -------
+    EdgePixels
+        The pixels, x and y from the image's middle, with even noise.
+    list of str
+        What may make them doubtful.
+
+    Raises
+    ------
+    NoEdgeError
+        If there is no straight edge, or more than one.
+    """
+    image = replace(image, saturated=image.saturated | _piled_up(image))
+    x, y = image.x - image.x.mean(), image.y - image.y.mean()
+    try:
+        # Where an edge is can be seen on clipped pixels too.
+        line, straightness = find_edge(np.where(image.dead, np.nan, image.radiance), x, y)
+        pixels = _pixels_of(image, x, y, line)
+        quick = _quick_fit(pixels)
+        doubts = _bent(straightness, image)
+        limits, clipped = _limits(image, x, y, line)
+        doubts += clipped
+        if clipped:
+            pixels = _within_limits(pixels, line, limits)
+            quick = _quick_fit(pixels)
+        else:
+            _check_edge(pixels, quick)
+        pixels, outliers = _without_outliers(pixels, quick)
+        doubts += outliers
+        _check_single(pixels, quick)
+    except NoEdgeError as error:
+        raise NoEdgeError(f"{image.name}: {error}") from None
+    said = [f"{image.name}: {doubt}" for doubt in (*image.doubts, *doubts)]
+    noise = float(np.std(pixels.radiance - quick.predicted(0, pixels)))
+    pixels = replace(pixels, sigma=np.full(pixels.x.size, max(noise, 1e-300)))
+    # A Gaussian with a free step can put the edge of a clipped image far away.
+    return (pixels if clipped else replace(pixels, line=quick.edges[0].line)), said
+
+
+def _pixels_of(
+    image: EdgeImage, x: NDArray[np.float64], y: NDArray[np.float64], line: EdgeLine
+) -> EdgePixels:
+    across, down = np.meshgrid(x, y)
+    usable = image.usable
+    if np.count_nonzero(usable) < 40:
+        raise NoEdgeError(f"{np.count_nonzero(usable)} usable pixels, expected 40 or more")
+    radiance = image.radiance[usable]
+    sigma = np.full(radiance.size, max(float(radiance.std()), 1e-300))
+    return EdgePixels(
+        across[usable], down[usable], radiance, sigma, image.pitch, image.footprint, line
+    )
+
+
+def _quick_fit(pixels: EdgePixels) -> ModelFit:
+    """A Gaussian fitted to the pixels."""
+    return fit_model(GaussianModel(), [pixels], tolerance=_ROUGHLY)
+
+
+def _check_edge(pixels: EdgePixels, quick: ModelFit) -> None:
+    """Raise unless the step is significant and enough of both sides is seen."""
+    edge = quick.edges[0]
+    distance = edge.line.distance(pixels.x, pixels.y)
+    dark, bright = -float(distance.min()), float(distance.max())
+    if edge.step < _LEAST_STEP * edge.step_uncertainty:
+        raise NoEdgeError(
+            f"the step is {edge.step:.3g} with a standard uncertainty of "
+            f"{edge.step_uncertainty:.2g}, expected {_LEAST_STEP:g} times as much or more"
+        )
+    if min(dark, bright) < max(quick.fwhm, 2 * pixels.pitch):
+        raise NoEdgeError(
+            f"the image reaches {dark * 1e6:.3g} um to the dark and {bright * 1e6:.3g} um to the "
+            f"bright side of the edge, which is {quick.fwhm * 1e6:.3g} um wide, "
+            "expected more of both"
+        )
+
+
+def _piled_up(image: EdgeImage) -> NDArray[np.bool_]:
+    """Pixels at a limit that no flag tells: many of just the greatest value, among noisy ones."""
+    values, counts = np.unique(image.radiance[image.usable], return_counts=True)
+    if values.size < 3:
+        return np.zeros_like(image.dead)
+    piled = counts[-1] >= _LEAST_PILE and counts[-1] > 3 * counts[-2] and counts[-1] > 3 * counts[0]
+    return np.asarray((image.radiance == values[-1]) & piled)
+
+
+def _limits(
+    image: EdgeImage, x: NDArray[np.float64], y: NDArray[np.float64], line: EdgeLine
+) -> tuple[tuple[float, float], list[str]]:
+    """Distances between which nothing is clipped, and what is to be said of it."""
+    across, down = np.meshgrid(x, y)
+    distance = line.distance(across, down)
+    low, high, said = -np.inf, np.inf, []
+    if image.saturated.any():
+        high = _first_clipped(distance, image.saturated & ~image.dead, image.pitch)
+        said.append(_clipped_text(image.saturated, "saturated", "bright", high))
+    if image.below.any():
+        low = -_first_clipped(-distance, image.below & ~image.dead, image.pitch)
+        said.append(_clipped_text(image.below, "below the camera's floor", "dark", -low))
+    return (low, high), said
+
+
+def _first_clipped(
+    distance: NDArray[np.float64], clipped: NDArray[np.bool_], pitch: float
+) -> float:
+    """Distance from which on more than single pixels are clipped, less a pitch."""
+    first = float(distance.min())
+    index = ((distance - first) / (pitch / 2)).astype(np.int64).ravel()
+    count = np.bincount(index)
+    share = np.bincount(index, clipped.ravel()) / np.maximum(count, 1)
+    found = np.flatnonzero((share > _CLIPPED_SHARE) & (share * count >= 2))
+    return first + float(found[0]) * pitch / 2 if found.size else np.inf
+
+
+def _clipped_text(clipped: NDArray[np.bool_], how: str, side: str, limit: float) -> str:
+    share = 100 * np.count_nonzero(clipped) / clipped.size
+    beyond = (
+        f"; nothing is used beyond {limit * 1e6:.3g} um on the {side} side, so that the step and "
+        "the tails are known less well"
+        if np.isfinite(limit)
+        else " and left out"
+    )
+    return f"{share:.2g} % of the pixels are {how}{beyond}."
+
+
+def _within_limits(pixels: EdgePixels, line: EdgeLine, limits: tuple[float, float]) -> EdgePixels:
+    distance = line.distance(pixels.x, pixels.y)
+    return _chosen(pixels, (distance > limits[0]) & (distance < limits[1]))
+
+
+def _chosen(pixels: EdgePixels, kept: NDArray[np.bool_]) -> EdgePixels:
+    if kept.sum() < 40:
+        raise NoEdgeError(f"{kept.sum()} pixels are not clipped, expected 40 or more")
+    return replace(
+        pixels,
+        x=pixels.x[kept],
+        y=pixels.y[kept],
+        radiance=pixels.radiance[kept],
+        sigma=pixels.sigma[kept],
+    )
+
+
+def _without_outliers(pixels: EdgePixels, quick: ModelFit) -> tuple[EdgePixels, list[str]]:
+    """The pixels without those that lie far from all others as near to the edge."""
+    left = pixels.radiance - quick.predicted(0, pixels)
+    spread = 1.4826 * float(np.median(np.abs(left - np.median(left))))
+    limit = max(_OUTLIER * spread, 0.2 * quick.edges[0].step)
+    kept = np.abs(left) <= limit
+    lost = int(np.count_nonzero(~kept))
+    # More than a few are no dead pixels but something that is not an edge.
+    if lost == 0 or lost > 0.01 * kept.size:
+        return pixels, []
+    text = f"{lost} pixels far from the others are left out; if they are dead, flag them."
+    return _chosen(pixels, kept), [text]
+
+
+def _check_single(pixels: EdgePixels, quick: ModelFit) -> None:
+    """Raise unless the two sides of the edge are all there is."""
+    left = pixels.radiance - quick.predicted(0, pixels)
+    column = np.round((pixels.x - pixels.x.min()) / pixels.pitch).astype(np.int64)
+    row = np.round((pixels.y - pixels.y.min()) / pixels.pitch).astype(np.int64)
+    total, count = np.zeros((2, row.max() + 1, column.max() + 1))
+    total[row, column], count[row, column] = left, 1.0
+    weight = uniform_filter(count, _BLOCK, mode="constant")
+    mean = uniform_filter(total, _BLOCK, mode="constant") / np.maximum(weight, 1e-9)
+    share = np.abs(np.where(weight > 0.5, mean, 0.0)) / quick.edges[0].step
+    change = np.diff(total, axis=1)[(count[:, 1:] * count[:, :-1]) > 0]
+    noise = float(np.median(np.abs(change))) / (_BLOCK * quick.edges[0].step)
+    if share.max() > max(_SECOND_EDGE, 7 * noise):
+        where = np.unravel_index(int(np.argmax(share)), share.shape)
+        raise NoEdgeError(
+            f"more than one straight edge: near row {where[0]}, column {where[1]} the image is "
+            f"{100 * share.max():.0f} % of the step away from a single edge's, expected a region "
+            "with one edge and even sides"
+        )
+
+
+def _bent(straightness: Straightness | None, image: EdgeImage) -> list[str]:
+    if straightness is None:
+        return ["the edge was found by its step only; that it is straight could not be checked."]
+    bent, unsure = straightness.sagitta, straightness.uncertainty
+    if bent < 4 * unsure or bent < 0.05 * image.pitch:
+        return []
+    return [
+        f"the edge is bent by {bent * 1e6:.2g} um over its length (standard uncertainty "
+        f"{unsure * 1e6:.1g} um), which makes the point spread function too wide."
+    ]

@@ -1,0 +1,145 @@
+"""A point spread function by the knife edge, as a picture."""
+
+from math import cos, hypot, sin
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from chipglow.drawing import drawing
+from chipglow.drawing.drawing import BLUE, GREY, VERMILLION, VOID
+from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge
+from chipglow.laboratory.psf.psf_fit import FittedEdge
+from chipglow.laboratory.psf.summary import with_uncertainty
+from chipglow.scene import Raster
+
+_HEIGHT: Final = 5.6
+_APERTURES: Final = 2.6
+_SHOWN_WIDTHS: Final = 5.0
+
+
+def draw_knife_edge(found: KnifeEdge) -> Figure:
+    """Draw each image with its edge, edge-spread function with the fit and what it leaves, and MTF.
+
+    Parameters
+    ----------
+    found : KnifeEdge
+        What was found.
+    """
+    heights = [_HEIGHT] * len(found.edges) + ([_APERTURES] if found.apertures else [])
+    with drawing.style():
+        figure = drawing.new_figure(sum(heights) + 0.4)
+        width = with_uncertainty(found.fwhm * 1e6, found.fwhm_uncertainty * 1e6)
+        figure.suptitle(f"{found.best.model.name}: optics {width} µm wide (FWHM)")
+        parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)
+        for k, edge in enumerate(found.edges):
+            _draw_edge(parts[k, 0], found, k, edge)
+        if found.apertures is not None:
+            _draw_apertures(parts[-1, 0].subplots(), found)
+    return figure
+
+
+def _draw_edge(figure: Any, found: KnifeEdge, k: int, edge: EdgeResult) -> None:
+    grid = figure.add_gridspec(3, 2, height_ratios=(3.0, 1.1, 3.2))
+    _draw_image(figure, figure.add_subplot(grid[0:2, 0]), edge, found.best.edges[k])
+    spread = figure.add_subplot(grid[0, 1])
+    residual = figure.add_subplot(grid[1, 1], sharex=spread)
+    response = found.best.response(k, edge.pixels)
+    shown = min(_SHOWN_WIDTHS * edge.line_fwhm, edge.pixels.reach)
+    fine = np.linspace(-shown, shown, 801)
+    _draw_spread(spread, residual, edge, fine, response(fine))
+    _draw_line(figure.add_subplot(grid[2, 0]), edge, fine, response.slope(fine))
+    _draw_transfer(figure.add_subplot(grid[2, 1]), edge)
+
+
+def _draw_image(figure: Any, axes: Axes, edge: EdgeResult, fitted: FittedEdge) -> None:
+    image, pitch = edge.image, edge.image.pitch
+    raster = Raster(
+        float(image.x[0]) - pitch / 2, float(image.y[0]) + pitch / 2, pitch, *image.radiance.shape
+    )
+    left, right, bottom, top = (end * 1e6 for end in raster.extent)
+    usable = np.where(image.usable, image.radiance, np.nan)
+    limits = float(np.nanmin(usable)), float(np.nanmax(usable))
+    picture = drawing.show_image(axes, usable, raster, None, drawing.HEAT, limits)
+    drawing.colour_bar(figure, picture, axes, _label(image.unit))
+    c, s = cos(fitted.line.normal), sin(fitted.line.normal)
+    middle = float(image.x.mean()) * 1e6, float(image.y.mean()) * 1e6
+    along = np.array([-1.0, 1.0]) * hypot(right - left, top - bottom)
+    x = middle[0] + fitted.line.position * 1e6 * c - along * s
+    y = middle[1] + fitted.line.position * 1e6 * s + along * c
+    axes.plot(x, y, color="white", linewidth=2.4)
+    axes.plot(x, y, color=BLUE, linewidth=1.2)
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
+    axes.set_title(image.name)
+
+
+def _label(unit: str) -> str:
+    return unit if unit == "counts" else f"radiance / ({unit})"
+
+
+def _draw_spread(axes: Axes, below: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:
+    spread = edge.spread
+    near = np.abs(spread.distance) <= distance[-1]
+    where = spread.distance[near] * 1e6
+    bars: dict[str, Any] = {"fmt": ".", "color": GREY, "markersize": 3, "elinewidth": 0.7}
+    axes.errorbar(where, spread.value[near], spread.uncertainty[near], label="measured", **bars)
+    axes.plot(distance * 1e6, model, color=VERMILLION, label="fit")
+    axes.set_title("edge-spread function")
+    axes.legend(loc="upper left")
+    axes.tick_params(labelbottom=False)
+    residual, deviation = 100 * spread.residual[near], 100 * spread.uncertainty[near]
+    below.errorbar(where, residual, deviation, **bars)
+    below.axhline(0.0, color=VERMILLION, linewidth=1.0)
+    below.set_ylabel("residual / %")
+    below.set_xlabel("distance from the edge / µm")
+
+
+def _draw_line(axes: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:
+    line = edge.line
+    near = np.abs(line.distance) <= distance[-1]
+    axes.errorbar(
+        line.distance[near] * 1e6, line.value[near] * 1e-6, line.uncertainty[near] * 1e-6,
+        fmt=".", color=GREY, markersize=3, elinewidth=0.7,
+    )  # fmt: skip
+    axes.plot(distance * 1e6, model * 1e-6, color=VERMILLION)
+    axes.set_title("line-spread function")
+    axes.set_xlabel("distance from the edge / µm")
+    axes.set_ylabel("1/µm")
+
+
+def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
+    transfer = edge.transfer
+    frequency = transfer.frequency * 1e-3
+    low, high = (transfer.value + sign * 2 * transfer.uncertainty for sign in (-1, 1))
+    axes.fill_between(frequency, low, high, color=GREY, alpha=0.3, linewidth=0)
+    axes.plot(frequency, transfer.value, color=GREY, label="measured, 2 u")
+    axes.plot(frequency, transfer.model, color=VERMILLION, label="fit: optics and sensor")
+    axes.plot(frequency, transfer.optics, color=BLUE, linestyle="--", label="fit: optics alone")
+    nyquist = 0.5e-3 / edge.image.pitch
+    axes.axvline(nyquist, color=VOID, linewidth=1.2, label="Nyquist", zorder=0)
+    axes.set_ylim(-0.05, 1.05)
+    axes.set_title("modulation transfer function")
+    axes.set_xlabel("frequency / (1/mm)")
+    # The curves go from one corner to the other: beside them there is no place for it.
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
+
+
+def _draw_apertures(axes: Axes, found: KnifeEdge) -> None:
+    signals, best = found.apertures, found.best
+    assert signals is not None
+    share = (signals.radiance - best.aperture_background) / best.source
+    model = signals.weights @ best.model.mean_transfer(best.values, signals.frequency)
+    order = np.argsort(signals.diameters)
+    diameters = signals.diameters[order] * 1e6
+    axes.errorbar(
+        diameters, 100 * share[order], 200 * signals.sigma[order] / best.source, fmt=".",
+        color=GREY, label="measured, 2 u",
+    )  # fmt: skip
+    axes.plot(diameters, 100 * model[order], color=VERMILLION, label="fit")
+    axes.set_xscale("log")
+    axes.set_title("size-of-source effect: signal in the middle of an aperture")
+    axes.set_xlabel("diameter / µm")
+    axes.set_ylabel("share of an endless source / %")
+    axes.legend(loc="lower right")

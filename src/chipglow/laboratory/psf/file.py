@@ -1,0 +1,105 @@
+"""Point spread functions by the knife edge in NetCDF-4 files."""
+
+import os
+from typing import Final
+
+import numpy as np
+import xarray as xr
+
+from chipglow.camera import MeasuredPSF, PointSpreadFunction
+from chipglow.io import write_dataset
+from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge
+from chipglow.laboratory.psf.psf_fit import ModelFit
+
+_SAMPLES_PER_WIDTH: Final = 10
+
+
+def write_psf(
+    knife: KnifeEdge, path: str | os.PathLike[str], psf: PointSpreadFunction | None = None
+) -> None:
+    """Write a point spread function and what it was found from.
+
+    Parameters
+    ----------
+    knife : KnifeEdge
+        What was found.
+    path : path-like
+        The file to write, for ``psf: {kind: measured, file: ...}`` of a study's camera and for
+        `MeasuredPSF.from_file`; one that is there is replaced at the end.
+    psf : PointSpreadFunction, optional
+        The optics' point spread function to write; that of the best model by default.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    psf = knife.psf() if psf is None else psf
+    spacing = psf.spacing if isinstance(psf, MeasuredPSF) else psf.fwhm / _SAMPLES_PER_WIDTH
+    data = xr.Dataset(
+        {"kernel": (("y", "x"), psf.kernel(spacing), {"units": "1", "spacing": spacing})},
+        attrs={
+            "fwhm": knife.fwhm,
+            "fwhm_uncertainty": knife.fwhm_uncertainty,
+            "model": knife.best.model.name,
+            "doubtful": "\n".join(knife.doubts),
+            "assumed": "\n".join(knife.assumptions),
+        },
+    )
+    for fit, weight in zip(knife.fits, knife.weights, strict=True):
+        data = data.assign(_fit_variables(fit.model.name.replace(" ", "_"), fit, weight))
+    for number, edge in enumerate(knife.edges, 1):
+        data = data.assign(_edge_variables(f"edge{number}", edge))
+    radial = knife.radial
+    data = data.assign(
+        radius=("ring", radial.radius, {"units": "m"}),
+        density=("ring", radial.density, {"units": "m-2"}),
+        encircled_radius=("ring_edge", radial.edges, {"units": "m"}),
+        encircled=("ring_edge", radial.encircled, {"units": "1"}),
+        encircled_uncertainty=("ring_edge", radial.encircled_uncertainty, {"units": "1"}),
+    )
+    write_dataset(data, path)
+
+
+def _fit_variables(name: str, fit: ModelFit, weight: float) -> dict[str, xr.Variable]:
+    """A model's parameters, their covariance, and how well it fits."""
+    about: dict[str, float | str] = {
+        "parameters": ", ".join(fit.model.parameters),
+        "fwhm": fit.fwhm,
+        "fwhm_uncertainty": fit.fwhm_uncertainty,
+        "aicc": fit.aicc,
+        "bic": fit.bic,
+        "weight": weight,
+        "misfit": fit.misfit,
+    }
+    dimension = f"{name}_parameter"
+    return {
+        name: xr.Variable((dimension,), fit.values, about),
+        f"{name}_covariance": xr.Variable((dimension, f"{dimension}_2"), fit.covariance),
+    }
+
+
+def _edge_variables(name: str, edge: EdgeResult) -> dict[str, xr.Variable]:
+    """Edge-spread, line-spread and transfer function of one image."""
+    about = {"image": edge.image.name, "fwhm": edge.fwhm, "fwhm_uncertainty": edge.fwhm_uncertainty}
+    columns = {
+        "distance": ("bin", edge.spread.distance, "m"),
+        "esf": ("bin", edge.spread.value, "1"),
+        "esf_uncertainty": ("bin", edge.spread.uncertainty, "1"),
+        "esf_residual": ("bin", edge.spread.residual, "1"),
+        "pixels": ("bin", edge.spread.count, "1"),
+        "line_distance": ("line", edge.line.distance, "m"),
+        "lsf": ("line", edge.line.value, "m-1"),
+        "lsf_uncertainty": ("line", edge.line.uncertainty, "m-1"),
+        "frequency": ("frequency", edge.transfer.frequency, "m-1"),
+        "mtf": ("frequency", edge.transfer.value, "1"),
+        "mtf_uncertainty": ("frequency", edge.transfer.uncertainty, "1"),
+        "mtf_model": ("frequency", edge.transfer.model, "1"),
+        "mtf_optics": ("frequency", edge.transfer.optics, "1"),
+    }
+    return {
+        f"{name}_{column}": xr.Variable(
+            (f"{name}_{dimension}_index",), np.asarray(values), {**about, "units": unit}
+        )
+        for column, (dimension, values, unit) in columns.items()
+    }

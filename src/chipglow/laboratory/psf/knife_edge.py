@@ -1,0 +1,412 @@
+"""A camera's point spread function from images of straight edges (the knife-edge method).
+
+All is done on radiance. Light is spread and added up by the optics, so that radiance is convolved
+with the point spread function; temperature, a bent function of it, is not.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import degrees, exp, sqrt
+from typing import Final, Literal
+
+import numpy as np
+from scipy.ndimage import uniform_filter
+from scipy.optimize import brentq
+from scipy.stats import chi2
+
+from chipglow.camera import MeasuredPSF, PointSpreadFunction
+from chipglow.laboratory.psf.edge_image import EdgeImage, usable_pixels
+from chipglow.laboratory.psf.edge_spread import (
+    BINS_PER_PITCH,
+    EdgeSpread,
+    LineSpread,
+    TransferFunction,
+    edge_spread,
+    line_spread,
+    transfer_function,
+)
+from chipglow.laboratory.psf.psf_fit import (
+    ApertureSignals,
+    EdgePixels,
+    ModelFit,
+    fit_model,
+    orientations,
+    with_noise,
+)
+from chipglow.laboratory.psf.psf_models import (
+    AnnularModel,
+    DefocusedDiscModel,
+    EllipticalModel,
+    GaussianModel,
+    GaussianTailModel,
+    MoffatModel,
+    PSFModel,
+)
+from chipglow.laboratory.psf.radial_psf import RadialPSF, radial_psf
+from chipglow.laboratory.psf.size_of_source import ApertureImage, aperture_signals
+
+RADIAL: Final = "radial"
+"""Name of the point spread function without a model."""
+
+_ROUGHLY: Final = 1e-6
+_MISFIT: Final = 1.6
+_BY_CHANCE: Final = 0.01
+_TRIES: Final = 6
+_APERTURE_MISFIT: Final = 4.0
+_NOTHING: Final = 5e-4
+_PLATEAU: Final = 3.0
+_UNRESOLVED: Final = 0.3
+_ALIGNED: Final = np.pi / 9
+_NUMBERS: Final = {1: "one orientation", 2: "two orientations"}
+_SEED: Final = 12233
+_SUBSAMPLES: Final = 9
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeResult:
+    """What one image of an edge showed.
+
+    Parameters
+    ----------
+    image : EdgeImage
+        The image.
+    pixels : EdgePixels
+        Those of its pixels that were used; x and y from the image's middle.
+    spread : EdgeSpread
+        Oversampled edge-spread function.
+    line : LineSpread
+        Line-spread function.
+    transfer : TransferFunction
+        Modulation transfer function.
+    noise : float
+        Standard deviation of a pixel on the dark side in W/(m² sr).
+    fwhm, fwhm_uncertainty : float
+        Full width at half maximum in m by this edge alone, and its standard uncertainty.
+    line_fwhm : float
+        Full width at half maximum of the line-spread function in m: optics and sensor.
+    """
+
+    image: EdgeImage
+    pixels: EdgePixels
+    spread: EdgeSpread
+    line: LineSpread
+    transfer: TransferFunction
+    noise: float
+    fwhm: float
+    fwhm_uncertainty: float
+    line_fwhm: float
+
+
+@dataclass(frozen=True, eq=False)
+class KnifeEdge:
+    """A camera's point spread function by the knife-edge method.
+
+    Parameters
+    ----------
+    edges : tuple of EdgeResult
+        What each image showed.
+    fits : tuple of ModelFit
+        Models of the optics fitted to all images at once, the best by the Bayesian information
+        criterion first.
+    apertures : ApertureSignals or None
+        Signals of apertures that were fitted with the edges.
+    doubts : tuple of str
+        Why results may not be trusted, a sentence each.
+    assumptions : tuple of str
+        What had to be assumed, a sentence each.
+    """
+
+    edges: tuple[EdgeResult, ...]
+    fits: tuple[ModelFit, ...]
+    apertures: ApertureSignals | None
+    doubts: tuple[str, ...]
+    assumptions: tuple[str, ...]
+
+    @cached_property
+    def radial(self) -> RadialPSF:
+        """A round point spread function without a model."""
+        return radial_psf(
+            self.best,
+            [edge.pixels for edge in self.edges],
+            [edge.spread for edge in self.edges],
+            self.apertures,
+            np.random.default_rng(_SEED),
+        )
+
+    @property
+    def best(self) -> ModelFit:
+        """The fit of the best model."""
+        return self.fits[0]
+
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """How probable each model is beside the others, by the Bayesian criterion; of sum 1."""
+        likely = [exp(-min(fit.bic - self.best.bic, 700.0) / 2) for fit in self.fits]
+        return tuple(value / sum(likely) for value in likely)
+
+    @property
+    def fwhm(self) -> float:
+        """Full width at half maximum of the optics' point spread function in m, best model."""
+        return self.best.fwhm
+
+    @property
+    def fwhm_uncertainty(self) -> float:
+        """Its standard uncertainty in m.
+
+        With the spread of the models by their weights and, where the best leaves more than noise
+        explains, with how much wider or narrower the point spread function is without a model.
+        """
+        pairs = zip(self.weights, self.fits, strict=True)
+        spread = sum(weight * (fit.fwhm - self.fwhm) ** 2 for weight, fit in pairs)
+        wider = self.radial.wider if self._unexplained else 0.0
+        return sqrt(self.best.fwhm_uncertainty**2 + spread + wider**2)
+
+    @property
+    def _unexplained(self) -> bool:
+        """Whether the best model leaves what noise does in less than one of a hundred edges."""
+        bins = sum(edge.spread.distance.size for edge in self.edges)
+        free = max(bins - self.best.free, 1)
+        chance = float(chi2.isf(_BY_CHANCE, free)) / free
+        return self.best.misfit > chance and max(map(_left, self.edges)) > _NOTHING
+
+    def fit(self, name: str) -> ModelFit:
+        """The fit of a model by its name.
+
+        Raises
+        ------
+        ValueError
+            If there is no such fit.
+        """
+        for fit in self.fits:
+            if fit.model.name == name:
+                return fit
+        known = ", ".join([*(fit.model.name for fit in self.fits), RADIAL])
+        raise ValueError(f"model: {name!r} was not fitted, expected one of {known}")
+
+    def psf(
+        self, part: Literal["optics", "system"] = "optics", model: str | None = None
+    ) -> PointSpreadFunction:
+        """The point spread function, for ``Camera(psf=...)``.
+
+        Parameters
+        ----------
+        part : {"optics", "system"}
+            That of the optics alone, for a camera whose ``psf_order`` is ``optics``; or that of
+            optics and sensor together, as an edge shows it.
+        model : str, optional
+            Name of a model, or ``radial`` for the one without a model; the best by default.
+
+        Raises
+        ------
+        ValueError
+            If there is no such model or part.
+        """
+        if part not in ("optics", "system"):
+            raise ValueError(f"part: {part!r}, expected optics or system")
+        if model == RADIAL:
+            optics: PointSpreadFunction = self.radial.psf()
+        else:
+            optics = (self.best if model is None else self.fit(model)).psf()
+        return optics if part == "optics" else _with_sensor(optics, self.edges[0].image.footprint)
+
+
+def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] = ()) -> KnifeEdge:
+    """Determine the point spread function of a camera.
+
+    Parameters
+    ----------
+    images : sequence of EdgeImage
+        Images of a straight edge, best of several orientations.
+    apertures : sequence of ApertureImage, optional
+        Images of round apertures of several diameters before one source: how much brighter the
+        middle of a large one is tells of the tails.
+
+    Raises
+    ------
+    NoEdgeError
+        If an image shows no straight edge, or more than one.
+    ValueError
+        If nothing is given, or the apertures are not what they are said to be.
+
+    Notes
+    -----
+    The models are fitted to all pixels of all images by weighted least squares, each with its
+    background, step, place and angle free, first with even weights, then with the noise that the
+    best model leaves on the dark and the bright side. Covariances grow by what is left beyond the
+    noise. Noise is taken as independent from pixel to pixel.
+    """
+    if not images:
+        raise ValueError("edges: none is given, expected an image or more")
+    read = [usable_pixels(image) for image in images]
+    edges = [pixels for pixels, _ in read]
+    doubts = [doubt for _, said in read for doubt in said]
+    signals = aperture_signals(apertures, images[0].footprint) if apertures else None
+    models, assumptions = _models(images, edges)
+    assumptions += dict.fromkeys(note for image in images for note in image.notes)
+    first = [fit_model(model, edges, signals, tolerance=_ROUGHLY) for model in models]
+    if min(fit.misfit for fit in first) > _MISFIT:
+        # Where much is clipped there are several minima.
+        first = [fit_model(model, edges, signals, None, _ROUGHLY, _TRIES) for model in models]
+    found = min(first, key=lambda fit: fit.bic)
+    edges = [with_noise(edge, found.predicted(k, edge)) for k, edge in enumerate(edges)]
+    fits = sorted(
+        (fit_model(fit.model, edges, signals, fit) for fit in first), key=lambda fit: fit.bic
+    )
+    best = fits[0]
+    alone = len(edges) == 1 and signals is None
+    spreads = [edge_spread(best, k, edge) for k, edge in enumerate(edges)]
+    results = tuple(
+        _result(best, k, images[k], edges[k], spreads[k], alone) for k in range(len(edges))
+    )
+    for k, result in enumerate(results):
+        doubts += _edge_doubts(best, k, result)
+    doubts += _fit_doubts(best, results)
+    doubts += _aperture_doubts(best, signals) if signals is not None else []
+    return KnifeEdge(results, tuple(fits), signals, tuple(doubts), tuple(assumptions))
+
+
+def _models(
+    images: Sequence[EdgeImage], edges: Sequence[EdgePixels]
+) -> tuple[list[PSFModel], list[str]]:
+    """Models that the images can tell apart, and what is assumed with them."""
+    models: list[PSFModel] = [
+        GaussianModel(),
+        GaussianTailModel(),
+        MoffatModel(),
+        DefocusedDiscModel(),
+    ]
+    assumptions = []
+    wavelength = images[0].wavelength
+    if wavelength is None:
+        assumptions.append(
+            "diffraction was not tried: the measurement does not tell the limits of its band."
+        )
+    else:
+        models.append(AnnularModel(wavelength))
+        assumptions.append(
+            f"diffraction at {wavelength * 1e6:.4g} um, the middle of the band; only the ratio of "
+            "the wavelength to the numerical aperture can be seen."
+        )
+    directions = orientations(edges)
+    tilts = [abs((direction + np.pi / 4) % (np.pi / 2) - np.pi / 4) for direction in directions]
+    if len(directions) >= 3:
+        models.append(EllipticalModel(tilted=True))
+    elif len(directions) == 2 and max(tilts) < _ALIGNED:
+        models.append(EllipticalModel(tilted=False))
+        assumptions.append(
+            "an oval point spread function has its axes along rows and columns: edges of two "
+            "orientations do not show one that lies oblique; an edge at 45 deg would."
+        )
+    else:
+        assumptions.append(
+            f"a round point spread function: edges of {_NUMBERS[len(directions)]} are given, "
+            "which do not show an oval one; edges of three orientations would."
+        )
+    return models, assumptions
+
+
+def _result(
+    best: ModelFit,
+    k: int,
+    image: EdgeImage,
+    pixels: EdgePixels,
+    spread: EdgeSpread,
+    alone: bool,
+) -> EdgeResult:
+    own = best
+    if not alone:
+        round_model = isinstance(best.model, EllipticalModel)
+        own = fit_model(GaussianModel() if round_model else best.model, [pixels])
+    found = best.edges[k]
+    dark = found.line.distance(pixels.x, pixels.y) < 0
+    return EdgeResult(
+        image,
+        pixels,
+        spread,
+        line_spread(spread),
+        transfer_function(best, k, pixels, spread),
+        float(np.median(pixels.sigma[dark])),
+        own.fwhm,
+        own.fwhm_uncertainty,
+        _line_fwhm(best, k, pixels),
+    )
+
+
+def _line_fwhm(best: ModelFit, k: int, pixels: EdgePixels) -> float:
+    """Width of the fitted line-spread function in m."""
+    response = best.response(k, pixels)
+    half = float(response.slope(np.array(0.0))) / 2
+    found = brentq(lambda u: float(response.slope(np.array(u))) - half, 0.0, pixels.reach)
+    return 2 * float(found)
+
+
+def _edge_doubts(best: ModelFit, k: int, result: EdgeResult) -> list[str]:
+    """What of an edge's place may make the results wrong."""
+    pixels, name = result.pixels, result.image.name
+    distance = best.edges[k].line.distance(pixels.x, pixels.y)
+    doubts = []
+    core = np.sort(distance[np.abs(distance) < max(best.fwhm, 2 * pixels.pitch)])
+    gap = float(np.diff(core).max()) if core.size > 1 else pixels.pitch
+    if gap > 1.05 * pixels.pitch / BINS_PER_PITCH:
+        doubts.append(
+            f"{name}: with a tilt of {degrees(best.edges[k].line.tilt):.2f} deg the pixels lie at "
+            f"distances up to {gap * 1e6:.2g} um apart, not at a quarter of the pitch: beyond "
+            f"{0.5 / gap / 1e3:.3g} /mm the MTF is aliased; tilt the edge by 2 deg to 10 deg."
+        )
+    short = min(-float(distance.min()), float(distance.max()))
+    if short < _PLATEAU * result.line_fwhm:
+        doubts.append(
+            f"{name}: only {short * 1e6:.3g} um of one side of the edge are seen, under "
+            f"{_PLATEAU:g} widths: tails and brightness of the side cannot be told apart."
+        )
+    return doubts
+
+
+def _fit_doubts(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
+    """What of the best fit may make the results wrong."""
+    doubts = []
+    footprint = max(edge.image.footprint for edge in edges)
+    if best.fwhm < _UNRESOLVED * footprint or best.fwhm_uncertainty > 0.5 * best.fwhm:
+        doubts.append(
+            f"the optics' width of {best.fwhm * 1e6:.2g} um is hardly seen beside the sensor's "
+            f"{footprint * 1e6:.3g} um: take it for an upper limit."
+        )
+    left = max(_left(edge) for edge in edges)
+    if best.misfit > _MISFIT and left > _NOTHING:
+        doubts.append(
+            f"no model fits: the best, {best.model.name}, leaves {sqrt(best.misfit):.2g} times the "
+            f"noise in the means at a distance, {100 * left:.2g} % of the step near the edge; "
+            "uncertainties are enlarged by it, and the point spread function without a model "
+            "(radial) may be nearer."
+        )
+    return doubts
+
+
+def _aperture_doubts(best: ModelFit, signals: ApertureSignals) -> list[str]:
+    """Whether apertures say something else than the edges."""
+    shares = signals.weights @ best.model.mean_transfer(best.values, signals.frequency)
+    left = (signals.radiance - best.aperture_background) / best.source - shares
+    square = float(np.sum((left * best.source / signals.sigma) ** 2))
+    greatest = int(np.argmax(np.abs(left)))
+    if square < _APERTURE_MISFIT * left.size or abs(left[greatest]) < _NOTHING:
+        return []
+    return [
+        f"the apertures and the edges contradict each other: the signal of "
+        f"{signals.diameters[greatest] * 1e6:.4g} um is {100 * abs(left[greatest]):.2g} % of the "
+        "source away from the fit; check the diameters and that the source is even."
+    ]
+
+
+def _left(edge: EdgeResult) -> float:
+    """Root of the mean square of what the model leaves near the edge, as a share of the step."""
+    near = np.abs(edge.spread.distance) < 2 * edge.line_fwhm
+    return float(np.sqrt(np.mean(edge.spread.residual[near] ** 2)))
+
+
+def _with_sensor(optics: PointSpreadFunction, footprint: float) -> MeasuredPSF:
+    """Kernel of optics and a square sensor."""
+    spacing = footprint / _SUBSAMPLES
+    kernel = np.pad(optics.kernel(spacing), _SUBSAMPLES // 2)
+    # A mean over squares of sum 1 leaves rounding below 0 where there is no light.
+    return MeasuredPSF(np.maximum(uniform_filter(kernel, _SUBSAMPLES, mode="constant"), 0), spacing)

@@ -1,0 +1,519 @@
+"""Fit of a model of the optics to the pixels of edges and to the signals of apertures, all at once.
+
+Every pixel is compared with the model at its own distance from the edge, with the sensor's
+footprint as it lies to the edge: nothing is binned, so that the edge's angle and place, which are
+fitted with the rest, broaden nothing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import cos, inf, log, pi, sin, sqrt
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from chipglow.camera import PointSpreadFunction
+from chipglow.laboratory.psf.edge_line import EdgeLine
+from chipglow.laboratory.psf.psf_models import EdgeResponse, PSFModel, disc_response, edge_response
+
+_APART: Final = pi / 18
+_START_WIDTHS: Final = (0.5, 1.0, 1.7, 3.0, 5.0, 9.0)
+_DIFFERENCE: Final = 1e-5
+_EDGE_PARAMETERS: Final = 4
+_SOURCE_PARAMETERS: Final = 2
+
+
+@dataclass(frozen=True, eq=False)
+class EdgePixels:
+    """The usable pixels of an image of an edge.
+
+    Parameters
+    ----------
+    x, y : ndarray
+        Where they are in m, shape (n,).
+    radiance : ndarray
+        In W/(m² sr), shape (n,).
+    sigma : ndarray
+        Standard deviation of their noise in W/(m² sr), shape (n,).
+    pitch, footprint : float
+        Distance between sensors, and side of a sensor's sensitive square, in m.
+    line : EdgeLine
+        About where the edge is.
+    """
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    radiance: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    pitch: float
+    footprint: float
+    line: EdgeLine
+
+    @cached_property
+    def reach(self) -> float:
+        """Greatest distance from the edge in m."""
+        return float(np.abs(self.line.distance(self.x, self.y)).max()) + 4 * self.pitch
+
+
+@dataclass(frozen=True, eq=False)
+class ApertureSignals:
+    """What the camera reads in the middle of bright round apertures before one source.
+
+    Parameters
+    ----------
+    diameters : ndarray
+        In m, shape (n,).
+    radiance, sigma : ndarray
+        Mean of the middle pixels and its standard uncertainty in W/(m² sr), shape (n,).
+    radii : tuple of ndarray
+        Distances of those pixels from the aperture's middle in m.
+    footprint : float
+        Side of a sensor's sensitive square in m.
+    outside : float
+        Radiance beside the apertures in W/(m² sr): the background, and what tails add to it.
+    """
+
+    diameters: NDArray[np.float64]
+    radiance: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    radii: tuple[NDArray[np.float64], ...]
+    footprint: float
+    outside: float
+
+    @cached_property
+    def frequency(self) -> NDArray[np.float64]:
+        """Frequencies in 1/m on which the transfer function is asked for."""
+        step = 1 / (16 * float(self.diameters.max()))
+        return np.arange(0.0, 3 / self.footprint, step)
+
+    @cached_property
+    def weights(self) -> NDArray[np.float64]:
+        """What makes signals of a transfer function, shape (aperture, frequency)."""
+        pairs = zip(self.diameters, self.radii, strict=True)
+        return np.array(
+            [disc_response(self.frequency, d, radii, self.footprint) for d, radii in pairs]
+        )
+
+
+@dataclass(frozen=True)
+class FittedEdge:
+    """What a fit found of one edge.
+
+    Parameters
+    ----------
+    line : EdgeLine
+        Where it is.
+    normal_uncertainty, position_uncertainty : float
+        Standard uncertainties in rad and m.
+    background, step : float
+        Radiance of the dark side, and how much brighter the other is, in W/(m² sr).
+    background_uncertainty, step_uncertainty : float
+        Standard uncertainties in W/(m² sr).
+    """
+
+    line: EdgeLine
+    normal_uncertainty: float
+    position_uncertainty: float
+    background: float
+    step: float
+    background_uncertainty: float
+    step_uncertainty: float
+
+
+@dataclass(frozen=True, eq=False)
+class ModelFit:
+    """A model of the optics fitted to edges and apertures.
+
+    Parameters
+    ----------
+    model : PSFModel
+        The model.
+    values : ndarray
+        Its parameters.
+    covariance : ndarray
+        Their covariance; what the residuals show beyond the noise is in it.
+    fwhm, fwhm_uncertainty : float
+        Full width at half maximum of the optics' point spread function and its standard
+        uncertainty in m, the model taken for true.
+    edges : tuple of FittedEdge
+        In the order of the images.
+    source, aperture_background : float
+        Radiance of the source behind the apertures above the background, and the background, in
+        W/(m² sr); NaN without apertures.
+    chi_square : float
+        Sum of the squared residuals over their noise.
+    count, free : int
+        Number of pixels and apertures, and of parameters.
+    misfit : float
+        Squared residuals of the means at a distance over their noise, per degree of freedom: 1 if
+        nothing but noise is left.
+    """
+
+    model: PSFModel
+    values: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    fwhm: float
+    fwhm_uncertainty: float
+    edges: tuple[FittedEdge, ...]
+    source: float
+    aperture_background: float
+    chi_square: float
+    count: int
+    free: int
+    misfit: float
+
+    @property
+    def aicc(self) -> float:
+        """Akaike's information criterion with its correction for few values."""
+        n, k = self.count, self.free + 1
+        return n * log(self.chi_square / n) + 2 * k + 2 * k * (k + 1) / max(n - k - 1, 1)
+
+    @property
+    def bic(self) -> float:
+        """The Bayesian information criterion."""
+        return self.count * log(self.chi_square / self.count) + (self.free + 1) * log(self.count)
+
+    @property
+    def uncertainties(self) -> NDArray[np.float64]:
+        """Standard uncertainties of the parameters."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    def psf(self) -> PointSpreadFunction:
+        """The optics' point spread function."""
+        return self.model.psf(self.values)
+
+    def response(self, edge: int, pixels: EdgePixels) -> EdgeResponse:
+        """Edge-spread function of optics and sensor for one of the edges, from 0 to 1."""
+        return _response(self.model, self.values, self.edges[edge].line, pixels)
+
+    def predicted(self, edge: int, pixels: EdgePixels) -> NDArray[np.float64]:
+        """Radiance of an edge's pixels in W/(m² sr)."""
+        found = self.edges[edge]
+        distance = found.line.distance(pixels.x, pixels.y)
+        return np.asarray(found.background + found.step * self.response(edge, pixels)(distance))
+
+
+def fit_model(
+    model: PSFModel,
+    edges: Sequence[EdgePixels],
+    apertures: ApertureSignals | None = None,
+    start: ModelFit | None = None,
+    tolerance: float = 1e-8,
+    tries: int = 1,
+) -> ModelFit:
+    """Weighted least squares with the edges' places, backgrounds and steps free.
+
+    Parameters
+    ----------
+    model : PSFModel
+        What to fit.
+    edges : sequence of EdgePixels
+        One or more edges.
+    apertures : ApertureSignals, optional
+        Signals of apertures, which tell of the tails.
+    start : ModelFit, optional
+        An earlier fit of the same model to begin with.
+    tolerance : float
+        Relative change of the parameters at which the fit ends.
+    tries : int
+        How many of the model's own starts are tried if there is no earlier fit.
+    """
+    problem = _Problem(model, tuple(edges), apertures)
+    starts = problem.starts()[:tries] if start is None else [problem.vector_of(start)]
+    ends = [problem.least(vector, tolerance) for vector in starts]
+    return problem.fitted(min(ends, key=problem.cost))
+
+
+class _Problem:
+    """Residuals of all pixels and apertures, and their derivatives."""
+
+    def __init__(
+        self, model: PSFModel, edges: tuple[EdgePixels, ...], apertures: ApertureSignals | None
+    ) -> None:
+        self.model, self.edges, self.apertures = model, edges, apertures
+        self.shapes = len(model.parameters)
+        self.count = sum(edge.x.size for edge in edges)
+        self.scales = self._scales()
+
+    def least(self, vector: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+        """Parameters with the least squares near some others."""
+        low, high = (limit / self.scales for limit in self.bounds())
+        result = least_squares(
+            lambda v: self.residual(v * self.scales),
+            np.clip(vector / self.scales, low + 1e-9, high - 1e-9),
+            jac=lambda v: self.jacobian(v * self.scales) * self.scales,
+            bounds=(low, high),
+            x_scale="jac",
+            xtol=tolerance,
+            ftol=tolerance,
+            max_nfev=60,
+        )
+        return np.asarray(result.x * self.scales)
+
+    def cost(self, vector: NDArray[np.float64]) -> float:
+        """Sum of the squared residuals."""
+        return float(np.sum(self.residual(vector) ** 2))
+
+    def starts(self) -> list[NDArray[np.float64]]:
+        """Some parameters to begin with, those first that fit best as they are."""
+        pitch = max(edge.pitch for edge in self.edges)
+        low, high = (limit[: self.shapes] for limit in self.bounds())
+        candidates = [
+            self._beginning(np.clip(values, low, high))
+            for width in _START_WIDTHS
+            for values in self.model.starts(width * pitch)
+        ]
+        return sorted(candidates, key=self.cost)
+
+    def vector_of(self, fit: ModelFit) -> NDArray[np.float64]:
+        """All parameters of an earlier fit."""
+        parts = [fit.values]
+        for edge in fit.edges:
+            parts.append(
+                np.array([edge.background, edge.step, edge.line.position, edge.line.normal])
+            )
+        if self.apertures is not None:
+            parts.append(np.array([fit.aperture_background, fit.source]))
+        return np.concatenate(parts)
+
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Least and greatest parameters."""
+        low, high = self.model.bounds(
+            min(edge.pitch for edge in self.edges), max(edge.reach for edge in self.edges)
+        )
+        free = _EDGE_PARAMETERS * len(self.edges)
+        low, high = low + [-inf] * free, high + [inf] * free
+        if self.apertures is not None:
+            outside = self.apertures.outside
+            contrast = float(self.apertures.radiance.max()) - outside
+            # Else a small change between large apertures could be that of a huge source.
+            low += [outside - 0.5 * contrast, 0.5 * contrast]
+            high += [outside + 0.1 * contrast, 2.0 * contrast]
+        return np.array(low), np.array(high)
+
+    def residual(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Measured less model, over the noise."""
+        values = vector[: self.shapes]
+        parts = []
+        for edge, (background, step, line) in zip(self.edges, self._places(vector), strict=True):
+            response = _response(self.model, values, line, edge)
+            modelled = background + step * response(line.distance(edge.x, edge.y))
+            parts.append((edge.radiance - modelled) / edge.sigma)
+        if self.apertures is not None:
+            background, source = vector[-_SOURCE_PARAMETERS:]
+            shares = self._shares(values)
+            parts.append(
+                (self.apertures.radiance - background - source * shares) / self.apertures.sigma
+            )
+        return np.concatenate(parts)
+
+    def jacobian(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivative of the residuals by the parameters."""
+        result = np.zeros((self.count + self._apertures, vector.size))
+        row, column = 0, self.shapes
+        for edge, (_, step, line) in zip(self.edges, self._places(vector), strict=True):
+            part = np.s_[row : row + edge.x.size]
+            distance = line.distance(edge.x, edge.y)
+            response = _response(self.model, vector[: self.shapes], line, edge)
+            slope = step * response.slope(distance)
+            turned = edge.y * cos(line.normal) - edge.x * sin(line.normal)
+            for k, value in enumerate(
+                (np.ones_like(slope), response(distance), -slope, slope * turned)
+            ):
+                result[part, column + k] = -value / edge.sigma
+            row, column = row + edge.x.size, column + _EDGE_PARAMETERS
+        if self.apertures is not None:
+            result[row:, column] = -1 / self.apertures.sigma
+            result[row:, column + 1] = -self._shares(vector[: self.shapes]) / self.apertures.sigma
+        here, high = self.residual(vector), self.bounds()[1]
+        for k in range(self.shapes):
+            shift = _DIFFERENCE * self.scales[k] * (1 if vector[k] < high[k] / 2 else -1)
+            moved = vector.copy()
+            moved[k] += shift
+            result[:, k] = (self.residual(moved) - here) / shift
+        return result
+
+    def fitted(self, vector: NDArray[np.float64]) -> ModelFit:
+        """The result, with what the residuals say of it."""
+        residual, jacobian = self.residual(vector), self.jacobian(vector)
+        misfit = self._misfit(vector, residual)
+        scaled = jacobian * self.scales
+        inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-13, hermitian=True)
+        inverse = inverse * np.outer(self.scales, self.scales)
+        # What is left beyond the noise acts as more of it (Birge).
+        noise = float(residual @ residual) / max(residual.size - vector.size, 1)
+        covariance = inverse * max(misfit, 1.0) * noise
+        values = vector[: self.shapes]
+        inner = covariance[: self.shapes, : self.shapes]
+        fwhm, gradient = self._fwhm(values)
+        deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        source = vector[-_SOURCE_PARAMETERS:] if self.apertures is not None else (np.nan, np.nan)
+        return ModelFit(
+            self.model,
+            values,
+            inner,
+            fwhm,
+            sqrt(max(float(gradient @ inner @ gradient), 0.0)),
+            tuple(self._fitted_edge(vector, deviations, k) for k in range(len(self.edges))),
+            float(source[1]),
+            float(source[0]),
+            float(residual @ residual),
+            residual.size,
+            vector.size,
+            misfit,
+        )
+
+    @property
+    def _apertures(self) -> int:
+        return 0 if self.apertures is None else self.apertures.diameters.size
+
+    def _fitted_edge(
+        self, vector: NDArray[np.float64], deviations: NDArray[np.float64], k: int
+    ) -> FittedEdge:
+        begin = self.shapes + _EDGE_PARAMETERS * k
+        background, step, position, normal = vector[begin : begin + _EDGE_PARAMETERS]
+        spread = deviations[begin : begin + _EDGE_PARAMETERS]
+        return FittedEdge(
+            EdgeLine(float(normal), float(position)),
+            float(spread[3]),
+            float(spread[2]),
+            float(background),
+            float(step),
+            float(spread[0]),
+            float(spread[1]),
+        )
+
+    def _fwhm(self, values: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        gradient = np.empty(self.shapes)
+        low, high = self.bounds()
+        for k in range(self.shapes):
+            shift = 1e-3 * self.scales[k]
+            above, below = values.copy(), values.copy()
+            above[k] = min(values[k] + shift, high[k])
+            below[k] = max(values[k] - shift, low[k])
+            change = self.model.fwhm(above) - self.model.fwhm(below)
+            gradient[k] = change / (above[k] - below[k])
+        return self.model.fwhm(values), gradient
+
+    def _misfit(self, vector: NDArray[np.float64], residual: NDArray[np.float64]) -> float:
+        """Means of the residuals at a distance, squared and over their noise, per freedom."""
+        total, bins, row = 0.0, 0, 0
+        for edge, (_, _, line) in zip(self.edges, self._places(vector), strict=True):
+            part = residual[row : row + edge.x.size]
+            row += edge.x.size
+            distance = line.distance(edge.x, edge.y)
+            index = np.floor((distance - distance.min()) / (edge.pitch / 4)).astype(np.int64)
+            count = np.bincount(index)
+            sums = np.bincount(index, part)
+            there = count >= 2
+            variance = max(float(part.var()), 1e-30)
+            total += float(np.sum(sums[there] ** 2 / count[there])) / variance
+            bins += int(there.sum())
+        return total / max(bins - vector.size, 1)
+
+    def _shares(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Signals of the apertures as shares of an endless source's."""
+        assert self.apertures is not None
+        transfer = self.model.mean_transfer(values, self.apertures.frequency)
+        return np.asarray(self.apertures.weights @ transfer)
+
+    def _places(self, vector: NDArray[np.float64]) -> list[tuple[float, float, EdgeLine]]:
+        places = []
+        for k in range(len(self.edges)):
+            begin = self.shapes + _EDGE_PARAMETERS * k
+            background, step, position, normal = vector[begin : begin + _EDGE_PARAMETERS]
+            places.append((background, step, EdgeLine(float(normal), float(position))))
+        return places
+
+    def _beginning(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """All parameters with these of the model: backgrounds and steps by linear least squares."""
+        parts = [values]
+        for edge in self.edges:
+            response = _response(self.model, values, edge.line, edge)
+            shares = response(edge.line.distance(edge.x, edge.y))
+            background, step = _straight_line(shares, edge.radiance, edge.sigma)
+            parts.append(np.array([background, step, edge.line.position, edge.line.normal]))
+        if self.apertures is not None:
+            signals = self.apertures
+            line = _straight_line(self._shares(values), signals.radiance, signals.sigma)
+            low, high = (limit[-_SOURCE_PARAMETERS:] for limit in self.bounds())
+            parts.append(np.clip(line, low, high))
+        return np.concatenate(parts)
+
+    def _scales(self) -> NDArray[np.float64]:
+        pitch = min(edge.pitch for edge in self.edges)
+        parts = [self.model.scales(pitch)]
+        for edge in self.edges:
+            contrast = max(float(np.ptp(edge.radiance)), 1e-300)
+            parts.append(np.array([contrast, contrast, edge.pitch, edge.pitch / edge.reach]))
+        if self.apertures is not None:
+            parts.append(np.full(_SOURCE_PARAMETERS, max(np.ptp(self.apertures.radiance), 1e-30)))
+        return np.concatenate(parts)
+
+
+def with_noise(edge: EdgePixels, predicted: NDArray[np.float64]) -> EdgePixels:
+    """The same pixels with the noise that the residuals show, on the dark and the bright side.
+
+    Parameters
+    ----------
+    edge : EdgePixels
+        The pixels.
+    predicted : ndarray
+        Their radiance by a fit.
+
+    Notes
+    -----
+    The variance goes straight from that of the dark side to that of the bright one, as the noise
+    of the light does.
+    """
+    low, high = float(predicted.min()), float(predicted.max())
+    share = (predicted - low) / max(high - low, 1e-300)
+    square = (edge.radiance - predicted) ** 2
+    sides = [share < 0.5, share >= 0.5]
+    # The means of both sides, taken at the sides' own mean brightness.
+    means = [
+        (float(share[side].mean()), float(square[side].mean())) for side in sides if side.any()
+    ]
+    slope = 0.0
+    if len(means) == 2:
+        slope = (means[1][1] - means[0][1]) / max(means[1][0] - means[0][0], 1e-3)
+    overall = float(square.mean())
+    variance = means[0][1] + slope * (share - means[0][0])
+    least = max(0.02 * overall, (1e-7 * (high - low)) ** 2, 1e-300)
+    return replace(edge, sigma=np.sqrt(np.maximum(variance, least)))
+
+
+def _response(
+    model: PSFModel, values: NDArray[np.float64], line: EdgeLine, edge: EdgePixels
+) -> EdgeResponse:
+    return edge_response(
+        lambda frequency: model.transfer(values, frequency, line.normal),
+        line.normal,
+        edge.footprint,
+        edge.reach,
+    )
+
+
+def _straight_line(
+    x: NDArray[np.float64], y: NDArray[np.float64], sigma: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Value at x = 0 and slope of the straight line through points, by least squares."""
+    weight = sigma**-2.0
+    middle = float(weight @ x / weight.sum()), float(weight @ y / weight.sum())
+    off = x - middle[0]
+    slope = float(weight @ (off * (y - middle[1]))) / max(float(weight @ off**2), 1e-300)
+    return middle[1] - slope * middle[0], slope
+
+
+def orientations(edges: Sequence[EdgePixels]) -> list[float]:
+    """Directions of the edges' normals, 0 to π, of which none is within 10 degrees of another."""
+    found: list[float] = []
+    for edge in edges:
+        direction = edge.line.normal % pi
+        apart = [abs((direction - other + pi / 2) % pi - pi / 2) for other in found]
+        if min(apart, default=pi) >= _APART:
+            found.append(direction)
+    return found

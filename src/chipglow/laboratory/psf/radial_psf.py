@@ -1,0 +1,281 @@
+"""A round point spread function from edges, which departs from a model as far as data ask.
+
+The light is shared among rings about the point. Each ring has a known edge-spread function, so
+that the shares follow from the measured one by least squares: the inversion of Abel's integral.
+Alone that would blow up the noise. No share is negative, and the difference to the best model
+changes as smoothly from ring to ring as the data let it: what the data do not tell, as the finest
+of the core and the farthest of the tails, is the model's.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+from scipy.special import j1
+
+from chipglow.camera import MeasuredPSF
+from chipglow.laboratory.psf.edge_spread import EdgeSpread
+from chipglow.laboratory.psf.psf_fit import ApertureSignals, EdgePixels, ModelFit
+from chipglow.laboratory.psf.psf_models import disc_response, edge_response, sampled_psf
+
+Values: TypeAlias = NDArray[np.float64]
+
+_RINGS: Final = 32
+_SMOOTHNESS: Final[list[float]] = np.geomspace(1e2, 1e-4, 13).tolist()
+_ROUGHER: Final = 4
+_REPEATS: Final = 24
+
+
+@dataclass(frozen=True, eq=False)
+class RadialPSF:
+    """A round point spread function of the optics, ring by ring.
+
+    Parameters
+    ----------
+    edges : ndarray
+        Radii in m that limit the rings, from 0, shape (n + 1,).
+    shares : ndarray
+        Share of the light in each ring, shape (n,); what is missing to 1 lies beyond.
+    uncertainty : ndarray
+        Standard uncertainty of the shares: by the noise, and by how much they change when they are
+        let be rougher.
+    encircled_uncertainty : ndarray
+        The same of `encircled`, shape (n + 1,).
+    smoothness : float
+        Weight of the smoothness.
+    wider : float
+        By how much its full width at half maximum is over that of the best model in m. Both are
+        read from the rings, so that what these are too coarse for drops out.
+    """
+
+    edges: NDArray[np.float64]
+    shares: NDArray[np.float64]
+    uncertainty: NDArray[np.float64]
+    encircled_uncertainty: NDArray[np.float64]
+    smoothness: float
+    wider: float
+
+    @property
+    def radius(self) -> NDArray[np.float64]:
+        """Middles of the rings in m."""
+        return np.asarray((self.edges[1:] + self.edges[:-1]) / 2)
+
+    @property
+    def density(self) -> NDArray[np.float64]:
+        """Light per area in 1/m²."""
+        return np.asarray(self.shares / (np.pi * np.diff(self.edges**2)))
+
+    @property
+    def encircled(self) -> NDArray[np.float64]:
+        """Share of the light within each of the radii `edges`."""
+        return np.concatenate([[0.0], np.cumsum(self.shares)])
+
+    def psf(self) -> MeasuredPSF:
+        """The kernel, straight lines between the rings' middles."""
+        radius, density = self.radius, self.density
+
+        def at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.interp(np.hypot(x, y), radius, density, right=0.0)
+
+        return sampled_psf(at, float(self.edges[-1]), float(self.edges[1]))
+
+
+def radial_psf(
+    fit: ModelFit,
+    edges: Sequence[EdgePixels],
+    spreads: Sequence[EdgeSpread],
+    apertures: ApertureSignals | None,
+    generator: np.random.Generator,
+) -> RadialPSF:
+    """Invert edge-spread functions and signals of apertures.
+
+    Parameters
+    ----------
+    fit : ModelFit
+        Where the edges are; of it come the edges' and the apertures' backgrounds and steps.
+    edges : sequence of EdgePixels
+        The edges' pixels.
+    spreads : sequence of EdgeSpread
+        Their edge-spread functions.
+    apertures : ApertureSignals, optional
+        Signals of apertures.
+    generator : numpy.random.Generator
+        For the repeats with other noise that give the uncertainty.
+
+    Notes
+    -----
+    The weight of the smoothness is the one with the least sum of squared residuals and twice the
+    number of free shares that it leaves (Mallows, 1973). What it hides is
+    estimated by the change with a hundredth of that weight. The repeats draw the model too.
+    """
+    radii = _radii(fit, edges)
+    design, left = _rows(fit, edges, spreads, apertures, radii)
+    penalty = _penalty(radii, _core(fit, edges))
+    shares_by = _shares_by(fit, radii)
+    model = shares_by(fit.values)
+    # Light of the model beyond the last ring stays in it.
+    data, beyond = left + design @ model, 1.0 - float(model.sum())
+    solutions = [_solved(design, data, weight * penalty, model) for weight in _SMOOTHNESS]
+    criteria = [
+        _criterion(design, data, weight * penalty, solution)
+        for weight, solution in zip(_SMOOTHNESS, solutions, strict=True)
+    ]
+    chosen = int(np.argmin(criteria))
+    weight = _SMOOTHNESS[chosen]
+    repeats = []
+    for values in _drawn(fit, edges, generator):
+        shares = shares_by(values)
+        noisy = left + generator.standard_normal(left.size) + design @ shares
+        repeats.append(_solved(design, noisy, weight * penalty, shares))
+    rougher = solutions[min(chosen + _ROUGHER, len(solutions) - 1)]
+    all_shares = np.array([solutions[chosen], rougher, *repeats])
+    all_shares /= all_shares.sum(axis=1, keepdims=True) + beyond
+    return RadialPSF(
+        radii,
+        all_shares[0],
+        _spread(all_shares),
+        np.concatenate([[0.0], _spread(np.cumsum(all_shares, axis=1))]),
+        weight,
+        _ring_width(radii, solutions[chosen]) - _ring_width(radii, model),
+    )
+
+
+def _ring_width(edges: Values, shares: Values) -> float:
+    """Twice the greatest radius in m with half of the greatest density, by straight lines."""
+    radius, density = (edges[1:] + edges[:-1]) / 2, shares / np.diff(edges**2)
+    half = density.max() / 2
+    last = int(np.flatnonzero(density >= half)[-1])
+    if last + 1 == radius.size:
+        return 2 * float(radius[-1])
+    share = (density[last] - half) / (density[last] - density[last + 1])
+    return 2 * float(radius[last] + share * (radius[last + 1] - radius[last]))
+
+
+def _drawn(
+    fit: ModelFit, edges: Sequence[EdgePixels], generator: np.random.Generator
+) -> NDArray[np.float64]:
+    """Parameters of the model as other noise would have given them, shape (repeat, parameter)."""
+    values, vectors = np.linalg.eigh(fit.covariance)
+    spread = vectors * np.sqrt(np.maximum(values, 0.0))
+    drawn = fit.values + generator.standard_normal((_REPEATS, values.size)) @ spread.T
+    low, high = fit.model.bounds(edges[0].pitch, edges[0].reach)
+    return np.asarray(np.clip(drawn, low, high))
+
+
+def _spread(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard uncertainty by the repeats (from row 2 on) and the rougher solution (row 1)."""
+    return np.asarray(np.hypot(np.std(values[2:], axis=0, ddof=1), values[0] - values[1]))
+
+
+def _radii(fit: ModelFit, edges: Sequence[EdgePixels]) -> NDArray[np.float64]:
+    """Limits of the rings: even in the core, in proportion to the radius beyond."""
+    core = _core(fit, edges)
+    last = 0.8 * min(edge.reach for edge in edges)
+    return np.asarray(core * np.sinh(np.linspace(0.0, np.arcsinh(last / core), _RINGS + 1)))
+
+
+def _core(fit: ModelFit, edges: Sequence[EdgePixels]) -> float:
+    return max(fit.fwhm, 0.5 * min(edge.pitch for edge in edges)) / 2
+
+
+def _rows(
+    fit: ModelFit,
+    edges: Sequence[EdgePixels],
+    spreads: Sequence[EdgeSpread],
+    apertures: ApertureSignals | None,
+    radii: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Design, and what the model leaves of the data, over the noise, of bins and apertures."""
+    rows, data = [], []
+    for found, pixels, spread in zip(fit.edges, edges, spreads, strict=True):
+        columns = [
+            edge_response(
+                partial(_ring_transfer, radii, k),
+                found.line.normal,
+                pixels.footprint,
+                pixels.reach,
+            )(spread.distance)
+            for k in range(radii.size - 1)
+        ]
+        rows.append(np.array(columns).T / spread.uncertainty[:, None])
+        data.append(spread.residual / spread.uncertainty)
+    if apertures is not None:
+        transfers = [_ring_transfer(radii, k, apertures.frequency) for k in range(radii.size - 1)]
+        sigma = apertures.sigma / fit.source
+        rows.append((apertures.weights @ np.array(transfers).T) / sigma[:, None])
+        shares = apertures.weights @ fit.model.mean_transfer(fit.values, apertures.frequency)
+        left = (apertures.radiance - fit.aperture_background) / fit.source - shares
+        data.append(left / sigma)
+    return np.concatenate(rows), np.concatenate(data)
+
+
+def _ring_transfer(
+    radii: NDArray[np.float64], k: int, frequency: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Transfer function of an even ring."""
+    inner, outer = radii[k], radii[k + 1]
+    whole = outer**2 * _jinc(frequency * outer) - inner**2 * _jinc(frequency * inner)
+    return np.asarray(whole / (outer**2 - inner**2))
+
+
+def _jinc(cycles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Transfer function of an even disc over frequency times radius."""
+    argument = 2 * np.pi * cycles
+    safe = np.where(argument == 0.0, 1.0, argument)
+    return np.asarray(np.where(argument == 0.0, 1.0, 2 * j1(safe) / safe))
+
+
+def _penalty(radii: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+    """Second differences from ring to ring; beyond the last one there is nothing.
+
+    They are those of the density in the core, which is flat there, and of the density times the
+    square of the radius in the tails, in which the density alone would be too small to be smoothed.
+    """
+    middles = (radii[1:] + radii[:-1]) / 2
+    weighted = np.diag((middles**2 + width**2) / np.diff(radii**2))
+    padded = np.concatenate([weighted[:1], weighted, np.zeros((1, middles.size))])
+    return np.asarray(np.diff(padded, n=2, axis=0) * 1e3)
+
+
+def _shares_by(fit: ModelFit, radii: NDArray[np.float64]) -> Callable[[Values], Values]:
+    """What gives the share of a model's light in each ring by the model's parameters."""
+    frequency = np.arange(0.0, 6 / fit.fwhm, 1 / (32 * float(radii[-1])))
+    middle = np.zeros(1)
+    encircled = np.array(
+        [disc_response(frequency, 2 * radius, middle, 0.0) for radius in radii.tolist()]
+    )
+    rings = np.diff(encircled, axis=0)
+    return lambda values: np.maximum(rings @ fit.model.mean_transfer(values, frequency), 0.0)
+
+
+def _solved(
+    design: NDArray[np.float64],
+    data: NDArray[np.float64],
+    penalty: NDArray[np.float64],
+    model: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    matrix = np.concatenate([design, penalty])
+    wanted = np.concatenate([data, penalty @ model])
+    # The normal equations are small, whatever the number of bins.
+    normal = matrix.T @ matrix
+    factor = np.linalg.cholesky(normal + 1e-12 * np.trace(normal) * np.eye(len(normal)))
+    solution, _ = nnls(factor.T, np.linalg.solve(factor, matrix.T @ wanted))
+    return np.asarray(solution)
+
+
+def _criterion(
+    design: NDArray[np.float64],
+    data: NDArray[np.float64],
+    penalty: NDArray[np.float64],
+    shares: NDArray[np.float64],
+) -> float:
+    """Squared residuals, and twice the trace of what makes fitted data of data."""
+    left = data - design @ shares
+    free = shares > 0
+    normal = design[:, free].T @ design[:, free]
+    smooth = penalty[:, free].T @ penalty[:, free]
+    return float(left @ left + 2 * np.trace(np.linalg.solve(normal + smooth, normal)))

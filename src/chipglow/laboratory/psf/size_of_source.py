@@ -1,0 +1,161 @@
+"""Size-of-source effect: what a camera reads in the middle of apertures of several diameters."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.camera import UNUSABLE, Flag, Measurement
+from chipglow.laboratory.psf.psf_fit import ApertureSignals
+
+_LEAST_APERTURES: Final = 3
+_FEWEST_OUTSIDE: Final = 20
+
+
+@dataclass(frozen=True, eq=False)
+class ApertureImage:
+    """A round aperture before a source of even radiance.
+
+    Parameters
+    ----------
+    diameter : float
+        In m, on the object.
+    radiance : ndarray
+        In W/(m² sr), NaN where it is not usable, shape (y, x).
+    x, y : ndarray
+        Positions of columns and rows in m.
+    name : str
+        What it is called in messages.
+
+    Raises
+    ------
+    ValueError
+        If the diameter is not positive.
+    """
+
+    diameter: float
+    radiance: NDArray[np.float64]
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    name: str
+
+    def __post_init__(self) -> None:
+        if not 0 < self.diameter < np.inf:
+            raise ValueError(f"{self.name}: diameter is {self.diameter!r} m, expected over 0")
+
+
+def aperture_image(measurement: Measurement, diameter: float, name: str) -> ApertureImage:
+    """The mean of a measurement's frames as an image of an aperture.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        One frame or several of the same aperture.
+    diameter : float
+        Its diameter in m.
+    name : str
+        What it is called in messages.
+
+    Raises
+    ------
+    ValueError
+        If the diameter is not positive.
+    """
+    usable = (np.bitwise_or.reduce(measurement.flags, axis=0) & (UNUSABLE | Flag.REPLACED)) == 0
+    radiance = np.where(usable, measurement.radiance.mean(axis=0), np.nan)
+    raster = measurement.raster
+    return ApertureImage(diameter, radiance, raster.x, raster.y, name)
+
+
+def aperture_signals(images: Sequence[ApertureImage], footprint: float) -> ApertureSignals:
+    """What the middle pixels of apertures read.
+
+    The middle is the centroid of what is brighter than half; the signal is the mean of the pixels
+    within a pitch of it, whose distances from the middle are kept.
+
+    Parameters
+    ----------
+    images : sequence of ApertureImage
+        Three apertures or more before the same source.
+    footprint : float
+        Side of a sensor's sensitive square in m.
+
+    Raises
+    ------
+    ValueError
+        If there are too few, or an image shows no aperture within its edges.
+    """
+    if len({image.diameter for image in images}) < _LEAST_APERTURES:
+        raise ValueError(
+            f"apertures: {len(images)} images of {len({i.diameter for i in images})} diameters, "
+            f"expected {_LEAST_APERTURES} diameters or more"
+        )
+    read = [_middle(image) for image in images]
+    return ApertureSignals(
+        np.array([image.diameter for image in images]),
+        np.array([middle.signal for middle in read]),
+        np.array([middle.sigma for middle in read]),
+        tuple(middle.radii for middle in read),
+        footprint,
+        min(middle.outside for middle in read),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Middle:
+    """What the middle pixels read, its uncertainty, their distances, and what is beside."""
+
+    signal: float
+    sigma: float
+    radii: NDArray[np.float64]
+    outside: float
+
+
+def _middle(image: ApertureImage) -> _Middle:
+    """Find the middle of an aperture and read it."""
+    known = np.isfinite(image.radiance)
+    if not known.any():
+        raise ValueError(f"{image.name}: no usable pixel, expected an aperture")
+    pitch = float(image.x[1] - image.x[0])
+    low, high = np.percentile(image.radiance[known], 10), image.radiance[known].max()
+    bright = known & (image.radiance > (low + high) / 2)
+    x, y = np.meshgrid(image.x, image.y)
+    weight = np.where(bright, image.radiance - low, 0.0)
+    if weight.sum() <= 0:
+        raise ValueError(f"{image.name}: all pixels are as bright, expected an aperture")
+    middle = float((weight * x).sum() / weight.sum()), float((weight * y).sum() / weight.sum())
+    away = np.hypot(x - middle[0], y - middle[1])
+    radius = image.diameter / 2
+    room = min(
+        middle[0] - image.x[0],
+        image.x[-1] - middle[0],
+        middle[1] - image.y[-1],
+        image.y[0] - middle[1],
+    )
+    seen = pitch * (np.count_nonzero(bright) / np.pi) ** 0.5
+    if not 0.6 * radius - pitch < seen < 1.5 * radius + 3 * pitch or room < radius:
+        raise ValueError(
+            f"{image.name}: no aperture of {image.diameter * 1e6:.4g} um within the image; what is "
+            f"bright is {2 * seen * 1e6:.4g} um wide, and {room * 1e6:.4g} um from the image's edge"
+        )
+    inner = known & (away <= pitch)
+    if not inner.any():
+        raise ValueError(f"{image.name}: no usable pixel in the middle of the aperture")
+    beside = known & (away > radius + 3 * pitch)
+    sigma = _noise(image.radiance, beside)
+    outside = float(np.median(image.radiance[beside])) if beside.any() else float(low)
+    number = int(inner.sum())
+    signal = float(image.radiance[inner].mean())
+    least = 1e-7 * float(high - low)
+    return _Middle(signal, max(sigma / number**0.5, least), away[inner], outside)
+
+
+def _noise(radiance: NDArray[np.float64], outside: NDArray[np.bool_]) -> float:
+    """Noise of a pixel in W/(m² sr), from the differences of neighbours outside the aperture."""
+    pairs = outside[:, 1:] & outside[:, :-1]
+    if pairs.sum() < _FEWEST_OUTSIDE:
+        pairs = np.isfinite(radiance[:, 1:]) & np.isfinite(radiance[:, :-1])
+    difference = np.diff(radiance, axis=1)[pairs]
+    return float(1.4826 * np.median(np.abs(difference - np.median(difference))) / 2**0.5)

@@ -1,0 +1,106 @@
+"""A point spread function by the knife edge in tables and sentences."""
+
+from math import degrees, sqrt
+
+import numpy as np
+from rich.table import Table
+
+from chipglow.camera import AnnularAperturePSF, GaussianPSF
+from chipglow.laboratory.psf.knife_edge import KnifeEdge
+from chipglow.laboratory.psf.psf_fit import ModelFit
+from chipglow.laboratory.psf.psf_models import is_length
+
+
+def model_table(found: KnifeEdge) -> Table:
+    """The models, the best first."""
+    table = Table("model", "FWHM / um", "AICc", "BIC", "weight", "misfit", box=None)
+    for fit, weight in zip(found.fits, found.weights, strict=True):
+        table.add_row(
+            fit.model.name,
+            with_uncertainty(fit.fwhm * 1e6, fit.fwhm_uncertainty * 1e6),
+            f"{fit.aicc - found.best.aicc:+.1f}",
+            f"{fit.bic - found.best.bic:+.1f}",
+            f"{weight:.3f}",
+            f"{fit.misfit:.3g}",
+        )
+    return table
+
+
+def edge_table(found: KnifeEdge) -> Table:
+    """The images: the edge's normal, the optics' width by it alone, the line spread's width."""
+    table = Table(
+        "image", "normal / deg", "FWHM / um", "LSF / um", "step/noise", "MTF(Nyquist)", box=None
+    )  # fmt: skip
+    for edge, fitted in zip(found.edges, found.best.edges, strict=True):
+        transfer = edge.transfer
+        half = int(np.argmin(np.abs(transfer.frequency - 0.5 / edge.image.pitch)))
+        table.add_row(
+            edge.image.name,
+            with_uncertainty(degrees(fitted.line.normal), degrees(fitted.normal_uncertainty)),
+            with_uncertainty(edge.fwhm * 1e6, edge.fwhm_uncertainty * 1e6),
+            f"{edge.line_fwhm * 1e6:.4g}",
+            f"{fitted.step / edge.noise:.3g}",
+            with_uncertainty(float(transfer.value[half]), float(transfer.uncertainty[half])),
+        )
+    return table
+
+
+def sentences(found: KnifeEdge) -> list[str]:
+    """The result, and how to use it."""
+    width = with_uncertainty(found.fwhm * 1e6, found.fwhm_uncertainty * 1e6)
+    lines = [
+        f"The optics' point spread function is {width} um wide (full width at half maximum, with "
+        f"its standard uncertainty; {found.best.model.name}: {_parameters(found.best)})."
+    ]
+    lines += _directions(found)
+    if (text := study_section(found)) is not None:
+        lines.append(f"For a study's camera: psf_order: optics, psf: {text}")
+    return lines
+
+
+def study_section(found: KnifeEdge) -> str | None:
+    """The best model as a study's camera section takes it; None if only a file can hold it."""
+    psf = found.psf()
+    if isinstance(psf, GaussianPSF):
+        return f"{{kind: gaussian, fwhm: {psf.fwhm * 1e6:.4g} um}}"
+    if isinstance(psf, AnnularAperturePSF):
+        return (
+            f"{{kind: annular-aperture, wavelength: {psf.wavelength * 1e6:.4g} um, "
+            f"numerical_aperture: {psf.numerical_aperture:.4g}, "
+            f"obscuration: {psf.obscuration:.4g}}}"
+        )
+    return None
+
+
+def with_uncertainty(value: float, uncertainty: float) -> str:
+    """A number and its standard uncertainty, which has two digits."""
+    if not np.isfinite(uncertainty) or uncertainty <= 0:
+        return f"{value:.4g}"
+    decimals = max(0, 1 - int(np.floor(np.log10(uncertainty))))
+    return f"{value:.{min(decimals, 9)}f} ± {uncertainty:.{min(decimals, 9)}f}"
+
+
+def _parameters(fit: ModelFit) -> str:
+    texts = []
+    for name, value, deviation in zip(
+        fit.model.parameters, fit.values, fit.uncertainties, strict=True
+    ):
+        scale, unit = (1e6, " um") if is_length(name) else (1.0, "")
+        number = with_uncertainty(float(value) * scale, float(deviation) * scale)
+        texts.append(f"{name.replace('_', ' ')} {number}{unit}")
+    return ", ".join(texts)
+
+
+def _directions(found: KnifeEdge) -> list[str]:
+    """Whether edges of several orientations agree."""
+    if len(found.edges) < 2:
+        return []
+    widths = np.array([edge.fwhm for edge in found.edges])
+    spread = np.array([edge.fwhm_uncertainty for edge in found.edges])
+    apart = float(np.ptp(widths))
+    unsure = sqrt(float(spread[widths.argmax()] ** 2 + spread[widths.argmin()] ** 2))
+    verdict = "agree" if apart < 2 * unsure else "differ: the point spread function is not round"
+    return [
+        f"The edges' own widths lie {apart * 1e6:.2g} um apart, with a standard uncertainty of "
+        f"{unsure * 1e6:.2g} um: they {verdict}."
+    ]

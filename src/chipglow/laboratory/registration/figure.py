@@ -1,0 +1,145 @@
+"""Infrared image and visible picture, on each other and in turns."""
+
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from chipglow.drawing import drawing
+from chipglow.drawing.drawing import HEAT, KELVIN, VERMILLION, WIDTH
+from chipglow.laboratory.registration.registration import Registration
+from chipglow.scene import Raster, Tool
+
+_FACE: Final = 3e-3
+_OPACITY: Final = 0.55
+_BLINK_WIDTH: Final = 6.4
+_LABEL: Final = "radiance temperature / °C"
+
+
+def draw_registration(
+    registration: Registration,
+    temperature: NDArray[np.floating],
+    raster: Raster,
+    visible: NDArray[Any],
+    tool: Tool | None = None,
+    points: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+) -> Figure:
+    """Draw the infrared image, and the visible picture with the infrared one laid over it.
+
+    Parameters
+    ----------
+    registration : Registration
+        The map.
+    temperature : ndarray
+        Radiance temperature in K, NaN where there is none, shape `raster.shape`.
+    raster : Raster
+        The infrared sensors.
+    visible : ndarray
+        Brightness, shape (rows, columns).
+    tool : Tool, optional
+        Its outline is drawn on both.
+    points : tuple of ndarray, optional
+        Points that were given: positions in m, and visible columns and rows.
+    """
+    celsius = np.asarray(temperature) - KELVIN
+    limits = _limits(celsius)
+    with drawing.style():
+        figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
+        FigureCanvasAgg(figure)
+        left, right = figure.subplots(1, 2)
+        picture = drawing.show_image(left, celsius, raster, tool, HEAT, limits)
+        left.set_title("infrared")
+        _draw_visible(right, visible)
+        warped = registration.warp(celsius, raster, (visible.shape[0], visible.shape[1]))
+        right.imshow(
+            np.ma.masked_invalid(warped),
+            cmap=HEAT,
+            vmin=limits[0],
+            vmax=limits[1],
+            alpha=_OPACITY,
+        )
+        right.set_title("visible, infrared over it")
+        _draw_tool(right, registration, tool, visible.shape)
+        if points is not None:
+            left.plot(*(1e6 * points[0]).T, "+", color=VERMILLION)
+            right.plot(*points[1].T, "+", color=VERMILLION)
+            right.plot(*registration.pixels(points[0]).T, "o", color="white", fillstyle="none")
+        drawing.colour_bar(figure, picture, [left, right], _LABEL)
+    return figure
+
+
+def blink_pictures(
+    registration: Registration,
+    temperature: NDArray[np.floating],
+    raster: Raster,
+    visible: NDArray[Any],
+    tool: Tool | None = None,
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Visible picture, and the infrared image as the visible camera would have it.
+
+    Parameters are those of `draw_registration`.
+
+    Returns
+    -------
+    tuple of ndarray
+        Two pictures of one size to show in turns, red, green and blue, shape (rows, columns, 3).
+    """
+    shape = (visible.shape[0], visible.shape[1])
+    celsius = registration.warp(np.asarray(temperature) - KELVIN, raster, shape)
+    limits = _limits(celsius)
+    plain = _rendered(registration, visible, tool)
+    hot = _rendered(registration, visible, tool, celsius, limits)
+    return plain, hot
+
+
+def _rendered(
+    registration: Registration,
+    visible: NDArray[Any],
+    tool: Tool | None,
+    celsius: NDArray[np.float64] | None = None,
+    limits: tuple[float, float] = (0.0, 1.0),
+) -> NDArray[np.uint8]:
+    height = _BLINK_WIDTH * visible.shape[0] / visible.shape[1]
+    figure = Figure(figsize=(_BLINK_WIDTH, height), dpi=100)
+    canvas: Any = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    if celsius is None:
+        _draw_visible(axes, visible)
+    else:
+        axes.imshow(np.ma.masked_invalid(celsius), cmap=HEAT, vmin=limits[0], vmax=limits[1])
+        axes.set_facecolor(drawing.VOID)
+    axes.set_axis_on()
+    axes.set_xticks([])
+    axes.set_yticks([])
+    _draw_tool(axes, registration, tool, visible.shape)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba(), np.uint8)[..., :3].copy()
+
+
+def _draw_visible(axes: Axes, visible: NDArray[Any]) -> None:
+    low, high = np.percentile(visible, (0.5, 99.5))
+    axes.imshow(visible, cmap="gray", vmin=low, vmax=max(high, low + 1e-9))
+    axes.set_xlabel("column")
+    axes.set_ylabel("row")
+
+
+def _draw_tool(
+    axes: Axes, registration: Registration, tool: Tool | None, shape: tuple[int, ...]
+) -> None:
+    if tool is not None:
+        line = registration.pixels(tool.outline(_FACE))
+        axes.plot(*line.T, color="white", linewidth=2.2)
+        axes.plot(*line.T, color="black", linewidth=1.0)
+    axes.set_xlim(-0.5, shape[1] - 0.5)
+    axes.set_ylim(shape[0] - 0.5, -0.5)
+
+
+def _limits(celsius: NDArray[np.floating]) -> tuple[float, float]:
+    known = celsius[np.isfinite(celsius)]
+    if known.size == 0:
+        return 0.0, 1.0
+    low, high = (float(value) for value in np.percentile(known, (0.5, 99.8)))
+    return low, max(high, low + 1.0)

@@ -1,0 +1,558 @@
+"""Registration of an infrared image and a visible picture by what they have in common."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from math import cos, hypot, log, radians, sin
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter, median_filter
+from scipy.optimize import minimize
+
+from chipglow.laboratory.registration.registration import (
+    Model,
+    NormalisedFrame,
+    Registration,
+    element_slopes,
+    mapped_places,
+    parameter_basis,
+)
+from chipglow.scene import Raster
+
+_BINS: Final = 8
+_ENDS: Final = (0.5, 98.0)
+_STEPS: Final = (4, 2, 1)
+_BLUR: Final = 0.6
+_WINDOW: Final = 5.0
+_NOISES: Final = 3.0
+_FAINT_INFRARED: Final = 0.02
+_FAINT_VISIBLE: Final = 0.5
+_NEARLY_ALL: Final = 0.95
+_FADE: Final = 2.0
+_LEAST_OVERLAP: Final = 0.5
+_REACH: Final = 0.25
+_SCALES: Final = (0.8, 0.9, 1.0, 1.1, 1.25)
+_TURNS: Final = (-4.0, 0.0, 4.0)
+_CANDIDATES: Final = 5
+_SURVEY: Final = (-4.5, -3.0, -1.5, 0.0, 1.5, 3.0, 4.5)
+_THINNED: Final = 4
+_FINALS: Final = 3
+_FAR: Final = 8.0
+_APART: Final = 3.0
+_RIVAL: Final = 0.8
+_UNRELATED: Final = 19
+_BLOCK: Final = 16
+_UNSURE: Final = 1.0
+_FLAT: Final = 1e-4
+_SYSTEMATIC: Final = 0.5
+_SETTLE: Final = {"xtol": 0.1, "ftol": 1e-3, "maxfev": 300}
+_CLIMB: Final = {"gtol": 1e-7, "maxiter": 100}
+
+
+@dataclass(frozen=True)
+class ImageFit:
+    """A registration from the images themselves.
+
+    Parameters
+    ----------
+    registration : Registration
+        The map.
+    information : float
+        Mutual information of the images as they lie on each other, in bits a sensor.
+    common_edges : float
+        How well their edges lie on each other: what the registration makes as great as it can.
+    placement : float
+        Mutual information times common edges of the best of many placements, at a quarter of the
+        resolution.
+    by_chance : ndarray
+        The same for infrared images that are turned over and moved round, so that they have
+        nothing to do with the visible picture, shape (n,).
+    """
+
+    registration: Registration
+    information: float
+    common_edges: float
+    placement: float
+    by_chance: NDArray[np.float64]
+
+
+def fit_images(
+    infrared: NDArray[np.floating],
+    raster: Raster,
+    visible: NDArray[np.generic],
+    model: Model = "affine",
+) -> ImageFit:
+    """Register two images by mutual information and common edges.
+
+    Parameters
+    ----------
+    infrared : ndarray
+        Radiance, NaN where it is not known; shape `raster.shape`.
+    raster : Raster
+        The infrared sensors.
+    visible : ndarray
+        Brightness, shape (rows, columns).
+    model : {"similarity", "affine", "homography"}
+        As in `fit_points`.
+
+    Raises
+    ------
+    ValueError
+        If an image has no contrast, or the images do not lie on each other.
+
+    Notes
+    -----
+    Mutual information (Viola and Wells, Int. J. Comput. Vision 24 (1997) 137) times common edges
+    (Pluim et al., IEEE Trans. Med. Imaging 19 (2000) 809) choose among placements round that in
+    which both images have the same middle and the same width, not mirrored: shifts of up to a
+    quarter of the width, turns of up to 4 degrees, scales of 0.8 to 1.25. From there the sum of
+    (g_i . g_v)^2 climbs, from coarse to fine: the products of both images' gradients, each over
+    the contrast of its surroundings, so that it does not matter which side of an edge is the
+    brighter (after Haber and Modersitzki, Methods Inf. Med. 46 (2007) 292). Mutual information
+    alone would be off by several pixels where heat spreads beyond what is seen. Radiance is taken
+    as it is: the logarithm, or the temperature, of a blurred edge lies beyond the edge.
+
+    The covariance is that of an estimate which maximises a sum over blocks of 16 x 16 sensors (the
+    sandwich of Huber, 1967), so that neighbours need not be independent. Half a sensor is added
+    for each parameter, at the image's corner, for what is systematic: an edge of heat beside the
+    edge that is seen.
+    """
+    levels = _levels(infrared, raster, visible)
+    coarse, middle, fine = levels
+    frame = _frame(raster, visible.shape)
+    placements = _placements(coarse, frame)
+    score, chance = _against_chance(coarse, frame, placements[0])
+    candidates = _narrowed(coarse, middle, frame, placements)
+    starts = _surveyed(fine, frame, candidates[0])
+    starts += [other for other in candidates[1:] if _apart(other, starts[0], fine, frame) > _FAR]
+    fits = sorted((_settled(fine, frame, matrix) for matrix in starts), key=_last)
+    matrix, _ = _climb(fine, frame, _climb(fine, frame, fits[-1][0], "similarity")[0], model)
+    basis = _scaled_basis(fine, frame, matrix, model)
+    spread, flat = _sandwich(fine, frame, matrix, basis)
+    full, covariance = frame.undone(matrix, basis @ spread @ basis.T)
+    found = Registration(full, covariance, model, "mutual-information")
+    doubts = (
+        *(() if score > chance.max() else (_BY_CHANCE,)),
+        *_rivals(fits[::-1], fine, frame),
+        *((_NO_OPTIMUM,) if flat else _unsure(found, raster)),
+    )
+    return ImageFit(
+        replace(found, doubts=doubts),
+        _information(fine, frame, matrix),
+        _common_edges(fine, frame, matrix, basis)[0],
+        score,
+        chance,
+    )
+
+
+_BY_CHANCE: Final = (
+    "the best placement is no better than that of images that have nothing to do with each other"
+)
+_NO_OPTIMUM: Final = "no placement is better than its neighbours in every direction"
+
+
+@dataclass(frozen=True)
+class _Level:
+    """Samples of the infrared image, and the visible picture, at one resolution.
+
+    `places` in m, shape (n, 2), with their `bins` and their `edges` along columns and rows.
+    The `sharp` ones have nearly all the edges there are. `lines` are the edges of the visible
+    picture, and their slopes along columns and rows, shape (rows, columns, 6); `codes` its bins.
+    `scale` is the number of visible pixels a sample.
+    """
+
+    places: NDArray[np.float64]
+    bins: NDArray[np.int64]
+    edges: NDArray[np.float64]
+    sharp: NDArray[np.bool_]
+    blocks: NDArray[np.int64]
+    codes: NDArray[np.int64]
+    lines: NDArray[np.float64]
+    bin_image: NDArray[np.int64]
+    edge_image: NDArray[np.float64]
+    known: NDArray[np.bool_]
+    pitch: float
+    scale: float
+
+    @cached_property
+    def directions(self) -> NDArray[np.float64]:
+        return np.ascontiguousarray(self.lines[..., :2])
+
+    @property
+    def count(self) -> int:
+        return len(self.places)
+
+
+def _levels(
+    infrared: NDArray[np.floating], raster: Raster, visible: NDArray[np.generic]
+) -> list[_Level]:
+    known, seen = np.isfinite(infrared), np.asarray(visible, np.float64)
+    for name, values in (("infrared image", infrared[known]), ("visible picture", seen)):
+        if values.size == 0 or not np.ptp(values) > 0:
+            raise ValueError(f"{name}: has no contrast, expected one in which something is seen")
+    filled = np.where(known, infrared, np.median(infrared[known]))
+    scale = min(seen.shape[0] / raster.rows, seen.shape[1] / raster.columns)
+    return [_level(filled, known, raster, seen, step, scale * step) for step in _STEPS]
+
+
+def _level(
+    infrared: NDArray[np.float64],
+    known: NDArray[np.bool_],
+    raster: Raster,
+    visible: NDArray[np.float64],
+    step: int,
+    scale: float,
+) -> _Level:
+    picture = gaussian_filter(visible, _BLUR * scale)
+    lines = _edges(picture, scale, _FAINT_VISIBLE * float(visible.std()))
+    faint = hypot(_NOISES * _noise(infrared), _FAINT_INFRARED * float(infrared.std()))
+    weight = gaussian_filter(known.astype(float), _BLUR * step)
+    smooth = gaussian_filter(infrared * known, _BLUR * step) / np.maximum(weight, 1e-9)
+    part = (slice(step // 2, None, step),) * 2
+    there = known[part]
+    edges = np.moveaxis(_edges(smooth, step, faint), 0, -1)[part]
+    bins = _binned(smooth)[part]
+    rows, columns = np.indices(raster.shape)
+    across = -(-raster.columns // _BLOCK)
+    return _Level(
+        np.stack(np.meshgrid(raster.x, raster.y), axis=-1)[part][there],
+        bins[there],
+        edges[there],
+        _sharp(edges[there]),
+        (rows // _BLOCK * across + columns // _BLOCK)[part][there],
+        _binned(picture),
+        np.concatenate([lines, *np.gradient(lines, axis=(2, 1))]).transpose(1, 2, 0).copy(),
+        bins,
+        edges,
+        there,
+        raster.spacing * step,
+        scale,
+    )
+
+
+def _edges(image: NDArray[np.float64], scale: float, faint: float) -> NDArray[np.float64]:
+    """Gradient a sample, over the contrast of the surroundings and what is faint: (2, y, x)."""
+    down, right = np.gradient(image)
+    mean = gaussian_filter(image, _WINDOW * scale)
+    variance = gaussian_filter((image - image.mean()) ** 2, _WINDOW * scale)
+    variance = np.maximum(variance - (mean - image.mean()) ** 2, 0.0)
+    return np.asarray(np.stack([right, down]) * scale / np.sqrt(variance + faint**2))
+
+
+def _sharp(edges: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """The fewest samples that have nearly all of the squares of the edges."""
+    squares = (edges**2).sum(axis=-1)
+    order = np.argsort(squares)[::-1]
+    least = squares[order][np.searchsorted(squares[order].cumsum(), _NEARLY_ALL * squares.sum())]
+    return np.asarray(squares >= least)
+
+
+def _noise(image: NDArray[np.float64]) -> float:
+    """Standard deviation of the noise: of a pixel's distance from the median around it."""
+    return 1.4826 * float(np.median(np.abs(image - median_filter(image, 3))))
+
+
+def _binned(image: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Bins of equal width from nearly the least to nearly the greatest value."""
+    low, high = np.percentile(image, _ENDS)
+    share = (image - low) / max(high - low, np.finfo(float).tiny)
+    return np.asarray(np.clip(share * _BINS, 0, _BINS - 1), np.int64)
+
+
+def _frame(raster: Raster, shape: tuple[int, ...]) -> NormalisedFrame:
+    left, right, bottom, top = raster.extent
+    centre = np.array([(left + right) / 2, (bottom + top) / 2])
+    radius = hypot(right - left, top - bottom) / 2
+    middle = np.array([shape[1] - 1, shape[0] - 1]) / 2
+    return NormalisedFrame(centre, radius, middle, radius * shape[1] / (right - left))
+
+
+def _pixels(
+    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    unit = mapped_places(matrix, frame.unit(level.places))
+    return unit * frame.pixel_scale + frame.pixel_centre
+
+
+def _sample(level: _Level, frame: NormalisedFrame) -> float:
+    """Distance of the level's samples in the frame's units."""
+    return level.pitch / frame.scale
+
+
+# The choice among placements
+
+
+def _placements(level: _Level, frame: NormalisedFrame) -> list[NDArray[np.float64]]:
+    """The best placements on a grid that are apart from each other, the best first."""
+    found: list[tuple[float, NDArray[np.float64]]] = []
+    for scale, turn in product(_SCALES, _TURNS):
+        matrix = np.eye(3)
+        angle = radians(turn)
+        matrix[:2, :2] = scale * np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
+        scores = _shifted_scores(level, frame, matrix, level.bins, level.edges)
+        found += [(score, _shifted(matrix, shift)) for score, shift in scores]
+    if not found:
+        raise ValueError("images: they do not lie on each other, expected views of one thing")
+    found.sort(key=lambda entry: entry[0], reverse=True)
+    kept: list[NDArray[np.float64]] = []
+    for _, matrix in found:
+        if all(_apart(matrix, other, level, frame) > _APART for other in kept):
+            kept.append(matrix)
+        if len(kept) == _CANDIDATES:
+            break
+    return kept
+
+
+def _shifted_scores(
+    level: _Level,
+    frame: NormalisedFrame,
+    matrix: NDArray[np.float64],
+    bins: NDArray[np.int64],
+    edges: NDArray[np.float64],
+) -> Iterator[tuple[float, tuple[float, float]]]:
+    """Mutual information times common edges for each shift on the grid."""
+    pixels = _pixels(level, frame, matrix)
+    reach = int(_REACH * level.bin_image.shape[1])
+    for across, down in product(range(-reach, reach + 1), repeat=2):
+        shift = across * _sample(level, frame), down * _sample(level, frame)
+        score = _score(level, pixels + np.array(shift) * frame.pixel_scale, bins, edges)
+        if score is not None:
+            yield score, shift
+
+
+def _score(
+    level: _Level,
+    pixels: NDArray[np.float64],
+    bins: NDArray[np.int64],
+    edges: NDArray[np.float64],
+) -> float | None:
+    """Mutual information times common edges of samples at pixels; None if too few overlap."""
+    column, row = np.rint(pixels).astype(np.int64).T
+    rows, columns = level.codes.shape
+    here = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
+    if here.mean() < _LEAST_OVERLAP:
+        return None
+    place = row[here], column[here]
+    joint = np.bincount(bins[here] * _BINS + level.codes[place], None, _BINS**2) / here.size
+    along = (edges[here] * level.directions[place]).sum(axis=1)
+    return _shared(joint.reshape(_BINS, _BINS)) * float(along @ along) / float(here.size)
+
+
+def _shared(joint: NDArray[np.float64]) -> float:
+    """Mutual information in nats of a joint histogram, times its sum: all that is shared."""
+    apart = np.outer(joint.sum(axis=1), joint.sum(axis=0))
+    filled = joint > 0
+    return float((joint[filled] * np.log(joint[filled] * joint.sum() / apart[filled])).sum())
+
+
+def _against_chance(
+    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64]
+) -> tuple[float, NDArray[np.float64]]:
+    """Best score over all shifts: of the image, and of images that have nothing to do with it."""
+    linear = matrix.copy()
+    linear[:2, 2] = 0.0
+
+    def best(bins: NDArray[np.int64], edges: NDArray[np.float64]) -> float:
+        scores = _shifted_scores(level, frame, linear, bins, edges)
+        return max((score for score, _ in scores), default=0.0)
+
+    generator = np.random.default_rng(2010)
+    chance = []
+    for number in range(_UNRELATED):
+        signs = ((-1, 1), (1, -1), (-1, -1))[number % 3]
+        shift = tuple(int(generator.integers(side)) for side in level.bin_image.shape)
+        flip = np.s_[:: signs[0], :: signs[1]]
+        bins = np.roll(level.bin_image[flip], shift, (0, 1))[level.known]
+        edges = np.roll(level.edge_image[flip], shift, (0, 1))[level.known]
+        chance.append(best(bins, edges * signs[::-1]))
+    return best(level.bins, level.edges), np.array(chance)
+
+
+def _shifted(matrix: NDArray[np.float64], shift: tuple[float, float]) -> NDArray[np.float64]:
+    moved = matrix.copy()
+    moved[:2, 2] += shift
+    return moved
+
+
+def _apart(
+    one: NDArray[np.float64], other: NDArray[np.float64], level: _Level, frame: NormalisedFrame
+) -> float:
+    """Distance of two maps of the image in samples: where it is greatest, of two corners."""
+    corners = frame.unit(level.places[[0, -1]])
+    apart = mapped_places(one, corners) - mapped_places(other, corners)
+    return float(np.hypot(apart[:, 0], apart[:, 1]).max()) / _sample(level, frame)
+
+
+# The climb
+
+
+def _last(fit: tuple[NDArray[np.float64], float]) -> float:
+    return fit[1]
+
+
+def _settled(
+    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float]:
+    """The similarity near a matrix with the best score, and that."""
+    basis = _scaled_basis(level, frame, matrix, "similarity")
+
+    def moved(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(matrix + (basis @ parameters).reshape(3, 3))
+
+    def loss(parameters: NDArray[np.float64]) -> float:
+        pixels = _pixels(level, frame, moved(parameters))
+        return -(_score(level, pixels, level.bins, level.edges) or 0.0)
+
+    found = minimize(loss, np.zeros(4), method="Powell", options=_SETTLE)
+    return moved(found.x), -float(found.fun)
+
+
+def _narrowed(
+    coarse: _Level, middle: _Level, frame: NormalisedFrame, candidates: list[NDArray[np.float64]]
+) -> list[NDArray[np.float64]]:
+    """Candidates after a search at a quarter and at half of the resolution, the best first."""
+    found = [_settled(coarse, frame, matrix)[0] for matrix in candidates]
+    fits = sorted((_settled(middle, frame, matrix) for matrix in found), key=_last)
+    return [matrix for matrix, _ in fits[::-1]]
+
+
+def _surveyed(
+    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64]
+) -> list[NDArray[np.float64]]:
+    """The best similarities on a grid of shifts, turns and scales around a matrix."""
+    basis = _scaled_basis(level, frame, matrix, "similarity")
+    unit, thin = frame.unit(level.places[::_THINNED]), slice(None, None, _THINNED)
+    found = []
+    for parameters in product(_SURVEY, repeat=4):
+        moved = matrix + (basis @ parameters).reshape(3, 3)
+        pixels = mapped_places(moved, unit) * frame.pixel_scale + frame.pixel_centre
+        score = _score(level, pixels, level.bins[thin], level.edges[thin])
+        found.append((score or 0.0, parameters))
+    found.sort(reverse=True)
+    return [matrix + (basis @ best).reshape(3, 3) for _, best in found[:_FINALS]]
+
+
+def _climb(
+    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64], model: Model
+) -> tuple[NDArray[np.float64], float]:
+    """Matrix of the most common edges near a matrix, and those."""
+    basis = _scaled_basis(level, frame, matrix, model)
+
+    def loss(parameters: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+        moved = matrix + (basis @ parameters).reshape(3, 3)
+        common, slopes, _ = _common_edges(level, frame, moved, basis)
+        return -common, -slopes.sum(axis=0)
+
+    found = minimize(loss, np.zeros(basis.shape[1]), jac=True, method="BFGS", options=_CLIMB)
+    return matrix + (basis @ found.x).reshape(3, 3), -float(found.fun)
+
+
+def _scaled_basis(
+    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64], model: Model
+) -> NDArray[np.float64]:
+    """Basis by which a parameter of 1 moves the image's corner by one sample."""
+    mirrored = bool(np.linalg.det(matrix[:2, :2]) < 0)
+    return parameter_basis(model, mirrored) * _sample(level, frame)
+
+
+def _common_edges(
+    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64], basis: NDArray[np.float64]
+) -> tuple[float, NDArray[np.float64], NDArray[np.bool_]]:
+    """Mean of (g_i . g_v)^2, what each sharp sample adds to its slope, and which of them do."""
+    places, edges = frame.unit(level.places[level.sharp]), level.edges[level.sharp]
+    pixels = mapped_places(matrix, places) * frame.pixel_scale + frame.pixel_centre
+    weight, fading = _window(pixels, level.codes.shape, _FADE * level.scale)
+    here = weight > 0
+    if weight.mean() < _LEAST_OVERLAP:
+        return 0.0, np.zeros((int(here.sum()), basis.shape[1])), here
+    weight, fading, edges = weight[here], fading[here], edges[here]
+    lines = _between(level.lines, pixels[here]).reshape(-1, 3, 2)
+    along, right, down = (lines * edges[:, None]).sum(axis=2).T
+    pull = 2 * (weight * along)[:, None] * np.stack([right, down], axis=1)
+    pull += (along**2)[:, None] * fading
+    slopes = element_slopes(matrix, places[here]) @ basis * (frame.pixel_scale / level.count)
+    common = float((weight * along**2).sum() / level.count)
+    return common, np.einsum("ni,nik->nk", pull, slopes), here
+
+
+def _between(fields: NDArray[np.float64], pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Fields of shape (rows, columns, k) between their pixels, bilinear, shape (n, k)."""
+    first = np.floor(np.minimum(pixels, np.array(fields.shape[1::-1]) - 1.000001)).astype(np.int64)
+    (right, down), (column, row) = (pixels - first).T[..., None], first.T
+    upper = fields[row, column] * (1 - right) + fields[row, column + 1] * right
+    lower = fields[row + 1, column] * (1 - right) + fields[row + 1, column + 1] * right
+    return np.asarray(upper * (1 - down) + lower * down)
+
+
+def _window(
+    pixels: NDArray[np.float64], shape: tuple[int, ...], fade: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weight of samples, falling to 0 at the picture's border, and its slope by the pixel."""
+    last = np.array([shape[1] - 1.0, shape[0] - 1.0])
+    room = np.minimum(pixels, last - pixels) / fade
+    weight = np.clip(room, 0.0, 1.0)
+    slope = np.where((room > 0) & (room < 1), np.where(pixels < last / 2, 1.0, -1.0) / fade, 0.0)
+    return weight.prod(axis=-1), slope * weight[..., ::-1]
+
+
+# The verdict
+
+
+def _information(level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64]) -> float:
+    """Mutual information in bits a sample."""
+    column, row = np.rint(_pixels(level, frame, matrix)).astype(np.int64).T
+    rows, columns = level.codes.shape
+    here = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
+    cells = level.bins[here] * _BINS + level.codes[row[here], column[here]]
+    joint = np.bincount(cells, None, _BINS**2).reshape(_BINS, _BINS) / here.sum()
+    return _shared(joint) / log(2)
+
+
+def _rivals(
+    fits: list[tuple[NDArray[np.float64], float]], level: _Level, frame: NormalisedFrame
+) -> tuple[str, ...]:
+    """A doubt for the best other placement that is nearly as good."""
+    best, most = fits[0]
+    for matrix, common in fits[1:]:
+        distance = _apart(best, matrix, level, frame)
+        if distance > _FAR and common > _RIVAL * most:
+            return (
+                f"another placement, {distance:.0f} infrared pixels away, fits nearly as well, "
+                "points or dots would decide",
+            )
+    return ()
+
+
+def _unsure(found: Registration, raster: Raster) -> tuple[str, ...]:
+    typical = found.uncertainty(raster)[0] / raster.spacing
+    if typical < _UNSURE:
+        return ()
+    return (
+        f"the standard uncertainty of a position is {typical:.2g} infrared pixels in the median: "
+        "the images have too little in common",
+    )
+
+
+def _sandwich(
+    level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float64], basis: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], bool]:
+    """Covariance of the parameters, and whether there is no optimum."""
+    count, step = basis.shape[1], 0.25
+
+    def slope(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+        moved = matrix + (basis @ parameters).reshape(3, 3)
+        return np.asarray(_common_edges(level, frame, moved, basis)[1].sum(axis=0))
+
+    curve = np.array([(slope(step * e) - slope(-step * e)) / (2 * step) for e in np.eye(count)])
+    values, vectors = np.linalg.eigh(-(curve + curve.T) / 2)
+    flat = not values.min() > _FLAT * values.max()
+    inverse = vectors / np.maximum(values, _FLAT * max(values.max(), 1e-12)) @ vectors.T
+    _, slopes, here = _common_edges(level, frame, matrix, basis)
+    _, blocks = np.unique(level.blocks[level.sharp][here], return_inverse=True)
+    used = max(int(blocks.max()) + 1, count + 1)
+    sums = np.stack([np.bincount(blocks, part, used) for part in slopes.T], axis=1)
+    scattered = inverse @ (sums.T @ sums) @ inverse * used / (used - count)
+    return scattered + _SYSTEMATIC**2 * np.eye(count), flat

@@ -1,0 +1,430 @@
+"""Where a point of the infrared image is in the visible picture, and how surely."""
+
+from dataclasses import dataclass
+from math import ceil, hypot
+from typing import Final, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares
+from scipy.stats import f as f_distribution
+
+from chipglow.scene import Raster
+
+Model: TypeAlias = Literal["similarity", "affine", "homography"]
+Method: TypeAlias = Literal["points", "dots", "mutual-information"]
+MODELS: Final = ("similarity", "affine", "homography")
+METHODS: Final = ("points", "dots", "mutual-information")
+
+_PARAMETERS: Final = {"similarity": 4, "affine": 6, "homography": 8}
+_FLATTEST: Final = 0.01
+_WORST_CONDITION: Final = 1e6
+_UNLIKELY: Final = 0.01
+_EXACT: Final = 1e-9
+
+
+@dataclass(frozen=True)
+class Registration:
+    """A map from the infrared image onto the visible picture.
+
+    A position (x, y) in m becomes (column, row) = (X / W, Y / W) with
+    (X, Y, W) = `matrix` (x, y, 1). Columns and rows count from 0 in the middle of the upper left
+    pixel.
+
+    Parameters
+    ----------
+    matrix : ndarray
+        Shape (3, 3), its last element 1.
+    covariance : ndarray
+        Covariance of the elements of the matrix, row by row, shape (9, 9).
+    model : {"similarity", "affine", "homography"}
+        What the matrix may be.
+    method : {"points", "dots", "mutual-information"}
+        How it was found.
+    degrees_of_freedom : float
+        Of the covariance: Student's t with so many gives the intervals; infinite for mutual
+        information.
+    doubts : tuple of str
+        Why it cannot be trusted, a sentence each; empty if nothing speaks against it.
+
+    Raises
+    ------
+    ValueError
+        If a shape or a value is impossible.
+    """
+
+    matrix: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    model: Model
+    method: Method
+    degrees_of_freedom: float = np.inf
+    doubts: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name, value, shape in (
+            ("matrix", self.matrix, (3, 3)),
+            ("covariance", self.covariance, (9, 9)),
+        ):
+            if value.shape != shape or not np.isfinite(value).all():
+                raise ValueError(f"registration: {name}: expected finite numbers, shape {shape}")
+        if self.matrix[2, 2] != 1.0:
+            raise ValueError(
+                f"registration: matrix: its last element is {self.matrix[2, 2]:g}, expected 1"
+            )
+        if not abs(np.linalg.det(self.matrix)) > 0:
+            raise ValueError("registration: matrix: is singular, expected one with an inverse")
+        for name, text, known in (("model", self.model, MODELS), ("method", self.method, METHODS)):
+            if text not in known:
+                raise ValueError(f"registration: {name} is {text!r}, expected {' or '.join(known)}")
+        if not self.degrees_of_freedom > 0:
+            raise ValueError(
+                f"registration: degrees_of_freedom is {self.degrees_of_freedom!r}, expected over 0"
+            )
+
+    def pixels(self, positions: ArrayLike) -> NDArray[np.float64]:
+        """Column and row in the visible picture of positions x, y in m, shape (..., 2)."""
+        return mapped_places(self.matrix, np.asarray(positions, np.float64))
+
+    def positions(self, pixels: ArrayLike) -> NDArray[np.float64]:
+        """Position x, y in m of columns and rows of the visible picture, shape (..., 2)."""
+        back = np.asarray(np.linalg.inv(self.matrix), np.float64)
+        return mapped_places(back, np.asarray(pixels, np.float64))
+
+    def pixel_covariance(self, positions: ArrayLike) -> NDArray[np.float64]:
+        """Covariance of `pixels` in pixels², shape (..., 2, 2)."""
+        slope = element_slopes(self.matrix, np.asarray(positions, np.float64))
+        return np.asarray(slope @ self.covariance @ np.swapaxes(slope, -1, -2))
+
+    def position_covariance(self, positions: ArrayLike) -> NDArray[np.float64]:
+        """Covariance in m² of the position that is found for the pixel of each position.
+
+        Parameters
+        ----------
+        positions : array_like
+            x and y in m, shape (..., 2).
+
+        Returns
+        -------
+        ndarray
+            Shape (..., 2, 2).
+        """
+        back = np.linalg.inv(self.jacobian(positions))
+        return np.asarray(back @ self.pixel_covariance(positions) @ np.swapaxes(back, -1, -2))
+
+    def jacobian(self, positions: ArrayLike) -> NDArray[np.float64]:
+        """Pixels per m at positions: derivative of column and row by x and y, (..., 2, 2)."""
+        places = np.asarray(positions, np.float64)
+        depth = _depth(self.matrix, places)[..., None, None]
+        pixels = self.pixels(places)[..., None]
+        return np.asarray((self.matrix[:2, :2] - pixels * self.matrix[2, :2]) / depth)
+
+    def uncertainty(self, raster: Raster) -> tuple[float, float]:
+        """Standard uncertainty of a mapped position in m: median and greatest over an image.
+
+        It is the root of the sum of the variances along x and y.
+        """
+        places = np.stack(np.meshgrid(raster.x, raster.y), axis=-1)
+        variance = np.trace(self.position_covariance(places), axis1=-2, axis2=-1)
+        found = np.sqrt(np.maximum(variance, 0.0))
+        return float(np.median(found)), float(found.max())
+
+    def warp(
+        self, image: NDArray[np.floating], raster: Raster, shape: tuple[int, int]
+    ) -> NDArray[np.float64]:
+        """An infrared image as the visible camera would have it.
+
+        Parameters
+        ----------
+        image : ndarray
+            Values on the infrared camera's sensors, shape `raster.shape`.
+        raster : Raster
+            The sensors.
+        shape : tuple of int
+            Rows and columns of the visible picture.
+
+        Returns
+        -------
+        ndarray
+            The value of the nearest sensor for each visible pixel, NaN where there is none.
+        """
+        rows, columns = np.indices(shape)
+        place = self.positions(np.stack([columns, rows], axis=-1))
+        column = np.floor((place[..., 0] - raster.left) / raster.spacing)
+        row = np.floor((raster.top - place[..., 1]) / raster.spacing)
+        inside = (column >= 0) & (row >= 0) & (column < raster.columns) & (row < raster.rows)
+        warped = np.full(shape, np.nan)
+        warped[inside] = image[row[inside].astype(int), column[inside].astype(int)]
+        return warped
+
+
+@dataclass(frozen=True)
+class PointFit:
+    """A registration from points that were seen in both images.
+
+    Parameters
+    ----------
+    registration : Registration
+        The map.
+    residuals : ndarray
+        Found less given column and row of each point in visible pixels, shape (n, 2).
+    scatter : float
+        Standard deviation of a point's column or row in visible pixels: of both pickings.
+    misplaced : ndarray
+        Whether a point lies farther off than the others make likely, shape (n,).
+    """
+
+    registration: Registration
+    residuals: NDArray[np.float64]
+    scatter: float
+    misplaced: NDArray[np.bool_]
+
+
+def fit_points(positions: ArrayLike, pixels: ArrayLike, model: Model = "affine") -> PointFit:
+    """Register two images by points that are seen in both.
+
+    Parameters
+    ----------
+    positions : array_like
+        x and y in m in the infrared image, shape (n, 2).
+    pixels : array_like
+        Column and row in the visible picture, shape (n, 2).
+    model : {"similarity", "affine", "homography"}
+        Turn and scale, mirrored or not; or with shear; or with perspective.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer points than the model needs and one more, from which the uncertainty
+        comes; if they lie on a line; or if they leave the model open.
+
+    Notes
+    -----
+    Least squares of the distances in the visible picture, from the direct linear solution in
+    normalised coordinates (Hartley and Zisserman, Multiple View Geometry, 2nd ed., 4.1 and 4.4).
+    The scatter comes from the residuals; pickings in both images are in it, whichever was worse.
+    A point is misplaced if the F test of its residual against the scatter of the other points
+    (the externally studentised residual) is beyond 1 % over all points.
+    """
+    given, seen = _checked(positions, pixels, model)
+    frame = NormalisedFrame.around(given, seen)
+    found, target = frame.unit(given), frame.unit_pixels(seen)
+    best = min(
+        (_least(found, target, model, mirrored) for mirrored in _orientations(model)),
+        key=lambda fit: float(fit[1] @ fit[1]),
+    )
+    basis, residual, slope, matrix = best
+    freedom = residual.size - basis.shape[1]
+    if np.linalg.cond(slope) > _WORST_CONDITION:
+        raise ValueError(
+            f"points: they leave the {model} open, expected {_least_points(model)} or more that "
+            "are apart, no three on a line"
+        )
+    variance = float(residual @ residual) / freedom
+    inverse = np.linalg.inv(slope.T @ slope)
+    misplaced = _misplaced(residual, slope @ inverse @ slope.T, variance, freedom)
+    full, spread = frame.undone(matrix, basis @ (variance * inverse) @ basis.T)
+    doubts = tuple(
+        f"point {i + 1} is {hypot(*(residual.reshape(-1, 2)[i] * frame.pixel_scale)):.3g} visible "
+        "pixels from where the others expect it"
+        for i in np.flatnonzero(misplaced)
+    )
+    return PointFit(
+        Registration(full, spread, model, "points", float(freedom), doubts),
+        residual.reshape(-1, 2) * frame.pixel_scale,
+        float(np.sqrt(variance)) * frame.pixel_scale,
+        misplaced,
+    )
+
+
+@dataclass(frozen=True)
+class NormalisedFrame:
+    """Coordinates in which the numbers of a registration are of the order of 1.
+
+    Parameters
+    ----------
+    centre : ndarray
+        x and y in m that become 0.
+    scale : float
+        Length in m that becomes 1; y is turned round, so that it grows down as rows do.
+    pixel_centre : ndarray
+        Column and row that become 0.
+    pixel_scale : float
+        Visible pixels that become 1.
+    """
+
+    centre: NDArray[np.float64]
+    scale: float
+    pixel_centre: NDArray[np.float64]
+    pixel_scale: float
+
+    @classmethod
+    def around(
+        cls, positions: NDArray[np.float64], pixels: NDArray[np.float64]
+    ) -> "NormalisedFrame":
+        """The middle of points, and their distance from it, in both images."""
+        centre, pixel_centre = positions.mean(axis=0), pixels.mean(axis=0)
+        spreads = (
+            float(np.sqrt(((points - middle) ** 2).sum(axis=1).mean()))
+            for points, middle in ((positions, centre), (pixels, pixel_centre))
+        )
+        scale, pixel_scale = spreads
+        return cls(centre, scale, pixel_centre, pixel_scale)
+
+    def unit(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Positions in these coordinates."""
+        return np.asarray((positions - self.centre) / self.scale * [1.0, -1.0])
+
+    def unit_pixels(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Columns and rows in these coordinates."""
+        return np.asarray((pixels - self.pixel_centre) / self.pixel_scale)
+
+    def undone(
+        self, matrix: NDArray[np.float64], covariance: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """A matrix in these coordinates, and its covariance, for m and pixels."""
+        before, after = self._sides()
+        whole = after @ matrix @ before
+        slope = np.kron(after, before.T)
+        last = np.zeros(9)
+        last[8] = 1.0
+        slope = (slope - np.outer(whole.ravel() / whole[2, 2], last @ slope)) / whole[2, 2]
+        full = whole / whole[2, 2]
+        full[2, 2] = 1.0
+        return full, slope @ covariance @ slope.T
+
+    def _sides(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        x, y = self.centre / self.scale
+        before = np.array([[1 / self.scale, 0, -x], [0, -1 / self.scale, y], [0, 0, 1]])
+        column, row = self.pixel_centre
+        after = np.array([[self.pixel_scale, 0, column], [0, self.pixel_scale, row], [0, 0, 1]])
+        return before, after
+
+
+def parameter_basis(model: Model, mirrored: bool) -> NDArray[np.float64]:
+    """Elements of a matrix by the parameters of a model, shape (9, parameters).
+
+    The matrix is this times the parameters, and 1 for its last element.
+    """
+    if model != "similarity":
+        return np.eye(9)[:, : _PARAMETERS[model]]
+    sign = -1.0 if mirrored else 1.0
+    basis = np.zeros((9, 4))
+    basis[[0, 4], 0] = 1.0, sign
+    basis[[1, 3], 1] = -sign, 1.0
+    basis[2, 2] = basis[5, 3] = 1.0
+    return basis
+
+
+def _least(
+    found: NDArray[np.float64], target: NDArray[np.float64], model: Model, mirrored: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Basis, residuals, their slopes and the matrix of the least squares."""
+    basis, last = parameter_basis(model, mirrored), np.eye(3)[2]
+
+    def matrix_of(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+        return (basis @ parameters).reshape(3, 3) + np.outer(last, last)
+
+    def residual(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray((mapped_places(matrix_of(parameters), found) - target).ravel())
+
+    def slope(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray((element_slopes(matrix_of(parameters), found) @ basis).reshape(-1, k))
+
+    k = basis.shape[1]
+    begin = _direct(found, target) if model == "homography" else _linear(found, target, basis)
+    fit = least_squares(residual, begin, slope, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    return basis, residual(fit.x), slope(fit.x), matrix_of(fit.x)
+
+
+def _linear(
+    found: NDArray[np.float64], target: NDArray[np.float64], basis: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    slopes = (element_slopes(np.eye(3), found) @ basis).reshape(target.size, -1)
+    return np.asarray(np.linalg.lstsq(slopes, target.ravel())[0])
+
+
+def _direct(found: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The direct linear solution of a homography: the least singular vector."""
+    whole = np.concatenate([found, np.ones((len(found), 1))], axis=1)
+    none = np.zeros_like(whole)
+    rows = np.concatenate(
+        [
+            np.concatenate([whole, none, -target[:, :1] * whole], axis=1),
+            np.concatenate([none, whole, -target[:, 1:] * whole], axis=1),
+        ]
+    )
+    vector = np.linalg.svd(rows)[2][-1]
+    return np.asarray(vector[:8] / vector[8])
+
+
+def _checked(
+    positions: ArrayLike, pixels: ArrayLike, model: Model
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    given, seen = np.asarray(positions, np.float64), np.asarray(pixels, np.float64)
+    if model not in MODELS:
+        raise ValueError(f"model: {model!r}, expected {', '.join(MODELS)}")
+    if given.ndim != 2 or given.shape[1:] != (2,) or given.shape != seen.shape:
+        raise ValueError(f"points: shapes {given.shape} and {seen.shape}, expected (n, 2) twice")
+    if not (np.isfinite(given).all() and np.isfinite(seen).all()):
+        raise ValueError("points: a value is not finite, expected numbers")
+    least = _least_points(model)
+    if len(given) < least:
+        raise ValueError(
+            f"points: {len(given)} for the model {model!r}, expected {least} or more: one more "
+            "than it needs, so that the residuals tell the uncertainty"
+        )
+    for name, points in (("infrared image", given), ("visible picture", seen)):
+        _, lengths, _ = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+        if not lengths[1] > _FLATTEST * lengths[0]:
+            raise ValueError(
+                f"points: in the {name} they lie on a line, expected points spread in both "
+                "directions"
+            )
+    return given, seen
+
+
+def _least_points(model: Model) -> int:
+    return ceil(_PARAMETERS[model] / 2) + 1
+
+
+def _orientations(model: Model) -> tuple[bool, ...]:
+    return (False, True) if model == "similarity" else (False,)
+
+
+def _misplaced(
+    residual: NDArray[np.float64], hat: NDArray[np.float64], variance: float, freedom: int
+) -> NDArray[np.bool_]:
+    """The F test of every point against the scatter of the others, 1 % over all points."""
+    count = residual.size // 2
+    if freedom <= 2 or variance <= _EXACT**2:
+        return np.zeros(count, np.bool_)
+    misplaced = np.zeros(count, np.bool_)
+    for i in range(count):
+        part = slice(2 * i, 2 * i + 2)
+        own = float(residual[part] @ np.linalg.solve(np.eye(2) - hat[part, part], residual[part]))
+        others = max(variance * freedom - own, 0.0) / (freedom - 2)
+        ratio = own / 2 / others if others > 0 else np.inf
+        misplaced[i] = f_distribution.sf(ratio, 2, freedom - 2) < _UNLIKELY / count
+    return misplaced
+
+
+def _depth(matrix: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(places @ matrix[2, :2] + matrix[2, 2])
+
+
+def mapped_places(matrix: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What a matrix makes of places, shape (..., 2)."""
+    return np.asarray(
+        (places @ matrix[:2, :2].T + matrix[:2, 2]) / _depth(matrix, places)[..., None]
+    )
+
+
+def element_slopes(matrix: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Derivative of what a matrix maps places to by its elements, shape (..., 2, 9)."""
+    whole = np.concatenate([places, np.ones((*places.shape[:-1], 1))], axis=-1)
+    whole = whole / _depth(matrix, places)[..., None]
+    mapped = mapped_places(matrix, places)
+    slopes = np.zeros((*places.shape, 9))
+    slopes[..., 0, 0:3] = slopes[..., 1, 3:6] = whole
+    slopes[..., 6:9] = -mapped[..., None] * whole[..., None, :]
+    return slopes

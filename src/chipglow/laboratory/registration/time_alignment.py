@@ -1,0 +1,336 @@
+"""When two cameras took their frames: clocks with an unknown offset, by an event that both saw."""
+
+from dataclasses import dataclass
+from math import log
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct, idct
+from scipy.interpolate import CubicSpline
+from scipy.optimize import least_squares, minimize_scalar
+from scipy.stats import t as student
+
+from chipglow.laboratory.registration.registration import Registration
+from chipglow.scene import Raster
+
+_FEWEST: Final = 6
+_LEAST_OVERLAP: Final = 0.5
+_RIVAL: Final = 9.0
+_CHANCE: Final = 0.01
+_MOST_OFFSETS: Final = 2_000_000
+_AT_ONCE: Final = 200_000
+_PENALTIES: Final = (-6.0, 9.0)
+
+
+@dataclass(frozen=True)
+class TimeAlignment:
+    """How the visible camera's clock goes by the infrared camera's.
+
+    Visible time = infrared time + `offset` + `drift` (infrared time - `reference`).
+
+    Parameters
+    ----------
+    offset : float
+        In s, at the reference.
+    drift : float
+        In s/s; 0 where it was not asked for.
+    reference : float
+        In s of the infrared camera's clock.
+    covariance : ndarray
+        Covariance of offset and drift, shape (2, 2).
+    correlation : float
+        Of both signals as they lie on each other.
+    degrees_of_freedom : float
+        Of the covariance.
+    doubts : tuple of str
+        Why it cannot be trusted, a sentence each.
+    """
+
+    offset: float
+    drift: float
+    reference: float
+    covariance: NDArray[np.float64]
+    correlation: float
+    degrees_of_freedom: float
+    doubts: tuple[str, ...] = ()
+
+    def visible_time(self, infrared_time: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Times of the visible camera's clock in s."""
+        return infrared_time + self.offset + self.drift * (infrared_time - self.reference)
+
+    def uncertainty(self, infrared_time: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Standard uncertainty of `visible_time` in s."""
+        slope = np.stack([np.ones_like(infrared_time), infrared_time - self.reference], axis=-1)
+        return np.asarray(np.sqrt(((slope @ self.covariance) * slope).sum(axis=-1)))
+
+
+def align_times(
+    infrared_times: NDArray[np.float64],
+    infrared_signal: NDArray[np.float64],
+    visible_times: NDArray[np.float64],
+    visible_signal: NDArray[np.float64],
+    drift: bool = False,
+) -> TimeAlignment:
+    """Find the offset of two clocks from one signal that both cameras saw.
+
+    Parameters
+    ----------
+    infrared_times, visible_times : ndarray
+        Middles of the exposures in s of each camera's own clock, ascending, shapes (n,) and (m,).
+    infrared_signal, visible_signal : ndarray
+        A number a frame that tells of the same event: the position of the chip's edge, or the mean
+        brightness of a region. One may fall where the other rises.
+    drift : bool
+        Whether one clock may be faster than the other.
+
+    Raises
+    ------
+    ValueError
+        If there are too few frames, times do not ascend, or a signal does not change.
+
+    Notes
+    -----
+    The visible signal, smoothed by generalised cross-validation (Garcia, Comput. Stat. Data Anal.
+    54 (2010) 1167), is put to the infrared times; the correlation of both is greatest at the offset
+    that is least squares for infrared = a + b visible(time). All offsets are tried, a third
+    of a visible frame apart, at which at least half of the infrared frames have visible ones;
+    Gauss-Newton ends it. What the spline cannot follow, faster than the visible camera's frames,
+    goes into the residuals and with them into the uncertainty.
+    """
+    for name, times, values in (
+        ("infrared", infrared_times, infrared_signal),
+        ("visible", visible_times, visible_signal),
+    ):
+        _check(name, times, values)
+    smooth = _smoothed(visible_signal / np.std(visible_signal))
+    spline = CubicSpline(visible_times, smooth, extrapolate=False)
+    target = (infrared_signal - infrared_signal.mean()) / infrared_signal.std()
+    reference = float(infrared_times.mean())
+    offsets, correlations = _correlations(infrared_times, target, visible_times, spline)
+    best = int(np.abs(correlations).argmax())
+    fitted, covariance, freedom, correlation = _refined(
+        infrared_times - reference, target, spline, float(offsets[best]) + reference, drift
+    )
+    doubts = (
+        *_chance(correlation, freedom, len(offsets)),
+        *_rivals(offsets, correlations, best, len(target)),
+    )
+    return TimeAlignment(
+        fitted[0] - reference, fitted[1], reference, covariance, correlation, freedom, doubts
+    )
+
+
+def simultaneous_frames(
+    alignment: TimeAlignment,
+    infrared_times: NDArray[np.float64],
+    integration_time: float,
+    visible_times: NDArray[np.float64],
+    visible_exposure: float,
+) -> list[NDArray[np.int64]]:
+    """Visible frames that were exposed within each infrared integration.
+
+    Parameters
+    ----------
+    alignment : TimeAlignment
+        The clocks.
+    infrared_times : ndarray
+        When each integration began in s, shape (n,).
+    integration_time : float
+        In s.
+    visible_times : ndarray
+        When each visible exposure began in s, shape (m,).
+    visible_exposure : float
+        In s.
+
+    Returns
+    -------
+    list of ndarray
+        For each infrared frame the numbers of the visible frames, from 0; empty if there is none.
+    """
+    begin = alignment.visible_time(infrared_times)
+    end = alignment.visible_time(infrared_times + integration_time)
+    return [
+        np.flatnonzero((visible_times < last) & (visible_times + visible_exposure > first))
+        for first, last in zip(begin, end, strict=True)
+    ]
+
+
+def region_signals(
+    registration: Registration,
+    infrared: NDArray[np.floating],
+    raster: Raster,
+    visible: NDArray[np.generic],
+    region: tuple[float, float, float, float],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean brightness of one region in every frame of both cameras.
+
+    Parameters
+    ----------
+    registration : Registration
+        Where the region is in the visible pictures.
+    infrared : ndarray
+        Radiance, shape (time, y, x).
+    raster : Raster
+        The infrared sensors.
+    visible : ndarray
+        Brightness, shape (frame, row, column).
+    region : tuple of float
+        Left, bottom, right and top in m.
+
+    Returns
+    -------
+    tuple of ndarray
+        A number for every infrared and for every visible frame.
+
+    Raises
+    ------
+    ValueError
+        If the region is outside an image.
+    """
+    left, bottom, right, top = region
+    columns = (raster.x >= left) & (raster.x <= right)
+    rows = (raster.y >= bottom) & (raster.y <= top)
+    down, across = np.indices(visible.shape[1:])
+    place = registration.positions(np.stack([across, down], axis=-1))
+    inside = (place[..., 0] >= left) & (place[..., 0] <= right)
+    inside &= (place[..., 1] >= bottom) & (place[..., 1] <= top)
+    if not (columns.any() and rows.any() and inside.any()):
+        raise ValueError("region: is outside an image, expected one that both cameras see")
+    hot = infrared[:, rows][:, :, columns].reshape(len(infrared), -1).mean(axis=1)
+    bright = visible.reshape(len(visible), -1)[:, inside.ravel()].mean(axis=1)
+    return np.asarray(hot, np.float64), np.asarray(bright, np.float64)
+
+
+def _check(name: str, times: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    if times.ndim != 1 or times.shape != values.shape:
+        raise ValueError(
+            f"{name} signal: {values.size} values for {times.size} times, expected as many"
+        )
+    if times.size < _FEWEST:
+        raise ValueError(f"{name} signal: {times.size} frames, expected {_FEWEST} or more")
+    if not (np.isfinite(values).all() and (np.diff(times) > 0).all()):
+        raise ValueError(f"{name} signal: expected finite values at ascending times")
+    if not values.std() > 1e-9 * max(abs(values.mean()), 1e-300):
+        raise ValueError(f"{name} signal: does not change, expected an event that is seen in it")
+
+
+def _smoothed(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Least squares with a penalty on second differences, chosen by cross-validation."""
+    parts = dct(signal, norm="ortho")
+    rough = (2 - 2 * np.cos(np.pi * np.arange(signal.size) / signal.size)) ** 2
+
+    def loss(exponent: float) -> float:
+        kept = 1 / (1 + 10.0**exponent * rough)
+        rest = float((((1 - kept) * parts) ** 2).sum())
+        return rest / float((1 - kept).sum()) ** 2
+
+    best = minimize_scalar(loss, bounds=_PENALTIES, method="bounded").x
+    return np.asarray(idct(parts / (1 + 10.0**best * rough), norm="ortho"))
+
+
+def _correlations(
+    times: NDArray[np.float64],
+    target: NDArray[np.float64],
+    visible_times: NDArray[np.float64],
+    spline: CubicSpline,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Offsets in s on a grid, and the correlation at each."""
+    step = float(np.median(np.diff(visible_times))) / 3
+    low = visible_times[0] - np.quantile(times, 1 - _LEAST_OVERLAP)
+    high = visible_times[-1] - np.quantile(times, _LEAST_OVERLAP)
+    count = int((high - low) / step) + 1
+    if not 1 <= count <= _MOST_OFFSETS:
+        raise ValueError(
+            "signals: the series do not overlap, or are too long, expected up to "
+            f"{_MOST_OFFSETS // 3} visible frames and half of the infrared ones among them"
+        )
+    offsets = low + step * np.arange(count)
+    parts = np.array_split(offsets, max(offsets.size * times.size // _AT_ONCE, 1))
+    found = [_correlation(target, spline(times + part[:, None])) for part in parts]
+    return offsets, np.concatenate(found)
+
+
+def _correlation(target: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Correlation of each row of values with the target where both are known, shape (n,)."""
+    known = np.isfinite(values)
+    count = np.maximum(known.sum(axis=1, keepdims=True), 1)
+    one, other = np.where(known, target, 0.0), np.where(known, values, 0.0)
+    one = np.where(known, one - one.sum(axis=1, keepdims=True) / count, 0.0)
+    other = np.where(known, other - other.sum(axis=1, keepdims=True) / count, 0.0)
+    size = np.sqrt((one**2).sum(axis=1) * (other**2).sum(axis=1))
+    enough = count[:, 0] >= max(_FEWEST, _LEAST_OVERLAP * target.size)
+    product = (one * other).sum(axis=1)
+    return np.where(enough & (size > 0), product / np.maximum(size, 1e-300), 0.0)
+
+
+def _refined(
+    times: NDArray[np.float64],
+    target: NDArray[np.float64],
+    spline: CubicSpline,
+    begin: float,
+    drift: bool,
+) -> tuple[tuple[float, float], NDArray[np.float64], float, float]:
+    """Offset and drift of least squares, their covariance, degrees of freedom, correlation."""
+    known = np.isfinite(spline(times + begin))
+    times, target = times[known], target[known]
+    first, last = float(spline.x[0]), float(spline.x[-1])
+    span = max(float(np.abs(times).max()), 1e-300)
+    unit = float(np.median(np.diff(spline.x)))
+    scale = np.array([unit, unit / span] if drift else [unit])
+
+    def residual(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
+        shift = scale * parameters[2:]
+        moved = times + begin + shift[0] + (shift[1] * times if drift else 0.0)
+        values = spline(np.clip(moved, first, last))
+        return np.asarray(parameters[0] + parameters[1] * values - target)
+
+    slope, level = np.polyfit(spline(times + begin), target, 1)
+    start = np.concatenate([[level, slope], np.zeros(scale.size)])
+    fit = least_squares(residual, start, x_scale="jac")
+    freedom = max(times.size - start.size, 1)
+    inverse = np.linalg.pinv(fit.jac.T @ fit.jac)[2:, 2:]
+    covariance = np.zeros((2, 2))
+    covariance[: scale.size, : scale.size] = (
+        float(fit.fun @ fit.fun) / freedom * inverse * np.outer(scale, scale)
+    )
+    shift = scale * fit.x[2:]
+    correlation = float(np.corrcoef(target, target + fit.fun)[0, 1]) * float(np.sign(fit.x[1]))
+    return (
+        (begin + float(shift[0]), float(shift[1]) if drift else 0.0),
+        covariance,
+        float(freedom),
+        correlation,
+    )
+
+
+def _chance(correlation: float, freedom: float, offsets: int) -> tuple[str, ...]:
+    """A doubt where one of so many offsets would have such a correlation by chance."""
+    rest = max(1.0 - correlation**2, 1e-15)
+    likely = 2 * float(student.sf(abs(correlation) * np.sqrt(freedom / rest), freedom)) * offsets
+    if likely < _CHANCE:
+        return ()
+    return (
+        f"a correlation of {correlation:.2f} is no better than that of signals which have nothing "
+        "to do with each other",
+    )
+
+
+def _rivals(
+    offsets: NDArray[np.float64], correlations: NDArray[np.float64], best: int, count: int
+) -> tuple[str, ...]:
+    """A doubt for the best other offset that is nearly as likely, beyond the best one's peak."""
+    squares = correlations**2
+    below = squares < squares[best] / 2
+    left = np.flatnonzero(below[:best])
+    right = np.flatnonzero(below[best:])
+    others = squares.copy()
+    others[(left[-1] if left.size else 0) : (best + right[0] if right.size else None)] = 0.0
+    rival = int(others.argmax())
+    gain = count * log((1 - others[rival] + 1e-12) / (1 - squares[best] + 1e-12))
+    if gain > _RIVAL or others[rival] == 0.0:
+        return ()
+    return (
+        f"an offset of {(offsets[rival] - offsets[best]) * 1e6:.4g} us more fits nearly as well, "
+        f"with a correlation of {correlations[rival]:.2f}: the signals are periodic, or say little",
+    )

@@ -1,0 +1,28 @@
+"""Units and their text, values as tables print them, and fields declared once."""
+
+from chipglow.quantities.field_tables import FieldEntry, field_entries, field_tables
+from chipglow.quantities.format import quantity_text, rounded_text
+from chipglow.quantities.section import (
+    OR_NONE,
+    FileBeside,
+    Part,
+    Section,
+    allowed,
+    beside_the_study,
+    described,
+)
+
+__all__ = [
+    "OR_NONE",
+    "FieldEntry",
+    "FileBeside",
+    "Part",
+    "Section",
+    "allowed",
+    "beside_the_study",
+    "described",
+    "field_entries",
+    "field_tables",
+    "quantity_text",
+    "rounded_text",
+]

@@ -1,0 +1,252 @@
+"""Regions of interest of an image: polygons, rectangles and circles with names."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Final, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.scene.polygon import in_polygon
+from chipglow.scene.raster import Raster
+
+Point: TypeAlias = tuple[float, float]
+"""Column and row in pixels from the image's upper left corner, or x and y in m."""
+
+_ROUND: Final = 72
+_BEYOND: Final = 1e-6
+
+
+@dataclass(frozen=True)
+class Polygon:
+    """A polygon.
+
+    Parameters
+    ----------
+    corners : tuple of tuple
+        Its corners in order, three or more.
+
+    Raises
+    ------
+    ValueError
+        If a corner is not finite, or there are fewer than three.
+    """
+
+    corners: tuple[Point, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.corners) < 3:
+            raise ValueError(f"polygon: has {len(self.corners)} corners, expected 3 or more")
+        if not np.isfinite(self.corners).all():
+            raise ValueError("polygon: a corner is not finite, expected numbers")
+
+    @classmethod
+    def rectangle(cls, corner: Point, opposite: Point) -> "Polygon":
+        """An upright rectangle between two opposite corners."""
+        (left, top), (right, bottom) = corner, opposite
+        return cls(((left, top), (right, top), (right, bottom), (left, bottom)))
+
+    @property
+    def outline(self) -> NDArray[np.float64]:
+        """Points along its edge, shape (n, 2)."""
+        return np.array(self.corners, np.float64)
+
+    def holds(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which points lie in it."""
+        return in_polygon(self.corners, x, y)
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A circle.
+
+    Raises
+    ------
+    ValueError
+        If the centre is not finite or the radius is not over 0.
+    """
+
+    centre: Point
+    radius: float
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.centre).all():
+            raise ValueError(f"circle: centre is {self.centre!r}, expected numbers")
+        if not 0 < self.radius < np.inf:
+            raise ValueError(f"circle: radius is {self.radius!r}, expected over 0")
+
+    @property
+    def outline(self) -> NDArray[np.float64]:
+        """Points along its edge, shape (n, 2)."""
+        angle = np.linspace(0.0, 2 * np.pi, _ROUND, endpoint=False)
+        directions = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        return np.asarray(self.centre, np.float64) + self.radius * directions
+
+    def holds(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which points lie in it."""
+        return np.asarray(np.hypot(x - self.centre[0], y - self.centre[1]) <= self.radius)
+
+
+@dataclass(frozen=True)
+class Region:
+    """A part of an image with a name.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    shape : Polygon or Circle
+        What it covers.
+    feature : str, optional
+        What it is a part of, such as "chip body"; regions of one feature are taken together.
+        By default the region's own name.
+    unit : {"pixel", "m"}
+        "pixel": points are column and row, counted from the upper left corner of the image, so that
+        the middle of the first pixel is (0.5, 0.5). "m": points are x and y of the measurement.
+
+    Raises
+    ------
+    ValueError
+        If the name is empty or the unit is unknown.
+    """
+
+    name: str
+    shape: Polygon | Circle
+    feature: str = ""
+    unit: Literal["pixel", "m"] = "pixel"
+
+    def __post_init__(self) -> None:
+        if not self.name.strip():
+            raise ValueError("region: the name is empty, expected one such as chip body")
+        if self.unit not in ("pixel", "m"):
+            raise ValueError(f"region {self.name}: unit is {self.unit!r}, expected pixel or m")
+        if not self.feature:
+            object.__setattr__(self, "feature", self.name)
+
+    def mask(self, raster: Raster) -> NDArray[np.bool_]:
+        """Which pixels have their middle in the region.
+
+        Parameters
+        ----------
+        raster : Raster
+            The image's pixels.
+
+        Returns
+        -------
+        ndarray of bool
+            Shape (y, x).
+
+        Raises
+        ------
+        ValueError
+            If the region reaches beyond the image, or holds the middle of no pixel.
+        """
+        self._check_inside(raster)
+        columns, rows = np.arange(raster.columns) + 0.5, np.arange(raster.rows) + 0.5
+        x, y = (columns, rows) if self.unit == "pixel" else (raster.x, raster.y)
+        mask = self.shape.holds(*np.meshgrid(x, y))
+        if not mask.any():
+            raise ValueError(
+                f"region {self.name}: is empty, expected one that holds the middle of a pixel"
+            )
+        return mask
+
+    def outline(self, raster: Raster) -> NDArray[np.float64]:
+        """Points along its edge as x and y in m, shape (n, 2)."""
+        points = self.shape.outline
+        if self.unit == "m":
+            return points
+        corner = np.array([raster.left, raster.top])
+        return np.asarray(corner + raster.spacing * points * [1.0, -1.0])
+
+    def _check_inside(self, raster: Raster) -> None:
+        points = self.outline(raster)
+        places = (points - [raster.left, raster.top]) / raster.spacing * [1.0, -1.0]
+        for name, place, count in zip(
+            ("columns", "rows"), places.T, (raster.columns, raster.rows), strict=True
+        ):
+            if place.min() < -_BEYOND or place.max() > count + _BEYOND:
+                raise ValueError(
+                    f"region {self.name}: reaches over {name} {place.min():.4g} to "
+                    f"{place.max():.4g}, expected within the image's 0 to {count}"
+                )
+
+
+@dataclass(frozen=True, eq=False)
+class Area:
+    """Pixels of an image that a table has a row for: a region, or all regions of a feature.
+
+    Parameters
+    ----------
+    name, feature : str
+        Its name, and the feature that it belongs to.
+    mask : ndarray of bool
+        Its pixels, shape (y, x).
+    whole : bool
+        Whether it is all that there is of the feature.
+    """
+
+    name: str
+    feature: str
+    mask: NDArray[np.bool_]
+    whole: bool
+
+
+def areas(regions: Sequence[Region], raster: Raster) -> tuple[Area, ...]:
+    """Pixels of regions and of the features that they make up.
+
+    Parameters
+    ----------
+    regions : sequence of Region
+        The regions, each with a name of its own.
+    raster : Raster
+        The image's pixels.
+
+    Returns
+    -------
+    tuple of Area
+        One of each region, then one of each feature that has several regions. A pixel in two
+        regions of one feature counts once in the feature.
+
+    Raises
+    ------
+    ValueError
+        If there is no region, two of one name, or one that is outside the image or empty.
+    """
+    if not regions:
+        raise ValueError("regions: there are none, expected 1 or more")
+    parts: dict[str, list[Region]] = {}
+    for region in regions:
+        parts.setdefault(region.feature, []).append(region)
+    several = {feature: those for feature, those in parts.items() if len(those) > 1}
+    names = [region.name for region in regions] + list(several)
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(
+                f"region {name}: another region, or a feature of several, has that name, "
+                "expected names that differ"
+            )
+    single = [
+        Area(region.name, region.feature, region.mask(raster), region.feature not in several)
+        for region in regions
+    ]
+    joined = [
+        Area(feature, feature, np.any([part.mask(raster) for part in those], axis=0), True)
+        for feature, those in several.items()
+    ]
+    return (*single, *joined)
+
+
+def shared_pixels(regions: Sequence[Region], raster: Raster) -> dict[tuple[str, str], int]:
+    """How many pixels two regions of different features share, by their names.
+
+    Regions may overlap: a pixel then counts in each.
+    """
+    masks = {region.name: region.mask(raster) for region in regions}
+    shared = {
+        (one.name, other.name): int((masks[one.name] & masks[other.name]).sum())
+        for one, other in combinations(regions, 2)
+        if one.feature != other.feature
+    }
+    return {names: count for names, count in shared.items() if count}

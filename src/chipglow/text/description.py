@@ -1,0 +1,138 @@
+"""Descriptions: YAML files in, one clear line for whatever is wrong with them."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from chipglow.text.yaml_file import parse_yaml, read_yaml
+
+Kind = TypeVar("Kind", bound=BaseModel)
+
+
+class DescriptionError(ValueError):
+    """A description that is not possible: names the file, the field and what was expected."""
+
+
+def read_description(path: Path) -> Any:
+    """What a YAML file holds.
+
+    Raises
+    ------
+    DescriptionError
+        If it is too large or no YAML; the message names the file.
+    OSError
+        If it cannot be read.
+    """
+    try:
+        return read_yaml(path)
+    except ValueError as error:
+        raise DescriptionError(str(error)) from None
+
+
+def validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
+    """What a YAML file holds, as the section that it should be.
+
+    Parameters
+    ----------
+    kind : type
+        The section.
+    data : object
+        As `read_description` gives it.
+    name : str
+        The file, as errors call it.
+    folder : Path
+        Where files that it names are looked up.
+
+    Raises
+    ------
+    DescriptionError
+        If a field is not possible; the message names it, its value and what was expected.
+    """
+    try:
+        return kind.model_validate(data, context={"folder": folder.resolve()})
+    except ValidationError as error:
+        raise DescriptionError(f"{name}: {problem(error)}") from None
+
+
+def described_by(kind: type[Kind], path: Path, field: str, settings: Iterable[str]) -> Kind:
+    """What a YAML file describes, or what another file alone, named by a field, means.
+
+    Parameters
+    ----------
+    kind : type
+        The section that describes it.
+    path : Path
+        A YAML file (.yaml, .yml), or the other file.
+    field : str
+        Key of the description that names the other file.
+    settings : iterable of str
+        Fields that come before those of the file: ``units.length=mm``.
+
+    Raises
+    ------
+    DescriptionError
+        If the file is no YAML or the description is not possible.
+    OSError
+        If the file cannot be read.
+    """
+    described = path.suffix.lower() in (".yaml", ".yml")
+    data = read_description(path) if described else {field: path.name}
+    for setting in settings:
+        data = _with(data, setting)
+    return validated(kind, data, path.name, path.parent)
+
+
+def _with(data: Any, setting: str) -> Any:
+    """The description with one field set."""
+    place, equals, value = setting.partition("=")
+    names = place.strip().split(".")
+    if not equals or not all(names):
+        raise DescriptionError(f"--set {setting}: expected FIELD=VALUE such as units.length=mm")
+    try:
+        return placed(data, names, parse_yaml(value))
+    except ValueError as error:
+        raise DescriptionError(f"--set {setting}: {error}") from None
+
+
+def placed(data: Any, names: list[str], value: Any) -> Any:
+    """Data with the value at a place, given by the names of its sections."""
+    if not names:
+        return value
+    inside = data if isinstance(data, dict) else {}
+    return {**inside, names[0]: placed(inside.get(names[0]), names[1:], value)}
+
+
+def problem(error: ValidationError) -> str:
+    """One line for the first problem of a study: field, value and what was expected."""
+    first = error.errors(include_url=False)[0]
+    place = ".".join(_place(first["loc"]))
+    if first["type"] == "value_error":
+        message = str(first["ctx"]["error"])
+    elif first["type"] == "missing":
+        message = "is missing, expected a value"
+    elif first["type"] in ("union_tag_invalid", "union_tag_not_found"):
+        field = place.rpartition(".")[2]
+        or_none = ", or none" if field == "psf" else ""
+        message = f"{first['input']!r}, expected kind: {', '.join(_KINDS[field])}{or_none}"
+    else:
+        expectation = first["msg"].removeprefix("Input should be ").removeprefix("Value should be ")
+        message = f"{first['input']!r}, expected {expectation}"
+    message = message.removeprefix(f"{place.rpartition('.')[2]}: ")
+    return f"{place}: {message}" if place else message
+
+
+def _place(location: Sequence[str | int]) -> Iterator[str]:
+    """Names of sections and field; which kind a section is of is no name."""
+    before: str | int = ""
+    for part in location:
+        if part not in _KINDS.get(str(before), ()):
+            yield str(part)
+        before = part
+
+
+_KINDS: Final[Mapping[str, tuple[str, ...]]] = {
+    "psf": ("annular-aperture", "airy", "gaussian", "measured"),
+    "surface": ("features", "uniform", "map", "temperature", "phase"),
+}
