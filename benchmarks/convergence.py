@@ -17,7 +17,7 @@ from chipglow.laboratory.chip import NoShearBandError, find_shear_band, segmenta
 from chipglow.scene import Material, Raster, ToolGeometry
 
 CELLS = (20.0, 14.0, 10.0, 7.0, 5.0)
-WINDOW = OutputWindow(interval=1e-6)
+WINDOW = OutputWindow(interval=1e-6, later_bands=0)
 RASTER = Raster(-560e-6, 460e-6, 2e-6, 270, 300)
 
 

@@ -170,7 +170,9 @@ def view(simulation: CuttingSimulation) -> Raster:
 def compute(simulation: CuttingSimulation) -> Means:
     """Run a cut and take its means over what follows the first build-up of the chip."""
     length = simulation.conditions.length_of_cut
-    window = OutputWindow(BUILD_UP * length, length, STEP / simulation.conditions.speed)
+    window = OutputWindow(
+        BUILD_UP * length, length, STEP / simulation.conditions.speed, later_bands=0
+    )
     chip, history, seconds = cut(simulation, window)
     return Means(
         cutting_force=chip.cutting_mean,

@@ -22,7 +22,7 @@ from chipglow.cutting import (
     OutputWindow,
 )
 
-WINDOW = OutputWindow(start=0.9e-3, interval=1e-6)
+WINDOW = OutputWindow(start=0.9e-3, interval=1e-6, later_bands=0)
 
 
 def damaged(**changes: float) -> JohnsonCookDamage:

@@ -40,7 +40,9 @@ from chipglow.camera import (
     MeasuredPSF,
     Measurement,
     PointSpreadFunction,
+    ReadNoise,
     Recording,
+    ShotNoise,
     fit_linear,
 )
 from chipglow.camera.exposure import Exposure
@@ -222,13 +224,13 @@ class Laboratory:
         # TIFF is read in a process of its own, whose start takes longer than all the rest.
         self.edge_format = ".tif" if seed % 10 == 0 else ".npy"
         self.optics = hidden_optics(generator)
-        self.detector = Detector(
+        plain = Detector(
             gain=generator.uniform(0.85, 1.0),
             offset=generator.uniform(200.0, 400.0),
             bits=12,
-            read_noise=generator.uniform(1.5, 2.5),
-            counts_per_electron=4e-3,
-        ).with_pattern(SHAPE, 0.02, 12.0, 0.003, generator)
+            terms=(ShotNoise(4e-3), ReadNoise(generator.uniform(1.5, 2.5))),
+        )
+        self.detector = plain.with_pattern(SHAPE, 0.02, 12.0, 0.003, generator)
         self.room = 293.0 + ROOM * generator.standard_normal()
         self.certificate = CERTIFICATE * generator.standard_normal()
         self.oven = CELSIUS + generator.uniform(360.0, 420.0)  # of the heated chip

@@ -15,6 +15,7 @@ from chipglow.camera import (
     Detector,
     Measurement,
     NonUniformity,
+    ReadNoise,
     Recording,
     find_bad_pixels,
     fit_linear,
@@ -58,7 +59,8 @@ def _fits() -> dict[str, CalibrationFit[Any]]:
 def _draw_sensors() -> Figure:
     """A chip as it is, as the counts show it, and as the measurement does."""
     rng = np.random.default_rng(1)
-    detector = Detector(gain=1.8, bits=14, read_noise=3.0).with_pattern(SHAPE, 0.05, 40, 0.004, rng)
+    plain = Detector(gain=1.8, bits=14, terms=(ReadNoise(3.0),))
+    detector = plain.with_pattern(SHAPE, 0.05, 40, 0.004, rng)
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
     truth = 700.0 + 350.0 * np.exp(-((x - 50) ** 2 + (y - 25) ** 2) / 250.0)
     cold, hot, chip = (_seen(detector, kelvins, rng) for kelvins in (623.15, 1123.15, truth))

@@ -52,10 +52,10 @@ def blocks(records):
 
 
 def test_without_later_bands_the_window_alone_is_recorded():
-    found = recorded(saw_tooth(80e-6, 8), OutputWindow())
+    found = recorded(saw_tooth(80e-6, 8), OutputWindow(later_bands=0))
     # 1.579 to 1.958 mm at 0.8333 um an interval.
     assert (found[0], found[-1], len(found)) == (1895, 2349, 455)
-    assert Recorder(OutputWindow(), SPEED, 2.6e-3).last == 2349
+    assert Recorder(OutputWindow(later_bands=0), SPEED, 2.6e-3).last == 2349
 
 
 def test_later_bands_come_a_part_of_the_period_after_the_valleys():

@@ -202,7 +202,7 @@ def test_thermal_exponent_reaches_the_cut():
             numerics=Numerics(cell=30e-6),
         )
         raster = Raster(-100e-6, 100e-6, 10e-6, 20, 20)
-        window = OutputWindow(start=0.02e-3, end=0.03e-3, interval=1e-6)
+        window = OutputWindow(start=0.02e-3, end=0.03e-3, interval=1e-6, later_bands=0)
         history = simulation.run(window, raster, lambda frame: None)
         work.append(history.energy.friction_work[-1])
     # A fiftieth of the force at most, on a chip that slides up to ten times as fast for it.
@@ -234,7 +234,7 @@ def test_energy_account_of_a_short_cut_closes():
         CuttingConditions(length_of_cut=0.1e-3), numerics=Numerics(cell=30e-6)
     )
     raster = Raster(-100e-6, 100e-6, 10e-6, 20, 20)
-    window = OutputWindow(start=0.09e-3, end=0.1e-3, interval=1e-6)
+    window = OutputWindow(start=0.09e-3, end=0.1e-3, interval=1e-6, later_bands=0)
     history = simulation.run(window, raster, lambda frame: None)
     energy = history.energy
     # The force through the tool and the work of the drive are counted apart; inertia is 1 %.

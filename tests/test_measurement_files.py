@@ -12,7 +12,7 @@ from analytic_chip import AnalyticChip
 from PIL import Image
 from typer.testing import CliRunner
 
-from chipglow.camera import Detector, Flag, Recording, fit_linear, fit_sakuma_hattori
+from chipglow.camera import Detector, Flag, ReadNoise, Recording, fit_linear, fit_sakuma_hattori
 from chipglow.cli import app
 from chipglow.io import is_measurement, read_measurement, write_measurement, write_scene
 from chipglow.io.cameras import read_recording, write_hcc
@@ -39,7 +39,7 @@ BAND = Band(3.8e-6, 5.1e-6)
 SHAPE = (30, 40)
 CELSIUS = np.arange(300.0, 1001.0, 100.0)
 TEMPERATURE_UNCERTAINTY, COUNT_UNCERTAINTY = 0.3, 1.0
-DETECTOR = Detector(gain=1.8, offset=400.0, bits=14, read_noise=3.0).with_pattern(
+DETECTOR = Detector(gain=1.8, offset=400.0, bits=14, terms=(ReadNoise(3.0),)).with_pattern(
     SHAPE, 0.03, 20.0, 0.003, np.random.default_rng(5)
 )
 Y, X = np.mgrid[: SHAPE[0], : SHAPE[1]]

@@ -14,10 +14,12 @@ from chipglow.cli import progress
 from chipglow.errors import Distribution
 from chipglow.errors.cut_error import Plan, analyse
 from chipglow.errors.draws import Headline
+from chipglow.radiometry import Band
 from chipglow.report import comparison_rows, write_report
 from chipglow.scene import Raster
 from chipglow.study import Study, expected_cost, fit, load_study, study_text
 from chipglow.study.assumed import left_to_the_paper
+from chipglow.study.camera_presets import CAMERAS
 from chipglow.surface import CHIP_1, CHIP_2
 from chipglow.text import DescriptionError
 
@@ -228,3 +230,28 @@ def test_a_part_of_an_error_of_unknown_sign_is_not_told():
     assert Headline(error, portion).psf_share is None
     known = Distribution(np.array([[[-30.0, -10.0, -20.0]]]), causes)
     assert Headline(known, portion).psf_share.mean == pytest.approx((1 / 3 + 1 + 1 / 2) / 3)
+
+
+def test_a_camera_by_name_has_its_data_sheets_numbers_and_says_where_they_stand():
+    study = Study(camera={"preset": "flir-lepton-3", "magnification": 0.5, "frame_rate": "9 Hz"})
+    camera = study.camera.build()
+    assert (camera.band, camera.pitch) == (Band(8e-6, 14e-6), pytest.approx(24e-6, rel=1e-12))
+    assert (study.camera.array, camera.frame_rate) == ((160, 120), 9.0)
+    # NA = m / (2 N (1 + m)) of a lens that is focused at infinity.
+    assert camera.psf.numerical_aperture == pytest.approx(0.5 / (2 * 1.1 * 1.5), rel=1e-12)
+    assert not study.is_papers
+    said = " ".join(left_to_the_paper(study))
+    assert "integration_time 10 us" in said
+    assert "band" not in said.split("camera")[-1]
+    for preset in CAMERAS.values():
+        assert preset.source
+
+
+def test_an_unknown_camera_is_refused():
+    with pytest.raises(ValueError, match="'lepton' is unknown, expected one of flir-lepton-3"):
+        Study(camera={"preset": "lepton"})
+
+
+def test_a_preset_needs_its_magnification():
+    with pytest.raises(ValueError, match="magnification: is missing"):
+        Study(camera={"preset": "alpha-nir"})

@@ -30,7 +30,7 @@ SIMULATION = CuttingSimulation(
     CuttingConditions(length_of_cut=0.05e-3),
     numerics=Numerics(cell=25e-6, upstream=0.3e-3, downstream=0.3e-3, depth=0.2e-3, height=0.5e-3),
 )
-WINDOW = OutputWindow(start=0.03e-3, end=0.05e-3, interval=0.5e-6)
+WINDOW = OutputWindow(start=0.03e-3, end=0.05e-3, interval=0.5e-6, later_bands=0)
 RASTER = Raster(left=-100e-6, top=150e-6, spacing=5e-6, rows=26, columns=24)
 COARSE = replace(RASTER, spacing=10e-6, rows=13, columns=12)
 STUDY = """

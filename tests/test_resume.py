@@ -38,7 +38,7 @@ SIMULATION = CuttingSimulation(
     CuttingConditions(length_of_cut=0.1e-3),
     numerics=Numerics(cell=20e-6, upstream=0.3e-3, downstream=0.3e-3, depth=0.2e-3, height=0.5e-3),
 )
-WINDOW = OutputWindow(start=0.02e-3, end=0.1e-3, interval=1e-6)
+WINDOW = OutputWindow(start=0.02e-3, end=0.1e-3, interval=1e-6, later_bands=0)
 RASTER = Raster(left=-100e-6, top=200e-6, spacing=5e-6, rows=36, columns=27)
 
 COMMAND = """

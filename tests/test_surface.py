@@ -389,11 +389,11 @@ def test_feature_surface_refuses(changed, message):
 
 
 def test_emissivities_refuse():
-    with pytest.raises(ValueError, match=r"expected a mean of 0 to 1, got 1.2"):
+    with pytest.raises(ValueError, match=r"Emissivity.mean: 1.2, expected 0 to 1"):
         Emissivity(1.2, 0.1)
-    with pytest.raises(ValueError, match=r"expected a deviation of 0 to 0.441 about a mean of 0.4"):
-        Emissivity(0.4, -0.1)
-    with pytest.raises(ValueError, match=r"expected a deviation of 0 to 0 about a mean of 1"):
+    with pytest.raises(ValueError, match=r"0.45, expected up to 0.441 about a mean of 0.4"):
+        Emissivity(0.4, 0.45)
+    with pytest.raises(ValueError, match=r"deviation: 0.1, expected up to 0 about a mean of 1"):
         Emissivity(1.0, 0.1)
     with pytest.raises(ValueError, match=r"emissivity: expected 0 to 1, got -0.5"):
         UniformSurface(-0.5)

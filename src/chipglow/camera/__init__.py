@@ -18,21 +18,36 @@ from chipglow.camera.detector.bad_pixels import (
 )
 from chipglow.camera.detector.detector import Detector
 from chipglow.camera.detector.nonuniformity import NonUniformity
+from chipglow.camera.detector.terms import (
+    DETECTOR_TERMS,
+    DeadElements,
+    DetectorTerm,
+    FixedPattern,
+    ReadNoise,
+    ShotNoise,
+)
 from chipglow.camera.exposure import Exposure, expose, expose_all, frame_weights
 from chipglow.camera.measurement import UNUSABLE, Flag, Measurement
 from chipglow.camera.optics.convolution import blur
 from chipglow.camera.optics.psf import (
+    PSFS,
+    AiryAperture,
     AnnularAperturePSF,
     GaussianPSF,
     MeasuredPSF,
+    MeasuredPSFFile,
     PointSpreadFunction,
+    PSFChoice,
 )
 from chipglow.camera.recording import PlanckConversion, Recording
 from chipglow.camera.warning import ChipglowWarning
 
 __all__ = [
+    "DETECTOR_TERMS",
     "LEAST_FRAMES",
+    "PSFS",
     "UNUSABLE",
+    "AiryAperture",
     "AnnularAperturePSF",
     "BadPixels",
     "Blackbody",
@@ -40,20 +55,27 @@ __all__ = [
     "CalibrationFit",
     "Camera",
     "ChipglowWarning",
+    "DeadElements",
     "Detector",
+    "DetectorTerm",
     "Exposure",
     "FittedCalibration",
+    "FixedPattern",
     "Flag",
     "GaussianPSF",
     "LinearCalibration",
     "MakersCalibration",
     "MeasuredPSF",
+    "MeasuredPSFFile",
     "Measurement",
     "NonUniformity",
+    "PSFChoice",
     "PlanckConversion",
     "PointSpreadFunction",
+    "ReadNoise",
     "Recording",
     "SakumaHattori",
+    "ShotNoise",
     "blur",
     "expose",
     "expose_all",

@@ -107,11 +107,16 @@ def init(
         bool,
         typer.Option("--measurement", help="Write the description of a camera's file instead."),
     ] = False,
+    schema: Annotated[
+        bool,
+        typer.Option("--schema", help="Write its JSON schema, for editors that check YAML."),
+    ] = False,
 ) -> None:
     """Write the paper's study as a commented YAML file."""
     from chipglow.io import ImportDescription, atomic_path, import_text
     from chipglow.laboratory.measurement import MeasurementDescription, measurement_text
     from chipglow.study import Study, study_text
+    from chipglow.text import json_schema
 
     if of_import and of_measurement:
         raise ValueError("--measurement: expected only one of --import and --measurement")
@@ -119,11 +124,12 @@ def init(
         raise FileExistsError(f"{path}: is there already, expected a new name or --force")
     with atomic_path(path) as temporary:
         if of_import:
-            text = import_text(ImportDescription())
+            text = json_schema(ImportDescription) if schema else import_text(ImportDescription())
         elif of_measurement:
-            text = measurement_text(MeasurementDescription())
+            measurement = MeasurementDescription
+            text = json_schema(measurement) if schema else measurement_text(measurement())
         else:
-            text = study_text(Study())
+            text = json_schema(Study) if schema else study_text(Study())
         temporary.write_text(text, encoding="utf-8")
     print(path)
 

@@ -27,7 +27,7 @@ from chipglow.io.sources.mesh import MeshSource
 from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap, metre_per_pixel
 from chipglow.io.sources.unit_text import parse_unit
 from chipglow.io.tool_section import ToolSection
-from chipglow.quantities.section import OR_NONE, FileBeside, Part, Section, described
+from chipglow.quantities import OR_NONE, FileBeside, Section, Settings, described
 from chipglow.quantities.units import Length, Position, Speed, Temperature, Time
 from chipglow.scene.completion import Completion
 from chipglow.text import commented_yaml, described_by
@@ -49,16 +49,16 @@ ColourSection = Annotated[tuple[int, int, int], Strict(False)]
 BoxSection = Annotated[tuple[int, int, int, int], Strict(False)]
 
 
-class UnitsSection(Part):
+class UnitsSection(Settings[Units]):
     """Units of the source."""
 
     length: str = described("m", "Unit of positions and lengths.", "m, mm, um, in, ...")
     time: str = described("s", "Unit of times.", "s, ms, us, ...")
     temperature: str = described("K", "Unit of temperatures.", "K, degC, degF")
-    velocity: Annotated[str | None, *OR_NONE] = described(
+    velocity: Annotated[str | None, OR_NONE] = described(
         "none", "Unit of velocities; none: made of length and time.", "none, m/s, mm/s, m/min, ..."
     )
-    strain_rate: Annotated[str | None, *OR_NONE] = described(
+    strain_rate: Annotated[str | None, OR_NONE] = described(
         "none", "Unit of strain rates; none: made of the time.", "none, 1/s, 1/ms, ..."
     )
 
@@ -84,7 +84,7 @@ def _unit(quantity: str, name: str, text: str) -> Unit:
         raise ValueError(f"{name}: {error}") from None
 
 
-class PlacementSection(Part):
+class PlacementSection(Settings[Placement]):
     """How the source's axes lie in the scene, whose x runs along the cut and whose y goes up."""
 
     horizontal: str = described(
@@ -106,14 +106,14 @@ class PlacementSection(Part):
         return Placement(self.horizontal, self.vertical, origin)
 
 
-class ViewSection(Part):
+class ViewSection(Settings[View]):
     """Where the scene is sampled; what is not said is as in the source."""
 
-    left: Annotated[Position | None, *OR_NONE] = described("none", "Left edge.")
-    right: Annotated[Position | None, *OR_NONE] = described("none", "Right edge.")
-    bottom: Annotated[Position | None, *OR_NONE] = described("none", "Lower edge.")
-    top: Annotated[Position | None, *OR_NONE] = described("none", "Upper edge.")
-    spacing: Annotated[Length | None, *OR_NONE] = described(
+    left: Annotated[Position | None, OR_NONE] = described("none", "Left edge.")
+    right: Annotated[Position | None, OR_NONE] = described("none", "Right edge.")
+    bottom: Annotated[Position | None, OR_NONE] = described("none", "Lower edge.")
+    top: Annotated[Position | None, OR_NONE] = described("none", "Upper edge.")
+    spacing: Annotated[Length | None, OR_NONE] = described(
         "none",
         "Side of a sample; none: the source's own, or 900 samples along the longer side.",
         "none, or over 0 um",
@@ -124,16 +124,16 @@ class ViewSection(Part):
         return View(self.left, self.right, self.bottom, self.top, self.spacing)
 
 
-class CompletionSection(Part):
+class CompletionSection(Settings[Completion]):
     """What stands in for what the source does not have."""
 
     surroundings: Temperature = described(
         "20 degC", "Temperature where there is no material, and of a tool that has none."
     )
-    cutting_speed: Annotated[Speed | None, *OR_NONE] = described(
+    cutting_speed: Annotated[Speed | None, OR_NONE] = described(
         "none", "Speed of the workpiece, for a source without velocity.", "none, or over 0 m/min"
     )
-    chip: Annotated[Corners | None, *OR_NONE] = described(
+    chip: Annotated[Corners | None, OR_NONE] = described(
         "none",
         "Corners of the chip, for a source without plastic strain.",
         "none, or [[-300 um, 0 um], [-50 um, 0 um], [-50 um, 400 um]]",
@@ -169,20 +169,20 @@ class SourceSection(Section):
 class FieldMovieSection(Section):
     """A movie of one field."""
 
-    file: Annotated[FileBeside | None, *OR_NONE] = described("none", "The movie.")
+    file: Annotated[FileBeside | None, OR_NONE] = described("none", "The movie.")
     first: str | int | float = described(
         "", "Value of the first colour, or at the bottom or left of the legend."
     )
     last: str | int | float = described(
         "", "Value of the last colour, or at the top or right of the legend."
     )
-    colours: Annotated[str | None, *OR_NONE] = described(
+    colours: Annotated[str | None, OR_NONE] = described(
         "none",
         "Name of the colour map; none: the legend in the picture is read.",
         "none, rainbow, jet, viridis, ... of matplotlib",
     )
     bands: int = described(0, "Number of the map's bands; 0: it runs without steps.", "0, 2 to 256")
-    legend: Annotated[BoxSection | None, *OR_NONE] = described(
+    legend: Annotated[BoxSection | None, OR_NONE] = described(
         "none",
         "Left, top, right and bottom pixel of the legend's colours; none: it is looked for.",
         "none, or [600, 40, 620, 400]",
@@ -193,27 +193,27 @@ class MovieSection(SourceSection):
     """Movies of fields with a colour scale, a movie a field."""
 
     temperature: FieldMovieSection = described({}, "The movie of the temperature.")
-    plastic_strain: Annotated[FieldMovieSection | None, *OR_NONE] = described(
+    plastic_strain: Annotated[FieldMovieSection | None, OR_NONE] = described(
         "none", "The movie of the plastic strain."
     )
-    plastic_strain_rate: Annotated[FieldMovieSection | None, *OR_NONE] = described(
+    plastic_strain_rate: Annotated[FieldMovieSection | None, OR_NONE] = described(
         "none", "The movie of the plastic strain rate."
     )
-    pixel: Annotated[Length | None, *OR_NONE] = described("none", "Side of a pixel.")
-    scale_from: Annotated[Pixels | None, *OR_NONE] = described(
+    pixel: Annotated[Length | None, OR_NONE] = described("none", "Side of a pixel.")
+    scale_from: Annotated[Pixels | None, OR_NONE] = described(
         "none", "A point whose distance from another is known, in pixels right and down.",
         "none, or [120, 400]",
     )  # fmt: skip
-    scale_to: Annotated[Pixels | None, *OR_NONE] = described("none", "The other point.")
-    scale_length: Annotated[Length | None, *OR_NONE] = described("none", "Their distance.")
+    scale_to: Annotated[Pixels | None, OR_NONE] = described("none", "The other point.")
+    scale_length: Annotated[Length | None, OR_NONE] = described("none", "Their distance.")
     origin: Pixels = described(
         [0.0, 0.0], "The tip of the tool, in pixels right and down from the upper left corner."
     )
-    crop: Annotated[BoxSection | None, *OR_NONE] = described(
+    crop: Annotated[BoxSection | None, OR_NONE] = described(
         "none", "Left, top, right and bottom pixel of what shows the field; none: all."
     )
     every: int = described(1, "Take one picture of so many.", "1 or more")
-    background: Annotated[tuple[ColourSection, ...] | None, Strict(False), *OR_NONE] = described(
+    background: Annotated[tuple[ColourSection, ...] | None, Strict(False), OR_NONE] = described(
         "none",
         "Colours of where nothing is; none: looked for at the border.",
         "none, or [[255, 255, 255]]",
@@ -227,7 +227,7 @@ class MovieSection(SourceSection):
     tool_polygon: Annotated[tuple[Pixels, ...], Strict(False)] = described(
         [], "Corners of the tool in pixels; two are the corners of a box."
     )
-    tool_colour: Annotated[ColourSection | None, *OR_NONE] = described(
+    tool_colour: Annotated[ColourSection | None, OR_NONE] = described(
         "none", "Colour of a tool that shows no values."
     )
 
@@ -311,7 +311,7 @@ _EXAMPLES: Final = {
 class MeshSection(SourceSection):
     """Finite-element results."""
 
-    section: Annotated[Position | Literal["facing"] | None, *OR_NONE] = described(
+    section: Annotated[Position | Literal["facing"] | None, OR_NONE] = described(
         "none",
         "Of solid elements: where to cut along the axis of depth, or the surface that faces the\n"
         "camera.",
@@ -320,10 +320,10 @@ class MeshSection(SourceSection):
     tool_parts: Annotated[tuple[str | int, ...], Strict(False)] = described(
         [], "Names of the blocks, parts or sets that are tool, or their numbers.", "[TOOL], [2]"
     )
-    part_field: Annotated[str | None, *OR_NONE] = described(
+    part_field: Annotated[str | None, OR_NONE] = described(
         "none", "Field of elements that numbers the parts; none: it is guessed."
     )
-    displacement: Annotated[str | None, *OR_NONE] = described(
+    displacement: Annotated[str | None, OR_NONE] = described(
         "none", "Field of node vectors to be added to the positions."
     )
 
@@ -345,14 +345,14 @@ class MeshSection(SourceSection):
 class PointsSection(SourceSection):
     """Points, as of smoothed particles or material points."""
 
-    spacing: Annotated[Length | None, *OR_NONE] = described(
+    spacing: Annotated[Length | None, OR_NONE] = described(
         "none", "Distance of neighbours before the cut; none: from volumes or the first frame."
     )
     tool_parts: Annotated[tuple[int, ...], Strict(False)] = described(
         [], "Numbers of the part field that are tool.", "[], [2]"
     )
     depth: Position = described("0 um", "Middle of the slab that is seen of points in space.")
-    thickness: Annotated[Length | None, *OR_NONE] = described(
+    thickness: Annotated[Length | None, OR_NONE] = described(
         "none", "Thickness of that slab; none: all points."
     )
 
@@ -374,24 +374,24 @@ class PointsSection(SourceSection):
 class GridSection(SourceSection):
     """Arrays on a regular grid."""
 
-    files: Annotated[dict[str, FileBeside] | None, *OR_NONE] = described(
+    files: Annotated[dict[str, FileBeside] | None, OR_NONE] = described(
         "none",
         "Files by the names of fields, in the place of source.",
         "none, or {temperature: T.npy, plastic_strain: strain.npy}",
     )
-    axes: Annotated[tuple[str, ...] | None, Strict(False), *OR_NONE] = described(
+    axes: Annotated[tuple[str, ...] | None, Strict(False), OR_NONE] = described(
         "none", "Order of the arrays' axes; none: as the file says, or [time, y, x]."
     )
     top_first: bool = described(True, "Whether row 0 is the top one, without a coordinate y.")
-    spacing: Annotated[Length | None, *OR_NONE] = described(
+    spacing: Annotated[Length | None, OR_NONE] = described(
         "none", "Distance of the columns; none: as the file says."
     )
-    row_spacing: Annotated[Length | None, *OR_NONE] = described(
+    row_spacing: Annotated[Length | None, OR_NONE] = described(
         "none", "Distance of the rows; none: that of the columns."
     )
     left: Position = described("0 um", "Left edge of the grid, with spacing.")
     top: Position = described("0 um", "Upper edge of the grid, with spacing.")
-    void_value: Annotated[float | None, *OR_NONE] = described(
+    void_value: Annotated[float | None, OR_NONE] = described(
         "none", "Number that stands for no material; NaN always does."
     )
 
@@ -416,10 +416,10 @@ class GridSection(SourceSection):
 class ImportDescription(Section):
     """An import: which source, what its fields mean, where they are sampled."""
 
-    source: Annotated[FileBeside | None, *OR_NONE] = described(
+    source: Annotated[FileBeside | None, OR_NONE] = described(
         "none", "The file, or a pattern for several: chip_*.vtu."
     )
-    kind: Annotated[Literal["movie", "mesh", "points", "grid"] | None, *OR_NONE] = described(
+    kind: Annotated[Literal["movie", "mesh", "points", "grid"] | None, OR_NONE] = described(
         "none", "What the source is; none: told by the file's name.", "movie, mesh, points, grid"
     )
     fields: dict[str, str] = described(
@@ -428,12 +428,12 @@ class ImportDescription(Section):
         "{temperature: NT11, plastic_strain: PEEQ, plastic_strain_rate: ..., velocity: V}",
     )
     units: UnitsSection = described({}, "Units of the source: SI if nothing is said.")
-    interval: Annotated[Time | None, *OR_NONE] = described(
+    interval: Annotated[Time | None, OR_NONE] = described(
         "none", "Time from frame to frame; none: as the source says."
     )
     placement: PlacementSection = described({}, "How the source's axes lie in the scene.")
     field_of_view: ViewSection = described({}, "Where the scene is sampled.")
-    tool: Annotated[ToolSection | None, *OR_NONE] = described(
+    tool: Annotated[ToolSection | None, OR_NONE] = described(
         "none", "The tool's outline with its tip at the origin: what is in it is tool."
     )
     completion: CompletionSection = described({}, "What stands in for what the source lacks.")

@@ -2,38 +2,16 @@
 
 from typing import Annotated, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
 from chipglow.cutting import material_names, tool_material
 from chipglow.io.tool_file import read_tool_outline
-from chipglow.quantities import OR_NONE, FileBeside, Part, described
+from chipglow.quantities import OR_NONE, Declared, FileBeside, Settings, described
 from chipglow.quantities.units import Angle, Length
 from chipglow.scene import Chamfer, Hone, Tool, ToolGeometry
 
 
-class ChamferSection(Part):
-    """A chamfer of the cutting edge."""
-
-    width: Length = Field(description="Width of the land, between its sharp corners.")
-    angle: Angle = Field(description="Angle between the land and the rake face.")
-
-    def build(self) -> Chamfer:
-        """The chamfer."""
-        return Chamfer(self.width, self.angle)
-
-
-class HoneSection(Part):
-    """A hone of the cutting edge."""
-
-    rake: Length = Field(description="Where it begins on the rake face, from the sharp edge.")
-    clearance: Length = Field(description="The same on the clearance face.")
-
-    def build(self) -> Hone:
-        """The hone."""
-        return Hone(self.rake, self.clearance)
-
-
-class ToolSection(Part):
+class ToolSection(Settings[Tool]):
     """The cutting tool."""
 
     rake_angle: Angle = described(
@@ -49,18 +27,18 @@ class ToolSection(Part):
     edge_radius: Length = described(
         "20 um", "Radius of the cutting edge, or of a chamfer's corners.", "over 0 um"
     )
-    chamfer: Annotated[ChamferSection | None, *OR_NONE] = described(
+    chamfer: Annotated[Declared[Chamfer] | None, OR_NONE] = described(
         "none",
         "Chamfer of the edge: the width between sharp corners, the angle from the rake face.",
         "none, or {width: 100 um, angle: 20 deg}",
     )
-    hone: Annotated[HoneSection | None, *OR_NONE] = described(
+    hone: Annotated[Declared[Hone] | None, OR_NONE] = described(
         "none",
         "Hone in the place of the edge's radius: how far from the sharp edge it begins on\n"
         "either face.",
         "none, or {rake: 40 um, clearance: 20 um}",
     )
-    outline: Annotated[FileBeside | None, *OR_NONE] = described(
+    outline: Annotated[FileBeside | None, OR_NONE] = described(
         "none",
         "File of an outline in the place of all these: its first line x_um,y_um, then a point a\n"
         "line, from the rake face round the edge to the clearance face.",
@@ -93,10 +71,6 @@ class ToolSection(Part):
         if self.outline:
             try:
                 return read_tool_outline(self.outline)
-            except OSError as error:
-                raise ValueError(
-                    f"outline: {self.outline}: {error.strerror}, expected an outline's file"
-                ) from None
             except ValueError as error:
                 raise ValueError(f"outline: {error}") from None
         return ToolGeometry(

@@ -2,10 +2,10 @@
 
 from chipglow.quantities.field_tables import FieldEntry, field_entries, field_tables
 from chipglow.quantities.format import quantity_text, rounded_text
+from chipglow.quantities.part import Declared, Family, Parameter, Part, Settings
 from chipglow.quantities.section import (
     OR_NONE,
     FileBeside,
-    Part,
     Section,
     allowed,
     beside_the_study,
@@ -14,10 +14,14 @@ from chipglow.quantities.section import (
 
 __all__ = [
     "OR_NONE",
+    "Declared",
+    "Family",
     "FieldEntry",
     "FileBeside",
+    "Parameter",
     "Part",
     "Section",
+    "Settings",
     "allowed",
     "beside_the_study",
     "described",

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass
 
+from chipglow.quantities.part import Parameter
 from chipglow.quantities.section import Section, allowed
 from chipglow.quantities.units import Quantity
 
@@ -38,7 +39,7 @@ def field_entries(section: Section) -> Iterator[FieldEntry]:
     for name, field in type(section).model_fields.items():
         if isinstance(getattr(section, name), Section):
             continue
-        units = [part.unit for part in field.metadata if isinstance(part, Quantity)]
+        units = [_unit(one) for one in field.metadata]
         yield FieldEntry(
             name=name,
             meaning=_one_line(field.description),
@@ -73,6 +74,11 @@ def _table_lines(section: Section, name: str) -> Iterator[str]:
         value = getattr(section, key)
         if isinstance(value, Section):
             yield from _table_lines(value, f"{name}.{key}")
+
+
+def _unit(metadata: object) -> str:
+    quantity = metadata.quantity if isinstance(metadata, Parameter) else metadata
+    return quantity.unit if isinstance(quantity, Quantity) else ""
 
 
 def _one_line(text: str | None) -> str:

@@ -1,24 +1,25 @@
 """What a section of a YAML file is: known keys only, each described, built into one object."""
 
 import reprlib
-from abc import abstractmethod
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, Final, Self
+from typing import Annotated, Any, Final
 
 from pydantic import (
     AfterValidator,
     BaseModel,
-    BeforeValidator,
     ConfigDict,
     Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
     SerializerFunctionWrapHandler,
     ValidationInfo,
-    WrapSerializer,
     model_validator,
 )
 from pydantic.fields import FieldInfo
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, core_schema
 
 
 def _none_of_text(value: object) -> object:
@@ -29,8 +30,40 @@ def _text_of_none(value: object, handler: SerializerFunctionWrapHandler) -> obje
     return "none" if value is None else handler(value)
 
 
-OR_NONE: Final = (BeforeValidator(_none_of_text), WrapSerializer(_text_of_none, when_used="json"))
-"""Annotations of a field that may be none."""
+def or_none(schema: CoreSchema) -> CoreSchema:
+    """Schema of a field that may be none, which descriptions write as the word."""
+    return core_schema.no_info_before_validator_function(
+        _none_of_text,
+        core_schema.nullable_schema(schema),
+        serialization=core_schema.wrap_serializer_function_ser_schema(
+            _text_of_none, when_used="json"
+        ),
+    )
+
+
+class OrNone:
+    """Annotation of a field that may be none, which descriptions write as the word."""
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Schema of the field, or the word none."""
+        return or_none(handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """JSON schema of the field, or the word none."""
+        return or_the_word_none(handler(schema))
+
+
+OR_NONE: Final = OrNone()
+"""The annotation."""
+
+
+def or_the_word_none(schema: JsonSchemaValue) -> JsonSchemaValue:
+    """JSON schema of a field that may also be the word none."""
+    return {"anyOf": [schema, {"const": "none"}]}
 
 
 def beside_the_study(file: str, info: ValidationInfo) -> str:
@@ -82,16 +115,3 @@ class Section(BaseModel):
                 hint = f"did you mean {close[0]!r}?" if close else f"expected one of {known}"
                 raise ValueError(f"unknown key {key!r}, {hint}")
         return data
-
-
-class Part(Section):
-    """A section that describes one object of the library, which says what is possible."""
-
-    @abstractmethod
-    def build(self) -> Any:
-        """The object that this section describes."""
-
-    @model_validator(mode="after")
-    def _possible(self) -> Self:
-        self.build()
-        return self

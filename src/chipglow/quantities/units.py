@@ -8,7 +8,8 @@ from functools import cache
 from math import isfinite
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from pydantic import GetCoreSchemaHandler
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 if TYPE_CHECKING:
@@ -95,6 +96,10 @@ class Quantity:
         """Text of a range that is read back as the same numbers."""
         return f"{self._number(limits[0])}-{self._number(limits[1])} {self.unit}"
 
+    def written(self, value: float | tuple[float, float]) -> str:
+        """Text of a value or of a range's limits."""
+        return self.range_text(value) if isinstance(value, tuple) else self.text(value)
+
     @property
     def expected(self) -> str:
         """What a field of this quantity expects, as errors say it."""
@@ -110,6 +115,12 @@ class Quantity:
             parse,
             serialization=core_schema.plain_serializer_function_ser_schema(text, when_used="json"),
         )
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """JSON schema: a text with a unit."""
+        return {"type": "string", "examples": [self.example]}
 
     def _to_base(self, value: str, number: str, unit: str) -> float:
         try:
@@ -144,6 +155,8 @@ class Quantity:
 
     def _number(self, value: float) -> str:
         exact = self._in_unit(value)
+        if exact == 0:
+            return "0"
         for digits in range(1, _MOST_DIGITS):
             rounded = Decimal(f"{exact:.{digits}g}")
             number = f"{rounded:f}" if -7 < rounded.adjusted() < 12 else f"{rounded:g}"
@@ -184,7 +197,7 @@ LENGTH: Final = Quantity("a length", "m", "um", "6 um")
 Length = Annotated[float, LENGTH]
 CUT_LENGTH: Final = Quantity("a length", "m", "mm", "0.3 mm")
 CutLength = Annotated[float, CUT_LENGTH]
-Wavelength = Annotated[float, Quantity("a wavelength", "m", "um", "4.5 um")]
+WAVELENGTH: Final = Quantity("a wavelength", "m", "um", "4.5 um")
 WAVELENGTHS: Final = Quantity("a band of wavelengths", "m", "um", "3.8-5.1 um")
 WavelengthRange = Annotated[tuple[float, float], WAVELENGTHS]
 TIME: Final = Quantity("a time", "s", "us", "10 us")
@@ -193,11 +206,11 @@ INSTANT: Final = Quantity("a time", "s", "us", "10 us", positive=False)
 Frequency = Annotated[float, Quantity("a frequency", "Hz", "Hz", "600 Hz")]
 SPEED: Final = Quantity("a speed", "m/s", "m/min", "250 m/min")
 Speed = Annotated[float, SPEED]
-Angle = Annotated[float, Quantity("an angle", "rad", "deg", "-7 deg", positive=False)]
-HeatTransfer = Annotated[
-    float,
-    Quantity("a coefficient of heat transfer", "W/m^2/K", "W/m^2/K", "50 W/m^2/K", positive=False),
-]
+ANGLE: Final = Quantity("an angle", "rad", "deg", "-7 deg", positive=False)
+Angle = Annotated[float, ANGLE]
+HEAT_TRANSFER: Final = Quantity(
+    "a coefficient of heat transfer", "W/m^2/K", "W/m^2/K", "50 W/m^2/K", positive=False
+)
 TEMPERATURE: Final = Quantity("a temperature", "K", "degC", "300 degC")
 Temperature = Annotated[float, TEMPERATURE]
 TEMPERATURE_DIFFERENCE: Final = Difference(

@@ -4,11 +4,13 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, cos, degrees, isfinite, pi, radians, sin, tan
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chipglow.quantities import Parameter, Part
+from chipglow.quantities.units import ANGLE, LENGTH
 from chipglow.scene.tool_surface import ToolSurface, surface_distance, surface_distances, surface_of
 
 SMALLEST_WEDGE: Final = radians(5.0)
@@ -146,66 +148,39 @@ def _right_of(start: float, end: float, curved: bool) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True)
-class Chamfer:
-    """A flat land between rake face and clearance face: a T-land, a negative land.
+class Chamfer(Part):
+    """A chamfer of the cutting edge: a flat land between the faces, a T-land, a negative land.
 
-    Parameters
-    ----------
-    width : float
-        Width b of the land in m, along it, between the sharp corners before they are rounded.
-    angle : float
-        Angle between land and rake face in rad: the land's own rake angle is the rake angle less
-        this angle.
-
-    Raises
-    ------
-    ValueError
-        If the width or the angle is impossible.
+    The land's own rake angle is the rake angle less the chamfer's angle.
     """
 
-    width: float
-    angle: float
-
-    def __post_init__(self) -> None:
-        if not (isfinite(self.width) and self.width > 0):
-            raise ValueError(f"chamfer width: expected over 0 m, got {self.width!r} m")
-        if not 0 < self.angle < _RIGHT_ANGLE:
-            raise ValueError(
-                "chamfer angle: expected over 0 and under 90 degrees, "
-                f"got {degrees(self.angle):g} degrees"
-            )
+    width: Annotated[
+        float, Parameter("Width of the land, between its sharp corners.", LENGTH, over=0.0)
+    ]
+    angle: Annotated[
+        float,
+        Parameter("Angle between the land and the rake face.", ANGLE, over=0.0, under=_RIGHT_ANGLE),
+    ]
 
 
 @dataclass(frozen=True)
-class Hone:
-    """A rounded edge that need not be symmetric.
+class Hone(Part):
+    """A hone of the cutting edge: a rounding that need not be symmetric.
 
-    Parameters
-    ----------
-    rake, clearance : float
-        S_gamma and S_alpha: distance in m from the ideal sharp edge to where the rounding leaves
-        the rake face and the clearance face.
-
-    Raises
-    ------
-    ValueError
-        If a distance is impossible, or one is over ten times the other.
-
-    Notes
-    -----
-    Denkena et al. describe an edge by these two distances; their ratio S_gamma / S_alpha is the
-    form factor K: over 1 is a waterfall hone, 1 a symmetric one. They leave the curve between open.
-    Here it is the arc of an ellipse that touches both faces there; for K = 1 that is the arc of a
-    circle.
+    Denkena et al. describe an edge by these two distances, S_gamma and S_alpha; their ratio
+    S_gamma / S_alpha is the form factor K: over 1 is a waterfall hone, 1 a symmetric one. They
+    leave the curve between open. Here it is the arc of an ellipse that touches both faces there;
+    for K = 1 that is the arc of a circle. K is 0.1 to 10.
     """
 
-    rake: float
-    clearance: float
+    rake: Annotated[
+        float,
+        Parameter("Where it begins on the rake face, from the sharp edge.", LENGTH, over=0.0),
+    ]
+    clearance: Annotated[float, Parameter("The same on the clearance face.", LENGTH, over=0.0)]
 
     def __post_init__(self) -> None:
-        for name, length in (("rake", self.rake), ("clearance", self.clearance)):
-            if not (isfinite(length) and length > 0):
-                raise ValueError(f"hone {name}: expected over 0 m, got {length!r} m")
+        super().__post_init__()
         factor = self.form_factor
         if not 1 / _LARGEST_FORM_FACTOR <= factor <= _LARGEST_FORM_FACTOR:
             raise ValueError(

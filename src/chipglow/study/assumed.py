@@ -6,7 +6,8 @@ from typing import Any, Final
 import yaml
 
 from chipglow.quantities.section import Section
-from chipglow.study.schema import FeaturesSection, Study
+from chipglow.study.schema import Study
+from chipglow.study.surface_section import FeaturesSection
 
 _HOW_FINELY: Final = {
     "cutting": {"numerics", "window", "field_of_view", "length_of_cut", "surroundings"},

@@ -6,6 +6,7 @@ from typing import Final, Literal
 
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study.schema import Study
+from chipglow.study.surface_section import surfaces_of
 from chipglow.surface import FeatureSurface, MapSurface, Surface
 
 _FEW_FRAMES: Final = 5
@@ -49,7 +50,7 @@ def fit(study: Study, scene: Scene) -> Fitted:
     ValueError
         If an emissivity map lies beside the scene.
     """
-    surfaces = study.surface.build(study.seed)
+    surfaces = surfaces_of(study.surface, study.seed)
     assumed = []
     if scene.tool is None and "tool" in study.cutting.model_fields_set:
         scene = scene.with_tool(study.cutting.tool.build())

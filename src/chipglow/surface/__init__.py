@@ -10,13 +10,22 @@ from chipglow.surface.feature import (
     shear_band_share,
 )
 from chipglow.surface.map import MapField, MapSurface
-from chipglow.surface.surface import EmissivityField, EmissivityStack, Surface, UniformSurface
-from chipglow.surface.temperature import TemperatureSurface
+from chipglow.surface.surface import (
+    SURFACES,
+    EmissivityField,
+    EmissivityStack,
+    Surface,
+    SurfaceChoice,
+    UniformEmissivity,
+    UniformSurface,
+)
+from chipglow.surface.temperature import PhaseEmissivity, TemperatureSurface, TemperatureTable
 from chipglow.surface.texture import Texture
 
 __all__ = [
     "CHIP_1",
     "CHIP_2",
+    "SURFACES",
     "Emissivity",
     "EmissivityField",
     "EmissivityStack",
@@ -24,9 +33,13 @@ __all__ = [
     "FeatureSurface",
     "MapField",
     "MapSurface",
+    "PhaseEmissivity",
     "Surface",
+    "SurfaceChoice",
     "TemperatureSurface",
+    "TemperatureTable",
     "Texture",
+    "UniformEmissivity",
     "UniformSurface",
     "chip_share",
     "shear_band_share",

@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 from functools import cached_property
 from math import sqrt
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import root
 from scipy.stats import beta, norm
 
+from chipglow.quantities import Parameter, Part
 from chipglow.surface.cubic import ENLARGED_VARIANCE, cubic_convolution
 
 REACH: Final = 8.0
@@ -22,41 +23,25 @@ _NORMAL_REACH: Final = 5.0
 
 
 @dataclass(frozen=True)
-class Emissivity:
-    """Mean and standard deviation of a feature's emissivity.
+class Emissivity(Part):
+    """Emissivity of one feature.
 
-    Parameters
-    ----------
-    mean : float
-        From 0 to 1.
-    deviation : float
-        Standard deviation over the surface.
-
-    Raises
-    ------
-    ValueError
-        If the mean is not within 0 to 1, or no emissivities from 0 to 1 have such a standard
-        deviation.
-
-    Notes
-    -----
     Heigel and Whitenton (2010) take "samples from a normal distribution". So it is here where
     five standard deviations to either side of the mean stay within 0 to 1, as in the paper's
     Table 1. Nearer to 0 or 1 a normal distribution would be cut off, and mean and standard
     deviation with it: there it is a beta distribution, which stays within 0 to 1 by itself.
     """
 
-    mean: float
-    deviation: float = 0.0
+    mean: Annotated[float, Parameter("Mean emissivity.", least=0.0, most=1.0)]
+    deviation: Annotated[float, Parameter("Standard deviation over the surface.", least=0.0)] = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.mean <= 1.0:
-            raise ValueError(f"emissivity: expected a mean of 0 to 1, got {self.mean!r}")
+        super().__post_init__()
         most = 0.9 * sqrt(self.mean * (1.0 - self.mean))
-        if not 0.0 <= self.deviation <= most:
+        if self.deviation > most:
             raise ValueError(
-                f"emissivity: expected a deviation of 0 to {most:.3g} about a mean of "
-                f"{self.mean:g}, got {self.deviation!r}"
+                f"deviation: {self.deviation:g}, expected up to {most:.3g} about a mean of "
+                f"{self.mean:g}"
             )
 
     @property

@@ -3,11 +3,12 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import Annotated, ClassVar, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.quantities import Family, Parameter, Part
 from chipglow.scene import Frame, Material, Scene
 
 
@@ -48,8 +49,32 @@ class _OneByOne(EmissivityStack):
         return np.stack([field.emissivity(frame) for field in self.fields])
 
 
-class Surface(ABC):
+SURFACES: Final = Family("surface")
+"""Emissivity models by their kind; other packages add theirs in the group ``chipglow.surface``."""
+
+
+class SurfaceChoice(Part, ABC):
+    """What a description says of a surface that is the only one."""
+
+    @abstractmethod
+    def surface(self) -> "Surface":
+        """The surface.
+
+        Raises
+        ------
+        ValueError
+            If it is not possible.
+        OSError
+            If its file is not there.
+        """
+
+
+class Surface(SurfaceChoice):
     """A model of emissivity, before it is laid on a scene."""
+
+    def surface(self) -> "Surface":
+        """Return itself."""
+        return self
 
     @abstractmethod
     def on(self, scene: Scene) -> EmissivityField:
@@ -89,3 +114,17 @@ class UniformSurface(Surface, EmissivityField):
     def emissivity(self, frame: Frame) -> NDArray[np.float32]:
         """Emissivity of every sample of a frame, shape (y, x); 0 in the void."""
         return np.where(frame.material == Material.VOID, 0.0, self.value).astype(np.float32)
+
+
+@SURFACES.part
+@dataclass(frozen=True)
+class UniformEmissivity(SurfaceChoice):
+    """Everywhere the same emissivity."""
+
+    kind: ClassVar[str] = "uniform"
+    example: ClassVar[str] = "{kind: uniform, emissivity: 0.5}  everywhere the same"
+    emissivity: Annotated[float, Parameter("The emissivity.", least=0.0, most=1.0)]
+
+    def surface(self) -> Surface:
+        """The surface."""
+        return UniformSurface(self.emissivity)

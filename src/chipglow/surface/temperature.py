@@ -1,12 +1,18 @@
 """A surface whose emissivity follows its temperature, or the phase that the temperature makes."""
 
 from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Strict
 
+from chipglow.quantities import Parameter
+from chipglow.quantities.units import TEMPERATURE, Temperature
 from chipglow.scene import Frame, Material, Scene
-from chipglow.surface.surface import EmissivityField, Surface
+from chipglow.surface.surface import SURFACES, EmissivityField, Surface, SurfaceChoice
+
+_Row = Annotated[tuple[Temperature, float], Strict(False)]
 
 
 @dataclass(frozen=True)
@@ -58,3 +64,50 @@ class TemperatureSurface(Surface, EmissivityField):
         """Emissivity of every sample of a frame, shape (y, x); 0 in the void."""
         values = np.interp(frame.temperature, self.temperatures, self.emissivities)
         return np.where(frame.material == Material.VOID, 0.0, values).astype(np.float32)
+
+
+@SURFACES.part
+@dataclass(frozen=True)
+class TemperatureTable(SurfaceChoice):
+    """A table over the true temperature."""
+
+    kind: ClassVar[str] = "temperature"
+    example: ClassVar[str] = (
+        "{kind: temperature, table: [[20 degC, 0.2], [1400 degC, 0.4]]}  linear between"
+    )
+    table: Annotated[
+        tuple[_Row, ...],
+        Strict(False),
+        Parameter("Temperature and emissivity, a pair a row; linear between."),
+    ]
+
+    def surface(self) -> Surface:
+        """The surface."""
+        temperatures, emissivities = zip(*self.table, strict=True) if self.table else ((), ())
+        return TemperatureSurface(temperatures, emissivities)
+
+
+@SURFACES.part
+@dataclass(frozen=True)
+class PhaseEmissivity(SurfaceChoice):
+    """Solid or liquid, by the true temperature."""
+
+    kind: ClassVar[str] = "phase"
+    example: ClassVar[str] = (
+        "{kind: phase, solid: 0.4, liquid: 0.25, solidus: 1658 K, liquidus: 1723 K}"
+    )
+    solid: Annotated[float, Parameter("Emissivity up to the solidus.", least=0.0, most=1.0)]
+    liquid: Annotated[
+        float,
+        Parameter("Emissivity from the liquidus on; between them linear.", least=0.0, most=1.0),
+    ]
+    solidus: Annotated[
+        float, Parameter("Temperature at which melting begins.", TEMPERATURE, over=0.0)
+    ]
+    liquidus: Annotated[
+        float, Parameter("Temperature at which all is melted.", TEMPERATURE, over=0.0)
+    ]
+
+    def surface(self) -> Surface:
+        """The surface."""
+        return TemperatureSurface((self.solidus, self.liquidus), (self.solid, self.liquid))

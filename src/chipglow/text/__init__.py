@@ -10,7 +10,7 @@ from chipglow.text.description import (
 )
 from chipglow.text.remarks import Remarks
 from chipglow.text.small_file import read_small_text
-from chipglow.text.template import commented_yaml
+from chipglow.text.template import commented_yaml, json_schema
 from chipglow.text.yaml_file import parse_yaml, read_yaml
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "Remarks",
     "commented_yaml",
     "described_by",
+    "json_schema",
     "parse_yaml",
     "placed",
     "problem",

@@ -1,8 +1,8 @@
 """Descriptions: YAML files in, one clear line for whatever is wrong with them."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -107,32 +107,13 @@ def placed(data: Any, names: list[str], value: Any) -> Any:
 def problem(error: ValidationError) -> str:
     """One line for the first problem of a study: field, value and what was expected."""
     first = error.errors(include_url=False)[0]
-    place = ".".join(_place(first["loc"]))
+    place = ".".join(str(part) for part in first["loc"])
     if first["type"] == "value_error":
         message = str(first["ctx"]["error"])
     elif first["type"] == "missing":
         message = "is missing, expected a value"
-    elif first["type"] in ("union_tag_invalid", "union_tag_not_found"):
-        field = place.rpartition(".")[2]
-        or_none = ", or none" if field == "psf" else ""
-        message = f"{first['input']!r}, expected kind: {', '.join(_KINDS[field])}{or_none}"
     else:
         expectation = first["msg"].removeprefix("Input should be ").removeprefix("Value should be ")
         message = f"{first['input']!r}, expected {expectation}"
     message = message.removeprefix(f"{place.rpartition('.')[2]}: ")
     return f"{place}: {message}" if place else message
-
-
-def _place(location: Sequence[str | int]) -> Iterator[str]:
-    """Names of sections and field; which kind a section is of is no name."""
-    before: str | int = ""
-    for part in location:
-        if part not in _KINDS.get(str(before), ()):
-            yield str(part)
-        before = part
-
-
-_KINDS: Final[Mapping[str, tuple[str, ...]]] = {
-    "psf": ("annular-aperture", "airy", "gaussian", "measured"),
-    "surface": ("features", "uniform", "map", "temperature", "phase"),
-}

@@ -1,5 +1,6 @@
 """Sections as commented YAML."""
 
+import json
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
@@ -23,6 +24,18 @@ def commented_yaml(header: str, section: Section, unused: Collection[str] = ()) 
     """
     values = section.model_dump(mode="json")
     return "\n".join([header, *_section_lines(section, values, "", unused)]) + "\n"
+
+
+def json_schema(section: type[Section]) -> str:
+    """JSON schema of a section, by which editors check and complete YAML.
+
+    Parameters
+    ----------
+    section : type
+        The section.
+    """
+    dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+    return json.dumps(dialect | section.model_json_schema(), indent=1) + "\n"
 
 
 def _section_lines(

@@ -2,16 +2,24 @@
 
 from chipglow.camera.optics.convolution import blur
 from chipglow.camera.optics.psf import (
+    PSFS,
+    AiryAperture,
     AnnularAperturePSF,
     GaussianPSF,
     MeasuredPSF,
+    MeasuredPSFFile,
     PointSpreadFunction,
+    PSFChoice,
 )
 
 __all__ = [
+    "PSFS",
+    "AiryAperture",
     "AnnularAperturePSF",
     "GaussianPSF",
     "MeasuredPSF",
+    "MeasuredPSFFile",
+    "PSFChoice",
     "PointSpreadFunction",
     "blur",
 ]

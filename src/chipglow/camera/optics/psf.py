@@ -6,7 +6,7 @@ from errno import ENOENT
 from math import ceil, inf, log, pi, sqrt
 from numbers import Real
 from pathlib import Path
-from typing import Any, Final, final
+from typing import Annotated, Any, ClassVar, Final, final
 
 import numpy as np
 import xarray as xr
@@ -16,6 +16,8 @@ from scipy.optimize import brentq
 from scipy.special import erf, erfinv, j1
 
 from chipglow.camera.optics.sampling import overlap_lengths
+from chipglow.quantities import Family, FileBeside, Parameter, Part
+from chipglow.quantities.units import LENGTH, WAVELENGTH
 
 GAUSSIAN_ENERGY: Final = 1.0 - 1e-12
 """Fraction of a Gaussian's light that its kernel holds: all but rounding.
@@ -37,7 +39,32 @@ _FAR: Final = 30.0
 """Radius, as v, from which on the mean of diffraction's rings falls as 1/r³: within 2 %."""
 
 
-class PointSpreadFunction(ABC):
+PSFS: Final = Family("psf")
+"""Point spread functions by their kind; other packages add theirs in the group ``chipglow.psf``."""
+
+
+class PSFChoice(Part, ABC):
+    """What a description of a camera says of its point spread function."""
+
+    @abstractmethod
+    def of_camera(self, wavelength: float, magnification: float | None) -> "PointSpreadFunction":
+        """The point spread function on the scene.
+
+        Parameters
+        ----------
+        wavelength : float
+            Middle of the camera's band in m.
+        magnification : float or None
+            Of its lens, if it is known.
+
+        Raises
+        ------
+        ValueError
+            If it is not possible.
+        """
+
+
+class PointSpreadFunction(PSFChoice):
     """How the light of a point is spread over the scene's plane.
 
     Attributes
@@ -47,6 +74,10 @@ class PointSpreadFunction(ABC):
     """
 
     fwhm: float
+
+    def of_camera(self, wavelength: float, magnification: float | None) -> "PointSpreadFunction":
+        """Return itself: it is given on the scene."""
+        return self
 
     @abstractmethod
     def kernel(self, spacing: float) -> NDArray[np.float64]:
@@ -96,77 +127,32 @@ class PointSpreadFunction(ABC):
 
 
 @final
-@dataclass(frozen=True)
-class GaussianPSF(PointSpreadFunction):
-    """A round Gaussian.
-
-    Parameters
-    ----------
-    fwhm : float
-        Full width at half maximum in m.
-
-    Raises
-    ------
-    ValueError
-        If the width is not positive, or longer than 0.1 m.
-    """
-
-    fwhm: float
-
-    def __str__(self) -> str:
-        return f"a Gaussian {self.fwhm * 1e6:.3g} µm wide at half maximum"
-
-    def __post_init__(self) -> None:
-        _check_length("fwhm", self.fwhm)
-
-    def kernel(self, spacing: float) -> NDArray[np.float64]:
-        """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
-        deviation = self.fwhm / _FWHM_PER_SIGMA
-        reach = sqrt(2) * deviation * float(erfinv(sqrt(GAUSSIAN_ENERGY)))
-        half = _half_size(reach, spacing)
-        edges = spacing * (np.arange(-half, half + 2) - 0.5)
-        line = np.diff(erf(edges / (sqrt(2) * deviation))) / 2
-        return np.outer(line, line)
-
-
-@final
+@PSFS.part
 @dataclass(frozen=True)
 class AnnularAperturePSF(PointSpreadFunction):
-    """Diffraction of a round pupil with a round obstruction in its middle.
+    """Diffraction of a reflecting microscope objective.
 
-    Parameters
-    ----------
-    wavelength : float
-        Wavelength in m; by default about the middle of the paper's band.
-    numerical_aperture : float
-        Sine of the half angle of the light that the objective takes in.
-    obscuration : float
-        Diameter of the obstruction over that of the pupil, 0 for none.
-
-    Attributes
-    ----------
-    fwhm : float
-        Full width at half maximum in m.
-
-    Raises
-    ------
-    ValueError
-        If a number is outside its range.
-
-    Notes
-    -----
-    The closed form, with v = 2π NA r / λ and the obscuration o, is
-    [2 J1(v)/v − o² 2 J1(ov)/(ov)]² / (1 − o²)² (Born and Wolf, Principles of Optics, 8.6.2).
-    It holds no aberration and nothing of the sensor.
+    Its pupil is round with a round obstruction in its middle. The closed form, with v = 2π NA r / λ
+    and the obscuration o, is [2 J1(v)/v − o² 2 J1(ov)/(ov)]² / (1 − o²)² (Born and Wolf, Principles
+    of Optics, 8.6.2). It holds no aberration and nothing of the detector. `fwhm` is its full width
+    at half maximum in m.
 
     The paper prints the point spread function of its camera as a picture only (Figure 2). The
     default values are an assumption: those usual for a reflecting (Schwarzschild) microscope
     objective of 15 times.
     """
 
-    wavelength: float = 4.5e-6
-    numerical_aperture: float = 0.28
-    obscuration: float = 0.35
+    kind: ClassVar[str] = "annular-aperture"
+    example: ClassVar[str] = "{kind: annular-aperture, numerical_aperture: 0.28}"
+    wavelength: Annotated[
+        float, Parameter("Wavelength of the diffraction.", WAVELENGTH, over=0.0, most=0.1)
+    ] = 4.5e-6
+    numerical_aperture: Annotated[
+        float, Parameter("Numerical aperture of the objective.", over=0.0, most=1.0)
+    ] = 0.28
+    obscuration: Annotated[
+        float, Parameter("Diameter of the central obstruction, as a share.", least=0.0, most=0.9)
+    ] = 0.35
     fwhm: float = field(init=False, repr=False, compare=False)
 
     def __str__(self) -> str:
@@ -177,12 +163,7 @@ class AnnularAperturePSF(PointSpreadFunction):
         )
 
     def __post_init__(self) -> None:
-        _check_length("wavelength", self.wavelength)
-        aperture = self.numerical_aperture
-        if not (isinstance(aperture, Real) and 0.0 < aperture <= 1.0):
-            raise ValueError(f"psf: numerical_aperture is {aperture!r}, expected over 0 to 1")
-        if not (isinstance(self.obscuration, Real) and 0.0 <= self.obscuration <= 0.9):
-            raise ValueError(f"psf: obscuration is {self.obscuration!r}, expected 0 to 0.9")
+        super().__post_init__()
         half = brentq(lambda v: float(self._profile(np.array(v))) - 0.5, 0.1, 3.0)
         object.__setattr__(self, "fwhm", 2 * float(half) * self._unit)
 
@@ -235,6 +216,29 @@ class AnnularAperturePSF(PointSpreadFunction):
         inner = self.obscuration**2
         amplitude = (_jinc(v) - inner * _jinc(self.obscuration * v)) / (1 - inner)
         return np.asarray(amplitude**2)
+
+
+@final
+@PSFS.part
+@dataclass(frozen=True)
+class GaussianPSF(PointSpreadFunction):
+    """A round Gaussian."""
+
+    kind: ClassVar[str] = "gaussian"
+    example: ClassVar[str] = "{kind: gaussian, fwhm: 12 um}"
+    fwhm: Annotated[float, Parameter("Full width at half maximum.", LENGTH, over=0.0, most=0.1)]
+
+    def __str__(self) -> str:
+        return f"a Gaussian {self.fwhm * 1e6:.3g} µm wide at half maximum"
+
+    def kernel(self, spacing: float) -> NDArray[np.float64]:
+        """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
+        deviation = self.fwhm / _FWHM_PER_SIGMA
+        reach = sqrt(2) * deviation * float(erfinv(sqrt(GAUSSIAN_ENERGY)))
+        half = _half_size(reach, spacing)
+        edges = spacing * (np.arange(-half, half + 2) - 0.5)
+        line = np.diff(erf(edges / (sqrt(2) * deviation))) / 2
+        return np.outer(line, line)
 
 
 @final
@@ -330,6 +334,83 @@ class MeasuredPSF(PointSpreadFunction):
         left = width / 2 + spacing * (np.arange(-half, half + 1) - 0.5)
         share = overlap_lengths(left, spacing, samples, self.spacing) / self.spacing
         return _normalised(np.einsum("ij,jk,lk->il", share, self.weights, share, optimize=True))
+
+
+@final
+@PSFS.part
+@dataclass(frozen=True)
+class AiryAperture(PSFChoice):
+    """Diffraction of a round aperture, by the data sheet of a lens."""
+
+    kind: ClassVar[str] = "airy"
+    example: ClassVar[str] = "{kind: airy, f_number: 2.5}  or numerical_aperture: a round aperture"
+    wavelength: Annotated[
+        float | None,
+        Parameter(
+            "Wavelength of the diffraction; none: the middle of the camera's band.",
+            WAVELENGTH,
+            over=0.0,
+            most=0.1,
+        ),
+    ] = None
+    numerical_aperture: Annotated[
+        float | None, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
+    ] = None
+    f_number: Annotated[
+        float | None,
+        Parameter(
+            "F-number of the lens, focused at infinity; with the camera's magnification m the\n"
+            "numerical aperture is m / (2 f_number (1 + m)).",
+            over=0.0,
+        ),
+    ] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.numerical_aperture is None) == (self.f_number is None):
+            raise ValueError("expected one of numerical_aperture and f_number")
+
+    def of_camera(self, wavelength: float, magnification: float | None) -> PointSpreadFunction:
+        """Diffraction by the numerical aperture; see `PSFChoice.of_camera`."""
+        aperture = self.numerical_aperture
+        if aperture is None:
+            assert self.f_number is not None
+            if magnification is None:
+                raise ValueError("magnification: is missing, expected it with psf.f_number")
+            aperture = magnification / (2 * self.f_number * (1 + magnification))
+        return AnnularAperturePSF(self.wavelength or wavelength, aperture, 0.0)
+
+
+@final
+@PSFS.part
+@dataclass(frozen=True)
+class MeasuredPSFFile(PSFChoice):
+    """A kernel from a file."""
+
+    kind: ClassVar[str] = "measured"
+    example: ClassVar[str] = (
+        "{kind: measured, file: psf.nc}  of chipglow psf; .npy or .csv with spacing: 1 um"
+    )
+    file: Annotated[FileBeside, Parameter("File of the kernel, .npy, .csv or .nc.")]
+    spacing: Annotated[
+        float | None,
+        Parameter(
+            "Side of the kernel's samples; none for a .nc, which tells it.",
+            LENGTH,
+            over=0.0,
+            most=0.1,
+        ),
+    ] = None
+
+    psf: MeasuredPSF = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "psf", MeasuredPSF.from_file(self.file, self.spacing))
+
+    def of_camera(self, wavelength: float, magnification: float | None) -> PointSpreadFunction:
+        """The kernel; see `PSFChoice.of_camera`."""
+        return self.psf
 
 
 def _jinc(v: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Final
 
@@ -18,65 +19,110 @@ _HEAD: Final = 520
 """Bytes from which a kind of file is told: those of HDF5 may follow 512 of the user's."""
 
 
+Begins = Callable[[bytes], bool]
+Read = Callable[[Path, slice | None, float | None], Recording]
+
+
+def _no_subprocess(path: Path) -> bool:
+    return False
+
+
 @dataclass(frozen=True)
 class CameraFormat:
     """A format of files.
 
     Parameters
     ----------
-    suffixes : tuple of str
-        Endings of such files' names.
     description : str
         What it is, for people.
-    tells_quantity : bool
-        Whether such a file says what was measured, so that the user need not.
+    suffixes : tuple of str
+        Endings of such files' names.
+    begins : callable, optional
+        Whether a file is of this format, by its first bytes.
+    read : callable, optional
+        Reads frames of a file that says what was measured: its path, which frames, and the time
+        between frames in s or None. Without one the file holds an array, and the user says.
+    in_subprocess : callable
+        Whether libraries in C or C++ would unpack a file: they do so in a subprocess.
+    inside_hdf5 : bool
+        Whether files begin as those of HDF5 may: the ending of the name says which it is.
     """
 
-    suffixes: tuple[str, ...]
     description: str
-    tells_quantity: bool
+    suffixes: tuple[str, ...]
+    begins: Begins | None = None
+    read: Read | None = None
+    in_subprocess: Callable[[Path], bool] = _no_subprocess
+    inside_hdf5: bool = False
+
+    @property
+    def tells_quantity(self) -> bool:
+        """Whether such a file says what was measured, so that the user need not."""
+        return self.read is not None
 
 
-CAMERA_FORMATS: Final[Mapping[str, CameraFormat]] = {
+def _starts(*beginnings: bytes) -> Begins:
+    return lambda head: head.startswith(beginnings)
+
+
+def _array(
+    description: str, *suffixes: str, begins: Begins | None = None, inside_hdf5: bool = False
+) -> CameraFormat:
+    """A format of arrays, which a library reads."""
+    return CameraFormat(
+        description, suffixes, begins, in_subprocess=lambda path: True, inside_hdf5=inside_hdf5
+    )
+
+
+_HDF5: Final = b"\x89HDF\r\n\x1a\n"
+_OWN: Final[Mapping[str, CameraFormat]] = {
     "flir": CameraFormat(
-        (".jpg", ".jpeg", ".fff", ".seq", ".csq"), "FLIR radiometric JPEG, FFF, SEQ, CSQ", True
+        "FLIR radiometric JPEG, FFF, SEQ, CSQ",
+        (".jpg", ".jpeg", ".fff", ".seq", ".csq"),
+        is_flir,
+        read_flir,
+        packed_counts,
     ),
-    "ptw": CameraFormat((".ptw",), "FLIR PTW (Cedip, Altair)", True),
-    "hcc": CameraFormat((".hcc",), "Telops HCC", True),
-    "cine": CameraFormat((".cine",), "Phantom CINE", True),
-    "tiff": CameraFormat((".tif", ".tiff"), "TIFF, a stack or a file a frame", False),
-    "npy": CameraFormat((".npy",), "NumPy array", False),
-    "npz": CameraFormat((".npz",), "NumPy arrays, zipped", False),
-    "mat": CameraFormat((".mat",), "MATLAB, versions 5 to 7.3", False),
-    "netcdf": CameraFormat((".nc", ".nc4", ".cdf"), "NetCDF", False),
-    "hdf5": CameraFormat((".h5", ".hdf5", ".hdf", ".he5"), "HDF5", False),
-    "zarr": CameraFormat((".zarr", ".zip"), "Zarr, a folder or zipped", False),
-    "csv": CameraFormat(
-        (".csv", ".txt", ".dat"), "table of numbers in text, a file a frame", False
+    "ptw": CameraFormat("FLIR PTW (Cedip, Altair)", (".ptw",), is_ptw, read_ptw),
+    "hcc": CameraFormat("Telops HCC", (".hcc",), is_hcc, read_hcc),
+    "cine": CameraFormat("Phantom CINE", (".cine",), is_cine, read_cine),
+    "tiff": _array(
+        "TIFF, a stack or a file a frame",
+        ".tif",
+        ".tiff",
+        begins=_starts(b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"),
     ),
+    "npy": CameraFormat("NumPy array", (".npy",), _starts(b"\x93NUMPY")),
+    "npz": _array("NumPy arrays, zipped", ".npz"),
+    "mat": _array(
+        "MATLAB, versions 5 to 7.3", ".mat", begins=_starts(b"MATLAB "), inside_hdf5=True
+    ),
+    "netcdf": _array(
+        "NetCDF",
+        ".nc",
+        ".nc4",
+        ".cdf",
+        begins=_starts(b"CDF\x01", b"CDF\x02", b"CDF\x05"),
+        inside_hdf5=True,
+    ),
+    "hdf5": _array(
+        "HDF5",
+        ".h5",
+        ".hdf5",
+        ".hdf",
+        ".he5",
+        begins=lambda head: _HDF5 in (head[:8], head[512:520]),
+        inside_hdf5=True,
+    ),
+    "zarr": _array("Zarr, a folder or zipped", ".zarr", ".zip"),
+    "csv": _array("table of numbers in text, a file a frame", ".csv", ".txt", ".dat"),
 }
-"""The formats that `read_recording` reads, by their names."""
-
-_OWN: Final[Mapping[str, tuple[Callable[[bytes], bool], Callable[..., Recording]]]] = {
-    "flir": (is_flir, read_flir),
-    "ptw": (is_ptw, read_ptw),
-    "hcc": (is_hcc, read_hcc),
-    "cine": (is_cine, read_cine),
+CAMERA_FORMATS: Final[Mapping[str, CameraFormat]] = {
+    **{entry.name: entry.load() for entry in entry_points(group="chipglow.camera_file")},
+    **_OWN,
 }
-_BEGINNINGS: Final = {
-    b"\x93NUMPY": "npy",
-    b"MATLAB ": "mat",
-    b"\x89HDF\r\n\x1a\n": "hdf5",
-    b"CDF\x01": "netcdf",
-    b"CDF\x02": "netcdf",
-    b"CDF\x05": "netcdf",
-    b"II*\0": "tiff",
-    b"MM\0*": "tiff",
-    b"II+\0": "tiff",
-    b"MM\0+": "tiff",
-}
-_INSIDE_HDF5: Final = {"hdf5", "netcdf", "mat"}
-"""Formats that begin alike: the ending of the name says which it is."""
+"""The formats that `read_recording` reads, by their names; other packages add theirs by an entry
+point in the group ``chipglow.camera_file``."""
 
 
 def find_format(path: Path) -> str:
@@ -100,7 +146,7 @@ def find_format(path: Path) -> str:
     if not head:
         raise SourceError(f"{first}: is empty")
     found = _by_content(head)
-    if found is None or {found, by_name} <= _INSIDE_HDF5:
+    if found is None or (by_name and all(CAMERA_FORMATS[n].inside_hdf5 for n in (found, by_name))):
         found = by_name or found
     if found is None:
         raise SourceError(
@@ -110,18 +156,10 @@ def find_format(path: Path) -> str:
 
 
 def _by_content(head: bytes) -> str | None:
-    for name, (begins, _) in _OWN.items():
-        if begins(head):
-            return name
-    for beginning, name in _BEGINNINGS.items():
-        if head.startswith(beginning) or (name == "hdf5" and head[512:].startswith(beginning)):
+    for name, one in CAMERA_FORMATS.items():
+        if one.begins is not None and one.begins(head):
             return name
     return None
-
-
-def through_libraries(path: Path, kind: str) -> bool:
-    """Whether libraries in C or C++ would unpack the file."""
-    return packed_counts(path) if kind == "flir" else kind not in _OWN and kind != "npy"
 
 
 def read_here(path: Path, kind: str, frames: slice | None, told: Told) -> Recording:
@@ -138,6 +176,7 @@ def read_here(path: Path, kind: str, frames: slice | None, told: Told) -> Record
     told : Told
         What the user says of it.
     """
-    if kind in _OWN:
-        return _OWN[kind][1](path, frames, told.interval)
-    return read_stack(path, CAMERA_FORMATS[kind].suffixes[0], frames, told)
+    one = CAMERA_FORMATS[kind]
+    if one.read is not None:
+        return one.read(path, frames, told.interval)
+    return read_stack(path, one.suffixes[0], frames, told)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from chipglow.camera import Recording
 from chipglow.io.cameras.apart import read_apart
-from chipglow.io.cameras.formats import CAMERA_FORMATS, find_format, read_here, through_libraries
+from chipglow.io.cameras.formats import CAMERA_FORMATS, find_format, read_here
 from chipglow.io.cameras.stacks import Told
 
 
@@ -64,6 +64,6 @@ def read_recording(
             f"{path}: is {CAMERA_FORMATS[kind].description}, which says itself what was measured: "
             "expected no quantity, unit, dataset or axes"
         )
-    if through_libraries(path, kind):
+    if CAMERA_FORMATS[kind].in_subprocess(path):
         return read_apart(path, kind, frames, told)
     return read_here(path, kind, frames, told)

@@ -12,7 +12,7 @@ from chipglow.quantities.units import Position
 from chipglow.scene import PlacedTool, Tool
 from chipglow.text import read_description, validated
 
-_Tip = Annotated[tuple[Position, Position] | None, Strict(False), *OR_NONE]
+_Tip = Annotated[tuple[Position, Position] | None, Strict(False), OR_NONE]
 
 
 class ToolDescription(ToolSection):

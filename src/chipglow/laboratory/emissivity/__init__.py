@@ -10,6 +10,7 @@ from chipglow.laboratory.emissivity.emissivity import (
     emissivity_line,
 )
 from chipglow.laboratory.emissivity.file import (
+    EmissivityMapFile,
     StoredEmissivity,
     read_emissivity_map,
     read_region_emissivity,
@@ -30,6 +31,7 @@ from chipglow.laboratory.emissivity.temperature import (
 __all__ = [
     "EmissivityLine",
     "EmissivityMap",
+    "EmissivityMapFile",
     "HeatedObject",
     "HeatedRow",
     "Heating",

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 import xarray as xr
@@ -23,9 +23,10 @@ from chipglow.laboratory.emissivity.emissivity import (
 )
 from chipglow.laboratory.emissivity.observations import RANDOM
 from chipglow.laboratory.emissivity.temperature import TEMPERATURE_BUDGET, TrueTemperature
+from chipglow.quantities import FileBeside, Parameter
 from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
-from chipglow.surface import MapSurface
+from chipglow.surface import SURFACES, MapSurface, SurfaceChoice
 from chipglow.uncertainty import Cause, Component, Estimate
 
 _KIND: Final = "emissivity map"
@@ -338,3 +339,17 @@ def _stated(estimate: Estimate) -> dict[str, float]:
 
 def _column(rows: Sequence[Sequence[RegionEmissivity]], name: str) -> list[list[float]]:
     return [[_value(row, name) for row in of] for of in rows]
+
+
+@SURFACES.part
+@dataclass(frozen=True)
+class EmissivityMapFile(SurfaceChoice):
+    """An image that stays where it is."""
+
+    kind: ClassVar[str] = "map"
+    example: ClassVar[str] = "{kind: map, file: emissivity.nc}  what chipglow emissivity writes"
+    file: Annotated[FileBeside, Parameter("What chipglow emissivity writes.")]
+
+    def surface(self) -> MapSurface:
+        """The surface."""
+        return read_emissivity_map(self.file)

@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import PlainSerializer, PlainValidator, Strict, field_validator, model_validator
 
-from chipglow.quantities.section import OR_NONE, Part, Section, described
+from chipglow.quantities import OR_NONE, Section, Settings, described
 from chipglow.quantities.units import POSITION
 from chipglow.scene import Circle, Polygon, Region
 from chipglow.scene.regions import Point
@@ -64,13 +64,13 @@ class CircleSection(Section):
 class RegionSection(Section):
     """One region: a polygon, a rectangle or a circle."""
 
-    polygon: Annotated[tuple[PointField, ...] | None, Strict(False), *OR_NONE] = described(
+    polygon: Annotated[tuple[PointField, ...] | None, Strict(False), OR_NONE] = described(
         "none", "Corners in order."
     )
-    rectangle: Annotated[tuple[PointField, PointField] | None, Strict(False), *OR_NONE] = described(
+    rectangle: Annotated[tuple[PointField, PointField] | None, Strict(False), OR_NONE] = described(
         "none", "Two opposite corners."
     )
-    circle: Annotated[CircleSection | None, *OR_NONE] = described("none", "Centre and radius.")
+    circle: Annotated[CircleSection | None, OR_NONE] = described("none", "Centre and radius.")
     feature: str = described("", "What it is a part of; by default its own name.")
 
     @model_validator(mode="after")
@@ -96,7 +96,7 @@ class RegionSection(Section):
         return Region(name, shape, self.feature, unit)
 
 
-class RegionsDescription(Part):
+class RegionsDescription(Settings[tuple[Region, ...]]):
     """A file of regions."""
 
     regions: dict[str, RegionSection] = described({}, "Regions by name.")

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, Strict
 
 from chipglow.camera import CalibrationFit, FittedCalibration, LinearCalibration, SakumaHattori
-from chipglow.quantities.section import OR_NONE, Part, described
+from chipglow.quantities import OR_NONE, Settings, described
 from chipglow.quantities.units import Temperature, Time, WavelengthRange
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.text import commented_yaml, read_description, validated
@@ -23,7 +23,7 @@ Rows = Annotated[tuple[Annotated[tuple[float, ...], Strict(False)], ...], Strict
 PointRow = Annotated[tuple[float, float, float, float], Strict(False)]
 
 
-class CalibrationDescription(Part):
+class CalibrationDescription(Settings[FittedCalibration]):
     """A calibration of a camera's counts by black bodies."""
 
     model: Literal["linear", "sakuma-hattori"] = Field(
@@ -31,15 +31,15 @@ class CalibrationDescription(Part):
         "sakuma-hattori: counts = offset + C / (exp(c2/(A T + B)) - 1)."
     )
     band: WavelengthRange = Field(description="The camera's spectral band.")
-    response: Annotated[Rows | None, *OR_NONE] = described(
+    response: Annotated[Rows | None, OR_NONE] = described(
         "none", "Pairs of wavelength in um and relative response; none: 1 in the band."
     )
     lowest: Temperature = Field(description="Coldest black body: colder pixels are flagged.")
     highest: Temperature = Field(description="Hottest black body: hotter pixels are flagged.")
-    integration_time: Annotated[Time | None, *OR_NONE] = described(
+    integration_time: Annotated[Time | None, OR_NONE] = described(
         "none", "Integration time for which it holds; none: not told, not checked."
     )
-    range: Annotated[str | None, *OR_NONE] = described(
+    range: Annotated[str | None, OR_NONE] = described(
         "none", "The camera's measuring range for which it holds; none: not told, not checked."
     )
     parameters: dict[str, float] = Field(

@@ -69,16 +69,16 @@ def band_of(text: str) -> Band:
 class ObjectSection(Section):
     """What the camera was told of the object, where the file does not say it or says it wrong."""
 
-    emissivity: Annotated[float | None, *OR_NONE] = described(
+    emissivity: Annotated[float | None, OR_NONE] = described(
         "none", "Emissivity of the object.", "none, or over 0 to 1"
     )
-    reflected: Annotated[Temperature | None, *OR_NONE] = described(
+    reflected: Annotated[Temperature | None, OR_NONE] = described(
         "none", "Temperature of the surroundings that the object reflects."
     )
-    transmission: Annotated[float | None, *OR_NONE] = described(
+    transmission: Annotated[float | None, OR_NONE] = described(
         "none", "Transmission of atmosphere and window.", "none, or over 0 to 1"
     )
-    atmosphere: Annotated[Temperature | None, *OR_NONE] = described(
+    atmosphere: Annotated[Temperature | None, OR_NONE] = described(
         "none", "Temperature of atmosphere and window."
     )
 
@@ -91,10 +91,10 @@ class ObjectSection(Section):
 class FlatFieldSection(Section):
     """Frames of uniform objects, such as a black body out of focus, by the same camera."""
 
-    frames: Annotated[FileBeside | None, *OR_NONE] = described(
+    frames: Annotated[FileBeside | None, OR_NONE] = described(
         "none", "Frames of a uniform object: with them every sensor's offset is corrected."
     )
-    brighter: Annotated[FileBeside | None, *OR_NONE] = described(
+    brighter: Annotated[FileBeside | None, OR_NONE] = described(
         "none", "Frames of a brighter uniform object: with both the gain is corrected, too."
     )
     correct: bool = described(
@@ -105,47 +105,47 @@ class FlatFieldSection(Section):
 class MeasurementDescription(Section):
     """A measurement of a camera's file: what it holds, how it lies, what is done with it."""
 
-    file: Annotated[FileBeside | None, *OR_NONE] = described(
+    file: Annotated[FileBeside | None, OR_NONE] = described(
         "none", "The camera's file; of TIFF and tables also a pattern: frame_*.tif."
     )
-    format: Annotated[str | None, *OR_NONE] = described(
+    format: Annotated[str | None, OR_NONE] = described(
         "none", "What the file is; none: told by its content.", "none, flir, ptw, hcc, tiff, ..."
     )
-    frames: Annotated[str | None, *OR_NONE] = described(
+    frames: Annotated[str | None, OR_NONE] = described(
         "none",
         "Frames to take, from 0: first:end, first:end:step; none: all.",
         "none, 100:200, ::10",
     )
-    dataset: Annotated[str | None, *OR_NONE] = described(
+    dataset: Annotated[str | None, OR_NONE] = described(
         "none", "Which array of the file, if it has several."
     )
-    axes: Annotated[tuple[str, ...] | None, Strict(False), *OR_NONE] = described(
+    axes: Annotated[tuple[str, ...] | None, Strict(False), OR_NONE] = described(
         "none", "Order of the array's axes; none: as the file says.", "none, or [time, y, x]"
     )
-    quantity: Annotated[Literal["counts", "radiance", "temperature"] | None, *OR_NONE] = described(
+    quantity: Annotated[Literal["counts", "radiance", "temperature"] | None, OR_NONE] = described(
         "none",
         "What the numbers are, for files that do not say it.",
         "none, counts, radiance, temperature",
     )
-    unit: Annotated[str | None, *OR_NONE] = described(
+    unit: Annotated[str | None, OR_NONE] = described(
         "none", "Their unit, for files that do not say it.", "none, counts, W/m2/sr, K, degC"
     )
-    interval: Annotated[Time | None, *OR_NONE] = described(
+    interval: Annotated[Time | None, OR_NONE] = described(
         "none", "Time from frame to frame; none: as the file says."
     )
-    camera: Annotated[str | None, *OR_NONE] = described(
+    camera: Annotated[str | None, OR_NONE] = described(
         "none", "Which camera, for readers; none: as the file says."
     )
-    band: Annotated[BandText | None, *OR_NONE] = described(
+    band: Annotated[BandText | None, OR_NONE] = described(
         "none",
         "Limits of the camera's band, or a table of its response (.csv with the columns\n"
         "wavelength_um,response); none: that of the calibration or the file.",
         "none, 3.8-5.1 um, response.csv",
     )
-    pitch: Annotated[Length | None, *OR_NONE] = described(
+    pitch: Annotated[Length | None, OR_NONE] = described(
         "none", "Distance between sensors on the object; none: as the file says."
     )
-    fill_factor: Annotated[float | None, *OR_NONE] = described(
+    fill_factor: Annotated[float | None, OR_NONE] = described(
         "none",
         "Portion of a sensor's square that takes light; none: not told, 1 is assumed for an edge.",
         "none, or over 0 to 1",
@@ -158,29 +158,29 @@ class MeasurementDescription(Section):
         "After turning: exchange left and right (horizontal) or top and bottom (vertical).",
         "none, horizontal, vertical",
     )
-    tip: Annotated[Pixels | None, *OR_NONE] = described(
+    tip: Annotated[Pixels | None, OR_NONE] = described(
         "none",
         "The tip of the tool, the origin of coordinates, in pixels right and down from the upper\n"
         "left corner of the image so turned; none: the lower left corner is the origin.",
         "none, [120.5, 88], or 120.5,88",
     )
-    integration_time: Annotated[Time | None, *OR_NONE] = described(
+    integration_time: Annotated[Time | None, OR_NONE] = described(
         "none", "Integration time; none: as the file says."
     )
-    range: Annotated[str | None, *OR_NONE] = described(
+    range: Annotated[str | None, OR_NONE] = described(
         "none", "Measuring range of the camera by its name; none: not told."
     )
-    saturation: Annotated[float | None, *OR_NONE] = described(
+    saturation: Annotated[float | None, OR_NONE] = described(
         "none", "Greatest number in the file that is not saturated; none: as the file says."
     )
-    floor: Annotated[Temperature | None, *OR_NONE] = described(
+    floor: Annotated[Temperature | None, OR_NONE] = described(
         "none", "Radiance temperatures under this are flagged; none: those under the calibration's."
     )
-    calibration: Annotated[FileBeside | None, *OR_NONE] = described(
+    calibration: Annotated[FileBeside | None, OR_NONE] = described(
         "none",
         "Calibration of the counts, as chipglow calibrate writes it; none: the maker's.",
     )
-    bad_pixels: Annotated[MaskText | None, *OR_NONE] = described(
+    bad_pixels: Annotated[MaskText | None, OR_NONE] = described(
         "none",
         "Table of bad pixels (.csv with the columns column,row, from 0 at the upper left of the\n"
         "file's image), or find: those that show in the uniform frames.",

@@ -9,7 +9,7 @@ from pydantic import Strict
 
 from chipglow.io import atomic_path
 from chipglow.laboratory.registration.registration import Method, Model, Registration
-from chipglow.quantities.section import Part, described
+from chipglow.quantities import Settings, described
 from chipglow.text import DescriptionError, read_description, validated
 
 _Row = Annotated[tuple[float, ...], Strict(False)]
@@ -22,7 +22,7 @@ _HEAD: Final = """\
 """
 
 
-class RegistrationDescription(Part):
+class RegistrationDescription(Settings[Registration]):
     """A registration."""
 
     model: Model = described("affine", "What the matrix may be.")

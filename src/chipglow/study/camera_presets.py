@@ -1,0 +1,67 @@
+"""Cameras by name: what their data sheets say, with the source."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Final
+
+
+@dataclass(frozen=True)
+class CameraPreset:
+    """What a source says of a camera.
+
+    Parameters
+    ----------
+    source : str
+        Where it stands.
+    fields : mapping
+        Fields of a study's section camera, as a YAML file gives them. What the source does not say
+        is not there; the lens's magnification never is.
+    """
+
+    source: str
+    fields: Mapping[str, Any]
+
+
+CAMERAS: Final[Mapping[str, CameraPreset]] = MappingProxyType(
+    {
+        "flir-lepton-3": CameraPreset(
+            "FLIR Lepton Engineering Datasheet, 500-0659-00-09 rev. 203: 160 x 120, 8 to 14 um, "
+            "f/1.1; M5Stack, unit FLIR (K021), Lepton 3.0: pixels of 12 um, 8.7 Hz",
+            {
+                "band": "8-14 um",
+                "detector_pitch": "12 um",
+                "array": [160, 120],
+                "psf": {"kind": "airy", "f_number": 1.1},
+                "frame_rate": "8.7 Hz",
+            },
+        ),
+        "alpha-nir": CameraPreset(
+            "List of infrared cameras of github.com/cameras/camerasIR: FLIR Alpha NIR, InGaAs, "
+            "320 x 256, 30 um, 0.9 to 1.7 um",
+            {"band": "0.9-1.7 um", "detector_pitch": "30 um", "array": [320, 256]},
+        ),
+    }
+)
+"""Cameras by the names of a study. A camera whose data sheet nobody could look at is not here."""
+
+
+def with_preset(camera: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A camera's data with what its preset says and the data do not.
+
+    Parameters
+    ----------
+    camera : mapping
+        The section as a YAML file gives it.
+
+    Raises
+    ------
+    ValueError
+        If there is no such preset.
+    """
+    name = camera.get("preset")
+    if name in (None, "none"):
+        return camera
+    if name not in CAMERAS:
+        raise ValueError(f"preset: {name!r} is unknown, expected one of {', '.join(CAMERAS)}")
+    return {**CAMERAS[name].fields, **camera}

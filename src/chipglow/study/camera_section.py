@@ -1,0 +1,121 @@
+"""The section of the camera."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Annotated, Literal
+
+from pydantic import Strict, model_validator
+
+from chipglow.camera import PSFS, Camera, PointSpreadFunction, PSFChoice
+from chipglow.io.column_file import read_response
+from chipglow.quantities import OR_NONE, Declared, FileBeside, Settings, described
+from chipglow.quantities.units import (
+    Frequency,
+    Length,
+    Position,
+    Temperature,
+    Time,
+    WavelengthRange,
+)
+from chipglow.radiometry import Band
+from chipglow.scene import Raster
+from chipglow.study.camera_presets import CAMERAS, with_preset
+from chipglow.study.scaling import with_pitch
+
+PSFSection = Annotated[Declared[PSFChoice], PSFS]
+
+
+class CameraSection(Settings[Camera]):
+    """The infrared camera."""
+
+    preset: Annotated[str | None, OR_NONE] = described(
+        "none",
+        "A camera by name: its data sheet's numbers where this section says nothing. Its lens's\n"
+        "magnification is given beside it.",
+        f"none, {', '.join(CAMERAS)}",
+    )
+    band: WavelengthRange = described("3.8-5.1 um", "Spectral band.")
+    response: Annotated[FileBeside | None, OR_NONE] = described(
+        "none",
+        "Relative spectral response, a CSV file: its first line wavelength_um,response, then a\n"
+        "point a line; it counts within the band.",
+        "none, or a file such as response.csv",
+    )
+    pitch: Length = described("6 um", "Distance between sensors, as seen on the scene.")
+    detector_pitch: Annotated[Length | None, OR_NONE] = described(
+        "none",
+        "The same on the detector, of its data sheet, in the place of pitch; with magnification.",
+        "none, or over 0 um",
+    )
+    magnification: Annotated[float | None, OR_NONE] = described(
+        "none",
+        "Of the lens: a pitch of 15 um at 2.5 is 6 um on the scene.",
+        "none, or over 0",
+    )
+    array: Annotated[tuple[int, int] | None, Strict(False), OR_NONE] = described(
+        "none",
+        "Columns and rows of the detector; none, and where the scene is smaller: as many as see\n"
+        "the scene.",
+        "none, or such as [640, 512]",
+    )
+    fill_factor: float = described(1.0, "Share of a sensor's square that takes light.")
+    offset_right: Position = described("0 um", "First sensor's corner from the scene's left edge.")
+    offset_down: Position = described("0 um", "First sensor's corner from the scene's upper edge.")
+    psf: Annotated[PSFSection | None, OR_NONE] = described(
+        {"kind": "annular-aperture"},
+        f"Point spread function of the optics, or none. Kinds:\n{PSFS.examples}",
+    )
+    psf_order: Literal["optics", "sensor"] = described(
+        "sensor",
+        "sensor (the paper's: on the sensors' values) or optics (on the samples, before the\n"
+        "sensors integrate).",
+    )
+    integration_time: Time = described("10 us", "Exposure.")
+    frame_rate: Frequency = described("600 Hz", "Frames a second.")
+    floor: Annotated[Temperature | None, OR_NONE] = described(
+        "300 degC", "Radiance temperatures under this are flagged, not returned; or none."
+    )
+    reflected: Annotated[Temperature | None, OR_NONE] = described(
+        "none", "Temperature of the surroundings that the surface reflects, or none."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _pitch_on_the_scene(cls, data: object) -> object:
+        return with_pitch(with_preset(data)) if isinstance(data, Mapping) else data
+
+    def build(self) -> Camera:
+        """The camera, with as many sensors as see the scene."""
+        response = None if self.response is None else read_response(self.response)
+        return Camera(
+            band=Band(*self.band, response),
+            pitch=self.pitch,
+            offset=(self.offset_right, self.offset_down),
+            fill_factor=self.fill_factor,
+            psf=self._psf(),
+            psf_order=self.psf_order,
+            integration_time=self.integration_time,
+            frame_rate=self.frame_rate,
+            floor=self.floor,
+            reflected=self.reflected,
+        )
+
+    def on(self, scene: Raster) -> Camera:
+        """The camera on a scene, with no more sensors than its detector has.
+
+        Parameters
+        ----------
+        scene : Raster
+            The scene's samples.
+        """
+        camera = self.build()
+        if self.array is None:
+            return camera
+        seen = camera.sensors(scene)
+        columns, rows = self.array
+        return replace(camera, shape=(min(rows, seen.rows), min(columns, seen.columns)))
+
+    def _psf(self) -> PointSpreadFunction | None:
+        if self.psf is None:
+            return None
+        return self.psf.build().of_camera(sum(self.band) / 2, self.magnification)

@@ -1,0 +1,175 @@
+"""The section of the surface: emissivities, the paper's Table 1 by default."""
+
+from collections.abc import Mapping
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import Field, GetJsonSchemaHandler, field_validator, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from chipglow.laboratory.emissivity import EmissivityMapFile, read_emissivity_map
+from chipglow.quantities import Declared, FileBeside, Section, described
+from chipglow.quantities.units import Length
+from chipglow.surface import (
+    CHIP_1,
+    CHIP_2,
+    SURFACES,
+    Emissivity,
+    FeatureSurface,
+    Surface,
+    SurfaceChoice,
+)
+
+CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2}
+"""Chips of the paper's Table 1 by the names of a study."""
+
+assert EmissivityMapFile.kind in SURFACES.kinds
+
+
+def _numbers(emissivity: Emissivity) -> dict[str, float]:
+    return {"mean": emissivity.mean, "deviation": emissivity.deviation}
+
+
+class ChipSection(Section):
+    """Emissivity of one chip."""
+
+    body: Declared[Emissivity] = Field(description="Body of the segments.")
+    shear_band: Declared[Emissivity] = Field(description="Shear bands: the fissures of the chip.")
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """JSON schema of the section, or the name of a chip."""
+        return {"anyOf": [handler(schema), {"enum": list(CHIPS)}]}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _preset(cls, data: object) -> object:
+        if not isinstance(data, str):
+            return data
+        preset = CHIPS[_known_name(data, CHIPS)]
+        return {"body": _numbers(preset.chip), "shear_band": _numbers(preset.shear_band)}
+
+
+class FeaturesSection(Section):
+    """Emissivity of the features of chips: the paper's maps."""
+
+    kind: Literal["features"] = described(
+        "features",
+        "What tells the emissivity: the features of a chip, each with its texture. Other kinds:\n"
+        f"{SURFACES.examples}",
+    )
+    chips: dict[str, ChipSection] = described(
+        {"chip 1": "chip-1", "chip 2": "chip-2"},
+        "Chips by name, each laid on the same scene. A chip is chip-1 or chip-2 (the paper's\n"
+        "Table 1), or the numbers of its body and shear bands.",
+    )
+    maps: dict[str, FileBeside] = described(
+        {},
+        "Emissivity maps by name, files of chipglow emissivity: each is laid on the scene where\n"
+        "its pixels lie, as one more chip. Of several true temperatures the first counts.",
+        "{} or names and files beside this one: {measured: emissivity.nc}",
+    )
+    workpiece: Declared[Emissivity] = described(
+        _numbers(CHIP_1.workpiece), "The uncut workpiece; the paper assumed these numbers."
+    )
+    tool: Declared[Emissivity] = described(_numbers(CHIP_1.tool), "The tool's side.")
+    grain: Length = described("20 um", "Size of a grain of the emissivity's texture.")
+    follow: Literal["material", "mean", "none"] = described(
+        "material",
+        "How textures move: material (each point keeps its own), mean (the paper's shift by the\n"
+        "feature's mean velocity) or none.",
+    )
+    restore_deviation: bool = described(
+        True, "Make up for the deviation that is lost when a texture is enlarged."
+    )
+
+    @field_validator("chips")
+    @classmethod
+    def _at_least_one(cls, chips: dict[str, ChipSection]) -> dict[str, ChipSection]:
+        if not chips:
+            raise ValueError("{} is empty, expected one chip or more, such as chip 1: chip-1")
+        return chips
+
+    @model_validator(mode="after")
+    def _different_names(self) -> Self:
+        for name in self.maps:
+            if name in self.chips:
+                raise ValueError(f"maps: {name!r} is the name of a chip too, expected another")
+        return self
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the surfaces: the chips, then the maps."""
+        return (*self.chips, *self.maps)
+
+    def build(self, seed: int) -> dict[str, Surface]:
+        """The surfaces by name.
+
+        Parameters
+        ----------
+        seed : int
+            Seed of the textures, the same for every chip: they differ by their numbers only.
+
+        Raises
+        ------
+        ValueError
+            If a file is no emissivity map.
+        OSError
+            If it is not there.
+        """
+        chips = {
+            name: FeatureSurface(
+                chip=chip.body.build(),
+                shear_band=chip.shear_band.build(),
+                workpiece=self.workpiece.build(),
+                tool=self.tool.build(),
+                grain=self.grain,
+                follow=self.follow,
+                seed=seed,
+                restore_deviation=self.restore_deviation,
+            )
+            for name, chip in self.chips.items()
+        }
+        return {**chips, **{name: read_emissivity_map(file) for name, file in self.maps.items()}}
+
+
+SURFACES.add("features", FeaturesSection)
+
+SurfaceSection = Annotated[FeaturesSection | Declared[SurfaceChoice], SURFACES]
+
+
+def surface_names(section: FeaturesSection | Declared[SurfaceChoice]) -> tuple[str, ...]:
+    """Names of a section's surfaces; a surface that is the only one is called by its kind."""
+    return section.names if isinstance(section, FeaturesSection) else (section.kind,)
+
+
+def surfaces_of(
+    section: FeaturesSection | Declared[SurfaceChoice], seed: int
+) -> dict[str, Surface]:
+    """The surfaces of a section by their names.
+
+    Parameters
+    ----------
+    section : FeaturesSection or Declared
+        The section.
+    seed : int
+        Seed of the textures.
+
+    Raises
+    ------
+    ValueError
+        If one is not possible.
+    OSError
+        If a file is not there.
+    """
+    if isinstance(section, FeaturesSection):
+        return section.build(seed)
+    return {section.kind: section.build().surface()}
+
+
+def _known_name(name: str, names: Mapping[str, object]) -> str:
+    if name not in names:
+        raise ValueError(f"{name!r} is unknown, expected one of {', '.join(names)}")
+    return name

@@ -1,0 +1,150 @@
+"""Parts: one declaration makes check, section, comment, error, JSON schema and documentation."""
+
+import json
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint
+from typing import Annotated
+
+import jsonschema
+import pytest
+import yaml
+from pydantic import ValidationError
+
+from chipglow import quantities
+from chipglow.camera import PSFS, GaussianPSF, PointSpreadFunction
+from chipglow.cli import main
+from chipglow.io import ImportDescription, import_text
+from chipglow.laboratory.measurement import MeasurementDescription, measurement_text
+from chipglow.quantities import Declared, Family, Parameter, Part
+from chipglow.quantities.units import LENGTH, TEMPERATURE
+from chipglow.study import Study, study_text
+from chipglow.text import commented_yaml, json_schema
+
+
+@dataclass(frozen=True)
+class Shelf(Part):
+    """A shelf.
+
+    Its second paragraph is for the documentation only.
+    """
+
+    width: Annotated[float, Parameter("Of the board.", LENGTH, over=0.0, most=2.0)]
+    boards: Annotated[int, Parameter("How many.", least=1)] = 3
+    warmth: Annotated[float | None, Parameter("Of the room.", TEMPERATURE, least=273.15)] = None
+    hidden: str = "not for descriptions"
+
+
+def test_a_wrong_value_is_refused_in_python_with_its_limits():
+    for values, message in (
+        ({"width": 0.0}, "Shelf.width: 0 m, expected over 0 m, up to 2 m"),
+        ({"width": "1 m"}, "Shelf.width: '1 m', expected over 0 m, up to 2 m"),
+        ({"width": float("nan")}, "Shelf.width: nan m, expected over 0 m, up to 2 m"),
+        ({"width": 1.0, "boards": 0}, "Shelf.boards: 0, expected 1 or more"),
+        ({"width": 1.0, "boards": 2.5}, "Shelf.boards: 2.5, expected 1 or more"),
+        ({"width": 1.0, "boards": True}, "Shelf.boards: True, expected 1 or more"),
+        ({"width": 1.0, "warmth": 3.0}, "Shelf.warmth: 3 K, expected 273.15 K or more"),
+    ):
+        with pytest.raises(ValueError, match="Shelf") as caught:
+            Shelf(**values)
+        assert str(caught.value) == message
+
+
+def test_its_section_takes_text_with_units_and_builds_it():
+    section = Declared[Shelf].model_validate({"width": "20 cm", "warmth": "20 degC"})
+    assert section.build() == Shelf(0.2, 3, 293.15)
+    assert section.model_dump(mode="json") == {
+        "width": "200000 um",
+        "boards": 3,
+        "warmth": "20 degC",
+    }
+    assert Declared[Shelf].model_validate({"width": "1 m", "warmth": "none"}).warmth is None
+    assert Declared[Shelf] is Declared[Shelf]
+    for values, message in (
+        ({"width": "3 m"}, "3000000 um, expected over 0 um, up to 2000000 um"),
+        ({"width": "1 m", "boards": 0}, "0, expected 1 or more"),
+        ({"width": "1 m", "boards": 2.0}, "valid integer"),
+        ({"width": "1 m", "warmth": "-1 degC"}, "-1 degC, expected 0 degC or more"),
+        ({"width": "1 m", "hidden": "x"}, "unknown key 'hidden'"),
+        ({"width": 1.0}, "has no unit"),
+        ({}, "Field required"),
+    ):
+        with pytest.raises(ValidationError) as caught:
+            Declared[Shelf].model_validate(values)
+        assert message in str(caught.value)
+
+
+def test_comment_schema_and_documentation_say_the_same():
+    section = Declared[Shelf].model_validate({"width": "1 m"})
+    text = commented_yaml("# head", section)
+    assert "# Of the board.\n# Allowed: over 0 um, up to 2000000 um.\nwidth: 1000000 um\n" in text
+    assert "# How many.\n# Allowed: 1 or more.\nboards: 3\n" in text
+    assert "# Of the room.\n# Allowed: none, or 0 degC or more.\nwarmth: none\n" in text
+    schema = json.loads(json_schema(Declared[Shelf]))
+    assert schema["properties"]["boards"]["minimum"] == 1
+    assert schema["properties"]["width"]["description"] == "Of the board."
+    assert schema["required"] == ["width"]
+    assert "width : float, in m\n    Of the board.\n" in Shelf.__doc__
+    assert "hidden" not in Shelf.__doc__
+
+
+def test_a_family_finds_parts_of_other_packages(monkeypatch):
+    family = Family("furniture")
+    family.add("shelf", Shelf)
+    with pytest.raises(ValueError, match="furniture: 'shelf' is no new kind"):
+        family.add("shelf", Shelf)
+    entry = EntryPoint("gauss", "chipglow.camera:GaussianPSF", "chipglow.furniture")
+    monkeypatch.setattr(
+        quantities.part, "entry_points", lambda group: [entry] if "furniture" in group else []
+    )
+    assert family.kinds == ("shelf", "gauss")
+    assert family.parts["gauss"] is GaussianPSF
+    del Family.families["furniture"]
+
+
+def test_every_kind_has_an_example_that_a_study_reads(tmp_path):
+    for kind, part in PSFS.parts.items():
+        assert f"kind: {kind}" in part.example
+    example = PSFS.parts["airy"].example.split("}")[0] + "}"
+    study = Study.model_validate({"camera": {"psf": yaml.safe_load(example), "magnification": 2.0}})
+    assert isinstance(study.camera.build().psf, PointSpreadFunction)
+
+
+@pytest.mark.parametrize(
+    ("section", "text"),
+    [
+        (Study, study_text(Study())),
+        (Study, study_text(Study.quick())),
+        (ImportDescription, import_text(ImportDescription())),
+        (MeasurementDescription, measurement_text(MeasurementDescription())),
+    ],
+)
+def test_the_templates_hold_their_json_schema(section, text):
+    schema = json.loads(json_schema(section))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(yaml.safe_load(text), schema)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"camera": {"pitch": 6}},
+        {"camera": {"lens": "1 x"}},
+        {"cutting": {"friction": {"coefficient": 3}}},
+        {"cutting": {"numerics": {"points_per_side": 0}}},
+        {"camera": {"psf": {"kind": "lens"}}},
+        {"surface": {"kind": "uniform", "emissivity": 1.5}},
+    ],
+)
+def test_the_schema_refuses_what_a_study_refuses(wrong):
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(wrong, json.loads(json_schema(Study)))
+    with pytest.raises(ValidationError):
+        Study.model_validate(wrong)
+
+
+def test_the_command_writes_the_schema(tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.argv", ["chipglow", "init", str(tmp_path / "s.json"), "--schema"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code in (0, None)
+    assert json.loads((tmp_path / "s.json").read_text())["title"] == "Study"
