@@ -13,7 +13,7 @@ No library states an uncertainty. Its result is taken to be doubtful if a placem
 away is 80 % as good, if the edges' correlation is low, if the steps end early, if few features
 agree, or if it refuses. Every method runs in a process of its own, on one thread.
 
-``python benchmarks/registration_libraries.py`` takes 25 minutes; ``--pairs 1`` one pair.
+``python benchmarks/registration_libraries.py`` takes half an hour; ``--pairs 1`` one pair.
 """
 
 import argparse
