@@ -47,6 +47,10 @@ PROGRAMS = {
         "--file",
         {"| rasterise, 5 fields": 5, "| VTK's probe": 5, "| SciPy": 5, "read ": 4},
     ),
+    "registration_libraries.py": (
+        "--pairs 1",
+        {"| chipglow |": 6, "| scikit-image, correlation |": 5, "| scikit-image, flow |": 5},
+    ),
     "reproduce_cost.py": ("tiny.yaml", {"tiny ": 3}),
     "softening.py": (f"--cell {COARSEST} default", {"| default": 9}),
     "solver_speed.py": ("--rounds 1 --sides 40 --threads 1", {"chipglow ": 6}),
@@ -66,6 +70,7 @@ NEEDED = {
     "movie_codecs.py": ("av",),
     "movie_matrix.py": ("av",),
     "rasterise.py": ("pyvista",),
+    "registration_libraries.py": ("skimage",),
     "synthetic_laboratory.py": ("tifffile",),
 }
 PEERS = {"taichi": "Taichi", "warp": "Warp"}
