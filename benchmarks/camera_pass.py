@@ -1,4 +1,4 @@
-"""Cost of one camera frame: fifty sub-frames of 810 x 900 samples to 90 x 100 sensors.
+"""Cost of one camera frame: fifty sub-frames of 810 x 900 samples to 90 x 100 pixels.
 
 Temperature and emissivity are given in memory. The peer is the paper's Figure 6 in plain NumPy
 (tests/figure6.py) with a radiance table, and with a quadrature over 64 wavelengths instead of the
@@ -26,7 +26,7 @@ from figure6 import figure_6
 SUB_FRAMES = 50
 STEP = 0.2e-6
 RASTER = Raster(-420e-6, 460e-6, 6e-6 / 9, 810, 900)
-CAMERA = Camera(psf=GaussianPSF(12e-6), psf_order="sensor", floor=None)
+CAMERA = Camera(psf=GaussianPSF(12e-6), psf_order="detector", floor=None)
 
 
 class GivenScene:

@@ -143,7 +143,7 @@ def main() -> None:
     parser.add_argument("first", type=int, help="the first seed")
     parser.add_argument("count", type=int, help="number of targets")
     options = parser.parse_args()
-    print("seed holes match  error  stated  inside  doubts   (in infrared sensors)", flush=True)
+    print("seed holes match  error  stated  inside  warnings   (in infrared pixels)", flush=True)
     within = tried = 0
     places = np.stack(np.meshgrid(RASTER.x, RASTER.y), axis=-1)[10::20, 10::20].reshape(-1, 2)
     for seed in range(options.first, options.first + options.count):
@@ -164,7 +164,7 @@ def main() -> None:
         stated = np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean()) / size
         print(
             f"{seed:4d} {len(target.holes):5d} {len(fit.pixels):5d} {error:6.3f} {stated:7.3f} "
-            f"{inside.mean():7.2f}  {'; '.join(found.doubts) or '-'}",
+            f"{inside.mean():7.2f}  {'; '.join(found.warnings) or '-'}",
             flush=True,
         )
     print(f"{within / max(tried, 1):.2f} of the places are within their 95 % region")

@@ -1,12 +1,12 @@
 """An infrared image and a visible picture of one chip, with a known map between them.
 
-The geometry is NIST's: infrared 160 x 120 sensors of 6 um, and a visible camera with finer pixels
+The geometry is NIST's: infrared 160 x 120 pixels of 6 um, and a visible camera with finer pixels
 that looks through the same optics (Heigel and Whitenton, 2010). What is bright differs: infrared
 by temperature and emissivity, visible by reflection and texture.
 
 ``python benchmarks/dual_spectrum.py 9000 16`` registers 16 pairs by the images alone, of seeds 9000
 and up, with the settings of `DualSpectrum.drawn`, and prints how far off each is, what it says of
-itself, and how many are wrong beyond that without a doubt being raised.
+itself, and how many are wrong beyond that without a warning being raised.
 """
 
 import argparse
@@ -191,7 +191,7 @@ def texture(
 
 
 def errors(found: Registration, pair: DualSpectrum) -> tuple[float, float]:
-    """Root of the mean square over the sensors of the error, and of its uncertainty, in sensors."""
+    """Root of the mean square over the pixels of the error, and of its uncertainty, in pixels."""
     raster = pair.infrared.raster
     places = np.stack(np.meshgrid(raster.x, raster.y), axis=-1).reshape(-1, 2)
     off = found.pixels(places) - pair.pixels(places)
@@ -207,7 +207,7 @@ def main() -> None:
     parser.add_argument("count", type=int, help="number of pairs")
     parser.add_argument("--model", default="affine")
     options = parser.parse_args()
-    print("seed bright  noise  v.noise  error  stated  ratio  seconds  doubts", flush=True)
+    print("seed bright  noise  v.noise  error  stated  ratio  seconds  warnings", flush=True)
     wrong = missed = 0
     for seed in range(options.first, options.first + options.count):
         pair = DualSpectrum.drawn(seed)
@@ -218,11 +218,11 @@ def main() -> None:
         seconds = time.process_time() - begin
         beyond = error > 2 * stated
         wrong += beyond
-        missed += beyond and not fit.registration.doubts
+        missed += beyond and not fit.registration.warnings
         print(
             f"{seed:4d} {pair.chip_brightness:6.2f} {pair.noise:6.4f} {pair.visible_noise:8.1f} "
             f"{error:6.2f} {stated:7.2f} {error / stated:6.2f} {seconds:8.1f}  "
-            f"{'; '.join(fit.registration.doubts) or '-'}",
+            f"{'; '.join(fit.registration.warnings) or '-'}",
             flush=True,
         )
     print(f"{wrong} of {options.count} wrong by over twice what they state, {missed} undoubted")

@@ -169,7 +169,7 @@ def view(simulation: CuttingSimulation) -> Raster:
 
 def compute(simulation: CuttingSimulation) -> Means:
     """Run a cut and take its means over what follows the first build-up of the chip."""
-    length = simulation.conditions.length_of_cut
+    length = simulation.conditions.cutting_length
     window = OutputWindow(
         BUILD_UP * length, length, STEP / simulation.conditions.speed, later_bands=0
     )
@@ -318,7 +318,7 @@ def arguments(names: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
     parser.add_argument("--cell", type=float, default=20.0, help="side of a cell in um")
-    parser.add_argument("--length", type=float, default=2.0, help="length of cut in mm")
+    parser.add_argument("--length", type=float, default=2.0, help="cutting length in mm")
     parser.add_argument("--markdown", action="store_true", help="print Markdown tables")
     given = parser.parse_args()
     if unknown := sorted(set(given.names) - set(names)):
@@ -337,7 +337,7 @@ def main() -> None:
         simulation = experiment.simulation(given.cell * 1e-6, given.length * 1e-3)
         computed.append((experiment, means_of(simulation, experiment.name)))
     table = markdown if given.markdown else aligned
-    print(f"Cell {given.cell:g} um, length of cut {given.length:g} mm, solver {SOLVER_VERSION}.")
+    print(f"Cell {given.cell:g} um, cutting length {given.length:g} mm, solver {SOLVER_VERSION}.")
     print(f"{NOT_READ}: the source was not read, look the number up before you quote it.")
     for rows in (comparison(computed), cuts(computed)):
         print(f"\n{table(rows)}")

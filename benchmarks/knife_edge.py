@@ -108,7 +108,7 @@ def kinds_of_optics(repeats):
             errors.append(found.fwhm - fwhm)
             uncertainties.append(found.fwhm_uncertainty)
             oblique = any("lies oblique" in text for text in found.assumptions)
-            said.append(oblique or any("no model fits" in doubt for doubt in found.doubts))
+            said.append(oblique or any("no model fits" in warning for warning in found.warnings))
             models[found.best.model.name] += 1
         held = np.abs(errors) < 1.96 * np.array(uncertainties)
         print(

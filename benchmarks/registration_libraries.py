@@ -9,9 +9,9 @@ cross-correlation of edges over the same turns and scales, with or without a den
 its RANSAC makes a map of; or ORB features of edges with RANSAC. SimpleITK's settings are the best
 of 35 on ten other pairs, of seeds 8000 to 8009.
 
-No library states an uncertainty. Its result is taken to be doubtful if a placement over 8 sensors
+No library states an uncertainty. Its result is taken to be doubtful if a placement over 8 pixels
 away is 80 % as good, if the edges' correlation is low, if the steps end early, if few features
-agree, or if it refuses. Every method runs in a process of its own, on one thread.
+agree, or if it refuses. Every method runs in a subprocess, on one thread.
 
 ``python benchmarks/registration_libraries.py`` takes half an hour; ``--pairs 1`` one pair.
 """
@@ -66,7 +66,7 @@ BINS, COARSE, FINE, WINDOW = 32, 1.0, 0.6, 5.0
 
 @dataclass(frozen=True)
 class Pair:
-    """What a method is given: images, the sensors and the model of the map."""
+    """What a method is given: images, the pixels and the model of the map."""
 
     infrared: Image
     raster: Raster
@@ -75,7 +75,7 @@ class Pair:
 
     @property
     def pitch(self) -> float:
-        """Width of a visible pixel in sensors, if both images were equally wide."""
+        """Width of a visible pixel in pixels, if both images were equally wide."""
         return float(self.infrared.shape[1] / self.visible.shape[1])
 
     @property
@@ -96,15 +96,15 @@ class Pair:
         matrix[:2, 2] = (offset - self.middle) / self.pitch + np.array([columns - 1, rows - 1]) / 2
         return matrix
 
-    def registration(self, matrix: Matrix, doubts: Iterable[str]) -> Registration:
-        """A map from sensors to visible pixels as one from m, its covariance 0."""
+    def registration(self, matrix: Matrix, warnings: Iterable[str]) -> Registration:
+        """A map from pixels to visible pixels as one from m, its covariance 0."""
         step = self.raster.spacing
         before = np.array(
             [[1 / step, 0, -self.raster.x[0] / step], [0, -1 / step, self.raster.y[0] / step]]
         )
         full = matrix @ np.vstack([before, [0, 0, 1]])
         none = np.zeros((9, 9))
-        return Registration(full, none, self.model, "mutual-information", doubts=tuple(doubts))
+        return Registration(full, none, self.model, "mutual-information", warnings=tuple(warnings))
 
 
 def mapped(matrix: Matrix, places: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -112,14 +112,14 @@ def mapped(matrix: Matrix, places: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def distance(one: Matrix, other: Matrix, pair: Pair) -> float:
-    """Distance of two maps in sensors: where it is greatest, of two corners."""
+    """Distance of two maps in pixels: where it is greatest, of two corners."""
     corners = np.stack([np.zeros(2), 2 * pair.middle])
     apart = mapped(one, corners) - mapped(other, corners)
     return float(np.hypot(*apart.T).max()) * pair.pitch
 
 
 def overlap(matrix: Matrix, pair: Pair) -> float:
-    """Share of the sensors that lie on the visible picture."""
+    """Share of the pixels that lie on the visible picture."""
     rows, columns = np.indices(pair.infrared.shape)[:, ::8, ::8]
     column, row = mapped(matrix, np.stack([columns, rows], axis=-1).reshape(-1, 2)).T
     height, width = pair.visible.shape
@@ -132,7 +132,7 @@ def best_first(tried: Tried) -> Tried:
 
 
 def rivals(tried: Tried, pair: Pair) -> Iterator[str]:
-    """A doubt for each placement far from the first that is nearly as good."""
+    """A warning for each placement far from the first that is nearly as good."""
     most, best = tried[0]
     for good, matrix in tried[1:]:
         if good > RIVAL * most and distance(best, matrix, pair) > FAR:
@@ -143,7 +143,7 @@ def rivals(tried: Tried, pair: Pair) -> Iterator[str]:
 
 
 def itk_images(pair: Pair, edges: float = 0.0) -> tuple[Any, Any]:
-    """Both images in sensors, one in the middle of the other; or their edges at a width."""
+    """Both images in pixels, one in the middle of the other; or their edges at a width."""
     fixed, moving = (
         sitk.GetImageFromArray(image.astype(np.float32)) for image in (pair.infrared, pair.visible)
     )
@@ -284,24 +284,24 @@ def itk_edges(pair: Pair) -> Registration:
 def itk_best(pair: Pair, images: tuple[Any, Any], starts: list[Place], metric: str) -> Registration:
     climbed = [itk_refined(images, place, metric, pair) for place in starts]
     tried = best_first([(good, matrix) for good, matrix, _ in climbed])
-    doubts = set(rivals(tried, pair))
+    warnings = set(rivals(tried, pair))
     if metric == "edges" and tried[0][0] < LOW:
-        doubts.add("the edges have little in common")
-    return pair.registration(tried[0][1], doubts)
+        warnings.add("the edges have little in common")
+    return pair.registration(tried[0][1], warnings)
 
 
 # scikit-image
 
 
 def edge_images(pair: Pair) -> tuple[Image, Image]:
-    """Edges of the infrared image and of the visible picture, at the sensors' resolution."""
+    """Edges of the infrared image and of the visible picture, at the pixels' resolution."""
     seen = gaussian_gradient_magnitude(pair.visible.astype(float), COARSE / pair.pitch)
     found = gaussian_gradient_magnitude(pair.infrared, COARSE)
     return found / found.std(), seen / seen.std()
 
 
 def laid(image: Image, matrix: Matrix, pair: Pair) -> Image:
-    """A visible picture on the sensors."""
+    """A visible picture on the pixels."""
     inverse = AffineTransform(matrix=matrix)
     return np.asarray(warp(image, inverse, output_shape=pair.infrared.shape, mode="edge"))
 
@@ -332,7 +332,7 @@ def skimage_correlation(pair: Pair) -> Registration:
 def agreed(
     found: NDArray[np.float64], seen: NDArray[np.float64], pair: Pair
 ) -> tuple[Matrix, int] | None:
-    """Map from sensors to visible pixels that most points agree on, and how many."""
+    """Map from pixels to visible pixels that most points agree on, and how many."""
     kind, least = (SimilarityTransform, 2) if pair.model == "similarity" else (AffineTransform, 3)
     if len(found) <= least:
         return None
@@ -350,10 +350,10 @@ def skimage_flow(pair: Pair) -> Registration:
     places = np.stack([column, row], axis=1).astype(float)
     flow = np.stack([right[row, column], down[row, column]], axis=1)
     found = agreed(places, mapped(start, places + flow), pair)
-    doubts = set(rivals(tried, pair))
+    warnings = set(rivals(tried, pair))
     if found is None or found[1] < len(places) / 2:
-        doubts.add("the flow is not that of a map")
-    return pair.registration(found[0] if found else start, doubts)
+        warnings.add("the flow is not that of a map")
+    return pair.registration(found[0] if found else start, warnings)
 
 
 def skimage_features(pair: Pair) -> Registration | None:
@@ -370,8 +370,8 @@ def skimage_features(pair: Pair) -> Registration | None:
     found = agreed(places, keys[1][pairs[:, 1]], pair)
     if found is None:
         return None
-    doubts = () if found[1] >= FEW else ("few features agree",)
-    return pair.registration(found[0], doubts)
+    warnings = () if found[1] >= FEW else ("few features agree",)
+    return pair.registration(found[0], warnings)
 
 
 # The comparison
@@ -394,7 +394,7 @@ METHODS: dict[str, Callable[[Pair], Registration | None]] = {
 
 @dataclass(frozen=True)
 class Outcome:
-    """How far off a map is and says it may be, in sensors; infinite for no map."""
+    """How far off a map is and says it may be, in pixels; infinite for no map."""
 
     error: float
     stated: float
@@ -428,7 +428,7 @@ def judged(name: str, pair: Pair, truth: DualSpectrum) -> Outcome:
     seconds = time.process_time() - begin
     if found is None:
         return Outcome(np.inf, 0.0, True, seconds)
-    return Outcome(*errors(found, truth), bool(found.doubts), seconds)
+    return Outcome(*errors(found, truth), bool(found.warnings), seconds)
 
 
 def drawn_pairs() -> Iterator[tuple[Pair, DualSpectrum]]:
@@ -442,7 +442,7 @@ def drawn_pairs() -> Iterator[tuple[Pair, DualSpectrum]]:
 def outcomes(
     name: str, pairs: list[tuple[Pair, DualSpectrum]]
 ) -> tuple[list[Outcome], float | None]:
-    """Of each pair, and the most memory beyond that at the begin, in a process of its own."""
+    """Of each pair, and the most memory beyond that at the begin, in a subprocess."""
     with ProcessPoolExecutor(1, get_context("spawn"), quiet) as pool:
         before = pool.submit(memory, "VmRSS").result()
         found = [pool.submit(judged, name, *pair).result() for pair in pairs]
@@ -485,7 +485,7 @@ def main() -> None:
     if sitk is None:
         print("SimpleITK is not installed: left out (pip install SimpleITK)\n")
     pairs = list(islice(drawn_pairs(), given.pairs))
-    print(f"{len(pairs)} pairs; errors are rms over the image, in infrared sensors\n")
+    print(f"{len(pairs)} pairs; errors are rms over the image, in infrared pixels\n")
     print(HEAD)
     for name in names:
         print(row(name, *outcomes(name, pairs)), flush=True)

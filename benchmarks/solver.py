@@ -56,7 +56,7 @@ class Block:
             reach=self.spacing / 2,
             area=self.spacing,
             friction=0.0,
-            shear_fraction=1.0,
+            friction_factor=1.0,
             floor=-FAR,
             inflow=-FAR,
             ceiling=-FAR,

@@ -7,7 +7,7 @@ Jaumann rate, radial return with Johnson and Cook's law and damage, some points 
 scatter of mass, momentum and the impulse of stress, new velocities. chipglow also looks for contact
 and adds up work; it sorts the points before each round, outside the time, as it does every 20 steps
 or so in a cut (`sort` tells the cost). Warp runs on one CPU core whatever it is given. All are
-timed in turn, each in a process of its own that sleeps while others run; the best of the rounds
+timed in turn, each in a subprocess that sleeps while others run; the best of the rounds
 counts. Taichi and Warp are optional: `pip install taichi==1.7.4 warp-lang`.
 """
 
@@ -148,7 +148,7 @@ def serve(pipe, module, start, threads):
 
 
 class Worker:
-    """A stepper in a process of its own."""
+    """A stepper in a subprocess."""
 
     def __init__(self, name, start, threads):
         self.name, self.threads, self.seconds = name, threads, []

@@ -4,7 +4,7 @@
     python benchmarks/synthetic_laboratory.py --first 0 --write FOLDER
 
 Of each seed a laboratory with hidden optics, emissivities and detector writes the files of an
-experiment: black bodies, uniform frames, a heated chip, knife edges, a hot chip. The procedures see
+experiment: blackbodies, uniform frames, a heated chip, knife edges, a hot chip. The procedures see
 only the files, and what a person would have noted. What they recover is set beside the truth: it
 shall be in their own 95 % interval in 95 of 100 repeats, and must be in 90. A repeat takes
 seconds; its results are kept in build/synthetic-laboratory, so that an interrupted run goes on.
@@ -74,7 +74,7 @@ WAVELENGTH: Final = 4.45e-6
 PITCH: Final = 6e-6
 INTEGRATION_TIME: Final = 10e-6
 SHAPE: Final = (48, 64)
-SAMPLES: Final = 3  # of a scene along a sensor's side
+SAMPLES: Final = 3  # of a scene along a pixel's side
 CELSIUS: Final = 273.15
 FWHM_PER_SIGMA: Final = 2 * sqrt(2 * np.log(2))
 IMAGES: Final = 4  # of each object: repetitions
@@ -97,7 +97,7 @@ PLATEAU = 105e-6  # radius in m of the even middle of the hot chip
 FREQUENCY = 12 / 64 / PITCH  # of the MTF in 1/m
 
 QUANTITIES = {
-    "black body": "K",
+    "blackbody": "K",
     "emissivity of the body": "",
     "emissivity of the fissure": "",
     "PSF, full width": "um",
@@ -221,7 +221,7 @@ class Laboratory:
 
     def __init__(self, seed: int) -> None:
         self._generator = generator = np.random.default_rng(seed)
-        # TIFF is read in a process of its own, whose start takes longer than all the rest.
+        # TIFF is read in a subprocess, whose start takes longer than all the rest.
         self.edge_format = ".tif" if seed % 10 == 0 else ".npy"
         self.optics = hidden_optics(generator)
         plain = Detector(
@@ -236,7 +236,7 @@ class Laboratory:
         self.oven = CELSIUS + generator.uniform(360.0, 420.0)  # of the heated chip
         self.reading = self.oven + THERMOCOUPLE * generator.standard_normal()
         self.hot = CELSIUS + generator.uniform(450.0, 650.0)
-        self.unknown = CELSIUS + generator.uniform(300.0, 600.0)  # a black body
+        self.unknown = CELSIUS + generator.uniform(300.0, 600.0)  # a blackbody
         self.emissivity = self._surface(generator.uniform(0.35, 0.5), generator.uniform(0.5, 0.7))
         tilts = generator.uniform(2.0, 9.0, 2) * generator.choice([-1, 1], 2)
         self.normals = tilts + [0.0, 90.0] + 180.0 * generator.integers(0, 2, 2)
@@ -249,13 +249,13 @@ class Laboratory:
         emissivity[:, SAMPLES * FISSURE.start : SAMPLES * FISSURE.stop] = fissure
         return np.asarray(emissivity + 0.015 * texture / texture.std())
 
-    def truth(self) -> dict[str, float]:
+    def reference(self) -> dict[str, float]:
         """What the procedures shall find, by `QUANTITIES`."""
         shape = (SHAPE[0], SAMPLES, SHAPE[1], SAMPLES)
         pixels = self.emissivity.reshape(shape).mean(axis=(1, 3))
         body = np.concatenate([pixels[4:44, 1:9], pixels[4:44, 55:63]])
         return {
-            "black body": self.unknown,
+            "blackbody": self.unknown,
             "emissivity of the body": float(body.mean()),
             "emissivity of the fissure": float(pixels[16:32, 28:36].mean()),
             "PSF, full width": self.optics.fwhm,
@@ -264,7 +264,7 @@ class Laboratory:
         }
 
     def _transfer(self) -> float:
-        """Of optics and sensor, across the first edge."""
+        """Of optics and pixel, across the first edge."""
         angle = radians(float(self.normals[0]))
         across, down = FREQUENCY * PITCH * cos(angle), FREQUENCY * PITCH * sin(angle)
         return self.optics.transfer(FREQUENCY) * float(np.sinc(across) * np.sinc(down))
@@ -321,7 +321,7 @@ class Laboratory:
         return np.asarray(self.hot - 60.0 * (1 - np.exp(-((beyond / 60e-6) ** 2))))
 
     def _seen(self, kelvins: float | NDArray[np.float64]) -> NDArray[np.float64]:
-        """Radiance of the chip at every sensor."""
+        """Radiance of the chip at every pixel."""
         reflected = float(BAND.radiance(np.array(self.room)))
         own = BAND.radiance(np.broadcast_to(kelvins, self.emissivity.shape))
         radiance = self.emissivity * own + (1 - self.emissivity) * reflected
@@ -329,10 +329,10 @@ class Laboratory:
         single = radiance.astype(np.float32)
         exposure = Exposure(0.0, INTEGRATION_TIME, raster, radiance, single, single, radiance)
         camera = Camera(BAND, PITCH, psf=self.optics.psf, floor=None)
-        return camera.develop(exposure).radiance[0]
+        return camera.form_measurement(exposure).radiance[0]
 
     def _edge(self, normal: float) -> NDArray[np.float64]:
-        """Radiance of a hot plate half behind a warm blade, at every sensor's square."""
+        """Radiance of a hot plate half behind a warm blade, at every pixel's square."""
         node, weight = np.polynomial.legendre.leggauss(6)
         inside = node * PITCH / 2
         rows, columns = SHAPE
@@ -348,13 +348,13 @@ class Laboratory:
 
 
 def _even(kelvins: float) -> NDArray[np.float64]:
-    """Radiance of a black body."""
+    """Radiance of a blackbody."""
     return np.full(SHAPE, float(BAND.radiance(np.array(kelvins))))
 
 
 CAMERA_FIELDS = (
-    "uniform.frames=cold.hcc",
-    "uniform.brighter=hot.hcc",
+    "flat_field.low=cold.hcc",
+    "flat_field.high=hot.hcc",
     "bad_pixels=find",
     "pitch=6 um",
 )
@@ -369,7 +369,7 @@ class Evaluation:
 
     @cached_property
     def calibration(self) -> FittedCalibration:
-        """Of the black bodies; ``chipglow calibrate``."""
+        """Of the blackbodies; ``chipglow calibrate``."""
         points = read_calibration_points(
             self.folder / "points.csv",
             lambda file: uniform_counts(self.folder / file, CAMERA_FIELDS),
@@ -402,8 +402,8 @@ class Evaluation:
         notes = yaml.safe_load((self.folder / "notes.yaml").read_text())
         heating = Heating(
             notes["thermocouple_degC"] + CELSIUS,
-            truth_uncertainty=THERMOCOUPLE,
-            environment_uncertainty=ROOM,
+            reference_uncertainty=THERMOCOUPLE,
+            reflected_uncertainty=ROOM,
         )
         regions = load_regions(self.folder / "regions.yaml")
         found = {area.name: area for area in areas(regions, heated[0].raster)}
@@ -417,7 +417,7 @@ class Evaluation:
             Surroundings(293.0, ROOM),
         )
         return {
-            "black body": Found.of(unknown.estimate),
+            "blackbody": Found.of(unknown.estimate),
             "emissivity of the body": Found.of(body.estimate),
             "emissivity of the fissure": Found.of(fissure.estimate),
             **self._spread(),
@@ -442,11 +442,11 @@ class Evaluation:
 def repeat(seed: int) -> dict[str, tuple[float, float, float]]:
     """Truth, value and expanded uncertainty of each quantity in a laboratory of this seed."""
     laboratory = Laboratory(seed)
-    truth = laboratory.truth()
+    reference = laboratory.reference()
     with TemporaryDirectory() as name:
         laboratory.perform(Path(name))
         found = Evaluation(Path(name)).results()
-    return {name: (truth[name], found[name].value, found[name].expanded) for name in QUANTITIES}
+    return {name: (reference[name], found[name].value, found[name].expanded) for name in QUANTITIES}
 
 
 Row = dict[str, tuple[float, float, float]]

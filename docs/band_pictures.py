@@ -64,7 +64,7 @@ def experiment(camera: Camera, scene: Scene, starts: np.ndarray) -> Measurement:
         clean.band,
         clean.times,
         clean.raster,
-        camera.floor,
+        camera.lower_limit,
         calibration_uncertainty=0.01 * radiance,
     ).with_tool(clean.tool)
 
@@ -72,7 +72,7 @@ def experiment(camera: Camera, scene: Scene, starts: np.ndarray) -> Measurement:
 def tell(result: Comparison) -> None:
     """Print the sentences."""
     places = (place.sentence for place in result.places)
-    for text in (*result.assumptions, *result.doubts, *places, result.statement):
+    for text in (*result.assumptions, *result.warnings, *places, result.statement):
         print(text)
 
 

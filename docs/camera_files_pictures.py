@@ -34,7 +34,7 @@ def main() -> None:
         recording = read_recording(real)
         assert recording.conversion is not None
         shown = recording.conversion.temperature(recording.signal[0]) - KELVIN
-        show(figure, right, shown, HEAT, "°C, of a black body")
+        show(figure, right, shown, HEAT, "°C, of a blackbody")
         right.set_title("FFF, a FLIR T420")
         figure.savefig(HERE / "camera-files.png", dpi=150)
 

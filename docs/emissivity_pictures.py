@@ -36,7 +36,7 @@ def main() -> None:
     """Draw both pictures."""
     heating = Heating(391.0 + 273.15, LABORATORY, 2.0, 1.0, 2.0)
     chip, background = chip_emissivity()
-    found = determine_emissivity([heated(chip, background, heating.truth)], heating)
+    found = determine_emissivity([heated(chip, background, heating.reference)], heating)
     draw_emissivity(found, REGIONS).savefig(HERE / "emissivity.png", dpi=150)
     table(found, chip)
     over_temperature(chip, background)
@@ -74,13 +74,13 @@ def heated(
 ) -> Measurement:
     """Frames of the chip at one temperature, with noise and drift."""
     scene = heated_scene(background, temperature)
-    camera = camera or Camera(pitch=PITCH, floor=473.15, reflected=LABORATORY)
+    camera = camera or Camera(pitch=PITCH, lower_limit=473.15, reflected=LABORATORY)
     image = camera.measure(scene, MapSurface(emissivity, RASTER), 0.0)
     generator = np.random.default_rng(3)
     radiance = image.radiance + NOISE * generator.standard_normal((frames, *image.raster.shape))
     radiance += DRIFT * generator.standard_normal((frames, 1, 1))
     times = np.arange(frames) / camera.frame_rate
-    return Measurement.from_radiance(radiance, BAND, times, image.raster, camera.floor)
+    return Measurement.from_radiance(radiance, BAND, times, image.raster, camera.lower_limit)
 
 
 def heated_scene(background: NDArray[np.bool_], temperature: float) -> Scene:
@@ -124,7 +124,7 @@ def over_temperature(chip: NDArray[np.float64], background: NDArray[np.bool_]) -
     for celsius in (391.0, 470.0, 570.0):
         heating = Heating(celsius + 273.15, LABORATORY, 2.0, 1.0, 2.0)
         values = chip + 2e-4 * (celsius - 391.0)
-        maps.append(determine_emissivity([heated(values, background, heating.truth)], heating))
+        maps.append(determine_emissivity([heated(values, background, heating.reference)], heating))
     found = [area for area in areas(REGIONS, maps[0].raster) if area.whole]
     lines = [emissivity_line([one.of(area) for one in maps]) for area in found]
     for line in lines:
@@ -143,7 +143,7 @@ def widths() -> None:
     background = chip_emissivity()[1]
     for width in (12e-6, 24e-6, 36e-6, 48e-6, 72e-6, 96e-6):
         flat = np.where(in_fissure(width), 0.53, 0.42)
-        found = determine_emissivity([heated(flat, background, heating.truth)], heating)
+        found = determine_emissivity([heated(flat, background, heating.reference)], heating)
         means = [
             found.of(areas((fissure(width / 2 - inset),), found.raster)[0]).mean
             for inset in (0.0, PITCH, 2 * PITCH)

@@ -23,7 +23,7 @@ from chipglow.camera import (
 )
 from chipglow.drawing.drawing import HEAT, KELVIN, new_figure, show_image, style
 from chipglow.laboratory.measurement import (
-    develop_recording,
+    calibrate_recording,
 )
 from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
 from chipglow.radiometry import Band
@@ -71,8 +71,8 @@ def _draw_sensors() -> Figure:
     calibration = fit_linear(
         KELVINS, [np.median(_seen(detector, kelvins, rng)) for kelvins in KELVINS], BAND
     ).calibration
-    plain = develop_recording(recording, calibration)
-    repaired = develop_recording(
+    plain = calibrate_recording(recording, calibration)
+    repaired = calibrate_recording(
         recording, calibration, NonUniformity.two_point(cold, hot), found.mask
     )
     for name, measured in (("as it is", plain), ("corrected", repaired)):
@@ -92,7 +92,7 @@ def _side_by_side(plain: Measurement, repaired: Measurement) -> Figure:
     with style():
         figure = new_figure(2.9)
         panels = figure.subplots(1, 2, sharey=True)
-        titles = ("the sensors as they are", "two-point correction, bad pixels replaced")
+        titles = ("the pixels as they are", "two-point correction, bad pixels replaced")
         for axes, measured, title in zip(panels, (plain, repaired), titles, strict=True):
             celsius = measured.radiance_temperature()[0] - KELVIN
             picture = show_image(axes, celsius, measured.raster, None, HEAT, (400.0, 800.0))

@@ -135,7 +135,7 @@ def a_heated_chip(folder: Path) -> None:
     for name, celsius, frames in (("chip", 391.0, 10), ("470", 470.0, 3), ("570", 570.0, 3)):
         values = emissivity + 2e-4 * (celsius - 391.0)
         seen = heated(values, background, celsius + CELSIUS, frames=frames)
-        write_small(seen, 1.0, folder / f"{name}.nc", floor=473.15)
+        write_small(seen, 1.0, folder / f"{name}.nc", lower_limit=473.15)
     write_scene(heated_scene(background, 391.0 + CELSIUS), folder / "scene.nc")
     regions = {
         region.name: {"polygon": np.array(region.shape.corners).tolist(), "feature": region.feature}
@@ -260,12 +260,14 @@ def given(*names: str) -> Callable[[Path], None]:
 
 
 def write_small(
-    measurement: Measurement, step: float, path: Path, floor: float | None = None
+    measurement: Measurement, step: float, path: Path, lower_limit: float | None = None
 ) -> None:
     """Write a measurement whose radiance is rounded, well within its noise, for a small file."""
     radiance = step * np.round(measurement.radiance / step)
     write_measurement(
-        Measurement.from_radiance(radiance, BAND, measurement.times, measurement.raster, floor),
+        Measurement.from_radiance(
+            radiance, BAND, measurement.times, measurement.raster, lower_limit
+        ),
         path,
     )
 

@@ -24,7 +24,7 @@ from synthetic_laboratory import QUANTITIES, Laboratory, kept, table  # noqa: E4
 
 SEED = 50
 REPEATS = 100
-CORRECTED = "--set uniform.frames=cold.hcc --set uniform.brighter=hot.hcc --set bad_pixels=find"
+CORRECTED = "--set flat_field.low=cold.hcc --set flat_field.high=hot.hcc --set bad_pixels=find"
 CAMERA = f"{CORRECTED} --set pitch=6um --set calibration=calibration.yaml"
 STACK = f"{CAMERA} --set unit=counts --set interval=2ms --set saturation=4094"
 COMMANDS = (
@@ -33,7 +33,7 @@ COMMANDS = (
     f"convert chip-1.npy {STACK} --out chip-1.nc",
     "show chip-1.nc --plot synthetic-chip.png",
     "emissivity heated-1.hcc heated-2.hcc heated-3.hcc heated-4.hcc --regions regions.yaml "
-    "--truth {reading}degC --truth-uncertainty 2K --environment-uncertainty 2K "
+    "--reference {reading}degC --reference-uncertainty 2K --reflected-uncertainty 2K "
     f"{CAMERA} --out emissivity.nc --plot synthetic-emissivity.png",
     f"psf edge-1.tif edge-2.tif {STACK} --out psf.nc --plot synthetic-psf.png",
     "temperature chip-1.npy chip-2.npy chip-3.npy chip-4.npy --regions regions.yaml "
@@ -46,7 +46,7 @@ def main() -> None:
     with TemporaryDirectory() as folder:
         laboratory = Laboratory(SEED)
         laboratory.perform(Path(folder))
-        print(f"{laboratory.optics.kind}: {laboratory.truth()}")
+        print(f"{laboratory.optics.kind}: {laboratory.reference()}")
         os.chdir(folder)
         reading = laboratory.reading - 273.15
         for command in COMMANDS:
@@ -69,11 +69,11 @@ def draw(rows: list[Any]) -> Figure:
         axes: Axes = figure.subplots()
         axes.axvspan(-1, 1, color=GREY, alpha=0.15, linewidth=0)
         for line, name in enumerate(QUANTITIES):
-            truth, value, expanded = np.array([row[name] for row in rows]).T
+            reference, value, expanded = np.array([row[name] for row in rows]).T
             place = line + np.linspace(-0.32, 0.32, REPEATS)
             for kind, colour in (("gaussian", BLUE), ("tail", GREEN), ("mirror", VERMILLION)):
                 mine = kinds == kind
-                share = (value - truth) / expanded
+                share = (value - reference) / expanded
                 axes.plot(
                     share[mine], place[mine], "o", color=colour, markersize=2.6,
                     label=f"{kind}: {mine.sum()}" if line == 0 else "",

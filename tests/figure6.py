@@ -8,7 +8,7 @@ def figure_6(temperatures, emissivities, radiance, invert, kernel, group=9):
     """Radiance temperature of one camera frame.
 
     `temperatures` and `emissivities` hold one image for each sub-frame; `radiance` is Equation 1
-    and `invert` its inverse; `kernel` is the point spread function on the sensors' grid.
+    and `invert` its inverse; `kernel` is the point spread function on the pixels' grid.
     """
     rows, columns = temperatures[0].shape
     frames = []

@@ -27,8 +27,8 @@ def table_1(body=(0.42, 0.07), fissure=(0.53, 0.05), seed=1, raster=RASTER):
 
 def measured(
     emissivity,
-    truth=391.0 + CELSIUS,
-    environment=293.0,
+    reference=391.0 + CELSIUS,
+    reflected=293.0,
     frames=1,
     noise=0.0,
     gain=1.0,
@@ -42,7 +42,7 @@ def measured(
     Noise and drift are standard deviations in W/(m² sr), of pixels and of whole frames.
     """
     generator = np.random.default_rng(seed)
-    hot, cold = BAND.radiance(np.array([truth, environment]))
+    hot, cold = BAND.radiance(np.array([reference, reflected]))
     radiance = gain * (emissivity * hot + (1 - emissivity) * cold)
     radiance = radiance + drift * generator.standard_normal((frames, 1, 1))
     radiance = radiance + noise * generator.standard_normal((frames, *raster.shape))

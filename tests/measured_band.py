@@ -93,7 +93,7 @@ def measured(
         BAND,
         1e-5 * np.arange(len(images)),
         raster,
-        floor=573.15,
+        lower_limit=573.15,
         calibration_uncertainty=known,
         attributes=attributes,
     ).with_tool(TOOL)

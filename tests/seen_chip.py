@@ -17,7 +17,7 @@ STARTS = [0.0, 10e-6]
 def look(angle, surface):
     """Two frames of a chip on a tool of this rake angle in degrees."""
     chip = AnalyticChip(tool=ToolGeometry(rake_angle=radians(angle)), frames=31)
-    camera = Camera(integration_time=5e-6, floor=FLOOR, psf=GaussianPSF(8e-6))
+    camera = Camera(integration_time=5e-6, lower_limit=FLOOR, psf=GaussianPSF(8e-6))
     return camera.measure(chip.scene(), surface, STARTS)
 
 

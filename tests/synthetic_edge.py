@@ -1,7 +1,7 @@
 """Images of edges and apertures of known optics, without the code that is tested.
 
 Edge-spread functions are closed forms, or come from the closed form of the point spread function
-by Abel's integral; each sensor's mean over its square is taken by Gauss's quadrature.
+by Abel's integral; each pixel's mean over its square is taken by Gauss's quadrature.
 """
 
 from functools import cache
@@ -97,7 +97,7 @@ def blurred_disc_edge(diameter, fwhm):
 
 
 def edge_radiance(edge, normal, side=40, position=1e-6, background=2.0, step=5.0, fill=1.0):
-    """Mean radiance of each sensor's square; the normal in degrees points to the bright side."""
+    """Mean radiance of each pixel's square; the normal in degrees points to the bright side."""
     rows, columns = (side, side) if np.isscalar(side) else side
     node, weight = np.polynomial.legendre.leggauss(6)
     inside = node * PITCH * sqrt(fill) / 2
@@ -110,7 +110,7 @@ def edge_radiance(edge, normal, side=40, position=1e-6, background=2.0, step=5.0
 
 
 def image_of(radiance, noise=0.0, seed=0, saturation=None, name="edge", wavelength=WAVELENGTH):
-    """The image of a sensor with noise, cut off at its saturation."""
+    """The image of a pixel with noise, cut off at its saturation."""
     radiance = radiance + np.random.default_rng(seed).normal(0.0, 1.0, radiance.shape) * noise
     rows, columns = radiance.shape
     none = np.zeros(radiance.shape, dtype=bool)
@@ -153,7 +153,7 @@ def gaussian_aperture(fwhm, diameter, share=0.0, length=1.0, side=61, noise=0.0,
 
 
 def gaussian_transfer(frequency, fwhm, normal):
-    """Modulation transfer function of a Gaussian and a square sensor along the edge's normal."""
+    """Modulation transfer function of a Gaussian and a square pixel along the edge's normal."""
     optics = np.exp(-2 * (pi * fwhm / FWHM_PER_SIGMA * frequency) ** 2)
     angle = radians(normal)
     sensor = np.sinc(frequency * PITCH * cos(angle)) * np.sinc(frequency * PITCH * sin(angle))

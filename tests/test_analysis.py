@@ -28,7 +28,7 @@ from chipglow.study import Study
 from chipglow.surface import CHIP_1, CHIP_2
 
 BAND = Band(3.8e-6, 5.1e-6)
-CAMERA = Camera(band=BAND, pitch=6e-6, psf=GaussianPSF(12e-6), psf_order="sensor")
+CAMERA = Camera(band=BAND, pitch=6e-6, psf=GaussianPSF(12e-6), psf_order="detector")
 GRID = Raster(left=-300e-6, top=300e-6, spacing=2e-6, rows=180, columns=180)
 TOOL = ToolGeometry()
 
@@ -107,7 +107,7 @@ def test_the_portions_add_up_and_an_ideal_camera_is_all_portion_free():
 def test_nothing_is_measured_over_the_maximum_without_a_psf(seed, pitch, offset, fill):
     camera = Camera(band=BAND, pitch=pitch, offset=(offset, offset / 2), fill_factor=fill, psf=None)
     exposure = random_exposure(seed)
-    measured = camera.develop(exposure).radiance[0]
+    measured = camera.form_measurement(exposure).radiance[0]
     greatest = BAND.radiance(reference_temperature(camera, exposure, "maximum"))
     # A mean of samples is not over their maximum, but for the slivers on four sides that the
     # maximum leaves out: they cover this part of the pixel at most.
@@ -208,7 +208,7 @@ def test_a_straight_ridge_is_found_where_it_is(degrees, width):
     offset = band.ridge.points - edge
     across = offset[:, 0] * sin(angle) + offset[:, 1] * cos(angle)
     # The parabola through three samples of a Gaussian, 2 µm apart, is within 0.4 µm of its top.
-    # The tool and the surface cut the ridge off aslant; that reaches as far in as the smoothing.
+    # The tool and the surface cut the ridge off oblique; that reaches as far in as the smoothing.
     distance = band.ridge.distance
     inner = (distance > 40e-6) & (distance < distance[-1] - 40e-6)
     assert np.abs(across[inner]).max() < 0.4e-6
@@ -292,11 +292,11 @@ def test_a_ridge_begins_where_the_band_does(degrees, bend, gap, layer):
     assert depth_in_layer(points).max() < 0
     inner = (along > gap + 40e-6) & (along < along[-1] - 40e-6)
     assert np.abs(across[inner]).max() < 0.4e-6
-    # Both ends are cut off aslant: the path bends there by up to 30 degrees.
+    # Both ends are cut off oblique: the path bends there by up to 30 degrees.
     assert turning(points) < bend * band.length + radians(60.0)
     whole = np.linspace(0.0, 0.4e-3, 4001)
     end = np.interp(200e-6, shape.curve(whole)[:, 1], whole)
-    # The free surface cuts it off aslant, so that it ends within its width of 20 µm.
+    # The free surface cuts it off oblique, so that it ends within its width of 20 µm.
     assert band.length == pytest.approx(end - gap, abs=20e-6)
     half = 10e-6 + GRID.spacing
     assert along[band.middle] == pytest.approx((gap + end) / 2, abs=half)
@@ -335,7 +335,7 @@ def check_that_it_begins_beside_the_layer(rate, workpiece, shape):
     assert -2 * GRID.spacing < along[0] - leaves < 8.5e-6 + 2 * GRID.spacing
     assert np.abs(across[along < along[-1] - 40e-6]).max() < 1.5e-6
     assert depth_in_layer(band.ridge.points).max() < 0
-    # It is cut off aslant at one end.
+    # It is cut off oblique at one end.
     assert turning(band.ridge.points) < shape.bend * band.length + radians(30.0)
 
 

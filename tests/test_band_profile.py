@@ -38,7 +38,7 @@ def found(image, noise=0.0):
 
 
 def inner(along):
-    """Without the two ends, which the tool and the fading band cut off aslant."""
+    """Without the two ends, which the tool and the fading band cut off oblique."""
     return (along > 60e-6) & (along < LENGTH - 40e-6)
 
 
@@ -248,7 +248,7 @@ def test_a_given_curve_is_the_place_of_the_reference():
 
 def test_a_single_band_has_a_doubtful_stage():
     profile = band_profile(measured([BandImage().temperature(), NO_BANDS["uniform"]]), TOOL)
-    assert profile.doubts == ("one frame has a band; without another its stage says nothing.",)
+    assert profile.warnings == ("one frame has a band; without another its stage says nothing.",)
 
 
 @pytest.mark.parametrize(("left", "doubted"), [(0.3, True), (0.95, False)])
@@ -260,7 +260,7 @@ def test_a_curve_over_a_deep_valley_is_doubtful(left, doubted):
     temperature = 600.0 + (image.temperature() - 600.0) * (1.0 - valley)
     profile = band_profile(measured([temperature, temperature]), TOOL)
     said = "the curve at 0, 10 µs crosses a valley"
-    assert any(doubt.startswith(said) for doubt in profile.doubts) is doubted
+    assert any(warning.startswith(said) for warning in profile.warnings) is doubted
 
 
 def test_without_a_band_near_the_edge_the_stages_are_doubtful():
@@ -269,7 +269,7 @@ def test_without_a_band_near_the_edge_the_stages_are_doubtful():
     temperature = np.where(along > 150e-6, image.temperature(), 600.0)
     profile = band_profile(measured([temperature, temperature + 5.0]), TOOL)
     assert profile.stage == (Stage.DEVELOPED, Stage.DEVELOPED)
-    assert any(doubt.startswith("no band begins near") for doubt in profile.doubts)
+    assert any(warning.startswith("no band begins near") for warning in profile.warnings)
 
 
 def test_a_tool_far_outside_the_image_is_one_error():
@@ -362,7 +362,7 @@ def test_the_command_writes_what_it_shows(file, tmp_path):
 
 def test_an_unknown_calibration_is_doubtful(tmp_path):
     write_measurement(measured([BandImage().temperature()]), tmp_path / "m.nc")
-    assert "Doubtful: the measurement does not tell" in run(tmp_path / "m.nc").output
+    assert "Warning: the measurement does not tell" in run(tmp_path / "m.nc").output
 
 
 def test_the_netcdf_file_holds_si_units(file, tmp_path):

@@ -5,8 +5,8 @@ import pytest
 
 from chipglow.camera import (
     Blackbody,
+    FactoryCalibration,
     LinearCalibration,
-    MakersCalibration,
     PlanckConversion,
     fit_linear,
     fit_sakuma_hattori,
@@ -211,7 +211,7 @@ def test_the_temperature_uncertainty_counts_where_the_counts_are_steep():
 
 @pytest.mark.parametrize("fitted", FITS.values())
 def test_errors_at_two_radiances_are_of_one_kind(fitted):
-    """Their covariance is that of fits to black bodies which are as far off as they are said."""
+    """Their covariance is that of fits to blackbodies which are as far off as they are said."""
     generator = np.random.default_rng(2)
     truth = counts_of("linear", KELVINS)
     counts = counts_of("linear", BETWEEN)
@@ -261,7 +261,7 @@ def test_counts_without_radiance_have_none():
 
 def test_the_makers_conversion_is_of_unknown_uncertainty():
     conversion = PlanckConversion(r1=1e5, r2=1.0, b=3000.0, f=1.0, o=0.0)
-    calibration = MakersCalibration(band=BAND, conversion=conversion)
+    calibration = FactoryCalibration(band=BAND, conversion=conversion)
     counts = np.array([3000.0, 6000.0])
     kelvins = 3000.0 / np.log(1e5 / counts + 1.0)
     np.testing.assert_allclose(BAND.temperature(calibration.radiance(counts)), kelvins, rtol=1e-9)
@@ -311,7 +311,7 @@ def test_sakuma_hattori_needs_more_points():
         ({"covariance": -np.eye(2)}, "variance is negative"),
         ({"covariance": np.full((2, 2), np.nan)}, "not finite"),
         ({"lowest": 900.0, "highest": 800.0}, "lowest is 900.0 K and highest 800.0 K"),
-        ({"highest": np.inf}, "temperatures of black bodies"),
+        ({"highest": np.inf}, "temperatures of blackbodies"),
     ],
 )
 def test_impossible_calibrations_are_refused(changed, message):

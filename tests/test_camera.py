@@ -81,7 +81,7 @@ def temperature_of(measurement):
 @pytest.mark.parametrize("psf", PSFS, ids=repr)
 def test_equals_the_loop_of_figure_6(psf):
     scene, surface = random_scene()
-    camera = Camera(psf=psf, psf_order="sensor", integration_time=6 * STEP, floor=None)
+    camera = Camera(psf=psf, psf_order="detector", integration_time=6 * STEP, lower_limit=None)
     expected = figure_6(
         scene.data["temperature"].values.astype(np.float64),
         surface.values,
@@ -101,7 +101,7 @@ def test_equals_the_loop_of_figure_6(psf):
     fill=st.floats(0.05, 1.0),
     offset=st.tuples(st.floats(0, 9e-6), st.floats(0, 9e-6)),
     psf=st.sampled_from(PSFS),
-    order=st.sampled_from(["optics", "sensor"]),
+    order=st.sampled_from(["optics", "detector"]),
 )
 def test_a_black_body_measures_its_temperature(temperature, pitch, fill, offset, psf, order):
     scene = make_scene(np.full((2, 50, 60), temperature))
@@ -274,7 +274,7 @@ def test_sampling_conserves_energy(pitch, offset, fill):
         overlap_lengths(np.array([offset]), pitch * count, samples, SPACING)[0]
         for count, samples in zip(sensors.shape, scene.shape, strict=True)
     ]
-    # The last sensor may stick out by 1e-6 of itself.
+    # The last pixel may stick out by 1e-6 of itself.
     assert whole == pytest.approx(reach[0] @ radiance @ reach[1], rel=1e-5)
 
 
@@ -284,7 +284,7 @@ def test_sensors_of_a_plane_read_it_at_their_middles(pitch, offset, fill):
     sensors = sensor_raster(scene, pitch, (offset, 0.0), None)
     plane = scene.x + 3 * scene.y[:, None]
     expected = sensors.x + 3 * sensors.y[:, None]
-    # A sample is even inside: at a sensor's edges that moves the mean by a part of a sample.
+    # A sample is even inside: at a pixel's edges that moves the mean by a part of a sample.
     found = integrate(plane, scene, sensors, fill)
     np.testing.assert_allclose(found, expected, atol=2.1 * SPACING)
 
@@ -306,11 +306,11 @@ def test_a_ninth_of_a_sensor_is_its_middle_third():
 
 def test_sensors_lie_where_they_are_said_to():
     scene = make_scene(np.full((1, 810, 900), 700.0))
-    sensors = Camera().sensors(scene.raster)
+    sensors = Camera().pixels(scene.raster)
     assert sensors.shape == (90, 100)
     assert sensors.x[0] == pytest.approx(-417e-6)
     assert sensors.y[0] == pytest.approx(457e-6)
-    moved = Camera(offset=(12e-6, 6e-6), shape=(3, 4)).sensors(scene.raster)
+    moved = Camera(offset=(12e-6, 6e-6), shape=(3, 4)).pixels(scene.raster)
     assert moved.shape == (3, 4)
     assert (moved.left, moved.top) == pytest.approx((-408e-6, 454e-6))
 
@@ -331,9 +331,9 @@ def test_motion_blur_of_a_moving_step_is_a_ramp():
 
 
 def edge_response(order, fwhm, pitch, spacing=0.5e-6, columns=480):
-    """Where the sensors are from a knife edge, in order, and how much of its step they see.
+    """Where the pixels are from a knife edge, in order, and how much of its step they see.
 
-    The edge stands at every sample of one sensor in turn: a slanted edge.
+    The edge stands at every sample of one pixel in turn: a slanted edge.
     """
     distance, response = [], []
     for edge in range(columns // 2, columns // 2 + round(pitch / spacing)):
@@ -363,15 +363,15 @@ def test_knife_edge_with_the_optics_first():
 
 def test_knife_edge_with_the_sensors_first():
     fwhm, pitch = 14e-6, 6e-6
-    x, response = edge_response("sensor", fwhm, pitch)
-    # Sensors see a ramp one sensor wide; the blur from sensor to sensor makes of it straight
-    # lines between the Gaussian's edge at the sensors' middles.
+    x, response = edge_response("detector", fwhm, pitch)
+    # Pixels see a ramp one pixel wide; the blur from pixel to pixel makes of it straight
+    # lines between the Gaussian's edge at the pixels' middles.
     middles = pitch * (np.arange(-60, 60) + 0.5)
     expected = np.interp(x, middles, gaussian_edge(middles, fwhm))
     np.testing.assert_allclose(response, expected, atol=3e-4)
 
 
-@pytest.mark.parametrize(("order", "footprints"), [("optics", 1), ("sensor", 2)])
+@pytest.mark.parametrize(("order", "footprints"), [("optics", 1), ("detector", 2)])
 def test_how_often_each_order_counts_the_footprint(order, footprints):
     fwhm, pitch = 14e-6, 6e-6
     x, response = edge_response(order, fwhm, pitch)
@@ -381,18 +381,18 @@ def test_how_often_each_order_counts_the_footprint(order, footprints):
     assert line @ middle**2 == pytest.approx(expected, rel=5e-3)
 
 
-@pytest.mark.parametrize("order", ["optics", "sensor"])
+@pytest.mark.parametrize("order", ["optics", "detector"])
 @pytest.mark.parametrize("psf", PSFS, ids=repr)
 def test_a_pixel_does_not_depend_on_how_many_others_are_read_out(psf, order):
     scene, surface = random_scene()
-    whole = Camera(integration_time=STEP, floor=None, psf=psf, psf_order=order)
+    whole = Camera(integration_time=STEP, lower_limit=None, psf=psf, psf_order=order)
     part = replace(whole, shape=(2, 3), offset=(2 * whole.pitch, 3 * whole.pitch))
     expected = whole.measure(scene, surface, 0.0).radiance[:, 3:5, 2:5]
     # Places and transforms are rounded.
     np.testing.assert_allclose(part.measure(scene, surface, 0.0).radiance, expected, rtol=1e-9)
 
 
-@pytest.mark.parametrize("order", ["optics", "sensor"])
+@pytest.mark.parametrize("order", ["optics", "detector"])
 def test_it_is_said_where_the_border_of_the_scene_matters(order):
     temperature = np.full((1, 54, 180), 700.0)
     temperature[..., 81:90] = 1300.0  # one column of pixels, at the border of the smaller scene
@@ -415,7 +415,7 @@ def test_it_is_said_where_the_border_of_the_scene_matters(order):
     assert 0.3 * wrong.max() < most < 3 * wrong.max()
 
 
-@pytest.mark.parametrize("order", ["optics", "sensor"])
+@pytest.mark.parametrize("order", ["optics", "detector"])
 def test_nothing_is_said_of_a_border_that_does_not_matter(order):
     temperature = np.full((1, 90, 90), 700.0)
     temperature[:, 42:48, 42:48] = 1300.0
@@ -426,17 +426,17 @@ def test_nothing_is_said_of_a_border_that_does_not_matter(order):
 
 def test_light_from_beyond_the_scene():
     scene = Raster(0.0, 0.0, SPACING, 90, 180)
-    for order in ("optics", "sensor"):
+    for order in ("optics", "detector"):
         camera = Camera(psf=GaussianPSF(8e-6), psf_order=order, shape=(10, 20))
         beyond = camera.light_from_beyond(scene)
         assert beyond.shape == (10, 20)
-        # The mean of (1 - erf) / 2 over a pixel at the border; with the sensors first the blur is
+        # The mean of (1 - erf) / 2 over a pixel at the border; with the pixels first the blur is
         # wider by a footprint, but what is within a pixel stays there.
         sigma = 8e-6 / (2 * sqrt(2 * log(2)))
         nodes, weights = np.polynomial.legendre.leggauss(20)
         x = 3e-6 * (1 + nodes)
         at_border = ((1 - erf(x / (sqrt(2) * sigma))) / 2) @ weights / 2
-        if order == "sensor":
+        if order == "detector":
             at_border = (1 - erf(3e-6 / (sqrt(2) * sigma))) / 2
         assert beyond[5, 0] == pytest.approx(at_border, rel=2e-3)
         assert beyond[5, 10] < 1e-12
@@ -447,18 +447,20 @@ def test_light_from_beyond_the_scene():
 
 def test_case_2_comes_from_the_same_exposure():
     scene, surface = random_scene()
-    camera = Camera(integration_time=6 * STEP, floor=None)
+    camera = Camera(integration_time=6 * STEP, lower_limit=None)
     exposure = camera.expose(scene, surface, 0.0)
     case_2 = replace(camera, psf=None)
     np.testing.assert_array_equal(
-        case_2.develop(exposure).radiance, case_2.measure(scene, surface, 0.0).radiance
+        case_2.form_measurement(exposure).radiance, case_2.measure(scene, surface, 0.0).radiance
     )
-    assert not np.allclose(case_2.develop(exposure).radiance, camera.develop(exposure).radiance)
+    assert not np.allclose(
+        case_2.form_measurement(exposure).radiance, camera.form_measurement(exposure).radiance
+    )
 
 
 def test_a_sequence_is_its_frames():
     scene, surface = random_scene(frames=8)
-    camera = Camera(integration_time=3 * STEP, floor=None)
+    camera = Camera(integration_time=3 * STEP, lower_limit=None)
     starts = [0.0, 1.5 * STEP, 5 * STEP]
     measured = camera.measure(scene, surface, starts)
     assert measured.times.tolist() == starts
@@ -490,7 +492,7 @@ def test_under_the_floor_is_flagged_not_returned():
     temperature[:, :, :9] = 500.0
     measured = Camera(psf=None).measure(make_scene(temperature), BLACK, 0.0)
     assert measured.flags.dtype == np.uint8
-    np.testing.assert_array_equal(measured.flags[0], [[Flag.BELOW_FLOOR, 0, 0]] * 2)
+    np.testing.assert_array_equal(measured.flags[0], [[Flag.UNDER_RANGE, 0, 0]] * 2)
     np.testing.assert_array_equal(np.isnan(temperature_of(measured)), measured.flags[0] == 1)
     np.testing.assert_allclose(
         measured.radiance_temperature(flagged=True)[0], [[500, 900, 900]] * 2, atol=ROUNDING
@@ -502,8 +504,8 @@ def test_without_a_floor_only_darkness_is_flagged():
     material = np.ones_like(temperature, dtype=np.uint8)
     material[:, :, :9] = 0
     scene = make_scene(temperature, material=material)
-    measured = Camera(psf=None, floor=None).measure(scene, BLACK, 0.0)
-    np.testing.assert_array_equal(measured.flags[0], [[Flag.BELOW_FLOOR, 0]])
+    measured = Camera(psf=None, lower_limit=None).measure(scene, BLACK, 0.0)
+    np.testing.assert_array_equal(measured.flags[0], [[Flag.UNDER_RANGE, 0]])
 
 
 def test_flagged_temperatures_need_the_band():
@@ -518,7 +520,7 @@ def test_a_measurement_keeps_a_response_that_is_no_box(tmp_path):
         return np.exp(-(((wavelength - 4.2e-6) / 0.3e-6) ** 2))
 
     band = Band(3e-6, 5e-6, response=hill)
-    measured = Camera(band=band, floor=600.0).measure(
+    measured = Camera(band=band, lower_limit=600.0).measure(
         make_scene(np.full((1, 9, 9), 500.0)), BLACK, 0.0
     )
     write_measurement(measured, tmp_path / "measured.nc")
@@ -573,7 +575,7 @@ def test_broken_measurements_are_refused(broken):
         {"integration_time": 10e-3},
         {"integration_time": float("nan")},
         {"frame_rate": -600.0},
-        {"floor": 20.0},
+        {"lower_limit": 20.0},
         {"reflected": 20.0},
         {"band": "3-5 um"},
         {"pitch": "6 um"},
@@ -587,7 +589,7 @@ def test_broken_measurements_are_refused(broken):
         {"integration_time": "10 us"},
         {"frame_rate": "600 Hz"},
         {"frame_rate": float("inf")},
-        {"floor": "300 degC"},
+        {"lower_limit": "300 degC"},
         {"reflected": "20 degC"},
     ],
     ids=str,
@@ -597,20 +599,20 @@ def test_impossible_cameras_are_refused(values):
         Camera(**values)
 
 
-@pytest.mark.parametrize("floor", [300.0, 250, 370.0])
-def test_a_floor_that_is_meant_in_degrees_celsius_is_doubted(floor):
+@pytest.mark.parametrize("lower_limit", [300.0, 250, 370.0])
+def test_a_floor_that_is_meant_in_degrees_celsius_is_doubted(lower_limit):
     with pytest.warns(
-        ChipglowWarning, match=rf"floor is {floor:g} K, .* {floor + 273.15:g} K"
+        ChipglowWarning, match=rf"floor is {lower_limit:g} K, .* {lower_limit + 273.15:g} K"
     ) as w:
-        camera = Camera(floor=floor)
-    assert camera.floor == floor
+        camera = Camera(lower_limit=lower_limit)
+    assert camera.lower_limit == lower_limit
     assert w[0].filename == __file__
 
 
-@pytest.mark.parametrize("floor", [None, 253.15, 273.15, 400.0, 573.15])
-def test_other_floors_are_not_doubted(floor):
+@pytest.mark.parametrize("lower_limit", [None, 253.15, 273.15, 400.0, 573.15])
+def test_other_floors_are_not_doubted(lower_limit):
     with catch_warnings(action="error"):
-        assert Camera(floor=floor).floor == floor
+        assert Camera(lower_limit=lower_limit).lower_limit == lower_limit
 
 
 @pytest.mark.parametrize("look", [Camera.expose, Camera.measure])
@@ -623,7 +625,7 @@ def test_what_is_no_surface_is_refused(look, surface):
 
 def test_the_papers_camera_is_that_of_a_study():
     assert Camera.paper() == Study().camera.build()
-    assert Camera.paper() == replace(Camera(), psf_order="sensor")
+    assert Camera.paper() == replace(Camera(), psf_order="detector")
 
 
 @pytest.mark.parametrize(
@@ -631,7 +633,7 @@ def test_the_papers_camera_is_that_of_a_study():
     [
         (Camera(pitch=50e-6), 0.0, r"pitch of 5e-05 m .* scene of 1.2e-05 x 1.2e-05 m"),
         (Camera(offset=(11e-6, 0.0)), 0.0, r"offset of 1.1e-05, 0 m does not fit"),
-        (Camera(shape=(3, 1)), 0.0, r"shape is 3 x 1 sensors, but only 2 x 2"),
+        (Camera(shape=(3, 1)), 0.0, r"shape is 3 x 1 pixels, but only 2 x 2"),
         (Camera(), 0.0, r"0 s to 1e-05 s is not within the scene, which lasts from 0 s to 1e-06"),
         (Camera(integration_time=STEP), -STEP, "not within the scene"),
         (Camera(integration_time=STEP), 4.5 * STEP, "not within the scene"),
@@ -655,9 +657,9 @@ def test_exposures_of_different_grids_are_refused():
     one = Camera().expose(make_scene(np.full((1, 9, 9), 900.0)), BLACK, 0.0)
     other = Camera().expose(make_scene(np.full((1, 9, 18), 900.0)), BLACK, 0.0)
     with pytest.raises(ValueError, match="different grids"):
-        Camera().develop([one, other])
+        Camera().form_measurement([one, other])
     with pytest.raises(ValueError, match="expected 1 or more"):
-        Camera().develop([])
+        Camera().form_measurement([])
     with pytest.raises(ValueError, match="mean_radiance has shape"):
         Exposure(**{**vars(one), "mean_radiance": np.zeros((2, 2))})
 
@@ -679,7 +681,7 @@ def test_a_measurement_from_radiance_keeps_the_flags_that_are_known():
     )
     temperature = measured.radiance_temperature()[0, 0]
     np.testing.assert_allclose(temperature, [np.nan, np.nan, np.nan, 900.0], rtol=1e-6)
-    assert measured.flags.tolist() == [[[Flag.BELOW_FLOOR, *flags[0, 0, 1:].tolist()]]]
+    assert measured.flags.tolist() == [[[Flag.UNDER_RANGE, *flags[0, 0, 1:].tolist()]]]
     np.testing.assert_array_equal(measured.calibration_uncertainty, uncertainty)
     assert (measured.band, measured.raster.columns) == (band, 4)
-    assert measured.data.attrs["camera"] == "one" and measured.data.attrs["floor"] == 573.15
+    assert measured.data.attrs["camera"] == "one" and measured.data.attrs["lower_limit"] == 573.15

@@ -63,7 +63,7 @@ def test_a_frame_of_a_real_camera(tmp_path):
     assert (told.emissivity, told.reflected, told.atmosphere) == pytest.approx(
         (0.95, 295.15, 292.15)
     )
-    assert told.transmission == 1  # an object at 0 m
+    assert told.transmittance == 1  # an object at 0 m
     # A room, and the upper end of its range is 150 degC as it says elsewhere.
     temperature = recording.conversion.temperature(recording.signal)
     assert 295 < temperature.min() < temperature.max() < 303
@@ -83,7 +83,7 @@ def test_a_sequence_of_flir(tmp_path, order):
 def test_what_is_behind_the_last_frame_of_flir_is_said(tmp_path):
     recording = read_recording(make(tmp_path, "a.seq", files.seq(PICTURES) + b"an index"))
     assert np.array_equal(recording.signal, PICTURES)
-    assert recording.doubts == ("8 bytes behind the last frame are no frame.",)
+    assert recording.warnings == ("8 bytes behind the last frame are no frame.",)
 
 
 def test_big_endian_counts_and_zeros_between_frames(tmp_path):
@@ -117,7 +117,7 @@ def test_the_air_takes_what_flirs_formula_says(tmp_path):
     alpha, beta = np.array([[0.006569, 0.01262], [-0.002276, -0.00667]])
     thick = np.sqrt(2) * (alpha + beta * np.sqrt(water))
     air = np.array([1.9, -0.9]) @ np.exp(-thick)
-    assert recording.object_parameters.transmission == pytest.approx(0.9 * air, rel=1e-6)
+    assert recording.object_parameters.transmittance == pytest.approx(0.9 * air, rel=1e-6)
     assert recording.object_parameters.atmosphere == pytest.approx(292.15)
     assert any("a window that lets 90 % pass, at 20 degC" in note for note in recording.notes)
 
@@ -152,7 +152,7 @@ def test_a_picture_that_ends_before_the_missing_end_of_a_file_is_whole(tmp_path,
     assert any("last 4 bytes of the file are missing" in note for note in recording.notes)
     cut = read_recording(make(tmp_path, "b.csq", content[:-20]))
     assert np.array_equal(cut.signal, PICTURES[:4])
-    assert any("its first 4 frames are whole" in doubt for doubt in cut.doubts)
+    assert any("its first 4 frames are whole" in warning for warning in cut.warnings)
 
 
 # PTW, CINE
@@ -168,10 +168,10 @@ def test_ptw(tmp_path, lock_in):
     assert recording.camera == "JADE MW, serial number J-1234"
     told = vars(recording.object_parameters)
     assert told == pytest.approx(
-        {"emissivity": 0.8, "reflected": 296.15, "transmission": 0.98, "atmosphere": 295.15}
+        {"emissivity": 0.8, "reflected": 296.15, "transmittance": 0.98, "atmosphere": 295.15}
     )
     assert any("lock-in" in note for note in recording.notes) == lock_in
-    assert not recording.doubts
+    assert not recording.warnings
 
 
 def test_ptw_as_altair_560_writes_it(tmp_path):
@@ -184,7 +184,7 @@ def test_ptw_as_altair_560_writes_it(tmp_path):
     assert np.array_equal(recording.signal, PICTURES)
     assert recording.times == pytest.approx(stamps, rel=1e-6)
     assert any("30000 us apart, as their stamps say" in one for one in recording.assumptions)
-    assert not recording.doubts
+    assert not recording.warnings
     assert np.array_equal(read_recording(path, slice(2, 4)).times, recording.times[2:4])
 
 
@@ -198,7 +198,7 @@ def test_stamps_that_no_multiple_of_the_period_explains_are_the_times(tmp_path):
 def test_frames_missing_in_ptw_are_said(tmp_path):
     stamps = np.array([0, 1, 2, 12, 13]) / 600
     recording = read_recording(make(tmp_path, "a.ptw", files.ptw(PICTURES, stamps=stamps)))
-    assert any("frames may be missing" in doubt for doubt in recording.doubts)
+    assert any("frames may be missing" in warning for warning in recording.warnings)
 
 
 def test_ptw_without_period_has_the_times_of_its_stamps_also_over_midnight(tmp_path):
@@ -251,7 +251,7 @@ def test_cine_whose_exposure_changes_has_no_integration_time(tmp_path):
     path = make(tmp_path, "a.cine", files.cine(PICTURES, exposures=exposures))
     recording = read_recording(path)
     assert recording.integration_time is None
-    assert any("the integration time goes" in doubt for doubt in recording.doubts)
+    assert any("the integration time goes" in warning for warning in recording.warnings)
     assert read_recording(path, slice(2, 5)).integration_time == pytest.approx(5e-6, rel=1e-4)
 
 
@@ -507,7 +507,7 @@ def test_of_a_file_cut_anywhere_the_whole_frames_are_read_or_it_is_one_error(tmp
         assert np.array_equal(recording.signal, PICTURES[: known[-1]])
         # FLIR and Telops do not tell how many frames there should be.
         ends_with_one = kind in ("flir", "hcc") and length == known[-1] * len(content) // 5
-        assert ends_with_one or any("cut short" in doubt for doubt in recording.doubts)
+        assert ends_with_one or any("cut short" in warning for warning in recording.warnings)
     assert set(known) == {1, 2, 3, 4}
 
 

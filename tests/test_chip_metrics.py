@@ -10,7 +10,7 @@ from chipglow.laboratory.chip import chip_metrics
 from chipglow.scene import Material, Raster, Scene
 
 CHIP = SerratedChip()
-# Surfaces lie between samples' centres, and lines aslant cut their squares.
+# Surfaces lie between samples' centres, and lines oblique cut their squares.
 SAMPLE = CHIP.raster.spacing
 
 

@@ -241,11 +241,11 @@ def test_cut_writes_the_scene(folder, runs):
     assert result.exit_code == 0, result.output
     assert len(open_scene(folder / "scene.nc").times) == AnalyticChip().frames
     assert result.stdout == "scene.nc\n"
-    # The chip in closed form has no kinetic energy; the paper's momentum flow is 4.09 N/mm.
+    # The chip in closed form has no kinetic energy; the paper's momentum flux is 4.09 N/mm.
     assert (
         "Scaled mass after the build-up: kinetic energy at most 0.00% of the work" in result.stderr
     )
-    assert "momentum flow 0.91% of the mean cutting force" in result.stderr
+    assert "momentum flux 0.91% of the mean cutting force" in result.stderr
     assert "Warning" not in result.stderr
 
 
@@ -324,7 +324,7 @@ def test_measure_writes_frames_at_the_camera_rate(folder, scene):
     np.testing.assert_allclose(measurement.times, [0.0, 1 / 60e3], atol=1e-12)
     assert measurement.data.attrs["surface"] == "chip 1"
     # The analytic chip goes on beyond the view, bands and all.
-    assert " ".join(result.output.split()).count("Doubtful: The border of the scene: ") == 1
+    assert " ".join(result.output.split()).count("Warning: The border of the scene: ") == 1
 
 
 def test_measure_lays_a_measured_emissivity_map_on_the_scene(folder, scene, chip_scene):
@@ -333,12 +333,12 @@ def test_measure_lays_a_measured_emissivity_map_on_the_scene(folder, scene, chip
     image = Measurement.from_radiance(
         (share * band.radiance(800.0))[None], band, np.zeros(1), raster
     )
-    found = determine_emissivity([image], Heating(800.0, environment=200.0))
+    found = determine_emissivity([image], Heating(800.0, reflected=200.0))
     everywhere = Area("all", "chip", np.ones(raster.shape, bool), whole=True)
     write_emissivity([found], [[found.of(everywhere)]], "e.nc")
     study = (
         "surface: {maps: {seen: e.nc}}\nanalysis: {band_chip: seen}\n"
-        "camera: {psf: none, floor: none}"
+        "camera: {psf: none, lower_limit: none}"
     )
     (folder / "study.yaml").write_text(study)
     arguments = ("measure", "scene.nc", "--study", "study.yaml", "--out", "m.nc")
@@ -346,10 +346,10 @@ def test_measure_lays_a_measured_emissivity_map_on_the_scene(folder, scene, chip
     result = chipglow(*arguments, "--chip", "seen")
     assert result.exit_code == 0, result.output
     measured = read_measurement("m.nc")
-    truth = Camera(psf=None, floor=None).measure(chip_scene, UniformSurface(1.0), 0.0)
+    truth = Camera(psf=None, lower_limit=None).measure(chip_scene, UniformSurface(1.0), 0.0)
     solid = truth.radiance[0] > 0
     ratio = np.divide(measured.radiance[0], truth.radiance[0], out=np.zeros((56, 70)), where=solid)
-    # The environment at 200 K adds nothing that counts; the map's edge is one sensor wide.
+    # The environment at 200 K adds nothing that counts; the map's edge is one pixel wide.
     np.testing.assert_allclose(ratio[solid & (raster.x < -106e-6)], 0.3, atol=2e-3)
     np.testing.assert_allclose(ratio[solid & (raster.x > -94e-6)], 0.8, atol=2e-3)
     (folder / "study.yaml").write_text(study.replace("seen: e.nc", "chip 1: e.nc"))

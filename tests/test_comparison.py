@@ -189,11 +189,14 @@ def test_a_pixel_without_light_does_not_take_the_uncertainty_away():
 
 def test_few_frames_and_an_unknown_calibration_are_doubtful():
     one = measured([field(X, Y)])
-    doubts = compare(one, {"same": frames(field(X, Y))}, TOOL, CURVE).doubts
-    assert any("1 frame only" in doubt for doubt in doubts)
-    assert any("does not tell the uncertainty of its calibration" in doubt for doubt in doubts)
+    warnings = compare(one, {"same": frames(field(X, Y))}, TOOL, CURVE).warnings
+    assert any("1 frame only" in warning for warning in warnings)
+    assert any(
+        "does not tell the uncertainty of its calibration" in warning for warning in warnings
+    )
     assert not any(
-        "calibration" in doubt for doubt in compare(one, {"a": one}, TOOL, CURVE, STATED).doubts
+        "calibration" in warning
+        for warning in compare(one, {"a": one}, TOOL, CURVE, STATED).warnings
     )
 
 
@@ -298,7 +301,7 @@ def test_without_a_band_the_rake_face_is_left():
     base = np.where(TOOL.signed_distance(X, Y) < 100e-6, 650.0, 500.0)
     result = compare(frames(base), {"same": frames(base)}, TOOL, stated=STATED)
     assert result.band is None
-    assert any("the shear band is left out: measured:" in doubt for doubt in result.doubts)
+    assert any("the shear band is left out: measured:" in warning for warning in result.warnings)
     assert all("rake face" in place.place or "chip" in place.place for place in result.places)
 
 
@@ -316,7 +319,7 @@ def test_another_rake_angle_and_no_tool_are_said():
     data = base.data.copy()
     data.attrs = {k: v for k, v in data.attrs.items() if not k.startswith("tool_")}
     result = compare(base, {"other": other, "none": Measurement(data)}, TOOL, CURVE, STATED)
-    assert "the rake angle of other differs by 7 degrees." in result.doubts
+    assert "the rake angle of other differs by 7 degrees." in result.warnings
     assert any("none tells no tool" in text for text in result.assumptions)
 
 

@@ -193,7 +193,7 @@ def test_only_the_window_loses_heat():
 
 def short_cut(surroundings):
     simulation = CuttingSimulation(
-        CuttingConditions(length_of_cut=0.06e-3),
+        CuttingConditions(cutting_length=0.06e-3),
         numerics=Numerics(cell=30e-6),
         surroundings=surroundings,
     )

@@ -42,8 +42,8 @@ def test_the_ripple_of_a_continuous_chip_has_no_valleys(swing):
     assert valleys_of(saw_tooth(80e-6, 6, swing=swing, noise=3e3)) == []
 
 
-def recorded(force, window, length_of_cut=2.6e-3):
-    recorder = Recorder(window, SPEED, length_of_cut)
+def recorded(force, window, cutting_length=2.6e-3):
+    recorder = Recorder(window, SPEED, cutting_length)
     return [k for k in range(1, recorder.last + 1) if recorder.wants(k, float(force[k - 1]))]
 
 

@@ -133,7 +133,7 @@ def pressed_on_a_face(**friction):
     """A block that meets an upright rake face squarely, far above the edge, and slides up."""
     upright = ToolGeometry(rake_angle=0.0)
     tool = upright.surface._replace(x=80e-6 + upright.edge_radius, y=-1.0)
-    block = Block((80e-6, 80e-6), tool=tool, shear_fraction=1.0, **friction)
+    block = Block((80e-6, 80e-6), tool=tool, friction_factor=1.0, **friction)
     block.set_velocity(lambda x, y: 1.0 + 0 * x * y, lambda x, y: 4.0 + 0 * x * y)
     return block
 
@@ -185,7 +185,7 @@ def test_shear_limit_holds_whatever_the_temperature():
     free = pressed_on_a_face(friction=2.0)
     free.points["temperature"] = 900.0
     for each in (block, free):
-        each.step = each.step._replace(shear_fraction=1e-8)
+        each.step = each.step._replace(friction_factor=1e-8)
         each.advance(10)
     # Coulomb's limit is far over the shear limit in both: it does not matter that it differs.
     assert free.force[1] != 0.0
@@ -197,7 +197,7 @@ def test_thermal_exponent_reaches_the_cut():
     work = []
     for exponent in (None, 0.01):
         simulation = CuttingSimulation(
-            CuttingConditions(length_of_cut=0.03e-3),
+            CuttingConditions(cutting_length=0.03e-3),
             friction=Friction(thermal_exponent=exponent),
             numerics=Numerics(cell=30e-6),
         )
@@ -231,7 +231,7 @@ def test_energy_of_a_vibrating_block_is_kept_but_for_what_the_transfer_dissipate
 
 def test_energy_account_of_a_short_cut_closes():
     simulation = CuttingSimulation(
-        CuttingConditions(length_of_cut=0.1e-3), numerics=Numerics(cell=30e-6)
+        CuttingConditions(cutting_length=0.1e-3), numerics=Numerics(cell=30e-6)
     )
     raster = Raster(-100e-6, 100e-6, 10e-6, 20, 20)
     window = OutputWindow(start=0.09e-3, end=0.1e-3, interval=1e-6, later_bands=0)
@@ -262,7 +262,7 @@ def test_result_does_not_depend_on_the_number_of_threads():
 
 def test_time_step_follows_the_fastest_point():
     simulation = CuttingSimulation(
-        CuttingConditions(length_of_cut=0.1e-3), numerics=Numerics(cell=30e-6)
+        CuttingConditions(cutting_length=0.1e-3), numerics=Numerics(cell=30e-6)
     )
     state = _State(simulation, 1e-6)
     sorted_at_rest, step_at_rest = state.cycles, state.step.time_step

@@ -56,7 +56,7 @@ def test_a_target_gives_the_map_within_its_uncertainty():
         found = fit_dots(target.infrared, RASTER, target.visible).registration
         assert found.method == "dots"
         off = found.pixels(CORNERS) - target.pixels(CORNERS)
-        # A quarter of a sensor at the image's corner, beyond the outermost dots.
+        # A quarter of a pixel at the image's corner, beyond the outermost dots.
         assert np.abs(off).max() * target.pitch < 0.25 * RASTER.spacing
         limit = 2 * f.ppf(0.95, 2, found.degrees_of_freedom)
         for error, covariance in zip(off, found.pixel_covariance(CORNERS), strict=True):
@@ -124,7 +124,7 @@ def test_grain_whose_pixels_are_alike_makes_the_middles_less_sure():
 
 
 def test_the_skirts_of_blurred_neighbours_do_not_pull():
-    """Dots without order, nearly as blurred as apart: with the skirts 0.22 sensors off."""
+    """Dots without order, nearly as blurred as apart: with the skirts 0.22 pixels off."""
     target = replace(SMALL, radius=26e-6, blur=15e-6, jitter=4e-6, noise=1e-3)
     off = errors(find_dots(target.infrared), in_sensors(target))
     assert np.sqrt((off**2).mean()) < 0.06
@@ -152,7 +152,7 @@ def test_an_arrangement_is_recognised(seed, turn, scale, lost):
     )
     assert (first[match.first] == second[match.second]).all()
     assert match.first.size == np.intersect1d(first, second).size
-    assert match.doubts == ()
+    assert match.warnings == ()
 
 
 def a_grid(columns):
@@ -164,12 +164,12 @@ def test_a_grid_that_goes_on_beyond_the_pictures_is_doubtful():
     """Seven columns in one and six of them in the other: where they belong is open."""
     whole = Arrangement(a_grid(7), (140, 180), 5.0)
     beyond = Arrangement(4 * a_grid(6) - [80, 0], (560, 520), 20.0)
-    assert "match 80 visible pixels further on" in match_dots(whole, beyond).doubts[0]
+    assert "match 80 visible pixels further on" in match_dots(whole, beyond).warnings[0]
     decided = Arrangement(4 * a_grid(7), (560, 720), 20.0)
-    assert match_dots(whole, decided).doubts == ()
+    assert match_dots(whole, decided).warnings == ()
     gap = np.delete(np.arange(35), 17)
     both = replace(whole, pixels=a_grid(7)[gap]), replace(decided, pixels=4 * a_grid(7)[gap])
-    assert match_dots(*both).doubts == ()
+    assert match_dots(*both).warnings == ()
 
 
 def test_arrangements_that_have_nothing_to_do_with_each_other_are_refused():
@@ -183,9 +183,9 @@ def test_arrangements_that_have_nothing_to_do_with_each_other_are_refused():
 def test_a_map_with_perspective_is_of_another_kind_than_an_affine_one():
     target = replace(SMALL, perspective=(200.0, -120.0))
     straight = fit_dots(target.infrared, RASTER, target.visible).registration
-    assert any("another kind than the model" in doubt for doubt in straight.doubts)
+    assert any("another kind than the model" in warning for warning in straight.warnings)
     found = fit_dots(target.infrared, RASTER, target.visible, "homography").registration
-    assert found.doubts == ()
+    assert found.warnings == ()
     assert found.pixels(CORNERS) == pytest.approx(target.pixels(CORNERS), abs=1.0)
 
 
@@ -233,6 +233,6 @@ def test_the_command_registers_by_dots(tmp_path, monkeypatch):
     assert "Visible: 19 dark dots of a radius of" in output
     assert "Assumed: the visible picture is not mirrored, is turned by up to 30 degrees" in output
     found = load_registration("map.yaml")
-    assert (found.method, found.doubts) == ("dots", ())
+    assert (found.method, found.warnings) == ("dots", ())
     assert found.pixels(CORNERS) == pytest.approx(SMALL.pixels(CORNERS), abs=1.0)
     assert (tmp_path / "over.png").exists()

@@ -45,9 +45,9 @@ def rows_of(found):
     return {area.name: found.of(area) for area in areas(REGION_LIST, found.raster)}
 
 
-def slopes(truth=TRUTH, environment=293.0):
+def slopes(reference=TRUTH, reflected=293.0):
     """Radiances of truth and environment, and their derivatives with temperature."""
-    points = np.array([truth, environment])
+    points = np.array([reference, reflected])
     return BAND.radiance(points), (BAND.radiance(points + 0.5) - BAND.radiance(points - 0.5))
 
 
@@ -56,10 +56,10 @@ def slopes(truth=TRUTH, environment=293.0):
 
 @given(st.floats(0.02, 1.0), st.floats(500.0, 1500.0), st.floats(200.0, 350.0))
 @settings(max_examples=50, deadline=None)
-def test_equation_2_is_undone(emissivity, truth, environment):
+def test_equation_2_is_undone(emissivity, reference, reflected):
     small = Raster(0.0, 0.0, 6e-6, 2, 2)
-    image = measured(np.full((2, 2), emissivity), truth, environment, raster=small)
-    found = determine_emissivity([image], Heating(truth, environment))
+    image = measured(np.full((2, 2), emissivity), reference, reflected, raster=small)
+    found = determine_emissivity([image], Heating(reference, reflected))
     np.testing.assert_allclose(found.emissivity, emissivity, rtol=1e-12)
 
 
@@ -73,10 +73,10 @@ def test_table_1_of_the_paper_comes_back_through_camera_and_scene(body, fissure,
     fields["temperature"] += celsius + CELSIUS
     fields["material"] += 1
     scene = Scene.from_fields(RASTER, np.arange(11) * 1e-6, fields)
-    camera = Camera(psf=None, floor=None, reflected=293.0)
+    camera = Camera(psf=None, lower_limit=None, reflected=293.0)
     image = camera.measure(scene, MapSurface(put_in, RASTER), 0.0)
     rows = rows_of(determine_emissivity([image], Heating(celsius + CELSIUS)))
-    # A camera without blur whose sensors are the samples; emissivities are float32 on their way.
+    # A camera without blur whose pixels are the samples; emissivities are float32 on their way.
     parts = {"chip body": put_in[:, np.r_[:16, 24:40]], "fissure": put_in[:, 17:23]}
     for name, (mean, deviation) in (("chip body", body), ("fissure", fissure)):
         row = rows[name]
@@ -89,7 +89,7 @@ def test_table_1_of_the_paper_comes_back_through_camera_and_scene(body, fissure,
 
 
 def test_the_spread_over_pixels_is_no_uncertainty_of_the_mean():
-    heating = replace(HEATING, truth_uncertainty=2.0)
+    heating = replace(HEATING, reference_uncertainty=2.0)
     smooth, rough = (table_1((0.42, sd), (0.53, sd)) for sd in (0.001, 0.07))
     rows = [
         rows_of(determine_emissivity([measured(one, frames=20, noise=0.1)], heating))["chip body"]
@@ -114,10 +114,10 @@ def test_the_budget_is_that_of_the_derivatives():
     temperature = BAND.temperature(seen)
     slope = BAND.radiance(temperature + 0.5) - BAND.radiance(temperature - 0.5)
     # Second-order terms of 2 K in 664 K are 1e-4 of the first.
-    assert row.estimate.effect("truth") == pytest.approx(
+    assert row.estimate.effect("reference") == pytest.approx(
         -0.5 * hot_slope / contrast * 2.0, rel=1e-3
     )
-    assert row.estimate.effect("environment") == pytest.approx(
+    assert row.estimate.effect("reflected") == pytest.approx(
         -0.5 * cold_slope / contrast * 1.5, rel=1e-3
     )
     assert row.estimate.effect("calibration") == pytest.approx(slope * 0.8 / contrast, rel=1e-3)
@@ -132,11 +132,11 @@ def test_propagation_is_that_of_monte_carlo():
     heating = Heating(TRUTH, 293.0, 5.0, 5.0, 4.0)
     row = determine_emissivity([measured(table_1())], heating).of(WHOLE)
     draws, generator = 200_000, np.random.default_rng(3)
-    truth, environment, camera = generator.normal(
+    reference, reflected, camera = generator.normal(
         (TRUTH, 293.0, 0.0), (5.0, 5.0, 4.0), (draws, 3)
     ).T
     temperature = BAND.temperature(measured(table_1()).radiance[0].mean())
-    hot, cold, seen = (BAND.radiance(t) for t in (truth, environment, temperature + camera))
+    hot, cold, seen = (BAND.radiance(t) for t in (reference, reflected, temperature + camera))
     found = (seen - cold) / (hot - cold)
     # The standard deviation of 200 000 draws is known to 0.16 %; terms of higher order and the
     # camera's error at the mean radiance in the place of each pixel's take 1 %.
@@ -246,11 +246,11 @@ def test_the_difference_of_two_regions_is_known_better_than_either():
 
 
 def test_the_uncertainty_of_a_pixel_has_its_noise():
-    heating = replace(HEATING, truth_uncertainty=2.0)
+    heating = replace(HEATING, reference_uncertainty=2.0)
     image = measured(np.full(RASTER.shape, 0.5), frames=200, noise=20.0)
     found = determine_emissivity([image], heating)
     (hot, cold), _ = slopes()
-    common = found.of(WHOLE).estimate.effect("truth")
+    common = found.of(WHOLE).estimate.effect("reference")
     expected = np.hypot(common, 20.0 / 200**0.5 / (hot - cold))
     # Each pixel's own noise is known to 5 % from 200 frames; of 1200 pixels, well within 1 %.
     assert found.estimate.standard_uncertainty.mean() == pytest.approx(expected, rel=0.01)
@@ -286,10 +286,10 @@ def test_the_line_is_as_uncertain_as_it_says(temperatures):
         heated_series(generator, temperatures, generator.normal((0.0, 0.0), (2.0, 1.0)))
         for _ in range(150)
     ]
-    for index, truth in ((1, 2e-4), (0, None)):
+    for index, reference in ((1, 2e-4), (0, None)):
         off = np.array(
             [
-                line.estimate.values[index] - (truth or 0.4 + 2e-4 * (line.middle - 700.0))
+                line.estimate.values[index] - (reference or 0.4 + 2e-4 * (line.middle - 700.0))
                 for line in lines
             ]
         )
@@ -313,7 +313,7 @@ def test_scatter_about_the_line_counts():
     )
 
 
-# Doubtful and impossible
+# Warning and impossible
 
 
 def test_flagged_pixels_are_left_out_counted_and_doubted():
@@ -327,7 +327,7 @@ def test_flagged_pixels_are_left_out_counted_and_doubted():
     out = (flags & (Flag.DEAD | Flag.SATURATED)).any(axis=0)
     np.testing.assert_array_equal(np.isnan(found.emissivity), out)
     assert (row.pixels, row.left_out) == (1150, 50)
-    assert row.flagged == {Flag.BELOW_FLOOR: 0, Flag.SATURATED: 40, Flag.DEAD: 10}
+    assert row.flagged == {Flag.UNDER_RANGE: 0, Flag.SATURATED: 40, Flag.DEAD: 10}
     assert row.mean == pytest.approx(put_in[~out].mean(), rel=1e-12)
     assert row.estimate.warnings == ()
     flags[0, 5, :20] = Flag.SATURATED
@@ -340,12 +340,17 @@ def test_flagged_pixels_are_left_out_counted_and_doubted():
 
 def test_a_region_that_the_floor_cuts_says_that_it_is_too_bright():
     put_in = table_1((0.42, 0.07))
-    floor = float(BAND.temperature(measured(np.full(RASTER.shape, 0.38)).radiance[0, 0, 0]))
-    image = measured(put_in, floor=floor)
+    lower_limit = float(BAND.temperature(measured(np.full(RASTER.shape, 0.38)).radiance[0, 0, 0]))
+    image = measured(put_in, lower_limit=lower_limit)
     row = determine_emissivity([image], HEATING).of(WHOLE)
     assert row.mean > put_in.mean() + 0.01
-    assert "under the floor); what is left is brighter than the region" in row.estimate.warnings[0]
-    assert row.estimate.warnings[0].endswith("the camera's floor hides emissivities under 0.38.")
+    assert (
+        "under the lower range limit); what is left is brighter than the region"
+        in row.estimate.warnings[0]
+    )
+    assert row.estimate.warnings[0].endswith(
+        "the camera's lower range limit hides emissivities under 0.38."
+    )
 
 
 def test_a_region_without_usable_pixels_is_refused():
@@ -370,26 +375,28 @@ def test_impossible_emissivities_are_told():
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"truth": 293.0}, "truth: 19.85 °C is not hotter than the environment's 19.85 °C"),
-        ({"truth": 280.0}, "truth: 6.85 °C is not hotter"),
-        ({"truth": float("nan")}, "truth: is nan K, expected over 0 K"),
-        ({"environment": -1.0}, "environment: is -1.0 K"),
-        ({"truth_uncertainty": -1.0}, "truth_uncertainty: is -1.0 K"),
+        ({"reference": 293.0}, "truth: 19.85 °C is not hotter than the environment's 19.85 °C"),
+        ({"reference": 280.0}, "truth: 6.85 °C is not hotter"),
+        ({"reference": float("nan")}, "truth: is nan K, expected over 0 K"),
+        ({"reflected": -1.0}, "environment: is -1.0 K"),
+        ({"reference_uncertainty": -1.0}, "truth_uncertainty: is -1.0 K"),
         ({"camera_uncertainty": float("inf")}, "camera_uncertainty: is inf"),
         (
-            {"truth": 300.0, "truth_uncertainty": 3.0},
+            {"reference": 300.0, "reference_uncertainty": 3.0},
             "by less than 5 standard uncertainties of 3 K",
         ),
     ],
 )
 def test_impossible_heatings_are_refused(values, message):
     with pytest.raises(ValueError, match=message):
-        Heating(**{"truth": TRUTH, **values})
+        Heating(**{"reference": TRUTH, **values})
 
 
 def test_a_truth_under_the_floor_and_images_that_do_not_fit_are_refused():
-    image = measured(table_1(), floor=700.0)
-    with pytest.raises(ValueError, match=r"truth: 391 °C is under the camera's floor of 426.85 °C"):
+    image = measured(table_1(), lower_limit=700.0)
+    with pytest.raises(
+        ValueError, match=r"truth: 391 °C is under the camera's lower range limit of 426.85 °C"
+    ):
         determine_emissivity([image], HEATING)
     other = measured(np.full((5, 5), 0.5), raster=Raster(0.0, 0.0, 6e-6, 5, 5))
     with pytest.raises(ValueError, match="image 2: has other pixels"):
@@ -499,8 +506,8 @@ def test_files_that_are_no_maps_are_refused(folder):
 
 def test_the_command_writes_table_map_and_picture(folder):
     outputs = ["--out", "e.nc", "--table", "t.csv", "--plot", "p.png"]
-    spread = ["--truth-uncertainty", "2 K", "--environment-uncertainty", "1 degC"]
-    result = command("a.nc", "--truth", "391degC", *spread, *outputs)
+    spread = ["--reference-uncertainty", "2 K", "--reflected-uncertainty", "1 degC"]
+    result = command("a.nc", "--reference", "391degC", *spread, *outputs)
     assert result.exit_code == 0, result.output
     assert result.stdout.splitlines()[-3:] == ["e.nc", "t.csv", "p.png"]
     assert "Assumed: the camera's calibration is exact" in result.output
@@ -524,12 +531,12 @@ def test_the_command_writes_table_map_and_picture(folder):
 
 
 def test_the_command_fits_over_the_temperature(folder):
-    truths = ["--truth", "391 degC", "--truth", "500 degC"]
-    result = command("a.nc", "b.nc", *truths, "--plot", "p.svg", "--out", "e.nc")
+    references = ["--reference", "391 degC", "--reference", "500 degC"]
+    result = command("a.nc", "b.nc", *references, "--plot", "p.svg", "--out", "e.nc")
     assert result.exit_code == 0, result.output
     assert "change in 100 K" in result.output
     assert (folder / "p.svg").is_file()
-    hotter = read_emissivity_map("e.nc", truth=770.0)
+    hotter = read_emissivity_map("e.nc", reference=770.0)
     # The body's emissivity is 0.04 more; its mean over 960 pixels varies by 0.07 / 31.
     assert hotter.values[:, :16].mean() == pytest.approx(0.46, abs=0.01)
 
@@ -537,15 +544,21 @@ def test_the_command_fits_over_the_temperature(folder):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["a.nc", "--truth", "391"], "--truth: 391 has no unit"),
-        (["a.nc", "--truth", "10degC"], "truth: 10 °C is not hotter than the environment's"),
-        (["a.nc", "--truth", "391degC", "--environment", "3 um"], "--environment: '3 um'"),
-        (["a.nc", "--truth", "391degC", "--truth-uncertainty", "2"], "--truth-uncertainty: 2 has"),
-        (["a.nc", "--truth", "1 K", "--truth", "2 K"], "--truth: 2 temperatures for 1 images"),
-        (["none.nc", "--truth", "391degC"], "none.nc: No such file"),
-        (["a.nc", "--truth", "391degC", "--plot", "p.doc"], "--plot: p.doc"),
-        (["a.nc", "--truth", "391degC", "--out", "no/e.nc"], "there is no folder no"),
-        (["a.nc", "--truth", "391degC", "--set", "band=1"], "--set"),
+        (["a.nc", "--reference", "391"], "--reference: 391 has no unit"),
+        (["a.nc", "--reference", "10degC"], "truth: 10 °C is not hotter than the environment's"),
+        (["a.nc", "--reference", "391degC", "--reflected", "3 um"], "--reflected: '3 um'"),
+        (
+            ["a.nc", "--reference", "391degC", "--reference-uncertainty", "2"],
+            "--reference-uncertainty: 2 has",
+        ),
+        (
+            ["a.nc", "--reference", "1 K", "--reference", "2 K"],
+            "--reference: 2 temperatures for 1 images",
+        ),
+        (["none.nc", "--reference", "391degC"], "none.nc: No such file"),
+        (["a.nc", "--reference", "391degC", "--plot", "p.doc"], "--plot: p.doc"),
+        (["a.nc", "--reference", "391degC", "--out", "no/e.nc"], "there is no folder no"),
+        (["a.nc", "--reference", "391degC", "--set", "band=1"], "--set"),
     ],
 )
 def test_bad_input_is_one_line(folder, arguments, message):
@@ -560,7 +573,7 @@ def test_bad_input_is_one_line(folder, arguments, message):
 def test_images_of_different_pixels_are_one_line(folder):
     small = measured(np.full((5, 5), 0.5), raster=Raster(0.0, 0.0, 6e-6, 5, 5))
     write_measurement(small, folder / "small.nc")
-    result = command("a.nc", "small.nc", "--truth", "391degC", "--truth", "500degC")
+    result = command("a.nc", "small.nc", "--reference", "391degC", "--reference", "500degC")
     assert result.exit_code == 2
     assert result.output.startswith("chipglow: small.nc: has other pixels than a.nc, expected")
 
@@ -569,7 +582,7 @@ def test_what_is_assumed_and_doubtful_is_said(folder):
     flags = np.zeros((1, *RASTER.shape), np.uint8)
     flags[0, :3] = Flag.DEAD
     write_measurement(measured(table_1(), flags=flags), folder / "a.nc")
-    result = command("a.nc", "--truth", "391degC")
+    result = command("a.nc", "--reference", "391degC")
     assert result.exit_code == 0
     for sentence in (
         "Assumed: the true temperature is exact",
@@ -580,12 +593,12 @@ def test_what_is_assumed_and_doubtful_is_said(folder):
         "Assumed: nothing changes from frame to frame",
     ):
         assert sentence in result.stderr
-    assert "Doubtful: fissure: 18 of 180 pixels are left out (18 dead)." in result.stdout
+    assert "Warning: fissure: 18 of 180 pixels are left out (18 dead)." in result.stdout
 
 
 def test_a_region_outside_the_image_is_one_line(folder):
     (folder / "regions.yaml").write_text("regions: {a: {rectangle: [[0, 0], [400, 3]]}}")
-    result = command("a.nc", "--truth", "391degC", "--out", "e.nc")
+    result = command("a.nc", "--reference", "391degC", "--out", "e.nc")
     assert result.exit_code == 2
     assert result.output == (
         "chipglow: region a: reaches over columns 0 to 400, expected within the image's 0 to 40\n"

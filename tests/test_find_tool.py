@@ -77,13 +77,13 @@ def test_squares_of_a_found_tool_are_within_the_uncertainty_of_its_place(found_i
 
 
 def test_the_shape_says_where_to_look_and_what_the_edge_is(seen):
-    """A rake face that is out of the 20 degrees around the shape's is not found without a doubt."""
+    """A rake face over 20 degrees from the shape's is not found without a warning."""
     measurement = noisy(seen[-7.0, "chip 2"], 1)
     found = find_tool(measurement, ToolGeometry(radians(0.0), radians(10.0), 8e-6)).tool.tool
     assert degrees(found.rake_angle) == pytest.approx(-7.0, abs=4.0)  # as stated above
     assert (found.clearance_angle, found.edge_radius) == (radians(10.0), 8e-6)
     elsewhere = find_tool(measurement, ToolGeometry(radians(30.0)))
-    assert any("at the end of what was looked for" in doubt for doubt in elsewhere.doubts)
+    assert any("at the end of what was looked for" in warning for warning in elsewhere.warnings)
 
 
 def test_a_found_tool_moves_with_the_image(seen):
@@ -109,9 +109,9 @@ def test_a_weak_edge_is_doubtful():
     image = np.where(x + 0.12 * y < 0.0, 106.5, 100.0)
     image = image + np.random.default_rng(0).normal(0.0, 2.0, image.shape)
     measurement = Measurement.from_radiance(image[None], BAND, np.zeros(1), raster)
-    doubts = find_tool(measurement).doubts
-    assert any("hardly stands out" in doubt for doubt in doubts)
-    assert any("the tip is not in the image" in doubt for doubt in doubts)
+    warnings = find_tool(measurement).warnings
+    assert any("hardly stands out" in warning for warning in warnings)
+    assert any("the tip is not in the image" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("noise", [0.0, 3.0])
@@ -196,7 +196,7 @@ def test_a_tool_that_the_image_shows_elsewhere_is_doubted(folder):
         (folder / "tool.yaml").write_text(text)
         code, said, _ = command("real.nc", "--tool", "tool.yaml")
         assert code == 0
-        assert ("Doubtful: the rake face that shows in the image is" in said) is doubted
+        assert ("Warning: the rake face that shows in the image is" in said) is doubted
 
 
 @pytest.mark.parametrize(

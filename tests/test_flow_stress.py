@@ -196,7 +196,7 @@ def test_the_rate_does_not_matter_below_the_reference():
 @given(st.floats(2.3e-308, 1.7e308))
 def test_logarithm(x):
     exact = np.log(x)
-    # The logarithm of numbers near 1 is near nought: there the absolute part counts.
+    # The logarithm of numbers near 1 is near zero: there the absolute part counts.
     assert abs(logarithm(x) - exact) <= 4e-15 + 2 * np.spacing(abs(exact))
 
 

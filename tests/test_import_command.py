@@ -121,7 +121,7 @@ def test_a_tool_is_drawn_where_the_description_says(arrays, tmp_path):
 def test_an_imported_scene_can_be_looked_at(arrays, tmp_path):
     out, study = tmp_path / "scene.nc", tmp_path / "study.yaml"
     study.write_text(
-        "camera: {pitch: 15 um, integration_time: 4 us, floor: none}\n"
+        "camera: {pitch: 15 um, integration_time: 4 us, lower_limit: none}\n"
         "cutting: {window: {interval: 1 us}}\n"
     )
     result = RUNNER.invoke(app, ["import", str(arrays), "--out", str(out), *options(SETTINGS)])

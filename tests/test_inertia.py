@@ -22,7 +22,7 @@ CHIP = AnalyticChip(frames=3)
 
 
 def scene_with(momentum_flow=None, **energies):
-    """The analytic chip's scene with an energy account."""
+    """The analytic chip's scene with an energy balance."""
     data = CHIP.scene().data
     time = data["force_time"].values
     for name in ENERGY_UNITS:
@@ -94,7 +94,7 @@ def test_a_warning_over_one_per_cent(kinetic, force, words, capsys):
     say_inertia(share)
     said = capsys.readouterr().err
     assert f"kinetic energy at most {kinetic:.2%} of the work" in said
-    assert f"momentum flow {force:.2%} of the mean cutting force" in said
+    assert f"momentum flux {force:.2%} of the mean cutting force" in said
     assert ("Warning" in said) == bool(words)
     assert all(word in share.warning and word in said for word in words)
 

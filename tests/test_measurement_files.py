@@ -53,7 +53,7 @@ FIELDS = {
     "calibration": "calibration.yaml",
     "saturation": 16382.0,
     "bad_pixels": "find",
-    "uniform": {"frames": "cold.npy", "brighter": "hot.npy"},
+    "flat_field": {"low": "cold.npy", "high": "hot.npy"},
 }
 
 
@@ -63,7 +63,7 @@ def seen(kelvins, count, rng):
 
 
 def points_text(rng):
-    """Black bodies whose true temperature differs from the noted one; the image's median."""
+    """Blackbodies whose true temperature differs from the noted one; the image's median."""
     lines = ["temperature_degC,counts,count_uncertainty,temperature_uncertainty_K"]
     for celsius in CELSIUS:
         true = celsius + 273.15 + rng.normal(0.0, TEMPERATURE_UNCERTAINTY)
@@ -73,7 +73,7 @@ def points_text(rng):
 
 
 def fill(folder, seed=1):
-    """Files of a laboratory: black bodies, uniform frames, a chip, a description of it all."""
+    """Files of a laboratory: blackbodies, uniform frames, a chip, a description of it all."""
     rng = np.random.default_rng(seed)
     (folder / "points.csv").write_text(points_text(rng))
     np.save(folder / "cold.npy", seen(623.15, 20, rng))
@@ -268,14 +268,14 @@ def test_the_truth_is_within_the_stated_interval(tmp_path, monkeypatch):
 
 
 def test_the_calibrated_range_is_kept(laboratory):
-    cut = ["uniform={}", "bad_pixels=none"]
+    cut = ["flat_field={}", "bad_pixels=none"]
     described = yaml.safe_load((laboratory / "calibration.yaml").read_text())
     (laboratory / "narrow.yaml").write_text(
         yaml.safe_dump({**described, "lowest": "500 degC", "highest": "700 degC"})
     )
     measured = load_measurement("chip.yaml", [*cut, "calibration=narrow.yaml"])
     kelvins = BAND.temperature(measured.radiance)
-    np.testing.assert_array_equal(measured.flags == Flag.BELOW_FLOOR, ~(kelvins >= 773.15))
+    np.testing.assert_array_equal(measured.flags == Flag.UNDER_RANGE, ~(kelvins >= 773.15))
     np.testing.assert_array_equal(measured.flags == Flag.SATURATED, kelvins > 973.15)
 
 
@@ -346,11 +346,11 @@ def test_a_measurement_is_read_as_it_is(laboratory, tmp_path):
         (["band=3-5 um"], "band 3.8-5.1 um, the recording has 3-5 um"),
         (["band=3 to 5"], "band: '3 to 5' is not a band"),
         (["frames=one"], "frames: 'one', expected first:end"),
-        (["uniform.frames=none"], "uniform.frames: is missing"),
-        (["uniform.brighter=cold.npy", "uniform.frames=hot.npy"], "second brighter"),
-        (["uniform.frames=small.npy", "uniform.brighter=none"], "of 4 x 3 sensors"),
-        (["uniform.frames=few.npy"], "2 frames, expected 8 or more"),
-        (["saturation=5000"], "uniform.brighter: .* saturated"),
+        (["flat_field.low=none"], "flat_field.low: is missing"),
+        (["flat_field.high=cold.npy", "flat_field.low=hot.npy"], "second brighter"),
+        (["flat_field.low=small.npy", "flat_field.high=none"], "of 4 x 3 pixels"),
+        (["flat_field.low=few.npy"], "2 frames, expected 8 or more"),
+        (["saturation=5000"], "flat_field.high: .* saturated"),
         (["mirror=left"], "mirror: 'left', expected"),
         (["quarter_turns=5"], "quarter_turns: is 5"),
         (["tip=[1, 2, 3]"], "tip"),
@@ -358,7 +358,7 @@ def test_a_measurement_is_read_as_it_is(laboratory, tmp_path):
         (["colour=red"], "unknown key 'colour'"),
         (["file=none"], "file: is missing"),
         (["unit=K", "calibration=none", "band=3-5 um"], "not linear in light"),
-        (["unit=K", "uniform={}", "bad_pixels=none"], "holds temperature, expected counts"),
+        (["unit=K", "flat_field={}", "bad_pixels=none"], "holds temperature, expected counts"),
     ],
 )
 def test_what_cannot_be_is_one_clear_error(laboratory, settings, message):
@@ -397,7 +397,7 @@ def test_calibrate_prints_fits_and_writes_the_preferred(laboratory, tmp_path):
 def test_calibrate_says_what_is_doubtful(laboratory):
     code, said = run("calibrate", "points.csv", "--band", "2-2.5 um", "--out", "wrong.yaml")
     assert code == 0, said
-    assert "Doubtful: linear: the residuals are" in said
+    assert "Warning: linear: the residuals are" in said
     assert "--common-uncertainty" in said
     assert "Assumed: The blackbody's emissivity is 1" in said
     assert "Assumed: The camera did not drift" in said
@@ -406,7 +406,7 @@ def test_calibrate_says_what_is_doubtful(laboratory):
     given = ["unit=counts", "interval=1 ms", "pitch=6 um", "calibration=wrong.yaml"]
     code, said = run("convert", "chip.npy", *(part for one in given for part in ("--set", one)))
     assert code == 0, said
-    assert "Doubtful: The calibration: the residuals are" in said
+    assert "Warning: The calibration: the residuals are" in said
     code, said = run(
         "calibrate", "points.csv", "--band", "3.8-5.1 um", "--emissivity", "0.97",
         "--emissivity-uncertainty", "0.005",
@@ -419,7 +419,7 @@ def test_calibrate_says_what_is_doubtful(laboratory):
     (laboratory / "bare.csv").write_text("temperature_K,counts\n600,1000\n800,2500\n1000,5000\n")
     code, said = run("calibrate", "bare.csv", "--band", "3.8-5.1 um")
     assert code == 0, said
-    assert "Doubtful: The uncertainty is from the scatter" in said
+    assert "Warning: The uncertainty is from the scatter" in said
 
 
 @pytest.mark.parametrize(
@@ -472,7 +472,7 @@ def test_what_is_assumed_and_doubtful_of_a_camera_s_file_is_said_by_who_takes_it
     head = "infrared_column,infrared_row,visible_column,visible_row"
     (laboratory / "corners.csv").write_text("\n".join([head, *corners]) + "\n")
     for command in (
-        ["emissivity", "chip.yaml", "--truth", "900 degC", "--regions", "all.yaml"],
+        ["emissivity", "chip.yaml", "--reference", "900 degC", "--regions", "all.yaml"],
         ["rake", "chip.yaml", "--tool", "tool.yaml"],
         ["temperature", "chip.yaml", "--emissivity", "0.5", "--regions", "all.yaml"],
         ["register", "chip.yaml", "visible.png", "--points", "corners.csv"],
@@ -480,21 +480,21 @@ def test_what_is_assumed_and_doubtful_of_a_camera_s_file_is_said_by_who_takes_it
         code, said = run(*command, *settings)
         assert code == 0, said
         assert said.count("Assumed: No pixel is saturated") == 1
-        assert "Doubtful: 5 values are 65535" in said
+        assert "Warning: 5 values are 65535" in said
 
 
 def test_what_the_camera_s_file_leaves_in_doubt_is_said_once(laboratory, tmp_path):
     exposures = [3e-6, 3e-6, 5e-6, 5e-6, 5e-6]
     written = camera_files.cine(camera_files.pictures(bits=12), "16", exposures=exposures)
     (tmp_path / "a.cine").write_bytes(written)
-    doubt = "Doubtful: the integration time goes from 3.00002 us to 5.00004 us."
+    warning = "Warning: the integration time goes from 3.00002 us to 5.00004 us."
     code, said = run("convert", tmp_path / "a.cine")
     assert "It is no measurement yet" in said
-    assert said.count(doubt) == 1
+    assert said.count(warning) == 1
     settings = ("--set", f"calibration={laboratory / 'calibration.yaml'}", "--set", "pitch=6 um")
     code, said = run("convert", tmp_path / "a.cine", *settings)
     assert code == 0, said
-    assert said.count(doubt) == 1
+    assert said.count(warning) == 1
 
 
 def test_a_scene_is_no_measurement(tmp_path):
@@ -526,7 +526,7 @@ def test_show_shows_a_measurement(laboratory, tmp_path):
     for words in (
         "40 x 30 of 6 µm",
         "at 4000 µs",
-        "below the floor",
+        "below the lower range limit",
         "450 °C",
         "10 µs",
         "3.8 µm to 5.1 µm",
@@ -547,11 +547,11 @@ def test_init_writes_the_description(tmp_path):
     assert run("init", path, "--measurement", "--import", "--force")[0] == 2
 
 
-# Recordings of black bodies
+# Recordings of blackbodies
 
 
 def seen_bodies(folder):
-    """Recordings of black bodies of exactly known temperature, and a table of them."""
+    """Recordings of blackbodies of exactly known temperature, and a table of them."""
     rng = np.random.default_rng(3)
     lines = ["temperature_degC,file"]
     for celsius in CELSIUS[:4]:
@@ -562,13 +562,13 @@ def seen_bodies(folder):
 
 
 CAMERA = ["unit=counts", "interval=2 ms", "saturation=16382"]
-CORRECTED = [*CAMERA, "uniform.frames=cold.npy", "uniform.brighter=hot.npy", "bad_pixels=find"]
+CORRECTED = [*CAMERA, "flat_field.low=cold.npy", "flat_field.high=hot.npy", "bad_pixels=find"]
 
 
 def test_counts_of_a_black_body_are_those_of_corrected_sensors(laboratory):
     seen_bodies(laboratory)
     cold, hot = (np.load(laboratory / name).mean(axis=0) for name in ("cold.npy", "hot.npy"))
-    # Corrected sensors have the median sensor's offset and gain, here without any noise.
+    # Corrected pixels have the median pixel's offset and gain, here without any noise.
     expected = [np.median(cold), np.median(cold) + np.median(hot - cold)]
     for name, mean, level in (("cold.npy", cold, expected[0]), ("hot.npy", hot, expected[1])):
         assert uniform_counts(name, CORRECTED) == pytest.approx(level, abs=1e-6)
@@ -612,7 +612,7 @@ def test_frames_that_correct_all_black_bodies_are_read_once(laboratory, monkeypa
 
 def test_frames_of_one_description_do_not_correct_recordings_of_another(laboratory):
     objects = UniformObjects()
-    by_cold, by_hot = ([*CAMERA, f"uniform.frames={name}.npy"] for name in ("cold", "hot"))
+    by_cold, by_hot = ([*CAMERA, f"flat_field.low={name}.npy"] for name in ("cold", "hot"))
     several = (by_cold, by_hot, CAMERA, by_cold)
     found = [uniform_counts("hot.npy", settings, objects) for settings in several]
     assert found == [uniform_counts("hot.npy", settings) for settings in several]
@@ -651,7 +651,7 @@ def test_uniform_frames_of_another_format_say_themselves_what_they_are(tmp_path)
         tmp_path / "even.hcc",
         Recording(counts, "counts", np.arange(10) / 600.0, "camera", 1e-5, 16382.0),
     )
-    fields = [*CAMERA, "uniform.frames=even.hcc"]
+    fields = [*CAMERA, "flat_field.low=even.hcc"]
     assert uniform_counts(tmp_path / "chip.npy", fields) == pytest.approx(np.median(counts), abs=1)
 
 

@@ -40,7 +40,7 @@ def test_view_window_and_length_of_cut_follow_the_feed():
     paper, own = Study().cutting, Study(**TITANIUM).cutting
     for ours, papers in (
         (own.window.start, paper.window.start),
-        (own.length_of_cut, paper.length_of_cut),
+        (own.cutting_length, paper.cutting_length),
         (own.field_of_view.left, paper.field_of_view.left),
         (own.field_of_view.top, paper.field_of_view.top),
     ):
@@ -58,14 +58,14 @@ def test_an_exposure_fits_into_what_is_kept():
     assert own.cutting.duration >= 3 * 20e-6 - 1e-9
     long = Study(camera={"integration_time": "100 us"}).cutting
     assert long.duration >= 300e-6 * (1 - 1e-6)
-    assert long.length_of_cut > long.window.end
+    assert long.cutting_length > long.window.end
 
 
 def test_what_is_given_stays_and_the_papers_own_study_does_not_change():
-    data = {**TITANIUM["cutting"], "window": {"start": "0.5 mm"}, "length_of_cut": "1 mm"}
+    data = {**TITANIUM["cutting"], "window": {"start": "0.5 mm"}, "cutting_length": "1 mm"}
     own = Study(cutting=data, camera=TITANIUM["camera"]).cutting
     assert own.window.start == 0.5e-3
-    assert own.length_of_cut == 1e-3
+    assert own.cutting_length == 1e-3
     assert Study(cutting={"feed": "0.3 mm", "speed": "250 m/min"}) == Study()
     assert Study(camera={"pitch": "5 um"}).cutting == Study().cutting
 

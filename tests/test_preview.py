@@ -27,7 +27,7 @@ from chipglow.scene import Frame, Material, Raster, ToolGeometry
 from chipglow.study import Study, cut, load_study, preview_raster
 
 SIMULATION = CuttingSimulation(
-    CuttingConditions(length_of_cut=0.05e-3),
+    CuttingConditions(cutting_length=0.05e-3),
     numerics=Numerics(cell=25e-6, upstream=0.3e-3, downstream=0.3e-3, depth=0.2e-3, height=0.5e-3),
 )
 WINDOW = OutputWindow(start=0.03e-3, end=0.05e-3, interval=0.5e-6, later_bands=0)
@@ -35,7 +35,7 @@ RASTER = Raster(left=-100e-6, top=150e-6, spacing=5e-6, rows=26, columns=24)
 COARSE = replace(RASTER, spacing=10e-6, rows=13, columns=12)
 STUDY = """
 cutting:
-  length_of_cut: 0.05 mm
+  cutting_length: 0.05 mm
   numerics: {cell: 30 um}
   window: {start: 0.03 mm, end: 0.05 mm, interval: 1 us}
   field_of_view: {left: -100 um, top: 150 um, spacing: 5 um, rows: 26, columns: 24}
@@ -167,7 +167,7 @@ def test_a_picture_keeps_nothing_of_the_one_before(picture):
     first = picture.draw(frame_of())
     other = picture.draw(frame_of(temperature=300.0, strain=4.0, time=12.3e-6))
     top = slice(0, 20)
-    assert (first[top] != other[top]).any()  # time and length of cut
+    assert (first[top] != other[top]).any()  # time and cutting length
     np.testing.assert_array_equal(picture.draw(frame_of()), first)
     assert first.shape == (*picture.shape, 3)
 
@@ -175,7 +175,7 @@ def test_a_picture_keeps_nothing_of_the_one_before(picture):
 def test_a_picture_says_time_and_length_of_cut(picture):
     picture.draw(frame_of(time=100e-6))
     # 100 us at 250 m/min
-    assert picture._title.get_text() == "100.0 µs    length of cut 0.417 mm"
+    assert picture._title.get_text() == "100.0 µs    cutting length 0.417 mm"
 
 
 def test_scales_follow_from_the_material_and_the_speed():

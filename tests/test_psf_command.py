@@ -52,7 +52,7 @@ def test_the_command_says_what_was_found(folder):
     assert abs(float(width[0]) - 10.0) < 3 * float(width[1]) < 0.3
     assert "kind: gaussian, fwhm: " in output
     assert "they agree" in output
-    assert "Assumed: the whole square of a sensor takes light" in output
+    assert "Assumed: the whole square of a pixel takes light" in output
     assert "Doubtful" not in output
 
 
@@ -60,7 +60,7 @@ def test_doubts_are_printed(folder):
     write_edge(folder / "straight.nc", 0.0)
     code, output = psf("straight.nc")
     assert code == 0
-    assert "Doubtful: straight.nc: with a tilt of" in output
+    assert "Warning: straight.nc: with a tilt of" in output
 
 
 @pytest.mark.parametrize("model", [None, "radial"])
@@ -195,7 +195,7 @@ def test_counts_without_a_calibration_serve_for_an_edge(folder, offset):
     width, uncertainty = found_width(output)
     assert abs(width - 10.0) < 3 * uncertainty < 0.6
     assert "Assumed: the counts are a straight line over the radiance" in output
-    assert ("below the camera's floor" in output) is (offset < 0)
+    assert ("below the camera's lower range limit" in output) is (offset < 0)
 
 
 def test_a_blade_colder_than_the_calibration_serves_for_an_edge(folder):
@@ -212,7 +212,7 @@ def test_a_blade_colder_than_the_calibration_serves_for_an_edge(folder):
 
 def test_a_measurement_under_the_cameras_range_serves_for_an_edge(folder):
     flags = np.full((1, 40, 40), 0, np.uint8)
-    flags[0, :, :20] = Flag.BELOW_FLOOR
+    flags[0, :, :20] = Flag.UNDER_RANGE
     write_edge(folder / "cold.nc", flags=flags)
     code, output = psf("cold.nc")
     assert code == 0
@@ -227,7 +227,7 @@ def test_the_fill_factor_of_a_cameras_file_is_taken(folder):
         found_width(psf("edge.npy", *given, *more)[1])[0]
         for more in ((), ("--set=fill_factor=0.36",))
     )
-    # The optics are wider if the sensor adds less: squares of the sides, as of a box, over 12.
+    # The optics are wider if the pixel adds less: squares of the sides, as of a box, over 12.
     sides = (6.0**2 - 3.6**2) * 8 * np.log(2) / 12
     assert small**2 - whole**2 == pytest.approx(sides, rel=0.1)
     code, output = psf("edge.npy", *given, "--set=fill_factor=2")

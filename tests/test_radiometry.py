@@ -105,21 +105,21 @@ def test_impossible_bands_are_refused(lower, upper):
     st.floats(0.3, 1.0),
     st.floats(250.0, 330.0),
 )
-def test_object_parameters_are_taken_back(temperature, emissivity, reflected, transmission, air):
-    told = ObjectParameters(emissivity, reflected, transmission, air)
+def test_object_parameters_are_taken_back(temperature, emissivity, reflected, transmittance, air):
+    told = ObjectParameters(emissivity, reflected, transmittance, air)
     received = told.apparent_radiance(temperature, MID_WAVE)
     # The band's table and its inverse are each within 1e-6 of the integral.
     assert told.temperature(received, MID_WAVE) == pytest.approx(temperature, rel=1e-5)
 
 
 def test_a_gray_object_without_surroundings_sends_its_share_of_a_black_body():
-    told = ObjectParameters(emissivity=0.4, reflected=1.0, transmission=0.5, atmosphere=1.0)
+    told = ObjectParameters(emissivity=0.4, reflected=1.0, transmittance=0.5, atmosphere=1.0)
     assert told.apparent_radiance(800.0, MID_WAVE) == pytest.approx(0.2 * MID_WAVE.radiance(800.0))
 
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("emissivity", 0.0), ("emissivity", 1.1), ("transmission", -0.1), ("reflected", 0.0)],
+    [("emissivity", 0.0), ("emissivity", 1.1), ("transmittance", -0.1), ("reflected", 0.0)],
 )
 def test_impossible_object_parameters_are_refused(field, value):
     with pytest.raises(ValueError, match=f"object parameters: {field} is {value}"):

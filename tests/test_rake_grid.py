@@ -94,7 +94,7 @@ def test_every_pixel_beside_the_face_counts_once():
     np.testing.assert_allclose(corners[-1, 0] - corners[0, 0], into)
 
 
-@pytest.mark.parametrize("flag", [Flag.BELOW_FLOOR, Flag.SATURATED, Flag.DEAD])
+@pytest.mark.parametrize("flag", [Flag.UNDER_RANGE, Flag.SATURATED, Flag.DEAD])
 def test_one_unusable_pixel_removes_its_square_alone(flag):
     tool = ToolGeometry()
     whole = rake_grid(measured(linear_image()), tool)
@@ -134,7 +134,7 @@ def test_frames_have_a_mean_and_a_deviation_between_them():
 
 def test_a_square_is_averaged_over_the_frames_that_show_it():
     flags = np.zeros((2, *RASTER.shape), np.uint8)
-    flags[1, :, :] = Flag.BELOW_FLOOR
+    flags[1, :, :] = Flag.UNDER_RANGE
     grid = rake_grid(measured(linear_image(), linear_image() + 9, flags=flags), ToolGeometry())
     seen = grid.usable[0]
     assert (grid.frame_count[seen] == 1).all()
@@ -160,7 +160,7 @@ def test_a_tool_outside_the_image_is_one_error():
 def test_a_chip_that_does_not_touch_is_one_error():
     tool = ToolGeometry()
     distance = tool.signed_distance(*np.meshgrid(RASTER.x, RASTER.y))
-    flags = np.where((distance > 0) & (distance < 30e-6), Flag.BELOW_FLOOR, 0).astype(np.uint8)
+    flags = np.where((distance > 0) & (distance < 30e-6), Flag.UNDER_RANGE, 0).astype(np.uint8)
     with pytest.raises(ValueError, match=r"none of the \d+ squares .* touches the tool"):
         rake_grid(measured(linear_image(), flags=flags[None]), tool)
 
@@ -181,7 +181,9 @@ def test_what_is_asked_must_be_possible(wrong, message):
 
 def test_a_simulated_measurement_tells_its_tool(tmp_path):
     chip = AnalyticChip(frames=30)
-    measurement = Camera(integration_time=5e-6, floor=None).measure(chip.scene(), CHIP_2, 2e-6)
+    measurement = Camera(integration_time=5e-6, lower_limit=None).measure(
+        chip.scene(), CHIP_2, 2e-6
+    )
     assert measurement.tool == chip.tool
     write_measurement(measurement, tmp_path / "m.nc")
     assert tool_of(read_measurement(tmp_path / "m.nc"), None) == chip.tool

@@ -1,4 +1,4 @@
-"""From a camera's recording to a measurement: sensors, flags, object parameters, position."""
+"""From a camera's recording to a measurement: pixels, flags, object parameters, position."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from chipglow.camera import (
     fit_linear,
     replace_bad_pixels,
 )
-from chipglow.laboratory.measurement import ImagePosition, develop_recording, flag_shares
+from chipglow.laboratory.measurement import ImagePosition, calibrate_recording, flag_shares
 from chipglow.radiometry import Band, ObjectParameters
 
 BAND = Band(3.8e-6, 5.1e-6)
@@ -38,7 +38,7 @@ def uniform(counts, frames=20, noise=2.0, shape=(12, 16)):
     return counts + rng.normal(0.0, noise, (frames, *shape))
 
 
-# Sensors
+# Pixels
 
 
 def test_two_points_correct_gain_and_offset_everywhere():
@@ -47,7 +47,7 @@ def test_two_points_correct_gain_and_offset_everywhere():
     correction = NonUniformity.two_point(seen[0][None], seen[1][None])
     corrected = correction.apply(seen[2][None])
     assert np.ptp(seen[2]) > 1000
-    # What is left of the pattern is rounding; the level is that of the median sensor.
+    # What is left of the pattern is rounding; the level is that of the median pixel.
     assert np.ptp(corrected) < 1e-9
     assert corrected[0, 0, 0] == pytest.approx(3000.0, rel=0.03)
 
@@ -92,7 +92,7 @@ def test_of_one_uniform_object_the_level_tells():
 
 
 def test_good_sensors_are_not_called_bad():
-    """192 sensors, 60 repeats, at the least number of frames: the limits are far out."""
+    """192 pixels, 60 repeats, at the least number of frames: the limits are far out."""
     for seed in range(60):
         rng = np.random.default_rng(seed)
         pattern = rng.normal(1.0, 0.05, (12, 16))
@@ -139,7 +139,7 @@ def test_larger_clusters_stay_dead():
         (lambda: NonUniformity.two_point(uniform(2000.0), uniform(1000.0)), "second brighter"),
         (
             lambda: NonUniformity.two_point(uniform(1000.0), uniform(2000.0, shape=(3, 4))),
-            "16 x 12 and 4 x 3 sensors",
+            "16 x 12 and 4 x 3 pixels",
         ),
         (lambda: NonUniformity.one_point(np.ones((3, 4))), "expected \\(time, y, x\\)"),
         (lambda: NonUniformity.one_point(np.ones((1, 3, 4))).apply(uniform(1.0)), "of 4 x 3"),
@@ -161,7 +161,7 @@ def test_what_does_not_fit_is_refused(call, message):
 def test_counts_become_radiance_with_its_uncertainty():
     kelvins = np.array([[[600.0, 900.0, 1200.0]]])
     counts = 500.0 + 1.8 * BAND.radiance(kelvins)
-    measured = develop_recording(recording(counts, integration_time=1e-5), LINE)
+    measured = calibrate_recording(recording(counts, integration_time=1e-5), LINE)
     np.testing.assert_allclose(measured.radiance_temperature(), kelvins, atol=1e-3)
     # It is taken from a table of 513 counts.
     np.testing.assert_allclose(
@@ -176,19 +176,19 @@ def test_many_frames_are_as_single_ones(monkeypatch):
     counts = RNG.integers(400, 9000, (7, 6, 8))
     bad = np.zeros((6, 8), bool)
     bad[2, 3] = True
-    whole = develop_recording(recording(counts, saturation=8000), LINE, bad_pixels=bad)
+    whole = calibrate_recording(recording(counts, saturation=8000), LINE, bad_pixels=bad)
     monkeypatch.setattr(
         "chipglow.laboratory.measurement.radiometric_calibration._PIXELS_AT_ONCE", 100
     )
-    parts = develop_recording(recording(counts, saturation=8000), LINE, bad_pixels=bad)
+    parts = calibrate_recording(recording(counts, saturation=8000), LINE, bad_pixels=bad)
     assert whole.data.identical(parts.data)
 
 
 def test_the_range_of_calibration_and_detector_is_flagged():
     kelvins = np.array([[[500.0, 572.0, 574.0, 1272.0, 1275.0, 1400.0]]])
     counts = 500.0 + 1.8 * BAND.radiance(kelvins)
-    measured = develop_recording(recording(counts, saturation=counts[0, 0, 4]), LINE)
-    under, over = Flag.BELOW_FLOOR, Flag.SATURATED
+    measured = calibrate_recording(recording(counts, saturation=counts[0, 0, 4]), LINE)
+    under, over = Flag.UNDER_RANGE, Flag.SATURATED
     assert measured.flags.tolist() == [[[under, under, 0, 0, over, over]]]
     assert (
         np.isnan(measured.radiance_temperature()[0, 0]).tolist()
@@ -196,10 +196,10 @@ def test_the_range_of_calibration_and_detector_is_flagged():
     )
     assert flag_shares(measured)[Flag.SATURATED] == pytest.approx(1 / 3)
     # At the detector's limit, within the calibrated range.
-    measured = develop_recording(recording(counts, saturation=counts[0, 0, 2]), LINE)
+    measured = calibrate_recording(recording(counts, saturation=counts[0, 0, 2]), LINE)
     assert measured.flags[0, 0, 3] == over
-    assert measured.data.attrs["floor"] == 573.15
-    higher = develop_recording(recording(counts), LINE, floor=600.0)
+    assert measured.data.attrs["lower_limit"] == 573.15
+    higher = calibrate_recording(recording(counts), LINE, lower_limit=600.0)
     assert higher.flags[0, 0, 2] == under
 
 
@@ -210,7 +210,7 @@ def test_bad_sensors_are_replaced_or_dead():
     bad[1, 1] = True
     bad[5:8, 5:8] = True
     counts[:, bad] = 1e6
-    measured = develop_recording(recording(counts, saturation=16000.0), LINE, bad_pixels=bad)
+    measured = calibrate_recording(recording(counts, saturation=16000.0), LINE, bad_pixels=bad)
     assert (measured.flags[:, 1, 1] == Flag.REPLACED).all()
     assert (measured.flags[:, 5:8, 5:8] == Flag.DEAD).all()
     np.testing.assert_allclose(measured.radiance_temperature()[:, 1, 1], 900.0, atol=1e-3)
@@ -222,7 +222,7 @@ def test_the_median_of_a_saturated_neighbourhood_is_not_trusted():
     counts[0, 1, 1] = 17000.0
     bad = np.zeros((5, 5), bool)
     bad[2, 2] = True
-    measured = develop_recording(recording(counts, saturation=16000.0), LINE, bad_pixels=bad)
+    measured = calibrate_recording(recording(counts, saturation=16000.0), LINE, bad_pixels=bad)
     assert measured.flags[0, 2, 2] == Flag.REPLACED | Flag.SATURATED
     assert np.isnan(measured.radiance_temperature()[0, 2, 2])
 
@@ -233,26 +233,26 @@ def test_the_correction_makes_dead_sensors_known():
     )
     hot[:, 2, 2] = cold[:, 2, 2]
     correction = NonUniformity.two_point(cold, hot)
-    measured = develop_recording(recording(hot), LINE, correction)
+    measured = calibrate_recording(recording(hot), LINE, correction)
     assert measured.flags[0, 2, 2] == Flag.REPLACED
     np.testing.assert_allclose(measured.radiance_temperature(), 1000.0, atol=1e-3)
 
 
 @given(
     emissivity=st.floats(0.1, 1.0),
-    transmission=st.floats(0.5, 1.0),
+    transmittance=st.floats(0.5, 1.0),
     reflected=st.floats(280.0, 400.0),
     atmosphere=st.floats(280.0, 310.0),
     kelvins=st.floats(600.0, 1500.0),
 )
 @settings(deadline=None, max_examples=50)  # the first call compiles
 def test_what_the_camera_was_told_is_taken_back(
-    emissivity, transmission, reflected, atmosphere, kelvins
+    emissivity, transmittance, reflected, atmosphere, kelvins
 ):
-    told = ObjectParameters(emissivity, reflected, transmission, atmosphere)
+    told = ObjectParameters(emissivity, reflected, transmittance, atmosphere)
     received = float(BAND.radiance(kelvins))
     shown = told.temperature(received, BAND)
-    measured = develop_recording(
+    measured = calibrate_recording(
         recording(np.full((1, 1, 1), shown), "temperature", object_parameters=told)
     )
     # Radiance is looked up within 1e-6 of the integral, twice, and divided by the emissivity.
@@ -261,7 +261,7 @@ def test_what_the_camera_was_told_is_taken_back(
 
 
 def test_without_object_parameters_it_is_said_what_is_assumed():
-    measured = develop_recording(recording(np.full((1, 2, 2), 900.0), "temperature"))
+    measured = calibrate_recording(recording(np.full((1, 2, 2), 900.0), "temperature"))
     np.testing.assert_allclose(measured.radiance_temperature(), 900.0, atol=1e-3)
     assert "emissivity of 1" in measured.data.attrs["assumed"]
     assert "lower left corner" in measured.data.attrs["assumed"]
@@ -270,8 +270,8 @@ def test_without_object_parameters_it_is_said_what_is_assumed():
 
 
 def test_what_the_file_says_is_kept_apart_from_what_was_assumed_and_is_doubtful():
-    said = {"notes": ("Lens: 25 mm.",), "assumptions": ("an even rate.",), "doubts": ("a gap.",)}
-    measured = develop_recording(recording(np.full((1, 2, 2), 9.0), "radiance", **said))
+    said = {"notes": ("Lens: 25 mm.",), "assumptions": ("an even rate.",), "warnings": ("a gap.",)}
+    measured = calibrate_recording(recording(np.full((1, 2, 2), 9.0), "radiance", **said))
     attributes = measured.data.attrs
     assert attributes["notes"] == "Lens: 25 mm."
     assert "an even rate." in attributes["assumed"].splitlines()
@@ -281,16 +281,16 @@ def test_what_the_file_says_is_kept_apart_from_what_was_assumed_and_is_doubtful(
 def test_radiance_is_taken_as_it_is():
     radiance = np.array([[[1000.0, np.inf, -5.0]]])
     told = ObjectParameters(emissivity=0.5)
-    measured = develop_recording(recording(radiance, "radiance", object_parameters=told))
+    measured = calibrate_recording(recording(radiance, "radiance", object_parameters=told))
     assert measured.radiance[0, 0, 0] == 1000.0
-    assert measured.flags[0, 0].tolist() == [0, Flag.BELOW_FLOOR, Flag.BELOW_FLOOR]
+    assert measured.flags[0, 0].tolist() == [0, Flag.UNDER_RANGE, Flag.UNDER_RANGE]
     assert "taken as it is" in measured.data.attrs["object_parameters"]
 
 
 def test_counts_by_the_makers_conversion():
     conversion = PlanckConversion(r1=1e6, r2=1.0, b=3300.0, f=1.0, o=-500.0)
     counts = np.array([[[20000, 40000]]], np.uint16)
-    measured = develop_recording(recording(counts, conversion=conversion))
+    measured = calibrate_recording(recording(counts, conversion=conversion))
     np.testing.assert_allclose(
         measured.radiance_temperature(), conversion.temperature(counts), rtol=1e-7
     )
@@ -300,9 +300,9 @@ def test_counts_by_the_makers_conversion():
 def test_full_counts_are_doubted_unless_the_saturation_is_known():
     counts = np.full((1, 4, 4), 2000, np.uint16)
     counts[0, :2, 0] = 4095
-    doubted = develop_recording(recording(counts), LINE)
+    doubted = calibrate_recording(recording(counts), LINE)
     assert "2 values are 4095" in doubted.data.attrs["doubtful"]
-    known = develop_recording(recording(counts, saturation=4094), LINE)
+    known = calibrate_recording(recording(counts, saturation=4094), LINE)
     assert "doubtful" not in known.data.attrs
     assert (known.flags[0, :2, 0] == Flag.SATURATED).all()
 
@@ -318,12 +318,12 @@ def test_full_counts_are_doubted_unless_the_saturation_is_known():
 )
 def test_a_calibration_of_something_else_is_refused(known, calibrated, message):
     with pytest.raises(ValueError, match=message):
-        develop_recording(recording(np.ones((1, 2, 2)), **known), replace(LINE, **calibrated))
+        calibrate_recording(recording(np.ones((1, 2, 2)), **known), replace(LINE, **calibrated))
 
 
 def test_what_the_file_does_not_say_is_the_calibrations():
     calibration = replace(LINE, integration_time=1e-5, range_name="A")
-    measured = develop_recording(recording(np.ones((1, 2, 2)), band=None), calibration)
+    measured = calibrate_recording(recording(np.ones((1, 2, 2)), band=None), calibration)
     assert "integration time is the calibration's" in measured.data.attrs["assumed"]
     assert "range is the calibration's, A" in measured.data.attrs["assumed"]
     assert measured.data.attrs["integration_time"] == 1e-5
@@ -339,23 +339,23 @@ def test_what_the_file_does_not_say_is_the_calibrations():
             {"non_uniformity": NonUniformity.one_point(uniform(900.0, shape=(2, 2)))},
             "not linear in light",
         ),
-        ("radiance", {"bad_pixels": np.zeros((3, 3), bool)}, "are of 3 x 3 sensors"),
+        ("radiance", {"bad_pixels": np.zeros((3, 3), bool)}, "are of 3 x 3 pixels"),
     ],
 )
 def test_what_is_missing_or_out_of_place_is_said(quantity, arguments, message):
     one = recording(np.full((1, 2, 2), 900.0), quantity)
     with pytest.raises(ValueError, match=message):
-        develop_recording(one, **arguments)
+        calibrate_recording(one, **arguments)
 
 
 def test_the_band_must_be_known():
     with pytest.raises(ValueError, match="band: is missing"):
-        develop_recording(recording(np.full((1, 2, 2), 900.0), "temperature", band=None))
+        calibrate_recording(recording(np.full((1, 2, 2), 900.0), "temperature", band=None))
 
 
 def test_the_image_is_turned_mirrored_and_placed():
     signal = np.arange(6.0).reshape(1, 2, 3) + 900.0
-    turned = develop_recording(
+    turned = calibrate_recording(
         recording(signal, "radiance"), position=ImagePosition(1, "horizontal", (0.5, 2.5))
     )
     expected = np.rot90(signal[0])[:, ::-1]
@@ -366,5 +366,5 @@ def test_the_image_is_turned_mirrored_and_placed():
     assert turned.raster.y[2] == pytest.approx(0.0, abs=1e-15)
     upside = ImagePosition(mirror="vertical").place(signal)
     np.testing.assert_array_equal(upside[0], signal[0, ::-1])
-    plain = develop_recording(recording(signal, "radiance"))
+    plain = calibrate_recording(recording(signal, "radiance"))
     assert plain.raster.extent == pytest.approx((0.0, 18e-6, 0.0, 12e-6))

@@ -72,7 +72,7 @@ def test_exact_points_give_the_exact_map(model, mirrored, seed):
     fit = fit_points(places, mapped(matrix, places), model)
     assert fit.registration.pixels(CORNERS) == pytest.approx(mapped(matrix, CORNERS), abs=1e-5)
     assert fit.registration.positions(mapped(matrix, CORNERS)) == pytest.approx(CORNERS, abs=1e-10)
-    assert fit.registration.doubts == ()
+    assert fit.registration.warnings == ()
 
 
 @pytest.mark.parametrize("model", ["similarity", "affine", "homography"])
@@ -118,7 +118,7 @@ def test_a_point_picked_wrong_is_named():
     pixels[4] += [12.0, -5.0]
     fit = fit_points(places, pixels)
     assert np.flatnonzero(fit.misplaced).tolist() == [4]
-    assert "point 5 is" in fit.registration.doubts[0]
+    assert "point 5 is" in fit.registration.warnings[0]
 
 
 def test_points_that_say_too_little_are_refused():
@@ -192,13 +192,13 @@ def test_images_of_unlike_contrast_come_within_the_stated_uncertainty(cropped):
     """Through the command: bright flanks and dark gaps beside hot bands and a hot rake face."""
     folder, pair, corner, output = cropped
     found = load_registration(folder / "map.yaml")
-    assert (found.method, found.model, found.doubts) == ("mutual-information", "similarity", ())
+    assert (found.method, found.model, found.warnings) == ("mutual-information", "similarity", ())
     part = Raster(RASTER.left + 180e-6, RASTER.top - 120e-6, 6e-6, 80, 100)
     places = np.stack(np.meshgrid(part.x, part.y), axis=-1).reshape(-1, 2)
     off = found.pixels(places) + corner - pair.pixels(places)
     error = np.sqrt((off**2).sum(axis=1).mean()) * pair.pitch
     typical, _ = found.uncertainty(part)
-    # Half a sensor for each of four parameters is in the uncertainty whatever the images say.
+    # Half a pixel for each of four parameters is in the uncertainty whatever the images say.
     assert 4e-6 < typical < 9e-6
     assert error < 2 * typical
     assert "Doubtful" not in output
@@ -217,7 +217,7 @@ def test_images_of_other_things_are_doubtful(cropped):
     other = np.random.default_rng(4).normal(100.0, 10.0, (80, 100))
     coarse = Raster(RASTER.left, RASTER.top, 12e-6, 40, 50)
     found = fit_images(image, coarse, other, "similarity").registration
-    assert any("no better than that of images" in doubt for doubt in found.doubts)
+    assert any("no better than that of images" in warning for warning in found.warnings)
 
 
 def test_images_without_contrast_are_refused():
@@ -256,7 +256,7 @@ def test_the_offset_of_the_clocks_is_within_its_interval():
         found = align_times(*clocks(generator, offset))
         limit = t.ppf(0.975, found.degrees_of_freedom) * np.sqrt(found.covariance[0, 0])
         inside += abs(found.offset - offset) < limit
-        assert found.doubts == ()
+        assert found.warnings == ()
         assert found.correlation < -0.99
         assert abs(found.offset - offset) < 200e-6
     # 15 trials at 0.95: less than 12 has a chance of 0.5 %.
@@ -286,9 +286,9 @@ def test_periodic_and_unrelated_signals_are_doubtful():
         visible,
         np.sin(2 * np.pi * 77 * visible),
     )
-    assert any("fits nearly as well" in doubt for doubt in found.doubts)
+    assert any("fits nearly as well" in warning for warning in found.warnings)
     found = align_times(infrared, generator.normal(size=60), visible, generator.normal(size=4500))
-    assert any("nothing to do with each other" in doubt for doubt in found.doubts)
+    assert any("nothing to do with each other" in warning for warning in found.warnings)
 
 
 def test_visible_frames_within_an_integration():
@@ -357,7 +357,7 @@ def test_the_command_writes_map_pictures_and_numbers(folder):
     assert "A visible pixel is 1.5 um" in output
     assert "2 degrees of freedom" in output
     # The folder's points are computed, not picked.
-    assert "Doubtful: the points agree to" in output
+    assert "Warning: the points agree to" in output
     found = load_registration("map.yaml")
     assert found.pixels([3e-6, 117e-6]) == pytest.approx([1.5, 1.5], abs=1e-6)
     assert found.model == "affine"

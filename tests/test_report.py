@@ -49,7 +49,7 @@ def result():
     return analyse(
         AnalyticChip(frames=60).scene(),
         {"chip 1": CHIP_1, "chip 2": CHIP_2},
-        Camera(psf_order="sensor"),
+        Camera(psf_order="detector"),
         Plan(instants=3, phases=2, textures=2, psf_widths=(4e-6, 12e-6, 20e-6)),
     )
 
@@ -290,7 +290,7 @@ def test_a_width_is_found_where_the_series_meets_the_value():
 
 def test_what_is_missing_is_left_out_and_unknown_is_null(result, tmp_path):
     still = tuple(replace(segment, sweep=float("nan")) for segment in result.segments)
-    ideal = replace(result.camera, psf=None, floor=None)
+    ideal = replace(result.camera, psf=None, lower_limit=None)
     headlines = {name: h for name, h in result.draws.headlines.items() if name != "rake"}
     draws = replace(result.draws, headlines=headlines)
     bare = replace(result, forces=None, camera=ideal, segments=still, draws=draws)

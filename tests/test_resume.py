@@ -29,13 +29,13 @@ from chipglow.study import cut, is_cut, kept_progress, load_study, running
 
 STUDY = """
 cutting:
-  length_of_cut: 0.1 mm
+  cutting_length: 0.1 mm
   numerics: {cell: 20 um}
   window: {start: 0.02 mm, end: 0.1 mm, interval: 0.5 us}
   field_of_view: {left: -100 um, top: 200 um, spacing: 5 um, rows: 36, columns: 27}
 """
 SIMULATION = CuttingSimulation(
-    CuttingConditions(length_of_cut=0.1e-3),
+    CuttingConditions(cutting_length=0.1e-3),
     numerics=Numerics(cell=20e-6, upstream=0.3e-3, downstream=0.3e-3, depth=0.2e-3, height=0.5e-3),
 )
 WINDOW = OutputWindow(start=0.02e-3, end=0.1e-3, interval=1e-6, later_bands=0)

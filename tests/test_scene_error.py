@@ -27,7 +27,7 @@ CAMERA = Camera(
     psf=GaussianPSF(8e-6),
     psf_order="optics",
     integration_time=2e-6,
-    floor=None,
+    lower_limit=None,
 )
 MIDDLE = PointPlace("middle", (30e-6, 0.0))
 ACROSS = LinePlace("across", ((-40e-6, 2e-6), (40e-6, 2e-6)))
@@ -182,7 +182,7 @@ camera:
   frame_rate: 600 Hz
   pitch: 4 um
   integration_time: 2 us
-  floor: none
+  lower_limit: none
   psf: {kind: gaussian, fwhm: 8 um}
   psf_order: optics
 analysis:
@@ -238,7 +238,7 @@ def test_the_study_as_run_runs_again(folder):
 
 
 def test_one_emissivity_is_enough(folder):
-    (folder / "short.yaml").write_text("camera: {integration_time: 2 us, floor: none}\n")
+    (folder / "short.yaml").write_text("camera: {integration_time: 2 us, lower_limit: none}\n")
     done = chipglow(
         "error", "plate.nc", "--study", "short.yaml", "--emissivity", "0.5", "--out", "out"
     )
@@ -266,7 +266,7 @@ def test_run_is_partial_where_something_is_missing_and_says_what(folder):
     study = Study(
         scene=str(folder / "plate.nc"),
         surface={"kind": "uniform", "emissivity": 0.6},
-        camera={"integration_time": "2 us", "floor": "none", "pitch": "4 um"},
+        camera={"integration_time": "2 us", "lower_limit": "none", "pitch": "4 um"},
         analysis={"instants": 1, "phases": 1},
     )
     result = run(study)
@@ -296,7 +296,7 @@ def test_a_chip_without_a_shear_band_still_has_a_rake_face(tmp_path):
     study = Study(
         scene=str(tmp_path / "chip.nc"),
         surface={"kind": "uniform", "emissivity": 0.6},
-        camera={"integration_time": "2 us", "floor": "none", "pitch": "4 um"},
+        camera={"integration_time": "2 us", "lower_limit": "none", "pitch": "4 um"},
         analysis={"instants": 1, "phases": 1},
     )
     result = run(study)

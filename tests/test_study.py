@@ -139,7 +139,7 @@ def test_the_default_study_has_the_librarys_defaults():
     assert cutting.friction.build() == Friction()
     assert cutting.numerics.build() == Numerics()
     assert cutting.window.build() == OutputWindow()
-    assert camera == Camera(psf_order="sensor")
+    assert camera == Camera(psf_order="detector")
     plan = study.analysis.build()
     # The same widths, but for the rounding of n * 1e-6.
     assert plan == replace(Plan(), psf_widths=plan.psf_widths)
@@ -151,7 +151,7 @@ def test_the_default_study_has_the_librarys_defaults():
 def test_the_default_view_holds_the_papers_sensors():
     study = Study()
     raster = study.cutting.field_of_view.build()
-    assert study.camera.build().sensors(raster).shape == (90, 100)
+    assert study.camera.build().pixels(raster).shape == (90, 100)
     frames = study.cutting.duration / study.cutting.window.interval
     assert round(frames) == 455
 
@@ -274,7 +274,7 @@ def load(text, folder):
         (
             "cutting: {window: {end: 3 mm}}",
             "cutting",
-            "window.end: 3 mm is beyond length_of_cut, expected up to 2.6 mm",
+            "window.end: 3 mm is beyond cutting_length, expected up to 2.6 mm",
         ),
         (
             "cutting: {window: {start: 1.9 mm, end: 1.8 mm}}",
@@ -316,9 +316,9 @@ def load(text, folder):
             "no.npy: No such file",
         ),
         (
-            "camera: {psf_order: sensors}",
+            "camera: {psf_order: pixels}",
             "camera.psf_order",
-            "'sensors', expected 'optics' or 'sensor'",
+            "'pixels', expected 'optics' or 'pixel'",
         ),
         ("surface: {chips: {}}", "surface.chips", "is empty, expected one chip or more"),
         (
@@ -421,10 +421,10 @@ def test_numbers_may_be_whole_or_have_an_exponent(tmp_path):
 
 
 def test_none_means_none(tmp_path):
-    study = load("camera: {psf: none, floor: none}", tmp_path)
+    study = load("camera: {psf: none, lower_limit: none}", tmp_path)
     camera = study.camera.build()
     assert camera.psf is None
-    assert camera.floor is None
+    assert camera.lower_limit is None
     assert load(study_text(study), tmp_path) == study
 
 

@@ -80,7 +80,7 @@ def test_every_field_of_the_cut_says_what_is_allowed_and_its_default(section, en
 
 
 NOT_ONE_NUMBER = (
-    "workpiece", "material", "left", "top", "end", "length_of_cut", "chamfer", "hone", "outline",
+    "workpiece", "material", "left", "top", "end", "cutting_length", "chamfer", "hone", "outline",
 )  # fmt: skip
 NUMBERS = [(section, entry) for section, entry in FIELDS if entry.name not in NOT_ONE_NUMBER]
 
@@ -109,7 +109,7 @@ def test_the_window_is_within_the_cut_as_it_says():
         ("1 mm", "1 mm", "1 mm", False),
         ("0.5 mm", "1.01 mm", "1 mm", False),
     ):
-        cutting = {"length_of_cut": length, "window": {**window, "start": start, "end": end}}
+        cutting = {"cutting_length": length, "window": {**window, "start": start, "end": end}}
         if good:
             Study(cutting=cutting)
         else:

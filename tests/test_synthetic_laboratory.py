@@ -16,7 +16,7 @@ from chipglow.camera import MeasuredPSF
 from chipglow.cli import app
 
 REPEATS = 10
-TYPED = ["--set", "uniform.frames=cold.hcc", "--set", "uniform.brighter=hot.hcc"]
+TYPED = ["--set", "flat_field.low=cold.hcc", "--set", "flat_field.high=hot.hcc"]
 TYPED += ["--set", "bad_pixels=find"]
 DEVELOPED = [*TYPED, "--set", "calibration=calibration.yaml", "--set", "pitch=6 um"]
 STACKED = [*DEVELOPED, "--set", "unit=counts", "--set", "interval=2 ms", "--set", "saturation=4094"]
@@ -59,10 +59,10 @@ def test_the_intervals_are_narrow(rows):
     """
     for row in rows:
         for name in ("emissivity of the body", "emissivity of the fissure"):
-            truth, _, expanded = row[name]
-            assert expanded < 0.05 * truth
+            reference, _, expanded = row[name]
+            assert expanded < 0.05 * reference
         assert row["PSF, full width"][2] < 0.01 * row["PSF, full width"][0]
-        assert row["black body"][2] < 2.0
+        assert row["blackbody"][2] < 2.0
         assert row["temperature of the fissure"][2] < 12.0
 
 
@@ -71,13 +71,13 @@ def test_a_thermocouple_far_off_is_found_out(experiment, tmp_path):
     notes = yaml.safe_load((tmp_path / "notes.yaml").read_text())
     notes["thermocouple_degC"] += 10 * synthetic_laboratory.THERMOCOUPLE
     (tmp_path / "notes.yaml").write_text(yaml.safe_dump(notes))
-    found, truth = Evaluation(tmp_path).results(), experiment.truth()
+    found, reference = Evaluation(tmp_path).results(), experiment.reference()
     for name in ("emissivity of the body", "emissivity of the fissure"):
-        assert found[name].value + found[name].expanded < truth[name]
+        assert found[name].value + found[name].expanded < reference[name]
     name = "temperature of the fissure"
-    assert found[name].value - found[name].expanded > truth[name]
+    assert found[name].value - found[name].expanded > reference[name]
     # What has nothing to do with the thermocouple is as right as ever.
-    assert abs(found["black body"].value - truth["black body"]) < found["black body"].expanded
+    assert abs(found["blackbody"].value - reference["blackbody"]) < found["blackbody"].expanded
 
 
 def test_the_same_seed_makes_the_same_files(tmp_path):
@@ -108,8 +108,8 @@ def test_the_commands_find_the_same_as_the_functions(experiment, tmp_path):
         typed("convert", name.replace(".nc", ".hcc"), *DEVELOPED, "--out", name)
     reading = yaml.safe_load((tmp_path / "notes.yaml").read_text())["thermocouple_degC"]
     typed(
-        "emissivity", *heated, "--truth", f"{reading}degC", "--truth-uncertainty", "2 K",
-        "--environment-uncertainty", "2 K", "--regions", "regions.yaml", "--out", "emissivity.nc",
+        "emissivity", *heated, "--reference", f"{reading}degC", "--reference-uncertainty", "2 K",
+        "--reflected-uncertainty", "2 K", "--regions", "regions.yaml", "--out", "emissivity.nc",
         "--table", "emissivity.csv",
     )  # fmt: skip
     chips = [f"chip-{number}.npy" for number in (1, 2, 3, 4)]

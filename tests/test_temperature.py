@@ -32,13 +32,13 @@ BODIES = np.arange(200.0, 701.0, 100.0) + CELSIUS
 OFFSET, GAIN = 400.0, 1.8
 
 
-def image(emissivity=0.42, kelvins=HOT, environment=ROOM, **more):
+def image(emissivity=0.42, kelvins=HOT, reflected=ROOM, **more):
     values = np.full(RASTER.shape, emissivity)
-    return measured(values, truth=kelvins, environment=environment, **more)
+    return measured(values, reference=kelvins, reflected=reflected, **more)
 
 
 def fitted(generator=None, common=0.0, spread=0.3):
-    """A calibration whose black bodies are as far off as they are said to be."""
+    """A calibration whose blackbodies are as far off as they are said to be."""
     shift = np.zeros(BODIES.size)
     if generator is not None:
         shift = generator.normal(0.0, common) + generator.normal(0.0, spread, BODIES.size)
@@ -78,14 +78,14 @@ def test_parts_of_the_uncertainty_are_those_of_small_changes():
     assert found.estimate.contribution("emissivity") == pytest.approx(
         found.estimate.values - more.estimate.values, rel=1e-2
     )
-    assert found.estimate.contribution("environment") == pytest.approx(
+    assert found.estimate.contribution("reflected") == pytest.approx(
         found.estimate.values - warmer.estimate.values, rel=1e-2
     )
     radiance = seen[0].radiance
     seen[0].data["calibration_uncertainty"] = (("time", "y", "x"), 1e-4 * radiance)
-    brighter = image(gain=1.0001)
+    high = image(gain=1.0001)
     found = true_temperature(seen, WHOLE, KnownEmissivity(0.42))
-    shifted = true_temperature([brighter], WHOLE, KnownEmissivity(0.42))
+    shifted = true_temperature([high], WHOLE, KnownEmissivity(0.42))
     expected = shifted.estimate.values - found.estimate.values
     assert found.estimate.contribution("calibration") == pytest.approx(expected, rel=1e-2)
 
@@ -93,15 +93,15 @@ def test_parts_of_the_uncertainty_are_those_of_small_changes():
 def test_errors_that_emissivity_and_image_share_cancel():
     """At the temperature of the heating itself, only the thermocouple's error is left."""
     calibration = fitted(common=1.0)
-    heated = developed(calibration, HEATING.truth, 0.42)
+    heated = developed(calibration, HEATING.reference, 0.42)
     emissivity = determine_emissivity([heated], HEATING).of(WHOLE)
     found = true_temperature([heated], WHOLE, emissivity, calibration=calibration)
-    assert found.estimate.values == pytest.approx(HEATING.truth, abs=1e-4)
+    assert found.estimate.values == pytest.approx(HEATING.reference, abs=1e-4)
     assert found.correlation == pytest.approx(1.0)
     assert found.estimate.contribution("calibration") == pytest.approx(0.0, abs=1e-3)
-    assert found.estimate.contribution("environment") == pytest.approx(0.0, abs=1e-3)
-    assert found.estimate.contribution("truth") == pytest.approx(
-        HEATING.truth_uncertainty, rel=1e-3
+    assert found.estimate.contribution("reflected") == pytest.approx(0.0, abs=1e-3)
+    assert found.estimate.contribution("reference") == pytest.approx(
+        HEATING.reference_uncertainty, rel=1e-3
     )
     apart = true_temperature([heated], WHOLE, emissivity)
     assert apart.correlation is None
@@ -109,7 +109,7 @@ def test_errors_that_emissivity_and_image_share_cancel():
     elsewhere = true_temperature(
         [heated], WHOLE, emissivity, ReflectedTemperature(ROOM, 5.0), calibration
     )
-    assert elsewhere.estimate.contribution("environment") > 0.01
+    assert elsewhere.estimate.contribution("reflected") > 0.01
 
 
 def test_stated_intervals_hold_the_truth():
@@ -122,8 +122,8 @@ def test_stated_intervals_hold_the_truth():
     scores = []
     for _ in range(200):
         calibration = fitted(generator, common=0.5)
-        room = ROOM + generator.normal(0.0, HEATING.environment_uncertainty)
-        oven = HEATING.truth + generator.normal(0.0, HEATING.truth_uncertainty)
+        room = ROOM + generator.normal(0.0, HEATING.reflected_uncertainty)
+        oven = HEATING.reference + generator.normal(0.0, HEATING.reference_uncertainty)
         seed = int(generator.integers(1 << 30))
         heated = developed(calibration, oven, 0.42, 4, 5.0, seed, room)
         hot = developed(calibration, HOT, 0.42, 4, 5.0, seed + 1, room)
@@ -139,15 +139,15 @@ def test_stated_intervals_hold_the_truth():
 def test_cold_surroundings_are_part_of_the_uncertainty():
     """Below 200 K a band has no table; what is reflected there counts as elsewhere."""
     cold = ReflectedTemperature(190.0, 1.0)
-    seen = [image(0.05, 330.0, environment=190.0)]
+    seen = [image(0.05, 330.0, reflected=190.0)]
     found = true_temperature(seen, WHOLE, KnownEmissivity(0.05), cold)
     warmer = true_temperature(seen, WHOLE, KnownEmissivity(0.05), ReflectedTemperature(191.0))
     assert found.estimate.values == pytest.approx(330.0, abs=1e-3)
-    assert found.estimate.contribution("environment") == pytest.approx(
+    assert found.estimate.contribution("reflected") == pytest.approx(
         found.estimate.values - warmer.estimate.values, rel=0.1
     )
     assert found.estimate.standard_uncertainty == pytest.approx(
-        found.estimate.contribution("environment")
+        found.estimate.contribution("reflected")
     )
 
 
@@ -168,7 +168,7 @@ def test_a_drift_between_recordings_is_held_if_it_is_stated(stated, least, most)
     generator, within = np.random.default_rng(1), 0
     heating = replace(HEATING, drift=stated)
     for seed in range(60):
-        ends = zip((HEATING.truth, HOT), 1 + 0.01 * generator.standard_normal(2), strict=True)
+        ends = zip((HEATING.reference, HOT), 1 + 0.01 * generator.standard_normal(2), strict=True)
         heated, hot = (
             Measurement.from_radiance(
                 drifted * image(0.42, kelvins, noise=5.0, seed=seed).radiance,
@@ -178,8 +178,8 @@ def test_a_drift_between_recordings_is_held_if_it_is_stated(stated, least, most)
             )
             for kelvins, drifted in ends
         )
-        read = replace(heating, truth=HEATING.truth + 0.5 * generator.standard_normal(),
-                       truth_uncertainty=0.5, environment_uncertainty=0.0)  # fmt: skip
+        read = replace(heating, reference=HEATING.reference + 0.5 * generator.standard_normal(),
+                       reference_uncertainty=0.5, reflected_uncertainty=0.0)  # fmt: skip
         row = determine_emissivity([heated], read).of(WHOLE)
         found = true_temperature([hot], WHOLE, row, drift=stated)
         within += abs(found.estimate.values - HOT) < found.estimate.expanded_uncertainty()
@@ -188,7 +188,7 @@ def test_a_drift_between_recordings_is_held_if_it_is_stated(stated, least, most)
 
 
 def test_several_recordings_show_the_drift_themselves():
-    images = [image(0.42, HEATING.truth, noise=1.0, seed=k) for k in range(4)]
+    images = [image(0.42, HEATING.reference, noise=1.0, seed=k) for k in range(4)]
     shown = [
         Measurement.from_radiance(f * one.radiance, BAND, np.zeros(1), RASTER)
         for f, one in zip((0.97, 0.99, 1.01, 1.03), images, strict=True)
@@ -208,14 +208,14 @@ def test_several_recordings_show_the_drift_themselves():
 
 def test_the_emissivity_of_a_file_is_the_one_that_was_written(tmp_path):
     calibration = fitted(common=0.5)
-    heated = developed(calibration, HEATING.truth, 0.42, 5, 20.0)
+    heated = developed(calibration, HEATING.reference, 0.42, 5, 20.0)
     hot = developed(calibration, HOT, 0.42, 5, 20.0, seed=9)
     found = determine_emissivity([heated], HEATING)
     row = found.of(WHOLE)
     write_emissivity([found], [[row]], tmp_path / "emissivity.nc")
     stored = read_region_emissivity(tmp_path / "emissivity.nc")["chip"]
     assert stored.heating == replace(HEATING, camera_uncertainty=None)
-    for cause in ("truth", "environment", "calibration"):
+    for cause in ("reference", "reflected", "calibration"):
         # Signs are kept, also where Equation 2 would have them otherwise.
         assert stored.estimate.effect(cause) == pytest.approx(row.estimate.effect(cause))
     assert stored.estimate.warnings == row.estimate.warnings
@@ -248,7 +248,7 @@ def test_regions_in_a_file_correlate_as_obsarray_says(tmp_path):
     ]
     values = np.where(halves[0].mask, 0.42, 1.05)
     heating = replace(HEATING, drift=0.01, camera_uncertainty=1.0)
-    found = determine_emissivity([measured(values, HEATING.truth, ROOM, frames=5)], heating)
+    found = determine_emissivity([measured(values, HEATING.reference, ROOM, frames=5)], heating)
     rows = [found.of(area) for area in halves]
     write_emissivity([found], [rows], tmp_path / "e.nc")
     with xr.open_dataset(tmp_path / "e.nc", engine="h5netcdf") as data:
@@ -257,7 +257,7 @@ def test_regions_in_a_file_correlate_as_obsarray_says(tmp_path):
     np.testing.assert_allclose(estimate.covariance(), expected.covariance(), rtol=1e-9, atol=1e-18)
     # A hotter room makes a grey surface darker, and one that is over 1 brighter.
     stored = read_region_emissivity(tmp_path / "e.nc")
-    signs = [np.sign(one.estimate.effect("environment")) for one in stored.values()]
+    signs = [np.sign(one.estimate.effect("reflected")) for one in stored.values()]
     assert signs == [-1.0, 1.0]
     both = stored["left"].estimate - rows[0].estimate
     assert both.standard_uncertainty == pytest.approx(0.0, abs=1e-12)
@@ -266,7 +266,7 @@ def test_regions_in_a_file_correlate_as_obsarray_says(tmp_path):
 def test_warnings_of_the_emissivity_travel_to_the_temperature(tmp_path):
     flags = np.zeros((1, *RASTER.shape), np.uint8)
     flags[:, :, :10] = Flag.SATURATED
-    found = determine_emissivity([image(kelvins=HEATING.truth, flags=flags)], HEATING)
+    found = determine_emissivity([image(kelvins=HEATING.reference, flags=flags)], HEATING)
     write_emissivity([found], [[found.of(WHOLE)]], tmp_path / "e.nc")
     stored = read_region_emissivity(tmp_path / "e.nc")["chip"]
     for emissivity in (found.of(WHOLE), stored):
@@ -281,7 +281,7 @@ def test_two_temperatures_by_one_emissivity_have_its_errors_in_common():
 
 
 def test_a_file_of_an_earlier_version_is_refused(tmp_path):
-    found = determine_emissivity([image(kelvins=HEATING.truth)], HEATING)
+    found = determine_emissivity([image(kelvins=HEATING.reference)], HEATING)
     write_emissivity([found], [[found.of(WHOLE)]], tmp_path / "e.nc")
     with xr.open_dataset(tmp_path / "e.nc", engine="h5netcdf") as data:
         data.load().drop_vars("observations").to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
@@ -291,10 +291,10 @@ def test_a_file_of_an_earlier_version_is_refused(tmp_path):
 
 def test_what_cannot_be_trusted_is_said():
     half = np.where(np.arange(RASTER.columns) < 20, HOT, HOT + 300.0)
-    uneven = measured(np.full(RASTER.shape, 0.42), truth=HOT)
+    uneven = measured(np.full(RASTER.shape, 0.42), reference=HOT)
     uneven.data["radiance"].values[:] = 0.42 * BAND.radiance(half) + 0.58 * BAND.radiance(ROOM)
     found = true_temperature([uneven], WHOLE, KnownEmissivity(0.42, 0.01))
-    assert any("is uneven" in doubt for doubt in found.estimate.warnings)
+    assert any("is uneven" in warning for warning in found.estimate.warnings)
     flags = np.zeros((1, *RASTER.shape), np.uint8)
     flags[:, :, :10] = Flag.SATURATED
     found = true_temperature([image(flags=flags)], WHOLE, KnownEmissivity(0.42))
@@ -332,7 +332,7 @@ def test_impossible_input_is_one_clear_error():
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "regions.yaml").write_text(REGIONS)
-    write_measurement(measured(table_1(), truth=HOT), tmp_path / "hot.nc")
+    write_measurement(measured(table_1(), reference=HOT), tmp_path / "hot.nc")
     return tmp_path
 
 
@@ -349,8 +349,8 @@ def test_the_command_prints_what_it_found_and_assumed(folder):
     assert "Assumed: the object reflects 293 K exactly" in output
     code, output = run(
         "hot.nc", "--regions", "regions.yaml", "--emissivity", "0.42",
-        "--emissivity-uncertainty", "0.01", "--environment", "20 degC",
-        "--environment-uncertainty", "1 K", "--table", "table.csv",
+        "--emissivity-uncertainty", "0.01", "--reflected", "20 degC",
+        "--reflected-uncertainty", "1 K", "--table", "table.csv",
     )  # fmt: skip
     assert code == 0, output
     assert "exact (--emissivity" not in output
@@ -360,9 +360,9 @@ def test_the_command_prints_what_it_found_and_assumed(folder):
 
 def test_an_emissivity_of_another_temperature_is_doubtful(folder):
     """The samples' chip at 570 °C with the emissivity of 391 °C is read 18 K too hot."""
-    for truth, doubtful in ((HEATING.truth, True), (HOT - 20.0, False)):
-        heating = replace(HEATING, truth=truth)
-        found = determine_emissivity([image(kelvins=truth)], heating)
+    for reference, doubtful in ((HEATING.reference, True), (HOT - 20.0, False)):
+        heating = replace(HEATING, reference=reference)
+        found = determine_emissivity([image(kelvins=reference)], heating)
         names = ("body left", "body right", "fissure 1", "fissure 2")
         rows = [replace(found.of(WHOLE), name=name) for name in names]
         write_emissivity([found], [rows], folder / "e.nc")
@@ -370,7 +370,7 @@ def test_an_emissivity_of_another_temperature_is_doubtful(folder):
         assert code == 0, output
         assert "Assumed: the emissivity is the same at all temperatures" in output
         far = "°C at which its emissivity was determined"
-        assert (f"K from the {truth - 273.15:.0f} {far}" in output) == doubtful, output
+        assert (f"K from the {reference - 273.15:.0f} {far}" in output) == doubtful, output
 
 
 @pytest.mark.parametrize(
@@ -378,7 +378,7 @@ def test_an_emissivity_of_another_temperature_is_doubtful(folder):
     [
         (["--emissivity", "none.nc"], "none.nc: there is no such file"),
         (["--emissivity", "1.5"], "emissivity: is 1.5, expected over 0 to 1"),
-        (["--emissivity", "0.4", "--environment", "warm"], "--environment: 'warm'"),
+        (["--emissivity", "0.4", "--reflected", "warm"], "--reflected: 'warm'"),
         (["--emissivity", "e.nc", "--emissivity-uncertainty", "1"], "expected none with a file"),
         (["--emissivity", "e.nc"], "tells of other, expected one of the regions"),
         (["--emissivity", "0.4", "--set", "pitch=6 um"], "describes nothing"),
@@ -386,7 +386,7 @@ def test_an_emissivity_of_another_temperature_is_doubtful(folder):
     ],
 )
 def test_bad_input_is_one_line(folder, arguments, message):
-    found = determine_emissivity([image(kelvins=HEATING.truth)], HEATING)
+    found = determine_emissivity([image(kelvins=HEATING.reference)], HEATING)
     row = replace(found.of(WHOLE), name="other")
     write_emissivity([found], [[row]], folder / "e.nc")
     code, output = run("hot.nc", "--regions", "regions.yaml", *arguments)

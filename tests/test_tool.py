@@ -407,7 +407,7 @@ def cut(tool):
     """Forces, last frame and points of a short, coarse cut."""
     frames, kept = [], []
     simulation = CuttingSimulation(
-        conditions=CuttingConditions(feed=0.15e-3, length_of_cut=LENGTH),
+        conditions=CuttingConditions(feed=0.15e-3, cutting_length=LENGTH),
         tool=tool,
         numerics=Numerics(cell=25e-6),
     )

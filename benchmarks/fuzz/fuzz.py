@@ -176,7 +176,7 @@ def serve(requests, answers):
 
 
 def read_as_the_product_does(source, name):
-    """Read a source in a process of its own; a plain refusal is no error."""
+    """Read a source in a subprocess; a plain refusal is no error."""
     isolated = Isolated(source, name, memory=MEMORY, patience=PATIENCE)
     try:
         isolated.survey()

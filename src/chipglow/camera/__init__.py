@@ -3,12 +3,19 @@
 from chipglow.camera.calibration.blackbody import Blackbody
 from chipglow.camera.calibration.calibration import (
     Calibration,
+    FactoryCalibration,
     FittedCalibration,
     LinearCalibration,
-    MakersCalibration,
     SakumaHattori,
 )
-from chipglow.camera.calibration.fit import CalibrationFit, fit_linear, fit_sakuma_hattori
+from chipglow.camera.calibration.fit import (
+    MODELS,
+    CalibrationFit,
+    fit_linear,
+    fit_models,
+    fit_sakuma_hattori,
+    preferred,
+)
 from chipglow.camera.camera import Camera
 from chipglow.camera.detector.bad_pixels import (
     LEAST_FRAMES,
@@ -45,6 +52,7 @@ from chipglow.camera.warning import ChipglowWarning
 __all__ = [
     "DETECTOR_TERMS",
     "LEAST_FRAMES",
+    "MODELS",
     "PSFS",
     "UNUSABLE",
     "AiryAperture",
@@ -59,12 +67,12 @@ __all__ = [
     "Detector",
     "DetectorTerm",
     "Exposure",
+    "FactoryCalibration",
     "FittedCalibration",
     "FixedPattern",
     "Flag",
     "GaussianPSF",
     "LinearCalibration",
-    "MakersCalibration",
     "MeasuredPSF",
     "MeasuredPSFFile",
     "Measurement",
@@ -81,7 +89,9 @@ __all__ = [
     "expose_all",
     "find_bad_pixels",
     "fit_linear",
+    "fit_models",
     "fit_sakuma_hattori",
     "frame_weights",
+    "preferred",
     "replace_bad_pixels",
 ]

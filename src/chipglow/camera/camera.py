@@ -22,7 +22,7 @@ from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Raster, Scene
 from chipglow.surface import EmissivityField, Surface
 
-PSF_ORDERS: Final = ("optics", "sensor")
+PSF_ORDERS: Final = ("optics", "detector")
 
 BORDER_TOLERANCE: Final = 1.0
 """Change in K of a pixel from which on it is said that the border of the scene matters."""
@@ -37,35 +37,35 @@ _Blur: TypeAlias = Callable[[NDArray[np.float64], PointSpreadFunction, float], N
 class Camera:
     """An infrared camera looking at a scene (Figure 6 of Heigel and Whitenton, 2010).
 
-    By default it is the paper's in all but the order of blur and sensors; `paper` is the paper's.
+    By default it is the paper's in all but the order of blur and pixels; `paper` is the paper's.
 
     Parameters
     ----------
     band : Band
         Spectral band; the paper's 3.8 µm to 5.1 µm by default.
     pitch : float
-        Distance between sensors in m, on the scene; the paper's 0.96 mm / 160 by default.
+        Distance between pixels in m, on the scene; the paper's 0.96 mm / 160 by default.
     shape : tuple of int, optional
-        Rows and columns of sensors; as many whole sensors as fit the scene by default.
+        Rows and columns of pixels; as many whole pixels as fit the scene by default.
     offset : tuple of float
-        Corner of the first sensor in m, right of and down from the scene's upper left corner.
+        Corner of the first pixel in m, right of and down from the scene's upper left corner.
     fill_factor : float
-        Share of a sensor's square that is sensitive: a square in its middle.
+        Share of a pixel's square that is sensitive: a square in its middle.
     psf : PointSpreadFunction, optional
         How the camera spreads a point; None for an ideal camera (the paper's case 2).
     psf_order : {"optics", "sensor"}
-        ``optics`` blurs the scene's samples and lets the sensors integrate the blurred image, as
-        light does it: the point spread function is that of the optics alone. ``sensor`` is the
-        paper's: the sensors integrate the scene, and the blur is applied from sensor to sensor.
-        The kernel is then the share of a point's light that each sensor receives, which holds
-        the sensor's footprint a second time: the variance of the blur is larger by pitch² / 12.
+        ``optics`` blurs the scene's samples and lets the pixels integrate the blurred image, as
+        light does it: the point spread function is that of the optics alone. ``detector`` is the
+        paper's: the pixels integrate the scene, and the blur is applied from pixel to pixel.
+        The kernel is then the share of a point's light that each pixel receives, which holds
+        the pixel's footprint a second time: the variance of the blur is larger by pitch² / 12.
     integration_time : float
         In s.
     frame_rate : float
         Frames a second.
     floor : float, optional
         Lowest radiance temperature in K that the camera measures; what is under it is flagged.
-        The paper's 300 °C by default; None for no floor.
+        The paper's 300 °C by default; None for no lower range limit.
     reflected : float, optional
         Temperature in K of surroundings that the surface reflects (Equation 2); by default
         reflections are left out, as in the paper's simulation (Equation 3).
@@ -78,7 +78,7 @@ class Camera:
     Warns
     -----
     ChipglowWarning
-        If the floor is so low and so round a number of K that it is probably meant in °C.
+        If the lower range limit is so low and round a number of K that °C is probably meant.
     """
 
     band: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
@@ -87,10 +87,10 @@ class Camera:
     offset: tuple[float, float] = (0.0, 0.0)
     fill_factor: float = 1.0
     psf: PointSpreadFunction | None = field(default_factory=AnnularAperturePSF)
-    psf_order: Literal["optics", "sensor"] = "optics"
+    psf_order: Literal["optics", "detector"] = "optics"
     integration_time: float = 10e-6
     frame_rate: float = 600.0
-    floor: float | None = 573.15
+    lower_limit: float | None = 573.15
     reflected: float | None = None
 
     def __post_init__(self) -> None:
@@ -126,7 +126,7 @@ class Camera:
             1 / self.frame_rate,
             f"over 0 to {1 / self.frame_rate:g} s, the time between frames",
         )
-        for name in ("floor", "reflected"):
+        for name in ("lower_limit", "reflected"):
             value = getattr(self, name)
             _expect(
                 value is None
@@ -135,10 +135,15 @@ class Camera:
                 value,
                 f"{TABLE_COLDEST:g} to {TABLE_HOTTEST:g} K, or None",
             )
-        if self.floor is not None and self.floor <= _COLD_FLOOR and self.floor % 10 == 0:
+        if (
+            self.lower_limit is not None
+            and self.lower_limit <= _COLD_FLOOR
+            and self.lower_limit % 10 == 0
+        ):
             warn(
-                f"camera: floor is {self.floor:g} K, which is {self.floor - 273.15:g} °C; if "
-                f"{self.floor:g} °C is meant, it is {self.floor + 273.15:g} K.",
+                f"camera: lower_limit is {self.lower_limit:g} K, which is "
+                f"{self.lower_limit - 273.15:g} °C; if "
+                f"{self.lower_limit:g} °C is meant, it is {self.lower_limit + 273.15:g} K.",
                 ChipglowWarning,
                 stacklevel=3,
             )
@@ -147,15 +152,15 @@ class Camera:
     def paper(cls) -> "Camera":
         """The camera of the paper's simulation, as far as the paper tells it.
 
-        The blur is applied from sensor to sensor (`psf_order` is ``sensor``), as in its Figure 6:
+        The blur is applied from pixel to pixel (`psf_order` is ``detector``), as in its Figure 6:
         that is what it differs in from `Camera()`, by up to 7 K. The point spread function, which
         the paper prints as a picture only, is an assumption: see `AnnularAperturePSF`. A study's
         camera is this one, unless it says otherwise.
         """
-        return cls(psf_order="sensor")
+        return cls(psf_order="detector")
 
-    def sensors(self, scene: Raster) -> Raster:
-        """Where the sensors lie on a scene.
+    def pixels(self, scene: Raster) -> Raster:
+        """Where the pixels lie on a scene.
 
         Parameters
         ----------
@@ -165,7 +170,7 @@ class Camera:
         Raises
         ------
         ValueError
-            If not one sensor fits, or `shape` reaches beyond the scene.
+            If not one pixel fits, or `shape` reaches beyond the scene.
         """
         return sensor_raster(scene, self.pitch, self.offset, self.shape)
 
@@ -201,15 +206,15 @@ class Camera:
         Raises
         ------
         ValueError
-            If the surface is none, the integration reaches beyond the scene, or the sensors do not
+            If the surface is none, the integration reaches beyond the scene, or the pixels do not
             fit it.
         """
-        self.sensors(scene.raster)
+        self.pixels(scene.raster)
         return expose(
             scene, _laid(surface, scene), self.band, start, self.integration_time, self.reflected
         )
 
-    def develop(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
+    def form_measurement(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
         """Make the frames that the camera reads from exposures.
 
         Size of source, blur and mean over time are linear and change places: the mean, which an
@@ -231,7 +236,7 @@ class Camera:
         Raises
         ------
         ValueError
-            If there is no exposure, they are of different grids, or the sensors do not fit.
+            If there is no exposure, they are of different grids, or the pixels do not fit.
 
         Notes
         -----
@@ -244,7 +249,7 @@ class Camera:
             exposures = (exposures,)
         starts, frames, alike, sensors = [], [], [], None
         for exposure in exposures:
-            found = self.sensors(exposure.raster)
+            found = self.pixels(exposure.raster)
             if sensors not in (None, found):
                 raise ValueError(f"camera: exposures of different grids, {sensors} and {found}")
             sensors = found
@@ -283,11 +288,11 @@ class Camera:
         Raises
         ------
         ValueError
-            If an integration reaches beyond the scene, or the sensors do not fit it.
+            If an integration reaches beyond the scene, or the pixels do not fit it.
         """
-        self.sensors(scene.raster)
+        self.pixels(scene.raster)
         emissivity = _laid(surface, scene)
-        measured = self.develop(
+        measured = self.form_measurement(
             expose(scene, emissivity, self.band, at, self.integration_time, self.reflected)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
         )
@@ -309,9 +314,9 @@ class Camera:
         Raises
         ------
         ValueError
-            If the sensors do not fit the scene.
+            If the pixels do not fit the scene.
         """
-        sensors = self.sensors(scene)
+        sensors = self.pixels(scene)
         if self.psf is None:
             return np.zeros(sensors.shape)
         if self.psf_order == "optics":
@@ -338,17 +343,17 @@ class Camera:
         ValueError
             If the pixels do not fit the scene.
         """
-        return self._read_out(exposure, self.sensors(exposure.raster), blur)
+        return self._read_out(exposure, self.pixels(exposure.raster), blur)
 
     def _read_out(self, exposure: Exposure, sensors: Raster, blurred: _Blur) -> NDArray[np.float64]:
-        """Radiance of every sensor, shape `sensors.shape`."""
+        """Radiance of every pixel, shape `sensors.shape`."""
         image, raster = exposure.mean_radiance, exposure.raster
         if self.psf is None:
             return integrate(image, raster, sensors, self.fill_factor)
         if self.psf_order == "optics":
             image = blurred(image, self.psf, raster.spacing)
             return integrate(image, raster, sensors, self.fill_factor)
-        # Sensors that are not read out tell what is beyond those that are.
+        # Pixels that are not read out tell what is beyond those that are.
         whole, own = whole_raster(raster, sensors)
         image = integrate(image, raster, whole, self.fill_factor)
         return blurred(image, self.psf, self.pitch)[own]
@@ -367,13 +372,13 @@ class Camera:
         scene : Raster
             The samples of the scene that they are images of.
         """
-        return self._measurement(images, starts, self.sensors(scene))
+        return self._measurement(images, starts, self.pixels(scene))
 
     def _measurement(
         self, radiance: NDArray[np.float64], starts: NDArray[np.float64], sensors: Raster
     ) -> Measurement:
         return Measurement.from_radiance(
-            radiance, self.band, starts, sensors, self.floor, attributes=self._attributes()
+            radiance, self.band, starts, sensors, self.lower_limit, attributes=self._attributes()
         )
 
     def _attributes(self) -> dict[str, float | str]:

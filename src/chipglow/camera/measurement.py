@@ -25,17 +25,17 @@ MEASUREMENT_UNITS: Final = {"radiance_temperature": "K", "radiance": "W m-2 sr-1
 class Flag(IntFlag):
     """What is wrong with a pixel; it has a radiance temperature only if it was `REPLACED`."""
 
-    BELOW_FLOOR = 1
+    UNDER_RANGE = 1
     """Colder than the camera measures at its integration time, or without any radiance."""
     SATURATED = 2
     """At the upper end of the camera's counts, or hotter than its calibration reaches."""
     DEAD = 4
-    """The sensor does not answer to light."""
+    """The pixel does not answer to light."""
     REPLACED = 8
-    """The sensor does not answer to light; the value is that of its neighbours."""
+    """The pixel does not answer to light; the value is that of its neighbours."""
 
 
-UNUSABLE: Final = Flag.BELOW_FLOOR | Flag.SATURATED | Flag.DEAD
+UNUSABLE: Final = Flag.UNDER_RANGE | Flag.SATURATED | Flag.DEAD
 """The flags of pixels without a radiance temperature."""
 
 
@@ -48,8 +48,8 @@ class Measurement:
         Variables of `MEASUREMENT_UNITS` with dimensions (time, y, x) and a ``units`` attribute
         each: ``radiance_temperature``, NaN where flagged; ``radiance``; ``flags``, a sum of
         `Flag`, uint8. Coordinates as a scene's: ``time`` in s, when each integration began;
-        ``x`` ascending and ``y`` descending in m, the middles of the sensors. Attributes tell the
-        camera; ``pitch`` is the distance between sensors in m, ``band_lower`` and ``band_upper``
+        ``x`` ascending and ``y`` descending in m, the middles of the pixels. Attributes tell the
+        camera; ``pitch`` is the distance between pixels in m, ``band_lower`` and ``band_upper``
         in m limit the band. Of a band that is not shaped like a box, ``response`` over
         ``wavelength`` in m is the relative spectral response. A tool may be told as in a scene.
         ``calibration_uncertainty``, of the shape and unit of ``radiance``, may be there: its
@@ -79,7 +79,7 @@ class Measurement:
         band: Band,
         times: NDArray[np.float64],
         raster: Raster,
-        floor: float | None = None,
+        lower_limit: float | None = None,
         flags: NDArray[np.uint8] | None = None,
         calibration_uncertainty: NDArray[np.floating] | None = None,
         attributes: Mapping[str, float | str] | None = None,
@@ -95,7 +95,7 @@ class Measurement:
         times : ndarray
             When each integration began in s, shape (time,).
         raster : Raster
-            The grid of the sensors.
+            The grid of the pixels.
         floor : float, optional
             Lowest radiance temperature in K that the camera measures; what is under it, or has no
             radiance, is flagged.
@@ -108,9 +108,9 @@ class Measurement:
             What else is known of the camera.
         """
         temperature = band.temperature(radiance)
-        below = ~(temperature >= (floor or 0.0))
+        below = ~(temperature >= (lower_limit or 0.0))
         flags = np.zeros(radiance.shape, np.uint8) if flags is None else flags
-        flags = flags | np.where(below & (flags & UNUSABLE == 0), Flag.BELOW_FLOOR, 0).astype(
+        flags = flags | np.where(below & (flags & UNUSABLE == 0), Flag.UNDER_RANGE, 0).astype(
             np.uint8
         )
         values = {
@@ -123,8 +123,8 @@ class Measurement:
             values["calibration_uncertainty"] = calibration_uncertainty
             units["calibration_uncertainty"] = units["radiance"]
         known: dict[str, float | str] = {**(attributes or {}), "pitch": raster.spacing}
-        if floor is not None:
-            known["floor"] = floor
+        if lower_limit is not None:
+            known["lower_limit"] = lower_limit
         known |= {"band_lower": band.lower, "band_upper": band.upper}
         data = xr.Dataset(
             {
@@ -184,7 +184,7 @@ class Measurement:
 
     @cached_property
     def raster(self) -> Raster:
-        """The grid of the sensors."""
+        """The grid of the pixels."""
         x, y, pitch = self.data["x"].values, self.data["y"].values, float(self.data.attrs["pitch"])
         return Raster(float(x[0]) - pitch / 2, float(y[0]) + pitch / 2, pitch, len(y), len(x))
 

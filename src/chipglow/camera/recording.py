@@ -14,7 +14,7 @@ QUANTITIES: Final = ("counts", "radiance", "temperature")
 
 @dataclass(frozen=True)
 class PlanckConversion:
-    """A maker's conversion between counts and the temperature of a black body.
+    """A factory conversion between counts and the temperature of a blackbody.
 
     T = b / ln(r1 / (r2 (S + o)) + f): counts S, temperature T in K.
 
@@ -42,7 +42,7 @@ class PlanckConversion:
                 raise ValueError(f"Planck conversion: {name} is {value!r}, expected over 0")
 
     def temperature(self, counts: NDArray[Any]) -> NDArray[np.float64]:
-        """Temperature in K of the black body that gives these counts; NaN where there is none."""
+        """Temperature in K of the blackbody that gives these counts; NaN where there is none."""
         signal = np.asarray(counts, np.float64) + self.o
         with np.errstate(divide="ignore", invalid="ignore"):
             logarithm = np.log(self.r1 / (self.r2 * signal) + self.f)
@@ -72,9 +72,9 @@ class Recording:
     band : Band, optional
         The camera's band.
     pitch : float, optional
-        Distance between sensors on the object in m.
+        Distance between pixels on the object in m.
     conversion : PlanckConversion, optional
-        The maker's conversion of counts.
+        The factory conversion of counts.
     object_parameters : ObjectParameters, optional
         What the camera was told of the object. Temperatures were computed with them; counts do not
         depend on them.
@@ -84,10 +84,10 @@ class Recording:
         The measuring range that was chosen, as the maker calls it.
     assumptions : tuple of str
         What had to be assumed to read it, a sentence each.
-    doubts : tuple of str
+    warnings : tuple of str
         Why the file may not be relied on, a sentence each.
     fill_factor : float, optional
-        Portion of a sensor's square that takes light.
+        Portion of a pixel's square that takes light.
 
     Raises
     ------
@@ -108,7 +108,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     range_name: str | None = None
     assumptions: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     fill_factor: float | None = None
 
     def __post_init__(self) -> None:

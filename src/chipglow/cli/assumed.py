@@ -18,7 +18,7 @@ def say_doubtful(sentences: Iterable[str]) -> None:
     """Say beside the results what cannot be relied on, a sentence each."""
     console = Console(highlight=False, markup=False, soft_wrap=True)
     for sentence in sentences:
-        console.print(f"Doubtful: {sentence}")
+        console.print(f"Warning: {sentence}")
 
 
 def say_missing(sentences: Iterable[str]) -> None:

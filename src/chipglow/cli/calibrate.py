@@ -1,6 +1,6 @@
-"""The command ``chipglow calibrate``: counts of black bodies to a calibration."""
+"""The command ``chipglow calibrate``: counts of blackbodies to a calibration."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -32,7 +32,7 @@ def calibrate(
         Path,
         typer.Argument(
             metavar="POINTS.csv",
-            help="Black bodies: columns temperature_degC (or _K), counts (or file, a recording of "
+            help="Blackbodies: columns temperature_degC (or _K), counts (or file, a recording of "
             "each) and, if known, their standard uncertainties count_uncertainty and "
             "temperature_uncertainty_K.",
         ),
@@ -50,7 +50,7 @@ def calibrate(
         str | None,
         typer.Option(
             metavar="KELVINS",
-            help="Standard uncertainty of the black body's temperature that all points have in "
+            help="Standard uncertainty of the blackbody's temperature that all points have in "
             "common, such as '0.5 K': that of its certificate.",
         ),
     ] = None,
@@ -76,21 +76,21 @@ def calibrate(
     ] = None,
     settings: Settings = None,
 ) -> None:
-    """Fit a calibration of a camera's counts to black bodies.
+    """Fit a calibration of a camera's counts to blackbodies.
 
-    It holds between the coldest and the hottest black body: what is outside is flagged later.
+    It holds between the coldest and the hottest blackbody: what is outside is flagged later.
     """
     from rich.console import Console
 
-    from chipglow.camera import Blackbody, fit_linear, fit_sakuma_hattori
+    from chipglow.camera import MODELS, Blackbody, fit_models, preferred
     from chipglow.cli.assumed import say_assumed, say_doubtful
     from chipglow.io.column_file import read_calibration_points
-    from chipglow.laboratory.measurement import UniformObjects, uniform_counts
+    from chipglow.laboratory.measurement import FlatFieldSources, uniform_counts
     from chipglow.laboratory.measurement.description import band_of
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import TEMPERATURE, TEMPERATURE_DIFFERENCE, TIME
 
-    recordings, uniform = [], UniformObjects()
+    recordings, uniform = [], FlatFieldSources()
 
     def counts_of(file: str) -> float:
         recordings.append(file)
@@ -121,26 +121,19 @@ def calibrate(
         "integration_time": parse("--integration-time", TIME, integration_time),
         "range_name": range_name,
     }
-    kinds: dict[Model, Callable[..., CalibrationFit[Any]]] = {
-        Model.LINEAR: fit_linear,
-        Model.SAKUMA_HATTORI: fit_sakuma_hattori,
-    }
-    wanted: list[Model] = list(kinds) if model is Model.BOTH else [model]
+    wanted = tuple(MODELS) if model is Model.BOTH else (model.value,)
     try:
         seen = band_of(band)
     except ValueError as error:
         raise ValueError(f"--band: {error}") from None
     try:
-        fits: Fits = {
-            name.value: kinds[name](table["temperature"], table["counts"], seen, **known)
-            for name in wanted
-        }
+        fits = fit_models(table["temperature"], table["counts"], seen, wanted, **known)
     except ValueError as error:
         raise ValueError(f"{points}: {error}") from None
     console = Console(highlight=False, markup=False, soft_wrap=True)
     for name, fit in fits.items():
         _print_fit(console, name, fit)
-    chosen = min(fits, key=lambda name: fits[name].information_criterion)
+    chosen = preferred(fits)
     if len(fits) > 1:
         _print_comparison(console, fits, chosen)
     say_assumed(_assumed(emissivity, surroundings, table["temperature"]))
@@ -181,7 +174,7 @@ def _print_fit(console: "Console", name: str, fit: "CalibrationFit[FittedCalibra
         parameters.add_row(label, f"{value:.7g}", f"{deviation:.2g}", unit)
     console.print(parameters)
     table = Table(
-        "black body / °C", "counts", "residual / counts", "residual / K", "u / K",
+        "blackbody / °C", "counts", "residual / counts", "residual / K", "u / K",
         box=None,
     )  # fmt: skip
     for column in table.columns:
@@ -255,6 +248,6 @@ def _doubtful(
         )
     if not common_known:
         yield (
-            "The uncertainty holds no error that all temperatures of the black body have in common "
+            "The uncertainty holds no error that all temperatures of the blackbody have in common "
             "(--common-uncertainty)."
         )

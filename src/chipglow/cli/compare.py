@@ -82,8 +82,7 @@ def compare(
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.cli.pictures import write_picture
     from chipglow.cli.times import frame_at
-    from chipglow.cli.tools import chosen_tool
-    from chipglow.laboratory.chip import read_curve
+    from chipglow.laboratory.chip import chosen_tool, read_curve
     from chipglow.laboratory.comparison import compare as compare_all
     from chipglow.laboratory.comparison.figure import draw_comparison
     from chipglow.laboratory.measurement import load_measurement
@@ -110,7 +109,7 @@ def compare(
         console.print(sentence)
     say_of_measurements(whole)
     say_assumed((*chosen.assumptions, *result.assumptions))
-    say_doubtful((*chosen.doubts, *result.doubts))
+    say_doubtful((*chosen.warnings, *result.warnings))
     console.print()
     for place in result.places:
         console.print(place.sentence)

@@ -49,7 +49,7 @@ def convert(
             raise
         console.print(f"\nIt is no measurement yet. {error}")
         say_assumed(recording.assumptions)
-        say_doubtful(recording.doubts)
+        say_doubtful(recording.warnings)
         return
     console.print("\nThe measurement:")
     say_measurement(measurement)
@@ -82,7 +82,7 @@ def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:
     if told is not None:
         yield "emissivity", f"{told.emissivity:g}"
         yield "reflected", f"{told.reflected - 273.15:.2f} °C"
-        yield "transmission", f"{told.transmission:g}"
+        yield "transmittance", f"{told.transmittance:g}"
         yield "atmosphere", f"{told.atmosphere - 273.15:.2f} °C"
     for note in recording.notes:
         yield "note", note

@@ -26,7 +26,7 @@ def emissivity(
         list[Path],
         typer.Argument(metavar="IMAGE...", help="Measurements of the heated object."),
     ],
-    truth: Annotated[
+    reference: Annotated[
         list[str],
         typer.Option(
             metavar="TEMPERATURE",
@@ -37,17 +37,17 @@ def emissivity(
     regions: Annotated[
         Path, typer.Option(metavar="FILE", help="The regions of the image, a YAML file.")
     ],
-    environment: Annotated[
+    reflected: Annotated[
         str,
         typer.Option(
             metavar="TEMPERATURE", help="Temperature of the surroundings that the object reflects."
         ),
     ] = "293 K",
-    truth_uncertainty: Annotated[
+    reference_uncertainty: Annotated[
         str | None,
         typer.Option(metavar="KELVINS", help="Its standard uncertainty, such as '2 K'."),
     ] = None,
-    environment_uncertainty: Annotated[
+    reflected_uncertainty: Annotated[
         str | None,
         typer.Option(metavar="KELVINS", help="Standard uncertainty of the surroundings'."),
     ] = None,
@@ -81,7 +81,7 @@ def emissivity(
     from chipglow.scene import areas, shared_pixels
 
     heatings = _heatings(
-        images, truth, environment, truth_uncertainty, environment_uncertainty,
+        images, reference, reflected, reference_uncertainty, reflected_uncertainty,
         camera_uncertainty, drift,
     )  # fmt: skip
     named = load_regions(regions)
@@ -116,10 +116,10 @@ def emissivity(
 
 def _heatings(
     images: list[Path],
-    truths: list[str],
-    environment: str,
-    truth_uncertainty: str | None,
-    environment_uncertainty: str | None,
+    references: list[str],
+    reflected: str,
+    reference_uncertainty: str | None,
+    reflected_uncertainty: str | None,
     camera_uncertainty: str | None,
     drift: float | None,
 ) -> "list[Heating]":
@@ -128,9 +128,9 @@ def _heatings(
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import TEMPERATURE, TEMPERATURE_DIFFERENCE
 
-    if len(truths) not in (1, len(images)):
+    if len(references) not in (1, len(images)):
         raise ValueError(
-            f"--truth: {len(truths)} temperatures for {len(images)} images, "
+            f"--reference: {len(references)} temperatures for {len(images)} images, "
             "expected one for all or one for each"
         )
 
@@ -139,14 +139,14 @@ def _heatings(
 
     return [
         Heating(
-            parse("--truth", TEMPERATURE, text),
-            parse("--environment", TEMPERATURE, environment),
-            spread("--truth-uncertainty", truth_uncertainty) or 0.0,
-            spread("--environment-uncertainty", environment_uncertainty) or 0.0,
+            parse("--reference", TEMPERATURE, text),
+            parse("--reflected", TEMPERATURE, reflected),
+            spread("--reference-uncertainty", reference_uncertainty) or 0.0,
+            spread("--reflected-uncertainty", reflected_uncertainty) or 0.0,
             spread("--camera-uncertainty", camera_uncertainty),
             drift,
         )
-        for text in (truths if len(truths) > 1 else truths * len(images))
+        for text in (references if len(references) > 1 else references * len(images))
     ]
 
 
@@ -167,7 +167,7 @@ def _print_tables(
     from chipglow.laboratory.emissivity.emissivity import BUDGET
 
     for of in rows:
-        console.print(f"\nObject at {of[0].heating.truth - 273.15:.6g} °C")
+        console.print(f"\nObject at {of[0].heating.reference - 273.15:.6g} °C")
         result = Table("region", "pixels", "mean", "sd of pixels", "u", "U 95 %", "k", box=None)
         budget = Table(
             "parts of u", *BUDGET, box=None,
@@ -211,13 +211,13 @@ def _spread(value: Any) -> str:
 
 def _assumptions(maps: "list[EmissivityMap]") -> "Iterator[str]":
     heating = maps[0].heating
-    if not heating.truth_uncertainty:
-        yield "the true temperature is exact (--truth-uncertainty)."
-    if not heating.environment_uncertainty:
+    if not heating.reference_uncertainty:
+        yield "the true temperature is exact (--reference-uncertainty)."
+    if not heating.reflected_uncertainty:
         yield (
-            f"the object reflects just {heating.environment - 273.15:.4g} degC; reflected apparent "
+            f"the object reflects just {heating.reflected - 273.15:.4g} degC; reflected apparent "
             f"temperature 100 K higher would make {_of_reflected(maps[0]):+.2g} of the emissivity "
-            "(--environment, --environment-uncertainty)."
+            "(--reflected, --reflected-uncertainty)."
         )
     if heating.drift is None and any(one.recordings == 1 for one in maps):
         yield (
@@ -243,15 +243,15 @@ def _of_reflected(one: "EmissivityMap") -> float:
     import numpy as np
 
     heating = one.heating
-    hotter = min(heating.environment + 100.0, (heating.environment + heating.truth) / 2)
-    other = replace(one, heating=replace(heating, environment=hotter, environment_uncertainty=0.0,
-                                         truth_uncertainty=0.0))  # fmt: skip
+    hotter = min(heating.reflected + 100.0, (heating.reflected + heating.reference) / 2)
+    other = replace(one, heating=replace(heating, reflected=hotter, reflected_uncertainty=0.0,
+                                         reference_uncertainty=0.0))  # fmt: skip
     return float(np.nanmean(other.emissivity) - np.nanmean(one.emissivity))
 
 
 def _doubts(rows: "list[list[RegionEmissivity]]") -> "Iterator[str]":
     for of in rows:
-        at = f" (object at {of[0].heating.truth - 273.15:.6g} °C)" if len(rows) > 1 else ""
+        at = f" (object at {of[0].heating.reference - 273.15:.6g} °C)" if len(rows) > 1 else ""
         for warning in (warning for row in of for warning in row.estimate.warnings):
             yield f"{warning.removesuffix('.')}{at}."
 
@@ -261,7 +261,7 @@ def _print_study(console: "Console", rows: "list[list[RegionEmissivity]]") -> No
 
     text = surface_text(rows[0])
     if text:
-        at = f" at {rows[0][0].heating.truth - 273.15:.6g} °C" if len(rows) > 1 else ""
+        at = f" at {rows[0][0].heating.reference - 273.15:.6g} °C" if len(rows) > 1 else ""
         console.print(f"\nFor a study{at}:\n\n{text}", soft_wrap=True)
 
 

@@ -103,4 +103,4 @@ def _print(found: "KnifeEdge") -> None:
     for sentence in sentences(found):
         console.print(sentence, soft_wrap=True)
     say_assumed(found.assumptions)
-    say_doubtful(found.doubts)
+    say_doubtful(found.warnings)

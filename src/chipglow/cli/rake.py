@@ -51,9 +51,9 @@ def rake(
 
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.cli.pictures import write_picture
-    from chipglow.cli.tools import chosen_tool
     from chipglow.laboratory.chip import (
         ToolUncertainty,
+        chosen_tool,
         rake_grid,
         write_rake_grid,
     )
@@ -75,7 +75,7 @@ def rake(
         console.print(sentence)
     say_of_measurements(measured)
     say_assumed(chosen.assumptions)
-    say_doubtful((*chosen.doubts, *_doubts(grid)))
+    say_doubtful((*chosen.warnings, *_doubts(grid)))
     if out is not None:
         write_rake_grid(grid, out)
         print(out)
@@ -150,7 +150,7 @@ def _left_out(measurement: "Measurement", grid: "RakeGrid") -> "Iterator[str]":
     if (seen == 0).any():
         yield (
             f"{int((seen == 0).sum())} of {seen.size} squares are left out (–): a pixel of theirs "
-            "is under the camera's floor, saturated or dead, or outside the image."
+            "is under the camera's lower range limit, saturated or dead, or outside the image."
         )
     if measurement.calibration_uncertainty is not None:
         yield (
@@ -164,5 +164,5 @@ def _doubts(grid: "RakeGrid") -> "Iterator[str]":
     if partly:
         yield (
             f"{partly} squares are usable in some of the {frames} frames only; their means are of "
-            "those frames, which are the hotter ones where the floor is the reason."
+            "those frames, which are the hotter ones where the lower range limit is the reason."
         )

@@ -149,7 +149,7 @@ def register(
     _say(console, found, measured)
     say_of_measurements(measured)
     say_assumed(f"{visible}: {sentence}" for sentence in seen.assumptions)
-    say_doubtful(f"{visible}: {sentence}" for sentence in seen.doubts)
+    say_doubtful(f"{visible}: {sentence}" for sentence in seen.warnings)
     if align is not None and region is not None:
         _align(console, found, measured, seen, region, pairs)
     if out is not None:
@@ -211,11 +211,11 @@ def _by_points(console: "Console", given: "Points", model: ModelName) -> "Regist
     _print_points(console, fit, given)
     if fit.scatter >= _BEST_PICKED:
         return fit.registration
-    doubt = (
+    warning = (
         f"the points agree to {fit.scatter:.1g} visible pixels, better than anyone picks them: "
         "they may be computed from each other, and the uncertainty that follows is too small"
     )
-    return replace(fit.registration, doubts=(*fit.registration.doubts, doubt))
+    return replace(fit.registration, warnings=(*fit.registration.warnings, warning))
 
 
 def _by_images(
@@ -281,7 +281,7 @@ def _print_images(console: "Console", fit: "ImageFit") -> None:
     from chipglow.cli.assumed import say_assumed
 
     console.print(
-        f"Mutual information: {fit.information:.3f} bits a sensor; score of the placement "
+        f"Mutual information: {fit.information:.3f} bits a pixel; score of the placement "
         f"{fit.placement:.3g}, of {fit.by_chance.size} unrelated images at most "
         f"{fit.by_chance.max():.3g}."
     )
@@ -314,7 +314,7 @@ def _say(console: "Console", found: "Registration", measured: "Measurement") -> 
         f"({typical / raster.spacing:.2g} infrared pixels) in the median, {1e6 * worst:.2g} um "
         "at most."
     )
-    say_doubtful(f"{doubt}." for doubt in found.doubts)
+    say_doubtful(f"{warning}." for warning in found.warnings)
 
 
 def _align(
@@ -346,7 +346,7 @@ def _align(
         f"Visible clock = infrared clock + {1e6 * alignment.offset:.2f} us, standard uncertainty "
         f"{1e6 * unsure:.2g} us, correlation {alignment.correlation:.3f}."
     )
-    say_doubtful(f"{doubt}." for doubt in alignment.doubts)
+    say_doubtful(f"{warning}." for warning in alignment.warnings)
     within = simultaneous_frames(alignment, measured.times, integration, seen.times, exposure)
     empty = sum(1 for numbers in within if numbers.size == 0)
     if empty:

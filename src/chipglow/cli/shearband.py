@@ -66,9 +66,9 @@ def shearband(
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
     from chipglow.cli.pictures import write_picture
     from chipglow.cli.times import frame_at
-    from chipglow.cli.tools import chosen_tool
     from chipglow.laboratory.chip import (
         band_profile,
+        chosen_tool,
         read_curve,
         write_band_profile,
     )
@@ -96,7 +96,7 @@ def shearband(
         console.print(sentence)
     say_of_measurements(measured)
     say_assumed((*chosen.assumptions, *profile.assumptions))
-    say_doubtful((*chosen.doubts, *profile.doubts))
+    say_doubtful((*chosen.warnings, *profile.warnings))
     if measured.calibration_uncertainty is None:
         say_doubtful(
             [

@@ -20,13 +20,13 @@ from chipglow.laboratory.measurement import (
 from chipglow.laboratory.measurement.figure import draw_measurement
 
 _FLAG_NAMES: Final = {
-    Flag.BELOW_FLOOR: "below the floor or the calibration",
+    Flag.UNDER_RANGE: "below the lower range limit or the calibration",
     Flag.SATURATED: "saturated or above the calibration",
     Flag.DEAD: "dead",
     Flag.REPLACED: "replaced by neighbours",
 }
 _SAID_APART: Final = ("assumed", "doubtful", "band_lower", "band_upper", "pitch", "tool_")
-_IN_FACTS: Final = ("integration_time", "floor")
+_IN_FACTS: Final = ("integration_time", "lower_limit")
 
 
 def show_measurement(path: Path, at: str | None, plot: Path | None) -> None:
@@ -85,8 +85,8 @@ def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tu
     yield from where_and_when("pixels", measurement.raster, measurement.times)
     if "integration_time" in data.attrs:
         yield "integration time", microseconds(float(data.attrs["integration_time"]))
-    if "floor" in data.attrs:
-        yield "floor", f"{float(data.attrs['floor']) - 273.15:.4g} °C"
+    if "lower_limit" in data.attrs:
+        yield "lower_limit", f"{float(data.attrs['lower_limit']) - 273.15:.4g} °C"
     if {"band_lower", "band_upper"} <= set(data.attrs):
         band = measurement.band
         shape = "" if band.response is None else ", with a response curve"

@@ -54,7 +54,7 @@ def temperature(
             "emissivity and here.",
         ),
     ] = None,
-    environment: Annotated[
+    reflected: Annotated[
         str | None,
         typer.Option(
             metavar="TEMPERATURE",
@@ -62,7 +62,7 @@ def temperature(
             "which the emissivity was determined, with the same error, or 293 K.",
         ),
     ] = None,
-    environment_uncertainty: Annotated[
+    reflected_uncertainty: Annotated[
         str | None,
         typer.Option(metavar="KELVINS", help="Its standard uncertainty, such as '2 K'."),
     ] = None,
@@ -90,7 +90,7 @@ def temperature(
     from chipglow.scene import areas
 
     named = load_regions(regions)
-    room = _room(environment, environment_uncertainty)
+    room = _room(reflected, reflected_uncertainty)
     known = None if calibration is None else load_calibration(calibration)
     measurements = [load_measurement(image, settings or ()) for image in images]
     found = areas(named, measurements[0].raster)
@@ -132,17 +132,17 @@ def _emissivities(text: str, spread: float | None, names: Sequence[str]) -> "Emi
     return dict.fromkeys(names, KnownEmissivity(number, spread or 0.0))
 
 
-def _room(environment: str | None, spread: str | None) -> "ReflectedTemperature | None":
+def _room(reflected: str | None, spread: str | None) -> "ReflectedTemperature | None":
     """What the object reflects, if that is said."""
     from chipglow.laboratory.emissivity import ReflectedTemperature
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import TEMPERATURE, TEMPERATURE_DIFFERENCE
 
-    if environment is None and spread is None:
+    if reflected is None and spread is None:
         return None
     return ReflectedTemperature(
-        parse("--environment", TEMPERATURE, environment or "293 K"),
-        parse("--environment-uncertainty", TEMPERATURE_DIFFERENCE, spread or "0 K"),
+        parse("--reflected", TEMPERATURE, reflected or "293 K"),
+        parse("--reflected-uncertainty", TEMPERATURE_DIFFERENCE, spread or "0 K"),
     )
 
 
@@ -156,10 +156,11 @@ def _far_from_the_heating(
         known = emissivities[row.name]
         if isinstance(known, KnownEmissivity):
             continue
-        difference = abs(float(row.estimate.values) - known.heating.truth)
+        difference = abs(float(row.estimate.values) - known.heating.reference)
         if difference > FAR:
             yield (
-                f"{row.name}: is {difference:.0f} K from the {known.heating.truth - 273.15:.0f} °C "
+                f"{row.name}: is {difference:.0f} K from the "
+                f"{known.heating.reference - 273.15:.0f} °C "
                 "at which its emissivity was determined; what the temperature changes in the "
                 "emissivity is not in u."
             )
@@ -210,13 +211,13 @@ def _assumptions(
     from chipglow.laboratory.emissivity import KnownEmissivity
 
     known = any(isinstance(one, KnownEmissivity) for one in emissivities.values())
-    yield "every region is of even temperature and emissivity."
+    yield "every region is of uniform temperature and emissivity."
     if not known:
         yield "the emissivity is the same at all temperatures."
     if known and not any(row.estimate.contribution("emissivity") for row in rows):
         yield "the emissivity is exact (--emissivity-uncertainty)."
     if known and room is None:
-        yield "the object reflects 293 K exactly (--environment, --environment-uncertainty)."
+        yield "the object reflects 293 K exactly (--reflected, --reflected-uncertainty)."
     if not known and room is None:
         yield "the object reflects what it did when its emissivity was determined."
     if not any(row.estimate.contribution("calibration") for row in rows):

@@ -22,11 +22,11 @@ class CuttingConditions(Part):
     feed: Annotated[
         float, Parameter("Feed: thickness of the uncut chip.", CUT_LENGTH, over=0.0)
     ] = 0.3e-3
-    length_of_cut: Annotated[
+    cutting_length: Annotated[
         float,
         Parameter(
-            "Length of cut, from the first contact. The paper's window ends at 1.958 mm; segments\n"
-            "after it make the scatter of the headlines known.",
+            "Cutting length, from the first contact. The paper's window ends at 1.958 mm;\n"
+            "segments after it make the scatter of the headlines known.",
             CUT_LENGTH,
             over=0.0,
         ),
@@ -55,7 +55,7 @@ class Friction(Part):
     """
 
     coefficient: Annotated[float, Parameter("Coulomb's coefficient.", least=0.0, most=2.0)] = 0.5
-    shear_fraction: Annotated[
+    friction_factor: Annotated[
         float,
         Parameter(
             "Limit of the friction stress, as a share of the chip's shear flow stress.",
@@ -122,10 +122,10 @@ class OutputWindow(Part):
     """
 
     start: Annotated[
-        float, Parameter("Length of cut at the first frame, under end.", CUT_LENGTH, over=0.0)
+        float, Parameter("Cutting length at the first frame, under end.", CUT_LENGTH, over=0.0)
     ] = 1.579e-3
     end: Annotated[
-        float, Parameter("Length of cut at the last frame.", CUT_LENGTH, over=0.0, under=1.0)
+        float, Parameter("Cutting length at the last frame.", CUT_LENGTH, over=0.0, under=1.0)
     ] = 1.958e-3
     interval: Annotated[
         float,
@@ -138,7 +138,7 @@ class OutputWindow(Part):
         Parameter(
             "Segments after the window of which one exposure is kept, when the shear band is\n"
             "developed, so that the headlines are drawn from several segments; as many as\n"
-            "length_of_cut leaves room for.",
+            "cutting_length leaves room for.",
             least=0,
             most=1000,
         ),

@@ -1,4 +1,4 @@
-"""The energy account of a cut: where the work of the drive went."""
+"""The energy balance of a cut: where the work of the drive went."""
 
 from dataclasses import dataclass, fields
 from typing import Final

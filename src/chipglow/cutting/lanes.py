@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract", "arcp", "nsz"}}
-"""How kernels are compiled: no checks for division by nought, and freedom to fuse and to divide by
+"""How kernels are compiled: no checks for division by zero, and freedom to fuse and to divide by
 multiplying; never the freedom to change the order of sums or to ignore what is not finite."""
 
 INLINE: Final[Any] = {**FAST, "forceinline": True}

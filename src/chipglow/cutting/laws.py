@@ -24,7 +24,7 @@ def homologous(temperature, law):  # type: ignore[no-untyped-def]
     share = (temperature - law.reference_temperature) / (
         law.melting_temperature - law.reference_temperature
     )
-    # A liquid's strength is not nought: 1 % is left, so that points never lose all stiffness.
+    # A liquid's strength is not zero: 1 % is left, so that points never lose all stiffness.
     return min(max(share, 0.0), 0.99)
 
 
@@ -185,7 +185,7 @@ class MarusichOrtiz(FlowStress):
 
     @property
     def melting_temperature(self) -> float:
-        """Temperature in K at which the line meets nought."""
+        """Temperature in K at which the line meets zero."""
         if self.thermal_softening == 0:
             return MELTING_LIMIT
         return min(self.reference_temperature + 1.0 / self.thermal_softening, MELTING_LIMIT)

@@ -42,7 +42,7 @@ BATCH_CELLS = 16
 NODE_VALUES = ADDED
 MASS, MOMENTUM_X, MOMENTUM_Y, IMPULSE_X, IMPULSE_Y, FRICTION_LIMIT = range(6)
 """What the points gather on a node: in kg/m; momentum and impulse of stress and contact in kg/s
-twice; limit of the friction impulse in N s/m. The last two values stay nought."""
+twice; limit of the friction impulse in N s/m. The last two values stay zero."""
 
 VELOCITY_VALUES = SUMMED
 VELOCITY_X, VELOCITY_Y, CHANGE_X, CHANGE_Y = range(VELOCITY_VALUES)
@@ -84,7 +84,7 @@ class Step(NamedTuple):
     reach: float
     area: float
     friction: float
-    shear_fraction: float
+    friction_factor: float
     floor: float
     inflow: float
     ceiling: float
@@ -179,7 +179,7 @@ def _contact(p, stress, tool, step, law, damage):  # type: ignore[no-untyped-def
         return 0.0, 0.0, 0.0
     strength = flow_stress(p.strain, _RATE_OF_SLIDING, p.temperature, law)
     strength = max(stress, strength * weakening(p.damage, damage))
-    sticking = step.shear_fraction * strength / np.sqrt(3.0) * step.area
+    sticking = step.friction_factor * strength / np.sqrt(3.0) * step.area
     coefficient = friction_coefficient(
         step.friction, step.friction_exponent, step.friction_melting, p.temperature
     )

@@ -76,16 +76,16 @@ class Recorder:
         What to record.
     speed : float
         Cutting speed in m/s.
-    length_of_cut : float
+    cutting_length : float
         In m.
     """
 
-    def __init__(self, window: OutputWindow, speed: float, length_of_cut: float) -> None:
+    def __init__(self, window: OutputWindow, speed: float, cutting_length: float) -> None:
         step = speed * window.interval
         self._window = window
         self.first = max(ceil(window.start / step - 1e-9), 1)
         self._last_of_window = floor(window.end / step + 1e-9)
-        end = length_of_cut if window.later_bands else window.end
+        end = cutting_length if window.later_bands else window.end
         self.last = floor(end / step + 1e-9)
         self._frames = max(1, round(window.band_duration / window.interval))
         self._valleys = Valleys(window.interval)

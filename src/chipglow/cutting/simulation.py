@@ -104,7 +104,7 @@ class CuttingSimulation:
     Parameters
     ----------
     conditions : CuttingConditions
-        Speed, feed, length of cut.
+        Speed, feed, cutting length.
     tool : Tool
         Outline of the tool.
     workpiece : WorkpieceMaterial
@@ -214,16 +214,16 @@ class CuttingSimulation:
         side = numerics.cell / numerics.points_per_side
         points = (numerics.upstream + numerics.downstream) * (numerics.depth + conditions.feed)
         step = numerics.courant * numerics.cell / (_sound(self) + conditions.speed)
-        return points / side**2 * conditions.length_of_cut / conditions.speed / step
+        return points / side**2 * conditions.cutting_length / conditions.speed / step
 
     def _recorder(self, window: OutputWindow) -> Recorder:
-        return Recorder(window, self.conditions.speed, self.conditions.length_of_cut)
+        return Recorder(window, self.conditions.speed, self.conditions.cutting_length)
 
     def _check_window(self, window: OutputWindow) -> None:
-        if window.end > self.conditions.length_of_cut * (1 + 1e-9):
+        if window.end > self.conditions.cutting_length * (1 + 1e-9):
             raise ValueError(
-                f"window end: {window.end * 1e3:g} mm is beyond the length of cut of "
-                f"{self.conditions.length_of_cut * 1e3:g} mm"
+                f"window end: {window.end * 1e3:g} mm is beyond the cutting length of "
+                f"{self.conditions.cutting_length * 1e3:g} mm"
             )
         recorder = self._recorder(window)
         if recorder.last < recorder.first:
@@ -284,7 +284,7 @@ class _State:
             reach=spacing / 2,
             area=spacing,
             friction=simulation.friction.coefficient,
-            shear_fraction=simulation.friction.shear_fraction,
+            friction_factor=simulation.friction.friction_factor,
             floor=-numerics.depth,
             inflow=-numerics.upstream,
             ceiling=conditions.feed + 2 * cell,
@@ -336,7 +336,7 @@ class _State:
         heights = np.linspace(0.0, conditions.feed, 64)
         self.face = _touching(self.tool, heights)
         self.columns = 0
-        travel = conditions.length_of_cut + 4 * numerics.cell
+        travel = conditions.cutting_length + 4 * numerics.cell
         capacity = int((self.face - self.entry + travel) / self.spacing + 4) * self.rows.size
         self.points = np.zeros(capacity, POINT)
         self.spare = np.zeros(capacity, POINT)

@@ -36,7 +36,7 @@ class _Vectors:
         self.zero = ir.Constant(self.type, [0.0] * length)
 
     def of(self, values: list[Any]) -> Any:
-        """Vector of some values; the rest is nought."""
+        """Vector of some values; the rest is zero."""
         vector = self.zero
         for lane, value in enumerate(values):
             vector = self.builder.insert_element(vector, value, _LANE(lane))
@@ -133,7 +133,7 @@ def add_to_nodes(_context, nodes, i, j, wx, wy, dx, dy, level, by_x, by_y):  # t
     """Add w (level + dx by_x + dy by_y) to the values of nodes; for kernels only.
 
     Arguments as for `sum_nodes`, with `nodes` (columns, rows, `ADDED`); `level`, `by_x` and `by_y`
-    are tuples of up to `ADDED` for the first values of a node, which get nought beyond.
+    are tuples of up to `ADDED` for the first values of a node, which get zero beyond.
     """
     _check(nodes)
 

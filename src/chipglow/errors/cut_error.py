@@ -74,7 +74,7 @@ class Plan:
         Reach of the analysis lines to either side and distance between their points in m.
     touching : float
         Distance from the rake face in m within which chip counts as touching it; by default half
-        the paper's sensor.
+        the paper's pixel.
 
     Raises
     ------
@@ -131,7 +131,7 @@ class SurfaceResult:
         What to know of the image of the developed instant, a sentence each.
     curves : tuple of ndarray
         Measured radiance temperature along the ridge of every instant in K, whether under the
-        camera's floor or not; empty for instants without a band.
+        camera's lower range limit or not; empty for instants without a band.
     """
 
     measurement: Measurement
@@ -149,7 +149,7 @@ class SurfaceResult:
 class CuttingForces:
     """Forces per width of cut in N/m over time in s, each of shape (n,), and their segments.
 
-    `unaccounted` is the share of the drive's work that the cutting simulation's energy account does
+    `unaccounted` is the share of the drive's work that the cutting simulation's energy balance does
     not find again in the end; NaN where the scene has no account.
     """
 
@@ -190,7 +190,7 @@ class StudyResult:
     draws : Draws
         The headline errors over segments, textures and positions of the pixels.
     sensitivity : tuple of Sensitivity
-        For either order of blur and sensors.
+        For either order of blur and pixels.
     heated : tuple of HeatedObject
         Heated chips and tool, and the emissivity that their images give back.
     forces : CuttingForces or None
@@ -417,7 +417,7 @@ def _measure(
             errors=errors,
             rake=site.rake_errors(errors),
             band=site.band_errors(errors),
-            warnings=tuple(camera.develop(exposure).warnings),
+            warnings=tuple(camera.form_measurement(exposure).warnings),
             curves=_curves(camera.band, measurement, instants),
         )
     return results
@@ -510,7 +510,7 @@ def _forces(scene: Scene) -> CuttingForces | None:
 
 
 def _unaccounted(scene: Scene) -> float:
-    """Share of the drive's work that the energy account does not find again, at the end."""
+    """Share of the drive's work that the energy balance does not find again, at the end."""
     if "drive_work" not in scene.data:
         return nan
     account = {name: np.asarray(scene.data[name].values, dtype=np.float64) for name in ENERGY_UNITS}

@@ -16,8 +16,8 @@ ReferenceKind: TypeAlias = Literal["maximum", "mean", "centre", "true"]
 """What the measured radiance temperature is compared with.
 
 ``maximum`` (the paper's): the greatest radiance temperature, emissivity included, of any scene
-sample in the sensor's square during the exposure; ``mean``: that of the mean radiance over square
-and exposure; ``centre``: that of the sample under the sensor's centre in the middle of the
+sample in the pixel's square during the exposure; ``mean``: that of the mean radiance over square
+and exposure; ``centre``: that of the sample under the pixel's centre in the middle of the
 exposure; ``true``: the greatest true temperature in the square during the exposure.
 """
 
@@ -31,12 +31,12 @@ neighbours' samples. A single hot one would be the reference of the whole pixel.
 
 @dataclass(frozen=True)
 class ErrorImages:
-    """Measurement error of every sensor in one exposure, in K of radiance temperature.
+    """Measurement error of every pixel in one exposure, in K of radiance temperature.
 
     Parameters
     ----------
     raster : Raster
-        The sensors' places.
+        The pixels' places.
     reference : ndarray
         What the measured temperature is compared with in K, shape (y, x); NaN where nothing
         radiates.
@@ -45,8 +45,8 @@ class ErrorImages:
     case_2 : ndarray
         Error with all but the point spread function.
     flagged : ndarray of bool
-        Sensors whose measurement (case 1) the camera marks as unusable, such as below its floor.
-        Their errors are given nevertheless: they follow from the radiance.
+        Pixels whose measurement (case 1) the camera marks as unusable, such as under its
+        range. Their errors are given nevertheless: they follow from the radiance.
     """
 
     raster: Raster
@@ -109,7 +109,7 @@ class Unblurred:
         """Compute it for one exposure."""
         return cls(
             camera,
-            camera.sensors(exposure.raster),
+            camera.pixels(exposure.raster),
             reference_temperature(camera, exposure, reference),
             replace(camera, psf=None).form_image(exposure),
         )
@@ -122,7 +122,7 @@ class Unblurred:
         radiance : ndarray
             Radiance of its pixels, as `Camera.form_image` gives it.
         """
-        band, floor = self.camera.band, self.camera.floor
+        band, lower_limit = self.camera.band, self.camera.lower_limit
         measured = np.asarray(band.temperature(radiance), dtype=np.float64)
         ideal = np.asarray(band.temperature(self.ideal), dtype=np.float64)
         return ErrorImages(
@@ -130,19 +130,19 @@ class Unblurred:
             reference=self.reference,
             case_1=measured - self.reference,
             case_2=ideal - self.reference,
-            flagged=~(measured >= (floor or 0.0)),
+            flagged=~(measured >= (lower_limit or 0.0)),
         )
 
 
 def reference_temperature(
     camera: Camera, exposure: Exposure, kind: ReferenceKind = "maximum"
 ) -> NDArray[np.float64]:
-    """What a sensor without error would say, by the chosen meaning.
+    """What a pixel without error would say, by the chosen meaning.
 
     Parameters
     ----------
     camera : Camera
-        Its band and the places and sensitive squares of its sensors are used.
+        Its band and the places and sensitive squares of its pixels are used.
     exposure : Exposure
         Radiance and temperature of the scene's samples during the exposure.
     kind : ReferenceKind
@@ -158,7 +158,7 @@ def reference_temperature(
     ValueError
         If the meaning is unknown.
     """
-    sensors = camera.sensors(exposure.raster)
+    sensors = camera.pixels(exposure.raster)
     if kind == "maximum":
         return _temperature(camera, _maximum(exposure.peak_radiance, camera, exposure, sensors))
     if kind == "mean":
@@ -175,7 +175,7 @@ def reference_temperature(
 def _maximum(
     values: NDArray[np.floating], camera: Camera, exposure: Exposure, sensors: Raster
 ) -> NDArray[np.float64]:
-    """Greatest value of the samples in every sensor's sensitive square; NaN for none."""
+    """Greatest value of the samples in every pixel's sensitive square; NaN for none."""
     grid, side = exposure.raster, camera.pitch * sqrt(camera.fill_factor)
     known = np.where(np.isnan(values), -np.inf, values).astype(np.float64)
     columns = _covered(sensors.x - grid.left, side, grid.columns, grid.spacing)
@@ -188,7 +188,7 @@ def _maximum(
 def _covered(
     centres: NDArray[np.float64], side: float, samples: int, spacing: float
 ) -> list[slice]:
-    """Samples under each sensor along a line; slivers under `LEAST_COVERED` do not count."""
+    """Samples under each pixel along a line; slivers under `LEAST_COVERED` do not count."""
     least = LEAST_COVERED * min(spacing, side)
     covered = overlap_lengths(centres - side / 2, side, samples, spacing) > least
     first = covered.argmax(axis=1)

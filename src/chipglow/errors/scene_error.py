@@ -219,7 +219,7 @@ def scene_errors(
     frame = scene.frame(frames[shown])
     places = _places(scene, frame, plan)
     for place in plan.places:
-        place.check_within(camera.sensors(scene.raster))
+        place.check_within(camera.pixels(scene.raster))
     collected = _collect(scene, fields, camera, plan, starts, shown, places, tell)
     results = {
         name: one.finish(textures[0], scene, frame, camera, starts, places)
@@ -312,7 +312,7 @@ class _Collected:
                 )
                 for name, rows in self.profiles.items()
             ),
-            warnings=tuple(camera.develop(exposure).warnings),
+            warnings=tuple(camera.form_measurement(exposure).warnings),
         )
 
     def _distributions(self) -> list[PlaceErrors]:

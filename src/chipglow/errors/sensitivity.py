@@ -12,9 +12,9 @@ from chipglow.errors.draws import BAND_READINGS, RAKE_READINGS, Site, pixel_phas
 from chipglow.errors.error_images import ErrorImages, Unblurred
 from chipglow.errors.local_error import LocalError
 
-PsfOrder: TypeAlias = Literal["sensor", "optics"]
-PSF_ORDERS: Final[tuple[PsfOrder, ...]] = ("sensor", "optics")
-"""Where the point spread function acts: on the sensors' grid as in the paper, or before them."""
+PsfOrder: TypeAlias = Literal["detector", "optics"]
+PSF_ORDERS: Final[tuple[PsfOrder, ...]] = ("detector", "optics")
+"""Where the point spread function acts: on the pixels' grid as in the paper, or before them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ def sensitivity(
     for i, site in enumerate(sites):
         places = [_Place.of(one, site) for one in pixel_phases(camera, phases)]
         for psf in (GaussianPSF(width) for width in widths):
-            found["sensor"].append([place.blurred_on_pixels(psf) for place in places])
+            found["detector"].append([place.blurred_on_pixels(psf) for place in places])
             rake, band = _spread(site.rake_exposure, psf), _spread(site.band_exposure, psf)
             found["optics"].append([place.of_exposures(rake, band) for place in places])
         progress((i + 1) / len(sites))
@@ -99,7 +99,7 @@ class _Place:
 
     def blurred_on_pixels(self, psf: GaussianPSF) -> dict[str, LocalError]:
         """Readings of a camera whose point spread function acts from pixel to pixel."""
-        camera = replace(self.rake.camera, psf=psf, psf_order="sensor")
+        camera = replace(self.rake.camera, psf=psf, psf_order="detector")
         return self._readings(
             self.rake.errors(camera.form_image(self.site.rake_exposure)),
             self.band.errors(camera.form_image(self.site.band_exposure)),

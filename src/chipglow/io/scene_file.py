@@ -225,7 +225,7 @@ class SceneWriter:
         thrust: ArrayLike,
         energies: Mapping[str, ArrayLike] | None = None,
     ) -> None:
-        """Write the force history, once, and the energy account with it.
+        """Write the force history, once, and the energy balance with it.
 
         Parameters
         ----------

@@ -14,7 +14,7 @@ def read_tool_outline(path: str | os.PathLike[str]) -> ToolOutline:
     ----------
     path : path-like
         First line ``x_um,y_um``, then a point a line in um, separated by a comma: from the rake
-        face round the edge to the clearance face, x with the workpiece's motion, y upward. Where
+        face round the edge to the flank face, x with the workpiece's motion, y upward. Where
         the origin is does not matter: see `ToolOutline.placed`.
 
     Raises

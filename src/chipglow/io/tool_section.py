@@ -41,7 +41,7 @@ class ToolSection(Settings[Tool]):
     outline: Annotated[FileBeside | None, OR_NONE] = described(
         "none",
         "File of an outline in the place of all these: its first line x_um,y_um, then a point a\n"
-        "line, from the rake face round the edge to the clearance face.",
+        "line, from the rake face round the edge to the flank face.",
         "none, or a file such as edge.csv",
     )
     material: str = described("carbide", "Material of the tool.", ", ".join(material_names("tool")))

@@ -69,7 +69,7 @@ class Band:
             raise ValueError("band: response must be finite, 0 or more, and not 0 everywhere")
 
     def radiance(self, temperature: ArrayLike) -> NDArray[np.floating]:
-        """In-band radiance of a black body.
+        """In-band radiance of a blackbody.
 
         Parameters
         ----------
@@ -91,7 +91,7 @@ class Band:
         return result
 
     def temperature(self, radiance: ArrayLike) -> NDArray[np.floating]:
-        """Radiance temperature: that of the black body which gives this in-band radiance.
+        """Radiance temperature: that of the blackbody which gives this in-band radiance.
 
         Parameters
         ----------

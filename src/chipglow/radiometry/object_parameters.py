@@ -21,7 +21,7 @@ class ObjectParameters:
         Emissivity ε of the object, over 0 to 1.
     reflected : float
         Temperature of the surroundings that the object reflects in K.
-    transmission : float
+    transmittance : float
         Transmission τ of atmosphere and window, over 0 to 1.
     atmosphere : float
         Temperature of atmosphere and window in K.
@@ -34,11 +34,11 @@ class ObjectParameters:
 
     emissivity: float = 1.0
     reflected: float = 293.15
-    transmission: float = 1.0
+    transmittance: float = 1.0
     atmosphere: float = 293.15
 
     def __post_init__(self) -> None:
-        for name in ("emissivity", "transmission"):
+        for name in ("emissivity", "transmittance"):
             value = getattr(self, name)
             if not 0 < value <= 1:
                 raise ValueError(f"object parameters: {name} is {value!r}, expected over 0 to 1")
@@ -65,7 +65,7 @@ class ObjectParameters:
         reflected, atmosphere = band.radiance([self.reflected, self.atmosphere])
         left = self.emissivity * band.radiance(np.asarray(temperature, np.float64))
         left += (1 - self.emissivity) * reflected
-        return np.asarray(self.transmission * left + (1 - self.transmission) * atmosphere)
+        return np.asarray(self.transmittance * left + (1 - self.transmittance) * atmosphere)
 
     def temperature(self, radiance: ArrayLike, band: Band) -> NDArray[np.float64]:
         """Temperature that the camera shows for a received radiance: the inverse.
@@ -83,6 +83,6 @@ class ObjectParameters:
             Temperature in K, of the same shape; NaN where the surroundings alone give more.
         """
         reflected, atmosphere = band.radiance([self.reflected, self.atmosphere])
-        left = np.asarray(radiance, np.float64) - (1 - self.transmission) * atmosphere
-        left = left / self.transmission - (1 - self.emissivity) * reflected
+        left = np.asarray(radiance, np.float64) - (1 - self.transmittance) * atmosphere
+        left = left / self.transmittance - (1 - self.emissivity) * reflected
         return np.asarray(band.temperature(left / self.emissivity), np.float64)

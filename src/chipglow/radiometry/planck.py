@@ -1,4 +1,4 @@
-"""Planck's law: spectral radiance of a black body."""
+"""Planck's law: spectral radiance of a blackbody."""
 
 from typing import Final
 
@@ -15,7 +15,7 @@ SECOND_RADIATION_CONSTANT: Final = 1.438776877503933e-2
 def spectral_radiance(
     wavelength: NDArray[np.float64], temperature: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Spectral radiance of a black body.
+    """Spectral radiance of a blackbody.
 
     Parameters
     ----------

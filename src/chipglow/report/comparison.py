@@ -287,7 +287,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
         ),
         _own(
             "energy_unaccounted_percent",
-            "Work that the energy account does not find",
+            "Work that the energy balance does not find",
             "%",
             result.forces.unaccounted * 100,
             1,
@@ -305,7 +305,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
         ),
         _own(
             "inertia_force_share_percent",
-            "Momentum flow of the scaled mass over the cutting force",
+            "Momentum flux of the scaled mass over the cutting force",
             "%",
             inert.force_share * 100,
             2,

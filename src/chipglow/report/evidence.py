@@ -13,7 +13,7 @@ from chipglow.laboratory.chip import Segmentation
 from chipglow.report.paper import PAPER
 
 ORDER_TEXT: Final = {
-    "sensor": "from pixel to pixel",
+    "detector": "from pixel to pixel",
     "optics": "before the pixels integrate",
 }
 
@@ -290,7 +290,7 @@ def _wings_text(result: StudyResult, name: str) -> str:
 
 
 def _same_order(result: StudyResult) -> Sensitivity:
-    """The sensitivity for the camera's own order of PSF and sensors."""
+    """The sensitivity for the camera's own order of PSF and pixels."""
     order = result.camera.psf_order
     return next(series for series in result.sensitivity if series.psf_order == order)
 

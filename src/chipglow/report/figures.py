@@ -27,7 +27,7 @@ from chipglow.report.paper import PAPER
 from chipglow.scene import Material
 
 _ORDER_STYLE: Final = {
-    "sensor": (BLUE, "Gaussian, pixel to pixel"),
+    "detector": (BLUE, "Gaussian, pixel to pixel"),
     "optics": (VERMILLION, "Gaussian, before the pixels"),
 }
 
@@ -98,11 +98,11 @@ def measurement(result: StudyResult) -> Figure:
     surface = result.surfaces[name]
     measured = surface.measurement.radiance_temperature()[result.developed] - KELVIN
     truth = surface.scene_temperature - KELVIN
-    floor = (result.camera.floor or KELVIN) - KELVIN
+    lower_limit = (result.camera.lower_limit or KELVIN) - KELVIN
     top = drawing.round_limit(np.asarray(truth, np.float64), 99.9, 50.0)
     figure = drawing.image_figure(result.raster, 2.8, rows=1)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-    shown = (max(floor - 50.0, 0.0), max(top, floor + 50.0))
+    shown = (max(lower_limit - 50.0, 0.0), max(top, lower_limit + 50.0))
     drawing.show_image(left, truth, result.raster, result.tool, drawing.HEAT, shown)
     picture = drawing.show_image(
         right, measured, surface.measurement.raster, result.tool, drawing.HEAT, shown
@@ -392,8 +392,8 @@ def _instant_label(result: StudyResult, index: int, first: float) -> str:
 
 
 def _draw_floor(axes: Axes, result: StudyResult) -> None:
-    if result.camera.floor is not None:
-        axes.axhline(result.camera.floor - KELVIN, color=GREY, linestyle="--", linewidth=1.0)
+    if result.camera.lower_limit is not None:
+        axes.axhline(result.camera.lower_limit - KELVIN, color=GREY, linestyle="--", linewidth=1.0)
 
 
 def _draw_analysis_lines(axes: Axes, result: StudyResult) -> None:
@@ -484,17 +484,17 @@ def _fields_caption(result: StudyResult) -> str:
 
 
 def _measurement_caption(result: StudyResult) -> str:
-    floor = ""
-    if result.camera.floor is not None:
+    lower_limit = ""
+    if result.camera.lower_limit is not None:
         share = float(np.mean(_surface(result).errors.flagged))
-        floor = (
+        lower_limit = (
             " Grey on the right: under the lower limit of the camera's range, "
-            f"{result.camera.floor - KELVIN:.0f} °C, {100 * share:.0f} % of the pixels."
+            f"{result.camera.lower_limit - KELVIN:.0f} °C, {100 * share:.0f} % of the pixels."
         )
     return beside(
         result,
         "What the simulated camera makes of the scene: radiance temperature of the scene's samples "
-        f"at one moment, and of the pixels over the exposure.{floor}",
+        f"at one moment, and of the pixels over the exposure.{lower_limit}",
         "The paper's figure is the scheme of this calculation; here is its result.",
     )
 

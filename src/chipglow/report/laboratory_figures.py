@@ -26,7 +26,7 @@ def heated_chips(result: StudyResult) -> Figure | None:
     panels = figure.subplots(1, len(chips), squeeze=False)[0]
     for letter, axes, heated in zip("abcdefgh", panels, chips, strict=False):
         _draw_heated(figure, axes, heated)
-        truth = heated.map.heating.truth - KELVIN
+        truth = heated.map.heating.reference - KELVIN
         axes.set_title(f"{letter}) {heated.name}, at {truth:.0f} °C")
     figure.legend(
         *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(_COLOURS)
@@ -47,7 +47,7 @@ def heated_tool(result: StudyResult) -> Figure | None:
     drawing.draw_tool(left, result.tool)
     left.set_xlim(raster.extent[0] * 1e6, raster.extent[1] * 1e6)
     left.set_ylim(raster.extent[2] * 1e6, raster.extent[3] * 1e6)
-    left.set_title(f"a) tool, at {tool.map.heating.truth - KELVIN:.0f} °C")
+    left.set_title(f"a) tool, at {tool.map.heating.reference - KELVIN:.0f} °C")
     inside = result.tool.signed_distance(*np.meshgrid(raster.x, raster.y)) < -3 * raster.spacing
     row = tool.rows[0]
     right.hist(tool.map.emissivity[inside], bins=40, color=BLUE, density=True)
@@ -117,7 +117,7 @@ def dual_spectrum(result: StudyResult) -> Figure:
     rows = len(result.moments)
     figure = drawing.image_figure(result.raster, 2.3, rows=rows)
     grid = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
-    low = (result.camera.floor or KELVIN + 100.0) - KELVIN
+    low = (result.camera.lower_limit or KELVIN + 100.0) - KELVIN
     top = max(drawing.round_limit(images[np.isfinite(images)], 99.9, 50.0), low + 50.0)
     letters = iter("abcdefgh")
     picture = None

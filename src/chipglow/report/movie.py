@@ -111,7 +111,7 @@ class CutPicture:
         ):
             image.set_data(np.ma.masked_where(~shown, values))
         cut = self._speed * frame.time * 1e3
-        self._title.set_text(f"{frame.time * 1e6:.1f} µs    length of cut {cut:.3f} mm")
+        self._title.set_text(f"{frame.time * 1e6:.1f} µs    cutting length {cut:.3f} mm")
         self._canvas.restore_region(self._background)
         for artist in self._moving:
             self._figure.draw_artist(artist)

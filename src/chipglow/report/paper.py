@@ -134,7 +134,7 @@ def table_2(study: Study) -> list[tuple[str, str, str]]:
         ("Cutting speed", "250 m/min", f"{cutting.speed * 60:g} m/min"),
         ("Initial temperature", "20 °C", f"{cutting.initial_temperature - 273.15:g} °C"),
         ("Workpiece height", "2 mm", depth),
-        ("Length of cut", "not legible", f"{cutting.length_of_cut * 1e3:g} mm"),
+        ("Cutting length", "not legible", f"{cutting.cutting_length * 1e3:g} mm"),
         (
             "Window",
             "1.579 mm to 1.958 mm",

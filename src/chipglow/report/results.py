@@ -28,7 +28,7 @@ def results_dataset(result: StudyResult, provenance: Mapping[str, str]) -> xr.Da
     Returns
     -------
     xarray.Dataset
-        Dimensions: ``y``, ``x`` the scene's samples; ``sensor_y``, ``sensor_x`` the sensors;
+        Dimensions: ``y``, ``x`` the scene's samples; ``sensor_y``, ``sensor_x`` the pixels;
         ``instant`` the exposures; ``surface`` the surfaces; ``ridge_point`` along the shear band,
         NaN beyond its end; ``rake_distance`` and ``band_distance`` along the analysis lines;
         ``contact_distance`` up the rake face; ``segment``, ``texture`` and ``pixel_phase`` the

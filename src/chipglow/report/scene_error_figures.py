@@ -74,9 +74,9 @@ def measurement(result: SceneErrors) -> Figure:
     for axes, (name, surface) in zip(rows, surfaces, strict=True):
         truth = surface.scene_temperature - KELVIN
         measured = surface.measurement.radiance_temperature()[result.shown] - KELVIN
-        floor = result.camera.floor
+        lower_limit = result.camera.lower_limit
         low, high = _ends(truth[np.isfinite(truth)], 0.5, 99.9)
-        low = low if floor is None else max(floor - KELVIN - 50.0, low)
+        low = low if lower_limit is None else max(lower_limit - KELVIN - 50.0, low)
         shown = (low, max(high, low + 50.0))
         drawing.show_image(axes[0], truth, result.raster, result.tool, drawing.HEAT, shown)
         pixels = surface.measurement.raster
@@ -254,8 +254,10 @@ def _scene_caption(result: SceneErrors) -> str:
 
 def _measurement_caption(result: SceneErrors) -> str:
     exposure, unit = _time_unit(result.camera.integration_time)
-    floor = result.camera.floor
-    grey = "" if floor is None else f" Grey: under the camera's {floor - KELVIN:.0f} °C."
+    lower_limit = result.camera.lower_limit
+    grey = (
+        "" if lower_limit is None else f" Grey: under the camera's {lower_limit - KELVIN:.0f} °C."
+    )
     return (
         "Radiance temperature of the scene's samples at one moment, and of the pixels over the "
         f"exposure of {result.camera.integration_time * exposure:.3g} {unit}.{grey}"
@@ -263,8 +265,8 @@ def _measurement_caption(result: SceneErrors) -> str:
 
 
 def _errors_caption(result: SceneErrors) -> str:
-    floor = result.camera.floor
-    paler = "" if floor is None else " Paler: under the lower limit of the camera's range."
+    lower_limit = result.camera.lower_limit
+    paler = "" if lower_limit is None else " Paler: under the lower limit of the camera's range."
     return (
         f"{definition_of(result.plan.reference)} On the right the part that the point spread "
         f"function makes. Green: the places.{paler}"

@@ -43,12 +43,12 @@ class PlacedTool(Tool):
 
     @property
     def clearance_angle(self) -> float:
-        """Clearance angle of the straight clearance face in rad."""
+        """Clearance angle of the straight flank face in rad."""
         return self.tool.clearance_angle
 
     @property
     def corners(self) -> NDArray[np.float64]:
-        """Centres of the rounded corners from the rake to the clearance face, in m, (n, 2)."""
+        """Centres of the rounded corners from the rake to the flank face, in m, (n, 2)."""
         return np.asarray(self.tool.corners + self.tip, dtype=np.float64)
 
     @property

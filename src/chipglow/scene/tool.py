@@ -24,7 +24,7 @@ _LARGEST_FORM_FACTOR: Final = 10.0
 
 
 class Tool(ABC):
-    """Cross-section of a tool: a rake face, a clearance face and the edge between them.
+    """Cross-section of a tool: a rake face, a flank face and the edge between them.
 
     The edge's lowest point is on y = 0, the cut surface; the chip is to the left of the rake face.
     The surface is at one distance, `corner_radius`, from the chain of `corners`.
@@ -38,12 +38,12 @@ class Tool(ABC):
     @property
     @abstractmethod
     def clearance_angle(self) -> float:
-        """Clearance angle of the straight clearance face in rad."""
+        """Clearance angle of the straight flank face in rad."""
 
     @property
     @abstractmethod
     def corners(self) -> NDArray[np.float64]:
-        """Centres of the rounded corners from the rake to the clearance face, in m, (n, 2)."""
+        """Centres of the rounded corners from the rake to the flank face, in m, (n, 2)."""
 
     @property
     @abstractmethod
@@ -68,7 +68,7 @@ class Tool(ABC):
 
     @property
     def clearance_direction(self) -> tuple[float, float]:
-        """Unit vector along the clearance face, away from the edge."""
+        """Unit vector along the flank face, away from the edge."""
         return cos(self.clearance_angle), sin(self.clearance_angle)
 
     @property
@@ -115,7 +115,7 @@ class Tool(ABC):
         return np.asarray(distance, dtype=np.float64).reshape(x.shape)
 
     def outline(self, length: float) -> NDArray[np.float64]:
-        """Polyline from the rake face round the edge to the clearance face.
+        """Polyline from the rake face round the edge to the flank face.
 
         Parameters
         ----------
@@ -177,7 +177,7 @@ class Hone(Part):
         float,
         Parameter("Where it begins on the rake face, from the sharp edge.", LENGTH, over=0.0),
     ]
-    clearance: Annotated[float, Parameter("The same on the clearance face.", LENGTH, over=0.0)]
+    clearance: Annotated[float, Parameter("The same on the flank face.", LENGTH, over=0.0)]
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -247,7 +247,7 @@ class ToolGeometry(Tool):
 
     @property
     def corners(self) -> NDArray[np.float64]:
-        """Centres of the rounded corners from the rake to the clearance face, in m, (n, 2)."""
+        """Centres of the rounded corners from the rake to the flank face, in m, (n, 2)."""
         if self.hone:
             return self._honed[0]
         lower = np.array([[self.edge_radius, self.edge_radius]])

@@ -17,7 +17,7 @@ _HONE: Final = ("tool_hone_rake", "tool_hone_clearance")
 def tool_attributes(tool: Tool) -> dict[str, Any]:
     """The tool as attributes of a dataset: angles in rad, lengths in m.
 
-    An outline is one row of numbers, x and y by turns; the tip of a tool that is not at the origin
+    An outline is one row of numbers, x and y in turn; the tip of a tool that is not at the origin
     is x and y.
     """
     if isinstance(tool, PlacedTool):

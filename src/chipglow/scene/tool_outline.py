@@ -19,7 +19,7 @@ _STRAIGHT: Final = 0.2e-6
 _TOUCHING: Final = 1e-10
 _LEVEL: Final = 1e-12
 _ORDER: Final = (
-    "points go from the rake face round the edge to the clearance face, the tool on their left"
+    "points go from the rake face round the edge to the flank face, the tool on their left"
 )
 
 
@@ -46,7 +46,7 @@ class ToolOutline(Tool):
     Parameters
     ----------
     points : tuple of (float, float)
-        x and y in m, from the rake face round the edge to the clearance face, so that the tool is
+        x and y in m, from the rake face round the edge to the flank face, so that the tool is
         on the left of one who walks along; the axes are those of the scene, the lowest point is on
         y = 0. `ToolOutline.placed` moves an outline there.
 
@@ -59,7 +59,7 @@ class ToolOutline(Tool):
     Notes
     -----
     The straight rake face is the longest stretch from the first point on that stays within 0.2 um
-    of the line through its ends; the clearance face is the same from the last point back. They
+    of the line through its ends; the flank face is the same from the last point back. They
     give rake and clearance angle and go on straight beyond the outer points. What is between them
     is the edge. Distances up the rake face count from the lower end of the straight rake face.
     """
@@ -115,7 +115,7 @@ class ToolOutline(Tool):
 
     @cached_property
     def clearance_angle(self) -> float:
-        """Clearance angle of the straight clearance face in rad."""
+        """Clearance angle of the straight flank face in rad."""
         x, y = self.corners[-1] - self.corners[-1 - _straight_end(self.corners[::-1])]
         return float(np.arctan2(y, x))
 

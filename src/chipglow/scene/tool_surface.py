@@ -19,7 +19,7 @@ class ToolSurface(NamedTuple):
     """The tool's surface as kernels take it: see `surface_distance`.
 
     Centre of the edge's arc and its radius (m); normal and direction, away from the edge, of the
-    rake face and of the clearance face; how far the chain's corners stand out from the two lines
+    rake face and of the flank face; how far the chain's corners stand out from the two lines
     through the centre along the faces (m); the chain and the length of its stretches.
     """
 
@@ -51,7 +51,7 @@ def surface_of(
     Parameters
     ----------
     corners : ndarray
-        x and y in m from the rake face round the edge to the clearance face, shape (n, 2). One
+        x and y in m from the rake face round the edge to the flank face, shape (n, 2). One
         corner is the rounded wedge.
     radius : float
         Distance of the surface from the chain in m: the radius of the rounded corners.

@@ -10,7 +10,7 @@ from chipglow.study.schema import Study
 from chipglow.study.surface_section import FeaturesSection
 
 _HOW_FINELY: Final = {
-    "cutting": {"numerics", "window", "field_of_view", "length_of_cut", "surroundings"},
+    "cutting": {"numerics", "window", "field_of_view", "cutting_length", "surroundings"},
     "camera": {"offset_right", "offset_down"},
     "surface": {"kind", "maps", "follow", "restore_deviation"},
 }

@@ -41,7 +41,7 @@ class CameraSection(Settings[Camera]):
         "point a line; it counts within the band.",
         "none, or a file such as response.csv",
     )
-    pitch: Length = described("6 um", "Distance between sensors, as seen on the scene.")
+    pitch: Length = described("6 um", "Distance between pixels, as seen on the scene.")
     detector_pitch: Annotated[Length | None, OR_NONE] = described(
         "none",
         "The same on the detector, of its data sheet, in the place of pitch; with magnification.",
@@ -58,21 +58,21 @@ class CameraSection(Settings[Camera]):
         "the scene.",
         "none, or such as [640, 512]",
     )
-    fill_factor: float = described(1.0, "Share of a sensor's square that takes light.")
-    offset_right: Position = described("0 um", "First sensor's corner from the scene's left edge.")
-    offset_down: Position = described("0 um", "First sensor's corner from the scene's upper edge.")
+    fill_factor: float = described(1.0, "Share of a pixel's square that takes light.")
+    offset_right: Position = described("0 um", "First pixel's corner from the scene's left edge.")
+    offset_down: Position = described("0 um", "First pixel's corner from the scene's upper edge.")
     psf: Annotated[PSFSection | None, OR_NONE] = described(
         {"kind": "annular-aperture"},
         f"Point spread function of the optics, or none. Kinds:\n{PSFS.examples}",
     )
-    psf_order: Literal["optics", "sensor"] = described(
-        "sensor",
-        "sensor (the paper's: on the sensors' values) or optics (on the samples, before the\n"
+    psf_order: Literal["optics", "detector"] = described(
+        "detector",
+        "sensor (the paper's: on the pixels' values) or optics (on the samples, before the\n"
         "sensors integrate).",
     )
     integration_time: Time = described("10 us", "Exposure.")
     frame_rate: Frequency = described("600 Hz", "Frames a second.")
-    floor: Annotated[Temperature | None, OR_NONE] = described(
+    lower_limit: Annotated[Temperature | None, OR_NONE] = described(
         "300 degC", "Radiance temperatures under this are flagged, not returned; or none."
     )
     reflected: Annotated[Temperature | None, OR_NONE] = described(
@@ -85,7 +85,7 @@ class CameraSection(Settings[Camera]):
         return with_pitch(with_preset(data)) if isinstance(data, Mapping) else data
 
     def build(self) -> Camera:
-        """The camera, with as many sensors as see the scene."""
+        """The camera, with as many pixels as see the scene."""
         response = None if self.response is None else read_response(self.response)
         return Camera(
             band=Band(*self.band, response),
@@ -96,12 +96,12 @@ class CameraSection(Settings[Camera]):
             psf_order=self.psf_order,
             integration_time=self.integration_time,
             frame_rate=self.frame_rate,
-            floor=self.floor,
+            lower_limit=self.lower_limit,
             reflected=self.reflected,
         )
 
     def on(self, scene: Raster) -> Camera:
-        """The camera on a scene, with no more sensors than its detector has.
+        """The camera on a scene, with no more pixels than its detector has.
 
         Parameters
         ----------
@@ -111,7 +111,7 @@ class CameraSection(Settings[Camera]):
         camera = self.build()
         if self.array is None:
             return camera
-        seen = camera.sensors(scene)
+        seen = camera.pixels(scene)
         columns, rows = self.array
         return replace(camera, shape=(min(rows, seen.rows), min(columns, seen.columns)))
 

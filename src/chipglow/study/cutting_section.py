@@ -75,10 +75,10 @@ class CuttingSection(Declared[CuttingConditions]):
 
     @model_validator(mode="after")
     def _window_within_cut(self) -> Self:
-        if self.window.end > self.length_of_cut * (1 + 1e-9):
+        if self.window.end > self.cutting_length * (1 + 1e-9):
             raise ValueError(
-                f"window.end: {self.window.end * 1e3:g} mm is beyond length_of_cut, "
-                f"expected up to {self.length_of_cut * 1e3:g} mm"
+                f"window.end: {self.window.end * 1e3:g} mm is beyond cutting_length, "
+                f"expected up to {self.cutting_length * 1e3:g} mm"
             )
         return self
 

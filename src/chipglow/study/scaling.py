@@ -1,4 +1,4 @@
-"""Defaults that follow what a study says: view, window and length of cut, as the feed asks."""
+"""Defaults that follow what a study says: view, window and cutting length, as the feed asks."""
 
 from collections.abc import Mapping
 from math import ceil
@@ -62,7 +62,7 @@ def scaled(study: Mapping[str, Any]) -> dict[str, Any]:
     if ratio != 1.0 or exposure * speed > _END - _START:
         end = _value(window, "end", CUT_LENGTH) or start + travel
         derived["window"] |= {"start": CUT_LENGTH.text(start), "end": CUT_LENGTH.text(end)}
-        derived["length_of_cut"] = CUT_LENGTH.text(max(ratio * _LENGTH, 1.05 * end))
+        derived["cutting_length"] = CUT_LENGTH.text(max(ratio * _LENGTH, 1.05 * end))
     if ratio != 1.0 or slower != 1.0:
         interval = min(ratio * slower * _INTERVAL, exposure / _SUB_FRAMES)
         derived["window"]["interval"] = TIME.text(interval)

@@ -68,7 +68,7 @@ class Study(Section):
 
         How finely it is computed, and how often drawn, does not matter.
         """
-        paper, finely = type(self)(), {"numerics", "window", "field_of_view", "length_of_cut"}
+        paper, finely = type(self)(), {"numerics", "window", "field_of_view", "cutting_length"}
         return (
             self.scene is None
             and self.cutting.model_dump(exclude=finely) == paper.cutting.model_dump(exclude=finely)

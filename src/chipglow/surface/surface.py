@@ -93,7 +93,7 @@ class Surface(SurfaceChoice):
 
 @dataclass(frozen=True)
 class UniformSurface(Surface, EmissivityField):
-    """The same emissivity wherever there is material; a black body by default.
+    """The same emissivity wherever there is material; a blackbody by default.
 
     Raises
     ------

@@ -5,15 +5,15 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Remarks:
-    """Sentences, each without a word such as "Doubtful" before it.
+    """Sentences, each without a word such as "Warning" before it.
 
     Parameters
     ----------
     assumptions : list of str
         What had to be assumed.
-    doubts : list of str
+    warnings : list of str
         Why the result may not be relied on.
     """
 
     assumptions: list[str] = field(default_factory=list)
-    doubts: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)

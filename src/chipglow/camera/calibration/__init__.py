@@ -3,21 +3,31 @@
 from chipglow.camera.calibration.blackbody import Blackbody
 from chipglow.camera.calibration.calibration import (
     Calibration,
+    FactoryCalibration,
     FittedCalibration,
     LinearCalibration,
-    MakersCalibration,
     SakumaHattori,
 )
-from chipglow.camera.calibration.fit import CalibrationFit, fit_linear, fit_sakuma_hattori
+from chipglow.camera.calibration.fit import (
+    MODELS,
+    CalibrationFit,
+    fit_linear,
+    fit_models,
+    fit_sakuma_hattori,
+    preferred,
+)
 
 __all__ = [
+    "MODELS",
     "Blackbody",
     "Calibration",
     "CalibrationFit",
+    "FactoryCalibration",
     "FittedCalibration",
     "LinearCalibration",
-    "MakersCalibration",
     "SakumaHattori",
     "fit_linear",
+    "fit_models",
     "fit_sakuma_hattori",
+    "preferred",
 ]

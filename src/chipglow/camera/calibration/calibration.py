@@ -73,14 +73,14 @@ class Calibration(ABC):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FittedCalibration(Calibration):
-    """A calibration whose parameters were fitted to black bodies.
+    """A calibration whose parameters were fitted to blackbodies.
 
     Parameters
     ----------
     parameters : ndarray
         As `NAMES` says, shape (n,).
     covariance : ndarray
-        Their covariance, shape (n, n): of the fit, and of what the black bodies have in common.
+        Their covariance, shape (n, n): of the fit, and of what the blackbodies have in common.
     **others
         As `Calibration` has them.
 
@@ -101,7 +101,7 @@ class FittedCalibration(Calibration):
         if not (self.lowest >= TABLE_COLDEST and self.highest <= TABLE_HOTTEST):
             raise ValueError(
                 f"calibration: lowest is {self.lowest:g} K and highest {self.highest:g} K, "
-                f"expected the temperatures of black bodies, {TABLE_COLDEST:g} to "
+                f"expected the temperatures of blackbodies, {TABLE_COLDEST:g} to "
                 f"{TABLE_HOTTEST:g} K"
             )
         count = len(self.NAMES)
@@ -117,7 +117,7 @@ class FittedCalibration(Calibration):
 
     @abstractmethod
     def counts(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Counts of a black body of this temperature in K."""
+        """Counts of a blackbody of this temperature in K."""
 
     @abstractmethod
     def slope(self, temperature: ArrayLike) -> NDArray[np.float64]:
@@ -129,7 +129,7 @@ class FittedCalibration(Calibration):
 
     @abstractmethod
     def temperature(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """Temperature in K of the black body that gives these counts; NaN where there is none."""
+        """Temperature in K of the blackbody that gives these counts; NaN where there is none."""
 
     @property
     def rises(self) -> bool:
@@ -193,7 +193,7 @@ class LinearCalibration(FittedCalibration):
         return "straight line over the in-band radiance"
 
     def counts(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Counts of a black body of this temperature in K."""
+        """Counts of a blackbody of this temperature in K."""
         offset, gain = self.parameters
         return np.asarray(offset + gain * self.band.radiance(_floats(temperature)))
 
@@ -207,7 +207,7 @@ class LinearCalibration(FittedCalibration):
         return np.stack([np.ones_like(radiance), radiance])
 
     def temperature(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """Temperature in K of the black body that gives these counts; NaN where there is none."""
+        """Temperature in K of the blackbody that gives these counts; NaN where there is none."""
         return np.asarray(self.band.temperature(self.radiance(counts)), np.float64)
 
     def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
@@ -242,7 +242,7 @@ class SakumaHattori(FittedCalibration):
         return "Planckian form of Sakuma and Hattori"
 
     def counts(self, temperature: ArrayLike) -> NDArray[np.float64]:
-        """Counts of a black body of this temperature in K."""
+        """Counts of a blackbody of this temperature in K."""
         offset, _, _, scale = self.parameters
         return np.asarray(offset + scale * _occupation(self._exponent(temperature)))
 
@@ -257,7 +257,7 @@ class SakumaHattori(FittedCalibration):
         return np.stack([np.ones_like(kelvins), kelvins * stretched, stretched, occupation])
 
     def temperature(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """Temperature in K of the black body that gives these counts; NaN where there is none."""
+        """Temperature in K of the blackbody that gives these counts; NaN where there is none."""
         offset, a, b, scale = self.parameters
         with np.errstate(divide="ignore", invalid="ignore"):
             logarithm = np.log1p(scale / (_floats(counts) - offset))
@@ -278,13 +278,13 @@ class SakumaHattori(FittedCalibration):
 
 @final
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MakersCalibration(Calibration):
+class FactoryCalibration(Calibration):
     """The conversion that a camera's maker stored in the file; its uncertainty is not known.
 
     Parameters
     ----------
     conversion : PlanckConversion
-        From counts to the temperature of a black body.
+        From counts to the temperature of a blackbody.
     **others
         As `Calibration` has them.
     """

@@ -1,6 +1,6 @@
-"""Calibrations fitted to what a camera shows of black bodies."""
+"""Calibrations fitted to what a camera shows of blackbodies."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Generic, TypeVar
 
@@ -125,12 +125,12 @@ def fit_linear(
     range_name: str | None = None,
     blackbody: Blackbody = _IDEAL,
 ) -> CalibrationFit[LinearCalibration]:
-    """Fit counts = offset + gain L(T), L the integral over the band, to black bodies.
+    """Fit counts = offset + gain L(T), L the integral over the band, to blackbodies.
 
     Parameters
     ----------
     temperatures : array_like
-        Temperatures of the black body in K, shape (n,).
+        Temperatures of the blackbody in K, shape (n,).
     counts : array_like
         Counts, shape (n,).
     band : Band
@@ -140,7 +140,7 @@ def fit_linear(
         points; of shape (n,) or one for all. If neither is given, all points weigh the same, and
         the scatter of the residuals tells the uncertainty.
     common_uncertainty : float
-        Standard uncertainty in K of the black body's temperature that all points have in common,
+        Standard uncertainty in K of the blackbody's temperature that all points have in common,
         as of its certificate.
     integration_time : float, optional
         In s.
@@ -185,7 +185,7 @@ def fit_sakuma_hattori(
     range_name: str | None = None,
     blackbody: Blackbody = _IDEAL,
 ) -> CalibrationFit[SakumaHattori]:
-    """Fit counts = offset + C / (exp(c2/(A T + B)) − 1) to black bodies.
+    """Fit counts = offset + C / (exp(c2/(A T + B)) − 1) to blackbodies.
 
     Parameters, weights and errors are those of `fit_linear`. The band is needed to tell the
     radiance of a temperature, and for a first guess of A and B.
@@ -253,7 +253,7 @@ class _Points:
         impossible = kelvins[~((kelvins >= TABLE_COLDEST) & (kelvins <= TABLE_HOTTEST))]
         if impossible.size:
             raise ValueError(
-                f"calibration: a black body is at {impossible[0]:g} K "
+                f"calibration: a blackbody is at {impossible[0]:g} K "
                 f"({impossible[0] - 273.15:g} °C), expected {TABLE_COLDEST:g} to "
                 f"{TABLE_HOTTEST:g} K"
             )
@@ -441,3 +441,44 @@ def _covariance(
     common = [solution @ (slope * error) for error in points.common]
     random = enlargement**2 * solution @ solution.T
     return np.asarray(random + sum(np.outer(moved, moved) for moved in common))
+
+
+MODELS: Final[Mapping[str, Callable[..., CalibrationFit[Any]]]] = {
+    "linear": fit_linear,
+    "sakuma-hattori": fit_sakuma_hattori,
+}
+"""Models of a calibration by name."""
+
+
+def fit_models(
+    temperatures: ArrayLike,
+    counts: ArrayLike,
+    band: Band,
+    models: Sequence[str] = tuple(MODELS),
+    **known: Any,
+) -> dict[str, CalibrationFit[Any]]:
+    """Fit several models to the same points; `preferred` is one of them.
+
+    Parameters
+    ----------
+    temperatures, counts, band
+        As `fit_linear` takes them.
+    models : sequence of str
+        Names of `MODELS`.
+    **known
+        What else is known, as `fit_linear` takes it.
+
+    Raises
+    ------
+    ValueError
+        As `fit_linear`, or if there is no such model.
+    """
+    for name in models:
+        if name not in MODELS:
+            raise ValueError(f"model: {name!r}, expected one of {', '.join(MODELS)}")
+    return {name: MODELS[name](temperatures, counts, band, **known) for name in models}
+
+
+def preferred(fits: Mapping[str, CalibrationFit[Any]]) -> str:
+    """Name of the model with the least information criterion (Akaike's, corrected)."""
+    return min(fits, key=lambda name: fits[name].information_criterion)

@@ -10,17 +10,17 @@ from scipy.ndimage import label
 from chipglow.camera.detector.nonuniformity import mean_frame, response, size_text
 
 LEAST_FRAMES: Final = 8
-"""Frames from which the noise of a sensor can be told."""
+"""Frames from which the noise of a pixel can be told."""
 
 NOISE_LIMIT: Final = 5.0
-"""Multiple of the median standard deviation over time from which on a sensor is noisy."""
+"""Multiple of the median standard deviation over time from which on a pixel is noisy."""
 
 GAIN_LIMITS: Final = (0.5, 1.5)
 """Gains relative to the median gain that are still good."""
 
 LEVEL_LIMIT: Final = 8.0
-"""Multiple of the sensors' spread (1.4826 times the median absolute deviation) by which the mean of
-a good sensor is from the median at most, of one uniform object."""
+"""Multiple of the pixels' spread (1.4826 times the median absolute deviation) by which the mean of
+a good pixel is from the median at most, of one flat-field source."""
 
 LARGEST_CLUSTER: Final = 4
 """Sensors of the largest cluster, neighbours over corner included, that is replaced."""
@@ -39,7 +39,7 @@ class BadPixels:
     noisy : ndarray
         The value changes much more than that of others.
     unresponsive : ndarray
-        The gain is out of limits, or, of one uniform object, the value is far from all others.
+        The gain is out of limits, or, of one flat-field source, the value is far from all others.
     """
 
     stuck: NDArray[np.bool_]
@@ -53,7 +53,7 @@ class BadPixels:
 
 
 def find_bad_pixels(frames: NDArray[Any], hot: NDArray[Any] | None = None) -> BadPixels:
-    """Find sensors that do not answer to light as others do.
+    """Find pixels that do not answer to light as others do.
 
     Noise is judged by `NOISE_LIMIT`, from `LEAST_FRAMES` frames on; of two objects the gain by
     `GAIN_LIMITS`, of one the level by `LEVEL_LIMIT`.
@@ -61,9 +61,9 @@ def find_bad_pixels(frames: NDArray[Any], hot: NDArray[Any] | None = None) -> Ba
     Parameters
     ----------
     frames : ndarray
-        Signal of a uniform object, shape (time, y, x).
+        Signal of a flat-field source, shape (time, y, x).
     hot : ndarray, optional
-        Signal of a brighter uniform object: tells the gain of every sensor.
+        Signal of a brighter flat-field source: tells the gain of every pixel.
 
     Raises
     ------
@@ -102,22 +102,22 @@ def _far_off(level: NDArray[np.float64]) -> NDArray[np.bool_]:
 def replace_bad_pixels(
     signal: NDArray[np.float64], bad: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Put the median of the good neighbours in the place of bad sensors.
+    """Put the median of the good neighbours in the place of bad pixels.
 
     Parameters
     ----------
     signal : ndarray
         Frames, shape (time, y, x).
     bad : ndarray
-        Which sensors are bad, shape (y, x).
+        Which pixels are bad, shape (y, x).
 
     Returns
     -------
     signal : ndarray
-        The frames; NaN where a sensor is bad and not replaced: in clusters of more than
+        The frames; NaN where a pixel is bad and not replaced: in clusters of more than
         `LARGEST_CLUSTER`, and where less than three of the eight neighbours are good.
     replaced : ndarray
-        Which sensors were replaced, shape (y, x).
+        Which pixels were replaced, shape (y, x).
 
     Raises
     ------
@@ -126,7 +126,7 @@ def replace_bad_pixels(
     """
     if bad.shape != signal.shape[1:]:
         raise ValueError(
-            f"bad pixels: are of {size_text(bad.shape)} sensors, the frames of "
+            f"bad pixels: are of {size_text(bad.shape)} pixels, the frames of "
             f"{size_text(signal.shape[1:])}, expected the same"
         )
     result = np.array(signal, np.float64)

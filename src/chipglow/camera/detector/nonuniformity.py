@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class NonUniformity:
-    """What makes every sensor answer like the median sensor: gain × signal + offset.
+    """What makes every pixel answer like the median pixel: gain × signal + offset.
 
     Parameters
     ----------
     gain, offset : ndarray
-        Shape (y, x); NaN where a sensor does not answer to light.
+        Shape (y, x); NaN where a pixel does not answer to light.
 
     Raises
     ------
@@ -34,26 +34,26 @@ class NonUniformity:
 
     @classmethod
     def one_point(cls, frames: NDArray[Any]) -> "NonUniformity":
-        """Offsets from frames of a uniform object.
+        """Offsets from frames of a flat-field source.
 
         Parameters
         ----------
         frames : ndarray
             Signal, shape (time, y, x). Right at the radiance of that object; elsewhere as far as
-            the sensors' gains are equal.
+            the pixels' gains are equal.
         """
         level = mean_frame(frames)
         return cls(np.ones_like(level), float(np.median(level)) - level)
 
     @classmethod
     def two_point(cls, cold: NDArray[Any], hot: NDArray[Any]) -> "NonUniformity":
-        """Gains and offsets from frames of two uniform objects.
+        """Gains and offsets from frames of two flat-field sources.
 
         Parameters
         ----------
         cold, hot : ndarray
             Signal of the darker and of the brighter object, shape (time, y, x). Right at both, and
-            at all other radiances as far as the sensors are linear.
+            at all other radiances as far as the pixels are linear.
 
         Raises
         ------
@@ -67,7 +67,7 @@ class NonUniformity:
         return cls(gain, float(np.median(low)) - gain * low)
 
     def apply(self, signal: NDArray[Any]) -> NDArray[np.float64]:
-        """Corrected signal of frames of shape (time, y, x); NaN where a sensor does not answer.
+        """Corrected signal of frames of shape (time, y, x); NaN where a pixel does not answer.
 
         Raises
         ------
@@ -76,7 +76,7 @@ class NonUniformity:
         """
         if signal.shape[1:] != self.gain.shape:
             raise ValueError(
-                f"non-uniformity: is of {size_text(self.gain.shape)} sensors, the frames of "
+                f"non-uniformity: is of {size_text(self.gain.shape)} pixels, the frames of "
                 f"{size_text(signal.shape[1:])}, expected the same"
             )
         return np.asarray(self.gain * signal + self.offset, np.float64)
@@ -98,7 +98,7 @@ def mean_frame(frames: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def response(cold: NDArray[np.float64], hot: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How much more each sensor gives of the brighter of two uniform objects, shape (y, x).
+    """How much more each pixel gives of the brighter of two flat-field sources, shape (y, x).
 
     Raises
     ------
@@ -107,7 +107,7 @@ def response(cold: NDArray[np.float64], hot: NDArray[np.float64]) -> NDArray[np.
     """
     if cold.shape != hot.shape:
         raise ValueError(
-            f"uniform frames: are of {size_text(cold.shape)} and {size_text(hot.shape)} sensors, "
+            f"uniform frames: are of {size_text(cold.shape)} and {size_text(hot.shape)} pixels, "
             "expected the same"
         )
     if not np.median(hot - cold) > 0:

@@ -1,4 +1,4 @@
-"""Size of source: what each sensor integrates, by exact area weights."""
+"""Size of source: what each pixel integrates, by exact area weights."""
 
 from math import sqrt
 from typing import Final
@@ -10,7 +10,7 @@ from scipy import sparse
 from chipglow.scene import Raster
 
 _ROUNDING: Final = 1e-6
-"""Share of a sensor or a sample that is taken for rounding of lengths."""
+"""Share of a pixel or a sample that is taken for rounding of lengths."""
 
 
 def overlap_lengths(
@@ -44,23 +44,23 @@ def overlap_lengths(
 def sensor_raster(
     scene: Raster, pitch: float, offset: tuple[float, float], shape: tuple[int, int] | None
 ) -> Raster:
-    """Where the sensors lie on a scene.
+    """Where the pixels lie on a scene.
 
     Parameters
     ----------
     scene : Raster
         The scene's samples.
     pitch : float
-        Distance between sensors in m, on the scene.
+        Distance between pixels in m, on the scene.
     offset : tuple of float
-        Corner of the first sensor in m, right of and down from the scene's upper left corner.
+        Corner of the first pixel in m, right of and down from the scene's upper left corner.
     shape : tuple of int, optional
-        Rows and columns of sensors; as many whole sensors as fit by default.
+        Rows and columns of pixels; as many whole pixels as fit by default.
 
     Raises
     ------
     ValueError
-        If not one sensor fits, or `shape` reaches beyond the scene.
+        If not one pixel fits, or `shape` reaches beyond the scene.
     """
     left, right, bottom, top = scene.extent
     room = (top - bottom - offset[1], right - left - offset[0])
@@ -72,7 +72,7 @@ def sensor_raster(
         )
     if shape is not None and (shape[0] > rows or shape[1] > columns):
         raise ValueError(
-            f"camera: shape is {shape[0]} x {shape[1]} sensors, but only {rows} x {columns} of "
+            f"camera: shape is {shape[0]} x {shape[1]} pixels, but only {rows} x {columns} of "
             f"{pitch:g} m fit the scene of {right - left:g} x {top - bottom:g} m"
         )
     rows, columns = shape or (rows, columns)
@@ -80,12 +80,12 @@ def sensor_raster(
 
 
 def whole_raster(scene: Raster, sensors: Raster) -> tuple[Raster, tuple[slice, slice]]:
-    """All whole sensors that fit a scene, in line with some of them, and where those are in it.
+    """All whole pixels that fit a scene, in line with some of them, and where those are in it.
 
     Parameters
     ----------
-    scene, sensors : Raster
-        The scene's samples, and sensors within it.
+    scene, pixels : Raster
+        The scene's samples, and pixels within it.
     """
     pitch = sensors.spacing
     down, right = scene.top - sensors.top, sensors.left - scene.left
@@ -98,16 +98,16 @@ def whole_raster(scene: Raster, sensors: Raster) -> tuple[Raster, tuple[slice, s
 def integrate(
     radiance: NDArray[np.float64], scene: Raster, sensors: Raster, fill_factor: float
 ) -> NDArray[np.float64]:
-    """Mean radiance over the sensitive square of every sensor.
+    """Mean radiance over the sensitive square of every pixel.
 
     Parameters
     ----------
     radiance : ndarray
         Radiance of the scene's samples in W/(m² sr), shape `scene.shape`.
-    scene, sensors : Raster
-        Where the samples and the sensors are.
+    scene, pixels : Raster
+        Where the samples and the pixels are.
     fill_factor : float
-        Share of a sensor's square that is sensitive: a square in its middle.
+        Share of a pixel's square that is sensitive: a square in its middle.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def integrate(
 def _line_weights(
     begin: float, samples: int, count: int, scene: Raster, sensors: Raster, fill_factor: float
 ) -> sparse.csr_array:
-    """Weights of a line of samples in a line of sensors, each row of sum 1."""
+    """Weights of a line of samples in a line of pixels, each row of sum 1."""
     side = sensors.spacing * sqrt(fill_factor)
     first = begin + (sensors.spacing - side) / 2
     left = first + sensors.spacing * np.arange(count, dtype=np.float64)

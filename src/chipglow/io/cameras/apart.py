@@ -1,4 +1,4 @@
-"""A recording read in a process of its own: whatever a damaged file does there is one error."""
+"""A recording read in a subprocess: whatever a damaged file does there is one error."""
 
 import json
 import os
@@ -23,11 +23,11 @@ from chipglow.radiometry import ObjectParameters
 
 _LONGEST_HEADER: Final = 100_000_000
 _PLAIN: Final = ("quantity", "camera", "integration_time", "saturation", "pitch")
-_SENTENCES: Final = ("notes", "assumptions", "doubts")
+_SENTENCES: Final = ("notes", "assumptions", "warnings")
 
 
 def read_apart(path: Path, kind: str, frames: slice | None, told: Told) -> Recording:
-    """Read frames in a process of its own; see `read_recording`.
+    """Read frames in a subprocess; see `read_recording`.
 
     Libraries in C and C++ unpack there what others wrote: a damaged file can make them crash, hang
     or ask for all of the memory.

@@ -146,12 +146,12 @@ def say_cut(remarks: FileRemarks, said: int, whole: int) -> None:
     Parameters
     ----------
     remarks : FileRemarks
-        Takes it as a doubt.
+        Takes it as a warning.
     said, whole : int
         How many frames the file should have, and how many of them are whole.
     """
     if whole < said:
-        remarks.doubts.append(
+        remarks.warnings.append(
             f"the file is cut short: of its {said} frames the first {whole} are whole, the others "
             "are left out."
         )
@@ -163,13 +163,13 @@ def say_cut_behind(remarks: FileRemarks, whole: int, left: int) -> None:
     Parameters
     ----------
     remarks : FileRemarks
-        Takes it as a doubt.
+        Takes it as a warning.
     whole : int
         How many frames are whole.
     left : int
         How many bytes lie behind them.
     """
-    remarks.doubts.append(
+    remarks.warnings.append(
         f"the file is cut short: its first {whole} frames are whole, the {left} bytes behind them "
         "are no whole frame and are left out."
     )
@@ -257,7 +257,7 @@ def common_exposure(exposures: NDArray[np.float64], remarks: FileRemarks) -> flo
     least, greatest = float(exposures.min()), float(exposures.max())
     if least == greatest:
         return least or None
-    remarks.doubts.append(
+    remarks.warnings.append(
         f"the integration time goes from {least * 1e6:g} us to {greatest * 1e6:g} us."
     )
     return None

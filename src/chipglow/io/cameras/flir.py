@@ -50,7 +50,7 @@ _MOST_PACKED: Final = 1100
 """More samples than that a byte are in no picture that is packed without loss."""
 _ZERO: Final = 273.15
 _LARGE: Final = 100.0
-"""An exponent that is possible, and no transmission."""
+"""An exponent that is possible, and no transmittance."""
 
 
 def is_flir(head: bytes) -> bool:
@@ -200,7 +200,7 @@ def _next(binary: Binary, end: int, remarks: FileRemarks) -> int | None:
     if begin >= 0:
         return end + begin
     if rest.strip(b"\0"):
-        remarks.doubts.append(f"{binary.size - end} bytes behind the last frame are no frame.")
+        remarks.warnings.append(f"{binary.size - end} bytes behind the last frame are no frame.")
     return None
 
 
@@ -426,14 +426,14 @@ def _conversion(fields: _Fields, remarks: FileRemarks) -> PlanckConversion | Non
 def _object(fields: _Fields, remarks: FileRemarks) -> ObjectParameters:
     distance, humidity = _finite(fields, 0x24), _finite(fields, 0x3C)
     atmosphere, window = _finite(fields, 0x2C), _finite(fields, 0x34)
-    transmission = window if window is not None and window > 0 else 1.0
+    transmittance = window if window is not None and window > 0 else 1.0
     if distance is not None and humidity is not None and atmosphere is not None:
         share = humidity / 100 if humidity > 2 else humidity
         remarks.notes.append(
             f"The camera was told of an object at {distance:g} m and a humidity of "
             f"{share * 100:g} %."
         )
-        transmission *= _through_air(fields, distance, share, atmosphere)
+        transmittance *= _through_air(fields, distance, share, atmosphere)
     if window is not None and window != 1:
         remarks.notes.append(
             f"The camera was told of a window that lets {window * 100:g} % pass, at "
@@ -443,7 +443,7 @@ def _object(fields: _Fields, remarks: FileRemarks) -> ObjectParameters:
         remarks,
         emissivity=_finite(fields, 0x20),
         reflected=_finite(fields, 0x28),
-        transmission=transmission,
+        transmittance=transmittance,
         atmosphere=atmosphere,
     )
 

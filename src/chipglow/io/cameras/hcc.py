@@ -204,7 +204,7 @@ def _times(
 
 def _integration_time(headers: NDArray[Any], remarks: FileRemarks) -> float | None:
     if len(np.unique(headers["filter_position"])) > 1:
-        remarks.doubts.append("the filter wheel turned between frames.")
+        remarks.warnings.append("the filter wheel turned between frames.")
     return common_exposure(headers["exposure"] * _EXPOSURE, remarks)
 
 

@@ -43,7 +43,7 @@ _HEADER: Final = layout(
     emissivity=("<f4", 141),
     ambient=("<f4", 145),
     distance=("<f4", 149),
-    transmission=("<f4", 170),
+    transmittance=("<f4", 170),
     atmosphere=("<f4", 184),
     cut_on=("<f4", 188),
     cut_off=("<f4", 192),
@@ -133,7 +133,7 @@ def read_ptw(path: Path, frames: slice | None = None, interval: float | None = N
             remarks,
             emissivity=header["emissivity"],
             reflected=header["ambient"],
-            transmission=_positive(header["transmission"]),
+            transmittance=_positive(header["transmittance"]),
             atmosphere=_positive(header["atmosphere"]),
         ),
     )
@@ -235,7 +235,7 @@ def _clocked_times(
                 f"header is {period * 1e6:g} us."
             )
             return evenly
-    remarks.doubts.append(
+    remarks.warnings.append(
         f"the times are from the frame period, {period * 1e6:g} us; the frames' own stamps are up "
         f"to {apart:.3g} s off: frames may be missing."
     )

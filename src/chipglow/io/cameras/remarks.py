@@ -8,7 +8,7 @@ from chipglow.text.remarks import Remarks
 
 @dataclass(frozen=True)
 class FileRemarks(Remarks):
-    """Sentences of a camera's file, of which assumptions and doubts are kept apart.
+    """Sentences of a camera's file, of which assumptions and warnings are kept apart.
 
     Parameters
     ----------
@@ -24,5 +24,5 @@ class FileRemarks(Remarks):
             recording,
             notes=tuple(self.notes),
             assumptions=tuple(self.assumptions),
-            doubts=tuple(self.doubts),
+            warnings=tuple(self.warnings),
         )

@@ -1,4 +1,4 @@
-"""A source read in a process of its own: whatever a damaged file does there ends in one error."""
+"""A source read in a subprocess: whatever a damaged file does there ends in one error."""
 
 import os
 import pickle
@@ -46,7 +46,7 @@ _MOST_FILES: Final = 100_000
 
 @dataclass(frozen=True)
 class Isolated(Source):
-    """Another source, read in a process of its own.
+    """Another source, read in a subprocess.
 
     Readers of other people's formats are large libraries, some in C and C++: a damaged file can
     make them crash, hang or ask for all of the memory. There it takes only their process with it.

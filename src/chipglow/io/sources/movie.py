@@ -505,13 +505,14 @@ def _completed(
 
 
 def _doubts(uncertainty: Mapping[str, ColourUncertainty]) -> Iterator[str]:
-    for name, doubt in uncertainty.items():
+    for name, warning in uncertainty.items():
         unit = FIELD_UNITS[name].replace("1/s", "/s").removeprefix("1")
         yield (
-            f"{name}: the colours leave a standard uncertainty of {doubt.total:.3g} {unit}".rstrip()
-            + f" ({doubt.colours:.3g} by their number, {doubt.noise:.3g} by their noise"
-            + (f", {doubt.legend:.3g} by the ends of the legend" if doubt.legend else "")
-            + (f", {doubt.lines:.3g} by the lines drawn over them" if doubt.lines else "")
+            f"{name}: the colours leave a standard uncertainty of "
+            + f"{warning.total:.3g} {unit}".rstrip()
+            + f" ({warning.colours:.3g} by their number, {warning.noise:.3g} by their noise"
+            + (f", {warning.legend:.3g} by the ends of the legend" if warning.legend else "")
+            + (f", {warning.lines:.3g} by the lines drawn over them" if warning.lines else "")
             + ")"
         )
 

@@ -3,6 +3,7 @@
 from chipglow.laboratory.chip.band_file import read_curve, write_band_profile
 from chipglow.laboratory.chip.band_profile import BandProfile, Stage, band_profile
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
+from chipglow.laboratory.chip.chosen_tool import ChosenTool, chosen_tool
 from chipglow.laboratory.chip.contact import NoContactError, contact_length
 from chipglow.laboratory.chip.find_tool import FoundTool, find_tool
 from chipglow.laboratory.chip.inertia import Inertia, inertia
@@ -20,6 +21,7 @@ __all__ = [
     "BandProfile",
     "ChipMetrics",
     "ChipScan",
+    "ChosenTool",
     "FoundTool",
     "Inertia",
     "Instant",
@@ -34,6 +36,7 @@ __all__ = [
     "ToolUncertainty",
     "band_profile",
     "chip_metrics",
+    "chosen_tool",
     "contact_length",
     "find_band",
     "find_shear_band",

@@ -120,6 +120,6 @@ def _dataset(profile: BandProfile) -> xr.Dataset:
         attrs={
             "width": profile.width,
             "assumed": "\n".join(profile.assumptions),
-            "doubtful": "\n".join(profile.doubts),
+            "doubtful": "\n".join(profile.warnings),
         },
     )

@@ -86,7 +86,7 @@ class BandProfile:
         Width of the mean across the curve in m.
     assumptions : tuple of str
         What had to be assumed, a sentence each.
-    doubts : tuple of str
+    warnings : tuple of str
         Why it may not be relied on, a sentence each.
     from_tool : tuple of ndarray
         What each independent standard uncertainty of the tool's place changes in `temperature` in
@@ -110,7 +110,7 @@ class BandProfile:
     times: NDArray[np.float64]
     width: float
     assumptions: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     from_tool: tuple[NDArray[np.float64], ...] = ()
 
     def __post_init__(self) -> None:
@@ -172,7 +172,7 @@ def band_profile(
     reference : int, optional
         Number of the frame whose band is fully developed. By default the given curve is its place;
         without a curve, the frame in which the band that begins near the edge has the greatest
-        integral of its temperature over the camera's floor.
+        integral of its temperature over the camera's lower range limit.
     width : float, optional
         Width across the curve in m over which to average; a pixel by default.
     position : float, optional
@@ -234,10 +234,10 @@ def band_profile(
     if not np.isfinite(temperature).any():
         raise ValueError(
             "shear band: no point of the curve is on usable pixels in any frame, expected a curve "
-            "in the image where the chip is hotter than the camera's floor"
+            "in the image where the chip is hotter than the camera's lower range limit"
         )
     if given is None:
-        remarks.doubts.extend(_joined(temperature, measurement.times[numbers]))
+        remarks.warnings.extend(_joined(temperature, measurement.times[numbers]))
     offset = np.array([_offset(line, base) for line in found])
     return BandProfile(
         reference=base,
@@ -251,7 +251,7 @@ def band_profile(
         times=measurement.times[numbers],
         width=width,
         assumptions=tuple(remarks.assumptions),
-        doubts=tuple(remarks.doubts),
+        warnings=tuple(remarks.warnings),
         from_tool=tuple(from_tool),
     )
 
@@ -330,13 +330,13 @@ def _reference(
     bands = [(line, k) for line, k in zip(found, numbers.tolist(), strict=True) if line]
     near = [(line, k) for line, k in bands if line.distance[0] < NEAR_THE_EDGE * pitch]
     if not near:
-        remarks.doubts.append(
+        remarks.warnings.append(
             "no band begins near the cutting edge, so that all may have moved; the "
             "stages are judged against the hottest and longest one."
         )
     line, number = max(near or bands, key=lambda band: _heat(measurement, *band))
     if len(bands) == 1:
-        remarks.doubts.append("one frame has a band; without another its stage says nothing.")
+        remarks.warnings.append("one frame has a band; without another its stage says nothing.")
     elif near:
         remarks.assumptions.append(
             f"the band at {measurement.times[number] * 1e6:.6g} µs is fully developed: "
@@ -346,7 +346,7 @@ def _reference(
 
 
 def _joined(temperature: NDArray[np.float64], times: NDArray[np.float64]) -> tuple[str, ...]:
-    """A doubt of found curves that cross a deep valley between two hot places."""
+    """A warning of found curves that cross a deep valley between two hot places."""
     valleys = [_valley(values[np.isfinite(values)]) for values in temperature]
     doubted = [
         (depth, time)
@@ -373,10 +373,10 @@ def _valley(values: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def _heat(measurement: Measurement, line: Line, number: int) -> float:
-    """Integral along a line of a frame of the temperature over the camera's floor in K m."""
+    """Integral along a line of the temperature over the lower range limit in K m."""
     frame = measurement.data["radiance_temperature"][number].values
-    floor = float(measurement.data.attrs.get("floor", np.nanmin(frame)))
-    values = np.nan_to_num(sample(frame, measurement.raster, line.points) - floor)
+    lower_limit = float(measurement.data.attrs.get("lower_limit", np.nanmin(frame)))
+    values = np.nan_to_num(sample(frame, measurement.raster, line.points) - lower_limit)
     return float(trapezoid(values, line.distance))
 
 

@@ -47,9 +47,9 @@ class ThermalImage:
     Parameters
     ----------
     temperature : ndarray
-        Radiance temperature in K, shape (y, x). Pixels under the camera's floor have the floor, or
-        the lowest temperature of the frame where no floor is told; saturated and dead ones have
-        that of their nearest usable neighbour.
+        Radiance temperature in K, shape (y, x). Pixels under the camera's range have its
+        lower limit, or the lowest temperature of the frame where none is stated; saturated and
+        dead ones have that of their nearest usable neighbour.
     usable : ndarray of bool
         Which pixels are measured.
     raster : Raster
@@ -74,10 +74,10 @@ class ThermalImage:
         usable = np.isfinite(known)
         if not usable.any():
             raise NoShearBandError("shear band: no pixel of the frame has a radiance temperature")
-        floor = float(measurement.data.attrs.get("floor", known[usable].min()))
+        lower_limit = float(measurement.data.attrs.get("lower_limit", known[usable].min()))
         nearest = distance_transform_edt(~usable, return_distances=False, return_indices=True)
         filled = np.where(usable, known, known[tuple(nearest)])
-        filled[flags & Flag.BELOW_FLOOR > 0] = floor
+        filled[flags & Flag.UNDER_RANGE > 0] = lower_limit
         return cls(filled, usable, measurement.raster)
 
     def index(self, points: NDArray[np.float64]) -> NDArray[np.float64]:

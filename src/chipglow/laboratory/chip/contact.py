@@ -35,7 +35,7 @@ def contact_length(
     -------
     float
         Length in m from the end of the edge up to the first gap that is longer than two of
-        the paper's sensors; 0 if the chip does not touch the rake face there.
+        the paper's pixels; 0 if the chip does not touch the rake face there.
     """
     step = raster.spacing / 2
     along = np.arange(0.0, np.hypot(raster.rows, raster.columns) * raster.spacing, step)

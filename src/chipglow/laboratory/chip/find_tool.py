@@ -45,13 +45,13 @@ class FoundTool:
         The tool in the measurement's coordinates.
     uncertainty : ToolUncertainty
         Standard uncertainties of its place and its rake angle.
-    doubts : tuple of str
+    warnings : tuple of str
         Why it may not be the rake face, a sentence each.
     """
 
     tool: PlacedTool
     uncertainty: ToolUncertainty
-    doubts: tuple[str, ...]
+    warnings: tuple[str, ...]
 
 
 def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> FoundTool:
@@ -103,7 +103,7 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
     angle_error, place_error = _jackknife(image, rows, fit)
     angle = atan(fit[1])
     tip_row, tip_seen = _tip_row(image, fit, rows)
-    doubts = _doubts(angle, angle_error, place_error, angles, coarse.prominence, tip_seen)
+    warnings = _doubts(angle, angle_error, place_error, angles, coarse.prominence, tip_seen)
     pitch = raster.spacing
     tool = _placed(replace(shape, rake_angle=angle), raster, fit, tip_row)
     uncertainty = ToolUncertainty(
@@ -112,7 +112,7 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
         angle=sqrt(angle_error**2 + 2 * (2 * _SHIFT / rows.size) ** 2),
         pivot=_up_the_face(tool, raster, float(rows.mean())),
     )
-    return FoundTool(tool, uncertainty, doubts)
+    return FoundTool(tool, uncertainty, warnings)
 
 
 @dataclass(frozen=True)
@@ -372,17 +372,17 @@ def _doubts(
     prominence: float,
     tip_seen: bool,
 ) -> tuple[str, ...]:
-    doubts = []
+    warnings = []
     if prominence < _SURE:
-        doubts.append("the rake face hardly stands out from the noise of the image.")
+        warnings.append("the rake face hardly stands out from the noise of the image.")
     if angle_error > _WORST_ANGLE:
-        doubts.append("the rows of the image do not agree on the rake angle.")
+        warnings.append("the rows of the image do not agree on the rake angle.")
     if place_error > 1.0:
-        doubts.append("the rows of the image do not agree on a line within a pixel.")
+        warnings.append("the rows of the image do not agree on a line within a pixel.")
     if not angles[0] < angle < angles[-1]:
-        doubts.append(
+        warnings.append(
             f"the rake angle of {degrees(angle):.1f} degrees is at the end of what was looked for."
         )
     if not tip_seen:
-        doubts.append("the tip is not in the image: lengths count from its lower end.")
-    return tuple(doubts)
+        warnings.append("the tip is not in the image: lengths count from its lower end.")
+    return tuple(warnings)

@@ -22,7 +22,7 @@ class Inertia:
     ----------
     kinetic_share : float
         Greatest change of the kinetic energy since the start over the work of the drive till then;
-        NaN where the scene has no energy account.
+        NaN where the scene has no energy balance.
     force_share : float
         Momentum that the scaled mass brings to the tool per time, ρV² times uncut chip thickness,
         over the mean cutting force; NaN where the scene does not tell it. By the balance of

@@ -159,7 +159,7 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     one line at right angles to the rake face, the lowest on which its free surface is in the view
     and over 1.2 times the feed all the time. There it is formed and still lies on the face: on a
     higher line, which a taller view would have, it has lifted off and curls, so that the line
-    crosses the gap and the chip aslant. The means are over whole periods, each moment
+    crosses the gap and the chip oblique. The means are over whole periods, each moment
     weighted by the chip's speed, which makes them means over the chip's length. At most 64
     frames, evenly spread, are looked at; of a scene with gaps those of its longest part without.
     """

@@ -173,8 +173,8 @@ def rake_grid(
     -----
     The squares stand on the rake face and turn with it. A pixel belongs to the square that holds
     its middle, so that every pixel counts once and one that is flagged removes one square; nothing
-    is resampled, which would mix pixels of the tool, or such as are under the camera's floor, into
-    the squares beside them. A square is left out in a frame if any of its pixels is `UNUSABLE`
+    is resampled, which would mix pixels of the tool, or such as are under the camera's range,
+    into the squares beside them. A square is left out in a frame if any of its pixels is `UNUSABLE`
     there, as in the paper, or if it is not whole inside the image.
 
     The middles of the pixels in a turned square are not spread evenly about the square's own
@@ -207,7 +207,7 @@ def rake_grid(
     if not np.isfinite(mean[:, 0]).any():
         raise ValueError(
             f"rake grid: none of the {columns} squares beside the rake face is usable, expected a "
-            "chip that touches the tool and is hotter than the camera's floor"
+            "chip that touches the tool and is hotter than the camera's lower range limit"
         )
     grid = RakeGrid(
         along=size * (np.arange(columns, dtype=np.float64) + 0.5),

@@ -249,7 +249,7 @@ class Comparison:
         Which simulation fits where.
     assumptions : tuple of str
         What had to be assumed, a sentence each.
-    doubts : tuple of str
+    warnings : tuple of str
         Why it may not be relied on, a sentence each.
     """
 
@@ -258,7 +258,7 @@ class Comparison:
     band: BandComparison | None
     places: tuple[PlaceResult, ...]
     assumptions: tuple[str, ...]
-    doubts: tuple[str, ...]
+    warnings: tuple[str, ...]
 
     @property
     def statement(self) -> str:
@@ -367,7 +367,7 @@ def compare(
     stated = stated or StatedUncertainties()
     remarks = Remarks()
     if measured.calibration_uncertainty is None and stated.temperature == 0.0:
-        remarks.doubts.append(
+        remarks.warnings.append(
             "the measurement does not tell the uncertainty of its calibration and none is stated, "
             "so that the E_n are too great."
         )
@@ -381,7 +381,7 @@ def compare(
     band = _compare_band(files, curve, stated, remarks)
     places = _places(tuple(simulated), grid, band)
     if not places:
-        reasons = " ".join(remarks.doubts)
+        reasons = " ".join(remarks.warnings)
         raise ValueError(f"comparison: there is nothing that can be compared: {reasons}")
     return Comparison(
         tuple(simulated),
@@ -389,7 +389,7 @@ def compare(
         band,
         places,
         tuple(remarks.assumptions),
-        tuple(remarks.doubts),
+        tuple(remarks.warnings),
     )
 
 
@@ -402,7 +402,9 @@ def _tool_of(
         return tool
     turn = abs(own.rake_angle - tool.rake_angle)
     if turn > allowed:
-        remarks.doubts.append(f"the rake angle of {label} differs by {degrees(turn):.2g} degrees.")
+        remarks.warnings.append(
+            f"the rake angle of {label} differs by {degrees(turn):.2g} degrees."
+        )
     return own
 
 
@@ -422,10 +424,10 @@ def _compare_grid(
             for label, item in simulated.items()
         }
     except ValueError as error:
-        remarks.doubts.append(f"the rake face is left out: {error}.")
+        remarks.warnings.append(f"the rake face is left out: {error}.")
         return None
     if base.times.size < _FEW:
-        remarks.doubts.append(_few_frames("measured", base.times.size))
+        remarks.warnings.append(_few_frames("measured", base.times.size))
     columns = min(grid.along.size for grid in (base, *grids.values()))
     readings = [_measured_squares(measured, base, columns, stated)]
     for label, item in simulated.items():
@@ -529,7 +531,7 @@ def _compare_band(
                 )
             )
         except NoShearBandError as error:
-            remarks.doubts.append(f"the shear band is left out: {name}: {error}.")
+            remarks.warnings.append(f"the shear band is left out: {name}: {error}.")
             return None
     if curve is not None and stated.tool is not None:
         moves = stated.tool.displacements(tool, tool.edge_point)
@@ -575,12 +577,14 @@ def _along(
     """
     used = profile.in_place
     remarks.assumptions.extend(f"{sentence} ({name})" for sentence in profile.assumptions)
-    remarks.doubts.extend(f"{sentence} ({name})" for sentence in profile.doubts)
+    remarks.warnings.extend(f"{sentence} ({name})" for sentence in profile.warnings)
     if not used.any():
-        remarks.doubts.append(f"{name}: no frame has a band that is in place; all frames are used.")
+        remarks.warnings.append(
+            f"{name}: no frame has a band that is in place; all frames are used."
+        )
         used = np.ones(used.size, np.bool_)
     elif used.sum() < _FEW:
-        remarks.doubts.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
+        remarks.warnings.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
     fields = (profile.temperature, profile.calibration, profile.position, *profile.from_tool)
     read = [
         np.stack([_at(distance, profile.distance, row) for row in field[used]]) for field in fields

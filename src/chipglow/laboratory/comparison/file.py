@@ -51,7 +51,7 @@ def write_comparison(comparison: Comparison, folder: Path) -> None:
         "simulations": list(comparison.labels),
         "places": [_place(result) for result in comparison.places],
         "assumed": list(comparison.assumptions),
-        "doubtful": list(comparison.doubts),
+        "doubtful": list(comparison.warnings),
     }
     text = json.dumps(summary, indent=1, ensure_ascii=False)
     (folder / RESULT_MARK).write_text(f"{text}\n", encoding="utf-8")

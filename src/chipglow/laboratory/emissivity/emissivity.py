@@ -26,7 +26,7 @@ from chipglow.radiometry import Band
 from chipglow.scene import Area, Raster
 from chipglow.uncertainty import Estimate, propagate
 
-COMMON: Final = ("truth", "environment", "calibration")
+COMMON: Final = ("reference", "reflected", "calibration")
 """Causes of error that are the same for all pixels, frames and images."""
 
 BUDGET: Final = (*COMMON, "drift", "repeatability", "noise")
@@ -66,33 +66,33 @@ class Heating:
         is negative.
     """
 
-    truth: float
-    environment: float = LABORATORY
-    truth_uncertainty: float = 0.0
-    environment_uncertainty: float = 0.0
+    reference: float
+    reflected: float = LABORATORY
+    reference_uncertainty: float = 0.0
+    reflected_uncertainty: float = 0.0
     camera_uncertainty: float | None = None
     drift: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("truth", "environment"):
+        for name in ("reference", "reflected"):
             value = getattr(self, name)
             if not (isfinite(value) and value > 0):
                 raise ValueError(f"{name}: is {value!r} K, expected over 0 K")
-        if self.truth <= self.environment:
+        if self.reference <= self.reflected:
             raise ValueError(
-                f"truth: {_celsius(self.truth)} is not hotter than the environment's "
-                f"{_celsius(self.environment)}, expected a heated object"
+                f"truth: {_celsius(self.reference)} is not hotter than the environment's "
+                f"{_celsius(self.reflected)}, expected a heated object"
             )
-        for name in ("truth_uncertainty", "environment_uncertainty", "camera_uncertainty"):
+        for name in ("reference_uncertainty", "reflected_uncertainty", "camera_uncertainty"):
             value = getattr(self, name)
             if value is not None and not 0 <= value < inf:
                 raise ValueError(f"{name}: is {value!r} K, expected 0 K or more")
         if self.drift is not None and not 0 <= self.drift < 1:
             raise ValueError(f"drift: is {self.drift!r}, expected 0 to 1")
-        spread = hypot(self.truth_uncertainty, self.environment_uncertainty)
-        if self.truth - self.environment < _CLEARLY * spread:
+        spread = hypot(self.reference_uncertainty, self.reflected_uncertainty)
+        if self.reference - self.reflected < _CLEARLY * spread:
             raise ValueError(
-                f"truth: {_celsius(self.truth)} is over the environment by less than "
+                f"truth: {_celsius(self.reference)} is over the environment by less than "
                 f"{_CLEARLY:g} standard uncertainties of {spread:.3g} K, expected a hotter object"
             )
 
@@ -117,7 +117,7 @@ class EmissivityMap:
     calibration : ndarray, optional
         Standard uncertainty of the radiance from the calibration in W/(m² sr), shape (y, x).
     floor : float
-        Lowest radiance temperature in K that the camera measures; 0 if it has no floor.
+        Lowest radiance temperature in K that the camera measures; 0 if it has no lower range limit.
     recordings : int
         From how many recordings the observations are.
     """
@@ -128,15 +128,15 @@ class EmissivityMap:
     radiance: NDArray[np.float64]
     flags: NDArray[np.uint8]
     calibration: NDArray[np.float64] | None
-    floor: float = 0.0
+    lower_limit: float = 0.0
     recordings: int = 1
 
     @property
     def hidden(self) -> float:
-        """Emissivity under which the camera's floor hides a pixel; 0 without a floor."""
-        if self.floor <= self.heating.environment:
+        """Lowest emissivity that the camera's range measures; 0 without a lower limit."""
+        if self.lower_limit <= self.heating.reflected:
             return 0.0
-        radiance = np.asarray(self.band.radiance(np.array(self.floor)), np.float64)
+        radiance = np.asarray(self.band.radiance(np.array(self.lower_limit)), np.float64)
         return float(emissivity_of_radiance(radiance, self.heating, self.band))
 
     @property
@@ -248,16 +248,18 @@ class EmissivityMap:
     def _systematic(self, values: NDArray[np.float64], radiance: Any, calibration: Any) -> Estimate:
         """Emissivities with what is common to all pixels, frames and images."""
 
-        def found(truth: Any, environment: Any) -> Any:
-            ends = (self.band.radiance(np.asarray(one)) for one in (truth, environment))
+        def found(reference: Any, reflected: Any) -> Any:
+            ends = (self.band.radiance(np.asarray(one)) for one in (reference, reflected))
             return _emissivity(radiance, *ends)
 
         heating = self.heating
         known = propagate(
             found,
-            Estimate(np.array(heating.truth)).with_component("truth", heating.truth_uncertainty),
-            Estimate(np.array(heating.environment)).with_component(
-                "environment", heating.environment_uncertainty
+            Estimate(np.array(heating.reference)).with_component(
+                "reference", heating.reference_uncertainty
+            ),
+            Estimate(np.array(heating.reflected)).with_component(
+                "reflected", heating.reflected_uncertainty
             ),
         )
         effect = 0.0 if calibration is None else calibration / self._contrast
@@ -271,8 +273,8 @@ class EmissivityMap:
 
     @property
     def _contrast(self) -> float:
-        """Radiance of a black body at the true temperature over that of the surroundings."""
-        radiance = self.band.radiance(np.array([self.heating.truth, self.heating.environment]))
+        """Radiance of a blackbody at the true temperature over that of the surroundings."""
+        radiance = self.band.radiance(np.array([self.heating.reference, self.heating.reflected]))
         return float(radiance[0] - radiance[1])
 
 
@@ -295,7 +297,7 @@ class RegionEmissivity:
     flagged : dict
         How many have each `Flag`.
     hidden : float
-        Emissivity under which the camera's floor hides a pixel; 0 without a floor.
+        Lowest emissivity that the camera's range measures; 0 without a lower limit.
     deviation : float
         Standard deviation over the pixels: how much the surface varies from place to place, with
         the pixels' noise. It is no uncertainty of the mean.
@@ -330,9 +332,9 @@ class RegionEmissivity:
     def _warnings(self) -> Iterator[str]:
         text = left_out_warning(self.name, self.pixels, self.left_out, self.flagged)
         if text is not None:
-            if self.flagged[Flag.BELOW_FLOOR]:
+            if self.flagged[Flag.UNDER_RANGE]:
                 text += (
-                    "; what is left is brighter than the region, as the camera's floor hides "
+                    "; what is left is brighter than the region, as the camera's range hides "
                     f"emissivities under {self.hidden:.3g}"
                 )
             elif self.flagged[Flag.SATURATED]:
@@ -347,7 +349,7 @@ class RegionEmissivity:
         if over:
             yield (
                 f"{self.name}: {over} of {self.pixels} pixels have an emissivity over 1: they "
-                "are brighter than a black body of the true temperature."
+                "are brighter than a blackbody of the true temperature."
             )
         if not 0 <= self.mean <= 1:
             yield f"{self.name}: the mean emissivity is not within 0 to 1."
@@ -396,7 +398,7 @@ def emissivity_of_radiance(
     -----
     ε = (L_app − L_env) / (L_true − L_env): Equation 2 of Heigel and Whitenton (2010), solved.
     """
-    ends = band.radiance(np.array([heating.truth, heating.environment]))
+    ends = band.radiance(np.array([heating.reference, heating.reflected]))
     return np.asarray(_emissivity(radiance, *ends), np.float64)
 
 
@@ -414,15 +416,15 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
     ------
     ValueError
         If there is no image, the images are of different pixels or bands, or the true temperature
-        is under the camera's floor.
+        is under the camera's lower range limit.
     """
     check_same_pixels(measurements, "emissivity")
     for measurement in measurements:
-        floor = _floor(measurement)
-        if heating.truth < floor:
+        lower_limit = _floor(measurement)
+        if heating.reference < lower_limit:
             raise ValueError(
-                f"truth: {_celsius(heating.truth)} is under the camera's floor of "
-                f"{_celsius(floor)}, expected a hotter object"
+                f"truth: {_celsius(heating.reference)} is under the camera's lower range limit of "
+                f"{_celsius(lower_limit)}, expected a hotter object"
             )
     first, radiance = measurements[0], observed_radiance(measurements)
     return EmissivityMap(
@@ -432,7 +434,7 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
         radiance=radiance,
         flags=observed_flags(measurements),
         calibration=_calibration(measurements, radiance.mean(axis=0), heating),
-        floor=max(map(_floor, measurements)),
+        lower_limit=max(map(_floor, measurements)),
         recordings=len(measurements),
     )
 
@@ -480,7 +482,7 @@ def emissivity_line(rows: Sequence[RegionEmissivity]) -> EmissivityLine:
     same at all temperatures. Chance is that of the rows, or the scatter about the line where that
     is more.
     """
-    temperature = np.array([row.heating.truth for row in rows])
+    temperature = np.array([row.heating.reference for row in rows])
     if len(set(temperature.tolist())) < 2:
         raise ValueError("emissivity over temperature: expected 2 temperatures or more")
     means = np.array([row.mean for row in rows])
@@ -495,9 +497,9 @@ def emissivity_line(rows: Sequence[RegionEmissivity]) -> EmissivityLine:
     observed = Estimate(means).with_component(RANDOM, chance, independent="per element")
     for cause in COMMON:
         shift = np.array([row.estimate.effect(cause) for row in rows])
-        if cause == "truth":
+        if cause == "reference":
             # An error of the temperature moves the points along the line too.
-            shift = shift - slope * np.array([row.heating.truth_uncertainty for row in rows])
+            shift = shift - slope * np.array([row.heating.reference_uncertainty for row in rows])
         observed = observed.with_component(cause, shift)
     return EmissivityLine(
         name=rows[0].name,
@@ -518,12 +520,12 @@ def _of_one_image(estimate: Estimate) -> float:
     return float(estimate.standard_uncertainty)
 
 
-def _emissivity(radiance: Any, truth: Any, environment: Any) -> Any:
-    return (radiance - environment) / (truth - environment)
+def _emissivity(radiance: Any, reference: Any, reflected: Any) -> Any:
+    return (radiance - reflected) / (reference - reflected)
 
 
 def _floor(measurement: Measurement) -> float:
-    return float(measurement.data.attrs.get("floor", 0.0))
+    return float(measurement.data.attrs.get("lower_limit", 0.0))
 
 
 def _calibration(

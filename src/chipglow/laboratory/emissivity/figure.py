@@ -47,7 +47,7 @@ def draw_emissivity(
             drawing.HEAT,
         ),
         ImagePanel(
-            f"emissivity, object at {found.heating.truth - KELVIN:.4g} °C",
+            f"emissivity, object at {found.heating.reference - KELVIN:.4g} °C",
             "emissivity",
             found.emissivity,
             _ends(found.emissivity),

@@ -30,7 +30,7 @@ from chipglow.surface import SURFACES, MapSurface, SurfaceChoice
 from chipglow.uncertainty import Cause, Component, Estimate
 
 _KIND: Final = "emissivity map"
-_HEATING: Final = ("environment", "truth_uncertainty", "environment_uncertainty")
+_HEATING: Final = ("reflected", "reference_uncertainty", "reflected_uncertainty")
 
 
 def write_emissivity(
@@ -67,26 +67,26 @@ def write_emissivity(
     names = np.array([row.name for row in rows[0]], dtype=object)
     data = xr.Dataset(
         {
-            **{name: (("truth", "y", "x"), image) for name, image in images.items()},
-            **{name: (("truth", "region"), np.array(table)) for name, table in tables.items()},
+            **{name: (("reference", "y", "x"), image) for name, image in images.items()},
+            **{name: (("reference", "region"), np.array(table)) for name, table in tables.items()},
             "region_covariance": (
-                ("truth", "region", "other_region"),
+                ("reference", "region", "other_region"),
                 np.stack([emissivity_covariance(of) for of in rows]),
             ),
             **{
-                name: ("truth", [getattr(one.heating, name) for one in maps], {"units": "K"})
+                name: ("reference", [getattr(one.heating, name) for one in maps], {"units": "K"})
                 for name in _HEATING
             },
             "region_warnings": (
-                ("truth", "region"),
+                ("reference", "region"),
                 np.array([["\n".join(row.estimate.warnings) for row in of] for of in rows], object),
             ),
-            "observations": ("truth", np.array([one.identity for one in maps], dtype=object)),
+            "observations": ("reference", np.array([one.identity for one in maps], dtype=object)),
             "feature": ("region", np.array([row.feature for row in rows[0]], dtype=object)),
         },
         coords={
             **raster_coordinates(raster, np.zeros(1)),
-            "truth": ("truth", [one.heating.truth for one in maps], {"units": "K"}),
+            "reference": ("reference", [one.heating.reference for one in maps], {"units": "K"}),
             "other_region": ("other_region", names),
             "region": ("region", names),
         },
@@ -113,7 +113,7 @@ def _say_correlations(data: xr.Dataset) -> None:
     for cause, forms in _FORMS.items():
         part = data[f"region_{cause}_uncertainty"]
         part.attrs["pdf_shape"] = "gaussian"
-        for number, (dim, form) in enumerate(zip(("truth", "region"), forms, strict=True), 1):
+        for number, (dim, form) in enumerate(zip(("reference", "region"), forms, strict=True), 1):
             start = f"err_corr_{number}"
             part.attrs |= {f"{start}_dim": dim, f"{start}_form": form}
             part.attrs |= {f"{start}_params": [], f"{start}_units": []}
@@ -166,13 +166,13 @@ def read_region_emissivity(path: str | os.PathLike[str]) -> dict[str, StoredEmis
 
 def _regions(data: xr.Dataset) -> dict[str, StoredEmissivity] | int:
     """Emissivities at one true temperature, or how many there are."""
-    if data.sizes["truth"] != 1:
-        return int(data.sizes["truth"])
+    if data.sizes["reference"] != 1:
+        return int(data.sizes["reference"])
     if "observations" not in data:
         raise ValueError("it is of an earlier version, expected one that is written anew")
-    one = data.isel(truth=0)
-    environment, *spreads = (float(one[name]) for name in _HEATING)
-    heating = Heating(float(one["truth"]), environment, *spreads)
+    one = data.isel(reference=0)
+    reflected, *spreads = (float(one[name]) for name in _HEATING)
+    heating = Heating(float(one["reference"]), reflected, *spreads)
     return {
         str(name): _stored(one.isel(region=index), heating)
         for index, name in enumerate(one["region"].values)
@@ -205,7 +205,7 @@ def _stored(row: xr.Dataset, heating: Heating) -> StoredEmissivity:
     )
 
 
-def read_emissivity_map(path: str | os.PathLike[str], truth: float | None = None) -> MapSurface:
+def read_emissivity_map(path: str | os.PathLike[str], reference: float | None = None) -> MapSurface:
     """Read an emissivity map as a surface.
 
     Parameters
@@ -229,7 +229,9 @@ def read_emissivity_map(path: str | os.PathLike[str], truth: float | None = None
     """
 
     def surface(data: xr.Dataset) -> MapSurface:
-        index = 0 if truth is None else int(np.abs(data["truth"].values - truth).argmin())
+        index = (
+            0 if reference is None else int(np.abs(data["reference"].values - reference).argmin())
+        )
         values = np.clip(data["emissivity"].values[index].astype(np.float64), 0.0, 1.0)
         x, y, pitch = data["x"].values, data["y"].values, float(data.attrs["pitch"])
         raster = Raster(float(x[0]) - pitch / 2, float(y[0]) + pitch / 2, pitch, len(y), len(x))
@@ -263,7 +265,7 @@ def write_emissivity_table(rows: Sequence[RegionEmissivity], path: str | os.Path
 
 
 def _line(row: RegionEmissivity) -> list[str]:
-    numbers = [row.heating.truth, row.heating.environment]
+    numbers = [row.heating.reference, row.heating.reflected]
     numbers += [_value(row, name) for name in _COLUMNS]
     numbers += [float(row.estimate.contribution(cause)) for cause in BUDGET]
     return [row.name, row.feature, *(f"{number:.9g}" for number in numbers)]
@@ -299,7 +301,7 @@ def write_temperature_table(rows: Sequence[TrueTemperature], path: str | os.Path
 
 _COLUMNS: Final = (
     "pixels",
-    "below_floor",
+    "under_range",
     "saturated",
     "dead",
     "under_0",
@@ -315,7 +317,7 @@ _COLUMNS: Final = (
 
 def _value(row: RegionEmissivity, name: str) -> float:
     special = {
-        "below_floor": row.flagged[Flag.BELOW_FLOOR],
+        "under_range": row.flagged[Flag.UNDER_RANGE],
         "saturated": row.flagged[Flag.SATURATED],
         "dead": row.flagged[Flag.DEAD],
         "under_0": row.outside[0],

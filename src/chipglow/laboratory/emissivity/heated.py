@@ -119,7 +119,7 @@ def heated_objects(
     The chip is a strip with straight bands across it, of one temperature. It reflects the paper's
     laboratory of 293 K (Equation 2), which the procedure takes into account.
     """
-    oven = replace(camera, floor=None, reflected=LABORATORY, shape=None, offset=(0.0, 0.0))
+    oven = replace(camera, lower_limit=None, reflected=LABORATORY, shape=None, offset=(0.0, 0.0))
     known = {name: s for name, s in surfaces.items() if isinstance(s, FeatureSurface)}
     chips = [
         _heated_chip(oven, name, surface, max(band_width, camera.pitch), band_spacing, textures)
@@ -212,11 +212,11 @@ def _scene(
 
 
 def _determined(
-    camera: Camera, scene: Scene, surface: FeatureSurface, truth: float
+    camera: Camera, scene: Scene, surface: FeatureSurface, reference: float
 ) -> EmissivityMap:
     at_rest = replace(surface, follow="material")
     image = camera.measure(scene, at_rest, 0.0)
-    return determine_emissivity([image], Heating(truth, truth_uncertainty=THERMOCOUPLE))
+    return determine_emissivity([image], Heating(reference, reference_uncertainty=THERMOCOUPLE))
 
 
 def _box(

@@ -107,13 +107,17 @@ def count_flags(flags: NDArray[np.uint8]) -> dict[Flag, int]:
     """How many pixels have each `Flag` that makes them unusable."""
     return {
         flag: int((flags & flag != 0).sum())
-        for flag in (Flag.BELOW_FLOOR, Flag.SATURATED, Flag.DEAD)
+        for flag in (Flag.UNDER_RANGE, Flag.SATURATED, Flag.DEAD)
     }
 
 
 def flag_text(flagged: dict[Flag, int]) -> str:
     """The same for people."""
-    words = {Flag.BELOW_FLOOR: "under the floor", Flag.SATURATED: "saturated", Flag.DEAD: "dead"}
+    words = {
+        Flag.UNDER_RANGE: "under the lower range limit",
+        Flag.SATURATED: "saturated",
+        Flag.DEAD: "dead",
+    }
     told = [f"{count} {words[flag]}" for flag, count in flagged.items() if count]
     return ", ".join(told) or "none flagged"
 

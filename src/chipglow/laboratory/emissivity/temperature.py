@@ -28,7 +28,7 @@ from chipglow.scene import Area
 from chipglow.uncertainty import Estimate, propagate
 
 TEMPERATURE_BUDGET: Final = (
-    *("truth", "environment", "calibration", "emissivity"),
+    *("reference", "reflected", "calibration", "emissivity"),
     *("drift", "repeatability", "noise"),
 )
 """Lines of the budget of a true temperature."""
@@ -118,7 +118,7 @@ class ReflectedTemperature:
     def estimate(self) -> Estimate:
         """The temperature, with the component ``environment``: the same wherever these are."""
         return Estimate(np.array(self.temperature)).with_component(
-            "environment", self.standard_uncertainty, independent="common"
+            "reflected", self.standard_uncertainty, independent="common"
         )
 
 
@@ -180,7 +180,7 @@ def true_temperature(
     measurements : sequence of Measurement
         Images of the object; several of them are repetitions.
     area : Area
-        Pixels of even temperature.
+        Pixels of uniform temperature.
     emissivity : RegionEmissivity or KnownEmissivity
         The area's emissivity, determined with the same camera, or known from elsewhere.
     surroundings : ReflectedTemperature, optional
@@ -318,14 +318,14 @@ class _Sensitivity:
 
     radiance: float
     emissivity: float
-    environment: float
+    reflected: float
 
     @property
     def partials(self) -> tuple[Callable[..., Any], ...]:
         """By emissivity, radiance and surroundings, as `propagate` takes them."""
         return tuple(
             lambda *_, value=value: np.array(value)
-            for value in (self.emissivity, self.radiance, self.environment)
+            for value in (self.emissivity, self.radiance, self.reflected)
         )
 
 
@@ -334,17 +334,17 @@ class _Equation:
     """Equation 2 for an emissivity and the temperature in K of what is reflected."""
 
     emissivity: float
-    environment: float
+    reflected: float
     band: Band
 
     @property
-    def reflected(self) -> float:
-        """Radiance of a black body at the surroundings' temperature in W/(m² sr)."""
-        return float(self.band.radiance(np.array(self.environment)))
+    def reflected_radiance(self) -> float:
+        """Radiance of a blackbody at the surroundings' temperature in W/(m² sr)."""
+        return float(self.band.radiance(np.array(self.reflected)))
 
     def own(self, radiance: Any) -> Any:
-        """Radiance in W/(m² sr) of a black body at the object's temperature."""
-        return (radiance - (1 - self.emissivity) * self.reflected) / self.emissivity
+        """Radiance in W/(m² sr) of a blackbody at the object's temperature."""
+        return (radiance - (1 - self.emissivity) * self.reflected_radiance) / self.emissivity
 
     def temperature(self, radiance: NDArray[np.float64]) -> NDArray[np.float64]:
         """True temperature in K of apparent radiance in W/(m² sr), of the same shape."""
@@ -353,15 +353,17 @@ class _Equation:
     def sensitivity(self, name: str, radiance: float) -> _Sensitivity:
         """How the temperature of a radiance in W/(m² sr) of an area depends on all that."""
         own = float(self.own(radiance))
-        if not own > self.reflected:
+        if not own > self.reflected_radiance:
             raise ValueError(
                 f"region {name}: is darker than what it reflects at "
-                f"{self.environment - 273.15:.6g} °C, expected a hotter object"
+                f"{self.reflected - 273.15:.6g} °C, expected a hotter object"
             )
         value = float(self.band.temperature(np.array(own)))
         by_radiance = 1 / (self.emissivity * self._slope(value))
-        by_environment = -(1 - self.emissivity) * self._slope(self.environment) * by_radiance
-        return _Sensitivity(by_radiance, -(own - self.reflected) * by_radiance, by_environment)
+        by_environment = -(1 - self.emissivity) * self._slope(self.reflected) * by_radiance
+        return _Sensitivity(
+            by_radiance, -(own - self.reflected_radiance) * by_radiance, by_environment
+        )
 
     def _slope(self, temperature: float) -> float:
         """dL/dT in W/(m² sr K), at any temperature: `Band.slope` ends with its table."""
@@ -378,8 +380,8 @@ def _surroundings(
     if isinstance(emissivity, KnownEmissivity):
         return ReflectedTemperature().estimate
     heating = emissivity.heating
-    return Estimate(np.array(heating.environment)).with_component(
-        "environment", heating.environment_uncertainty
+    return Estimate(np.array(heating.reflected)).with_component(
+        "reflected", heating.reflected_uncertainty
     )
 
 
@@ -393,7 +395,7 @@ def _correlation(
     if calibration is None or isinstance(emissivity, KnownEmissivity):
         return None
     heating = emissivity.heating
-    hot, cold = band.radiance(np.array([heating.truth, heating.environment])).tolist()
+    hot, cold = band.radiance(np.array([heating.reference, heating.reflected])).tolist()
     then = cold + float(emissivity.estimate.values) * (hot - cold)
     covariance = calibration.radiance_covariance(band.temperature(np.array([then, radiance])))
     scale = float(np.sqrt(covariance[0, 0] * covariance[1, 1]))

@@ -6,7 +6,7 @@ from chipglow.laboratory.measurement.calibration_file import (
     load_calibration,
 )
 from chipglow.laboratory.measurement.camera_file import (
-    UniformObjects,
+    FlatFieldSources,
     bad_pixels_of,
     load_measurement,
     load_recording,
@@ -20,7 +20,7 @@ from chipglow.laboratory.measurement.description import (
 )
 from chipglow.laboratory.measurement.radiometric_calibration import (
     ImagePosition,
-    develop_recording,
+    calibrate_recording,
     flag_shares,
     repaired_signal,
 )
@@ -28,13 +28,13 @@ from chipglow.laboratory.measurement.summary import MeasurementSummary, measurem
 
 __all__ = [
     "CalibrationDescription",
+    "FlatFieldSources",
     "ImagePosition",
     "MeasurementDescription",
     "MeasurementSummary",
-    "UniformObjects",
     "bad_pixels_of",
+    "calibrate_recording",
     "calibration_text",
-    "develop_recording",
     "flag_shares",
     "load_calibration",
     "load_description",

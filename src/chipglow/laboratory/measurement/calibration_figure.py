@@ -29,14 +29,14 @@ def draw_calibrations(fits: Mapping[str, CalibrationFit[FittedCalibration]]) -> 
         figure = drawing.new_figure(5.2)
         upper, lower = figure.subplots(2, 1, sharex=True)
         first = next(iter(fits.values()))
-        upper.plot(first.temperatures - KELVIN, first.counts, "o", color=GREY, label="black body")
+        upper.plot(first.temperatures - KELVIN, first.counts, "o", color=GREY, label="blackbody")
         for (name, fit), colour, mark in zip(fits.items(), _COLOURS, _MARKS, strict=False):
             _draw(upper, lower, name, fit, colour, mark)
         upper.set_ylabel("counts")
         upper.legend()
         lower.axhline(0.0, color=GREY, linewidth=0.6)
         lower.set_ylabel("residual / K")
-        lower.set_xlabel("temperature of the black body / °C")
+        lower.set_xlabel("temperature of the blackbody / °C")
     return figure
 
 

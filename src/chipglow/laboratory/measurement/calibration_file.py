@@ -24,7 +24,7 @@ PointRow = Annotated[tuple[float, float, float, float], Strict(False)]
 
 
 class CalibrationDescription(Settings[FittedCalibration]):
-    """A calibration of a camera's counts by black bodies."""
+    """A calibration of a camera's counts by blackbodies."""
 
     model: Literal["linear", "sakuma-hattori"] = Field(
         description="linear: counts = offset + gain L(T), L the radiance in the band;\n"
@@ -34,8 +34,8 @@ class CalibrationDescription(Settings[FittedCalibration]):
     response: Annotated[Rows | None, OR_NONE] = described(
         "none", "Pairs of wavelength in um and relative response; none: 1 in the band."
     )
-    lowest: Temperature = Field(description="Coldest black body: colder pixels are flagged.")
-    highest: Temperature = Field(description="Hottest black body: hotter pixels are flagged.")
+    lowest: Temperature = Field(description="Coldest blackbody: colder pixels are flagged.")
+    highest: Temperature = Field(description="Hottest blackbody: hotter pixels are flagged.")
     integration_time: Annotated[Time | None, OR_NONE] = described(
         "none", "Integration time for which it holds; none: not told, not checked."
     )
@@ -47,7 +47,7 @@ class CalibrationDescription(Settings[FittedCalibration]):
     )
     covariance: Rows = Field(
         description="Covariance of offset and gain, or of offset, A, B and C: of the fit, and of\n"
-        "what the temperatures of the black body have in common."
+        "what the temperatures of the blackbody have in common."
     )
     warnings: Annotated[tuple[str, ...], Strict(False)] = described(
         [], "Why it may not be relied on, a sentence each; every measurement by it says so."
@@ -141,5 +141,5 @@ def calibration_text(description: CalibrationDescription) -> str:
 
 _HEADER: Final = """\
 # A calibration of a camera, written by chipglow calibrate.
-# It holds from the coldest to the hottest black body, for one integration time and range.
+# It holds from the coldest to the hottest blackbody, for one integration time and range.
 """

@@ -24,12 +24,12 @@ from chipglow.io.cameras.stacks import MissingError
 from chipglow.laboratory.measurement.calibration_file import load_calibration
 from chipglow.laboratory.measurement.description import MeasurementDescription, load_description
 from chipglow.laboratory.measurement.radiometric_calibration import (
-    develop_recording,
+    calibrate_recording,
 )
 from chipglow.text import DescriptionError
 
 _MOST_SATURATED: Final = 0.05
-"""Share of frames of a uniform object that may be saturated, as bad pixels are."""
+"""Share of frames of a flat-field source that may be saturated, as bad pixels are."""
 
 
 def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measurement:
@@ -85,7 +85,7 @@ def load_recording(description: MeasurementDescription) -> Recording:
 def _further(description: MeasurementDescription) -> Iterator[str]:
     """What a measurement needs besides, and the description of a file of numbers lacks."""
     if description.pitch is None:
-        yield "pitch: is missing, expected the distance between sensors such as 6 um"
+        yield "pitch: is missing, expected the distance between pixels such as 6 um"
     if description.calibration is None and description.band is None:
         yield "calibration (of counts) or band: is missing"
 
@@ -125,14 +125,14 @@ def measurement_of(
         If a file that the description names cannot be read.
     """
     try:
-        uniform = UniformObjects().of(description, recording)
+        uniform = FlatFieldSources().of(description, recording)
         calibration = description.calibration
-        return develop_recording(
+        return calibrate_recording(
             recording,
             None if calibration is None else load_calibration(calibration),
-            uniform.correction if uniform and description.uniform.correct else None,
+            uniform.correction if uniform and description.flat_field.correct else None,
             bad_pixels_of(description, recording, uniform),
-            description.floor,
+            description.lower_limit,
             description.position(),
         )
     except ValueError as error:
@@ -140,11 +140,11 @@ def measurement_of(
 
 
 def uniform_counts(
-    source: str | Path, settings: Iterable[str] = (), objects: "UniformObjects | None" = None
+    source: str | Path, settings: Iterable[str] = (), objects: "FlatFieldSources | None" = None
 ) -> float:
-    """Mean counts of a recording of a uniform object, such as a black body.
+    """Mean counts of a recording of a flat-field source, such as a blackbody.
 
-    Its sensors are corrected as those of a measurement with the same description: the counts are
+    Its pixels are corrected as those of a measurement with the same description: the counts are
     those that a calibration for such measurements needs.
 
     Parameters
@@ -153,7 +153,7 @@ def uniform_counts(
         A camera's file, or a YAML file (.yaml, .yml) that describes one.
     settings : iterable of str
         Fields of the description.
-    objects : UniformObjects, optional
+    objects : FlatFieldSources, optional
         What was read for the recording before, where several are corrected by the same frames.
 
     Returns
@@ -173,10 +173,10 @@ def uniform_counts(
     try:
         if recording.quantity != "counts":
             raise ValueError(f"holds {recording.quantity}, expected counts")
-        uniform = (objects or UniformObjects()).of(description, recording)
+        uniform = (objects or FlatFieldSources()).of(description, recording)
         bad = bad_pixels_of(description, recording, uniform)
         signal = recording.signal.astype(np.float64)
-        if uniform is not None and description.uniform.correct:
+        if uniform is not None and description.flat_field.correct:
             signal = uniform.correction.apply(signal)
         good = np.isfinite(signal).all(axis=0) & (True if bad is None else ~bad)
         if not good.any():
@@ -190,8 +190,8 @@ def uniform_counts(
     return float(signal[:, good].mean())
 
 
-class UniformObjects:
-    """Frames of uniform objects, read and judged once for recordings that have them in common.
+class FlatFieldSources:
+    """Frames of flat-field sources, read and judged once for recordings that have them in common.
 
     Those of the last description are kept.
     """
@@ -199,7 +199,7 @@ class UniformObjects:
     def __init__(self) -> None:
         self._read = lru_cache(maxsize=1)(_read_uniform)
 
-    def of(self, description: MeasurementDescription, recording: Recording) -> "Uniform | None":
+    def of(self, description: MeasurementDescription, recording: Recording) -> "FlatFields | None":
         """Those that a recording's description names, if it does.
 
         Raises
@@ -209,50 +209,52 @@ class UniformObjects:
         OSError
             If a file cannot be read.
         """
-        section = description.uniform
-        if section.frames is None:
-            if section.brighter is not None or description.bad_pixels == "find":
-                raise ValueError("uniform.frames: is missing, expected frames of a uniform object")
+        section = description.flat_field
+        if section.low is None:
+            if section.high is not None or description.bad_pixels == "find":
+                raise ValueError(
+                    "flat_field.low: is missing, expected frames of a flat-field source"
+                )
             return None
         # Which frames of which file are corrected makes no difference to what corrects them.
         uniform = self._read(description.model_copy(update={"file": None, "frames": None}))
-        for name, found in (("brighter", uniform.brighter), ("frames", uniform.frames)):
+        for name, found in (("high", uniform.high), ("low", uniform.low)):
             problem = None if found is None else _misfit(found, recording)
             if problem is not None:
-                raise ValueError(f"uniform.{name}: {problem}")
+                raise ValueError(f"flat_field.{name}: {problem}")
         return uniform
 
 
 @dataclass(frozen=True, eq=False)
-class Uniform:
-    """Frames of one or two uniform objects."""
+class FlatFields:
+    """Frames of one or two flat-field sources."""
 
-    frames: Recording
-    brighter: Recording | None
+    low: Recording
+    high: Recording | None
 
     @cached_property
     def correction(self) -> NonUniformity:
         """What makes all detector elements answer alike."""
-        if self.brighter is None:
-            return NonUniformity.one_point(self.frames.signal)
-        return NonUniformity.two_point(self.frames.signal, self.brighter.signal)
+        if self.high is None:
+            return NonUniformity.one_point(self.low.signal)
+        return NonUniformity.two_point(self.low.signal, self.high.signal)
 
     @cached_property
     def bad_pixels(self) -> BadPixels:
         """Detector elements that answer unlike the others."""
-        frames = self.frames.signal
+        frames = self.low.signal
         if len(frames) < LEAST_FRAMES:
             raise ValueError(
-                f"uniform.frames: {len(frames)} frames, expected {LEAST_FRAMES} or more to find "
+                f"flat_field.low: {len(frames)} frames, expected {LEAST_FRAMES} or more to find "
                 "bad pixels in"
             )
-        return find_bad_pixels(frames, None if self.brighter is None else self.brighter.signal)
+        return find_bad_pixels(frames, None if self.high is None else self.high.signal)
 
 
-def _read_uniform(description: MeasurementDescription) -> Uniform:
-    section = description.uniform
-    brighter = None if section.brighter is None else _uniform(description, section.brighter)
-    return Uniform(_uniform(description, str(section.frames)), brighter)
+def _read_uniform(description: MeasurementDescription) -> FlatFields:
+    section = description.flat_field
+    high = None if section.high is None else _uniform(description, section.high)
+    return FlatFields(_uniform(description, str(section.low)), high)
 
 
 def _uniform(description: MeasurementDescription, file: str) -> Recording:
@@ -263,7 +265,7 @@ def _uniform(description: MeasurementDescription, file: str) -> Recording:
 
 
 def _misfit(uniform: Recording, recording: Recording) -> str | None:
-    """Why frames of a uniform object are of no use for a recording."""
+    """Why frames of a flat-field source are of no use for a recording."""
     if uniform.quantity != recording.quantity:
         return f"holds {uniform.quantity}, expected {recording.quantity} as the recording"
     theirs, ours = uniform.integration_time, recording.integration_time
@@ -275,14 +277,14 @@ def _misfit(uniform: Recording, recording: Recording) -> str | None:
     if recording.saturation is not None:
         share = float(np.mean(uniform.signal > recording.saturation))
         if share > _MOST_SATURATED:
-            return f"{share:.0%} of it is saturated, expected a darker uniform object"
+            return f"{share:.0%} of it is saturated, expected a darker flat-field source"
     return None
 
 
 def bad_pixels_of(
-    description: MeasurementDescription, recording: Recording, uniform: "Uniform | None"
+    description: MeasurementDescription, recording: Recording, uniform: "FlatFields | None"
 ) -> NDArray[np.bool_] | None:
-    """Bad pixels by the frames of uniform objects or by a list, shape (y, x); None for neither."""
+    """Bad pixels by frames of flat-field sources or by a list, shape (y, x), or None."""
     if description.bad_pixels == "find" and uniform is not None:
         return uniform.bad_pixels.mask
     rows, columns = recording.signal.shape[1:]

@@ -75,7 +75,7 @@ class ObjectSection(Section):
     reflected: Annotated[Temperature | None, OR_NONE] = described(
         "none", "Temperature of the surroundings that the object reflects."
     )
-    transmission: Annotated[float | None, OR_NONE] = described(
+    transmittance: Annotated[float | None, OR_NONE] = described(
         "none", "Transmission of atmosphere and window.", "none, or over 0 to 1"
     )
     atmosphere: Annotated[Temperature | None, OR_NONE] = described(
@@ -89,16 +89,16 @@ class ObjectSection(Section):
 
 
 class FlatFieldSection(Section):
-    """Frames of uniform objects, such as a black body out of focus, by the same camera."""
+    """Frames of flat-field sources, such as a blackbody out of focus, by the same camera."""
 
-    frames: Annotated[FileBeside | None, OR_NONE] = described(
-        "none", "Frames of a uniform object: with them every sensor's offset is corrected."
+    low: Annotated[FileBeside | None, OR_NONE] = described(
+        "none", "Frames of a flat-field source: with them every pixel's offset is corrected."
     )
-    brighter: Annotated[FileBeside | None, OR_NONE] = described(
-        "none", "Frames of a brighter uniform object: with both the gain is corrected, too."
+    high: Annotated[FileBeside | None, OR_NONE] = described(
+        "none", "Frames of a brighter flat-field source: with both the gain is corrected, too."
     )
     correct: bool = described(
-        True, "Whether to correct the sensors, or only to find bad pixels with these frames."
+        True, "Whether to correct the pixels, or only to find bad pixels with these frames."
     )
 
 
@@ -143,15 +143,15 @@ class MeasurementDescription(Section):
         "none, 3.8-5.1 um, response.csv",
     )
     pitch: Annotated[Length | None, OR_NONE] = described(
-        "none", "Distance between sensors on the object; none: as the file says."
+        "none", "Distance between pixels on the object; none: as the file says."
     )
     fill_factor: Annotated[float | None, OR_NONE] = described(
         "none",
-        "Portion of a sensor's square that takes light; none: not told, 1 is assumed for an edge.",
+        "Portion of a pixel's square that takes light; none: not told, 1 is assumed for an edge.",
         "none, or over 0 to 1",
     )
     quarter_turns: int = described(
-        0, "Quarter turns against the clock that put the image upright.", "0 to 3"
+        0, "Quarter turns counter-clockwise that put the image upright.", "0 to 3"
     )
     mirror: Literal["none", "horizontal", "vertical"] = described(
         "none",
@@ -173,7 +173,7 @@ class MeasurementDescription(Section):
     saturation: Annotated[float | None, OR_NONE] = described(
         "none", "Greatest number in the file that is not saturated; none: as the file says."
     )
-    floor: Annotated[Temperature | None, OR_NONE] = described(
+    lower_limit: Annotated[Temperature | None, OR_NONE] = described(
         "none", "Radiance temperatures under this are flagged; none: those under the calibration's."
     )
     calibration: Annotated[FileBeside | None, OR_NONE] = described(
@@ -191,7 +191,7 @@ class MeasurementDescription(Section):
         "What the camera was told of the object; none: as the file says. Of temperatures it is\n"
         "taken back: chipglow takes radiance as the camera received it.",
     )
-    uniform: FlatFieldSection = described({}, "Frames of uniform objects.")
+    flat_field: FlatFieldSection = described({}, "Frames of flat-field sources.")
 
     def chosen_frames(self) -> slice | None:
         """The frames to take."""

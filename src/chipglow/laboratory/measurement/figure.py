@@ -14,7 +14,7 @@ from chipglow.drawing.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, VOID
 from chipglow.drawing.frames import shown_frame
 
 _FLAGS: Final = {
-    Flag.BELOW_FLOOR: ("below the floor", VOID),
+    Flag.UNDER_RANGE: ("below the lower range limit", VOID),
     Flag.SATURATED: ("saturated", VERMILLION),
     Flag.DEAD: ("dead", "black"),
     Flag.REPLACED: ("replaced", GREEN),

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from chipglow.camera import (
     Calibration,
+    FactoryCalibration,
     FittedCalibration,
     Flag,
-    MakersCalibration,
     Measurement,
     NonUniformity,
     Recording,
@@ -37,7 +37,7 @@ class ImagePosition:
     Parameters
     ----------
     quarter_turns : int
-        How often the image is turned by 90° against the clock.
+        How often the image is turned by 90° counter-clockwise.
     mirror : {"none", "horizontal", "vertical"}
         After turning: ``horizontal`` exchanges left and right, ``vertical`` top and bottom.
     tip : tuple of float, optional
@@ -72,17 +72,17 @@ class ImagePosition:
         return np.ascontiguousarray(turned)
 
     def raster(self, shape: tuple[int, int], pitch: float) -> Raster:
-        """Grid of the sensors of placed frames, for their rows and columns and pitch in m."""
+        """Grid of the pixels of placed frames, for their rows and columns and pitch in m."""
         right, down = (0.0, float(shape[0])) if self.tip is None else self.tip
         return Raster(-right * pitch, down * pitch, pitch, *shape)
 
 
-def develop_recording(
+def calibrate_recording(
     recording: Recording,
     calibration: Calibration | None = None,
     non_uniformity: NonUniformity | None = None,
     bad_pixels: NDArray[np.bool_] | None = None,
-    floor: float | None = None,
+    lower_limit: float | None = None,
     position: ImagePosition | None = None,
 ) -> Measurement:
     """Make a measurement of what a camera wrote.
@@ -97,11 +97,11 @@ def develop_recording(
         What the camera wrote. Its band and pitch are needed; ``dataclasses.replace`` sets what the
         file does not say.
     calibration : Calibration, optional
-        Of counts; by default the maker's conversion, if the file has one.
+        Of counts; by default the factory conversion, if the file has one.
     non_uniformity : NonUniformity, optional
         Correction of the signal before all else.
     bad_pixels : ndarray, optional
-        Which sensors are bad, shape (y, x): replaced by their neighbours, or dead.
+        Which pixels are bad, shape (y, x): replaced by their neighbours, or dead.
     floor : float, optional
         Lowest radiance temperature in K that counts; that of the calibration if it is higher.
     position : ImagePosition, optional
@@ -111,7 +111,7 @@ def develop_recording(
     -------
     Measurement
         Pixels over the recording's saturation, or hotter than the calibration reaches, are
-        `Flag.SATURATED`; colder ones `Flag.BELOW_FLOOR`. Attributes, each with a sentence a line:
+        `Flag.SATURATED`; colder ones `Flag.UNDER_RANGE`. Attributes, each with a sentence a line:
         ``notes`` (what the file says), ``assumed`` and ``doubtful``.
 
     Raises
@@ -136,13 +136,13 @@ def develop_recording(
     known = [part.uncertainty for part in parts if part.uncertainty is not None]
     radiance = position.place(np.concatenate([part.radiance for part in parts]))
     if calibration is not None:
-        floor = max(floor or 0.0, calibration.lowest) or None
+        lower_limit = max(lower_limit or 0.0, calibration.lowest) or None
     return Measurement.from_radiance(
         radiance,
         band,
         recording.times,
         position.raster((radiance.shape[1], radiance.shape[2]), recording.pitch),
-        floor,
+        lower_limit,
         position.place(np.concatenate([part.flags for part in parts])),
         position.place(np.concatenate(known)) if known else None,
         _attributes(recording, calibration, position, bool(known)),
@@ -174,7 +174,7 @@ def _check_known(recording: Recording, calibration: Calibration | None) -> None:
         )
     if recording.pitch is None:
         missing.append(
-            "pitch: is missing, the file does not say it, expected the distance between sensors "
+            "pitch: is missing, the file does not say it, expected the distance between pixels "
             "on the object such as 6 um"
         )
     if missing:
@@ -192,7 +192,7 @@ def _calibration(recording: Recording, given: Calibration | None) -> Calibration
         _check_same(recording, given)
         return given
     assert recording.conversion is not None
-    return MakersCalibration(
+    return FactoryCalibration(
         band=_band(recording, None),
         conversion=recording.conversion,
         integration_time=recording.integration_time,
@@ -263,7 +263,7 @@ def repaired_signal(
     non_uniformity: NonUniformity | None = None,
     bad_pixels: NDArray[np.bool_] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    """A recording's signal with its sensors corrected.
+    """A recording's signal with its pixels corrected.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def repaired_signal(
     non_uniformity : NonUniformity, optional
         Correction of the signal.
     bad_pixels : ndarray, optional
-        Which sensors are bad, shape (y, x).
+        Which pixels are bad, shape (y, x).
 
     Returns
     -------
@@ -304,7 +304,7 @@ def repaired_signal(
 def _over(
     over: NDArray[np.bool_], bad: NDArray[np.bool_], replaced: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """A replaced sensor is saturated if a neighbour is: its median cannot be trusted."""
+    """A replaced pixel is saturated if a neighbour is: its median cannot be trusted."""
     trusted = over & ~bad
     result = trusted.copy()
     for y, x in np.argwhere(replaced):
@@ -379,8 +379,8 @@ def _told(recording: Recording) -> str | None:
         "temperature": "taken back",
     }
     return (
-        f"emissivity {told.emissivity:g}, reflected {told.reflected - 273.15:g} degC, transmission "
-        f"{told.transmission:g}, atmosphere {told.atmosphere - 273.15:g} degC: "
+        f"emissivity {told.emissivity:g}, reflected {told.reflected - 273.15:g} degC, "
+        f"transmittance {told.transmittance:g}, atmosphere {told.atmosphere - 273.15:g} degC: "
         f"{became[recording.quantity]}"
     )
 
@@ -415,7 +415,7 @@ def _assumed(
 def _doubtful(
     recording: Recording, calibration: Calibration | None, uncertainty_known: bool
 ) -> Iterator[str]:
-    yield from recording.doubts
+    yield from recording.warnings
     for warning in calibration.warnings if calibration else ():
         yield f"The calibration: {warning[0].lower()}{warning[1:]}"
     if not uncertainty_known:

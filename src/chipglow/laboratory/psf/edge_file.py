@@ -6,7 +6,7 @@ from pathlib import Path
 
 from chipglow.io import is_measurement, is_scene
 from chipglow.laboratory.measurement import (
-    UniformObjects,
+    FlatFieldSources,
     bad_pixels_of,
     load_calibration,
     load_description,
@@ -52,10 +52,10 @@ def load_edge(
         calibration = load_calibration(described.calibration)
         recording = replace(recording, band=recording.band or calibration.band)
     try:
-        uniform = UniformObjects().of(described, recording)
+        uniform = FlatFieldSources().of(described, recording)
         signal, flags = repaired_signal(
             recording,
-            uniform.correction if uniform and described.uniform.correct else None,
+            uniform.correction if uniform and described.flat_field.correct else None,
             bad_pixels_of(described, recording, uniform),
         )
         return counts_image(recording, signal, flags, name, region)

@@ -21,7 +21,7 @@ _BLOCK: Final = 5
 _ROUGHLY: Final = 1e-5
 _LEAST_PILE: Final = 10
 _CLIPPED_SHARE: Final = 0.02
-_WHOLE_SQUARE: Final = "the whole square of a sensor takes light (fill factor 1)."
+_WHOLE_SQUARE: Final = "the whole square of a pixel takes light (fill factor 1)."
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,14 +37,14 @@ class EdgeImage:
     dead, saturated, below : ndarray
         Which pixels have no value, are too bright or are too dark for the camera, shape (y, x).
     footprint : float
-        Side of a sensor's sensitive square in m.
+        Side of a pixel's sensitive square in m.
     wavelength : float, optional
         Middle of the camera's band in m.
     name : str
         What it is called in messages.
     notes : tuple of str
         What is assumed of it, a sentence each.
-    doubts : tuple of str
+    warnings : tuple of str
         Why it may not be trusted, a sentence each.
     unit : str
         Of the radiance: counts where no calibration is needed.
@@ -60,12 +60,12 @@ class EdgeImage:
     wavelength: float | None
     name: str
     notes: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     unit: str = "W/(m² sr)"
 
     @property
     def pitch(self) -> float:
-        """Distance between sensors in m."""
+        """Distance between pixels in m."""
         return float(self.x[1] - self.x[0])
 
     @property
@@ -110,7 +110,7 @@ def edge_image(
         footprint=image.pitch * sqrt(float(attributes.get("fill_factor", 1.0))),
         wavelength=(band.lower + band.upper) / 2 if band else None,
         notes=tuple(notes),
-        doubts=tuple(str(attributes.get("doubtful", "")).splitlines()),
+        warnings=tuple(str(attributes.get("doubtful", "")).splitlines()),
     )
 
 
@@ -142,12 +142,12 @@ def counts_image(
     """
     if recording.pitch is None:
         raise ValueError(
-            "pitch: is missing, the file does not say it, expected the distance between sensors "
+            "pitch: is missing, the file does not say it, expected the distance between pixels "
             "on the object such as 6 um"
         )
     raster = Raster(0.0, 0.0, recording.pitch, *signal.shape[1:])
     # No camera counts less than nothing: there, the dark side is cut off.
-    cut = np.where(recording.signal <= 0, Flag.BELOW_FLOOR, 0).astype(np.uint8)
+    cut = np.where(recording.signal <= 0, Flag.UNDER_RANGE, 0).astype(np.uint8)
     image = _mean_image(signal, flags | cut, raster, name, region)
     notes = [
         *recording.assumptions,
@@ -163,7 +163,7 @@ def counts_image(
         footprint=image.pitch * sqrt(recording.fill_factor or 1.0),
         wavelength=(band.lower + band.upper) / 2 if band else None,
         notes=tuple(notes),
-        doubts=recording.doubts,
+        warnings=recording.warnings,
         unit="counts",
     )
 
@@ -190,7 +190,7 @@ def _mean_image(
         raster.y[part[0]],
         ((told & (Flag.DEAD | Flag.REPLACED)) != 0) | ~np.isfinite(radiance),
         (told & Flag.SATURATED) != 0,
-        (told & Flag.BELOW_FLOOR) != 0,
+        (told & Flag.UNDER_RANGE) != 0,
         raster.spacing,
         None,
         name,
@@ -201,9 +201,9 @@ def _notes(measurement: Measurement) -> tuple[str, ...]:
     notes = str(measurement.data.attrs.get("assumed", "")).splitlines()
     if "fill_factor" not in measurement.data.attrs:
         notes.append(_WHOLE_SQUARE)
-    if measurement.data.attrs.get("psf_order") == "sensor":
+    if measurement.data.attrs.get("psf_order") == "detector":
         notes.append(
-            "each sensor's square acts once; this camera was simulated with psf_order sensor, "
+            "each pixel's square acts once; this camera was simulated with psf_order pixel, "
             "where it acts twice, and the second time is counted as optics."
         )
     return tuple(notes)
@@ -212,8 +212,8 @@ def _notes(measurement: Measurement) -> tuple[str, ...]:
 def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
     """Find the edge in an image, and the pixels that tell of it.
 
-    Where pixels are saturated or below the floor, all pixels from there on outward are left out:
-    to leave out only those whose noise goes over the limit would shift the mean of the others.
+    Where pixels are saturated or under range, all pixels from there on outward are left
+    out: to leave out only those whose noise goes over the limit would shift the mean of the others.
 
     Parameters
     ----------
@@ -239,20 +239,20 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
         line, straightness = find_edge(np.where(image.dead, np.nan, image.radiance), x, y)
         pixels = _pixels_of(image, x, y, line)
         quick = _quick_fit(pixels)
-        doubts = _bent(straightness, image)
+        warnings = _bent(straightness, image)
         limits, clipped = _limits(image, x, y, line)
-        doubts += clipped
+        warnings += clipped
         if clipped:
             pixels = _within_limits(pixels, line, limits)
             quick = _quick_fit(pixels)
         else:
             _check_edge(pixels, quick)
         pixels, outliers = _without_outliers(pixels, quick)
-        doubts += outliers
+        warnings += outliers
         _check_single(pixels, quick)
     except NoEdgeError as error:
         raise NoEdgeError(f"{image.name}: {error}") from None
-    said = [f"{image.name}: {doubt}" for doubt in (*image.doubts, *doubts)]
+    said = [f"{image.name}: {warning}" for warning in (*image.warnings, *warnings)]
     noise = float(np.std(pixels.radiance - quick.predicted(0, pixels)))
     pixels = replace(pixels, sigma=np.full(pixels.x.size, max(noise, 1e-300)))
     # A Gaussian with a free step can put the edge of a clipped image far away.
@@ -317,7 +317,9 @@ def _limits(
         said.append(_clipped_text(image.saturated, "saturated", "bright", high))
     if image.below.any():
         low = -_first_clipped(-distance, image.below & ~image.dead, image.pitch)
-        said.append(_clipped_text(image.below, "below the camera's floor", "dark", -low))
+        said.append(
+            _clipped_text(image.below, "below the camera's lower range limit", "dark", -low)
+        )
     return (low, high), said
 
 

@@ -60,16 +60,16 @@ class LineSpread:
 
 @dataclass(frozen=True, eq=False)
 class TransferFunction:
-    """Modulation transfer function of optics and sensor along the edge's normal.
+    """Modulation transfer function of optics and pixel along the edge's normal.
 
     Parameters
     ----------
     frequency : ndarray
-        Spatial frequency in 1/m, shape (n,), up to twice the sensors' Nyquist frequency.
+        Spatial frequency in 1/m, shape (n,), up to twice the pixels' Nyquist frequency.
     value, uncertainty : ndarray
         Measured, and its standard uncertainty.
     model, optics : ndarray
-        That of the fitted model with the sensor, and of its optics alone.
+        That of the fitted model with the pixel, and of its optics alone.
     """
 
     frequency: NDArray[np.float64]

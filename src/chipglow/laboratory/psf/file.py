@@ -42,7 +42,7 @@ def write_psf(
             "fwhm": knife.fwhm,
             "fwhm_uncertainty": knife.fwhm_uncertainty,
             "model": knife.best.model.name,
-            "doubtful": "\n".join(knife.doubts),
+            "doubtful": "\n".join(knife.warnings),
             "assumed": "\n".join(knife.assumptions),
         },
     )

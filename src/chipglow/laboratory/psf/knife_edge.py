@@ -84,7 +84,7 @@ class EdgeResult:
     fwhm, fwhm_uncertainty : float
         Full width at half maximum in m by this edge alone, and its standard uncertainty.
     line_fwhm : float
-        Full width at half maximum of the line-spread function in m: optics and sensor.
+        Full width at half maximum of the line-spread function in m: optics and pixel.
     """
 
     image: EdgeImage
@@ -111,7 +111,7 @@ class KnifeEdge:
         criterion first.
     apertures : ApertureSignals or None
         Signals of apertures that were fitted with the edges.
-    doubts : tuple of str
+    warnings : tuple of str
         Why results may not be trusted, a sentence each.
     assumptions : tuple of str
         What had to be assumed, a sentence each.
@@ -120,7 +120,7 @@ class KnifeEdge:
     edges: tuple[EdgeResult, ...]
     fits: tuple[ModelFit, ...]
     apertures: ApertureSignals | None
-    doubts: tuple[str, ...]
+    warnings: tuple[str, ...]
     assumptions: tuple[str, ...]
 
     @cached_property
@@ -193,7 +193,7 @@ class KnifeEdge:
         ----------
         part : {"optics", "system"}
             That of the optics alone, for a camera whose ``psf_order`` is ``optics``; or that of
-            optics and sensor together, as an edge shows it.
+            optics and pixel together, as an edge shows it.
         model : str, optional
             Name of a model, or ``radial`` for the one without a model; the best by default.
 
@@ -240,7 +240,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
         raise ValueError("edges: none is given, expected an image or more")
     read = [usable_pixels(image) for image in images]
     edges = [pixels for pixels, _ in read]
-    doubts = [doubt for _, said in read for doubt in said]
+    warnings = [warning for _, said in read for warning in said]
     signals = aperture_signals(apertures, images[0].footprint) if apertures else None
     models, assumptions = _models(images, edges)
     assumptions += dict.fromkeys(note for image in images for note in image.notes)
@@ -260,10 +260,10 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
         _result(best, k, images[k], edges[k], spreads[k], alone) for k in range(len(edges))
     )
     for k, result in enumerate(results):
-        doubts += _edge_doubts(best, k, result)
-    doubts += _fit_doubts(best, results)
-    doubts += _aperture_doubts(best, signals) if signals is not None else []
-    return KnifeEdge(results, tuple(fits), signals, tuple(doubts), tuple(assumptions))
+        warnings += _edge_doubts(best, k, result)
+    warnings += _fit_doubts(best, results)
+    warnings += _aperture_doubts(best, signals) if signals is not None else []
+    return KnifeEdge(results, tuple(fits), signals, tuple(warnings), tuple(assumptions))
 
 
 def _models(
@@ -345,42 +345,42 @@ def _edge_doubts(best: ModelFit, k: int, result: EdgeResult) -> list[str]:
     """What of an edge's place may make the results wrong."""
     pixels, name = result.pixels, result.image.name
     distance = best.edges[k].line.distance(pixels.x, pixels.y)
-    doubts = []
+    warnings = []
     core = np.sort(distance[np.abs(distance) < max(best.fwhm, 2 * pixels.pitch)])
     gap = float(np.diff(core).max()) if core.size > 1 else pixels.pitch
     if gap > 1.05 * pixels.pitch / BINS_PER_PITCH:
-        doubts.append(
+        warnings.append(
             f"{name}: with a tilt of {degrees(best.edges[k].line.tilt):.2f} deg the pixels lie at "
             f"distances up to {gap * 1e6:.2g} um apart, not at a quarter of the pitch: beyond "
             f"{0.5 / gap / 1e3:.3g} /mm the MTF is aliased; tilt the edge by 2 deg to 10 deg."
         )
     short = min(-float(distance.min()), float(distance.max()))
     if short < _PLATEAU * result.line_fwhm:
-        doubts.append(
+        warnings.append(
             f"{name}: only {short * 1e6:.3g} um of one side of the edge are seen, under "
             f"{_PLATEAU:g} widths: tails and brightness of the side cannot be told apart."
         )
-    return doubts
+    return warnings
 
 
 def _fit_doubts(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
     """What of the best fit may make the results wrong."""
-    doubts = []
+    warnings = []
     footprint = max(edge.image.footprint for edge in edges)
     if best.fwhm < _UNRESOLVED * footprint or best.fwhm_uncertainty > 0.5 * best.fwhm:
-        doubts.append(
-            f"the optics' width of {best.fwhm * 1e6:.2g} um is hardly seen beside the sensor's "
+        warnings.append(
+            f"the optics' width of {best.fwhm * 1e6:.2g} um is hardly seen beside the pixel's "
             f"{footprint * 1e6:.3g} um: take it for an upper limit."
         )
     left = max(_left(edge) for edge in edges)
     if best.misfit > _MISFIT and left > _NOTHING:
-        doubts.append(
+        warnings.append(
             f"no model fits: the best, {best.model.name}, leaves {sqrt(best.misfit):.2g} times the "
             f"noise in the means at a distance, {100 * left:.2g} % of the step near the edge; "
             "uncertainties are enlarged by it, and the point spread function without a model "
             "(radial) may be nearer."
         )
-    return doubts
+    return warnings
 
 
 def _aperture_doubts(best: ModelFit, signals: ApertureSignals) -> list[str]:
@@ -405,7 +405,7 @@ def _left(edge: EdgeResult) -> float:
 
 
 def _with_sensor(optics: PointSpreadFunction, footprint: float) -> MeasuredPSF:
-    """Kernel of optics and a square sensor."""
+    """Kernel of optics and a square pixel."""
     spacing = footprint / _SUBSAMPLES
     kernel = np.pad(optics.kernel(spacing), _SUBSAMPLES // 2)
     # A mean over squares of sum 1 leaves rounding below 0 where there is no light.

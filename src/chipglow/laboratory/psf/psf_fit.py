@@ -1,6 +1,6 @@
 """Fit of a model of the optics to the pixels of edges and to the signals of apertures, all at once.
 
-Every pixel is compared with the model at its own distance from the edge, with the sensor's
+Every pixel is compared with the model at its own distance from the edge, with the pixel's
 footprint as it lies to the edge: nothing is binned, so that the edge's angle and place, which are
 fitted with the rest, broaden nothing.
 """
@@ -39,7 +39,7 @@ class EdgePixels:
     sigma : ndarray
         Standard deviation of their noise in W/(m² sr), shape (n,).
     pitch, footprint : float
-        Distance between sensors, and side of a sensor's sensitive square, in m.
+        Distance between pixels, and side of a pixel's sensitive square, in m.
     line : EdgeLine
         About where the edge is.
     """
@@ -71,7 +71,7 @@ class ApertureSignals:
     radii : tuple of ndarray
         Distances of those pixels from the aperture's middle in m.
     footprint : float
-        Side of a sensor's sensitive square in m.
+        Side of a pixel's sensitive square in m.
     outside : float
         Radiance beside the apertures in W/(m² sr): the background, and what tails add to it.
     """
@@ -186,7 +186,7 @@ class ModelFit:
         return self.model.psf(self.values)
 
     def response(self, edge: int, pixels: EdgePixels) -> EdgeResponse:
-        """Edge-spread function of optics and sensor for one of the edges, from 0 to 1."""
+        """Edge-spread function of optics and pixel for one of the edges, from 0 to 1."""
         return _response(self.model, self.values, self.edges[edge].line, pixels)
 
     def predicted(self, edge: int, pixels: EdgePixels) -> NDArray[np.float64]:

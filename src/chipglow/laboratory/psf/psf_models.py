@@ -421,7 +421,7 @@ class EllipticalModel(PSFModel):
 
 @dataclass(frozen=True, eq=False)
 class EdgeResponse:
-    """Edge-spread function of optics and sensor, a curve through even samples.
+    """Edge-spread function of optics and pixel, a curve through even samples.
 
     Parameters
     ----------
@@ -465,7 +465,7 @@ def edge_response(
     footprint: float,
     reach: float,
 ) -> EdgeResponse:
-    """Edge-spread function of optics and sensor.
+    """Edge-spread function of optics and pixel.
 
     Parameters
     ----------
@@ -495,7 +495,7 @@ def edge_response(
 def footprint_transfer(
     frequency: NDArray[np.float64], angle: float, footprint: float
 ) -> NDArray[np.float64]:
-    """Transfer function of a square sensor along a direction; shapes and units as above."""
+    """Transfer function of a square pixel along a direction; shapes and units as above."""
     across, down = footprint * cos(angle), footprint * sin(angle)
     return np.asarray(np.sinc(frequency * across) * np.sinc(frequency * down))
 
@@ -515,7 +515,7 @@ def disc_response(
     diameter : float
         The disc's in m.
     radii : ndarray
-        Distances from its middle in m of the sensors whose mean is taken.
+        Distances from its middle in m of the pixels whose mean is taken.
     footprint : float
         Side of the sensitive square in m.
 

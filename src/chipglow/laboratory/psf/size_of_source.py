@@ -80,7 +80,7 @@ def aperture_signals(images: Sequence[ApertureImage], footprint: float) -> Apert
     images : sequence of ApertureImage
         Three apertures or more before the same source.
     footprint : float
-        Side of a sensor's sensitive square in m.
+        Side of a pixel's sensitive square in m.
 
     Raises
     ------

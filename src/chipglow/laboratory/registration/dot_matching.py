@@ -53,13 +53,13 @@ class DotMatch:
     ----------
     first, second : ndarray
         Numbers of the dots in both images that belong together, shape (n,).
-    doubts : tuple of str
+    warnings : tuple of str
         Why it cannot be trusted, a sentence each.
     """
 
     first: NDArray[np.int64]
     second: NDArray[np.int64]
-    doubts: tuple[str, ...]
+    warnings: tuple[str, ...]
 
 
 def match_dots(first: Arrangement, second: Arrangement) -> DotMatch:
@@ -83,7 +83,7 @@ def match_dots(first: Arrangement, second: Arrangement) -> DotMatch:
     an affine map. A dot that the other image should show, and does not, speaks against a placement
     as three that match speak for it. A regular grid matches itself one column further as well
     where nothing beyond its border is seen: then there is another placement that is contradicted
-    by no more than one dot more, and that is a doubt.
+    by no more than one dot more, and that is a warning.
     """
     tree = KDTree(second.pixels)
     spacing = float(np.median(tree.query(second.pixels, 2)[0][:, 1]))
@@ -126,7 +126,7 @@ class _Placement:
 def _rivals(
     best: _Placement, judged: list[_Placement], first: NDArray[np.float64], spacing: float
 ) -> tuple[str, ...]:
-    """A doubt for the best other placement that hardly more speaks against."""
+    """A warning for the best other placement that hardly more speaks against."""
     others = [
         other
         for other in judged

@@ -98,7 +98,7 @@ def fit_dots(
     infrared : ndarray
         Radiance, NaN where it is not known; shape `raster.shape`.
     raster : Raster
-        The infrared sensors.
+        The infrared pixels.
     visible : ndarray
         Brightness, shape (rows, columns).
     model : {"similarity", "affine", "homography"}
@@ -112,9 +112,9 @@ def fit_dots(
     Notes
     -----
     The dots of both images are put to each other by their arrangement (`match_dots`), their middles
-    are the points of `fit_points`. It is a doubt if they scatter more than three times what the
+    are the points of `fit_points`. It is a warning if they scatter more than three times what the
     uncertainty of the middles explains: then the map is of another kind than the model. A fiftieth
-    of a sensor is added for the shift, and for each slope at the image's corner, for what all dots
+    of a pixel is added for the shift, and for each slope at the image's corner, for what all dots
     have in common: light and blurred skirts that are not quite as the fit takes them.
     """
     dots = find_dots(infrared, "infrared image"), find_dots(visible, "visible picture")
@@ -131,9 +131,9 @@ def fit_dots(
     scale = raster.spacing * np.sqrt(abs(np.linalg.det(fit.registration.jacobian(positions))))
     variance = (scale * dots[0].uncertainty[match.first]) ** 2
     expected = float(np.sqrt((variance + dots[1].uncertainty[match.second] ** 2).mean()))
-    doubts = (*fit.registration.doubts, *match.doubts, *_scattered(fit.scatter, expected))
+    warnings = (*fit.registration.warnings, *match.warnings, *_scattered(fit.scatter, expected))
     covariance = fit.registration.covariance + _systematic(fit.registration, raster)
-    found = replace(fit.registration, covariance=covariance, method="dots", doubts=doubts)
+    found = replace(fit.registration, covariance=covariance, method="dots", warnings=warnings)
     return DotFit(replace(fit, registration=found), positions, pixels, *dots)
 
 

@@ -36,7 +36,7 @@ def draw_registration(
     temperature : ndarray
         Radiance temperature in K, NaN where there is none, shape `raster.shape`.
     raster : Raster
-        The infrared sensors.
+        The infrared pixels.
     visible : ndarray
         Brightness, shape (rows, columns).
     tool : Tool, optional

@@ -30,7 +30,7 @@ class RegistrationDescription(Settings[Registration]):
     matrix: _Rows = described(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), "The map.")
     covariance: _Rows = described(((0.0,) * 9,) * 9, "Of the elements of the matrix.")
     degrees_of_freedom: float | None = described(None, "Of the covariance; none: infinite.")
-    doubts: Annotated[tuple[str, ...], Strict(False)] = described((), "Why it is not trusted.")
+    warnings: Annotated[tuple[str, ...], Strict(False)] = described((), "Why it is not trusted.")
 
     def build(self) -> Registration:
         """The registration."""
@@ -43,7 +43,7 @@ class RegistrationDescription(Settings[Registration]):
             self.model,
             self.method,
             np.inf if self.degrees_of_freedom is None else self.degrees_of_freedom,
-            self.doubts,
+            self.warnings,
         )
 
 
@@ -62,7 +62,7 @@ def write_registration(registration: Registration, path: str | Path) -> None:
         "matrix": registration.matrix.tolist(),
         "covariance": registration.covariance.tolist(),
         "degrees_of_freedom": registration.degrees_of_freedom if finite else None,
-        "doubts": list(registration.doubts),
+        "warnings": list(registration.warnings),
     }
     text = _HEAD + yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=100)
     with atomic_path(path) as temporary:

@@ -61,7 +61,7 @@ class ImageFit:
     registration : Registration
         The map.
     information : float
-        Mutual information of the images as they lie on each other, in bits a sensor.
+        Mutual information of the images as they lie on each other, in bits a pixel.
     common_edges : float
         How well their edges lie on each other: what the registration makes as great as it can.
     placement : float
@@ -92,7 +92,7 @@ def fit_images(
     infrared : ndarray
         Radiance, NaN where it is not known; shape `raster.shape`.
     raster : Raster
-        The infrared sensors.
+        The infrared pixels.
     visible : ndarray
         Brightness, shape (rows, columns).
     model : {"similarity", "affine", "homography"}
@@ -115,8 +115,8 @@ def fit_images(
     alone would be off by several pixels where heat spreads beyond what is seen. Radiance is taken
     as it is: the logarithm, or the temperature, of a blurred edge lies beyond the edge.
 
-    The covariance is that of an estimate which maximises a sum over blocks of 16 x 16 sensors (the
-    sandwich of Huber, 1967), so that neighbours need not be independent. Half a sensor is added
+    The covariance is that of an estimate which maximises a sum over blocks of 16 x 16 pixels (the
+    sandwich of Huber, 1967), so that neighbours need not be independent. Half a pixel is added
     for each parameter, at the image's corner, for what is systematic: an edge of heat beside the
     edge that is seen.
     """
@@ -134,13 +134,13 @@ def fit_images(
     spread, flat = _sandwich(fine, frame, matrix, basis)
     full, covariance = frame.undone(matrix, basis @ spread @ basis.T)
     found = Registration(full, covariance, model, "mutual-information")
-    doubts = (
+    warnings = (
         *(() if score > chance.max() else (_BY_CHANCE,)),
         *_rivals(fits[::-1], fine, frame),
         *((_NO_OPTIMUM,) if flat else _unsure(found, raster)),
     )
     return ImageFit(
-        replace(found, doubts=doubts),
+        replace(found, warnings=warnings),
         _information(fine, frame, matrix),
         _common_edges(fine, frame, matrix, basis)[0],
         score,
@@ -514,7 +514,7 @@ def _information(level: _Level, frame: NormalisedFrame, matrix: NDArray[np.float
 def _rivals(
     fits: list[tuple[NDArray[np.float64], float]], level: _Level, frame: NormalisedFrame
 ) -> tuple[str, ...]:
-    """A doubt for the best other placement that is nearly as good."""
+    """A warning for the best other placement that is nearly as good."""
     best, most = fits[0]
     for matrix, common in fits[1:]:
         distance = _apart(best, matrix, level, frame)

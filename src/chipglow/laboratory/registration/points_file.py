@@ -29,7 +29,7 @@ def read_points(
         ``infrared_column,infrared_row,visible_column,visible_row``, then a point a line. Columns
         and rows count from 0 in the middle of the upper left pixel.
     raster : Raster
-        The infrared sensors.
+        The infrared pixels.
     shape : tuple of int
         Rows and columns of the visible picture.
 

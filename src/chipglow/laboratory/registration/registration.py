@@ -44,7 +44,7 @@ class Registration:
     degrees_of_freedom : float
         Of the covariance: Student's t with so many gives the intervals; infinite for mutual
         information.
-    doubts : tuple of str
+    warnings : tuple of str
         Why it cannot be trusted, a sentence each; empty if nothing speaks against it.
 
     Raises
@@ -58,7 +58,7 @@ class Registration:
     model: Model
     method: Method
     degrees_of_freedom: float = np.inf
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name, value, shape in (
@@ -136,16 +136,16 @@ class Registration:
         Parameters
         ----------
         image : ndarray
-            Values on the infrared camera's sensors, shape `raster.shape`.
+            Values on the infrared camera's pixels, shape `raster.shape`.
         raster : Raster
-            The sensors.
+            The pixels.
         shape : tuple of int
             Rows and columns of the visible picture.
 
         Returns
         -------
         ndarray
-            The value of the nearest sensor for each visible pixel, NaN where there is none.
+            The value of the nearest pixel for each visible pixel, NaN where there is none.
         """
         rows, columns = np.indices(shape)
         place = self.positions(np.stack([columns, rows], axis=-1))
@@ -223,13 +223,13 @@ def fit_points(positions: ArrayLike, pixels: ArrayLike, model: Model = "affine")
     inverse = np.linalg.inv(slope.T @ slope)
     misplaced = _misplaced(residual, slope @ inverse @ slope.T, variance, freedom)
     full, spread = frame.undone(matrix, basis @ (variance * inverse) @ basis.T)
-    doubts = tuple(
+    warnings = tuple(
         f"point {i + 1} is {hypot(*(residual.reshape(-1, 2)[i] * frame.pixel_scale)):.3g} visible "
         "pixels from where the others expect it"
         for i in np.flatnonzero(misplaced)
     )
     return PointFit(
-        Registration(full, spread, model, "points", float(freedom), doubts),
+        Registration(full, spread, model, "points", float(freedom), warnings),
         residual.reshape(-1, 2) * frame.pixel_scale,
         float(np.sqrt(variance)) * frame.pixel_scale,
         misplaced,

@@ -43,7 +43,7 @@ class TimeAlignment:
         Of both signals as they lie on each other.
     degrees_of_freedom : float
         Of the covariance.
-    doubts : tuple of str
+    warnings : tuple of str
         Why it cannot be trusted, a sentence each.
     """
 
@@ -53,7 +53,7 @@ class TimeAlignment:
     covariance: NDArray[np.float64]
     correlation: float
     degrees_of_freedom: float
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def visible_time(self, infrared_time: NDArray[np.float64]) -> NDArray[np.float64]:
         """Times of the visible camera's clock in s."""
@@ -112,12 +112,12 @@ def align_times(
     fitted, covariance, freedom, correlation = _refined(
         infrared_times - reference, target, spline, float(offsets[best]) + reference, drift
     )
-    doubts = (
+    warnings = (
         *_chance(correlation, freedom, len(offsets)),
         *_rivals(offsets, correlations, best, len(target)),
     )
     return TimeAlignment(
-        fitted[0] - reference, fitted[1], reference, covariance, correlation, freedom, doubts
+        fitted[0] - reference, fitted[1], reference, covariance, correlation, freedom, warnings
     )
 
 
@@ -172,7 +172,7 @@ def region_signals(
     infrared : ndarray
         Radiance, shape (time, y, x).
     raster : Raster
-        The infrared sensors.
+        The infrared pixels.
     visible : ndarray
         Brightness, shape (frame, row, column).
     region : tuple of float
@@ -305,7 +305,7 @@ def _refined(
 
 
 def _chance(correlation: float, freedom: float, offsets: int) -> tuple[str, ...]:
-    """A doubt where one of so many offsets would have such a correlation by chance."""
+    """A warning where one of so many offsets would have such a correlation by chance."""
     rest = max(1.0 - correlation**2, 1e-15)
     likely = 2 * float(student.sf(abs(correlation) * np.sqrt(freedom / rest), freedom)) * offsets
     if likely < _CHANCE:
@@ -319,7 +319,7 @@ def _chance(correlation: float, freedom: float, offsets: int) -> tuple[str, ...]
 def _rivals(
     offsets: NDArray[np.float64], correlations: NDArray[np.float64], best: int, count: int
 ) -> tuple[str, ...]:
-    """A doubt for the best other offset that is nearly as likely, beyond the best one's peak."""
+    """A warning for the best other offset that is nearly as likely, beyond the best one's peak."""
     squares = correlations**2
     below = squares < squares[best] / 2
     left = np.flatnonzero(below[:best])

@@ -1,4 +1,4 @@
-"""Tools on the command line: told, described in a file, or found in the image."""
+"""The tool that is meant: stated, described in a file, or found in the image."""
 
 from dataclasses import dataclass
 from math import degrees, hypot
@@ -7,7 +7,9 @@ from typing import Final
 import numpy as np
 
 from chipglow.camera import Measurement
-from chipglow.laboratory.chip import FoundTool, ToolUncertainty, find_tool, tool_of
+from chipglow.laboratory.chip.find_tool import FoundTool, find_tool
+from chipglow.laboratory.chip.tool_description import tool_of
+from chipglow.laboratory.chip.tool_position import ToolUncertainty
 from chipglow.scene import Tool
 
 _FACE: Final = 200e-6
@@ -25,7 +27,7 @@ class ChosenTool:
     ----------
     tool : Tool
         The tool in the measurement's coordinates.
-    found, assumptions, doubts : tuple of str
+    found, assumptions, warnings : tuple of str
         What was found, what was assumed, and why it may not be relied on.
     uncertainty : ToolUncertainty, optional
         How well its place is known, if it was found and no option tells an uncertainty.
@@ -34,7 +36,7 @@ class ChosenTool:
     tool: Tool
     found: tuple[str, ...] = ()
     assumptions: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     uncertainty: ToolUncertainty | None = None
 
 
@@ -65,7 +67,7 @@ def chosen_tool(
         return ChosenTool(tool_of(measurement, None))
     if tool != "found":
         told = tool_of(measurement, tool)
-        return ChosenTool(told, doubts=_contradictions(measurement, told))
+        return ChosenTool(told, warnings=_contradictions(measurement, told))
     found = find_tool(measurement)
     shape = found.tool.tool
     assumed = (
@@ -74,11 +76,11 @@ def chosen_tool(
     )
     used = found.uncertainty if position is None else None
     said = (_found(found), _position(found.uncertainty, position))
-    return ChosenTool(found.tool, said, (assumed,), found.doubts, used)
+    return ChosenTool(found.tool, said, (assumed,), found.warnings, used)
 
 
 def _contradictions(measurement: Measurement, told: Tool) -> tuple[str, ...]:
-    """A doubt, if the image clearly shows a rake face elsewhere than where the tool's is said."""
+    """A warning, if the image clearly shows a rake face elsewhere than where the tool's is said."""
     try:
         found = find_tool(measurement)
     except ValueError:
