@@ -8,6 +8,7 @@ from chipglow.camera.calibration.calibration import (
     MakersCalibration,
     SakumaHattori,
 )
+from chipglow.camera.calibration.errors import CalibrationErrors
 from chipglow.camera.calibration.fit import CalibrationFit, fit_linear, fit_sakuma_hattori
 from chipglow.camera.camera import Camera
 from chipglow.camera.detector.bad_pixels import (
@@ -37,6 +38,7 @@ __all__ = [
     "BadPixels",
     "Blackbody",
     "Calibration",
+    "CalibrationErrors",
     "CalibrationFit",
     "Camera",
     "ChipglowWarning",

@@ -8,11 +8,13 @@ from chipglow.camera.calibration.calibration import (
     MakersCalibration,
     SakumaHattori,
 )
+from chipglow.camera.calibration.errors import CalibrationErrors
 from chipglow.camera.calibration.fit import CalibrationFit, fit_linear, fit_sakuma_hattori
 
 __all__ = [
     "Blackbody",
     "Calibration",
+    "CalibrationErrors",
     "CalibrationFit",
     "FittedCalibration",
     "LinearCalibration",
