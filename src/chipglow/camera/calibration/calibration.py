@@ -9,11 +9,12 @@ from typing import Any, ClassVar, Final, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.camera.calibration.errors import CalibrationErrors
+from chipglow.camera.calibration.errors import CALIBRATION, CalibrationErrors
 from chipglow.camera.recording import PlanckConversion
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT
+from chipglow.uncertainty.estimate import factor
 
 _CHECKED: Final = 101
 _NODES: Final = 513
@@ -169,11 +170,7 @@ class FittedCalibration(Calibration):
         (JCGM 100, Equation 13): at given counts S a change of the parameters moves the radiance by
         dL = −(∂S/∂p) dp (dL/dT) / (∂S/∂T).
         """
-        # Of correlations, for parameters are of very different sizes.
-        scale = np.sqrt(np.diag(self.covariance))
-        scale[scale == 0.0] = 1.0
-        values, directions = np.linalg.eigh(self.covariance / np.outer(scale, scale))
-        errors = scale[:, None] * directions * np.sqrt(np.maximum(values, 0.0))
+        errors = factor(self.covariance, CALIBRATION)
         return np.tensordot(errors.T, self._sensitivity(temperature), 1)
 
     def _sensitivity(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
