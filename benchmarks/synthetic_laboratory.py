@@ -44,11 +44,11 @@ from chipglow.camera import (
     fit_linear,
 )
 from chipglow.camera.exposure import Exposure
-from chipglow.cutting import Surroundings
 from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import read_calibration_points
 from chipglow.laboratory.emissivity import (
     KnownEmissivity,
+    ReflectedTemperature,
     determine_emissivity,
     load_regions,
     true_temperature,
@@ -412,7 +412,7 @@ class Evaluation:
             self.images("unknown-*.hcc"),
             found["fissure"],
             KnownEmissivity(1.0),
-            Surroundings(293.0, ROOM),
+            ReflectedTemperature(293.0, ROOM),
         )
         return {
             "black body": Found.of(unknown.estimate),
