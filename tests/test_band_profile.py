@@ -356,6 +356,13 @@ def test_the_command_writes_what_it_shows(file, tmp_path):
     values = [float(row["radiance_temperature_degC"] or "nan") for row in rows]
     there = np.isfinite(profile.points[..., 0])
     np.testing.assert_allclose(values, profile.temperature[there] - 273.15, atol=1e-3)
+    for cause in ("calibration", "position"):
+        parts = [float(row[f"{cause}_uncertainty_K"] or "nan") for row in rows]
+        expected = profile.estimate.contribution(cause)[there]
+        np.testing.assert_allclose(parts, expected, atol=1e-3)
+        (line,) = (line.split() for line in result.output.splitlines() if cause in line)
+        assert float(line[-1]) == pytest.approx(np.nanmax(expected), rel=0.05)
+    assert {row["tool_along_uncertainty_K"] for row in rows} == {""}
     assert [row["stage"] for row in rows].count("developing") == there[0].sum()
     with Image.open(tmp_path / "band.png") as picture:
         assert picture.width > 800

@@ -1,15 +1,20 @@
 """The calibration's and the tool's errors in what is read of a chip, by drawing them anew."""
 
+import csv
 from dataclasses import replace
 from math import cos, hypot, radians, sin
 
 import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
 from measured_band import BAND, RASTER, TOOL, BandImage, measured
+from typer.testing import CliRunner
 
 from chipglow.camera import CalibrationErrors, Measurement, fit_linear, fit_sakuma_hattori
+from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, rake_grid
+from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
 from chipglow.laboratory.comparison import StatedUncertainties, compare
 from chipglow.scene import PlacedTool
 from chipglow.uncertainty import Estimate, draw
@@ -253,6 +258,35 @@ def test_a_table_of_errors_without_its_radiance_is_refused():
     for wrong in (data.drop_vars("calibration_radiance"), data.transpose(..., "calibration_error")):
         with pytest.raises(ValueError, match=r"'calibration_errors' over .* is missing"):
             _ = Measurement(wrong).calibration_errors
+
+
+def test_the_command_writes_the_calibration_s_part(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_measurement(measured(images(600.0), relative_uncertainty=0.01), tmp_path / "m.nc")
+    result = CliRunner().invoke(app, ["rake", "m.nc", "--out", "grid.csv"])
+    assert result.exit_code == 0, result.output
+    estimate = rake_grid(read_measurement("m.nc")).estimate
+    with (tmp_path / "grid.csv").open(encoding="utf-8") as table:
+        rows = list(csv.DictReader(table))
+    for column in ("calibration_uncertainty_K", "standard_uncertainty_K"):
+        found = [float(row[column] or "nan") for row in rows]
+        expected = estimate.contribution("calibration").ravel()
+        np.testing.assert_allclose(found, expected, atol=1e-3)
+    most = np.nanmax(expected)
+    lines = [line.split() for line in result.output.splitlines()]
+    (line,) = (line for line in lines if line[:1] == ["calibration"])
+    assert float(line[-1]) == pytest.approx(most, rel=0.05)
+    assert "Errors of calibration move all squares together" in result.output
+
+
+@pytest.mark.parametrize("known", [0.01, None])
+def test_the_picture_has_a_band_where_the_calibration_is_known(known):
+    frames = measured(images(600.0), relative_uncertainty=known)
+    figure = draw_rake_grid(frames, rake_grid(frames))
+    profiles = figure.axes[1]
+    bands = [one for one in profiles.collections if isinstance(one, PolyCollection)]
+    assert bool(bands) is (known is not None)
+    assert ("standard uncertainty" in profiles.get_title("left")) is (known is not None)
 
 
 # Beside simulations
