@@ -26,7 +26,7 @@ from figure6 import figure_6
 SUB_FRAMES = 50
 STEP = 0.2e-6
 RASTER = Raster(-420e-6, 460e-6, 6e-6 / 9, 810, 900)
-CAMERA = Camera(psf=GaussianPSF(12e-6), psf_order="detector", floor=None)
+CAMERA = Camera(psf=GaussianPSF(12e-6), psf_order="detector", lower_limit=None)
 
 
 class GivenScene:

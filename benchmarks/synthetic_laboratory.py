@@ -46,11 +46,11 @@ from chipglow.camera import (
     fit_linear,
 )
 from chipglow.camera.exposure import Exposure
-from chipglow.cutting import Surroundings
 from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import read_calibration_points
 from chipglow.laboratory.emissivity import (
     KnownEmissivity,
+    ReflectedTemperature,
     determine_emissivity,
     load_regions,
     true_temperature,
@@ -328,7 +328,7 @@ class Laboratory:
         raster = Raster(0.0, 0.0, PITCH / SAMPLES, *radiance.shape)
         single = radiance.astype(np.float32)
         exposure = Exposure(0.0, INTEGRATION_TIME, raster, radiance, single, single, radiance)
-        camera = Camera(BAND, PITCH, psf=self.optics.psf, floor=None)
+        camera = Camera(BAND, PITCH, psf=self.optics.psf, lower_limit=None)
         return camera.form_measurement(exposure).radiance[0]
 
     def _edge(self, normal: float) -> NDArray[np.float64]:
@@ -414,7 +414,7 @@ class Evaluation:
             self.images("unknown-*.hcc"),
             found["fissure"],
             KnownEmissivity(1.0),
-            Surroundings(293.0, ROOM),
+            ReflectedTemperature(293.0, ROOM),
         )
         return {
             "blackbody": Found.of(unknown.estimate),

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import chipglow
-from chipglow.camera import Camera, Measurement
+from chipglow.camera import CalibrationErrors, Camera, Measurement
 from chipglow.laboratory.chip import (
     band_profile,
 )
@@ -65,7 +65,7 @@ def experiment(camera: Camera, scene: Scene, starts: np.ndarray) -> Measurement:
         clean.times,
         clean.raster,
         camera.lower_limit,
-        calibration_uncertainty=0.01 * radiance,
+        calibration_errors=CalibrationErrors(np.array([0.0, 1e6]), np.array([[0.0, 1e4]])),
     ).with_tool(clean.tool)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera import Measurement
+from chipglow.camera import CalibrationErrors, Measurement
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, ToolGeometry
 
@@ -87,13 +87,18 @@ def measured(
     temperature = np.stack(images)
     temperature = temperature + noise * generator.standard_normal(temperature.shape)
     radiance = np.asarray(BAND.radiance(temperature))
-    known = None if relative_uncertainty is None else relative_uncertainty * radiance
+    known = None
+    if relative_uncertainty is not None:
+        # A straight line from no radiance to more than any here.
+        known = CalibrationErrors(
+            np.array([0.0, 1e6]), np.array([[0.0, relative_uncertainty * 1e6]])
+        )
     return Measurement.from_radiance(
         radiance,
         BAND,
         1e-5 * np.arange(len(images)),
         raster,
         lower_limit=573.15,
-        calibration_uncertainty=known,
+        calibration_errors=known,
         attributes=attributes,
     ).with_tool(TOOL)

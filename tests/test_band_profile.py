@@ -26,6 +26,7 @@ from chipglow.laboratory.chip import (
 )
 from chipglow.laboratory.chip.band_figure import draw_band_profile
 from chipglow.scene import Line, PlacedTool
+from chipglow.uncertainty import Estimate, from_xarray
 
 PITCH = RASTER.spacing
 X, Y = np.meshgrid(RASTER.x, RASTER.y)
@@ -174,7 +175,7 @@ def test_pixels_under_the_floor_give_no_temperature():
     profile = band_profile(measured([temperature]), TOOL, curve=STRAIGHT)
     beyond = profile.points[0, :, 0] < -135e-6
     assert np.isnan(profile.temperature[0][beyond]).all()
-    assert np.isnan(profile.uncertainty[0][beyond]).all()
+    assert np.isnan(profile.estimate.standard_uncertainty[0][beyond]).all()
     assert np.isfinite(profile.temperature[0][profile.points[0, :, 0] > -115e-6]).all()
 
 
@@ -187,7 +188,7 @@ def test_the_calibration_s_uncertainty_becomes_kelvins():
     radiance = float(BAND.radiance(800.0))
     expected = float(BAND.temperature(1.02 * radiance)) - 800.0
     # The slope of the radiance rises by 1 % over the step.
-    np.testing.assert_allclose(profile.uncertainty[0], expected, rtol=0.02)
+    np.testing.assert_allclose(profile.estimate.standard_uncertainty[0], expected, rtol=0.02)
 
 
 @settings(max_examples=8, deadline=None)
@@ -206,7 +207,7 @@ def test_the_position_s_uncertainty_is_that_of_curves_that_are_off(shift, error)
     # of those of a Gaussian 3.3 pixels wide, and up to 0.1 K of what vanishes.
     middle = slice(5, -5)
     mean = np.sqrt((spread[middle] ** 2).mean())
-    stated = np.sqrt((profile.uncertainty[0][middle] ** 2).mean())
+    stated = np.sqrt((profile.estimate.standard_uncertainty[0][middle] ** 2).mean())
     assert stated == pytest.approx(mean, rel=0.15, abs=0.1)
 
 
@@ -313,7 +314,7 @@ def test_what_cannot_be_is_one_error(wrong, message):
 def test_a_profile_s_shapes_must_fit():
     line = Line(np.arange(3.0), np.zeros((3, 2)))
     three, ok = np.zeros((1, 3)), np.zeros(1)
-    parts = {"temperature": three, "calibration": three, "position": three, "offset": ok}
+    parts = {"estimate": Estimate(three), "offset": ok}
     common = {"reference": line, "distance": np.arange(3.0), "times": ok, "width": 0.0}
     with pytest.raises(ValueError, match=r"points has shape \(1, 3\)"):
         BandProfile(**common, **parts, points=three, stage=(Stage.NONE,))
@@ -355,6 +356,13 @@ def test_the_command_writes_what_it_shows(file, tmp_path):
     values = [float(row["radiance_temperature_degC"] or "nan") for row in rows]
     there = np.isfinite(profile.points[..., 0])
     np.testing.assert_allclose(values, profile.temperature[there] - 273.15, atol=1e-3)
+    for cause in ("calibration", "position"):
+        parts = [float(row[f"{cause}_uncertainty_K"] or "nan") for row in rows]
+        expected = profile.estimate.contribution(cause)[there]
+        np.testing.assert_allclose(parts, expected, atol=1e-3)
+        (line,) = (line.split() for line in result.output.splitlines() if cause in line)
+        assert float(line[-1]) == pytest.approx(np.nanmax(expected), rel=0.05)
+    assert {row["tool_along_uncertainty_K"] for row in rows} == {""}
     assert [row["stage"] for row in rows].count("developing") == there[0].sum()
     with Image.open(tmp_path / "band.png") as picture:
         assert picture.width > 800
@@ -375,8 +383,10 @@ def test_the_netcdf_file_holds_si_units(file, tmp_path):
     assert data.sizes["time"] == 1
     assert data.attrs["width"] == pytest.approx(12e-6)
     assert 600 < float(data["temperature"].mean()) < 800
-    both = np.hypot(data["uncertainty_calibration"], data["uncertainty_position"])
-    np.testing.assert_allclose(data["uncertainty"], both)
+    read = from_xarray(data, "temperature")
+    both = np.hypot(read.contribution("calibration"), read.contribution("position"))
+    np.testing.assert_allclose(data["standard_uncertainty"], both)
+    assert 1.5 < np.nanmax(read.contribution("calibration")) < 2.0
 
 
 @pytest.mark.parametrize(("count", "names"), [(2, 2), (13, 1)])

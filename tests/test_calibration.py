@@ -221,7 +221,7 @@ def test_errors_at_two_radiances_are_of_one_kind(fitted):
         fit = fitted(KELVINS - wrong, truth, BAND, 0.01, 0.3, 0.5)
         found.append(fit.calibration.radiance(counts))
     calibration = fitted(KELVINS, truth, BAND, 0.01, 0.3, 0.5).calibration
-    stated = calibration.radiance_covariance(BETWEEN)
+    stated = calibration.errors.estimate(BAND.radiance(BETWEEN)).covariance()
     scale = np.sqrt(np.diag(stated))
     np.testing.assert_allclose(scale, calibration.uncertainty(counts), rtol=1e-3)
     # Correlations of 400 repeats are known to 0.05 or better, deviations to 4 %: three times that.
@@ -265,7 +265,7 @@ def test_the_makers_conversion_is_of_unknown_uncertainty():
     counts = np.array([3000.0, 6000.0])
     kelvins = 3000.0 / np.log(1e5 / counts + 1.0)
     np.testing.assert_allclose(BAND.temperature(calibration.radiance(counts)), kelvins, rtol=1e-9)
-    assert calibration.uncertainty(counts) is None
+    assert calibration.errors is None
     assert "not known" in calibration.description
 
 

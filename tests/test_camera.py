@@ -16,6 +16,7 @@ from scipy.special import erf
 
 from chipglow.camera import (
     AnnularAperturePSF,
+    CalibrationErrors,
     Camera,
     ChipglowWarning,
     Exposure,
@@ -667,7 +668,7 @@ def test_exposures_of_different_grids_are_refused():
 def test_a_measurement_from_radiance_keeps_the_flags_that_are_known():
     radiance = Band(3.8e-6, 5.1e-6).radiance(np.array([[[400.0, 700.0, 800.0, 900.0]]]))
     flags = np.array([[[0, Flag.SATURATED, Flag.DEAD, Flag.REPLACED]]], np.uint8)
-    uncertainty = 0.01 * radiance
+    errors = CalibrationErrors(np.array([0.0, 1e6]), np.array([[0.0, 6e3], [0.0, -8e3]]))
     band = Band(3.8e-6, 5.1e-6)
     measured = Measurement.from_radiance(
         radiance,
@@ -676,12 +677,13 @@ def test_a_measurement_from_radiance_keeps_the_flags_that_are_known():
         Raster(0, 6e-6, 6e-6, 1, 4),
         573.15,
         flags,
-        uncertainty,
+        errors,
         {"camera": "one"},
     )
     temperature = measured.radiance_temperature()[0, 0]
     np.testing.assert_allclose(temperature, [np.nan, np.nan, np.nan, 900.0], rtol=1e-6)
     assert measured.flags.tolist() == [[[Flag.UNDER_RANGE, *flags[0, 0, 1:].tolist()]]]
-    np.testing.assert_array_equal(measured.calibration_uncertainty, uncertainty)
+    # 0.6 % and 0.8 % of other errors: 1 % of the radiance.
+    np.testing.assert_allclose(measured.calibration_uncertainty, 0.01 * radiance, rtol=1e-12)
     assert (measured.band, measured.raster.columns) == (band, 4)
     assert measured.data.attrs["camera"] == "one" and measured.data.attrs["lower_limit"] == 573.15

@@ -17,10 +17,11 @@ from typer.testing import CliRunner
 from chipglow.camera import Flag, Measurement
 from chipglow.cli import app
 from chipglow.io import write_measurement
-from chipglow.laboratory.comparison import StatedUncertainties, compare, normalised_error, reading
+from chipglow.laboratory.chip.frame_scatter import FrameScatter
+from chipglow.laboratory.comparison import StatedUncertainties, compare, normalised_error
 from chipglow.laboratory.comparison.comparison import SURE, _confidence
-from chipglow.laboratory.comparison.frame_scatter import FrameScatter
 from chipglow.scene import PlacedTool, ToolGeometry
+from chipglow.uncertainty import Estimate
 
 X, Y = np.meshgrid(RASTER.x, RASTER.y)
 CURVE = TOOL.edge_point + np.array([[-30e-6, 30e-6], [-230e-6, 230e-6]])
@@ -58,7 +59,9 @@ def slope_of(temperature):
 )
 def test_e_n_is_the_difference_over_its_expanded_uncertainty(away, first, second):
     one, other = (
-        reading(np.array([700.0 + shift]), *(np.array([part]) for part in parts))
+        Estimate([700.0 + shift])
+        .with_component("systematic", parts[0], independent="common")
+        .with_component("position", parts[1], independent="per element")
         for shift, parts in ((0.0, first), (away, second))
     )
     expected = abs(700.0 + away - 700.0) / (2 * hypot(*first, *second))
@@ -177,7 +180,7 @@ def test_a_pixel_without_light_does_not_take_the_uncertainty_away():
     radiance, flags = clean.radiance.copy(), clean.flags.copy()
     radiance[0, 20:30, 40:60], flags[0, 20:30, 40:60] = 0.0, Flag.DEAD
     damaged = Measurement.from_radiance(
-        radiance, BAND, clean.times, RASTER, 573.15, flags, 0.02 * radiance
+        radiance, BAND, clean.times, RASTER, 573.15, flags, clean.calibration_errors
     )
     result = compare(damaged, {"same": frames(field(X, Y))}, TOOL, CURVE)
     for part in (result.grid, result.band):
@@ -331,11 +334,6 @@ def test_impossible_uncertainties_are_refused(wrong):
         StatedUncertainties(**wrong)
 
 
-def test_a_reading_s_shapes_must_fit():
-    with pytest.raises(ValueError, match=r"random has shape \(2,\), expected \(3,\)"):
-        reading(np.zeros(3), np.zeros(3), np.zeros(2))
-
-
 # The command
 
 
@@ -429,15 +427,16 @@ def alike(generator, count=24, places=60, time=0.7, space=4.0):
 @pytest.mark.parametrize("known", [True, False])
 def test_noise_that_is_alike_makes_no_set_of_two_the_best(known):
     """Two sets as far from the truth: each may be called best in 5 % of the measurements."""
-    claims, repeats, none = 0, 60, np.zeros(60)
-    sets = [reading(np.full(60, 700.0 + away), none, none) for away in (10.0, -10.0)]
+    claims, repeats = 0, 60
+    sets = [Estimate(np.full(60, 700.0 + away)) for away in (10.0, -10.0)]
     for seed in range(repeats):
         shown = 700.0 + alike(np.random.default_rng(seed))
         scatter = FrameScatter.of(shown)
         alone = shown.std(axis=0, ddof=1) / sqrt(len(shown))
         mean = shown.mean(axis=0)
-        parts = (scatter.deviation, (), scatter) if known else (alone,)
-        found = reading(mean, none, *parts)
+        found = Estimate(mean).with_component("position", alone, independent="per element")
+        if known:
+            found = Estimate(mean, (scatter.component(),))
         best = int(np.argmin([((one.values - mean) ** 2).mean() for one in sets]))
         claims += _confidence(found, sets, best) >= SURE
     # Without the frames' own patterns 84 % are called so; binomial: 6 of 60 +- 2.3.
@@ -448,7 +447,7 @@ def test_noise_that_is_alike_makes_no_set_of_two_the_best(known):
 def of_mean(scatter):
     """Standard uncertainty of the mean over all places."""
     none = np.zeros(scatter.deviation.shape)
-    return reading(none, none, scatter.deviation, (), scatter).mean().standard_uncertainty
+    return Estimate(none, (scatter.component(),)).mean().standard_uncertainty
 
 
 def test_the_uncertainty_of_a_mean_over_frames_that_are_alike_is_theirs():

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from chipglow.camera import Camera, Flag
+from chipglow.camera import CalibrationErrors, Camera, Flag
 from chipglow.cli import app
 from chipglow.io import write_measurement
 from chipglow.laboratory.emissivity import (
@@ -218,7 +218,9 @@ def test_images_are_the_repetitions_where_there_are_several():
 
 def test_the_uncertainty_of_the_calibration_comes_from_the_measurement():
     put_in = table_1()
-    image = measured(put_in, calibration_uncertainty=np.full((1, *RASTER.shape), 5.0))
+    image = measured(
+        put_in, calibration_errors=CalibrationErrors(np.array([0.0, 1.0]), np.array([[5.0, 5.0]]))
+    )
     (hot, cold), _ = slopes()
     row = determine_emissivity([image], HEATING).of(WHOLE)
     # It is common to all pixels: a mean over them does not lessen it.

@@ -19,8 +19,8 @@ from chipglow.io.cameras import read_recording, write_hcc
 from chipglow.io.column_file import POINT_COLUMNS, read_bad_pixels, read_columns, read_response
 from chipglow.laboratory.measurement import (
     CalibrationDescription,
+    FlatFieldSources,
     MeasurementDescription,
-    UniformObjects,
     calibration_text,
     load_calibration,
     load_description,
@@ -611,7 +611,7 @@ def test_frames_that_correct_all_black_bodies_are_read_once(laboratory, monkeypa
 
 
 def test_frames_of_one_description_do_not_correct_recordings_of_another(laboratory):
-    objects = UniformObjects()
+    objects = FlatFieldSources()
     by_cold, by_hot = ([*CAMERA, f"flat_field.low={name}.npy"] for name in ("cold", "hot"))
     several = (by_cold, by_hot, CAMERA, by_cold)
     found = [uniform_counts("hot.npy", settings, objects) for settings in several]

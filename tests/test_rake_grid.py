@@ -252,5 +252,5 @@ def test_a_measurement_without_a_tool_needs_a_file():
     with pytest.raises(ValueError, match="already"):
         PlacedTool(PlacedTool(ToolGeometry(), (0.0, 0.0)), (0.0, 0.0))
     grid = rake_grid(measured(linear_image()), ToolGeometry())
-    with pytest.raises(ValueError, match="rake grid: mean has shape"):
+    with pytest.raises(ValueError, match="rake grid: estimate has shape"):
         replace(grid, along=grid.along[:-1])

@@ -324,7 +324,7 @@ def test_the_papers_emissivities_come_back_from_heated_objects(result):
             assert (row.deviations < paper.deviation).all()
     for chip in ("chip 1", "chip 2"):
         body, band = found[f"{chip} chip body"].found, found[f"{chip} shear band"].found
-        assert band.mean > body.mean + 2 * band.standard_uncertainty
+        assert band.mean > body.mean + 2 * band.estimate.standard_uncertainty
 
 
 def test_profiles_beside_the_rake_face_are_those_of_the_laboratory(result):

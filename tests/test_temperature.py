@@ -8,7 +8,7 @@ import xarray as xr
 from heated_chip import BAND, CELSIUS, RASTER, REGIONS, measured, table_1
 from typer.testing import CliRunner
 
-from chipglow.camera import Flag, Measurement, fit_linear
+from chipglow.camera import CalibrationErrors, Flag, Measurement, fit_linear
 from chipglow.cli import app
 from chipglow.io import write_measurement
 from chipglow.laboratory.emissivity import (
@@ -52,7 +52,7 @@ def developed(calibration, kelvins, emissivity, frames=1, noise=0.0, seed=0, roo
     counts = OFFSET + GAIN * true
     found = Measurement.from_radiance(
         calibration.radiance(counts), BAND, np.arange(frames) / 600.0, RASTER,
-        calibration_uncertainty=calibration.uncertainty(counts),
+        calibration_errors=calibration.errors,
     )  # fmt: skip
     vars(found)["band"] = BAND
     return found
@@ -82,7 +82,9 @@ def test_parts_of_the_uncertainty_are_those_of_small_changes():
         found.estimate.values - warmer.estimate.values, rel=1e-2
     )
     radiance = seen[0].radiance
-    seen[0].data["calibration_uncertainty"] = (("time", "y", "x"), 1e-4 * radiance)
+    mean = radiance.mean()
+    errors = CalibrationErrors(np.array([0.0, 2 * mean]), np.array([[0.0, 2e-4 * mean]]))
+    seen = [Measurement.from_radiance(radiance, BAND, np.zeros(1), RASTER, None, None, errors)]
     high = image(gain=1.0001)
     found = true_temperature(seen, WHOLE, KnownEmissivity(0.42))
     shifted = true_temperature([high], WHOLE, KnownEmissivity(0.42))

@@ -16,9 +16,10 @@ from typer.testing import CliRunner
 from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import ToolUncertainty, band_profile, find_tool, rake_grid
-from chipglow.laboratory.comparison import StatedUncertainties, compare, normalised_error, reading
+from chipglow.laboratory.comparison import StatedUncertainties, compare, normalised_error
 from chipglow.scene import PlacedTool, ToolGeometry
 from chipglow.surface import CHIP_2
+from chipglow.uncertainty import Estimate, from_xarray
 
 X, Y = np.meshgrid(RASTER.x, RASTER.y)
 SLOPE = np.array([2e5, 1e5])
@@ -30,6 +31,12 @@ FOUND = ToolUncertainty(along=16e-6, across=2e-6, angle=radians(1.5), pivot=70e-
 def linear(count=3):
     """Frames whose radiance temperature is linear in x and y, with the slope `SLOPE`."""
     return measured([700.0 + SLOPE[0] * X + SLOPE[1] * Y] * count)
+
+
+def of_the_tool(estimate):
+    """What each error of the tool's place changes, shape (3, ...)."""
+    (component,) = estimate.only("tool").components
+    return component.effects.T.reshape(3, *estimate.shape)
 
 
 def moved(tool, uncertainty, along, across, angle):
@@ -84,19 +91,20 @@ def test_squares_are_uncertain_by_slope_times_position():
     ]
     known = grid.frame_count > 0
     assert known.sum() > 30
-    for part, value in zip(grid.frame_from_tool, expected, strict=True):
+    for part, value in zip(of_the_tool(grid.frame_estimate), expected, strict=True):
         # A thousandth of a kelvin is lost on the way through radiance.
         np.testing.assert_allclose(part[known], value[known], atol=1e-3)
     total = np.sqrt(sum(value**2 for value in expected))
-    np.testing.assert_allclose(grid.frame_tool_uncertainty[known], total[known], rtol=1e-3)
-    np.testing.assert_allclose(grid.tool_uncertainty[1][known], total[known], rtol=1e-3)
+    for estimate in (grid.frame_estimate, grid.estimate[1]):
+        spread = estimate.only("tool").standard_uncertainty
+        np.testing.assert_allclose(spread[known], total[known], rtol=1e-3)
 
 
 def test_a_tool_whose_place_is_known_has_none():
     grid = rake_grid(linear(), TOOL)
-    assert grid.from_tool == ()
-    assert (grid.tool_uncertainty == 0.0).all() and (grid.frame_tool_uncertainty == 0.0).all()
-    assert (band_profile(linear(), TOOL, curve=CURVE).tool_uncertainty == 0.0).all()
+    profile = band_profile(linear(), TOOL, curve=CURVE)
+    for estimate in (grid.estimate, grid.frame_estimate, profile.estimate):
+        assert not estimate.only("tool").components
 
 
 def test_the_distance_along_a_curve_is_uncertain_by_the_edge():
@@ -107,10 +115,10 @@ def test_the_distance_along_a_curve_is_uncertain_by_the_edge():
     alone = band_profile(linear(), TOOL, curve=CURVE)
     expected = np.abs(moves @ way * (SLOPE @ way))
     known = np.isfinite(profile.temperature)
-    for part, value in zip(profile.from_tool, expected, strict=True):
+    for part, value in zip(of_the_tool(profile.estimate), expected, strict=True):
         np.testing.assert_allclose(np.abs(part[known]), value, atol=1e-3)
-    total = np.hypot(alone.uncertainty[known], np.hypot.reduce(expected))
-    np.testing.assert_allclose(profile.uncertainty[known], total, rtol=1e-3)
+    total = np.hypot(alone.estimate.standard_uncertainty[known], np.hypot.reduce(expected))
+    np.testing.assert_allclose(profile.estimate.standard_uncertainty[known], total, rtol=1e-3)
 
 
 def test_a_comparison_has_the_uncertainty_of_the_tool_s_place():
@@ -119,7 +127,7 @@ def test_a_comparison_has_the_uncertainty_of_the_tool_s_place():
     grid = rake_grid(linear(), TOOL, uncertainty=FOUND)
     assert result.grid is not None and result.band is not None
     known = np.isfinite(result.grid.measured.values)
-    expected = np.hypot(3.0, grid.frame_tool_uncertainty)
+    expected = np.hypot(3.0, grid.frame_estimate.standard_uncertainty)
     # Frames that are alike: nothing else, not the pixel's position either.
     np.testing.assert_allclose(
         result.grid.measured.standard_uncertainty[known], expected[known], rtol=1e-3
@@ -131,7 +139,7 @@ def test_a_comparison_has_the_uncertainty_of_the_tool_s_place():
     np.testing.assert_allclose(
         result.band.measured.standard_uncertainty[known], hypot(3.0, pixel, *moves), rtol=1e-3
     )
-    assert not result.grid.simulated[0].contribution("tool").any()
+    assert not result.grid.simulated[0].only("tool").components
 
 
 def test_a_tool_that_is_off_moves_all_squares_together():
@@ -180,10 +188,8 @@ def test_the_uncertainty_holds_for_tools_that_are_off_at_random():
     for off in rng.standard_normal((120, 3)):
         grid = rake_grid(chip, moved(TOOL, FOUND, *off), uncertainty=FOUND)
         columns = min(grid.along.size, true.along.size)
-        here, there = (g.frame_mean[:, :columns] for g in (grid, true))
-        none = np.zeros(here.shape)
-        parts = tuple(part[:, :columns] for part in grid.frame_from_tool)
-        e_n = normalised_error(reading(here, none, none, parts), reading(there, none, none))
+        own = grid.up_to(columns).frame_estimate.only("tool")
+        e_n = normalised_error(own, Estimate(true.up_to(columns).frame_mean))
         within += int((e_n <= 1).sum())
         count += int(np.isfinite(e_n).sum())
     # 120 tools whose squares go together: a standard deviation of 2 %.
@@ -230,19 +236,21 @@ def test_the_place_of_a_found_tool_is_uncertain_and_position_wins(folder):
         code, text, _ = command("rake", "real.nc", *options, "--out", "grid.nc")
         assert code == 0
         with xr.open_dataset(folder / "grid.nc", engine="h5netcdf", decode_times=False) as data:
-            written = data["tool_uncertainty"].values
+            written = from_xarray(data.load(), "mean")
         tool = tool or PlacedTool(ToolGeometry(radians(-7.0)), (0.0, 0.0))
         grid = rake_grid(measurement, tool, uncertainty=uncertainty)
-        expected = grid.tool_uncertainty if uncertainty else np.full(grid.mean.shape, np.nan)
-        np.testing.assert_array_equal(written, expected)
+        np.testing.assert_array_equal(written.values, grid.mean)
+        np.testing.assert_array_equal(
+            (written - grid.estimate).standard_uncertainty[grid.usable], 0
+        )
+        assert bool(written.only("tool").components) is (uncertainty is not None)
         assert ("Position of the tool: " in text) is (said is not None)
         assert said is None or f"Position of the tool: {said}" in text
-        assert ("The position of the tool makes a standard uncertainty of" in text) is (
-            uncertainty is not None
-        )
+        assert ("Errors of tool move all squares together" in text) is (uncertainty is not None)
         if uncertainty:
-            most = np.nanmax(grid.frame_tool_uncertainty)
-            assert f"up to {most:.1f} K; it moves all squares together" in " ".join(text.split())
+            most = np.nanmax(grid.frame_estimate.contribution("tool across"))
+            (line,) = (line.split() for line in text.splitlines() if "tool across" in line)
+            assert float(line[-1]) == pytest.approx(most, rel=0.05)
 
 
 def test_the_place_of_a_found_tool_goes_into_the_comparison(folder):
@@ -262,7 +270,8 @@ def test_the_place_of_a_found_tool_goes_into_the_comparison(folder):
     found = find_tool(measurement)
     grid = rake_grid(measurement, found.tool, uncertainty=found.uncertainty)
     added = np.sqrt(widths["found"] ** 2 - widths["stated"] ** 2)
-    expected = 2 * grid.frame_tool_uncertainty[:, : added.size // grid.depth.size].ravel()
+    spread = grid.frame_estimate.only("tool").standard_uncertainty
+    expected = 2 * spread[:, : added.size // grid.depth.size].ravel()
     known = np.isfinite(added)
     assert known.sum() > 5
     # Four digits after the point are written.
@@ -278,9 +287,10 @@ def test_the_place_of_a_found_tool_goes_into_the_band(folder):
         assert code == 0 and "Position of the tool: " in text
         path = folder / f"{name}.nc"
         with xr.open_dataset(path, engine="h5netcdf", decode_times=False) as data:
-            uncertainty[name] = data["uncertainty_tool"].values
-            whole = np.hypot(data["uncertainty_position"], data["uncertainty_tool"])
-            np.testing.assert_allclose(data["uncertainty"], whole)
+            read = from_xarray(data.load(), "temperature")
+            uncertainty[name] = read.only("tool").standard_uncertainty
+            whole = np.hypot(read.contribution("position"), uncertainty[name])
+            np.testing.assert_allclose(data["standard_uncertainty"], whole)
     assert np.nanmin(uncertainty["found"]) >= 0.0
     assert np.nanmax(uncertainty["found"]) > 1.0
     assert (uncertainty["stated"] == 0.0).all()
@@ -303,12 +313,8 @@ def test_impossible_uncertainties_are_refused(wrong, message):
         ToolUncertainty(**({"along": 1e-6, "across": 1e-6} | wrong))
 
 
-def test_shapes_of_what_the_tool_makes_must_fit():
-    grid = rake_grid(linear(1), TOOL)
-    with pytest.raises(ValueError, match=r"from_tool has shape \(2,\)"):
-        replace(grid, from_tool=(np.zeros(2),))
-    with pytest.raises(ValueError, match=r"from_tool has shape \(2,\), expected \(3,\)"):
-        reading(np.zeros(3), np.zeros(3), np.zeros(3), (np.zeros(2),))
-    profile = band_profile(linear(1), TOOL, curve=CURVE)
-    with pytest.raises(ValueError, match=r"band profile: from_tool has shape \(2,\)"):
-        replace(profile, from_tool=(np.zeros(2),))
+def test_the_shape_of_an_estimate_must_fit():
+    grid, profile = rake_grid(linear(1), TOOL), band_profile(linear(1), TOOL, curve=CURVE)
+    for result in (grid, profile):
+        with pytest.raises(ValueError, match=r"estimate has shape \(2,\), expected \(1, "):
+            replace(result, estimate=Estimate([1.0, 2.0]))

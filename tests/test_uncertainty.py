@@ -125,6 +125,16 @@ def test_h2_resistance_and_reactance():
     np.testing.assert_allclose(found.degrees_of_freedom, 4.0)
 
 
+def test_a_covariance_of_values_of_very_different_sizes_is_kept():
+    """A variance of 1e-24 beside one of 4e8 is below the rounding of the greater."""
+    correlation = np.array([[1.0, 0.6, 0.3], [0.6, 1.0, -0.2], [0.3, -0.2, 1.0]])
+    sizes = np.array([2e4, 1e-12, 1.0])
+    matrix = correlation * np.outer(sizes, sizes)
+    found = Estimate.from_covariance([1.0, 1.0, 1.0], matrix, "fit")
+    np.testing.assert_allclose(found.covariance(), matrix, rtol=1e-12)
+    np.testing.assert_allclose(found.correlation(), correlation, rtol=1e-12)
+
+
 def test_h2_from_the_covariance_is_the_same():
     observed = Estimate.from_observations(np.transpose([VOLTS, AMPERES, RADIANS]), "repeated")
     known = Estimate.from_covariance(observed.values, observed.covariance(), "repeated", "", 4)

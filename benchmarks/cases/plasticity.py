@@ -77,7 +77,7 @@ def adiabatic_shear(steps=(4e-3, 2e-3, 1e-3)):
     errors = [abs(result[2][-1] - expected[1]) for result in results]
     # Kernels take the heat capacity of the whole kelvin below: half a kelvin low in the mean.
     capacity = UNBROKEN.heat_capacity.at([expected[1] - 0.5, expected[1]])
-    floor = (expected[1] - 293.0) * (1 - capacity[0] / capacity[1])
+    lower_limit = (expected[1] - 293.0) * (1 - capacity[0] / capacity[1])
 
     def draw(figure):
         left, middle, right = figure.subplots(1, 3)
@@ -96,7 +96,7 @@ def adiabatic_shear(steps=(4e-3, 2e-3, 1e-3)):
         right.loglog(np.array(steps) * 1e3, errors, "o-", color=BLUE, markersize=4)
         slope = errors[0] * np.array(steps) / steps[0]
         right.loglog(np.array(steps) * 1e3, slope, ":", color=GREY, label="first order")
-        right.axhline(floor, color=GREEN, linewidth=0.9, label="whole kelvins")
+        right.axhline(lower_limit, color=GREEN, linewidth=0.9, label="whole kelvins")
         right.set_xlabel("shear in a step / 10⁻³")
         right.set_ylabel("error of the temperature / K")
         right.set_xticks(np.array(steps) * 1e3, [f"{step * 1e3:g}" for step in steps])

@@ -8,6 +8,7 @@ from chipglow.camera.calibration.calibration import (
     LinearCalibration,
     SakumaHattori,
 )
+from chipglow.camera.calibration.errors import CalibrationErrors
 from chipglow.camera.calibration.fit import (
     MODELS,
     CalibrationFit,
@@ -60,6 +61,7 @@ __all__ = [
     "BadPixels",
     "Blackbody",
     "Calibration",
+    "CalibrationErrors",
     "CalibrationFit",
     "Camera",
     "ChipglowWarning",

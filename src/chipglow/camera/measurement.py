@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from chipglow.camera.calibration.errors import CALIBRATION, CalibrationErrors
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import Raster, Tool
 from chipglow.scene.notebook import ZERO_CELSIUS, frames_text, plot_image
 from chipglow.scene.scene import raster_coordinates
 from chipglow.scene.tool_attributes import stored_tool, tool_attributes
+from chipglow.uncertainty import Estimate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,8 +54,9 @@ class Measurement:
         camera; ``pitch`` is the distance between pixels in m, ``band_lower`` and ``band_upper``
         in m limit the band. Of a band that is not shaped like a box, ``response`` over
         ``wavelength`` in m is the relative spectral response. A tool may be told as in a scene.
-        ``calibration_uncertainty``, of the shape and unit of ``radiance``, may be there: its
-        standard uncertainty from the calibration, which is common to all pixels and frames.
+        ``calibration_errors`` over (``calibration_error``, ``calibration_radiance``), in
+        W/(m² sr), may be there: the effects of a calibration's independent errors on the radiance,
+        as `CalibrationErrors` has them.
 
     Raises
     ------
@@ -81,7 +84,7 @@ class Measurement:
         raster: Raster,
         lower_limit: float | None = None,
         flags: NDArray[np.uint8] | None = None,
-        calibration_uncertainty: NDArray[np.floating] | None = None,
+        calibration_errors: CalibrationErrors | None = None,
         attributes: Mapping[str, float | str] | None = None,
     ) -> "Measurement":
         """Frames from their radiance.
@@ -101,9 +104,8 @@ class Measurement:
             radiance, is flagged.
         flags : ndarray, optional
             Sums of `Flag` that are known already, uint8, shape (time, y, x).
-        calibration_uncertainty : ndarray, optional
-            Standard uncertainty of the radiance from the calibration in W/(m² sr), shape
-            (time, y, x).
+        calibration_errors : CalibrationErrors, optional
+            What the errors of the calibration change in the radiance.
         attributes : mapping, optional
             What else is known of the camera.
         """
@@ -118,10 +120,6 @@ class Measurement:
             "radiance": radiance,
             "flags": flags,
         }
-        units = dict(MEASUREMENT_UNITS)
-        if calibration_uncertainty is not None:
-            values["calibration_uncertainty"] = calibration_uncertainty
-            units["calibration_uncertainty"] = units["radiance"]
         known: dict[str, float | str] = {**(attributes or {}), "pitch": raster.spacing}
         if lower_limit is not None:
             known["lower_limit"] = lower_limit
@@ -129,12 +127,16 @@ class Measurement:
         data = xr.Dataset(
             {
                 name: (("time", "y", "x"), values[name], {"units": unit})
-                for name, unit in units.items()
+                for name, unit in MEASUREMENT_UNITS.items()
             },
             coords=raster_coordinates(raster, times),
             attrs=known,
         )
-        return cls(data if band.response is None else data.assign(_response(band)))
+        if band.response is not None:
+            data = data.assign(_response(band))
+        if calibration_errors is not None:
+            data = data.assign(_errors(calibration_errors))
+        return cls(data)
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -284,15 +286,81 @@ class Measurement:
         time, label = float(self.times[frame]), "radiance temperature / °C"
         return plot_image(self.celsius(frame), self.raster, self.tool, label, time, axes)
 
+    @cached_property
+    def calibration_errors(self) -> CalibrationErrors | None:
+        """What the errors of the calibration change in the radiance, if that is known.
+
+        Raises
+        ------
+        ValueError
+            If what is told of them cannot be.
+        """
+        if "calibration_errors" not in self.data:
+            return None
+        table = self.data["calibration_errors"]
+        if table.dims != _ERRORS or _ERRORS[1] not in self.data.coords:
+            raise ValueError(f"measurement: 'calibration_errors' over {_ERRORS} is missing")
+        return CalibrationErrors(table[_ERRORS[1]].values, table.values)
+
     @property
     def calibration_uncertainty(self) -> NDArray[np.float64] | None:
         """Standard uncertainty of the radiance from the calibration in W/(m² sr), if known.
 
         Of shape (time, y, x), and common to all pixels and frames: it does not fall in a mean.
         """
-        if "calibration_uncertainty" not in self.data:
-            return None
-        return np.asarray(self.data["calibration_uncertainty"].values, dtype=np.float64)
+        errors = self.calibration_errors
+        return None if errors is None else errors.standard_uncertainty(self.radiance)
+
+    def calibration_effects(self, frame: int) -> NDArray[np.float64]:
+        """What each independent error of the calibration changes in the radiance temperature.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame.
+
+        Returns
+        -------
+        ndarray
+            In K with its sign, by an error of one standard uncertainty, shape (errors, y, x); NaN
+            where flagged as unusable. Without errors if none is known.
+        """
+        kelvins = np.asarray(self.data["radiance_temperature"][frame].values, np.float64)
+        if self.calibration_errors is None:
+            return np.zeros((0, *kelvins.shape))
+        slope = self.band.slope(kelvins)
+        return self.calibration_errors.at(self.data["radiance"][frame].values) / slope
+
+    def estimate(self, values: NDArray[np.float64], effects: ArrayLike) -> Estimate:
+        """What was computed of radiance temperatures, with the component ``calibration``.
+
+        Parameters
+        ----------
+        values : ndarray
+            Results of the frames in K, shape (frames, ...); NaN where there is none.
+        effects : array_like
+            What became of `calibration_effects`, shape (frames, errors, ...).
+
+        Returns
+        -------
+        Estimate
+            Without that component, but with a remark that it is not evaluated, where nothing is
+            known of the calibration.
+        """
+        if self.calibration_errors is None:
+            return Estimate(values).with_unevaluated(CALIBRATION)
+        changes = np.where(np.isfinite(values), np.swapaxes(effects, 0, 1), np.nan)
+        return Estimate(values, (self.calibration_errors.component(changes),))
+
+
+_ERRORS: Final = ("calibration_error", "calibration_radiance")
+
+
+def _errors(errors: CalibrationErrors) -> dict[str, xr.DataArray]:
+    """What a file tells of the errors of a calibration."""
+    units = {"units": MEASUREMENT_UNITS["radiance"]}
+    coords = {_ERRORS[1]: (_ERRORS[1], errors.radiance, units)}
+    return {"calibration_errors": xr.DataArray(errors.effects, coords, _ERRORS, attrs=units)}
 
 
 def _response(band: Band) -> dict[str, xr.DataArray]:

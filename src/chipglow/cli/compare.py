@@ -89,7 +89,7 @@ def compare(
 
     stated = _stated(uncertainty, emissivity_uncertainty, position)
     whole = load_measurement(measured, settings or ())
-    if uncertainty is not None and whole.calibration_uncertainty is not None:
+    if uncertainty is not None and whole.calibration_errors is not None:
         raise ValueError(
             f"--uncertainty: {uncertainty} beside the uncertainty that {measured} tells, "
             "expected one or the other"

@@ -1,7 +1,7 @@
 """The command ``chipglow emissivity``: emissivity from images of heated objects."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -164,6 +164,7 @@ def _print_tables(
 ) -> None:
     from rich.table import Table
 
+    from chipglow.cli.budget import spread_text
     from chipglow.laboratory.emissivity.emissivity import BUDGET
 
     for of in rows:
@@ -181,10 +182,10 @@ def _print_tables(
                 row.name,
                 str(row.pixels),
                 f"{row.mean:.4f}",
-                *map(_spread, (row.deviation, *spread)),
+                *map(spread_text, (row.deviation, *spread)),
                 f"{found.coverage_factor():.2f}",
             )
-            budget.add_row(row.name, *(_spread(found.contribution(cause)) for cause in BUDGET))
+            budget.add_row(row.name, *(spread_text(found.contribution(cause)) for cause in BUDGET))
         console.print(result)
         console.print()
         console.print(budget)
@@ -196,17 +197,12 @@ def _print_tables(
             of_middle, of_slope = line.estimate.standard_uncertainty
             table.add_row(
                 line.name,
-                f"{middle:.4f} ± {_spread(of_middle)}",
+                f"{middle:.4f} ± {spread_text(of_middle)}",
                 f"{line.middle - 273.15:.6g} °C",
-                f"{100 * slope:+.4f} ± {_spread(100 * of_slope)}",
-                _spread(line.residual),
+                f"{100 * slope:+.4f} ± {spread_text(100 * of_slope)}",
+                spread_text(line.residual),
             )
         console.print(table)
-
-
-def _spread(value: Any) -> str:
-    """Two digits that count, or a dash where nothing is known."""
-    return f"{value:#.2g}".removesuffix(".") if value == value else "–"
 
 
 def _assumptions(maps: "list[EmissivityMap]") -> "Iterator[str]":

@@ -52,7 +52,13 @@ def psf(
     """Determine a camera's point spread function and MTF from images of an edge."""
     from chipglow.cli.pictures import write_picture
     from chipglow.laboratory.measurement import load_measurement
-    from chipglow.laboratory.psf import aperture_image, knife_edge, load_apertures, load_edge
+    from chipglow.laboratory.psf import (
+        aperture_image,
+        knife_edge,
+        load_apertures,
+        load_edge,
+        psf_kernel,
+    )
 
     part = None if region is None else _region(region)
     given = settings or ()
@@ -62,7 +68,7 @@ def psf(
         for path, diameter in (load_apertures(apertures) if apertures else ())
     ]
     found = knife_edge(images, holes)
-    chosen = found.psf(model=model)
+    chosen = psf_kernel(found, model)
     _print(found)
     if out is not None:
         from chipglow.laboratory.psf import write_psf

@@ -50,6 +50,7 @@ def rake(
     from rich.console import Console
 
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
+    from chipglow.cli.budget import budget_table
     from chipglow.cli.pictures import write_picture
     from chipglow.laboratory.chip import (
         ToolUncertainty,
@@ -71,7 +72,10 @@ def rake(
     chosen = chosen_tool(measured, tool, position)
     grid = rake_grid(measured, chosen.tool, pixels, reach, frames, given or chosen.uncertainty)
     console.print(_table(grid))
-    for sentence in (*chosen.found, *_of_the_tool(grid), *_left_out(measured, grid)):
+    console.print("\nStandard uncertainty of the squares' means")
+    console.print(budget_table(grid.frame_estimate))
+    console.print()
+    for sentence in (*chosen.found, *_common(grid), *_left_out(grid)):
         console.print(sentence)
     say_of_measurements(measured)
     say_assumed(chosen.assumptions)
@@ -130,31 +134,23 @@ def _cell(mean: float, deviation: float) -> str:
     return f"{mean:.1f}" if isnan(deviation) else f"{mean:.1f} ± {deviation:.1f}"
 
 
-def _of_the_tool(grid: "RakeGrid") -> "Iterator[str]":
-    """What the uncertainty of the tool's position makes."""
-    import numpy as np
-
-    if grid.from_tool:
-        kelvins = grid.frame_tool_uncertainty[grid.frame_count > 0]
-        mean = np.sqrt((kelvins**2).mean())
+def _common(grid: "RakeGrid") -> "Iterator[str]":
+    """What the deviations do not hold."""
+    causes = [one.cause.name for one in grid.estimate.components]
+    if causes:
         yield (
-            f"The position of the tool makes a standard uncertainty of {mean:.1f} K (root mean "
-            f"square), up to {kelvins.max():.1f} K; it moves all squares together and is not in "
-            "the deviations."
+            f"Errors of {' and '.join(causes)} move all squares together and are not in the "
+            "deviations."
         )
 
 
-def _left_out(measurement: "Measurement", grid: "RakeGrid") -> "Iterator[str]":
+def _left_out(grid: "RakeGrid") -> "Iterator[str]":
     """What is not in the table."""
     seen = grid.frame_count
     if (seen == 0).any():
         yield (
             f"{int((seen == 0).sum())} of {seen.size} squares are left out (–): a pixel of theirs "
             "is under the camera's lower range limit, saturated or dead, or outside the image."
-        )
-    if measurement.calibration_uncertainty is not None:
-        yield (
-            "The uncertainty of the calibration is common to all squares and not in the deviations."
         )
 
 

@@ -64,6 +64,7 @@ def shearband(
     from rich.console import Console
 
     from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
+    from chipglow.cli.budget import budget_table
     from chipglow.cli.pictures import write_picture
     from chipglow.cli.times import frame_at
     from chipglow.laboratory.chip import (
@@ -92,16 +93,19 @@ def shearband(
     )
     console = Console(highlight=False, markup=False)
     console.print(_table(profile))
+    console.print("\nStandard uncertainty of the points along the band")
+    console.print(budget_table(profile.estimate))
+    console.print()
     for sentence in chosen.found:
         console.print(sentence)
     say_of_measurements(measured)
     say_assumed((*chosen.assumptions, *profile.assumptions))
     say_doubtful((*chosen.warnings, *profile.warnings))
-    if measured.calibration_uncertainty is None:
+    if measured.calibration_errors is None:
         say_doubtful(
             [
-                "the measurement does not tell the uncertainty of its calibration; the uncertainty "
-                "is that of the position only."
+                "the measurement does not tell the uncertainty of its calibration, which is not in "
+                "the uncertainty here."
             ]
         )
     if out is not None:
@@ -129,8 +133,9 @@ def _table(profile: "BandProfile") -> "Table":
         title_justify="left",
     )
     table.columns[1].no_wrap = True
+    uncertainty = profile.estimate.standard_uncertainty
     for frame, time in enumerate(profile.times):
-        values, uncertainty = profile.temperature[frame], profile.uncertainty[frame]
+        values = profile.temperature[frame]
         known = np.isfinite(values)
         row = [f"{1e6 * time:.7g}", str(profile.stage[frame])]
         offset = profile.offset[frame]
@@ -142,7 +147,7 @@ def _table(profile: "BandProfile") -> "Table":
                 f"{ends[1]:.0f}",
                 f"{values[known].mean() - 273.15:.1f}",
                 f"{values[known].max() - 273.15:.1f}",
-                f"{np.sqrt((uncertainty[known] ** 2).mean()):.1f}",
+                f"{np.sqrt((uncertainty[frame, known] ** 2).mean()):.1f}",
             ]
         else:
             row += ["–"] * 5

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -169,6 +169,7 @@ def _far_from_the_heating(
 def _print(console: "Console", rows: "list[TrueTemperature]") -> None:
     from rich.table import Table
 
+    from chipglow.cli.budget import spread_text
     from chipglow.laboratory.emissivity.temperature import TEMPERATURE_BUDGET
 
     result = Table(
@@ -186,20 +187,15 @@ def _print(console: "Console", rows: "list[TrueTemperature]") -> None:
             f"{row.radiance_temperature - 273.15:.2f} °C",
             f"{row.emissivity:.4f}",
             f"{found.values - 273.15:.2f} °C",
-            f"{_spread(found.standard_uncertainty)} K",
-            f"{_spread(found.expanded_uncertainty())} K",
+            f"{spread_text(found.standard_uncertainty)} K",
+            f"{spread_text(found.expanded_uncertainty())} K",
             f"{found.coverage_factor():.2f}",
         )
-        parts = (_spread(found.contribution(cause)) for cause in TEMPERATURE_BUDGET)
+        parts = (spread_text(found.contribution(cause)) for cause in TEMPERATURE_BUDGET)
         budget.add_row(row.name, *parts)
     console.print(result)
     console.print()
     console.print(budget)
-
-
-def _spread(value: Any) -> str:
-    """Two digits that count, or a dash where nothing is known."""
-    return "–" if isnan(value) else f"{value:#.2g}".removesuffix(".")
 
 
 def _assumptions(

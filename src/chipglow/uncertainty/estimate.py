@@ -517,16 +517,20 @@ def factor(covariance: NDArray[np.float64], name: str) -> NDArray[np.float64]:
     ValueError
         If the matrix is not symmetric, or has a negative variance beyond rounding.
     """
-    scale = float(np.abs(covariance).max(initial=0.0))
-    if not np.allclose(covariance, covariance.T, rtol=0.0, atol=1e-9 * scale):
+    scale = np.sqrt(np.abs(np.diag(covariance)))
+    scale[scale == 0.0] = 1.0
+    # Of correlations: beside a value in kelvins the variance of one in metres is lost in rounding.
+    matrix = covariance / np.outer(scale, scale)
+    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9):
         raise ValueError(f"component {name}: covariance is not symmetric, expected it so")
-    variances, directions = np.linalg.eigh(covariance)
-    if variances.min(initial=0.0) < -1e-9 * scale:
+    variances, directions = np.linalg.eigh(matrix)
+    if variances.min(initial=0.0) < -1e-9:
         raise ValueError(
             f"component {name}: covariance has a variance of {variances.min():.3g} in one "
-            "direction, expected 0 or more"
+            "direction, relative to the values' own, expected 0 or more"
         )
-    return cast(NDArray[np.float64], directions * np.sqrt(np.maximum(variances, 0.0)))
+    effects = scale[:, None] * directions * np.sqrt(np.maximum(variances, 0.0))
+    return cast(NDArray[np.float64], effects)
 
 
 def check_same(one: Cause, other: Cause) -> None:

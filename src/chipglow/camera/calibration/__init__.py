@@ -8,6 +8,7 @@ from chipglow.camera.calibration.calibration import (
     LinearCalibration,
     SakumaHattori,
 )
+from chipglow.camera.calibration.errors import CalibrationErrors
 from chipglow.camera.calibration.fit import (
     MODELS,
     CalibrationFit,
@@ -21,6 +22,7 @@ __all__ = [
     "MODELS",
     "Blackbody",
     "Calibration",
+    "CalibrationErrors",
     "CalibrationFit",
     "FactoryCalibration",
     "FittedCalibration",

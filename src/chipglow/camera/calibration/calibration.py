@@ -2,18 +2,22 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
 from typing import Any, ClassVar, Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chipglow.camera.calibration.errors import CALIBRATION, CalibrationErrors
 from chipglow.camera.recording import PlanckConversion
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT
+from chipglow.uncertainty.estimate import factor
 
 _CHECKED: Final = 101
+_NODES: Final = 513
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,9 +65,10 @@ class Calibration(ABC):
     def radiance(self, counts: ArrayLike) -> NDArray[np.float64]:
         """In-band radiance in W/(m² sr) of counts, of the same shape; NaN where there is none."""
 
+    @property
     @abstractmethod
-    def uncertainty(self, counts: ArrayLike) -> NDArray[np.float64] | None:
-        """Standard uncertainty of `radiance` from the calibration; None if it is not known."""
+    def errors(self) -> CalibrationErrors | None:
+        """What its errors change in the radiance; None if that is not known."""
 
     @property
     @abstractmethod
@@ -143,23 +148,30 @@ class FittedCalibration(Calibration):
         return np.asarray(self.band.radiance(self.temperature(counts)), np.float64)
 
     def uncertainty(self, counts: ArrayLike) -> NDArray[np.float64]:
-        """Standard uncertainty of `radiance` in W/(m² sr), of the same shape.
+        """Standard uncertainty of `radiance` in W/(m² sr), of the same shape."""
+        return np.asarray(np.sqrt((self._effects(self.temperature(counts)) ** 2).sum(axis=0)))
 
-        Propagated from the covariance of the parameters (JCGM 100, Equation 13): at given counts S
-        a change of the parameters moves the radiance by dL = −(∂S/∂p) dp (dL/dT) / (∂S/∂T).
+    @cached_property
+    def errors(self) -> CalibrationErrors:
+        """What its errors change in the radiance, from the coldest to the hottest blackbody.
+
+        What the calibration makes wrong at one radiance it makes wrong at others, too: ratios and
+        differences are known better, or worse, than that.
         """
-        sensitivity = self._sensitivity(self.temperature(counts))
-        variance = np.einsum("i...,ij,j...->...", sensitivity, self.covariance, sensitivity)
-        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+        coldest, hottest = self.counts([self.lowest, self.highest]).tolist()
+        kelvins = self.temperature(np.linspace(coldest, hottest, _NODES))
+        radiance = np.asarray(self.band.radiance(kelvins), np.float64)
+        return CalibrationErrors(radiance, self._effects(kelvins))
 
-    def radiance_covariance(self, temperatures: ArrayLike) -> NDArray[np.float64]:
-        """Covariance of the radiance at several radiance temperatures in K of shape (n,).
+    def _effects(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Changes of the radiance by independent errors of the parameters, shape (n, ...).
 
-        In (W/(m² sr))², shape (n, n). What the calibration makes wrong at one radiance it makes
-        wrong at others, too: ratios and differences are known better, or worse, than that.
+        Each is of one standard uncertainty; together they have the covariance of the parameters
+        (JCGM 100, Equation 13): at given counts S a change of the parameters moves the radiance by
+        dL = −(∂S/∂p) dp (dL/dT) / (∂S/∂T).
         """
-        sensitivity = self._sensitivity(_floats(temperatures))
-        return np.asarray(sensitivity.T @ self.covariance @ sensitivity)
+        errors = factor(self.covariance, CALIBRATION)
+        return np.tensordot(errors.T, self._sensitivity(temperature), 1)
 
     def _sensitivity(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
         """Change of the radiance with each parameter at given counts, shape (n, ...)."""
@@ -301,8 +313,9 @@ class FactoryCalibration(Calibration):
         kelvins = self.conversion.temperature(np.asarray(counts))
         return np.asarray(self.band.radiance(kelvins), np.float64)
 
-    def uncertainty(self, counts: ArrayLike) -> None:
-        """None: makers do not store it."""
+    @property
+    def errors(self) -> None:
+        """None: makers do not store them."""
 
 
 def _floats(values: ArrayLike) -> NDArray[Any]:

@@ -18,6 +18,7 @@ from scipy.special import erf, erfinv, j1
 from chipglow.camera.optics.sampling import overlap_lengths
 from chipglow.quantities import Family, FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, WAVELENGTH
+from chipglow.uncertainty import Component, Estimate, from_xarray
 
 GAUSSIAN_ENERGY: Final = 1.0 - 1e-12
 """Fraction of a Gaussian's light that its kernel holds: all but rounding.
@@ -253,6 +254,9 @@ class MeasuredPSF(PointSpreadFunction):
         side, first row on top, the point in the middle of the middle square.
     spacing : float
         Side of those squares in m, on the scene.
+    components : tuple of Component
+        What independent errors change in the weights, in their unit; those of ``chipglow psf`` are
+        in its files. None by default: then nothing is known of them.
 
     Attributes
     ----------
@@ -275,6 +279,7 @@ class MeasuredPSF(PointSpreadFunction):
 
     weights: NDArray[np.float64] = field(repr=False)
     spacing: float
+    components: tuple[Component, ...] = field(default=(), repr=False)
     fwhm: float = field(init=False)
 
     def __str__(self) -> str:
@@ -283,12 +288,19 @@ class MeasuredPSF(PointSpreadFunction):
 
     def __post_init__(self) -> None:
         _check_length("spacing", self.spacing)
-        weights = _normalised(_checked_weights(self.weights))
-        weights.flags.writeable = False
-        object.__setattr__(self, "weights", weights)
-        row, column = _peak(weights)
-        widths = [_half_maximum_width(line) for line in (weights[row], weights[:, column])]
+        given = Estimate(_checked_weights(self.weights), self.components)
+        estimate = given / given.sum()
+        object.__setattr__(self, "weights", estimate.values)
+        object.__setattr__(self, "components", estimate.components)
+        row, column = _peak(estimate.values)
+        lines = estimate.values[row], estimate.values[:, column]
+        widths = [_half_maximum_width(line) for line in lines]
         object.__setattr__(self, "fwhm", float(np.mean(widths)) * self.spacing)
+
+    @property
+    def estimate(self) -> Estimate:
+        """`weights` with `components`."""
+        return Estimate(self.weights, self.components)
 
     @classmethod
     def from_file(cls, path: str | Path, spacing: float | None = None) -> "MeasuredPSF":
@@ -321,7 +333,8 @@ class MeasuredPSF(PointSpreadFunction):
             )
         try:
             if spacing is None:
-                return cls(*_read_netcdf(path))
+                estimate, spacing = _read_netcdf(path)
+                return cls(estimate.values, spacing, estimate.components)
             return cls(readers[kind](path), spacing)
         except (ValueError, EOFError, MemoryError, KeyError, RuntimeError) as error:
             raise ValueError(f"psf: {path} is not a kernel: {error}") from error
@@ -510,13 +523,12 @@ def _read_csv(path: Path) -> NDArray[np.float64]:
     return np.array(rows, dtype=np.float64)
 
 
-def _read_netcdf(path: Path) -> tuple[NDArray[np.float64], float]:
-    """Kernel and its spacing."""
+def _read_netcdf(path: Path) -> tuple[Estimate, float]:
+    """Kernel, with the components of its uncertainty if it has any, and its spacing."""
     if not path.is_file():
         raise FileNotFoundError(ENOENT, "there is no such file", str(path))
     try:
         with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as data:
-            kernel = data["kernel"]
-            return np.asarray(kernel.values, np.float64), float(kernel.attrs["spacing"])
+            return from_xarray(data, "kernel"), float(data["kernel"].attrs["spacing"])
     except OSError as error:
         raise ValueError(f"cut short, or no NetCDF-4 file: {error}") from error

@@ -108,7 +108,7 @@ def _draw_profile(
     values = profile.temperature[frame] - KELVIN
     if not np.isfinite(values).any():
         return
-    along, uncertainty = 1e6 * profile.distance, profile.uncertainty[frame]
+    along, uncertainty = 1e6 * profile.distance, profile.estimate.standard_uncertainty[frame]
     stage = profile.stage[frame]
     label = f"{1e6 * profile.times[frame]:.4g} µs, {stage}"
     axes.plot(along, values, color=colour, linestyle=_LINES[stage], label=label)

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from chipglow.io.polyline_file import read_polyline
 from chipglow.io.table_file import celsius_text, number_text, write_table_or_dataset
-from chipglow.laboratory.chip.band_profile import BandProfile
+from chipglow.laboratory.chip.band_profile import BAND_BUDGET, BandProfile
+from chipglow.laboratory.chip.budget_columns import budget_columns, budget_values
+from chipglow.uncertainty import to_xarray
 
 _COLUMNS: Final = (
     "time_us",
@@ -20,7 +22,7 @@ _COLUMNS: Final = (
     "x_um",
     "y_um",
     "radiance_temperature_degC",
-    "standard_uncertainty_K",
+    *budget_columns(BAND_BUDGET),
 )
 
 
@@ -65,8 +67,9 @@ def write_band_profile(profile: BandProfile, path: Path) -> None:
         What to write.
     path : Path
         ``.csv``: a line for each point of each frame's band, with its units in the names of the
-        columns. ``.nc``: NetCDF-4 in SI units with the dimensions (time, distance). A file that is
-        there is replaced at the end.
+        columns; what is not known of its uncertainty is empty. ``.nc``: NetCDF-4 in SI units with
+        the dimensions (time, distance), ``temperature`` with its components as
+        `chipglow.uncertainty.from_xarray` reads them. A file that is there is replaced at the end.
 
     Raises
     ------
@@ -79,47 +82,39 @@ def write_band_profile(profile: BandProfile, path: Path) -> None:
 
 
 def _rows(profile: BandProfile) -> Iterator[tuple[Any, ...]]:
-    uncertainty = profile.uncertainty
+    budget = budget_values(profile.estimate, BAND_BUDGET)
     for frame, (time, stage) in enumerate(zip(profile.times, profile.stage, strict=True)):
         for n in np.flatnonzero(np.isfinite(profile.points[frame, :, 0])):
             x, y = profile.points[frame, n]
             places = [f"{1e6 * value:.6g}" for value in (profile.distance[n], x, y)]
-            values = (
-                celsius_text(profile.temperature[frame, n]),
-                number_text(uncertainty[frame, n]),
-            )
-            yield (f"{1e6 * time:.10g}", stage.value, *places, *values)
+            value = celsius_text(profile.temperature[frame, n])
+            parts = map(number_text, budget[frame, n])
+            yield (f"{1e6 * time:.10g}", stage.value, *places, value, *parts)
 
 
 def _dataset(profile: BandProfile) -> xr.Dataset:
-    both, kelvin = ("time", "distance"), {"units": "K"}
-    name = {"long_name": "radiance temperature"}
-    return xr.Dataset(
-        {
-            "temperature": (both, profile.temperature, kelvin | name),
-            "uncertainty": (both, profile.uncertainty, kelvin),
-            "uncertainty_calibration": (both, profile.calibration, kelvin),
-            "uncertainty_position": (both, profile.position, kelvin),
-            "uncertainty_tool": (both, profile.tool_uncertainty, kelvin),
-            "x": (both, profile.points[..., 0], {"units": "m"}),
-            "y": (both, profile.points[..., 1], {"units": "m"}),
-            "offset": ("time", profile.offset, {"units": "m"}),
-            "stage": ("time", [stage.value for stage in profile.stage]),
-            "reference_x": ("reference_distance", profile.reference.points[:, 0], {"units": "m"}),
-            "reference_y": ("reference_distance", profile.reference.points[:, 1], {"units": "m"}),
-        },
-        coords={
-            "time": ("time", profile.times, {"units": "s"}),
-            "distance": ("distance", profile.distance, {"units": "m"}),
-            "reference_distance": (
-                "reference_distance",
-                profile.reference.distance,
-                {"units": "m"},
-            ),
-        },
-        attrs={
-            "width": profile.width,
-            "assumed": "\n".join(profile.assumptions),
-            "doubtful": "\n".join(profile.warnings),
-        },
+    both = ("time", "distance")
+    data = to_xarray(profile.estimate, "temperature", both, "K")
+    data["temperature"].attrs["long_name"] = "radiance temperature"
+    metres = {"units": "m"}
+    return (
+        data.assign(
+            standard_uncertainty=(both, profile.estimate.standard_uncertainty, {"units": "K"}),
+            x=(both, profile.points[..., 0], metres),
+            y=(both, profile.points[..., 1], metres),
+            offset=("time", profile.offset, metres),
+            stage=("time", [stage.value for stage in profile.stage]),
+            reference_x=("reference_distance", profile.reference.points[:, 0], metres),
+            reference_y=("reference_distance", profile.reference.points[:, 1], metres),
+        )
+        .assign_coords(
+            time=("time", profile.times, {"units": "s"}),
+            distance=("distance", profile.distance, metres),
+            reference_distance=("reference_distance", profile.reference.distance, metres),
+        )
+        .assign_attrs(
+            width=profile.width,
+            assumed="\n".join(profile.assumptions),
+            doubtful="\n".join(profile.warnings),
+        )
     )

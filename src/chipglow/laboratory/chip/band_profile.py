@@ -1,7 +1,7 @@
 """Temperature along the shear band of a measurement, and how far the band has developed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import isfinite, nan, sqrt
 from typing import Final
@@ -12,17 +12,25 @@ from scipy.integrate import trapezoid
 from scipy.ndimage import map_coordinates
 
 from chipglow.camera import Measurement
+from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
 from chipglow.laboratory.chip.frames import frame_numbers
 from chipglow.laboratory.chip.ridge import NoShearBandError, arc_length, normals_of
 from chipglow.laboratory.chip.tool_position import (
+    TOOL_BUDGET,
     ToolUncertainty,
-    combined,
     contribution,
     tool_in,
 )
 from chipglow.scene import Line, Tool, sample
 from chipglow.text.remarks import Remarks
+from chipglow.uncertainty import Estimate
+
+POSITION: Final = "position"
+"""Name of the component of uncertainty that the place of a curve makes."""
+
+BAND_BUDGET: Final = (CALIBRATION, POSITION, *TOOL_BUDGET)
+"""Lines of the budget of a temperature along the band."""
 
 NEAR_THE_EDGE: Final = 15.0
 """Distance from the edge in pixels within which a band has not left it."""
@@ -53,7 +61,7 @@ class Stage(StrEnum):
     """No band is found in the frame."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BandProfile:
     """Radiance temperature along the shear band in several frames.
 
@@ -67,14 +75,12 @@ class BandProfile:
     points : ndarray
         Where they are in each frame, x and y in m, shape (frames, n, 2); NaN where the frame's
         band does not reach.
-    temperature : ndarray
+    estimate : Estimate
         Mean radiance temperature in K over the width, shape (frames, n); NaN where a pixel in it
-        is not usable.
-    calibration : ndarray
-        Its standard uncertainty in K from the calibration, common to all, of the same shape; 0
-        where the measurement tells none.
-    position : ndarray
-        Its standard uncertainty in K from the position of the curve, of the same shape.
+        is not usable. Its components are ``calibration``, which is the same in all that was
+        measured by it; ``position`` of the curve, of every point by itself; and ``tool``, the same
+        in all that is read by this tool, of which `TOOL_BUDGET` are parts: it moves the edge from
+        which the distance counts.
     offset : ndarray
         Median distance in m of each frame's band from the reference, shape (frames,): positive
         toward the chip, negative toward the workpiece; NaN without a band.
@@ -88,10 +94,6 @@ class BandProfile:
         What had to be assumed, a sentence each.
     warnings : tuple of str
         Why it may not be relied on, a sentence each.
-    from_tool : tuple of ndarray
-        What each independent standard uncertainty of the tool's place changes in `temperature` in
-        K, with its sign, each of shape (frames, n): it moves the edge from which the distance
-        counts. None if the place is known.
 
     Raises
     ------
@@ -102,26 +104,21 @@ class BandProfile:
     reference: Line
     distance: NDArray[np.float64]
     points: NDArray[np.float64]
-    temperature: NDArray[np.float64]
-    calibration: NDArray[np.float64]
-    position: NDArray[np.float64]
+    estimate: Estimate
     offset: NDArray[np.float64]
     stage: tuple[Stage, ...]
     times: NDArray[np.float64]
     width: float
     assumptions: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
-    from_tool: tuple[NDArray[np.float64], ...] = ()
 
     def __post_init__(self) -> None:
         shape = (self.times.size, self.distance.size)
-        expected = {"points": (*shape, 2), "offset": shape[:1]} | dict.fromkeys(
-            ("temperature", "calibration", "position"), shape
-        )
-        fields = [(name, getattr(self, name), size) for name, size in expected.items()]
-        for name, values, size in (*fields, *(("from_tool", p, shape) for p in self.from_tool)):
-            if values.shape != size:
-                raise ValueError(f"band profile: {name} has shape {values.shape}, expected {size}")
+        expected = {"points": (*shape, 2), "estimate": shape, "offset": shape[:1]}
+        for name, size in expected.items():
+            found = getattr(self, name).shape
+            if found != size:
+                raise ValueError(f"band profile: {name} has shape {found}, expected {size}")
         if len(self.stage) != self.times.size:
             raise ValueError(
                 f"band profile: {len(self.stage)} stages for {self.times.size} frames, "
@@ -129,15 +126,9 @@ class BandProfile:
             )
 
     @property
-    def uncertainty(self) -> NDArray[np.float64]:
-        """Standard uncertainty of `temperature` in K, shape (frames, n)."""
-        parts = (self.calibration, self.position, *self.from_tool)
-        return combined(parts, self.temperature.shape)
-
-    @property
-    def tool_uncertainty(self) -> NDArray[np.float64]:
-        """Its part from the tool's place in K, shape (frames, n)."""
-        return combined(self.from_tool, self.temperature.shape)
+    def temperature(self) -> NDArray[np.float64]:
+        """Values of `estimate` in K, shape (frames, n)."""
+        return self.estimate.values
 
     @property
     def in_place(self) -> NDArray[np.bool_]:
@@ -221,15 +212,9 @@ def band_profile(
     distance = _common(lines, pitch) if given is None else given.distance
     points = np.stack([_laid(line, distance) for line in lines])
     reader = _Reader(measurement, images, width, position)
-    moves = np.zeros((0, 2))
-    if uncertainty is not None:
-        moves = uncertainty.displacements(tool, tool.edge_point)
-    read = [
-        reader(int(k), p, _toward(moves, line, tool))
-        for k, p, line in zip(numbers, points, lines, strict=True)
-    ]
-    temperature, calibration, from_position, *from_tool = (
-        np.stack(part) for part in zip(*read, strict=True)
+    read = [reader(int(k), p) for k, p in zip(numbers, points, strict=True)]
+    temperature, off = (
+        np.stack([getattr(one, name) for one in read]) for name in ("temperature", "position")
     )
     if not np.isfinite(temperature).any():
         raise ValueError(
@@ -238,21 +223,31 @@ def band_profile(
         )
     if given is None:
         remarks.warnings.extend(_joined(temperature, measurement.times[numbers]))
+    estimate = measurement.estimate(temperature, [one.calibration for one in read])
+    known = np.isfinite(temperature)
+    off = np.where(known, off, nan)
+    estimate = estimate.with_component(POSITION, off, independent="per element")
+    if uncertainty is not None:
+        moves = uncertainty.displacements(tool, tool.edge_point)
+        changes = [
+            reader.of_the_edge(int(k), p, _toward(moves, line, tool))
+            for k, p, line in zip(numbers, points, lines, strict=True)
+        ]
+        effects = np.where(known, np.swapaxes(changes, 0, 1), nan)
+        component = uncertainty.component(tool, effects)
+        estimate = replace(estimate, components=(*estimate.components, component))
     offset = np.array([_offset(line, base) for line in found])
     return BandProfile(
         reference=base,
         distance=distance,
         points=points,
-        temperature=temperature,
-        calibration=calibration,
-        position=from_position,
+        estimate=estimate,
         offset=offset,
         stage=tuple(_stage(value, pitch) for value in offset),
         times=measurement.times[numbers],
         width=width,
         assumptions=tuple(remarks.assumptions),
         warnings=tuple(remarks.warnings),
-        from_tool=tuple(from_tool),
     )
 
 
@@ -408,6 +403,25 @@ def _toward(moves: NDArray[np.float64], line: Line | None, tool: Tool) -> NDArra
     return np.asarray(moves @ way / np.hypot(*way))
 
 
+@dataclass(frozen=True, eq=False)
+class _Read:
+    """Temperature along a curve in K, and what makes it uncertain, of a frame.
+
+    Parameters
+    ----------
+    temperature : ndarray
+        Mean across the curve, shape (n,); NaN where there is none.
+    calibration : ndarray
+        Its change with each error of the calibration, shape (errors, n).
+    position : ndarray
+        Its standard uncertainty from the place of the curve, shape (n,).
+    """
+
+    temperature: NDArray[np.float64]
+    calibration: NDArray[np.float64]
+    position: NDArray[np.float64]
+
+
 class _Reader:
     """Reads means across a curve, and what makes them uncertain, in one frame after another."""
 
@@ -420,45 +434,28 @@ class _Reader:
         count = max(round(width / self.pitch * _FINE), 1)
         self.offsets = width * ((np.arange(count) + 0.5) / count - 0.5)
 
-    def __call__(
-        self, number: int, points: NDArray[np.float64], nearer: NDArray[np.float64]
-    ) -> list[NDArray[np.float64]]:
-        """Temperature, its uncertainty from the calibration, the position and the tool, in K.
-
-        The edge of the tool may be nearer to the curve's first point by each of `nearer` in m.
-        """
-        empty = np.full(len(points), nan)
+    def __call__(self, number: int, points: NDArray[np.float64]) -> _Read:
+        """What is read at points of a frame, NaN beyond the ends of its curve."""
+        effects = self.measurement.calibration_effects(number)
+        found = _Read(
+            np.full(len(points), nan), np.zeros((len(effects), len(points))), np.zeros(len(points))
+        )
         there = np.isfinite(points[:, 0])
         if there.sum() < 2:
-            return [empty.copy() for _ in range(3 + nearer.size)]
+            return found
         curve = points[there]
-        across = self.offsets[:, None] * normals_of(curve)[:, None]
-        places = curve[:, None] + across
-        results = []
-        for part in (
-            self._mean("radiance_temperature", number, places),
-            self._calibration(number, places),
-            self._position(number, curve),
-            *self._tool(number, curve, nearer),
-        ):
-            whole = empty.copy()
-            whole[there] = part
-            results.append(whole)
-        known = np.isfinite(results[0])
-        for part in results[1:]:
-            part[~known] = nan
-        return results
+        places = curve[:, None] + self.offsets[:, None] * normals_of(curve)[:, None]
+        frame = self.measurement.data["radiance_temperature"][number].values
+        found.temperature[there] = self._mean(frame, places)
+        for error, image in enumerate(effects):
+            found.calibration[error, there] = self._mean(image, places)
+        found.position[there] = self._position(number, curve)
+        return found
 
-    def _mean(self, name: str, number: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        frame = self.measurement.data[name][number].values
-        return np.asarray(sample(frame, self.measurement.raster, places).mean(axis=-1))
-
-    def _calibration(self, number: int, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        if "calibration_uncertainty" not in self.measurement.data:
-            return np.zeros(len(places))
-        temperature = self._mean("radiance_temperature", number, places)
-        radiance = self._mean("calibration_uncertainty", number, places)
-        return radiance / self.measurement.band.slope(temperature)
+    def _mean(
+        self, image: NDArray[np.floating], places: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        return np.asarray(sample(image, self.measurement.raster, places).mean(axis=-1))
 
     def _position(self, number: int, curve: NDArray[np.float64]) -> NDArray[np.float64]:
         image = self.images[number]
@@ -475,13 +472,23 @@ class _Reader:
         u = self.position
         return np.asarray(np.sqrt(squared * u**2 + 0.75 * bend**2 * u**4))
 
-    def _tool(
-        self, number: int, curve: NDArray[np.float64], nearer: NDArray[np.float64]
-    ) -> list[NDArray[np.float64]]:
-        """Changes in K of what is read at a distance from an edge that is nearer to the curve."""
-        normal = normals_of(curve)
-        tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-        return [contribution(self.images[number], curve, step * tangent) for step in nearer]
+    def of_the_edge(
+        self, number: int, points: NDArray[np.float64], nearer: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Changes in K of what is read at a distance from an edge that is nearer to the curve.
+
+        By each of `nearer` in m, shape (k, n).
+        """
+        found = np.zeros((nearer.size, len(points)))
+        there = np.isfinite(points[:, 0])
+        if there.sum() >= 2:
+            curve = points[there]
+            normal = normals_of(curve)
+            tangent = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+            image = self.images[number]
+            for step, changes in zip(nearer, found, strict=True):
+                changes[there] = contribution(image, curve, step * tangent)
+        return found
 
 
 def _offset(line: Line | None, reference: Line) -> float:

@@ -2,22 +2,27 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import isfinite
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from chipglow.camera import UNUSABLE, Measurement
+from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage
+from chipglow.laboratory.chip.frame_scatter import FRAMES, FrameScatter
 from chipglow.laboratory.chip.frames import frame_numbers
 from chipglow.laboratory.chip.tool_position import (
+    TOOL_BUDGET,
     ToolUncertainty,
-    combined,
     contribution,
     tool_in,
 )
 from chipglow.scene import Raster, Tool
+from chipglow.uncertainty import Component, Estimate
 
 PIXELS: Final = 3.0
 """Side of the paper's squares in pixels."""
@@ -25,10 +30,13 @@ PIXELS: Final = 3.0
 DEPTH: Final = 90e-6
 """How far into the chip the grid reaches by default in m: five rows of 3 pixels of 6 um."""
 
+RAKE_BUDGET: Final = (CALIBRATION, *TOOL_BUDGET)
+"""Lines of the budget of a square in one frame."""
+
 _ROUNDING: Final = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RakeGrid:
     """Radiance temperature in squares beside the rake face (Heigel and Whitenton 2010, Figure 7).
 
@@ -39,9 +47,11 @@ class RakeGrid:
         shape (n,).
     depth : ndarray
         Middles of the squares from the rake face into the chip in m, shape (m,).
-    mean : ndarray
+    estimate : Estimate
         Mean radiance temperature in K of each square's pixels, shape (frames, m, n); NaN where
-        the square is left out.
+        the square is left out. Its components are ``calibration``, which is the same in all that
+        was measured by it, and ``tool``, the same in all that is read by this tool, of which
+        `TOOL_BUDGET` are parts.
     deviation : ndarray
         Standard deviation over the square's pixels in K, of the same shape; NaN also for a single
         pixel.
@@ -53,9 +63,6 @@ class RakeGrid:
         The tool, in the measurement's coordinates.
     times : ndarray
         When each frame's integration began in s, shape (frames,).
-    from_tool : tuple of ndarray
-        What each independent standard uncertainty of the tool's place changes in `mean` in K, with
-        its sign, each of that shape: it moves all squares together. None if the place is known.
 
     Raises
     ------
@@ -65,22 +72,26 @@ class RakeGrid:
 
     along: NDArray[np.float64]
     depth: NDArray[np.float64]
-    mean: NDArray[np.float64]
+    estimate: Estimate
     deviation: NDArray[np.float64]
     count: NDArray[np.int64]
     size: float
     tool: Tool
     times: NDArray[np.float64]
-    from_tool: tuple[NDArray[np.float64], ...] = ()
 
     def __post_init__(self) -> None:
         shape = (self.times.size, self.depth.size, self.along.size)
-        fields = [(name, getattr(self, name)) for name in ("mean", "deviation", "count")]
-        for name, values in (*fields, *(("from_tool", part) for part in self.from_tool)):
-            if values.shape != shape:
-                raise ValueError(f"rake grid: {name} has shape {values.shape}, expected {shape}")
+        for name in ("estimate", "deviation", "count"):
+            found = getattr(self, name).shape
+            if found != shape:
+                raise ValueError(f"rake grid: {name} has shape {found}, expected {shape}")
         if not self.size > 0:
             raise ValueError(f"rake grid: size is {self.size!r}, expected over 0 m")
+
+    @property
+    def mean(self) -> NDArray[np.float64]:
+        """Values of `estimate` in K, shape (frames, m, n)."""
+        return self.estimate.values
 
     @property
     def usable(self) -> NDArray[np.bool_]:
@@ -92,11 +103,28 @@ class RakeGrid:
         """Number of frames in which each square is usable, shape (m, n)."""
         return np.asarray(self.usable.sum(axis=0), dtype=np.int64)
 
+    @cached_property
+    def frame_estimate(self) -> Estimate:
+        """Mean of `mean` over the frames in which a square is usable in K, shape (m, n).
+
+        The component ``frames`` is what they tell of their mean (`FrameScatter`): what differs
+        from frame to frame, the pixels' noise included. One frame tells nothing of it.
+        """
+        there = Estimate(
+            np.nan_to_num(self.mean),
+            tuple(replace(c, effects=np.nan_to_num(c.effects)) for c in self.estimate.components),
+            self.estimate.unevaluated,
+        )
+        mean = there.linear(_averages(self.usable)).reshape(*self.mean.shape[1:])
+        if self.times.size == 1:
+            return mean.with_unevaluated(FRAMES)
+        scatter = FrameScatter.of(self.mean).component()
+        return replace(mean, components=(*mean.components, scatter))
+
     @property
     def frame_mean(self) -> NDArray[np.float64]:
-        """Mean of `mean` over the frames in which a square is usable in K, shape (m, n)."""
-        total = np.where(self.usable, self.mean, 0.0).sum(axis=0)
-        return _ratio(total, self.frame_count)
+        """Values of `frame_estimate` in K, shape (m, n); NaN where no frame has one."""
+        return self.frame_estimate.values
 
     @property
     def frame_deviation(self) -> NDArray[np.float64]:
@@ -104,23 +132,21 @@ class RakeGrid:
         away = np.where(self.usable, self.mean - self.frame_mean, 0.0)
         return np.sqrt(_ratio((away**2).sum(axis=0), self.frame_count - 1))
 
-    @property
-    def tool_uncertainty(self) -> NDArray[np.float64]:
-        """Standard uncertainty of `mean` from the tool's place in K, shape (frames, m, n)."""
-        return combined(self.from_tool, self.mean.shape)
+    def up_to(self, columns: int) -> "RakeGrid":
+        """The same of the first squares along the face.
 
-    @property
-    def frame_from_tool(self) -> tuple[NDArray[np.float64], ...]:
-        """What `from_tool` makes of `frame_mean` in K, each of shape (m, n)."""
-        return tuple(
-            _ratio(np.where(self.usable, part, 0.0).sum(axis=0), self.frame_count)
-            for part in self.from_tool
+        Parameters
+        ----------
+        columns : int
+            How many of each row.
+        """
+        return replace(
+            self,
+            along=self.along[:columns],
+            estimate=self.estimate[:, :, :columns],
+            deviation=self.deviation[:, :, :columns],
+            count=self.count[:, :, :columns],
         )
-
-    @property
-    def frame_tool_uncertainty(self) -> NDArray[np.float64]:
-        """Standard uncertainty of `frame_mean` from the tool's place in K, shape (m, n)."""
-        return combined(self.frame_from_tool, self.mean.shape[1:])
 
     def corners(self) -> NDArray[np.float64]:
         """Corners of the squares in the measurement's coordinates.
@@ -185,9 +211,10 @@ def rake_grid(
     of 9 pixels rises by 6 % on average at a rake angle of -7 degrees, by 18 % at most.
     `RakeGrid.deviation` is the plain standard deviation.
 
-    Each uncertainty of the tool's place displaces the squares to either side by one standard
-    uncertainty; half the difference of the temperatures there is what it contributes (JCGM 100,
-    5.1.3). Pixels that are not usable are filled as in `ThermalImage`.
+    What the calibration's errors change in a square is the weighted mean of what they change in its
+    pixels. Each uncertainty of the tool's place displaces the squares to either side by one
+    standard uncertainty; half the difference of the temperatures there is what it contributes
+    (JCGM 100, 5.1.3). Pixels that are not usable are filled as in `ThermalImage`.
     """
     tool, raster = tool_in(measurement, tool), measurement.raster
     size = _checked_size(pixels, depth, raster)
@@ -198,12 +225,14 @@ def rake_grid(
     shape = (numbers.size, rows, columns)
     mean, deviation = np.empty(shape), np.empty(shape)
     count = np.empty(shape, np.int64)
+    effects = []
     temperatures = measurement.data["radiance_temperature"]
     flags = measurement.data["flags"]
     for index, number in enumerate(numbers):
         usable = flags[number].values & UNUSABLE == 0
         values = np.asarray(temperatures[number].values, dtype=np.float64)
         mean[index], deviation[index], count[index] = squares.statistics(values, usable)
+        effects.append([squares.mean(e) for e in measurement.calibration_effects(int(number))])
     if not np.isfinite(mean[:, 0]).any():
         raise ValueError(
             f"rake grid: none of the {columns} squares beside the rake face is usable, expected a "
@@ -212,7 +241,7 @@ def rake_grid(
     grid = RakeGrid(
         along=size * (np.arange(columns, dtype=np.float64) + 0.5),
         depth=size * (np.arange(rows, dtype=np.float64) + 0.5),
-        mean=mean,
+        estimate=measurement.estimate(mean, effects),
         deviation=deviation,
         count=count,
         size=size,
@@ -221,7 +250,9 @@ def rake_grid(
     )
     if uncertainty is None:
         return grid
-    return replace(grid, from_tool=_from_tool(measurement, grid, numbers, uncertainty))
+    component = _from_tool(measurement, grid, numbers, uncertainty)
+    known = (*grid.estimate.components, component)
+    return replace(grid, estimate=replace(grid.estimate, components=known))
 
 
 def _from_tool(
@@ -229,16 +260,29 @@ def _from_tool(
     grid: RakeGrid,
     numbers: NDArray[np.int64],
     uncertainty: ToolUncertainty,
-) -> tuple[NDArray[np.float64], ...]:
-    """What the uncertainties of the tool's place change in the means; NaN without a mean."""
+) -> Component:
+    """What the uncertainties of the tool's place change in the means."""
     places = _places_in_squares(grid, measurement.raster.spacing)
     displacements = uncertainty.displacements(grid.tool, places)
-    found = np.full((len(displacements), *grid.mean.shape), np.nan)
+    found = np.zeros((len(displacements), *grid.mean.shape))
     for index in np.flatnonzero(grid.usable.any(axis=(1, 2))):
         image = ThermalImage.of(measurement, int(numbers[index]))
         for kind, displacement in enumerate(displacements):
             found[kind, index] = contribution(image, places, displacement).mean(axis=-1)
-    return tuple(np.where(grid.usable, part, np.nan) for part in found)
+    return uncertainty.component(grid.tool, np.where(grid.usable, found, np.nan))
+
+
+def _averages(usable: NDArray[np.bool_]) -> "sparse.csr_array":
+    """What makes means over the frames of flat values of shape (frames, ...).
+
+    Of what is not usable in any frame it makes NaN.
+    """
+    frames, squares = len(usable), usable[0].size
+    flat = usable.reshape(frames, squares)
+    count = flat.sum(axis=0)
+    weights = np.where(count > 0, flat / np.maximum(count, 1), np.nan)
+    places = (np.tile(np.arange(squares), frames), np.arange(usable.size))
+    return sparse.csr_array((weights.ravel(), places), shape=(squares, usable.size))
 
 
 def _places_in_squares(grid: RakeGrid, pitch: float) -> NDArray[np.float64]:
@@ -302,6 +346,11 @@ class _Squares:
         deviation = np.where(left_out, np.nan, deviation)
         number_kept = kept.astype(np.int64).reshape(self.shape)
         return mean.reshape(self.shape), deviation.reshape(self.shape), number_kept
+
+    def mean(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Mean of values of all pixels, NaN counting as 0, of `shape`."""
+        good = np.nan_to_num(values.ravel()[self.pixel])
+        return self._sum(self.weight * good).reshape(self.shape)
 
     def _sum(self, values: NDArray[np.generic]) -> NDArray[np.float64]:
         total = np.bincount(self.square, values.astype(np.float64), minlength=self.whole.size)

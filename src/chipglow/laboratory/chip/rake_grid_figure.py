@@ -29,7 +29,8 @@ def draw_rake_grid(measurement: Measurement, grid: RakeGrid) -> Figure:
     grid : RakeGrid
         The grid. Of several frames their mean is drawn, with bars of one standard deviation
         between frames, and hollow where a square is usable in some of the frames only; of one
-        frame, with bars of one standard deviation over a square's pixels.
+        frame, with bars of one standard deviation over a square's pixels. Bands are of one standard
+        uncertainty of the mean, where calibration or tool are in it.
     """
     with drawing.style():
         figure = drawing.new_figure(_HEIGHT)
@@ -74,6 +75,7 @@ def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
     several = grid.times.size > 1
     mean = grid.frame_mean - KELVIN
     bars = grid.frame_deviation if several else grid.deviation[0]
+    spread = grid.frame_estimate.standard_uncertainty
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, grid.depth.size))
     for m, depth in enumerate(grid.depth):
         if not grid.usable[:, m].any():
@@ -93,10 +95,14 @@ def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
             capsize=2,
             label=f"{1e6 * depth:.3g} µm",
         )
+        if grid.estimate.components:
+            ends = mean[m] - spread[m], mean[m] + spread[m]
+            axes.fill_between(along, *ends, color=colours[m], alpha=0.15, linewidth=0)
         partly = grid.frame_count[m] < grid.times.size
         hollow = {"color": colours[m], "markerfacecolor": "white", "linestyle": "none"}
         axes.plot(along[partly], mean[m, partly], marker=marker, markersize=4, zorder=3, **hollow)
     axes.set_xlabel("distance along the rake face / µm")
     axes.set_ylabel("radiance temperature / °C")
     over = f"between {grid.times.size} frames" if several else "in a square"
-    axes.set_title(f"b) profiles\nbars: deviation {over}")
+    bands = "\nbands: ± 1 standard uncertainty" * bool(grid.estimate.components)
+    axes.set_title(f"b) profiles\nbars: deviation {over}{bands}")

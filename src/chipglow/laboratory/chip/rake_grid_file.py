@@ -4,13 +4,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chipglow.io.table_file import celsius_text, number_text, write_table_or_dataset
-from chipglow.laboratory.chip.rake_grid import RakeGrid
+from chipglow.laboratory.chip.budget_columns import budget_columns, budget_values
+from chipglow.laboratory.chip.rake_grid import RAKE_BUDGET, RakeGrid
 from chipglow.scene.tool_attributes import tool_attributes
+from chipglow.uncertainty import to_xarray
 
 _COLUMNS: Final = (
     "time_us",
@@ -19,7 +19,7 @@ _COLUMNS: Final = (
     "mean_degC",
     "deviation_K",
     "usable_pixels",
-    "tool_uncertainty_K",
+    *budget_columns(RAKE_BUDGET),
 )
 
 
@@ -32,9 +32,10 @@ def write_rake_grid(grid: RakeGrid, path: Path) -> None:
         What to write.
     path : Path
         ``.csv``: a line for each square of each frame, with its units in the names of the columns;
-        what is left out has no mean, and a tool whose place is known no uncertainty. ``.nc``:
-        NetCDF-4 in SI units with the dimensions (time, depth, along), and the tool as a scene tells
-        it. A file that is there is replaced at the end.
+        what is left out has no mean, and what is not known of its uncertainty is empty. ``.nc``:
+        NetCDF-4 in SI units with the dimensions (time, depth, along), ``mean`` with its components
+        as `chipglow.uncertainty.from_xarray` reads them, and the tool as a scene tells it. A file
+        that is there is replaced at the end.
 
     Raises
     ------
@@ -47,35 +48,32 @@ def write_rake_grid(grid: RakeGrid, path: Path) -> None:
 
 
 def _rows(grid: RakeGrid) -> Iterator[tuple[Any, ...]]:
-    uncertainty = _uncertainty(grid)
+    budget = budget_values(grid.estimate, RAKE_BUDGET)
     for frame, time in enumerate(grid.times):
         for m, depth in enumerate(grid.depth):
             for n, along in enumerate(grid.along):
                 place = (f"{1e6 * time:.10g}", f"{1e6 * depth:.10g}", f"{1e6 * along:.10g}")
                 mean, deviation = grid.mean[frame, m, n], grid.deviation[frame, m, n]
                 values = (celsius_text(mean), number_text(deviation))
-                of_tool = number_text(uncertainty[frame, m, n])
-                yield (*place, *values, int(grid.count[frame, m, n]), of_tool)
-
-
-def _uncertainty(grid: RakeGrid) -> NDArray[np.float64]:
-    """Standard uncertainty from the tool's place in K; NaN if none is told."""
-    return grid.tool_uncertainty if grid.from_tool else np.full(grid.mean.shape, np.nan)
+                parts = map(number_text, budget[frame, m, n])
+                yield (*place, *values, int(grid.count[frame, m, n]), *parts)
 
 
 def _dataset(grid: RakeGrid) -> xr.Dataset:
     dimensions = ("time", "depth", "along")
-    return xr.Dataset(
-        {
-            "mean": (dimensions, grid.mean, {"units": "K", "long_name": "radiance temperature"}),
-            "deviation": (dimensions, grid.deviation, {"units": "K"}),
-            "tool_uncertainty": (dimensions, _uncertainty(grid), {"units": "K"}),
-            "count": (dimensions, grid.count, {"units": "1"}),
-        },
-        coords={
-            "time": ("time", grid.times, {"units": "s"}),
-            "depth": ("depth", grid.depth, {"units": "m"}),
-            "along": ("along", grid.along, {"units": "m"}),
-        },
-        attrs={"size": grid.size, **tool_attributes(grid.tool)},
+    data = to_xarray(grid.estimate, "mean", dimensions, "K")
+    data["mean"].attrs["long_name"] = "radiance temperature"
+    whole = budget_values(grid.estimate, ())[..., 0]
+    return (
+        data.assign(
+            standard_uncertainty=(dimensions, whole, {"units": "K"}),
+            deviation=(dimensions, grid.deviation, {"units": "K"}),
+            count=(dimensions, grid.count, {"units": "1"}),
+        )
+        .assign_coords(
+            time=("time", grid.times, {"units": "s"}),
+            depth=("depth", grid.depth, {"units": "m"}),
+            along=("along", grid.along, {"units": "m"}),
+        )
+        .assign_attrs(size=grid.size, **tool_attributes(grid.tool))
     )

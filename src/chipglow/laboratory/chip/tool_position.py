@@ -1,8 +1,10 @@
 """How uncertain the place of a tool is, and what that makes uncertain."""
 
-from collections.abc import Sequence
+import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import isfinite
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,13 @@ from scipy.ndimage import map_coordinates
 from chipglow.camera import Measurement
 from chipglow.laboratory.chip.band_ridge import ThermalImage
 from chipglow.scene import Tool
+from chipglow.uncertainty import Cause, Component
+
+TOOL: Final = "tool"
+"""Name of the component of uncertainty that the place of a tool makes."""
+
+TOOL_BUDGET: Final = ("tool along", "tool across", "tool angle")
+"""Its lines in a budget."""
 
 
 def tool_in(measurement: Measurement, given: Tool | None) -> Tool:
@@ -97,6 +106,22 @@ class ToolUncertainty:
             [moved, np.broadcast_to(self.across * normal, points.shape), self.angle * turned]
         )
 
+    def component(self, tool: Tool, effects: Iterable[NDArray[np.float64]]) -> Component:
+        """The component that the place of a tool makes.
+
+        Parameters
+        ----------
+        tool : Tool
+            The tool. The errors of the same tool with the same uncertainty are the same, in
+            whatever is read by it.
+        effects : iterable of ndarray
+            Changes of the values by one standard uncertainty `along`, `across` and of `angle`,
+            with their sign, all of one shape; NaN where there is no value.
+        """
+        columns = np.stack([one.ravel() for one in effects], axis=1)
+        identity = hashlib.sha256(repr((tool, self)).encode()).hexdigest()[:16]
+        return Component(Cause(TOOL, identity, len(TOOL_BUDGET), parts=TOOL_BUDGET), columns)
+
 
 def contribution(
     image: ThermalImage, points: NDArray[np.float64], displacement: NDArray[np.float64]
@@ -135,10 +160,3 @@ def _read(
     outside = (row < 0) | (row > rows - 1) | (column < 0) | (column > columns - 1)
     values = map_coordinates(image.temperature, [row, column], order=1, mode="nearest")
     return values, outside
-
-
-def combined(
-    contributions: Sequence[NDArray[np.float64]], shape: tuple[int, ...]
-) -> NDArray[np.float64]:
-    """Root of the sum of the squares of independent contributions in K; 0 without any."""
-    return np.sqrt(sum((part**2 for part in contributions), np.zeros(shape)))

@@ -9,7 +9,6 @@ from chipglow.laboratory.comparison.comparison import (
     StatedUncertainties,
     compare,
     normalised_error,
-    reading,
 )
 from chipglow.laboratory.comparison.file import write_comparison
 
@@ -22,6 +21,5 @@ __all__ = [
     "StatedUncertainties",
     "compare",
     "normalised_error",
-    "reading",
     "write_comparison",
 ]

@@ -18,12 +18,13 @@ from chipglow.laboratory.chip import (
     band_profile,
     rake_grid,
 )
+from chipglow.laboratory.chip.band_profile import POSITION
+from chipglow.laboratory.chip.frame_scatter import FrameScatter
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
-from chipglow.laboratory.chip.tool_position import contribution
-from chipglow.laboratory.comparison.frame_scatter import FrameScatter
+from chipglow.laboratory.chip.tool_position import TOOL, contribution
 from chipglow.scene import Tool, sample
 from chipglow.text.remarks import Remarks
-from chipglow.uncertainty import Estimate, draw
+from chipglow.uncertainty import Component, Estimate, draw
 
 COVERAGE: Final = 2.0
 """Factor between standard and expanded uncertainty: about 95 %."""
@@ -38,61 +39,6 @@ _DRAWS: Final = 4000
 _SEED: Final = 2010
 _FEW: Final = 3
 _SAME_ANGLE: Final = radians(0.1)
-
-
-def reading(
-    temperature: NDArray[np.float64],
-    systematic: NDArray[np.float64],
-    random: NDArray[np.float64],
-    from_tool: Sequence[NDArray[np.float64]] = (),
-    scatter: FrameScatter | None = None,
-) -> Estimate:
-    """Radiance temperatures with their standard uncertainties, all of one shape.
-
-    Parameters
-    ----------
-    temperature : ndarray
-        In K; NaN where there is none.
-    systematic : ndarray
-        Standard uncertainty in K of what all values have in common: calibration, a stated one,
-        the emissivity of a simulation.
-    random : ndarray
-        Standard uncertainty in K of what differs from value to value: position, and the mean over
-        the frames.
-    from_tool : sequence of ndarray
-        What each independent standard uncertainty of the tool's place changes in K, with its sign:
-        it changes all values together, up the one slope and down the other.
-    scatter : FrameScatter, optional
-        What of `random` comes from the mean over the frames, in which values change together. By
-        default every value changes by itself.
-
-    Returns
-    -------
-    Estimate
-        With the components ``systematic``, ``position``, ``frames`` and ``tool``, independent of
-        those of other readings.
-
-    Raises
-    ------
-    ValueError
-        If the shapes differ.
-    """
-    fields = [("systematic", systematic), ("random", random)]
-    for name, values in (*fields, *(("from_tool", part) for part in from_tool)):
-        if values.shape != temperature.shape:
-            raise ValueError(
-                f"reading: {name} has shape {values.shape}, expected {temperature.shape}"
-            )
-    alone = random
-    if scatter is not None:
-        alone = np.sqrt(np.maximum(random**2 - scatter.deviation**2, 0.0))
-    found = Estimate(temperature).with_component("systematic", systematic, independent="common")
-    found = found.with_component("position", alone, independent="per element")
-    if scatter is not None:
-        found = replace(found, components=(*found.components, scatter.component()))
-    for part in from_tool:
-        found = found.with_component("tool", part, independent="common")
-    return found
 
 
 def normalised_error(measured: Estimate, simulated: Estimate) -> NDArray[np.float64]:
@@ -366,7 +312,7 @@ def compare(
         raise ValueError("comparison: no simulation, expected 1 or more")
     stated = stated or StatedUncertainties()
     remarks = Remarks()
-    if measured.calibration_uncertainty is None and stated.temperature == 0.0:
+    if measured.calibration_errors is None and stated.temperature == 0.0:
         remarks.warnings.append(
             "the measurement does not tell the uncertainty of its calibration and none is stated, "
             "so that the E_n are too great."
@@ -429,45 +375,46 @@ def _compare_grid(
     if base.times.size < _FEW:
         remarks.warnings.append(_few_frames("measured", base.times.size))
     columns = min(grid.along.size for grid in (base, *grids.values()))
-    readings = [_measured_squares(measured, base, columns, stated)]
-    for label, item in simulated.items():
-        grid = grids[label]
-        mean = grid.frame_mean[:, :columns]
-        emissivity = _of_the_emissivity(item, mean, stated)
-        scatter = FrameScatter.of(grid.mean[:, :, :columns])
-        readings.append(reading(mean, emissivity, scatter.deviation, scatter=scatter))
-    return GridComparison(base.along[:columns], base.depth, readings[0], tuple(readings[1:]))
+    base = base.up_to(columns)
+    readings = [
+        _assumed(item, grids[label].up_to(columns).frame_estimate, stated)
+        for label, item in simulated.items()
+    ]
+    return GridComparison(
+        base.along, base.depth, _measured_squares(measured, base, stated), tuple(readings)
+    )
 
 
 def _measured_squares(
-    measured: Measurement, grid: RakeGrid, columns: int, stated: StatedUncertainties
+    measured: Measurement, grid: RakeGrid, stated: StatedUncertainties
 ) -> Estimate:
-    mean = grid.frame_mean[:, :columns]
-    corners = grid.corners()[:, : columns + 1]
+    found = _stated(grid.frame_estimate, stated)
+    if stated.tool is not None and stated.position is None:
+        return found
+    corners = grid.corners()
     middles = (corners[1:, 1:] + corners[:-1, :-1]) / 2
-    systematic = np.full(mean.shape, stated.temperature)
-    if measured.calibration_uncertainty is not None:
-        share = sample(_relative_calibration(measured), measured.raster, middles)
-        systematic = np.hypot(systematic, share * _relative_to_kelvin(measured, mean))
-    scatter = FrameScatter.of(grid.mean[:, :, :columns])
-    random = scatter.deviation
-    if stated.tool is None or stated.position is not None:
-        images = [_image(measured, k) for k in range(measured.times.size)]
-        image = np.mean([item.temperature for item in images if item is not None], axis=0)
-        pitch = measured.raster.spacing
-        slopes = [sample(slope, measured.raster, middles) for slope in np.gradient(image, pitch)]
-        random = np.hypot(random, np.hypot(*slopes) * _position(measured, stated))
-    from_tool = tuple(p[:, :columns] for p in grid.frame_from_tool)
-    return reading(mean, systematic, random, from_tool, scatter)
+    images = [_image(measured, k) for k in range(measured.times.size)]
+    image = np.mean([item.temperature for item in images if item is not None], axis=0)
+    pitch = measured.raster.spacing
+    slopes = [sample(slope, measured.raster, middles) for slope in np.gradient(image, pitch)]
+    off = np.where(np.isfinite(found.values), np.hypot(*slopes), np.nan)
+    off = off * _position(measured, stated)
+    return found.with_component(POSITION, off, independent="per element")
 
 
-def _relative_calibration(measured: Measurement) -> NDArray[np.float64]:
-    """Uncertainty of the calibration over the radiance, mean over the frames, shape (y, x)."""
-    absolute = measured.calibration_uncertainty
-    assert absolute is not None
-    usable = measured.usable & (measured.radiance > 0)
-    share = np.divide(absolute, measured.radiance, out=np.zeros(absolute.shape), where=usable)
-    return _mean(share, usable)
+def _stated(found: Estimate, stated: StatedUncertainties) -> Estimate:
+    """What was measured, with the stated uncertainty that all values have in common."""
+    return found.with_component("stated", stated.temperature, independent="common")
+
+
+def _assumed(simulated: Measurement, found: Estimate, stated: StatedUncertainties) -> Estimate:
+    """What was simulated, with what the uncertainty of the assumed emissivity makes."""
+    spread = np.zeros(found.shape)
+    if stated.emissivity > 0.0:
+        # Kelvins of radiance temperature for a radiance that is off by its own amount.
+        radiance = np.asarray(simulated.band.radiance(found.values), np.float64)
+        spread = stated.emissivity * radiance / simulated.band.slope(found.values)
+    return found.with_component("emissivity", spread, independent="common")
 
 
 def _image(measured: Measurement, frame: int) -> ThermalImage | None:
@@ -487,23 +434,6 @@ def _few_frames(name: str, count: int) -> str:
         f"{name}: {count} {frames} only, which do not tell how the temperature varies between "
         "frames."
     )
-
-
-def _relative_to_kelvin(
-    measurement: Measurement, temperature: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Kelvins of radiance temperature for a radiance that is off by its own amount."""
-    radiance = np.asarray(measurement.band.radiance(temperature), np.float64)
-    return radiance / measurement.band.slope(temperature)
-
-
-def _of_the_emissivity(
-    simulated: Measurement, temperature: NDArray[np.float64], stated: StatedUncertainties
-) -> NDArray[np.float64]:
-    """Standard uncertainty in K that the assumed emissivity makes."""
-    if stated.emissivity == 0.0:
-        return np.zeros(temperature.shape)
-    return stated.emissivity * _relative_to_kelvin(simulated, temperature)
 
 
 def _compare_band(
@@ -534,44 +464,45 @@ def _compare_band(
             remarks.warnings.append(f"the shear band is left out: {name}: {error}.")
             return None
     if curve is not None and stated.tool is not None:
-        moves = stated.tool.displacements(tool, tool.edge_point)
-        profiles[0] = replace(profiles[0], from_tool=_of_the_curve(measured, profiles[0], moves))
+        profiles[0] = _laid_by_the_edge(measured, profiles[0], tool, stated.tool)
     step = measured.raster.spacing
     last = max(float(profile.distance[-1]) for profile in profiles)
     distance = step * np.arange(1, int(last / step) + 1, dtype=np.float64)
     names = [name for name, *_ in files]
-    parts = [_along(name, p, distance, remarks) for name, p in zip(names, profiles, strict=True)]
-    (mean, calibration, off, *from_tool), scatter = parts[0]
-    systematic = np.hypot(calibration, stated.temperature)
-    random = np.hypot(off, scatter.deviation)
-    own = reading(mean, systematic, random, tuple(from_tool), scatter)
-    readings = []
-    for (_, item, *_), ((mean, *_), scatter) in zip(files[1:], parts[1:], strict=True):
-        emissivity = _of_the_emissivity(item, mean, stated)
-        readings.append(reading(mean, emissivity, scatter.deviation, scatter=scatter))
-    return BandComparison(distance, own, tuple(readings))
+    own, *others = [
+        _along(name, p, distance, remarks) for name, p in zip(names, profiles, strict=True)
+    ]
+    readings = [
+        _assumed(item, found.without(POSITION), stated)
+        for (_, item, *_), found in zip(files[1:], others, strict=True)
+    ]
+    return BandComparison(distance, _stated(own, stated), tuple(readings))
 
 
-def _of_the_curve(
-    measured: Measurement, profile: BandProfile, moves: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], ...]:
-    """What it makes in K that the edge places a given curve on the simulations.
+def _laid_by_the_edge(
+    measured: Measurement, profile: BandProfile, tool: Tool, uncertainty: ToolUncertainty
+) -> BandProfile:
+    """The profile with what it makes that the edge places a given curve on the simulations.
 
     There the curve is off by as much as the edge is here, across itself too, and the distances
     that are compared are the same: what it would read here stands for all simulations.
     """
+    moves = uncertainty.displacements(tool, tool.edge_point)
     found = np.full((len(moves), *profile.temperature.shape), np.nan)
     for frame, points in enumerate(profile.points):
         image = _image(measured, frame)
         if image is not None:
             found[:, frame] = [contribution(image, points, move) for move in moves]
-    return tuple(found)
+    found[:, np.isnan(profile.temperature)] = np.nan
+    alone = profile.estimate.without(TOOL)
+    components = (*alone.components, uncertainty.component(tool, found))
+    return replace(profile, estimate=replace(alone, components=components))
 
 
 def _along(
     name: str, profile: BandProfile, distance: NDArray[np.float64], remarks: Remarks
-) -> tuple[tuple[NDArray[np.float64], ...], FrameScatter]:
-    """Means over the frames of temperature, calibration, position, tool; and how the frames differ.
+) -> Estimate:
+    """Means over the frames at distances from the edge.
 
     Where a single frame reaches, the variance between frames is the mean of it where several do.
     """
@@ -585,19 +516,33 @@ def _along(
         used = np.ones(used.size, np.bool_)
     elif used.sum() < _FEW:
         remarks.warnings.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
-    fields = (profile.temperature, profile.calibration, profile.position, *profile.from_tool)
-    read = [
-        np.stack([_at(distance, profile.distance, row) for row in field[used]]) for field in fields
+
+    def read(field: NDArray[np.float64]) -> NDArray[np.float64]:
+        rows = field.reshape(profile.temperature.shape)[used]
+        return np.stack([_at(distance, profile.distance, row) for row in rows])
+
+    frames = read(profile.temperature)
+    known = np.isfinite(frames)
+    # The curve's place does not change from frame to frame: it is as uncertain in their mean.
+    position = _mean(read(profile.estimate.contribution(POSITION)), known)
+    systematic = [
+        Component(one.cause, np.stack([_mean(read(e), known) for e in one.effects.T], axis=1))
+        for one in profile.estimate.without(POSITION).components
     ]
-    known = np.isfinite(read[0])
-    count = known.sum(axis=0)
-    scatter = FrameScatter.of(read[0])
+    found = Estimate(_mean(frames, known), tuple(systematic), profile.estimate.unevaluated)
+    found = found.with_component(POSITION, position, independent="per element")
+    return replace(found, components=(*found.components, _scatter(frames, known).component()))
+
+
+def _scatter(frames: NDArray[np.float64], known: NDArray[np.bool_]) -> FrameScatter:
+    """How the frames differ, where they are known."""
+    count, scatter = known.sum(axis=0), FrameScatter.of(frames)
     several = count > 1
     if several.any() and (count == 1).any():
         patterns = scatter.patterns.copy()
         patterns[0, count == 1] = sqrt(float((count * scatter.deviation**2)[several].mean()))
         scatter = replace(scatter, patterns=patterns)
-    return tuple(_mean(field, known) for field in read), scatter
+    return scatter
 
 
 def _at(

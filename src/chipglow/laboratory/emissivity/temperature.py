@@ -397,6 +397,5 @@ def _correlation(
     heating = emissivity.heating
     hot, cold = band.radiance(np.array([heating.reference, heating.reflected])).tolist()
     then = cold + float(emissivity.estimate.values) * (hot - cold)
-    covariance = calibration.radiance_covariance(band.temperature(np.array([then, radiance])))
-    scale = float(np.sqrt(covariance[0, 0] * covariance[1, 1]))
-    return float(covariance[0, 1]) / scale if scale > 0 else 0.0
+    found = calibration.errors.estimate([then, radiance]).correlation()[0, 1]
+    return float(np.nan_to_num(found))

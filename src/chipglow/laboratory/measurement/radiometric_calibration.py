@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from chipglow.camera import (
     Calibration,
     FactoryCalibration,
-    FittedCalibration,
     Flag,
     Measurement,
     NonUniformity,
@@ -26,7 +25,6 @@ MIRRORS: Final = ("none", "horizontal", "vertical")
 _SAME: Final = 0.01
 """Relative difference up to which two integration times or limits of bands are the same."""
 _PIXELS_AT_ONCE: Final = 1 << 22
-_NODES: Final = 513
 _FULL_SCALES: Final = tuple(2**bits - 1 for bits in (8, 10, 12, 13, 14, 16))
 
 
@@ -133,10 +131,13 @@ def calibrate_recording(
         _develop_frames(part, calibration, band, non_uniformity, bad_pixels)
         for part in _parts(recording)
     ]
-    known = [part.uncertainty for part in parts if part.uncertainty is not None]
     radiance = position.place(np.concatenate([part.radiance for part in parts]))
+    errors = None
     if calibration is not None:
-        lower_limit = max(lower_limit or 0.0, calibration.lowest) or None
+        lower_limit, errors = (
+            max(lower_limit or 0.0, calibration.lowest) or None,
+            calibration.errors,
+        )
     return Measurement.from_radiance(
         radiance,
         band,
@@ -144,18 +145,17 @@ def calibrate_recording(
         position.raster((radiance.shape[1], radiance.shape[2]), recording.pitch),
         lower_limit,
         position.place(np.concatenate([part.flags for part in parts])),
-        position.place(np.concatenate(known)) if known else None,
-        _attributes(recording, calibration, position, bool(known)),
+        errors,
+        _attributes(recording, calibration, position, errors is not None),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Developed:
-    """Radiance, flags and, if it is known, uncertainty of some frames, of shape (time, y, x)."""
+    """Radiance and flags of some frames, of shape (time, y, x)."""
 
     radiance: NDArray[np.float32]
     flags: NDArray[np.uint8]
-    uncertainty: NDArray[np.float32] | None
 
 
 def _check_known(recording: Recording, calibration: Calibration | None) -> None:
@@ -249,13 +249,12 @@ def _develop_frames(
     non_uniformity: NonUniformity | None,
     bad_pixels: NDArray[np.bool_] | None,
 ) -> _Developed:
-    """Radiance in 32 bits, which hold more than counts can tell, with flags and uncertainty."""
+    """Radiance in 32 bits, which hold more than counts can tell, with flags."""
     signal, flags = repaired_signal(recording, non_uniformity, bad_pixels)
     radiance = _radiance(recording, calibration, band, signal)
     if calibration is not None and calibration.highest < np.inf:
         flags[radiance > band.radiance(calibration.highest)] |= np.uint8(Flag.SATURATED)
-    uncertainty = _uncertainty(calibration, signal)
-    return _Developed(radiance.astype(np.float32), flags, uncertainty)
+    return _Developed(radiance.astype(np.float32), flags)
 
 
 def repaired_signal(
@@ -327,25 +326,11 @@ def _radiance(
     return told.apparent_radiance(signal, band)
 
 
-def _uncertainty(
-    calibration: Calibration | None, signal: NDArray[np.float64]
-) -> NDArray[np.float32] | None:
-    """From a table over the calibrated range: it is smooth, and there are many pixels."""
-    if calibration is None:
-        return None
-    if isinstance(calibration, FittedCalibration):
-        coldest, hottest = calibration.counts([calibration.lowest, calibration.highest]).tolist()
-        counts = np.linspace(coldest, hottest, _NODES)
-        return np.interp(signal, counts, calibration.uncertainty(counts)).astype(np.float32)
-    values = calibration.uncertainty(signal)
-    return None if values is None else values.astype(np.float32)
-
-
 def _attributes(
     recording: Recording,
     calibration: Calibration | None,
     position: ImagePosition,
-    uncertainty_known: bool,
+    errors_known: bool,
 ) -> dict[str, float | str]:
     attributes: dict[str, float | str | None] = {
         "camera": recording.camera,
@@ -357,7 +342,7 @@ def _attributes(
         "object_parameters": _told(recording),
         "notes": "\n".join(recording.notes),
         "assumed": "\n".join(_assumed(recording, calibration, position)),
-        "doubtful": "\n".join(_doubtful(recording, calibration, uncertainty_known)),
+        "doubtful": "\n".join(_doubtful(recording, calibration, errors_known)),
     }
     return {name: value for name, value in attributes.items() if value not in (None, "")}
 
@@ -413,12 +398,12 @@ def _assumed(
 
 
 def _doubtful(
-    recording: Recording, calibration: Calibration | None, uncertainty_known: bool
+    recording: Recording, calibration: Calibration | None, errors_known: bool
 ) -> Iterator[str]:
     yield from recording.warnings
     for warning in calibration.warnings if calibration else ():
         yield f"The calibration: {warning[0].lower()}{warning[1:]}"
-    if not uncertainty_known:
+    if not errors_known:
         yield "The uncertainty of the radiance from the calibration is not known."
     signal = recording.signal
     if recording.saturation is None and np.issubdtype(signal.dtype, np.integer):

@@ -5,6 +5,7 @@ from chipglow.laboratory.psf.edge_file import load_edge
 from chipglow.laboratory.psf.edge_image import EdgeImage, counts_image, edge_image
 from chipglow.laboratory.psf.edge_line import EdgeLine, NoEdgeError, find_edge
 from chipglow.laboratory.psf.file import write_psf
+from chipglow.laboratory.psf.kernel import psf_kernel
 from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge, knife_edge
 from chipglow.laboratory.psf.psf_fit import ModelFit
 from chipglow.laboratory.psf.radial_psf import RadialPSF
@@ -26,5 +27,6 @@ __all__ = [
     "knife_edge",
     "load_apertures",
     "load_edge",
+    "psf_kernel",
     "write_psf",
 ]

@@ -1,21 +1,20 @@
 """Point spread functions by the knife edge in NetCDF-4 files."""
 
 import os
-from typing import Final
 
 import numpy as np
 import xarray as xr
 
-from chipglow.camera import MeasuredPSF, PointSpreadFunction
+from chipglow.camera import MeasuredPSF
 from chipglow.io import write_dataset
+from chipglow.laboratory.psf.kernel import psf_kernel
 from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge
 from chipglow.laboratory.psf.psf_fit import ModelFit
-
-_SAMPLES_PER_WIDTH: Final = 10
+from chipglow.uncertainty import to_xarray
 
 
 def write_psf(
-    knife: KnifeEdge, path: str | os.PathLike[str], psf: PointSpreadFunction | None = None
+    knife: KnifeEdge, path: str | os.PathLike[str], psf: MeasuredPSF | None = None
 ) -> None:
     """Write a point spread function and what it was found from.
 
@@ -26,37 +25,36 @@ def write_psf(
     path : path-like
         The file to write, for ``psf: {kind: measured, file: ...}`` of a study's camera and for
         `MeasuredPSF.from_file`; one that is there is replaced at the end.
-    psf : PointSpreadFunction, optional
-        The optics' point spread function to write; that of the best model by default.
+    psf : MeasuredPSF, optional
+        The kernel to write, with the components of its uncertainty; by default that of the best
+        model, as `psf_kernel` makes it.
 
     Raises
     ------
     OSError
         If the file cannot be written.
     """
-    psf = knife.psf() if psf is None else psf
-    spacing = psf.spacing if isinstance(psf, MeasuredPSF) else psf.fwhm / _SAMPLES_PER_WIDTH
-    data = xr.Dataset(
-        {"kernel": (("y", "x"), psf.kernel(spacing), {"units": "1", "spacing": spacing})},
-        attrs={
-            "fwhm": knife.fwhm,
-            "fwhm_uncertainty": knife.fwhm_uncertainty,
-            "model": knife.best.model.name,
-            "doubtful": "\n".join(knife.warnings),
-            "assumed": "\n".join(knife.assumptions),
-        },
+    psf = psf_kernel(knife) if psf is None else psf
+    data = to_xarray(psf.estimate, "kernel", ("y", "x"))
+    data["kernel"].attrs["spacing"] = psf.spacing
+    data = data.assign_attrs(
+        fwhm=knife.fwhm,
+        fwhm_uncertainty=knife.fwhm_uncertainty,
+        model=knife.best.model.name,
+        doubtful="\n".join(knife.warnings),
+        assumed="\n".join(knife.assumptions),
     )
     for fit, weight in zip(knife.fits, knife.weights, strict=True):
         data = data.assign(_fit_variables(fit.model.name.replace(" ", "_"), fit, weight))
     for number, edge in enumerate(knife.edges, 1):
         data = data.assign(_edge_variables(f"edge{number}", edge))
-    radial = knife.radial
+    radial, encircled = knife.radial, knife.radial.encircled
     data = data.assign(
         radius=("ring", radial.radius, {"units": "m"}),
         density=("ring", radial.density, {"units": "m-2"}),
         encircled_radius=("ring_edge", radial.edges, {"units": "m"}),
-        encircled=("ring_edge", radial.encircled, {"units": "1"}),
-        encircled_uncertainty=("ring_edge", radial.encircled_uncertainty, {"units": "1"}),
+        encircled=("ring_edge", encircled.values, {"units": "1"}),
+        encircled_uncertainty=("ring_edge", encircled.standard_uncertainty, {"units": "1"}),
     )
     write_dataset(data, path)
 

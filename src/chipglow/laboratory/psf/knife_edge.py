@@ -159,11 +159,11 @@ class KnifeEdge:
         """
         pairs = zip(self.weights, self.fits, strict=True)
         spread = sum(weight * (fit.fwhm - self.fwhm) ** 2 for weight, fit in pairs)
-        wider = self.radial.wider if self._unexplained else 0.0
+        wider = self.radial.wider if self.unexplained else 0.0
         return sqrt(self.best.fwhm_uncertainty**2 + spread + wider**2)
 
     @property
-    def _unexplained(self) -> bool:
+    def unexplained(self) -> bool:
         """Whether the best model leaves what noise does in less than one of a hundred edges."""
         bins = sum(edge.spread.distance.size for edge in self.edges)
         free = max(bins - self.best.free, 1)

@@ -544,7 +544,16 @@ def sampled_psf(
     reach: float,
     spacing: float,
 ) -> MeasuredPSF:
-    """Kernel of a density over the plane, integrated over squares.
+    """Point spread function of a density over the plane; parameters as of `sampled_kernel`."""
+    return MeasuredPSF(*sampled_kernel(density, reach, spacing))
+
+
+def sampled_kernel(
+    density: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]],
+    reach: float,
+    spacing: float,
+) -> tuple[NDArray[np.float64], float]:
+    """Kernel of a density over the plane, integrated over squares, and their side in m.
 
     Parameters
     ----------
@@ -564,7 +573,7 @@ def sampled_psf(
         for j in range(_KERNEL_NODES):
             x, y = line[None, :, j], line[::-1, i, None]
             kernel += weight[i] * weight[j] * density(x, y)
-    return MeasuredPSF(kernel, spacing)
+    return kernel, spacing
 
 
 def _gaussian_transfer(fwhm: float, frequency: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ changes as smoothly from ring to ring as the data let it: what the data do not t
 of the core and the farthest of the tails, is the model's.
 """
 
+import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -20,14 +21,26 @@ from scipy.special import j1
 from chipglow.camera import MeasuredPSF
 from chipglow.laboratory.psf.edge_spread import EdgeSpread
 from chipglow.laboratory.psf.psf_fit import ApertureSignals, EdgePixels, ModelFit
-from chipglow.laboratory.psf.psf_models import disc_response, edge_response, sampled_psf
+from chipglow.laboratory.psf.psf_models import disc_response, edge_response, sampled_kernel
+from chipglow.uncertainty import Cause, Component, Estimate
 
 Values: TypeAlias = NDArray[np.float64]
+
+FIT: Final = "psf fit"
+"""Name of the component of uncertainty that the noise of the images makes."""
+
+_KEPT: Final = 0.9999
+"""Fraction of the variance of the shares that the kernel's fewer errors hold."""
 
 _RINGS: Final = 32
 _SMOOTHNESS: Final[list[float]] = np.geomspace(1e2, 1e-4, 13).tolist()
 _ROUGHER: Final = 4
 _REPEATS: Final = 24
+
+
+def psf_cause(name: str, content: NDArray[np.float64], errors: int) -> Cause:
+    """A cause of errors of one point spread function, the same in another run."""
+    return Cause(name, hashlib.sha256(content.tobytes()).hexdigest()[:16], errors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,26 +51,32 @@ class RadialPSF:
     ----------
     edges : ndarray
         Radii in m that limit the rings, from 0, shape (n + 1,).
-    shares : ndarray
-        Share of the light in each ring, shape (n,); what is missing to 1 lies beyond.
-    uncertainty : ndarray
-        Standard uncertainty of the shares: by the noise, and by how much they change when they are
-        let be rougher.
-    encircled_uncertainty : ndarray
-        The same of `encircled`, shape (n + 1,).
+    estimate : Estimate
+        Share of the light in each ring, shape (n,); what is missing to 1 lies beyond. Its component
+        `FIT` is by the noise, and by how much the shares change when they are let be rougher.
+    model : ndarray
+        Share of the light of the best model in each ring, shape (n,).
     smoothness : float
         Weight of the smoothness.
-    wider : float
-        By how much its full width at half maximum is over that of the best model in m. Both are
-        read from the rings, so that what these are too coarse for drops out.
     """
 
     edges: NDArray[np.float64]
-    shares: NDArray[np.float64]
-    uncertainty: NDArray[np.float64]
-    encircled_uncertainty: NDArray[np.float64]
+    estimate: Estimate
+    model: NDArray[np.float64]
     smoothness: float
-    wider: float
+
+    @property
+    def shares(self) -> NDArray[np.float64]:
+        """Values of `estimate`."""
+        return self.estimate.values
+
+    @property
+    def wider(self) -> float:
+        """By how much its full width at half maximum is over that of the best model in m.
+
+        Both are read from the rings, so that what these are too coarse for drops out.
+        """
+        return _ring_width(self.edges, self.shares) - _ring_width(self.edges, self.model)
 
     @property
     def radius(self) -> NDArray[np.float64]:
@@ -70,18 +89,33 @@ class RadialPSF:
         return np.asarray(self.shares / (np.pi * np.diff(self.edges**2)))
 
     @property
-    def encircled(self) -> NDArray[np.float64]:
+    def encircled(self) -> Estimate:
         """Share of the light within each of the radii `edges`."""
-        return np.concatenate([[0.0], np.cumsum(self.shares)])
+        return self.estimate.linear(np.tri(self.edges.size, self.shares.size, -1))
 
     def psf(self) -> MeasuredPSF:
-        """The kernel, straight lines between the rings' middles."""
-        radius, density = self.radius, self.density
+        """The kernel with its uncertainty, straight lines between the rings' middles."""
+        kernel, spacing = self._kernel(self.shares)
+        (found,) = self.estimate.components
+        directions, sizes, _ = np.linalg.svd(found.effects, full_matrices=False)
+        kept = 1 + int(np.searchsorted(np.cumsum(sizes**2), _KEPT * np.sum(sizes**2)))
+        errors = (directions * sizes)[:, :kept]
+        effects = np.stack([self._kernel(error)[0].ravel() for error in errors.T], axis=1)
+        cause = psf_cause(FIT, effects, kept)
+        return MeasuredPSF(kernel, spacing, (Component(cause, effects),))
+
+    def model_psf(self) -> MeasuredPSF:
+        """The same kernel of the best model: with what the rings are too coarse for."""
+        return MeasuredPSF(*self._kernel(self.model))
+
+    def _kernel(self, shares: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Kernel of light that is shared among the rings so, and its spacing in m."""
+        radius, density = self.radius, shares / np.diff(self.edges**2)
 
         def at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
             return np.interp(np.hypot(x, y), radius, density, right=0.0)
 
-        return sampled_psf(at, float(self.edges[-1]), float(self.edges[1]))
+        return sampled_kernel(at, float(self.edges[-1]), float(self.edges[1]))
 
 
 def radial_psf(
@@ -134,14 +168,8 @@ def radial_psf(
     rougher = solutions[min(chosen + _ROUGHER, len(solutions) - 1)]
     all_shares = np.array([solutions[chosen], rougher, *repeats])
     all_shares /= all_shares.sum(axis=1, keepdims=True) + beyond
-    return RadialPSF(
-        radii,
-        all_shares[0],
-        _spread(all_shares),
-        np.concatenate([[0.0], _spread(np.cumsum(all_shares, axis=1))]),
-        weight,
-        _ring_width(radii, solutions[chosen]) - _ring_width(radii, model),
-    )
+    component = Component(psf_cause(FIT, all_shares, len(all_shares) - 1), _effects(all_shares))
+    return RadialPSF(radii, Estimate(all_shares[0], (component,)), model, weight)
 
 
 def _ring_width(edges: Values, shares: Values) -> float:
@@ -166,9 +194,11 @@ def _drawn(
     return np.asarray(np.clip(drawn, low, high))
 
 
-def _spread(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Standard uncertainty by the repeats (from row 2 on) and the rougher solution (row 1)."""
-    return np.asarray(np.hypot(np.std(values[2:], axis=0, ddof=1), values[0] - values[1]))
+def _effects(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What the repeats (from row 2 on) and the rougher solution (row 1) change, (value, error)."""
+    repeats = values[2:]
+    away = (repeats - repeats.mean(axis=0)) / np.sqrt(len(repeats) - 1)
+    return np.concatenate([[values[1] - values[0]], away]).T.copy()
 
 
 def _radii(fit: ModelFit, edges: Sequence[EdgePixels]) -> NDArray[np.float64]:

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from chipglow.uncertainty import Cause, Component
 
+FRAMES: Final = "frames"
+"""Name of the component of uncertainty that the scatter of frames makes."""
+
 _LEAST: Final = 8
 """Frames from which on it is asked how alike successive ones are."""
 
@@ -57,7 +60,7 @@ class FrameScatter:
 
     def component(self) -> Component:
         """The errors as a component ``frames``, independent of that of other frames."""
-        cause = Cause("frames", uuid4().hex, len(self.patterns), self.freedom)
+        cause = Cause(FRAMES, uuid4().hex, len(self.patterns), self.freedom)
         return Component(cause, self.patterns.reshape(len(self.patterns), -1).T.copy())
 
 

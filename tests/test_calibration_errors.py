@@ -1,0 +1,339 @@
+"""The calibration's and the tool's errors in what is read of a chip, by drawing them anew."""
+
+import csv
+from dataclasses import replace
+from math import cos, hypot, radians, sin
+
+import numpy as np
+import pytest
+from matplotlib.collections import PolyCollection
+from measured_band import BAND, RASTER, TOOL, BandImage, measured
+from typer.testing import CliRunner
+
+from chipglow.camera import CalibrationErrors, Measurement, fit_linear, fit_sakuma_hattori
+from chipglow.cli import app
+from chipglow.io import read_measurement, write_measurement
+from chipglow.laboratory.chip import ToolUncertainty, band_profile, rake_grid
+from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
+from chipglow.laboratory.comparison import StatedUncertainties, compare
+from chipglow.scene import PlacedTool
+from chipglow.uncertainty import Estimate, draw
+
+X, Y = np.meshgrid(RASTER.x, RASTER.y)
+SLOPE = np.array([2e5, 1e5])
+CURVE = TOOL.edge_point + np.array([[-30e-6, 30e-6], [-230e-6, 230e-6]])
+FOUND = ToolUncertainty(along=3e-6, across=1e-6, angle=radians(0.3), pivot=70e-6)
+WIDE = ToolUncertainty(along=16e-6, across=2e-6, angle=radians(1.5), pivot=70e-6)
+BODIES = np.arange(300.0, 701.0, 50.0) + 273.15
+DRAWS = 20_000
+
+H, LIGHT, BOLTZMANN = 6.62607015e-34, 299792458.0, 1.380649e-23
+KELVINS = np.arange(450.0, 1100.0, 0.1)
+
+
+def planck():
+    """In-band radiance of `KELVINS` in W/(m² sr): the integral by Simpson's rule, written out."""
+    wavelengths = np.linspace(3.8e-6, 5.1e-6, 401)
+    weights = np.ones(401)
+    weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
+    step = wavelengths[1] - wavelengths[0]
+    total = np.zeros(KELVINS.size)
+    for wavelength, weight in zip(wavelengths, weights, strict=True):
+        photon = H * LIGHT / (wavelength * BOLTZMANN * KELVINS)
+        spectral = 2 * H * LIGHT**2 / wavelength**5 / (np.exp(photon) - 1)
+        total += weight * step / 3 * spectral
+    return total
+
+
+RADIANCE = planck()
+
+
+def by_line(counts, offset, gain):
+    """Temperatures in K of counts on a straight line over the radiance."""
+    return np.interp((counts - offset) / gain, RADIANCE, KELVINS)
+
+
+def by_sakuma_hattori(counts, offset, a, b, scale):
+    c2 = H * LIGHT / BOLTZMANN
+    return (c2 / np.log(scale / (counts - offset) + 1) - b) / a
+
+
+# Of counts, of each blackbody and of all of them in K. The form's parameters are so uncertain by
+# themselves that, with errors as of the line, counts are no longer linear in them.
+CAMERAS = {
+    "line": (fit_linear, by_line, (2.0, 0.3, 1.0)),
+    "form": (fit_sakuma_hattori, by_sakuma_hattori, (0.05, 0.008, 0.2)),
+}
+
+
+def temperature_at(points):
+    """A chip whose temperature is linear in x and y: a square's mean is that of its middle."""
+    return 700.0 + points @ SLOPE
+
+
+def counts_of(kelvins):
+    return 400.0 + 1.8 * np.interp(kelvins, KELVINS, RADIANCE)
+
+
+def looked_at(fit, frames=2):
+    """The chip as a camera shows it that was calibrated by `fit`."""
+    counts = counts_of(temperature_at(np.stack([X, Y], axis=-1)))
+    return Measurement.from_radiance(
+        np.repeat(fit.radiance(counts)[None], frames, axis=0),
+        fit.band,
+        1e-5 * np.arange(frames),
+        RASTER,
+        573.15,
+        calibration_errors=fit.errors,
+    ).with_tool(TOOL)
+
+
+def drawn_parameters(fit, generator):
+    """Parameters as other blackbodies would have given them, each of shape (DRAWS, 1)."""
+    scale = np.sqrt(np.diag(fit.covariance))
+    alike = fit.covariance / scale / scale[:, None]
+    root = np.linalg.cholesky(alike + 1e-13 * np.eye(scale.size))
+    away = generator.standard_normal((DRAWS, scale.size)) @ root.T
+    return (fit.parameters + scale * away).T[..., None]
+
+
+def displaced(points, drawn):
+    """Points fixed to a tool that is up its face, into the chip, and turned by so many u."""
+    up = np.array([sin(TOOL.rake_angle), cos(TOOL.rake_angle)])
+    into = np.array([-cos(TOOL.rake_angle), sin(TOOL.rake_angle)])
+    pivot = TOOL.rake_foot + FOUND.pivot * up
+    turn = FOUND.angle * drawn[:, 2, None]
+    away = points - pivot
+    across, along = away @ into, away @ up
+    moved = points + np.multiply.outer(FOUND.along * drawn[:, 0], up)[:, None]
+    moved = moved + np.multiply.outer(FOUND.across * drawn[:, 1], into)[:, None]
+    moved = moved + (np.cos(turn) - 1)[..., None] * away
+    return moved + np.sin(turn)[..., None] * (across[:, None] * up - along[:, None] * into)
+
+
+@pytest.mark.parametrize(("fitted", "temperature_of", "stated"), CAMERAS.values(), ids=CAMERAS)
+def test_squares_and_band_have_errors_in_common(fitted, temperature_of, stated):
+    """Against draws of the calibration's parameters and of the tool's place."""
+    generator = np.random.default_rng(7)
+    fit = fitted(BODIES, counts_of(BODIES), BAND, *stated).calibration
+    measurement = looked_at(fit)
+    grid = rake_grid(measurement, TOOL, uncertainty=FOUND)
+    profile = band_profile(measurement, TOOL, curve=CURVE, position=0.0, uncertainty=FOUND)
+    rows, columns = np.array([0, 0, 4, 4]), np.array([1, 8, 1, 8])
+    squares = grid.frame_estimate[rows, columns]
+    places = np.array([10, 60])
+    band = profile.estimate[0, places]
+
+    parameters = drawn_parameters(fit, generator)
+    tools = generator.standard_normal((DRAWS, 3))
+    up = np.array([sin(TOOL.rake_angle), cos(TOOL.rake_angle)])
+    into = np.array([-cos(TOOL.rake_angle), sin(TOOL.rake_angle)])
+    middles = TOOL.rake_foot + grid.along[columns, None] * up + grid.depth[rows, None] * into
+    way = (CURVE[1] - CURVE[0]) / hypot(*(CURVE[1] - CURVE[0]))
+    edge = TOOL.edge_point
+    farther = (displaced(edge[None], tools)[:, 0] - edge) @ way
+    along = profile.points[0, places] + np.multiply.outer(farther, way)[:, None]
+    seen = temperature_at(np.concatenate([displaced(middles, tools), along], axis=1))
+    read = temperature_of(counts_of(seen), *parameters)
+
+    together = Estimate(
+        np.concatenate([squares.values, band.values]),
+        [
+            replace(one, effects=np.concatenate([one.effects, other.effects]))
+            for one in squares.components
+            for other in band.components
+            if one.cause == other.cause
+        ],
+    )
+    # The calibration and the tool, each the same in both.
+    assert [one.cause.name for one in together.components] == ["calibration", "tool"]
+    np.testing.assert_allclose(read.mean(axis=0), together.values, atol=0.2)
+    spread = together.standard_uncertainty
+    # A standard deviation of 20 000 draws is good to 0.5 %, three times that; of a correlation to
+    # 0.7 %, three times that. Slopes change by 0.5 % where the draws go.
+    np.testing.assert_allclose(read.std(axis=0), spread, rtol=0.02)
+    np.testing.assert_allclose(np.corrcoef(read.T), together.correlation(), atol=0.021)
+    # The calibration is a part that shows.
+    part = together.contribution("calibration") / spread
+    assert part.min() > 0.05
+
+
+def test_the_calibration_alone_is_as_drawn():
+    generator = np.random.default_rng(8)
+    fit = fit_linear(BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
+    grid = rake_grid(looked_at(fit), TOOL)
+    kelvins = grid.frame_mean[grid.frame_count > 0]
+    read = by_line(counts_of(kelvins), *drawn_parameters(fit, generator))
+    estimate = grid.frame_estimate[grid.frame_count > 0]
+    # Three standard errors of 20 000 draws, and a 513th of the range between nodes.
+    np.testing.assert_allclose(estimate.contribution("calibration"), read.std(axis=0), rtol=0.015)
+    hot, cold = int(np.argmax(kelvins)), int(np.argmin(kelvins))
+    expected = (read[:, hot] - read[:, cold]).std()
+    difference = estimate[hot] - estimate[cold]
+    assert difference.contribution("calibration") == pytest.approx(expected, rel=0.015)
+    # What is common to all squares does not fall in their mean.
+    mean = estimate.mean().contribution("calibration")
+    assert mean == pytest.approx(read.mean(axis=1).std(), rel=0.015)
+    assert mean > 0.8 * estimate.contribution("calibration").min()
+
+
+def test_draws_of_an_estimate_are_of_its_calibration():
+    fit = fit_linear(BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
+    grid = rake_grid(looked_at(fit), TOOL)
+    (values,) = draw([grid.frame_estimate[0, 1:3]], 4000, np.random.default_rng(2))
+    assert np.corrcoef(values.T)[0, 1] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_the_errors_of_a_calibration_come_back_from_a_file(tmp_path):
+    fit = fit_sakuma_hattori(BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
+    measurement = looked_at(fit)
+    write_measurement(measurement, tmp_path / "m.nc")
+    again = read_measurement(tmp_path / "m.nc")
+    assert again.calibration_errors is not None
+    np.testing.assert_array_equal(again.calibration_errors.effects, fit.errors.effects)
+    assert again.calibration_errors.identity == fit.errors.identity
+    # Two files by one calibration have its errors in common, two calibrations do not.
+    same = rake_grid(again, TOOL).estimate - rake_grid(measurement, TOOL).estimate
+    assert np.nanmax(same.standard_uncertainty) < 1e-9
+    other = fit_sakuma_hattori(BODIES, counts_of(BODIES), BAND, 2.0, 0.4, 1.0).calibration
+    apart = rake_grid(looked_at(other), TOOL).estimate - rake_grid(measurement, TOOL).estimate
+    assert np.nanmin(apart.contribution("calibration")) > 0.5
+    alone = Measurement.from_radiance(
+        measurement.radiance, fit.band, measurement.times, RASTER, 573.15
+    )
+    write_measurement(alone, tmp_path / "alone.nc")
+    without = read_measurement(tmp_path / "alone.nc")
+    assert without.calibration_errors is None and without.calibration_uncertainty is None
+    for result in (rake_grid(without, TOOL), band_profile(without, TOOL, curve=CURVE)):
+        assert not result.estimate.only("calibration").components
+        assert result.estimate.unevaluated == ("calibration",)
+
+
+@pytest.mark.parametrize("fitted", [fit_linear, fit_sakuma_hattori])
+def test_the_table_of_errors_is_what_the_covariance_says(fitted):
+    """Between its nodes too, against Equation 13 of the GUM with differences for derivatives."""
+    fit = fitted(BODIES, counts_of(BODIES), BAND, 2.0, 0.3, 1.0).calibration
+    kelvins = np.linspace(fit.lowest, fit.highest, 37)
+    counts = fit.counts(kelvins)
+    changes = []
+    for number, spread in enumerate(np.sqrt(np.diag(fit.covariance))):
+        step = 1e-4 * spread * np.eye(fit.parameters.size)[number]
+        above, below = (
+            replace(fit, parameters=fit.parameters + sign * step).radiance(counts)
+            for sign in (1, -1)
+        )
+        changes.append((above - below) / (2e-4 * spread))
+    expected = np.transpose(changes) @ fit.covariance @ changes
+    found = fit.errors.estimate(BAND.radiance(kelvins)).covariance()
+    np.testing.assert_allclose(found, expected, rtol=2e-3, atol=1e-4 * expected.max())
+    np.testing.assert_allclose(fit.uncertainty(counts), np.sqrt(np.diag(expected)), rtol=1e-3)
+
+
+def test_the_same_tool_has_the_same_errors_and_another_has_its_own():
+    frame = measured([temperature_at(np.stack([X, Y], axis=-1))])
+    one = rake_grid(frame, TOOL, uncertainty=FOUND).frame_estimate[0, 3]
+    same = rake_grid(frame, TOOL, uncertainty=FOUND).frame_estimate[0, 3]
+    assert (one - same).standard_uncertainty == pytest.approx(0.0, abs=1e-12)
+    elsewhere = PlacedTool(TOOL, (1e-6, 0.0))
+    other = rake_grid(frame, elsewhere, uncertainty=FOUND).frame_estimate[0, 3]
+    assert (one - other).standard_uncertainty > one.standard_uncertainty
+
+
+@pytest.mark.parametrize(
+    ("radiance", "effects", "message"),
+    [
+        ([0.0, 1.0], [[1.0]], r"have shapes \(2,\) and \(1, 1\)"),
+        ([0.0, 1.0], [1.0, 1.0], r"expected \(k,\) and \(errors, k\)"),
+        ([1.0, 1.0], [[1.0, 1.0]], "does not rise"),
+        ([0.0, 1.0], [[1.0, np.nan]], "a number is not finite"),
+    ],
+)
+def test_impossible_errors_are_refused(radiance, effects, message):
+    with pytest.raises(ValueError, match=f"calibration errors: .*{message}"):
+        CalibrationErrors(np.array(radiance), np.array(effects))
+
+
+def test_a_table_of_errors_without_its_radiance_is_refused():
+    data = measured([np.full(RASTER.shape, 700.0)], relative_uncertainty=0.01).data
+    for wrong in (data.drop_vars("calibration_radiance"), data.transpose(..., "calibration_error")):
+        with pytest.raises(ValueError, match=r"'calibration_errors' over .* is missing"):
+            _ = Measurement(wrong).calibration_errors
+
+
+def test_the_command_writes_the_calibration_s_part(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_measurement(measured(images(600.0), relative_uncertainty=0.01), tmp_path / "m.nc")
+    result = CliRunner().invoke(app, ["rake", "m.nc", "--out", "grid.csv"])
+    assert result.exit_code == 0, result.output
+    estimate = rake_grid(read_measurement("m.nc")).estimate
+    with (tmp_path / "grid.csv").open(encoding="utf-8") as table:
+        rows = list(csv.DictReader(table))
+    for column in ("calibration_uncertainty_K", "standard_uncertainty_K"):
+        found = [float(row[column] or "nan") for row in rows]
+        expected = estimate.contribution("calibration").ravel()
+        np.testing.assert_allclose(found, expected, atol=1e-3)
+    most = np.nanmax(expected)
+    lines = [line.split() for line in result.output.splitlines()]
+    (line,) = (line for line in lines if line[:1] == ["calibration"])
+    assert float(line[-1]) == pytest.approx(most, rel=0.05)
+    assert "Errors of calibration move all squares together" in result.output
+
+
+@pytest.mark.parametrize("known", [0.01, None])
+def test_the_picture_has_a_band_where_the_calibration_is_known(known):
+    frames = measured(images(600.0), relative_uncertainty=known)
+    figure = draw_rake_grid(frames, rake_grid(frames))
+    profiles = figure.axes[1]
+    bands = [one for one in profiles.collections if isinstance(one, PolyCollection)]
+    assert bool(bands) is (known is not None)
+    assert ("standard uncertainty" in profiles.get_title("left")) is (known is not None)
+
+
+# Beside simulations
+
+
+def images(base):
+    return [BandImage(shift=shift, base=base).temperature() for shift in (-6e-6, -3e-6, 0.0, 3e-6)]
+
+
+@pytest.mark.parametrize(
+    ("curve", "stated", "expected"),
+    [
+        (
+            None,
+            StatedUncertainties(3.0, 0.02, tool=WIDE),
+            (1348.2729825857812, 308.83206070633275, 9.794418503589467, 5.1855947049657996),
+        ),
+        (
+            None,
+            StatedUncertainties(1.0, 0.01),
+            (369.483962039152, 147.12893747912335, 2.824933947757538, 2.198074173848494),
+        ),
+        (
+            CURVE,
+            StatedUncertainties(1.0, 0.01, 4e-6, WIDE),
+            (1344.274336927997, 1812.0104102450234, 9.398151146032033, 54.569773309383415),
+        ),
+    ],
+    ids=["tool", "pixel", "curve"],
+)
+def test_a_comparison_without_calibration_keeps_its_numbers(curve, stated, expected):
+    """Numbers of the version that worked out the tool's part by itself."""
+    sets = {"cold": measured(images(595.0)), "hot": measured(images(612.0), noise=2.0, seed=4)}
+    result = compare(measured(images(600.0), noise=4.0, seed=2), sets, TOOL, curve, stated)
+    assert result.grid is not None and result.band is not None
+    found = [
+        *(np.nansum(pair.measured.standard_uncertainty) for pair in (result.grid, result.band)),
+        *(result.places[index].fits[0].bias_uncertainty for index in (0, 2)),
+    ]
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def test_a_comparison_has_the_calibration_of_its_squares():
+    frames = measured(images(600.0), relative_uncertainty=0.01)
+    result = compare(frames, {"same": measured(images(600.0))}, TOOL, CURVE)
+    assert result.grid is not None and result.band is not None
+    for pair in (result.grid, result.band):
+        part = pair.measured.contribution("calibration")[np.isfinite(pair.measured.values)]
+        assert part.min() > 1.0
+        assert "calibration" in pair.simulated[0].unevaluated

@@ -1,0 +1,133 @@
+"""What is uncertain of a point spread function by the knife edge, in its kernel and its file."""
+
+from math import sqrt
+
+import numpy as np
+import pytest
+from scipy.special import erf
+from synthetic_edge import edge_radiance, gaussian_edge, image_of, ring_edge, tailed_edge
+
+from chipglow.camera import MeasuredPSF
+from chipglow.laboratory.psf import knife_edge, psf_kernel, write_psf
+from chipglow.uncertainty import Cause, Component
+
+FWHM = 10e-6
+
+
+def seen(edge, noise=0.05, seed=0, side=40):
+    return image_of(edge_radiance(edge, 5.0, side), noise, seed, None, "edge")
+
+
+@pytest.fixture(scope="module")
+def gaussian():
+    return knife_edge([seen(gaussian_edge(FWHM))])
+
+
+def encircled(psf, radius):
+    """Light within a radius in m, as an estimate."""
+    half = len(psf.weights) // 2
+    x = (np.arange(len(psf.weights)) - half) * psf.spacing
+    inside = np.hypot(x, x[:, None]) < radius
+    return psf.estimate.linear(inside.reshape(1, -1).astype(float))[0]
+
+
+def line_of(fwhm, spacing, half):
+    """Light of a Gaussian on a row of squares."""
+    edges = spacing * (np.arange(-half, half + 2) - 0.5)
+    return np.diff(erf(edges * 2 * sqrt(np.log(2)) / fwhm)) / 2
+
+
+def test_the_fit_s_part_is_that_of_a_wider_and_a_narrower_gaussian(gaussian):
+    fit = gaussian.fit("gaussian")
+    psf = psf_kernel(gaussian, "gaussian")
+    half, spread = len(psf.weights) // 2, sqrt(float(fit.covariance[0, 0]))
+    wide, narrow = (
+        line_of(fit.values[0] + sign * spread, psf.spacing, half) for sign in (1.0, -1.0)
+    )
+    expected = np.abs(np.outer(wide, wide) - np.outer(narrow, narrow)) / 2
+    found = psf.estimate.contribution("psf fit")
+    np.testing.assert_allclose(found, expected, atol=1e-6 * expected.max())
+    # All the light is there, whatever is uncertain.
+    assert psf.estimate.sum().standard_uncertainty == pytest.approx(0.0, abs=1e-12)
+
+
+def blurred(psf, deviation):
+    """Light of a point behind a Gaussian hole, whatever the squares, as an estimate."""
+    half = len(psf.weights) // 2
+    x = np.exp(-0.5 * ((np.arange(-half, half + 1) * psf.spacing) / deviation) ** 2)
+    return psf.estimate.linear(np.outer(x, x).reshape(1, -1))[0]
+
+
+def test_kernels_of_repeats_differ_as_is_said():
+    """Light behind two Gaussian holes, of 24 images of one edge with other noise."""
+    holes, edge = (3e-6, 8e-6), gaussian_edge(FWHM)
+    kernels = [psf_kernel(knife_edge([seen(edge, seed=seed)])) for seed in range(24)]
+    light = [[blurred(psf, hole) for hole in holes] for psf in kernels]
+    spread = np.std([[one.values for one in of] for of in light], axis=0, ddof=1)
+    stated = [[one.standard_uncertainty for one in of] for of in light]
+    # A standard deviation of 24 is good to 15 %: three times that, and what the choice of the
+    # model adds.
+    np.testing.assert_allclose(np.sqrt(np.mean(np.square(stated), axis=0)), spread, rtol=0.5)
+
+
+def test_the_kernel_without_a_model_is_as_uncertain_as_its_rings(gaussian):
+    radial, psf = gaussian.radial, psf_kernel(gaussian, "radial")
+    for ring in (8, 12, 16):
+        found = encircled(psf, float(radial.edges[ring]))
+        ours = radial.encircled[ring]
+        # Straight lines between the rings' middles carry some light from one to the other.
+        assert found.values == pytest.approx(float(ours.values), abs=0.01)
+        assert found.standard_uncertainty == pytest.approx(
+            float(ours.standard_uncertainty), rel=0.25
+        )
+
+
+@pytest.mark.parametrize("model", [None, "radial"])
+def test_the_file_keeps_the_components(gaussian, tmp_path, model):
+    psf = psf_kernel(gaussian, model)
+    write_psf(gaussian, tmp_path / "psf.nc", psf)
+    again = MeasuredPSF.from_file(tmp_path / "psf.nc")
+    np.testing.assert_allclose(again.weights, psf.weights, rtol=1e-12)
+    assert again.estimate.names == psf.estimate.names
+    assert encircled(again, 5e-6).standard_uncertainty > 1e-4
+    away = encircled(again, 5e-6) - encircled(psf, 5e-6)
+    assert away.standard_uncertainty == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_parts_are_those_of_the_width():
+    """Their effects on the width of a smooth kernel make up what `KnifeEdge` says of it."""
+    found = knife_edge([seen(tailed_edge(8e-6, 0.2, 20e-6), 0.01, side=64)])
+    psf = psf_kernel(found)
+    changes = []
+    for component in psf.components:
+        for error in component.effects.T.reshape(-1, *psf.weights.shape):
+            ends = [MeasuredPSF(psf.weights + sign * error, psf.spacing).fwhm for sign in (-1, 1)]
+            changes.append((ends[1] - ends[0]) / 2)
+    assert np.hypot.reduce(changes) == pytest.approx(found.fwhm_uncertainty, rel=0.1)
+
+
+def test_what_no_model_explains_is_in_the_kernel():
+    found = knife_edge([seen(ring_edge(6e-6, 12e-6), 0.02, side=64)])
+    psf = psf_kernel(found)
+    light = encircled(psf, 5e-6)
+    # A ring has no light in its middle, and its best model, a disc, has: 16 % of its own.
+    assert light.values > 0.1
+    assert light.contribution("psf unexplained") > 5 * light.contribution("psf fit")
+    assert light.values < 2.5 * light.standard_uncertainty
+
+
+def test_a_kernel_without_uncertainty_has_none(tmp_path):
+    np.save(tmp_path / "k.npy", np.ones((3, 3)))
+    assert MeasuredPSF.from_file(tmp_path / "k.npy", 1e-6).estimate.components == ()
+
+
+def test_components_are_scaled_with_the_weights():
+    effects = np.zeros((9, 1))
+    effects[4] = 2.0
+    psf = MeasuredPSF(np.full((3, 3), 2.0), 1e-6, (Component(Cause("noise"), effects),))
+    # w / s with w = 2 ± 2 and s = 18 ± 2: 2/18 − 2·2/18² in the middle, −2·2/18² beside it.
+    expected = np.full((3, 3), -4 / 18**2)
+    expected[1, 1] += 2 / 18
+    np.testing.assert_allclose(psf.estimate.effect("noise"), expected, rtol=1e-12)
+    with pytest.raises(ValueError, match="has effects on 9 values, expected 25"):
+        MeasuredPSF(np.ones((5, 5)), 1e-6, psf.components)
