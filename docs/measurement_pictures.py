@@ -78,7 +78,7 @@ def _draw_sensors() -> Figure:
     for name, measured in (("as it is", plain), ("corrected", repaired)):
         error = measured.radiance_temperature()[0] - truth
         print(f"{name}: error {np.sqrt(np.nanmean(error**2)):.2f} K rms")
-    print(f"bad pixels: {found.mask.sum()} found, {detector.dead.sum()} made")
+    print(f"bad pixels: {found.mask.sum()} found, {detector.terms[-1].mask.sum()} made")
     return _side_by_side(plain, repaired)
 
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
 from figure6 import figure_6
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from measured_band import BandImage
 from scipy.interpolate import RegularGridInterpolator
 
@@ -497,7 +496,7 @@ def chip():
 
 @pytest.fixture(scope="module")
 def study(chip):
-    plan = Plan(instants=5, phases=2, textures=3, psf_widths=(6e-6, 12e-6, 18e-6))
+    plan = Plan(exposures=5, phases=2, textures=3, psf_widths=(6e-6, 12e-6, 18e-6))
     told = []
     result = analyse(
         chip.scene(),
@@ -577,7 +576,7 @@ def test_every_draw_is_the_loop_of_figure_6(chip):
     """A literal transcription: textures of other seeds, pixels that begin at another sample."""
     scene, phases, group = chip.scene(), 3, 3
     surfaces = {"chip 1": CHIP_1, "chip 2": CHIP_2}
-    plan = Plan(instants=5, phases=phases, textures=2, psf_widths=(12e-6,))
+    plan = Plan(exposures=5, phases=phases, textures=2, psf_widths=(12e-6,))
     result = analyse(scene, surfaces, CAMERA, plan)
     start, kernel = result.segment.start, CAMERA.psf.kernel(CAMERA.pitch)
     first = int(np.searchsorted(scene.times, start - 1e-9))
@@ -610,7 +609,7 @@ def test_each_part_of_a_scene_with_gaps_is_a_segment(chip):
     # The first part grows the band, the second holds one exposure of 20 frames after a gap.
     kept = [*range(0, 50), *range(55, 75)]
     scene = Scene(whole.data.isel(time=kept))
-    plan = Plan(instants=5, phases=1, textures=2, psf_widths=(12e-6,))
+    plan = Plan(exposures=5, phases=1, textures=2, psf_widths=(12e-6,))
     result = analyse(scene, {"chip 1": CHIP_1, "chip 2": CHIP_2}, CAMERA, plan)
     starts = [segment.start for segment in result.segments]
     assert starts[1] == whole.times[55]
@@ -673,7 +672,7 @@ def test_a_study_that_can_not_be_is_refused(chip):
     plan = Plan(rake_surface="chip 1")
     with pytest.raises(ValueError, match="expected an exposure's 2e-05 s"):
         analyse(scene, surfaces, replace(CAMERA, integration_time=2e-5), plan)
-    for name in ("instants", "phases", "textures", "line_step", "touching"):
+    for name in ("exposures", "phases", "textures", "line_step", "touching"):
         with pytest.raises(ValueError, match=f"plan: {name}"):
             Plan(**{name: 0})
     bare = scene.data.copy()

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from figure6 import figure_6
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.special import erf
 
 from chipglow.camera import (
@@ -603,7 +602,7 @@ def test_impossible_cameras_are_refused(values):
 @pytest.mark.parametrize("lower_limit", [300.0, 250, 370.0])
 def test_a_floor_that_is_meant_in_degrees_celsius_is_doubted(lower_limit):
     with pytest.warns(
-        ChipglowWarning, match=rf"floor is {lower_limit:g} K, .* {lower_limit + 273.15:g} K"
+        ChipglowWarning, match=rf"lower_limit is {lower_limit:g} K, .* {lower_limit + 273.15:g} K"
     ) as w:
         camera = Camera(lower_limit=lower_limit)
     assert camera.lower_limit == lower_limit

@@ -13,11 +13,10 @@ import pytest
 import scipy.io
 import tifffile
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from chipglow.camera import PlanckConversion, Recording
-from chipglow.io.cameras import CAMERA_FORMATS, apart, read_recording, write_hcc
+from chipglow.io.cameras import apart, camera_formats, read_recording, write_hcc
 from chipglow.io.cameras.cine import _CURVE
 from chipglow.io.cameras.formats import find_format, read_here
 from chipglow.io.cameras.stacks import Told
@@ -589,6 +588,6 @@ def test_what_a_process_of_its_own_refuses_is_the_same_error(tmp_path):
 
 
 def test_formats_have_endings_of_their_own():
-    endings = [ending for one in CAMERA_FORMATS.values() for ending in one.suffixes]
+    endings = [ending for one in camera_formats().values() for ending in one.suffixes]
     assert len(set(endings)) == len(endings)
     assert PlanckConversion(**files.PLANCK).temperature(np.array([1e4])) > 0

@@ -33,7 +33,7 @@ cutting:
     spacing: {RASTER.spacing} m
     rows: {RASTER.rows}
     columns: {RASTER.columns}
-analysis: {{instants: 3, psf_widths: [8 um, 12 um]}}
+analysis: {{exposures: 3, psf_widths: [8 um, 12 um]}}
 """
 
 
@@ -284,7 +284,7 @@ def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(folder, runs, ch
     assert result.exit_code == 0, result.output
     (folder / "study.yaml").write_text(
         "scene: scene.nc\ncutting: {tool: {}}\n"
-        "analysis: {instants: 2, phases: 1, textures: 1, psf_widths: [8 um]}\n"
+        "analysis: {exposures: 2, phases: 1, textures: 1, psf_widths: [8 um]}\n"
     )
     result = chipglow("run", "study.yaml", "--out", "results")
     assert result.exit_code == 0, result.output

@@ -7,8 +7,7 @@ from math import erf, hypot, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from measured_band import BAND, RASTER, TOOL, BandImage, measured
 from PIL import Image
 from scipy.ndimage import gaussian_filter

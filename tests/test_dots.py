@@ -6,8 +6,7 @@ from math import radians
 import numpy as np
 import pytest
 from dot_target import DotTarget
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 from scipy.stats import f

@@ -7,8 +7,7 @@ from functools import partial
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from refusals import PNG, refused_on
 
 from chipglow.io.sources import CELSIUS, Placement, SourceError, Unit, Units

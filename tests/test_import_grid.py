@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 import scipy.io
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from PIL import Image
 from refusals import PNG, refused_on
 

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, example, given, settings, strategies as st
 from matplotlib import colormaps
 from movie_codecs import CODECS, Codec, drawn, encode, known_field, measure
 from movie_matrix import GIF, MJPEG, Case, outcome, picture_of, write

@@ -22,14 +22,12 @@ from chipglow.laboratory.measurement import (
     FlatFieldSources,
     MeasurementDescription,
     calibration_text,
+    camera_file as measured,
     load_calibration,
     load_description,
     load_measurement,
     measurement_text,
     uniform_counts,
-)
-from chipglow.laboratory.measurement import (
-    camera_file as measured,
 )
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import ToolGeometry
@@ -245,7 +243,7 @@ def test_the_measurement_holds_the_truth_within_its_uncertainty(laboratory):
     measured = load_measurement("chip.yaml")
     assert measured.times == pytest.approx(2e-3 * np.arange(5))
     assert measured.raster.extent == pytest.approx((-120e-6, 120e-6, 0.0, 180e-6), abs=1e-12)
-    dead = DETECTOR.dead
+    dead = DETECTOR.terms[-1].mask
     assert dead.any()
     np.testing.assert_array_equal((measured.flags[0] & Flag.REPLACED) != 0, dead)
 
@@ -519,7 +517,7 @@ def test_convert_only_looks_without_out(laboratory):
 
 def test_show_shows_a_measurement(laboratory, tmp_path):
     out, plot = tmp_path / "measured.nc", tmp_path / "measured.svg"
-    measured = load_measurement("chip.yaml", ["floor=450 degC"])
+    measured = load_measurement("chip.yaml", ["lower_limit=450 degC"])
     write_measurement(measured.with_tool(ToolGeometry()), out)
     code, said = run("show", out, "--at", "4 ms", "--plot", plot)
     assert code == 0, said
@@ -644,7 +642,7 @@ def test_recordings_that_are_no_black_bodies_are_one_clear_error(
 def test_uniform_frames_of_another_format_say_themselves_what_they_are(tmp_path):
     """A recording without words of its own, and uniform frames of a camera that has them."""
     rng = np.random.default_rng(4)
-    detector = replace(DETECTOR, gain_pattern=None, offset_pattern=None, dead=None)
+    detector = replace(DETECTOR, terms=(ReadNoise(3.0),))
     counts = detector.counts(np.full((10, 8, 64), 500.0), rng)
     np.save(tmp_path / "chip.npy", counts.astype(np.uint16))
     write_hcc(

@@ -28,4 +28,4 @@ def test_what_a_page_uses_is_in_the_package_itself(page):
 
 
 def test_a_plan_is_at_hand_for_the_analysis():
-    assert chipglow.Plan(instants=3).instants == 3
+    assert chipglow.Plan(exposures=3).exposures == 3

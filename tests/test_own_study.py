@@ -125,7 +125,7 @@ def test_data_sheets_that_cannot_be_are_refused(camera, wrong):
 
 def test_what_is_left_to_the_paper_is_said():
     told = " ".join(left_to_the_paper(Study(**TITANIUM)))
-    for name in ("of cutting", "tool", "friction", "of surface", "chips", "floor 300 degC"):
+    for name in ("of cutting", "tool", "friction", "of surface", "chips", "lower_limit 300 degC"):
         assert name in told, told
     for name in ("workpiece ti-6al-4v", "feed", "integration_time", "detector_pitch"):
         assert name not in told, told
@@ -137,7 +137,7 @@ def test_what_is_left_to_the_paper_is_said():
 
 @pytest.fixture(scope="module")
 def own_result():
-    plan = Plan(instants=2, phases=1, textures=1, psf_widths=(8e-6, 12e-6), beside_paper=False)
+    plan = Plan(exposures=2, phases=1, textures=1, psf_widths=(8e-6, 12e-6), beside_paper=False)
     scene = AnalyticChip().scene()
     camera = Camera(integration_time=5e-6)
     return analyse(scene, {"chip 1": CHIP_1, "chip 2": CHIP_2}, camera, plan)

@@ -6,17 +6,20 @@ from importlib.metadata import EntryPoint
 from typing import Annotated
 
 import jsonschema
+import numpy as np
 import pytest
 import yaml
 from pydantic import ValidationError
 
 from chipglow import quantities
 from chipglow.camera import PSFS, GaussianPSF, PointSpreadFunction
+from chipglow.camera.optics import psf
 from chipglow.cli import main
 from chipglow.io import ImportDescription, import_text
 from chipglow.laboratory.measurement import MeasurementDescription, measurement_text
 from chipglow.quantities import Declared, Family, Parameter, Part
 from chipglow.quantities.units import LENGTH, TEMPERATURE
+from chipglow.scene import Raster
 from chipglow.study import Study, study_text
 from chipglow.text import commented_yaml, json_schema
 
@@ -96,9 +99,17 @@ def test_a_family_finds_parts_of_other_packages(monkeypatch):
     monkeypatch.setattr(
         quantities.part, "entry_points", lambda group: [entry] if "furniture" in group else []
     )
-    assert family.kinds == ("shelf", "gauss")
+    quantities.part.of_other_packages.cache_clear()
+    assert set(family.kinds) == {"shelf", "gauss"}
     assert family.parts["gauss"] is GaussianPSF
-    del Family.families["furniture"]
+    quantities.part.of_other_packages.cache_clear()
+
+
+def test_a_package_that_cannot_be_loaded_is_a_warning(monkeypatch):
+    entry = EntryPoint("broken", "no_such_module:Part", "chipglow.broken")
+    monkeypatch.setattr(quantities.part, "entry_points", lambda group: [entry])
+    with pytest.warns(RuntimeWarning, match="no_such_module:Part: cannot be loaded"):
+        assert Family("broken").kinds == ()
 
 
 def test_every_kind_has_an_example_that_a_study_reads(tmp_path):
@@ -107,6 +118,21 @@ def test_every_kind_has_an_example_that_a_study_reads(tmp_path):
     example = PSFS.parts["airy"].example.split("}")[0] + "}"
     study = Study.model_validate({"camera": {"psf": yaml.safe_load(example), "magnification": 2.0}})
     assert isinstance(study.camera.build().psf, PointSpreadFunction)
+
+
+def test_a_file_of_a_psf_is_opened_once(tmp_path, monkeypatch):
+    np.save(tmp_path / "psf.npy", np.ones((3, 3)))
+    opened, read = [], psf._read_npy
+
+    def counted(path):
+        opened.append(path)
+        return read(path)
+
+    monkeypatch.setattr(psf, "_read_npy", counted)
+    section = {"kind": "measured", "file": str(tmp_path / "psf.npy"), "spacing": "1 um"}
+    study = Study.model_validate({"camera": {"psf": section}})
+    assert study.camera.build().psf == study.camera.on(Raster(0, 0, 1e-6, 12, 12)).psf
+    assert len(opened) == 1
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,7 @@ from math import log, pi, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.ndimage import convolve
 from scipy.special import erf, j0, j1
 

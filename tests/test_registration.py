@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from camera_files import cine
 from dual_spectrum import DualSpectrum
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from PIL import Image
 from scipy.stats import chi2, f, t
 from typer.testing import CliRunner

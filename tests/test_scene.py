@@ -6,8 +6,7 @@ from math import cos, radians, sin
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from chipglow.camera import Camera
 from chipglow.scene import FIELD_UNITS, Raster, Scene, SceneError, ToolGeometry

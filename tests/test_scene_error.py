@@ -42,7 +42,7 @@ def plate(temperature=None, times=(0.0, 1e-6, 2e-6, 3e-6)):
 
 def found(scene=None, camera=CAMERA, surface=None, **plan):
     surfaces = {"plate": surface or UniformSurface(0.6)}
-    plan = {"instants": 2, "phases": 2, **plan}
+    plan = {"exposures": 2, "phases": 2, **plan}
     return scene_errors(scene or plate(), surfaces, camera, ScenePlan(**plan))
 
 
@@ -186,7 +186,7 @@ camera:
   psf: {kind: gaussian, fwhm: 8 um}
   psf_order: optics
 analysis:
-  instants: 2
+  exposures: 2
   phases: 2
   points: {middle: [30 um, 0 um]}
   lines: {across: [[-40 um, 2 um], [40 um, 2 um]]}
@@ -267,7 +267,7 @@ def test_run_is_partial_where_something_is_missing_and_says_what(folder):
         scene=str(folder / "plate.nc"),
         surface={"kind": "uniform", "emissivity": 0.6},
         camera={"integration_time": "2 us", "lower_limit": "none", "pitch": "4 um"},
-        analysis={"instants": 1, "phases": 1},
+        analysis={"exposures": 1, "phases": 1},
     )
     result = run(study)
     missing = " ".join(result.missing)
@@ -297,7 +297,7 @@ def test_a_chip_without_a_shear_band_still_has_a_rake_face(tmp_path):
         scene=str(tmp_path / "chip.nc"),
         surface={"kind": "uniform", "emissivity": 0.6},
         camera={"integration_time": "2 us", "lower_limit": "none", "pitch": "4 um"},
-        analysis={"instants": 1, "phases": 1},
+        analysis={"exposures": 1, "phases": 1},
     )
     result = run(study)
     assert [place.name for place in result.places] == ["hottest pixel", "rake face"]

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 from pydantic import ValidationError
 
 from chipglow.camera import Camera, GaussianPSF, MeasuredPSF
@@ -318,7 +317,7 @@ def load(text, folder):
         (
             "camera: {psf_order: pixels}",
             "camera.psf_order",
-            "'pixels', expected 'optics' or 'pixel'",
+            "'pixels', expected 'optics' or 'detector'",
         ),
         ("surface: {chips: {}}", "surface.chips", "is empty, expected one chip or more"),
         (
@@ -337,7 +336,7 @@ def load(text, folder):
             "analysis.reference",
             "'best', expected 'maximum', 'mean', 'centre' or 'true'",
         ),
-        ("analysis: {instants: 0}", "analysis", "instants is 0, expected 1 or more"),
+        ("analysis: {exposures: 0}", "analysis", "exposures is 0, expected 1 or more"),
         ("analysis: {psf_widths: [4]}", "analysis.psf_widths.0", "4 has no unit"),
         ("seed: -1", "seed", "-1 is negative, expected 0 or more"),
         (
@@ -441,9 +440,9 @@ def test_other_kinds_of_psf_are_built_and_written(tmp_path):
 
 
 def test_a_study_in_python_takes_the_same_text():
-    study = Study(camera={"pitch": "5 um"}, analysis={"instants": 3})
+    study = Study(camera={"pitch": "5 um"}, analysis={"exposures": 3})
     assert study.camera.pitch == 5e-6
-    assert study.analysis.instants == 3
+    assert study.analysis.exposures == 3
     with pytest.raises(ValidationError, match="has no unit"):
         Study(camera={"pitch": 5e-6})
     with pytest.raises(ValidationError, match="frozen"):

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numba
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from chipglow.scene import FIELD_UNITS, Frame, Raster, Scene
 from chipglow.surface import (

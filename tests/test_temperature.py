@@ -321,9 +321,9 @@ def test_impossible_input_is_one_clear_error():
             KnownEmissivity(value)
     with pytest.raises(ValueError, match="standard uncertainty is -1"):
         KnownEmissivity(0.5, -1.0)
-    with pytest.raises(ValueError, match="environment: is 0"):
+    with pytest.raises(ValueError, match="reflected: is 0"):
         ReflectedTemperature(0.0)
-    with pytest.raises(ValueError, match="environment: standard uncertainty"):
+    with pytest.raises(ValueError, match="reflected: standard uncertainty"):
         ReflectedTemperature(293.0, -1.0)
 
 

@@ -6,8 +6,7 @@ from math import nan
 import pytest
 import titanium
 import yaml
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from titanium import Condition, Cut, Trial
 
 from chipglow.cutting import SolverError

@@ -5,8 +5,7 @@ from math import cos, degrees, hypot, pi, radians, sin, tan
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 from matplotlib.path import Path as Polygon
 
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow

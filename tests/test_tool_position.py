@@ -7,8 +7,7 @@ from math import hypot, radians
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from measured_band import RASTER, TOOL, measured
 from seen_chip import look, noisy
 from typer.testing import CliRunner

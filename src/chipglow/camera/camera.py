@@ -63,7 +63,7 @@ class Camera:
         In s.
     frame_rate : float
         Frames a second.
-    floor : float, optional
+    lower_limit : float, optional
         Lowest radiance temperature in K that the camera measures; what is under it is flagged.
         The paper's 300 °C by default; None for no lower range limit.
     reflected : float, optional

@@ -99,7 +99,7 @@ class Measurement:
             When each integration began in s, shape (time,).
         raster : Raster
             The grid of the pixels.
-        floor : float, optional
+        lower_limit : float, optional
             Lowest radiance temperature in K that the camera measures; what is under it, or has no
             radiance, is flagged.
         flags : ndarray, optional

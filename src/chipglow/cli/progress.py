@@ -17,8 +17,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from chipglow.study import Progress as Report
-from chipglow.study import Study, expected_cost, is_cut, kept_progress
+from chipglow.study import Progress as Report, Study, expected_cost, is_cut, kept_progress
 
 _ROOM: Final = 4
 

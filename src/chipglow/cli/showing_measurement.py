@@ -86,7 +86,7 @@ def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tu
     if "integration_time" in data.attrs:
         yield "integration time", microseconds(float(data.attrs["integration_time"]))
     if "lower_limit" in data.attrs:
-        yield "lower_limit", f"{float(data.attrs['lower_limit']) - 273.15:.4g} °C"
+        yield "lower range limit", f"{float(data.attrs['lower_limit']) - 273.15:.4g} °C"
     if {"band_lower", "band_upper"} <= set(data.attrs):
         band = measurement.band
         shape = "" if band.response is None else ", with a response curve"

@@ -122,7 +122,7 @@ class OutputWindow(Part):
     """
 
     start: Annotated[
-        float, Parameter("Cutting length at the first frame, under end.", CUT_LENGTH, over=0.0)
+        float, Parameter("Cutting length at the first frame, under end.", CUT_LENGTH, least=0.0)
     ] = 1.579e-3
     end: Annotated[
         float, Parameter("Cutting length at the last frame.", CUT_LENGTH, over=0.0, under=1.0)

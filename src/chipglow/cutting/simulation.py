@@ -26,8 +26,8 @@ from chipglow.cutting.heat import (
     even_out,
     heat_contact,
     return_heat,
+    tool_fraction as fraction_of_tool,
 )
-from chipglow.cutting.heat import tool_fraction as fraction_of_tool
 from chipglow.cutting.heat_loss import HeatLoss, lose_heat
 from chipglow.cutting.library import AISI_1045, CARBIDE
 from chipglow.cutting.material import ROOM_TEMPERATURE, ToolMaterial, WorkpieceMaterial

@@ -56,7 +56,7 @@ class Plan:
 
     Parameters
     ----------
-    instants : int
+    exposures : int
         Number of exposures, spread evenly over the scene's longest part without a gap.
     phases, textures : int
         How often each headline is drawn anew: positions of the pixels along each axis (3 makes 9),
@@ -82,7 +82,7 @@ class Plan:
         If a number is not positive, or there are no widths.
     """
 
-    instants: int = 9
+    exposures: int = 9
     phases: int = 3
     textures: int = 5
     rake_surface: str = "chip 2"
@@ -97,7 +97,7 @@ class Plan:
     touching: float = 3e-6
 
     def __post_init__(self) -> None:
-        for name in ("instants", "phases", "textures"):
+        for name in ("exposures", "phases", "textures"):
             if getattr(self, name) < 1:
                 raise ValueError(f"plan: {name} is {getattr(self, name)!r}, expected 1 or more")
         if not self.psf_widths or min(self.psf_widths) <= 0:
@@ -281,7 +281,7 @@ def analyse(
     _check(scene, surfaces, plan)
     tell = progress or _say_nothing
     duration = camera.integration_time
-    starts = spread_starts(scene, duration, plan.instants)
+    starts = spread_starts(scene, duration, plan.exposures)
     others = other_starts(scene, duration)
     instants = _instants(scene, duration, (*starts, *others), tell)
     developed = _developed(scene, instants[: len(starts)])

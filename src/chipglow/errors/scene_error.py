@@ -31,7 +31,7 @@ class ScenePlan:
     ----------
     places : tuple of Place
         Where the error is read, beside the hottest pixel and the rake face.
-    instants : int
+    exposures : int
         Number of exposures, spread evenly over the scene.
     phases, textures : int
         How often each reading is drawn anew: positions of the pixels along each axis (3 makes 9),
@@ -50,7 +50,7 @@ class ScenePlan:
     """
 
     places: tuple[Place, ...] = ()
-    instants: int = 9
+    exposures: int = 9
     phases: int = 3
     textures: int = 5
     reference: ReferenceKind = "maximum"
@@ -59,7 +59,7 @@ class ScenePlan:
     touching: float = 3e-6
 
     def __post_init__(self) -> None:
-        for name in ("instants", "phases", "textures", "line_reach", "line_step", "touching"):
+        for name in ("exposures", "phases", "textures", "line_reach", "line_step", "touching"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"plan: {name} is {getattr(self, name)!r}, expected over 0")
         names = [place.name for place in self.places]
@@ -212,7 +212,7 @@ def scene_errors(
     """
     tell = progress or (lambda label, part: None)
     fields = [_textures(surface, scene, plan.textures) for surface in surfaces.values()]
-    starts = spread_starts(scene, camera.integration_time, plan.instants)
+    starts = spread_starts(scene, camera.integration_time, plan.exposures)
     frames = [_middle(scene, float(start), camera.integration_time) for start in starts]
     hottest = [float(scene.field("temperature", index).max()) for index in frames]
     shown = int(np.argmax(hottest))

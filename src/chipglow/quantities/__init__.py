@@ -2,7 +2,7 @@
 
 from chipglow.quantities.field_tables import FieldEntry, field_entries, field_tables
 from chipglow.quantities.format import quantity_text, rounded_text
-from chipglow.quantities.part import Declared, Family, Parameter, Part, Settings
+from chipglow.quantities.part import Declared, Family, Parameter, Part, Settings, of_other_packages
 from chipglow.quantities.section import (
     OR_NONE,
     FileBeside,
@@ -27,6 +27,7 @@ __all__ = [
     "described",
     "field_entries",
     "field_tables",
+    "of_other_packages",
     "quantity_text",
     "rounded_text",
 ]

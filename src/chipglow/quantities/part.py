@@ -24,6 +24,7 @@ from typing import (
     get_origin,
     get_type_hints,
 )
+from warnings import warn
 
 import pydantic
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, create_model, model_validator
@@ -200,7 +201,9 @@ class Settings(Section, Generic[Built]):
         try:
             self.build()
         except OSError as error:
-            raise ValueError(f"{error.filename}: {error.strerror}, expected a file") from None
+            named = [name for name, value in self if str(value) == str(error.filename)]
+            place = ": ".join([*named, str(error.filename)])
+            raise ValueError(f"{place}: {error.strerror}, expected a file") from None
         return self
 
 
@@ -243,12 +246,9 @@ class Family:
         What the family is called, and the field of descriptions that chooses.
     """
 
-    families: ClassVar[dict[str, "Family"]] = {}
-
     def __init__(self, name: str) -> None:
         self.name: Final = name
         self._own: dict[str, type[Part | Section]] = {}
-        Family.families[name] = self
 
     def part(self, part: PartType) -> PartType:
         """Add a part; a decorator."""
@@ -269,11 +269,8 @@ class Family:
 
     @property
     def parts(self) -> "dict[str, type[Part | Section]]":
-        """All parts by their kind: the library's own, then those of other packages."""
-        found = dict(self._own)
-        for entry in entry_points(group=f"chipglow.{self.name}"):
-            found.setdefault(entry.name, entry.load())
-        return found
+        """All parts by their kind: those of other packages, then the library's own."""
+        return {**of_other_packages(f"chipglow.{self.name}"), **self._own}
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -315,6 +312,24 @@ class Family:
             shown = reprlib.repr(value if kind is None else kind)
             raise ValueError(f"kind: {shown}, expected one of {', '.join(self.kinds)}")
         return _section_of(self.parts[kind]).model_validate(value, context=info.context)
+
+
+@cache
+def of_other_packages(group: str) -> dict[str, Any]:
+    """What other packages add by entry points, by their names; a warning for what cannot be loaded.
+
+    Parameters
+    ----------
+    group : str
+        Group of the entry points.
+    """
+    found = {}
+    for entry in entry_points(group=group):
+        try:
+            found[entry.name] = entry.load()
+        except Exception as error:  # whatever another package does wrong
+            warn(f"{entry.value}: cannot be loaded ({error}).", RuntimeWarning, stacklevel=2)
+    return found
 
 
 def _section_of(part: Any) -> type[Section]:

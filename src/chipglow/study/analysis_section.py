@@ -17,7 +17,7 @@ Corners = Annotated[tuple[PointOfScene, ...], Strict(False)]
 class AnalysisSection(Settings[Plan]):
     """What is computed from the simulated measurement."""
 
-    instants: int = described(9, "Exposures, spread evenly over the scene.")
+    exposures: int = described(9, "Exposures, spread evenly over the scene.")
     phases: int = described(
         3,
         "Positions of the pixels along each axis, evenly over a pixel, on which each headline is\n"
@@ -82,7 +82,7 @@ class AnalysisSection(Settings[Plan]):
         """What to analyse of a scene that is no cut, or at the user's places."""
         return ScenePlan(
             places=self.places,
-            instants=self.instants,
+            exposures=self.exposures,
             phases=self.phases,
             textures=self.textures,
             reference=self.reference,
@@ -96,7 +96,7 @@ class AnalysisSection(Settings[Plan]):
     def build(self) -> Plan:
         """What to analyse."""
         return Plan(
-            instants=self.instants,
+            exposures=self.exposures,
             phases=self.phases,
             textures=self.textures,
             rake_surface=self.rake_chip,

@@ -61,7 +61,7 @@ def expected_cost(study: Study) -> Cost:
     frames = ceil(cutting.duration / window.interval) + kept
     solver = cutting.simulation().point_steps / (_POINT_STEPS * get_num_threads())
     exposed = ceil(camera.integration_time / window.interval)
-    exposures = study.analysis.instants + window.later_bands + 1
+    exposures = study.analysis.exposures + window.later_bands + 1
     return Cost(
         seconds=_ALWAYS
         + solver

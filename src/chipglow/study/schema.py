@@ -89,7 +89,7 @@ class Study(Section):
                     "field_of_view": {"spacing": "1.5 um", "rows": 360, "columns": 400},
                 },
                 "analysis": {
-                    "instants": 5,
+                    "exposures": 5,
                     "phases": 2,
                     "textures": 2,
                     "psf_widths": ["4 um", "8 um", "12 um", "20 um"],

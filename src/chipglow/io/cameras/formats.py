@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import entry_points
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -14,6 +14,7 @@ from chipglow.io.cameras.ptw import is_ptw, read_ptw
 from chipglow.io.cameras.stacks import Told, read_stack
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import matching_files
+from chipglow.quantities import of_other_packages
 
 _HEAD: Final = 520
 """Bytes from which a kind of file is told: those of HDF5 may follow 512 of the user's."""
@@ -117,12 +118,15 @@ _OWN: Final[Mapping[str, CameraFormat]] = {
     "zarr": _array("Zarr, a folder or zipped", ".zarr", ".zip"),
     "csv": _array("table of numbers in text, a file a frame", ".csv", ".txt", ".dat"),
 }
-CAMERA_FORMATS: Final[Mapping[str, CameraFormat]] = {
-    **{entry.name: entry.load() for entry in entry_points(group="chipglow.camera_file")},
-    **_OWN,
-}
-"""The formats that `read_recording` reads, by their names; other packages add theirs by an entry
-point in the group ``chipglow.camera_file``."""
+
+
+@cache
+def camera_formats() -> Mapping[str, CameraFormat]:
+    """The formats that `read_recording` reads, by their names.
+
+    Other packages add theirs by an entry point in the group ``chipglow.camera_file``.
+    """
+    return {**of_other_packages("chipglow.camera_file"), **_OWN}
 
 
 def find_format(path: Path) -> str:
@@ -136,9 +140,9 @@ def find_format(path: Path) -> str:
         If it is missing or not accessible.
     """
     first = matching_files(str(path))[0]
-    by_name = {suffix: name for name, one in CAMERA_FORMATS.items() for suffix in one.suffixes}.get(
-        first.suffix.lower()
-    )
+    by_name = {
+        suffix: name for name, one in camera_formats().items() for suffix in one.suffixes
+    }.get(first.suffix.lower())
     if first.is_dir():
         return "zarr"
     with first.open("rb") as stream:
@@ -146,17 +150,19 @@ def find_format(path: Path) -> str:
     if not head:
         raise SourceError(f"{first}: is empty")
     found = _by_content(head)
-    if found is None or (by_name and all(CAMERA_FORMATS[n].inside_hdf5 for n in (found, by_name))):
+    if found is None or (
+        by_name and all(camera_formats()[n].inside_hdf5 for n in (found, by_name))
+    ):
         found = by_name or found
     if found is None:
         raise SourceError(
-            f"{first}: is of an unknown kind, expected one of {', '.join(CAMERA_FORMATS)}"
+            f"{first}: is of an unknown kind, expected one of {', '.join(camera_formats())}"
         )
     return found
 
 
 def _by_content(head: bytes) -> str | None:
-    for name, one in CAMERA_FORMATS.items():
+    for name, one in camera_formats().items():
         if one.begins is not None and one.begins(head):
             return name
     return None
@@ -170,13 +176,13 @@ def read_here(path: Path, kind: str, frames: slice | None, told: Told) -> Record
     path : Path
         The file.
     kind : str
-        One of `CAMERA_FORMATS`.
+        One of `camera_formats`.
     frames : slice, optional
         Which frames to read.
     told : Told
         What the user says of it.
     """
-    one = CAMERA_FORMATS[kind]
+    one = camera_formats()[kind]
     if one.read is not None:
         return one.read(path, frames, told.interval)
     return read_stack(path, one.suffixes[0], frames, told)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from chipglow.camera import Recording
 from chipglow.io.cameras.apart import read_apart
-from chipglow.io.cameras.formats import CAMERA_FORMATS, find_format, read_here
+from chipglow.io.cameras.formats import camera_formats, find_format, read_here
 from chipglow.io.cameras.stacks import Told
 
 
@@ -29,7 +29,7 @@ def read_recording(
     frames : slice, optional
         Which frames to read, all by default; the others are not read.
     format : str, optional
-        One of `CAMERA_FORMATS`; found by the file's content and name by default.
+        One of `camera_formats`; found by the file's content and name by default.
     quantity : {"counts", "radiance", "temperature"}, optional
         What was measured, for files that do not say it.
     unit : {"counts", "W/m2/sr", "K", "degC"}, optional
@@ -56,14 +56,15 @@ def read_recording(
     """
     told = Told(quantity, unit, interval, dataset, axes)
     path = Path(path)
-    if format is not None and format not in CAMERA_FORMATS:
-        raise ValueError(f"format: is {format!r}, expected one of {', '.join(CAMERA_FORMATS)}")
+    if format is not None and format not in camera_formats():
+        raise ValueError(f"format: is {format!r}, expected one of {', '.join(camera_formats())}")
     kind = format or find_format(path)
-    if CAMERA_FORMATS[kind].tells_quantity and told != Told(interval=interval):
+    one = camera_formats()[kind]
+    if one.tells_quantity and told != Told(interval=interval):
         raise ValueError(
-            f"{path}: is {CAMERA_FORMATS[kind].description}, which says itself what was measured: "
+            f"{path}: is {one.description}, which says itself what was measured: "
             "expected no quantity, unit, dataset or axes"
         )
-    if CAMERA_FORMATS[kind].in_subprocess(path):
+    if one.in_subprocess(path):
         return read_apart(path, kind, frames, told)
     return read_here(path, kind, frames, told)

@@ -45,9 +45,9 @@ class Heating:
 
     Parameters
     ----------
-    truth : float
+    reference : float
         True temperature of the object, as of a thermocouple.
-    environment : float
+    reflected : float
         Temperature of the surroundings that it reflects; the paper's 293 K by default.
     truth_uncertainty, environment_uncertainty : float
         Standard uncertainties.
@@ -62,8 +62,8 @@ class Heating:
     Raises
     ------
     ValueError
-        If a temperature is not over 0 K, the truth is not over the environment, or an uncertainty
-        is negative.
+        If a temperature is not over 0 K, the reference is not over what is reflected, or an
+        uncertainty is negative.
     """
 
     reference: float
@@ -80,7 +80,7 @@ class Heating:
                 raise ValueError(f"{name}: is {value!r} K, expected over 0 K")
         if self.reference <= self.reflected:
             raise ValueError(
-                f"truth: {_celsius(self.reference)} is not hotter than the environment's "
+                f"reference: {_celsius(self.reference)} is not hotter than what is reflected, "
                 f"{_celsius(self.reflected)}, expected a heated object"
             )
         for name in ("reference_uncertainty", "reflected_uncertainty", "camera_uncertainty"):
@@ -92,7 +92,7 @@ class Heating:
         spread = hypot(self.reference_uncertainty, self.reflected_uncertainty)
         if self.reference - self.reflected < _CLEARLY * spread:
             raise ValueError(
-                f"truth: {_celsius(self.reference)} is over the environment by less than "
+                f"reference: {_celsius(self.reference)} is over what is reflected by less than "
                 f"{_CLEARLY:g} standard uncertainties of {spread:.3g} K, expected a hotter object"
             )
 
@@ -116,7 +116,7 @@ class EmissivityMap:
         All `Flag` that a pixel has in any frame, uint8, shape (y, x).
     calibration : ndarray, optional
         Standard uncertainty of the radiance from the calibration in W/(m² sr), shape (y, x).
-    floor : float
+    lower_limit : float
         Lowest radiance temperature in K that the camera measures; 0 if it has no lower range limit.
     recordings : int
         From how many recordings the observations are.
@@ -344,7 +344,7 @@ class RegionEmissivity:
         if under:
             yield (
                 f"{self.name}: {under} of {self.pixels} pixels have an emissivity under 0: they "
-                "are darker than the environment is said to be."
+                "are darker than what is said to be reflected."
             )
         if over:
             yield (
@@ -423,8 +423,8 @@ def determine_emissivity(measurements: Sequence[Measurement], heating: Heating) 
         lower_limit = _floor(measurement)
         if heating.reference < lower_limit:
             raise ValueError(
-                f"truth: {_celsius(heating.reference)} is under the camera's lower range limit of "
-                f"{_celsius(lower_limit)}, expected a hotter object"
+                f"reference: {_celsius(heating.reference)} is under the camera's lower range limit "
+                f"of {_celsius(lower_limit)}, expected a hotter object"
             )
     first, radiance = measurements[0], observed_radiance(measurements)
     return EmissivityMap(

@@ -212,7 +212,7 @@ def read_emissivity_map(path: str | os.PathLike[str], reference: float | None = 
     ----------
     path : path-like
         A file of `write_emissivity`.
-    truth : float, optional
+    reference : float, optional
         True temperature in K of the map to take, the nearest; the file's first by default.
 
     Returns

@@ -107,16 +107,16 @@ class ReflectedTemperature:
 
     def __post_init__(self) -> None:
         if not 0 < self.temperature < inf:
-            raise ValueError(f"environment: is {self.temperature!r} K, expected over 0 K")
+            raise ValueError(f"reflected: is {self.temperature!r} K, expected over 0 K")
         if not 0 <= self.standard_uncertainty < inf:
             raise ValueError(
-                f"environment: standard uncertainty is {self.standard_uncertainty!r} K, "
+                f"reflected: standard uncertainty is {self.standard_uncertainty!r} K, "
                 "expected 0 K or more"
             )
 
     @cached_property
     def estimate(self) -> Estimate:
-        """The temperature, with the component ``environment``: the same wherever these are."""
+        """The temperature, with the component ``reflected``: the same wherever these are."""
         return Estimate(np.array(self.temperature)).with_component(
             "reflected", self.standard_uncertainty, independent="common"
         )
@@ -144,8 +144,8 @@ class TrueTemperature:
     emissivity : float
         Emissivity that was taken.
     estimate : Estimate
-        True temperature in K, with the components ``truth`` (of the heating with which the
-        emissivity was determined), ``environment``, ``calibration``, ``emissivity`` (by chance, or
+        True temperature in K, with the components ``reference`` (of the heating with which the
+        emissivity was determined), ``reflected``, ``calibration``, ``emissivity`` (by chance, or
         as it is known), ``drift`` between recordings, that of the emissivity included, and
         ``random``, of which ``repeatability`` and ``noise`` are parts.
     correlation : float or None
@@ -204,8 +204,8 @@ def true_temperature(
     L(T) = (L_app − (1 − ε) L_env) / ε: Equation 2 of Heigel and Whitenton (2010), solved. The
     uncertainty is propagated to first order (JCGM 100:2008, Equation 13). Emissivity and area have
     errors in common, which partly cancel: a camera that shows too little radiance makes the
-    emissivity too small. The environment's is the same for both, unless other surroundings are
-    given. The calibration's have the correlation that its covariance tells; without `calibration`
+    emissivity too small. What is reflected is the same for both, unless another is given. The
+    calibration's have the correlation that its covariance tells; without `calibration`
     none is taken, which is too much rather than too little as long as they are of one sign.
     """
     check_same_pixels(measurements, "temperature")

@@ -18,7 +18,7 @@ from chipglow.camera import (
     find_bad_pixels,
 )
 from chipglow.io import is_measurement, is_scene, read_measurement
-from chipglow.io.cameras import CAMERA_FORMATS, read_recording
+from chipglow.io.cameras import camera_formats, read_recording
 from chipglow.io.cameras.formats import find_format
 from chipglow.io.cameras.stacks import MissingError
 from chipglow.laboratory.measurement.calibration_file import load_calibration
@@ -258,7 +258,7 @@ def _read_uniform(description: MeasurementDescription) -> FlatFields:
 
 
 def _uniform(description: MeasurementDescription, file: str) -> Recording:
-    if CAMERA_FORMATS[find_format(Path(file))].tells_quantity:
+    if camera_formats()[find_format(Path(file))].tells_quantity:
         # What the description says of the recording's file, this file says itself.
         return read_recording(file)
     return _read(description, file, every=True)

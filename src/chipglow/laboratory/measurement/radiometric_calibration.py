@@ -100,7 +100,7 @@ def calibrate_recording(
         Correction of the signal before all else.
     bad_pixels : ndarray, optional
         Which pixels are bad, shape (y, x): replaced by their neighbours, or dead.
-    floor : float, optional
+    lower_limit : float, optional
         Lowest radiance temperature in K that counts; that of the calibration if it is higher.
     position : ImagePosition, optional
         How the image lies in the coordinates of the cut.

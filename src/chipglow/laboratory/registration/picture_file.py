@@ -9,7 +9,7 @@ from PIL import Image, ImageSequence, UnidentifiedImageError
 
 from chipglow.camera import Recording
 from chipglow.io import atomic_path
-from chipglow.io.cameras import CAMERA_FORMATS, read_recording
+from chipglow.io.cameras import camera_formats, read_recording
 from chipglow.io.cameras.formats import find_format
 
 PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".gif")
@@ -46,7 +46,7 @@ def read_pictures(path: str | Path, interval: float | None = None) -> Recording:
         frames = _frames(path)
         times = np.arange(len(frames), dtype=np.float64) * (1.0 if interval is None else interval)
         return Recording(frames, "counts", times, f"picture {path.name}")
-    if CAMERA_FORMATS[find_format(path)].tells_quantity:
+    if camera_formats()[find_format(path)].tells_quantity:
         return read_recording(path, interval=interval)
     return read_recording(path, quantity="counts", unit="counts", interval=interval)
 
