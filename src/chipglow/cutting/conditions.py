@@ -1,7 +1,7 @@
 """What is cut and how: speed, feed, friction; when to look; how finely to compute."""
 
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import dataclass, replace
+from typing import Annotated, Final
 
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import (
@@ -12,6 +12,8 @@ from chipglow.quantities.units import (
     TEMPERATURE,
     TIME,
 )
+
+_FROM_CONTACT: Final = replace(CUT_LENGTH, positive=False)
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ class OutputWindow(Part):
     """
 
     start: Annotated[
-        float, Parameter("Cutting length at the first frame, under end.", CUT_LENGTH, least=0.0)
+        float, Parameter("Cutting length at the first frame, under end.", _FROM_CONTACT, least=0.0)
     ] = 1.579e-3
     end: Annotated[
         float, Parameter("Cutting length at the last frame.", CUT_LENGTH, over=0.0, under=1.0)
