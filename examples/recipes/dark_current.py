@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera import DETECTOR_TERMS, DetectorTerm
 from chipglow.quantities import Parameter
-from chipglow.quantities.units import Quantity
+from chipglow.quantities.units import TIME, Quantity
 
 CURRENT = Quantity("a current of electrons", "Hz", "Hz", "50 kHz", positive=False)
 
@@ -20,15 +20,15 @@ class DarkCurrent(DetectorTerm):
     """Electrons that come without light, at random (EMVA 1288, 2.3)."""
 
     kind: ClassVar[str] = "dark-current"
-    example: ClassVar[str] = "{kind: dark-current, current: 50 kHz, integration_time_us: 10}"
+    example: ClassVar[str] = "{kind: dark-current, current: 50 kHz, integration_time: 10 us}"
     current: Annotated[float, Parameter("Electrons a second and element.", CURRENT, least=0.0)]
-    integration_time_us: Annotated[float, Parameter("Exposure in us.", over=0.0)] = 10.0
+    integration_time: Annotated[float, Parameter("Exposure.", TIME, over=0.0)] = 10e-6
     conversion_gain: Annotated[float, Parameter("Counts of one electron.", over=0.0)] = 0.02
 
     @property
     def electrons(self) -> float:
         """Mean number in one exposure."""
-        return self.current * self.integration_time_us * 1e-6
+        return self.current * self.integration_time
 
     def offset(self, shape: tuple[int, ...]) -> float:
         """Mean counts of the dark electrons."""

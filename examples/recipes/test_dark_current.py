@@ -9,7 +9,7 @@ from chipglow.quantities import Declared
 
 
 def test_mean_and_variance_of_dark_frames_are_those_of_electrons_at_random():
-    term = DarkCurrent(current=4e8, integration_time_us=100.0, conversion_gain=0.05)
+    term = DarkCurrent(current=4e8, integration_time=100e-6, conversion_gain=0.05)
     detector = Detector(gain=1.0, offset=100.0, terms=(term,))
     counts = detector.counts(np.zeros((1, 400, 400)), np.random.default_rng(1)).astype(float)
     mean, variance = 0.05 * 40_000, 0.05**2 * 40_000 + 1 / 12  # rounding to whole counts: 1/12

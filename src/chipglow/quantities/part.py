@@ -64,7 +64,7 @@ class Parameter:
 
     @property
     def limits(self) -> str:
-        """The values it may have, in words and in the unit of descriptions; empty for any."""
+        """The values it may have, in words and in the unit of descriptions."""
         return self._limits(self.text)
 
     @property
@@ -127,15 +127,14 @@ class Parameter:
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         """JSON schema: a text with a unit, or a plain value with its limits."""
-        optional = schema["type"] == "function-before"  # the word none
         if self.quantity is not None:
-            json: JsonSchemaValue = {"type": "string", "examples": [self.quantity.example]}
-            return json
+            return {"type": "string", "examples": [self.quantity.example]}
         json = handler(schema)
         if json.get("type") in ("number", "integer"):
             names = ("exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
             limits = (self.over, self.least, self.under, self.most)
             json |= {k: v for k, v in zip(names, limits, strict=True) if v is not None}
+        optional = schema["type"] == "function-before"  # `or_none` made it
         return or_the_word_none(json) if optional else json
 
     def _within(self, value: Any) -> Any:

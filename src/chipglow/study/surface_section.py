@@ -7,7 +7,7 @@ from pydantic import Field, GetJsonSchemaHandler, field_validator, model_validat
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from chipglow.laboratory.emissivity import EmissivityMapFile, read_emissivity_map
+from chipglow.laboratory.emissivity import read_emissivity_map
 from chipglow.quantities import Declared, FileBeside, Section, described
 from chipglow.quantities.units import Length
 from chipglow.surface import (
@@ -22,8 +22,6 @@ from chipglow.surface import (
 
 CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2}
 """Chips of the paper's Table 1 by the names of a study."""
-
-assert EmissivityMapFile.kind in SURFACES.kinds
 
 
 def _numbers(emissivity: Emissivity) -> dict[str, float]:
