@@ -3,6 +3,7 @@
 from chipglow.text.description import (
     DescriptionError,
     described_by,
+    load_described,
     placed,
     problem,
     read_description,
@@ -19,6 +20,7 @@ __all__ = [
     "commented_yaml",
     "described_by",
     "json_schema",
+    "load_described",
     "parse_yaml",
     "placed",
     "problem",

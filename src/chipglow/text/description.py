@@ -56,6 +56,27 @@ def validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
         raise DescriptionError(f"{name}: {problem(error)}") from None
 
 
+def load_described(kind: type[Kind], path: str | Path) -> Kind:
+    """What a YAML file holds, as the section that it should be.
+
+    Parameters
+    ----------
+    kind : type
+        The section.
+    path : str or Path
+        The file. Files that it names are looked up beside it.
+
+    Raises
+    ------
+    DescriptionError
+        If the file is no YAML or the section is not possible.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    return validated(kind, read_description(path), path.name, path.parent)
+
+
 def described_by(kind: type[Kind], path: Path, field: str, settings: Iterable[str]) -> Kind:
     """What a YAML file describes, or what another file alone, named by a field, means.
 

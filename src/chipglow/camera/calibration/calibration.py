@@ -89,12 +89,18 @@ class FittedCalibration(Calibration):
     **others
         As `Calibration` has them.
 
+    Attributes
+    ----------
+    kind : str
+        Name of the model, in files and commands.
+
     Raises
     ------
     ValueError
         If shapes do not fit or a value is impossible.
     """
 
+    kind: ClassVar[str] = ""
     NAMES: ClassVar[tuple[str, ...]] = ()
     UNITS: ClassVar[tuple[str, ...]] = ()
 
@@ -191,6 +197,7 @@ class LinearCalibration(FittedCalibration):
         As `FittedCalibration` has them; offset in counts, gain in counts per W/(m² sr).
     """
 
+    kind: ClassVar[str] = "linear"
     NAMES: ClassVar[tuple[str, ...]] = ("offset", "gain")
     UNITS: ClassVar[tuple[str, ...]] = ("counts", "counts m² sr/W")
 
@@ -245,6 +252,7 @@ class SakumaHattori(FittedCalibration):
     Their signal has no offset; the counts of a camera have one.
     """
 
+    kind: ClassVar[str] = "sakuma-hattori"
     NAMES: ClassVar[tuple[str, ...]] = ("offset", "A", "B", "C")
     UNITS: ClassVar[tuple[str, ...]] = ("counts", "m", "m K", "counts")
 

@@ -444,8 +444,8 @@ def _covariance(
 
 
 MODELS: Final[Mapping[str, Callable[..., CalibrationFit[Any]]]] = {
-    "linear": fit_linear,
-    "sakuma-hattori": fit_sakuma_hattori,
+    LinearCalibration.kind: fit_linear,
+    SakumaHattori.kind: fit_sakuma_hattori,
 }
 """Models of a calibration by name."""
 

@@ -10,7 +10,7 @@ from chipglow.io import ToolSection
 from chipglow.quantities.section import OR_NONE, described
 from chipglow.quantities.units import Position
 from chipglow.scene import PlacedTool, Tool
-from chipglow.text import read_description, validated
+from chipglow.text import load_described
 
 _Tip = Annotated[tuple[Position, Position] | None, Strict(False), OR_NONE]
 
@@ -52,8 +52,7 @@ def load_tool(path: str | Path) -> Tool:
     OSError
         If the file cannot be read.
     """
-    path = Path(path)
-    return validated(ToolDescription, read_description(path), path.name, path.parent).build()
+    return load_described(ToolDescription, path).build()
 
 
 def tool_of(measurement: Measurement, path: str | Path | None) -> Tool:

@@ -11,7 +11,7 @@ from chipglow.quantities import OR_NONE, Section, Settings, described
 from chipglow.quantities.units import POSITION
 from chipglow.scene import Circle, Polygon, Region
 from chipglow.scene.regions import Point
-from chipglow.text import read_description, validated
+from chipglow.text import load_described
 
 _SHAPES: Final = ("polygon", "rectangle", "circle")
 
@@ -139,5 +139,4 @@ def load_regions(path: str | Path) -> tuple[Region, ...]:
     OSError
         If the file cannot be read.
     """
-    path = Path(path)
-    return validated(RegionsDescription, read_description(path), path.name, path.parent).build()
+    return load_described(RegionsDescription, path).build()

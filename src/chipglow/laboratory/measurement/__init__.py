@@ -7,10 +7,10 @@ from chipglow.laboratory.measurement.calibration_file import (
 )
 from chipglow.laboratory.measurement.camera_file import (
     FlatFieldSources,
-    bad_pixels_of,
     load_measurement,
     load_recording,
     measurement_of,
+    pixel_correction,
     uniform_counts,
 )
 from chipglow.laboratory.measurement.description import (
@@ -32,7 +32,6 @@ __all__ = [
     "ImagePosition",
     "MeasurementDescription",
     "MeasurementSummary",
-    "bad_pixels_of",
     "calibrate_recording",
     "calibration_text",
     "flag_shares",
@@ -43,6 +42,7 @@ __all__ = [
     "measurement_of",
     "measurement_summary",
     "measurement_text",
+    "pixel_correction",
     "repaired_signal",
     "uniform_counts",
 ]

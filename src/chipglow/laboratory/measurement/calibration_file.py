@@ -11,11 +11,10 @@ from chipglow.camera import CalibrationFit, FittedCalibration, LinearCalibration
 from chipglow.quantities import OR_NONE, Settings, described
 from chipglow.quantities.units import Temperature, Time, WavelengthRange
 from chipglow.radiometry import Band, TabulatedResponse
-from chipglow.text import commented_yaml, read_description, validated
+from chipglow.text import commented_yaml, load_described
 
 MODELS: Final[Mapping[str, type[FittedCalibration]]] = {
-    "linear": LinearCalibration,
-    "sakuma-hattori": SakumaHattori,
+    one.kind: one for one in (LinearCalibration, SakumaHattori)
 }
 """Forms of a calibration by the names of a file."""
 
@@ -62,13 +61,12 @@ class CalibrationDescription(Settings[FittedCalibration]):
         """What a file shall hold of a fit."""
         calibration = fit.calibration
         band, response = calibration.band, calibration.band.response
-        names = {kind: name for name, kind in MODELS.items()}
         values = zip(calibration.NAMES, calibration.parameters.tolist(), strict=True)
         points = (
             fit.temperatures - 273.15, fit.counts, fit.residuals, fit.residuals_temperature
         )  # fmt: skip
         return cls.model_construct(
-            model=names[type(calibration)],
+            model=calibration.kind,
             band=(band.lower, band.upper),
             response=_pairs(response) if isinstance(response, TabulatedResponse) else None,
             lowest=calibration.lowest,
@@ -130,8 +128,7 @@ def load_calibration(path: str | Path) -> FittedCalibration:
     OSError
         If the file cannot be read.
     """
-    path = Path(path)
-    return validated(CalibrationDescription, read_description(path), path.name, path.parent).build()
+    return load_described(CalibrationDescription, path).build()
 
 
 def calibration_text(description: CalibrationDescription) -> str:

@@ -125,13 +125,13 @@ def measurement_of(
         If a file that the description names cannot be read.
     """
     try:
-        uniform = FlatFieldSources().of(description, recording)
+        correction, bad_pixels = pixel_correction(description, recording, FlatFieldSources())
         calibration = description.calibration
         return calibrate_recording(
             recording,
             None if calibration is None else load_calibration(calibration),
-            uniform.correction if uniform and description.flat_field.correct else None,
-            bad_pixels_of(description, recording, uniform),
+            correction,
+            bad_pixels,
             description.lower_limit,
             description.position(),
         )
@@ -173,11 +173,11 @@ def uniform_counts(
     try:
         if recording.quantity != "counts":
             raise ValueError(f"holds {recording.quantity}, expected counts")
-        uniform = (objects or FlatFieldSources()).of(description, recording)
-        bad = bad_pixels_of(description, recording, uniform)
+        sources = objects or FlatFieldSources()
+        correction, bad = pixel_correction(description, recording, sources)
         signal = recording.signal.astype(np.float64)
-        if uniform is not None and description.flat_field.correct:
-            signal = uniform.correction.apply(signal)
+        if correction is not None:
+            signal = correction.apply(signal)
         good = np.isfinite(signal).all(axis=0) & (True if bad is None else ~bad)
         if not good.any():
             raise ValueError("all pixels are bad, expected some that are not")
@@ -190,6 +190,42 @@ def uniform_counts(
     return float(signal[:, good].mean())
 
 
+def pixel_correction(
+    description: MeasurementDescription, recording: Recording, sources: "FlatFieldSources"
+) -> tuple[NonUniformity | None, NDArray[np.bool_] | None]:
+    """What corrects a recording's pixels, and which of them are bad, as its description says.
+
+    Parameters
+    ----------
+    description : MeasurementDescription
+        What is done with the recording.
+    recording : Recording
+        As `load_recording` gives it for this description.
+    sources : FlatFieldSources
+        Where frames of flat-field sources are read.
+
+    Returns
+    -------
+    correction : NonUniformity or None
+        None if the pixels are not to be corrected.
+    bad : ndarray of bool or None
+        By frames of flat-field sources or by a list, shape (y, x); None for neither.
+
+    Raises
+    ------
+    ValueError
+        As `FlatFieldSources.of`, or if the frames are too few to find bad pixels in.
+    OSError
+        If a file cannot be read.
+    """
+    fields = sources.of(description, recording)
+    correction = fields.correction if fields and description.flat_field.correct else None
+    if fields is not None and description.bad_pixels == "find":
+        return correction, fields.bad_pixels.mask
+    rows, columns = recording.signal.shape[1:]
+    return correction, description.listed_bad_pixels((rows, columns))
+
+
 class FlatFieldSources:
     """Frames of flat-field sources, read and judged once for recordings that have them in common.
 
@@ -199,7 +235,7 @@ class FlatFieldSources:
     def __init__(self) -> None:
         self._read = lru_cache(maxsize=1)(_read_uniform)
 
-    def of(self, description: MeasurementDescription, recording: Recording) -> "FlatFields | None":
+    def of(self, description: MeasurementDescription, recording: Recording) -> "_FlatFields | None":
         """Those that a recording's description names, if it does.
 
         Raises
@@ -226,7 +262,7 @@ class FlatFieldSources:
 
 
 @dataclass(frozen=True, eq=False)
-class FlatFields:
+class _FlatFields:
     """Frames of one or two flat-field sources."""
 
     low: Recording
@@ -234,14 +270,12 @@ class FlatFields:
 
     @cached_property
     def correction(self) -> NonUniformity:
-        """What makes all detector elements answer alike."""
         if self.high is None:
             return NonUniformity.one_point(self.low.signal)
         return NonUniformity.two_point(self.low.signal, self.high.signal)
 
     @cached_property
     def bad_pixels(self) -> BadPixels:
-        """Detector elements that answer unlike the others."""
         frames = self.low.signal
         if len(frames) < LEAST_FRAMES:
             raise ValueError(
@@ -251,10 +285,10 @@ class FlatFields:
         return find_bad_pixels(frames, None if self.high is None else self.high.signal)
 
 
-def _read_uniform(description: MeasurementDescription) -> FlatFields:
+def _read_uniform(description: MeasurementDescription) -> _FlatFields:
     section = description.flat_field
     high = None if section.high is None else _uniform(description, section.high)
-    return FlatFields(_uniform(description, str(section.low)), high)
+    return _FlatFields(_uniform(description, str(section.low)), high)
 
 
 def _uniform(description: MeasurementDescription, file: str) -> Recording:
@@ -279,13 +313,3 @@ def _misfit(uniform: Recording, recording: Recording) -> str | None:
         if share > _MOST_SATURATED:
             return f"{share:.0%} of it is saturated, expected a darker flat-field source"
     return None
-
-
-def bad_pixels_of(
-    description: MeasurementDescription, recording: Recording, uniform: "FlatFields | None"
-) -> NDArray[np.bool_] | None:
-    """Bad pixels by frames of flat-field sources or by a list, shape (y, x), or None."""
-    if description.bad_pixels == "find" and uniform is not None:
-        return uniform.bad_pixels.mask
-    rows, columns = recording.signal.shape[1:]
-    return description.listed_bad_pixels((rows, columns))

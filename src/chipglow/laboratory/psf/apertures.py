@@ -7,7 +7,7 @@ from pydantic import Field, Strict
 
 from chipglow.quantities.section import FileBeside, Section
 from chipglow.quantities.units import Length
-from chipglow.text import read_description, validated
+from chipglow.text import load_described
 
 
 class ApertureSection(Section):
@@ -46,6 +46,5 @@ def load_apertures(path: str | Path) -> list[tuple[Path, float]]:
     OSError
         If the file cannot be read.
     """
-    path = Path(path)
-    found = validated(ApertureList, read_description(path), path.name, path.parent)
+    found = load_described(ApertureList, path)
     return [(Path(aperture.file), aperture.diameter) for aperture in found.apertures]

@@ -7,12 +7,12 @@ from pathlib import Path
 from chipglow.io import is_measurement, is_scene
 from chipglow.laboratory.measurement import (
     FlatFieldSources,
-    bad_pixels_of,
     load_calibration,
     load_description,
     load_measurement,
     load_recording,
     measurement_of,
+    pixel_correction,
     repaired_signal,
 )
 from chipglow.laboratory.psf.edge_image import EdgeImage, counts_image, edge_image
@@ -52,12 +52,8 @@ def load_edge(
         calibration = load_calibration(described.calibration)
         recording = replace(recording, band=recording.band or calibration.band)
     try:
-        uniform = FlatFieldSources().of(described, recording)
-        signal, flags = repaired_signal(
-            recording,
-            uniform.correction if uniform and described.flat_field.correct else None,
-            bad_pixels_of(described, recording, uniform),
-        )
+        corrected = pixel_correction(described, recording, FlatFieldSources())
+        signal, flags = repaired_signal(recording, *corrected)
         return counts_image(recording, signal, flags, name, region)
     except ValueError as error:
         raise DescriptionError(f"{source}: {str(error).removeprefix(f'{name}: ')}") from error
