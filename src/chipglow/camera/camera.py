@@ -53,7 +53,7 @@ class Camera:
         Share of a pixel's square that is sensitive: a square in its middle.
     psf : PointSpreadFunction, optional
         How the camera spreads a point; None for an ideal camera (the paper's case 2).
-    psf_order : {"optics", "sensor"}
+    psf_order : {"optics", "detector"}
         ``optics`` blurs the scene's samples and lets the pixels integrate the blurred image, as
         light does it: the point spread function is that of the optics alone. ``detector`` is the
         paper's: the pixels integrate the scene, and the blur is applied from pixel to pixel.
@@ -336,7 +336,7 @@ class Camera:
         Returns
         -------
         ndarray
-            Radiance of every pixel in W/(m² sr), shape `sensors(exposure.raster).shape`.
+            Radiance of every pixel in W/(m² sr), shape `pixels(exposure.raster).shape`.
 
         Raises
         ------

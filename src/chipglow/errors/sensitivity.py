@@ -23,7 +23,7 @@ class Sensitivity:
 
     Parameters
     ----------
-    psf_order : {"sensor", "optics"}
+    psf_order : {"detector", "optics"}
         Where the point spread function acts.
     widths : ndarray
         Full widths at half maximum in m, shape (n,).

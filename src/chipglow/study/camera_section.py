@@ -67,7 +67,7 @@ class CameraSection(Settings[Camera]):
     )
     psf_order: Literal["optics", "detector"] = described(
         "detector",
-        "sensor (the paper's: on the pixels' values) or optics (on the samples, before the\n"
+        "detector (the paper's: on the pixels' values) or optics (on the samples, before the\n"
         "sensors integrate).",
     )
     integration_time: Time = described("10 us", "Exposure.")

@@ -1,4 +1,4 @@
-"""Sensors that do not answer to light as others do: finding them, and standing in for them."""
+"""Pixels that do not answer to light as others do: finding them, and standing in for them."""
 
 from dataclasses import dataclass
 from typing import Any, Final
@@ -23,14 +23,14 @@ LEVEL_LIMIT: Final = 8.0
 a good pixel is from the median at most, of one flat-field source."""
 
 LARGEST_CLUSTER: Final = 4
-"""Sensors of the largest cluster, neighbours over corner included, that is replaced."""
+"""Pixels of the largest cluster, neighbours over corner included, that is replaced."""
 
 _FEWEST_NEIGHBOURS: Final = 3
 
 
 @dataclass(frozen=True, eq=False)
 class BadPixels:
-    """Sensors that do not answer to light as others do, each an array of bool of shape (y, x).
+    """Pixels that do not answer to light as others do, each an array of bool of shape (y, x).
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def find_bad_pixels(frames: NDArray[Any], hot: NDArray[Any] | None = None) -> Ba
 
 
 def _by_noise(frames: NDArray[Any]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Sensors without any noise, and with too much."""
+    """Pixels without any noise, and with too much."""
     none = np.zeros(frames.shape[1:], np.bool_)
     if len(frames) < LEAST_FRAMES:
         return none, none

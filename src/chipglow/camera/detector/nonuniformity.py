@@ -1,4 +1,4 @@
-"""Sensors that answer differently to the same light: one- and two-point corrections."""
+"""Pixels that answer differently to the same light: one- and two-point corrections."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -124,7 +124,7 @@ class PointSpreadFunction(PSFChoice):
         ValueError
             As `kernel`.
         """
-        return _folded(_normalised(self.kernel(spacing)), rows, columns)
+        return _folded(normalised(self.kernel(spacing)), rows, columns)
 
 
 @final
@@ -346,7 +346,7 @@ class MeasuredPSF(PointSpreadFunction):
         half = _half_size(width / 2, spacing)
         left = width / 2 + spacing * (np.arange(-half, half + 1) - 0.5)
         share = overlap_lengths(left, spacing, samples, self.spacing) / self.spacing
-        return _normalised(np.einsum("ij,jk,lk->il", share, self.weights, share, optimize=True))
+        return normalised(np.einsum("ij,jk,lk->il", share, self.weights, share, optimize=True))
 
 
 @final
@@ -432,7 +432,8 @@ def _jinc(v: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(v == 0.0, 1.0, 2 * j1(safe) / safe)
 
 
-def _normalised(kernel: NDArray[np.float64]) -> NDArray[np.float64]:
+def normalised(kernel: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A kernel of sum 1."""
     return np.asarray(kernel / kernel.sum())
 
 

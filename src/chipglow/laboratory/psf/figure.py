@@ -115,7 +115,7 @@ def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
     low, high = (transfer.value + sign * 2 * transfer.uncertainty for sign in (-1, 1))
     axes.fill_between(frequency, low, high, color=GREY, alpha=0.3, linewidth=0)
     axes.plot(frequency, transfer.value, color=GREY, label="measured, 2 u")
-    axes.plot(frequency, transfer.model, color=VERMILLION, label="fit: optics and sensor")
+    axes.plot(frequency, transfer.model, color=VERMILLION, label="fit: optics and pixel")
     axes.plot(frequency, transfer.optics, color=BLUE, linestyle="--", label="fit: optics alone")
     nyquist = 0.5e-3 / edge.image.pitch
     axes.axvline(nyquist, color=VOID, linewidth=1.2, label="Nyquist", zorder=0)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera import MeasuredPSF, PointSpreadFunction
+from chipglow.camera.optics.psf import normalised
 from chipglow.laboratory.psf.knife_edge import RADIAL, KnifeEdge
 from chipglow.laboratory.psf.psf_fit import ModelFit
 from chipglow.laboratory.psf.radial_psf import FIT, psf_cause
@@ -54,10 +55,10 @@ def psf_kernel(knife: KnifeEdge, model: str | None = None) -> MeasuredPSF:
         return psf
     fit = knife.best if model is None else knife.fit(model)
     spacing = psf.spacing if isinstance(psf, MeasuredPSF) else psf.fwhm / _SAMPLES_PER_WIDTH
-    middle = _normalised(psf.kernel(spacing))
+    middle = normalised(psf.kernel(spacing))
 
     def kernel(other: PointSpreadFunction) -> NDArray[np.float64]:
-        return _of_side(_normalised(other.kernel(spacing)), len(middle))
+        return _of_side(normalised(other.kernel(spacing)), len(middle))
 
     parts = {FIT: _of_the_fit(knife, fit, kernel), MODEL: _of_the_model(knife, fit, kernel)}
     if knife.unexplained:
@@ -97,10 +98,6 @@ def _of_the_model(knife: KnifeEdge, fit: ModelFit, kernel: _Kernel) -> list[NDAr
 def _component(name: str, effects: Sequence[NDArray[np.float64]]) -> Component:
     columns = np.stack([one.ravel() for one in effects], axis=1)
     return Component(psf_cause(name, columns, len(effects)), columns)
-
-
-def _normalised(kernel: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(kernel / kernel.sum())
 
 
 def _of_side(kernel: NDArray[np.float64], side: int) -> NDArray[np.float64]:
