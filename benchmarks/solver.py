@@ -7,7 +7,7 @@ from numba import get_num_threads
 
 from chipglow.cutting.damage import Damage
 from chipglow.cutting.energy import held_energy
-from chipglow.cutting.heat import conduct, even_out, return_heat
+from chipglow.cutting.heat import conduct, return_heat
 from chipglow.cutting.library import AISI_1045
 from chipglow.cutting.material import ROOM_TEMPERATURE
 from chipglow.cutting.momentum import NODE_VALUES, SUMS, VELOCITY_VALUES, Step, advance_with
@@ -106,17 +106,13 @@ class Block:
     def conduct(self, duration, steps, conductivity, capacity):
         """Conduct heat for a time, with properties sampled as a `TemperatureTable` does."""
         shape = (self.grid.columns, self.grid.rows)
-        nodes, increment, deviation = np.zeros((*shape, 3)), np.zeros(shape), np.zeros(shape)
+        nodes, increment = np.zeros((*shape, 3)), np.zeros(shape)
         diffusivity = conductivity[0] / (self.step.heat_mass / self.step.volume * capacity[0])
         share = min(diffusivity * duration / steps / self.cell**2, 1.0)
         for _ in range(steps):
             conduct(
                 self.points, self.count, nodes, increment, conductivity, capacity,
-                self.step.heat_mass, self.grid, duration / steps,
-            )  # fmt: skip
-            even_out(
-                self.points, self.count, nodes, deviation, capacity, self.step.heat_mass,
-                self.grid, share,
+                self.step.heat_mass, self.grid, duration / steps, share,
             )  # fmt: skip
             return_heat(self.points, self.count, increment, self.grid)
 

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from time import perf_counter
 
-from cases import cylinder, expansion, heat, motion, plasticity, taylor, upsetting
+from cases import cylinder, expansion, heat, motion, plasticity, surface_heat, taylor, upsetting
 
 from chipglow.drawing.drawing import new_figure, style
 
@@ -20,6 +20,8 @@ CASES = {
     "waves": motion.waves,
     "vibration": motion.vibrations,
     "conduction": heat.conduction,
+    "surface-flux": surface_heat.surface_flux,
+    "moving-source": surface_heat.moving_source,
     "expansion": expansion.bent,
     "shear": plasticity.adiabatic_shear,
     "friction": plasticity.friction,

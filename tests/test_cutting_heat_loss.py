@@ -42,7 +42,7 @@ class WarmBlock:
         conduct(
             block.points, block.count, self.nodes, self.increment,
             np.full(samples, conductivity), np.full(samples, CAPACITY), block.step.heat_mass,
-            block.grid, duration,
+            block.grid, duration, 0.0,
         )  # fmt: skip
         lost = lose_heat(
             self.nodes, self.increment, self.tool_temperature, self.fraction, TOOL_HEAT, loss,

@@ -2,7 +2,17 @@
 
 import pytest
 import verification
-from cases import Check, cylinder, expansion, heat, motion, plasticity, taylor, upsetting
+from cases import (
+    Check,
+    cylinder,
+    expansion,
+    heat,
+    motion,
+    plasticity,
+    surface_heat,
+    taylor,
+    upsetting,
+)
 
 
 @pytest.mark.parametrize(
@@ -12,6 +22,8 @@ from cases import Check, cylinder, expansion, heat, motion, plasticity, taylor, 
         motion.waves,
         motion.vibrations,
         heat.conduction,
+        surface_heat.surface_flux,
+        surface_heat.moving_source,
         expansion.bent,
         plasticity.adiabatic_shear,
         plasticity.friction,

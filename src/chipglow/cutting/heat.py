@@ -38,20 +38,24 @@ def tool_fraction(grid, tool):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def conduct(points, count, nodes, increment, conductivity, capacity, heat_mass, grid, duration):  # type: ignore[no-untyped-def]
+def conduct(  # type: ignore[no-untyped-def]
+    points, count, nodes, increment, conductivity, capacity, heat_mass, grid, duration, share
+):
     """Gather heat and temperature of the points on the grid and conduct for `duration` (s).
 
     `nodes` (columns, rows, 3) becomes heat capacity (J/(m K)), temperature (K) and filled share;
-    `increment` (columns, rows) the rise of temperature (K). No heat crosses a free surface: the
-    flux between two nodes goes through the smaller of their filled shares.
+    `increment` (columns, rows) the rise of temperature (K), for `return_heat`. The flux is that at
+    the points and acts on the nodes by the slopes of their weights (weak form), so none crosses a
+    free surface wherever the surface lies between the nodes.
+
+    Increments leave differences between the points of a cell as they are, so a point much colder
+    than the others would be cooled with them. `share` is taken off what the grid does not see:
+    all of the noise, and of a smooth field only a fourth derivative.
     """
     _gather_heat(points, count, nodes, capacity, heat_mass, grid)
     increment[:] = 0.0
-    for i in range(grid.columns - 1):
-        for j in range(grid.rows - 1):
-            if nodes[i, j, 0] > 0.0:
-                _exchange(nodes, increment, conductivity, i, j, i + 1, j, duration)
-                _exchange(nodes, increment, conductivity, i, j, i, j + 1, duration)
+    for k in range(count):
+        _conduct_at(points[k], nodes, increment, conductivity, grid, duration, share)
     for i in range(grid.columns):
         for j in range(grid.rows):
             if nodes[i, j, 0] > 0.0:
@@ -59,26 +63,39 @@ def conduct(points, count, nodes, increment, conductivity, capacity, heat_mass, 
 
 
 @njit
-def _nodes_around(p, grid):  # type: ignore[no-untyped-def]
-    """First of the nodes around a point, column and row, and their weights along either."""
+def _place(p, grid):  # type: ignore[no-untyped-def]
+    """First of the nodes around a point, column and row, and its offset from it in cells."""
     i, ax = spline((p.x - grid.left) / grid.cell)
     j, ay = spline((p.y - grid.bottom) / grid.cell)
-    return i, j, spline_weights(ax), spline_weights(ay)
+    return i, j, ax, ay
+
+
+@njit
+def _slopes(offset):  # type: ignore[no-untyped-def]
+    """Slopes of the weights of the three nodes, per cell."""
+    return offset - 1.5, 2.0 * (1.0 - offset), offset - 0.5
 
 
 @njit
 def _gather_heat(points, count, nodes, capacity, heat_mass, grid):  # type: ignore[no-untyped-def]
+    """Heat capacity, temperature and filled share of the nodes.
+
+    A point brings the temperature that its slopes make at the node (affine transfer, Jiang et al.
+    2015): a linear field is exact up to a free surface, where the points lie on one side only.
+    """
     nodes[:] = 0.0
     for k in range(count):
         p = points[k]
-        i, j, wx, wy = _nodes_around(p, grid)
+        i, j, ax, ay = _place(p, grid)
+        wx, wy = spline_weights(ax), spline_weights(ay)
         heat = heat_mass * property_at(capacity, p.temperature)
         share = p.volume / (grid.cell * grid.cell)
         for a in range(3):
             for b in range(3):
                 w = wx[a] * wy[b]
+                there = p.temperature + p.rise_x * (a - ax) + p.rise_y * (b - ay)
                 nodes[i + a, j + b, 0] += w * heat
-                nodes[i + a, j + b, 1] += w * heat * p.temperature
+                nodes[i + a, j + b, 1] += w * heat * there
                 nodes[i + a, j + b, 2] += w * share
     for i in range(grid.columns):
         for j in range(grid.rows):
@@ -86,54 +103,29 @@ def _gather_heat(points, count, nodes, capacity, heat_mass, grid):  # type: igno
                 nodes[i, j, 1] /= nodes[i, j, 0]
 
 
-@njit(cache=True)
-def even_out(points, count, nodes, deviation, capacity, heat_mass, grid, share):  # type: ignore[no-untyped-def]
-    """Take a share of what the grid cannot see off the points' temperatures; heat is kept.
-
-    Increments from the grid leave differences between the points of a cell as they are, so a point
-    much colder than the others would be cooled with them. The share is taken off T - S T - S(T -
-    S T), with S the way from the points to the grid and back: all of the noise that the grid does
-    not see, and of a smooth field only a fourth derivative (XPIC of order 2 for the temperature,
-    Hammerquist and Nairn 2017). `nodes` is that of `conduct`; `deviation` (columns, rows) is
-    overwritten.
-    """
-    deviation[:] = 0.0
-    for k in range(count):
-        p = points[k]
-        i, j, wx, wy = _nodes_around(p, grid)
-        heat = heat_mass * property_at(capacity, p.temperature)
-        beyond = p.temperature
-        for a in range(3):
-            for b in range(3):
-                beyond -= wx[a] * wy[b] * nodes[i + a, j + b, 1]
-        for a in range(3):
-            for b in range(3):
-                deviation[i + a, j + b] += wx[a] * wy[b] * heat * beyond
-    for i in range(grid.columns):
-        for j in range(grid.rows):
-            if nodes[i, j, 0] > 0.0:
-                deviation[i, j] /= nodes[i, j, 0]
-    for k in range(count):
-        p = points[k]
-        i, j, wx, wy = _nodes_around(p, grid)
-        noise = p.temperature
-        for a in range(3):
-            for b in range(3):
-                node = nodes[i + a, j + b, 1] + deviation[i + a, j + b]
-                noise -= wx[a] * wy[b] * node
-        p.temperature -= share * noise
-
-
 @njit
-def _exchange(nodes, increment, conductivity, i, j, k, l, duration):  # type: ignore[no-untyped-def]  # noqa: E741
-    if nodes[k, l, 0] == 0.0:
-        return
-    mean = 0.5 * (nodes[i, j, 1] + nodes[k, l, 1])
-    k_mean = property_at(conductivity, mean)
-    share = min(nodes[i, j, 2], nodes[k, l, 2], 1.0)
-    heat = k_mean * share * (nodes[k, l, 1] - nodes[i, j, 1]) * duration
-    increment[i, j] += heat
-    increment[k, l] -= heat
+def _conduct_at(p, nodes, increment, conductivity, grid, duration, share):  # type: ignore[no-untyped-def]
+    """Slopes of a point's temperature, its noise less, and the heat of its flux to its nodes."""
+    i, j, ax, ay = _place(p, grid)
+    wx, wy = spline_weights(ax), spline_weights(ay)
+    sx, sy = _slopes(ax), _slopes(ay)
+    seen = rise_x = rise_y = slope_x = slope_y = 0.0
+    for a in range(3):
+        for b in range(3):
+            temperature = nodes[i + a, j + b, 1]
+            weighted = wx[a] * wy[b] * temperature
+            seen += weighted
+            rise_x += (a - ax) * weighted
+            rise_y += (b - ay) * weighted
+            slope_x += sx[a] * wy[b] * temperature
+            slope_y += wx[a] * sy[b] * temperature
+    # Squares of the nodes' distances are a quarter of a cell's in the mean, wherever the point is.
+    p.rise_x, p.rise_y = 4.0 * rise_x, 4.0 * rise_y
+    p.temperature += share * (seen - p.temperature)
+    flow = property_at(conductivity, seen) * p.volume / (grid.cell * grid.cell) * duration
+    for a in range(3):
+        for b in range(3):
+            increment[i + a, j + b] -= flow * (sx[a] * wy[b] * slope_x + wx[a] * sy[b] * slope_y)
 
 
 @njit(cache=True)
@@ -163,34 +155,100 @@ need a needlessly short time step."""
 
 @njit(cache=True)
 def heat_contact(  # type: ignore[no-untyped-def]
-    points, count, friction, increment, nodes, temperature, fraction, tool, tool_heat, capacity,
-    heat_mass, grid,
+    points, count, friction, touched, increment, nodes, temperature, fraction, tool, tool_heat,
+    capacity, heat_mass, grid,
 ):  # fmt: skip
     """Share the friction work and exchange heat through the contact.
 
-    Friction work (J/m, on the chip's nodes) goes to chip and tool by their effusivities; each
-    point that touched the tool then exchanges heat with the tool's temperature next to it.
+    Friction work (J/m, on the chip's nodes) goes to the points that touched the tool, and from each
+    to chip and tool by their effusivities; each then exchanges heat with the tool next to it. Heat
+    that finds no point is kept for the next time. `touched` (columns, rows) is overwritten.
     """
-    for i in range(grid.columns):
-        for j in range(grid.rows):
-            if friction[i, j] > 0.0:
-                into_tool = tool_heat.friction_share * friction[i, j]
-                increment[i, j] += (friction[i, j] - into_tool) / max(nodes[i, j, 0], 1e-12)
-                x, y = grid.left + i * grid.cell, grid.bottom + j * grid.cell
-                _warm(x, y, into_tool, temperature, fraction, tool, tool_heat, grid)
-                friction[i, j] = 0.0
+    touched[:] = 0.0
+    for k in range(count):
+        if points[k].contact_time > 0.0:
+            _touch(points[k], touched, grid)
     for k in range(count):
         p = points[k]
         if p.contact_time > 0.0:
-            inside = _tool_temperature(p.x, p.y, temperature, fraction, tool, grid)
-            chip = heat_mass * property_at(capacity, p.temperature)
-            store = tool_heat.capacity * grid.cell**2
-            both = chip * store / (chip + store)
-            flow = tool_heat.conductance * tool_heat.area * p.contact_time
-            heat = both * (1.0 - np.exp(-flow / both)) * (p.temperature - inside)
-            p.temperature -= heat / chip
+            work = _friction_work(p, friction, touched, grid)
+            _heat_contact_of(
+                p, work, increment, nodes, temperature, fraction, tool, tool_heat, capacity,
+                heat_mass, grid,
+            )  # fmt: skip
             p.contact_time = 0.0
-            _warm(p.x, p.y, heat, temperature, fraction, tool, tool_heat, grid)
+    for i in range(grid.columns):
+        for j in range(grid.rows):
+            if touched[i, j] > 0.0:
+                friction[i, j] = 0.0
+
+
+@njit
+def _touch(p, touched, grid):  # type: ignore[no-untyped-def]
+    """A point's time in contact, weighted, to its nodes."""
+    i, j, ax, ay = _place(p, grid)
+    wx, wy = spline_weights(ax), spline_weights(ay)
+    for a in range(3):
+        for b in range(3):
+            touched[i + a, j + b] += wx[a] * wy[b] * p.contact_time
+
+
+@njit
+def _friction_work(p, friction, touched, grid):  # type: ignore[no-untyped-def]
+    """A point's part of its nodes' friction work in J/m, by weight and time in contact."""
+    i, j, ax, ay = _place(p, grid)
+    wx, wy = spline_weights(ax), spline_weights(ay)
+    work = 0.0
+    for a in range(3):
+        for b in range(3):
+            if friction[i + a, j + b] > 0.0:
+                part = wx[a] * wy[b] * p.contact_time / touched[i + a, j + b]
+                work += part * friction[i + a, j + b]
+    return work
+
+
+@njit
+def _heat_contact_of(  # type: ignore[no-untyped-def]
+    p, work, increment, nodes, temperature, fraction, tool, tool_heat, capacity, heat_mass, grid
+):
+    """Heat of a point's friction work to chip and tool, and what they exchange there.
+
+    Both surfaces are warmer than the next place at which their temperature is known, by what
+    flows through the layer between: the chip's by the slopes of its temperature, the tool's by the
+    heat that enters it.
+    """
+    distance, nx, ny = surface_distance(p.x, p.y, tool)
+    dx, dy = -distance * nx / grid.cell, -distance * ny / grid.cell
+    into_tool = tool_heat.friction_share * work
+    surface = p.temperature + p.rise_x * dx + p.rise_y * dy
+    contact = tool_heat.area * p.contact_time
+    layer = 0.5 * grid.cell / tool_heat.conductivity
+    inside = _tool_temperature(p.x, p.y, temperature, fraction, tool, grid)
+    inside += layer * into_tool / contact
+    chip = heat_mass * property_at(capacity, p.temperature)
+    store = tool_heat.capacity * grid.cell**2
+    both = chip * store / (chip + store)
+    flow = contact * tool_heat.conductance / (1.0 + layer * tool_heat.conductance)
+    heat = both * (1.0 - np.exp(-flow / both)) * (surface - inside)
+    heat_surface(p, dx, dy, work - into_tool - heat, increment, nodes, grid)
+    _warm(p.x, p.y, into_tool + heat, temperature, fraction, tool, tool_heat, grid)
+
+
+@njit
+def heat_surface(p, dx, dy, heat, increment, nodes, grid):  # type: ignore[no-untyped-def]
+    """Heat (J/m) to a point's nodes as if it entered at dx, dy (cells) from the point.
+
+    Weights that are extrapolated to the surface keep the heat's first moment, and reach no node
+    that the material does not fill.
+    """
+    i, j, ax, ay = _place(p, grid)
+    wx, wy = spline_weights(ax), spline_weights(ay)
+    sx, sy = _slopes(ax), _slopes(ay)
+    for a in range(3):
+        for b in range(3):
+            if nodes[i + a, j + b, 0] > 0.0:
+                weight = wx[a] * wy[b] + dx * sx[a] * wy[b] + dy * wx[a] * sy[b]
+                increment[i + a, j + b] += weight * heat / nodes[i + a, j + b, 0]
 
 
 @njit
@@ -240,7 +298,8 @@ def return_heat(points, count, increment, grid):  # type: ignore[no-untyped-def]
     """Give the rise of temperature on the grid to the points: increments, so nothing diffuses."""
     for k in range(count):
         p = points[k]
-        i, j, wx, wy = _nodes_around(p, grid)
+        i, j, ax, ay = _place(p, grid)
+        wx, wy = spline_weights(ax), spline_weights(ay)
         rise = 0.0
         for a in range(3):
             for b in range(3):

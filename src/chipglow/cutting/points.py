@@ -14,7 +14,7 @@ POINT: Final = np.dtype(
             "cxx", "cxy", "cyx", "cyy",
             "dxx", "dyy", "dxy",
             "strain", "increment", "strain_before", "damage", "temperature",
-            "volume", "free_volume",
+            "volume", "free_volume", "rise_x", "rise_y",
             "material_x", "material_y", "contact_time",
         )
     ]
@@ -22,8 +22,9 @@ POINT: Final = np.dtype(
 """Position, velocity of the grid there, velocity that the point carries, velocity gradient,
 deviator of the Cauchy stress that the elastic strain makes at room temperature; plastic strain,
 what the last step added to it and what it was at the last record; damage, temperature, volume per
-width and what it would be without stress (at the temperature of the last step), position before the
-cut, time in contact since the last exchange of heat; SI units."""
+width and what it would be without stress (at the temperature of the last step), rise of the
+temperature over a cell, position before the cut, time in contact since the last exchange of heat;
+SI units."""
 
 Points: TypeAlias = NDArray[np.void]
 

@@ -23,7 +23,6 @@ from chipglow.cutting.heat import (
     ToolHeat,
     conduct,
     conduct_tool,
-    even_out,
     heat_contact,
     return_heat,
     tool_fraction as fraction_of_tool,
@@ -66,7 +65,7 @@ _CONTACT_DAMPING: Final = 0.2
 _KEPT: Final = 1.0
 _LARGEST_DRIFT: Final = 0.1
 _FASTEST_DRIFT: Final = 0.4
-_HEAT_STABILITY: Final = 0.2
+_HEAT_STABILITY: Final = 0.15
 
 
 class SolverError(RuntimeError):
@@ -308,7 +307,7 @@ class _State:
         self.nodes = np.zeros((*shape, NODE_VALUES))
         self.heat_nodes = np.zeros((*shape, 3))
         self.increment = np.zeros(shape)
-        self.deviation = np.zeros(shape)
+        self.touched = np.zeros(shape)
         self.friction_heat = np.zeros(shape)
         self.tool_temperature = np.full(shape, conditions.initial_temperature)
         self.tool_border = border_nodes(self.tool_fraction)
@@ -444,15 +443,6 @@ class _State:
             self.step.heat_mass,
             self.grid,
             self.cycle,
-        )
-        even_out(
-            self.points,
-            self.count,
-            self.heat_nodes,
-            self.deviation,
-            self.capacity,
-            self.step.heat_mass,
-            self.grid,
             min(self.diffusivity * self.cycle / self.grid.cell**2, 1.0),
         )
         conduct_tool(
@@ -482,6 +472,7 @@ class _State:
             self.points,
             self.count,
             self.friction_heat,
+            self.touched,
             self.increment,
             self.heat_nodes,
             self.tool_temperature,
