@@ -190,13 +190,14 @@ class Numerics(Part):
         ),
     ] = 10e-6
     mass_scaling: Annotated[
-        float,
+        float | None,
         Parameter(
-            "Factor on the density in the equation of motion, for longer time steps.",
+            "Factor on the density in the equation of motion, for longer time steps; none: by the\n"
+            "cutting speed, so that the momentum of the scaled mass stays under 0.5 % of the force.",
             least=1.0,
             most=1e4,
         ),
-    ] = 100.0
+    ] = None
     courant: Annotated[
         float,
         Parameter(

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from chipglow.cutting.damage import weakening
 from chipglow.cutting.flow_stress import comes_with_chipglow, flow_stress
 from chipglow.cutting.friction import friction_coefficient
 from chipglow.cutting.lanes import FAST, INLINE
@@ -167,7 +166,7 @@ def _scatter(p, soft, tension, fx, fy, limit, nodes, grid, step):  # type: ignor
 
 
 @njit(**FAST)
-def _contact(p, stress, tool, step, law, damage):  # type: ignore[no-untyped-def]
+def _contact(p, stress, tool, step, law):  # type: ignore[no-untyped-def]
     """Force of the tool's surface on a point (N/m) and the limit of its friction impulse."""
     distance, nx, ny = surface_distance(p.x, p.y, tool)
     depth = step.reach - distance
@@ -178,7 +177,7 @@ def _contact(p, stress, tool, step, law, damage):  # type: ignore[no-untyped-def
     if push <= 0.0:
         return 0.0, 0.0, 0.0
     strength = flow_stress(p.strain, _RATE_OF_SLIDING, p.temperature, law)
-    strength = max(stress, strength * weakening(p.damage, damage))
+    strength = max(stress, strength)
     sticking = step.friction_factor * strength / np.sqrt(3.0) * step.area
     coefficient = friction_coefficient(
         step.friction, step.friction_exponent, step.friction_melting, p.temperature
@@ -240,7 +239,7 @@ def _work_block(  # type: ignore[no-untyped-def]
                 sums[block, EXPANSION_WORK] += buffer[EXPANSION + k - begin]
                 fx = fy = limit = 0.0
                 if surface_bound(p.x, p.y, tool) < step.reach:
-                    fx, fy, limit = _contact(p, buffer[STRESS + k - begin], tool, step, law, damage)
+                    fx, fy, limit = _contact(p, buffer[STRESS + k - begin], tool, step, law)
                     sums[block, FORCE_X] += fx
                     sums[block, FORCE_Y] += fy
                     sums[block, CONTACT_WORK] += step.time_step * (fx * p.vx + fy * p.vy)

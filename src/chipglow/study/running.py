@@ -263,7 +263,7 @@ def _compute(
     attributes: Mapping[str, str | float] = {
         "inputs": dumps(_inputs(study), sort_keys=True),
         "momentum_flow": simulation.momentum_flow,
-        "mass_scaling": simulation.numerics.mass_scaling,
+        "mass_scaling": simulation.mass_scaling,
     }
     left = unfinished_scenes(path) if resume else []
     start = left[0] if left and left[0].progress > 0 else None
