@@ -132,6 +132,7 @@ class Means:
     contact: float
     period: float
     segments: int
+    degree: float
     drift: float
     unaccounted: float
     seconds: float
@@ -181,6 +182,7 @@ def compute(simulation: CuttingSimulation) -> Means:
         contact=chip.contact,
         period=chip.period,
         segments=chip.segments,
+        degree=chip.degree,
         drift=drift(history),
         unaccounted=float(history.energy.closing_error[-1]),
         seconds=seconds,
@@ -270,7 +272,7 @@ def _sides(entry: Published | None, here: float, unit: Quantity) -> list[str]:
 def cuts(computed: Iterable[tuple[Experiment, Means]]) -> list[list[str]]:
     """Rows of the table of conditions and of how each cut went, its head first."""
     head = ["cut", "speed / (m/min)", "feed / mm", "rake / °", "conditions from", "assumed"]
-    rows = [[*head, "segments", "drift / %", "unaccounted work / %", "time / s"]]
+    rows = [[*head, "segments", "degree / %", "drift / %", "unaccounted work / %", "time / s"]]
     for experiment, means in computed:
         numbers = [
             number(getattr(experiment, name), CONDITIONS[name]) for name in list(CONDITIONS)[:3]
@@ -282,6 +284,7 @@ def cuts(computed: Iterable[tuple[Experiment, Means]]) -> list[list[str]]:
                 experiment.source + mark(experiment.read),
                 ", ".join(experiment.assumed) or "–",
                 f"{means.segments}",
+                f"{100 * means.degree:.0f}",
                 f"{100 * means.drift:+.0f}".replace("-", "−"),
                 f"{100 * means.unaccounted:.1f}".replace("-", "−"),
                 f"{means.seconds:.0f}",

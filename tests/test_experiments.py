@@ -19,6 +19,7 @@ MEANS = Means(
     contact=0.25e-3,
     period=80e-6,
     segments=3,
+    degree=0.2,
     drift=-0.02,
     unaccounted=0.008,
     seconds=60.0,
