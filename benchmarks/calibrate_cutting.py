@@ -11,19 +11,12 @@ What is found: the best point, what a cut there gives, the valley of points that
 which combinations of the numbers the forces do not tell apart.
 """
 
-import argparse
-import os
 from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement
 from math import exp, log
 
 import numpy as np
-from experiments import Experiment, Means, aligned, markdown, means_of, read_experiments
-from numpy.typing import NDArray
-from scipy.optimize import minimize
-from scipy.stats import qmc
+from experiments import Experiment, Means, means_of
 
 from chipglow.cutting import AISI_1045, CuttingSimulation, Numerics
 
@@ -35,7 +28,8 @@ FORCES = {"cutting_force": 0.05, "thrust_force": 0.1}
 """Measured forces, and the relative standard uncertainty taken for each: none is told."""
 
 PERIOD, PERIOD_UNCERTAINTY = 90e-6, 15e-6
-SEED = 20261122
+AXIAL = 0.7
+"""Distance of the design's outer points from its middle, of the half range."""
 
 
 @dataclass(frozen=True)
@@ -77,9 +71,7 @@ def simulation(experiment: Experiment, place: Iterable[float]) -> CuttingSimulat
     )
     tool = cut.tool if experiment.name == "paper" else replace(cut.tool, edge_radius=edge)
     numerics: Numerics = cut.numerics
-    return replace(
-        cut, workpiece=replace(AISI_1045, damage=damage), tool=tool, numerics=numerics
-    )
+    return replace(cut, workpiece=replace(AISI_1045, damage=damage), tool=tool, numerics=numerics)
 
 
 def compute(task: tuple[Experiment, tuple[float, ...]]) -> Means:
@@ -88,7 +80,7 @@ def compute(task: tuple[Experiment, tuple[float, ...]]) -> Means:
     return means_of(simulation(experiment, place), f"fit-{experiment.name}")
 
 
-def design(points: int) -> list[tuple[float, ...]]:
-    """Places of the design: a scrambled Sobol sequence, its middle first."""
-    sobol = qmc.Sobol(len(RANGES), seed=SEED).random(max(points - 1, 1))
-    return [(0.0,) * len(RANGES), *(tuple(2 * row - 1) for row in sobol[: points - 1])]
+def design() -> list[tuple[float, ...]]:
+    """Places of the design: the middle, then each number alone below and above it."""
+    axes = np.eye(len(RANGES)) * AXIAL
+    return [(0.0,) * len(RANGES), *(tuple(sign * axis) for axis in axes for sign in (-1, 1))]

@@ -7,6 +7,7 @@ import pytest
 from solver import Block
 
 from chipglow.cutting import TemperatureTable, workpiece
+from chipglow.cutting.momentum import MODULI_LOSS
 from chipglow.cutting.stress import BULK
 
 STRAIN = 1e-4
@@ -72,10 +73,13 @@ def test_warmed_at_constant_strain_stress_and_energy_fall_with_the_moduli_and_co
     # In-plane difference is shear alone; the whole is both. Moduli are sampled at whole kelvins.
     assert warm[0] - warm[1] == pytest.approx(shear * (cold[0] - cold[1]), rel=1e-6)
     assert shear < held / before < bulk
+    # Nothing moves: what is not held any more is the account's entry for it.
+    assert block.sums[MODULI_LOSS] == pytest.approx(before - held, rel=1e-6)
     block.points["temperature"] = 300.0
     block.advance(1)
     assert stresses(block)[0] == pytest.approx(cold, rel=1e-6, abs=1.0)
     assert block.energy()[1] == pytest.approx(before, rel=1e-6)
+    assert block.sums[MODULI_LOSS] == pytest.approx(held - before, rel=1e-6)
 
 
 def test_a_step_knows_no_difference_between_a_constant_and_a_level_table():

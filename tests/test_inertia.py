@@ -70,6 +70,20 @@ def test_before_the_tool_touches_nothing_is_known():
     assert np.isnan([found.kinetic_share, found.force_share]).all()
 
 
+@pytest.mark.parametrize("speed", [50.0, 100.0, 250.0, 400.0])
+def test_the_mass_is_scaled_by_the_speed_to_half_a_per_cent_of_the_force(speed):
+    simulation = CuttingSimulation(CuttingConditions(speed=speed / 60))
+    # Measured at 200 m/min, this feed and -7 deg: 719 N/mm (reference/orthogonal-cutting.yaml).
+    assert simulation.momentum_flow < 0.005 * 719e3
+    slow = simulation.mass_scaling == 1000.0
+    assert slow or simulation.momentum_flow > 0.004 * 719e3
+
+
+def test_a_mass_scaling_of_ones_own_is_kept():
+    simulation = CuttingSimulation(numerics=Numerics(mass_scaling=37.0))
+    assert simulation.mass_scaling == 37.0
+
+
 def test_momentum_flow_of_the_papers_cut():
     simulation = CuttingSimulation(CuttingConditions(), numerics=Numerics(mass_scaling=100.0))
     # 785 000 kg/m³ × (4.16667 m/s)² × 0.3 mm: 13.6 MPa on 0.3 mm.

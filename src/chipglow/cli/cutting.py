@@ -10,7 +10,7 @@ from rich.console import Console
 from chipglow.cli.inertia import say_inertia
 from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.io import atomic_path, open_scene
-from chipglow.laboratory.chip import inertia
+from chipglow.laboratory.chip import inertia, resolution_warnings
 from chipglow.scene import Frame
 from chipglow.study import Study, cut, is_cut, kept_progress, preview_raster
 
@@ -40,6 +40,8 @@ def cut_study(study: Study, out: Path, preview: Path | None, resume: bool, agree
             copyfile(cut(study, progress, resume, on_preview), temporary)
     scene = open_scene(out)
     say_inertia(inertia(scene))
+    for warning in resolution_warnings(scene):
+        Console(stderr=True, highlight=False, soft_wrap=True).print(f"Warning: {warning}")
     scene.data.close()
 
 

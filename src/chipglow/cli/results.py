@@ -98,12 +98,13 @@ def _report(
 
 
 def _warnings(result: StudyResult | SceneErrors) -> list[str]:
-    """What to know of the images."""
-    return [
+    """What to know of the cut and of the images."""
+    of_images = [
         f"Image of {name}. {warning}"
         for name, surface in result.surfaces.items()
         for warning in surface.warnings
     ]
+    return [*(result.warnings if isinstance(result, StudyResult) else ()), *of_images]
 
 
 def _provenance(study: Study) -> dict[str, str]:

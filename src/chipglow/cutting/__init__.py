@@ -25,6 +25,7 @@ from chipglow.cutting.library import (
 )
 from chipglow.cutting.material import RateTable, TemperatureTable, ToolMaterial, WorkpieceMaterial
 from chipglow.cutting.preview import Preview
+from chipglow.cutting.resolution import unresolved
 from chipglow.cutting.simulation import SOLVER_VERSION, CuttingSimulation, ForceHistory, SolverError
 
 __all__ = [
@@ -59,5 +60,6 @@ __all__ = [
     "material_file",
     "material_names",
     "tool_material",
+    "unresolved",
     "workpiece",
 ]

@@ -192,8 +192,8 @@ class Numerics(Part):
     mass_scaling: Annotated[
         float | None,
         Parameter(
-            "Factor on the density in the equation of motion, for longer time steps; none: by the\n"
-            "cutting speed, so that the momentum of the scaled mass stays under 0.5 % of the force.",
+            "Factor on the density in the equation of motion, for longer time steps; none: by\n"
+            "the speed, so that the scaled mass makes less than 0.5 % of the cutting force.",
             least=1.0,
             most=1e4,
         ),

@@ -32,6 +32,9 @@ class EnergyHistory:
     expansion_work : ndarray
         Elastic energy that material got from heat when it was warmed under pressure (or cooled
         under tension), shape (n,): no drive did that work.
+    moduli_loss : ndarray
+        Elastic energy that was lost as the moduli fell with the temperature, shape (n,); less than
+        0 if material under stress cooled.
     lost_heat : ndarray
         Heat that free surfaces lost to the surroundings, shape (n,). It was plastic or friction
         work before, so it is no entry of the mechanical account.
@@ -45,13 +48,14 @@ class EnergyHistory:
     friction_work: NDArray[np.float64]
     sharing_loss: NDArray[np.float64]
     expansion_work: NDArray[np.float64]
+    moduli_loss: NDArray[np.float64]
     lost_heat: NDArray[np.float64]
 
     @property
     def closing_error(self) -> NDArray[np.float64]:
         """Share of the work that the account does not find again: what the grid dissipates."""
         held = self.kinetic_energy + self.elastic_energy
-        used = self.plastic_work + self.friction_work + self.sharing_loss
+        used = self.plastic_work + self.friction_work + self.sharing_loss + self.moduli_loss
         done = self.drive_work + self.contact_work + self.expansion_work
         return (done - held - used) / self.drive_work
 

@@ -21,6 +21,7 @@ from chipglow.cutting.stress import (
     BUFFER,
     BULK,
     EXPANSION,
+    FALL,
     LANES,
     SOFT,
     STRESS,
@@ -47,14 +48,15 @@ VELOCITY_VALUES = SUMMED
 VELOCITY_X, VELOCITY_Y, CHANGE_X, CHANGE_Y = range(VELOCITY_VALUES)
 """A node's velocity after a step and its change in the step, in m/s."""
 
-SUMS = 8
+SUMS = 9
 (
     FORCE_X, FORCE_Y, BOUNDARY_WORK, CONTACT_WORK, PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS,
-    EXPANSION_WORK,
+    EXPANSION_WORK, MODULI_LOSS,
 ) = range(SUMS)  # fmt: skip
-"""What a step adds up: forces on the chip (N/m), and work per width of cut (J/m); the last two are
-the elastic energy that goes when the points of a cell share one dilation, and that which comes when
-their volume without stress changes with the temperature."""
+"""What a step adds up: forces on the chip (N/m), and work per width of cut (J/m); the last three
+are the elastic energy that goes when the points of a cell share one dilation, that which comes when
+their volume without stress changes with the temperature, and that which goes when the moduli fall
+with it."""
 
 _RATE_OF_SLIDING = 1e4
 
@@ -237,6 +239,7 @@ def _work_block(  # type: ignore[no-untyped-def]
                 p = points[k]
                 sums[block, PLASTIC_WORK] += buffer[WORK + k - begin]
                 sums[block, EXPANSION_WORK] += buffer[EXPANSION + k - begin]
+                sums[block, MODULI_LOSS] += buffer[FALL + k - begin]
                 fx = fy = limit = 0.0
                 if surface_bound(p.x, p.y, tool) < step.reach:
                     fx, fy, limit = _contact(p, buffer[STRESS + k - begin], tool, step, law)

@@ -14,6 +14,7 @@ POINT: Final = np.dtype(
             "cxx", "cxy", "cyx", "cyy",
             "dxx", "dyy", "dxy",
             "strain", "increment", "strain_before", "damage", "temperature",
+            "elastic_temperature",
             "volume", "free_volume", "rise_x", "rise_y",
             "material_x", "material_y", "contact_time",
         )
@@ -21,10 +22,10 @@ POINT: Final = np.dtype(
 )  # fmt: skip
 """Position, velocity of the grid there, velocity that the point carries, velocity gradient,
 deviator of the Cauchy stress that the elastic strain makes at room temperature; plastic strain,
-what the last step added to it and what it was at the last record; damage, temperature, volume per
-width and what it would be without stress (at the temperature of the last step), rise of the
-temperature over a cell, position before the cut, time in contact since the last exchange of heat;
-SI units."""
+what the last step added to it and what it was at the last record; damage, temperature, that of the
+moduli in the last step, volume per width and what it would be without stress (at the temperature of
+the last step), rise of the temperature over a cell, position before the cut, time in contact since
+the last exchange of heat; SI units."""
 
 Points: TypeAlias = NDArray[np.void]
 
@@ -48,7 +49,7 @@ def block_of_points(
     points["y"] = np.tile(y, x.size)
     points["vx"] = points["own_vx"] = speed
     points["volume"] = points["free_volume"] = spacing**2
-    points["temperature"] = temperature
+    points["temperature"] = points["elastic_temperature"] = temperature
     points["material_x"], points["material_y"] = points["x"], points["y"]
     return points
 

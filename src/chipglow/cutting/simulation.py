@@ -37,6 +37,7 @@ from chipglow.cutting.momentum import (
     FORCE_X,
     FORCE_Y,
     FRICTION_WORK,
+    MODULI_LOSS,
     NODE_VALUES,
     PLASTIC_WORK,
     SHARING_LOSS,
@@ -51,6 +52,7 @@ from chipglow.cutting.plastic_heat import heat_shares
 from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
 from chipglow.cutting.preview import Preview
 from chipglow.cutting.recording import Recorder
+from chipglow.cutting.resolution import unresolved
 from chipglow.cutting.tool_border import CELLS, border_nodes, conduct_beyond
 from chipglow.cutting.watch import Trouble, fastest_point, find_lost, find_off_grid, find_trouble
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
@@ -224,6 +226,12 @@ class CuttingSimulation:
         dynamic = float(self.workpiece.density_at(start)) * self.conditions.speed**2
         share = _INERTIA_SHARE * sqrt(3.0) * strength / dynamic
         return min(max(share, 1.0), _LARGEST_SCALING)
+
+    @property
+    def resolution_warnings(self) -> tuple[str, ...]:
+        """Lengths of the cut that fewer than `CELLS_NEEDED` cells resolve, a sentence each."""
+        lengths = (("feed", self.conditions.feed), ("edge radius", self.tool.corner_radius))
+        return unresolved(dict(lengths), self.numerics.cell)
 
     @property
     def point_steps(self) -> float:
@@ -423,7 +431,7 @@ class _State:
         self.choose_steps(self.grid.cell / self.cycle)
         drive = self.work[BOUNDARY_WORK] + self.carried
         held = self._held() - self.held_at_start
-        used = self.work[[PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS, EXPANSION_WORK]]
+        used = self.work[[PLASTIC_WORK, FRICTION_WORK, SHARING_LOSS, EXPANSION_WORK, MODULI_LOSS]]
         return np.concatenate(
             [forces, [drive, self.work[CONTACT_WORK]], held, used, [self.lost_heat]]
         )

@@ -28,13 +28,14 @@ _SMALL_CHANGE = 0.02
 _SMALL_STRAIN = 0.01
 (
     DXX, DYY, DXY, STRAIN, DAMAGE, TEMPERATURE, INCREMENT, VOLUME,
-    CXX, CXY, CYX, CYY, TRIAL, WEAK, BOUND, WORK, SOFT, TENSION, FREE, EXPANSION,
-) = range(0, 20 * _ROW, _ROW)  # fmt: skip
-BUFFER = 20 * _ROW
+    CXX, CXY, CYX, CYY, TRIAL, WEAK, BOUND, WORK, SOFT, TENSION, FREE, EXPANSION, FALL,
+) = range(0, 21 * _ROW, _ROW)  # fmt: skip
+BUFFER = 21 * _ROW
 STRESS = TRIAL
 """Rows of the buffer; in the end the trial stress has become the equivalent stress (Pa). `SOFT` is
 the shear modulus over that at room temperature; the deviator is that at room temperature. `FREE` is
-the volume without stress (m²), `EXPANSION` the elastic energy (J/m) that its change has given."""
+the volume without stress (m²), `EXPANSION` the elastic energy (J/m) that its change has given,
+`FALL` that which went as the moduli fell with the temperature."""
 
 SHEAR, BULK, VOLUME_FREE, VOLUME_RISE = range(4)
 """Columns of `WorkpieceMaterial.elastic_ratios`."""
@@ -151,6 +152,22 @@ def _return(b, count, step, law, damage):  # type: ignore[no-untyped-def]
         b[TRIAL + k] = stress
 
 
+@njit(**INLINE)
+def _moduli_loss(p, warm, elastic, step):  # type: ignore[no-untyped-def]
+    """Elastic energy (J/m) that a point lost since its last step, as its moduli fell.
+
+    The energy is that of the strain before this step's.
+    """
+    before = kelvin_index(p.elastic_temperature, elastic.shape[0])
+    if before == warm:
+        return 0.0
+    square = p.dxx * p.dxx + p.dyy * p.dyy + p.dxx * p.dyy + p.dxy * p.dxy
+    dilation = p.volume / p.free_volume - 1.0
+    sheared = (elastic[before, SHEAR] - elastic[warm, SHEAR]) * square / step.shear_modulus
+    pressed = (elastic[before, BULK] - elastic[warm, BULK]) * step.bulk_modulus * dilation**2
+    return 0.5 * (sheared * p.volume + pressed * p.free_volume)
+
+
 @njit(**FAST)
 def update_stresses(  # type: ignore[no-untyped-def]
     points, begin, end, step, law, damage, elastic, capacity, heat_shares, b
@@ -169,6 +186,8 @@ def update_stresses(  # type: ignore[no-untyped-def]
         b[INCREMENT + k], b[VOLUME + k] = p.increment, p.volume
         warm = kelvin_index(p.temperature, elastic.shape[0])
         b[SOFT + k], b[TENSION + k] = elastic[warm, SHEAR], elastic[warm, BULK]
+        b[FALL + k] = _moduli_loss(p, warm, elastic, step)
+        p.elastic_temperature = p.temperature
         # A kelvin of expansion is some megapascals of pressure: rows alone would be too coarse.
         share = min(max(0.0, p.temperature - TABLE_COLDEST - warm), 1.0)
         free = elastic[warm, VOLUME_FREE] + share * elastic[warm, VOLUME_RISE]

@@ -29,6 +29,7 @@ from chipglow.laboratory.chip import (
     chip_metrics,
     inertia,
     rake_grid,
+    resolution_warnings,
     segmentation,
 )
 from chipglow.laboratory.emissivity import HeatedObject
@@ -197,6 +198,8 @@ class StudyResult:
         If the scene has them.
     chip : ChipMetrics
         Shape, motion and shear band of the chip over the scene's longest part without a gap.
+    warnings : tuple of str
+        What the grid of the cutting simulation does not resolve.
     """
 
     plan: Plan
@@ -213,6 +216,7 @@ class StudyResult:
     heated: tuple[HeatedObject, ...]
     forces: CuttingForces | None
     chip: ChipMetrics
+    warnings: tuple[str, ...]
 
     @property
     def one_segment(self) -> tuple[Instant, ...]:
@@ -289,6 +293,7 @@ def analyse(
     results = _measure(scene, surfaces, camera, plan, instants, developed, segments[0], tell)
     sites = _sites(scene, surfaces, camera, plan, segments, tell)
     chip = _chip(scene, tell)
+    band_width = float(np.nanmean([segment.band_width for segment in segments]))
     return StudyResult(
         plan=plan,
         camera=camera,
@@ -311,12 +316,13 @@ def analyse(
             camera,
             surfaces,
             segments[0].tool,
-            float(np.nanmean([segment.band_width for segment in segments])),
+            band_width,
             chip.chip_spacing if isfinite(chip.chip_spacing) else _USUAL_SPACING,
             plan.textures,
         ),
         forces=_forces(scene),
         chip=chip,
+        warnings=resolution_warnings(scene, band_width),
     )
 
 

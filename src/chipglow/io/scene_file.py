@@ -63,6 +63,7 @@ _LONG_NAMES: Final[Mapping[str, str]] = {
     "friction_work": "friction work since the start",
     "sharing_loss": "elastic energy lost by sharing dilation since the start",
     "expansion_work": "elastic energy got from heat by thermal expansion since the start",
+    "moduli_loss": "elastic energy lost as the moduli fell with the temperature since the start",
     "lost_heat": "heat lost to the surroundings since the start",
 }
 _FAST: Final[Mapping[str, Any]] = dict(

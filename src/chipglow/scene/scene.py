@@ -57,6 +57,7 @@ ENERGY_UNITS: Final[Mapping[str, str]] = dict.fromkeys(
         "friction_work",
         "sharing_loss",
         "expansion_work",
+        "moduli_loss",
         "lost_heat",
     ),
     "J/m",

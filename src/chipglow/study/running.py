@@ -264,6 +264,8 @@ def _compute(
         "inputs": dumps(_inputs(study), sort_keys=True),
         "momentum_flow": simulation.momentum_flow,
         "mass_scaling": simulation.mass_scaling,
+        "cell": simulation.numerics.cell,
+        "resolution_warnings": "\n".join(simulation.resolution_warnings),
     }
     left = unfinished_scenes(path) if resume else []
     start = left[0] if left and left[0].progress > 0 else None

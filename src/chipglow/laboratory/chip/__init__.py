@@ -10,6 +10,7 @@ from chipglow.laboratory.chip.inertia import Inertia, inertia
 from chipglow.laboratory.chip.metrics import ChipMetrics, ChipScan, chip_metrics
 from chipglow.laboratory.chip.rake_grid import RakeGrid, rake_grid
 from chipglow.laboratory.chip.rake_grid_file import write_rake_grid
+from chipglow.laboratory.chip.resolution import resolution_warnings
 from chipglow.laboratory.chip.ridge import NoShearBandError
 from chipglow.laboratory.chip.segment import Instant, Segment
 from chipglow.laboratory.chip.segmentation import Segmentation, segmentation
@@ -45,6 +46,7 @@ __all__ = [
     "load_tool",
     "rake_grid",
     "read_curve",
+    "resolution_warnings",
     "segmentation",
     "tool_of",
     "write_band_profile",
