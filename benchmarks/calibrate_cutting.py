@@ -21,7 +21,7 @@ from experiments import Experiment, Means, means_of
 from chipglow.cutting import AISI_1045, CuttingSimulation, Numerics
 
 CELL = 20e-6
-LENGTHS = {"amm-200-0.15": 1.0e-3, "amm-200-0.30": 1.5e-3, "paper": 2.2e-3}
+LENGTHS = {"amm-200-0.15": 1.0e-3, "amm-200-0.30": 1.5e-3, "paper": 2.8e-3}
 """Cutting lengths by the beginning of a cut's name: several segments, or a steady force."""
 
 FORCES = {"cutting_force": 0.05, "thrust_force": 0.1}

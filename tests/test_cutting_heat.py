@@ -145,7 +145,8 @@ def test_contact_shares_friction_heat_and_loses_none():
 
     before = heat_of_all()
     heat_contact(
-        block.points, block.count, friction, np.zeros(shape), increment, nodes, temperature,
+        block.points, block.count, friction, np.zeros(shape),
+        np.zeros((*shape, 2)), increment, nodes, temperature,
         fraction, geometry.surface, heat, capacity, block.step.heat_mass, block.grid,
     )  # fmt: skip
     return_heat(block.points, block.count, increment, block.grid)
@@ -186,7 +187,8 @@ def test_friction_heats_chip_and_tool_as_half_spaces_in_contact():
         rows = block.grid.bottom + cell * np.arange(block.grid.rows)
         friction[column, (rows > 60e-6) & (rows < 260e-6)] = flux * cell * duration / steps
         heat_contact(
-            block.points, block.count, friction, np.zeros(shape), increment, nodes, temperature,
+            block.points, block.count, friction, np.zeros(shape),
+        np.zeros((*shape, 2)), increment, nodes, temperature,
             fraction, tool, heat, capacity, block.step.heat_mass, block.grid,
         )  # fmt: skip
         return_heat(block.points, block.count, increment, block.grid)

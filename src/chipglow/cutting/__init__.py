@@ -27,6 +27,7 @@ from chipglow.cutting.material import RateTable, TemperatureTable, ToolMaterial,
 from chipglow.cutting.preview import Preview
 from chipglow.cutting.resolution import unresolved
 from chipglow.cutting.simulation import SOLVER_VERSION, CuttingSimulation, ForceHistory, SolverError
+from chipglow.cutting.steady_tool import SteadyTool, ToolBody
 
 __all__ = [
     "AISI_1045",
@@ -50,8 +51,10 @@ __all__ = [
     "Preview",
     "RateTable",
     "SolverError",
+    "SteadyTool",
     "Surroundings",
     "TemperatureTable",
+    "ToolBody",
     "ToolMaterial",
     "WorkpieceMaterial",
     "ZerilliArmstrong",

@@ -155,14 +155,16 @@ need a needlessly short time step."""
 
 @njit(cache=True)
 def heat_contact(  # type: ignore[no-untyped-def]
-    points, count, friction, touched, increment, nodes, temperature, fraction, tool, tool_heat,
-    capacity, heat_mass, grid,
+    points, count, friction, touched, entered, increment, nodes, temperature, fraction, tool,
+    tool_heat, capacity, heat_mass, grid,
 ):  # fmt: skip
     """Share the friction work and exchange heat through the contact.
 
     Friction work (J/m, on the chip's nodes) goes to the points that touched the tool, and from each
     to chip and tool by their effusivities; each then exchanges heat with the tool next to it. Heat
-    that finds no point is kept for the next time. `touched` (columns, rows) is overwritten.
+    that finds no point is kept for the next time. `touched` (columns, rows) is overwritten;
+    `entered` (columns, rows, 2) gathers heat that entered the tool (J/m), and contact area times
+    time (m s).
     """
     touched[:] = 0.0
     for k in range(count):
@@ -173,8 +175,8 @@ def heat_contact(  # type: ignore[no-untyped-def]
         if p.contact_time > 0.0:
             work = _friction_work(p, friction, touched, grid)
             _heat_contact_of(
-                p, work, increment, nodes, temperature, fraction, tool, tool_heat, capacity,
-                heat_mass, grid,
+                p, work, entered, increment, nodes, temperature, fraction, tool, tool_heat,
+                capacity, heat_mass, grid,
             )  # fmt: skip
             p.contact_time = 0.0
     for i in range(grid.columns):
@@ -209,8 +211,9 @@ def _friction_work(p, friction, touched, grid):  # type: ignore[no-untyped-def]
 
 @njit
 def _heat_contact_of(  # type: ignore[no-untyped-def]
-    p, work, increment, nodes, temperature, fraction, tool, tool_heat, capacity, heat_mass, grid
-):
+    p, work, entered, increment, nodes, temperature, fraction, tool, tool_heat, capacity, heat_mass,
+    grid,
+):  # fmt: skip
     """Heat of a point's friction work to chip and tool, and what they exchange there.
 
     Both surfaces are warmer than the next place at which their temperature is known, by what
@@ -231,7 +234,8 @@ def _heat_contact_of(  # type: ignore[no-untyped-def]
     flow = contact * tool_heat.conductance / (1.0 + layer * tool_heat.conductance)
     heat = both * (1.0 - np.exp(-flow / both)) * (surface - inside)
     heat_surface(p, dx, dy, work - into_tool - heat, increment, nodes, grid)
-    _warm(p.x, p.y, into_tool + heat, temperature, fraction, tool, tool_heat, grid)
+    into_tool += heat
+    _warm(p.x, p.y, into_tool, contact, entered, temperature, fraction, tool, tool_heat, grid)
 
 
 @njit
@@ -275,7 +279,9 @@ def _tool_temperature(x, y, temperature, fraction, tool, grid):  # type: ignore[
 
 
 @njit
-def _warm(x, y, heat, temperature, fraction, tool, tool_heat, grid):  # type: ignore[no-untyped-def]
+def _warm(  # type: ignore[no-untyped-def]
+    x, y, heat, contact, entered, temperature, fraction, tool, tool_heat, grid
+):
     i, j, ax, ay = _partner(x, y, tool, grid)
     weight = 0.0
     for a in range(2):
@@ -291,6 +297,8 @@ def _warm(x, y, heat, temperature, fraction, tool, tool_heat, grid):  # type: ig
                     * max(fraction[i + a, j + b], SMALLEST_FRACTION)
                 )
                 temperature[i + a, j + b] += heat * w / weight / store
+                entered[i + a, j + b, 0] += heat * w / weight
+                entered[i + a, j + b, 1] += contact * w / weight
 
 
 @njit(cache=True)

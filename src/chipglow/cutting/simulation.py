@@ -1,7 +1,7 @@
 """The cutting simulation: a workpiece driven against a rigid, conducting tool."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import ceil, inf, sqrt
 from typing import Final
 
@@ -53,6 +53,7 @@ from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_b
 from chipglow.cutting.preview import Preview
 from chipglow.cutting.recording import Recorder
 from chipglow.cutting.resolution import unresolved
+from chipglow.cutting.steady_tool import SteadyTool, ToolBody, beyond, steady_temperature
 from chipglow.cutting.tool_border import CELLS, border_nodes, conduct_beyond
 from chipglow.cutting.watch import Trouble, fastest_point, find_lost, find_off_grid, find_trouble
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
@@ -70,6 +71,16 @@ _FASTEST_DRIFT: Final = 0.4
 _HEAT_STABILITY: Final = 0.15
 _INERTIA_SHARE: Final = 0.0045
 _LARGEST_SCALING: Final = 1000.0
+
+
+STEADY: Final = 1.0
+"""Change in K of a warm tool's mean temperature in the contact that is left."""
+
+_ROUND: Final = 2.0
+_COARSE: Final = 15.0
+_FULL_STEPS: Final = 3
+_SETTLED: Final = 3
+_MOST_ROUNDS: Final = 24
 
 
 class SolverError(RuntimeError):
@@ -120,6 +131,10 @@ class CuttingSimulation:
         How finely it is computed.
     surroundings : Surroundings
         What free surfaces lose heat to.
+    tool_temperature : float or ToolBody, optional
+        The tool's temperature in K when the cut begins; a body: that of a tool that has been
+        cutting for long, whose heat flows through it. None: as cold as the workpiece, as the
+        paper's.
     """
 
     conditions: CuttingConditions = field(default_factory=CuttingConditions)
@@ -129,6 +144,7 @@ class CuttingSimulation:
     friction: Friction = field(default_factory=Friction)
     numerics: Numerics = field(default_factory=Numerics)
     surroundings: Surroundings = field(default_factory=Surroundings)
+    tool_temperature: float | ToolBody | None = None
 
     def run(
         self,
@@ -178,6 +194,8 @@ class CuttingSimulation:
         """
         self._check_window(window)
         state = _State(self, window.interval)
+        if isinstance(self.tool_temperature, ToolBody) and resume is None:
+            state.warm(self.steady_tool(), self.tool_temperature)
         picture = self._picture(raster, state)
         coarse = self._picture(preview.raster, state) if preview is not None else None
         recorder = self._recorder(window)
@@ -241,6 +259,47 @@ class CuttingSimulation:
         points = (numerics.upstream + numerics.downstream) * (numerics.depth + conditions.feed)
         step = numerics.courant * numerics.cell / (_sound(self) + conditions.speed)
         return points / side**2 * conditions.cutting_length / conditions.speed / step
+
+    def steady_tool(self) -> SteadyTool:
+        """The tool after a long cut: cut and conduct in turn till its temperature stays.
+
+        A cut on a coarser grid tells the heat that enters the tool, averaged over about two
+        segments; conduction in the tool's body tells the temperature that this heat makes. The
+        chip would take the more heat the warmer the tool is: as much as a half-space that slides
+        past the contact (Jaeger). By that slope each round comes close to where both agree; from
+        the fourth on rounds are averaged, since no two segments are alike.
+
+        Raises
+        ------
+        ValueError
+            If `tool_temperature` is no body.
+        SolverError
+            If the simulation goes wrong, or the temperature does not settle to 1 °C.
+        """
+        body = self.tool_temperature
+        if not isinstance(body, ToolBody):
+            raise ValueError(f"tool_temperature: {body!r}, expected the body of a tool")
+        feed = self.conditions.feed
+        distance = _ROUND * feed
+        coarse = replace(
+            self,
+            conditions=replace(self.conditions, cutting_length=_MOST_ROUNDS * distance),
+            numerics=replace(self.numerics, cell=max(self.numerics.cell, feed / _COARSE)),
+            tool_temperature=None,
+        )
+        state = _State(coarse, distance / self.conditions.speed)
+        rounds: list[float] = []
+        for number in range(1, _MOST_ROUNDS + 1):
+            rounds.append(state.heat_through(body, number))
+            recent = rounds[-_SETTLED:]
+            if number > _FULL_STEPS + _SETTLED and max(recent) - min(recent) < STEADY:
+                break
+        else:
+            raise SolverError(
+                f"warm tool: the contact's temperature still changes by "
+                f"{max(recent) - min(recent):.1f} K in {_SETTLED} rounds, expected under {STEADY:g}"
+            )
+        return SteadyTool(state.grid, state.tool_fraction, state.tool_temperature, tuple(rounds))
 
     def _recorder(self, window: OutputWindow) -> Recorder:
         return Recorder(window, self.conditions.speed, self.conditions.cutting_length)
@@ -335,11 +394,16 @@ class _State:
         self.heat_nodes = np.zeros((*shape, 3))
         self.increment = np.zeros(shape)
         self.touched = np.zeros(shape)
+        self.entered = np.zeros((*shape, 2))
+        self.contact_area = np.zeros(shape)
         self.friction_heat = np.zeros(shape)
-        self.tool_temperature = np.full(shape, conditions.initial_temperature)
+        given = simulation.tool_temperature
+        cold = conditions.initial_temperature
+        of_tool = given if isinstance(given, float) else cold
+        self.tool_temperature = np.full(shape, of_tool)
         self.tool_border = border_nodes(self.tool_fraction)
         far = (len(self.tool_border), CELLS)
-        self.tool_beyond = np.full(far, conditions.initial_temperature)
+        self.tool_beyond = np.full(far, of_tool)
         self.starts = np.zeros(self.grid.columns * self.grid.rows + 1, np.int64)
         self.right = numerics.downstream
         self.top = numerics.height
@@ -350,6 +414,37 @@ class _State:
         self.carried = 0.0
         self.lost_heat = 0.0
         self.held_at_start = self._held()
+
+    def warm(self, tool: SteadyTool, body: ToolBody) -> None:
+        """Give the tool the temperature of a long cut."""
+        self.tool_temperature = tool.on(self.grid, self.tool_fraction)
+        self.tool_beyond = beyond(self.grid, self.tool_border, self.tool_temperature, body)
+
+    def heat_through(self, body: ToolBody, number: int) -> float:
+        """Cut for an interval, give the tool what its heat makes of it; mean in the contact in K.
+
+        `number` is that of the round; from the fourth on the mean of the rounds is kept.
+        """
+        self.entered[:] = 0.0
+        self.advance()
+        heat, area = np.moveaxis(self.entered, -1, 0) / self.interval
+        contact = area.sum()
+        self.contact_area += area
+        if contact <= 0.0:
+            raise SolverError("warm tool: the chip did not touch the tool")
+        material, start = self.simulation.workpiece, self.simulation.conditions.initial_temperature
+        effusivity = _effusivity(material, start)
+        # Jaeger's slider at high speed: mean rise q √(L / V) / (0.94 e) over a contact of length L.
+        draining = 0.94 * effusivity * sqrt(self.speed / contact) * area
+        before = self.tool_temperature
+        after = steady_temperature(
+            self.grid, self.tool_fraction, self.tool_heat, body,
+            np.maximum(heat + draining * before, 0.0), draining,
+        )  # fmt: skip
+        part = 1.0 / max(number - _FULL_STEPS, 1)
+        self.tool_temperature = before + part * (after - before)
+        self.tool_beyond = beyond(self.grid, self.tool_border, self.tool_temperature, body)
+        return float((self.contact_area * self.tool_temperature).sum() / self.contact_area.sum())
 
     def _start_points(self, conditions: CuttingConditions, numerics: Numerics) -> None:
         """Fill the region up to where the workpiece's face touches the rake face."""
@@ -500,6 +595,7 @@ class _State:
             self.count,
             self.friction_heat,
             self.touched,
+            self.entered,
             self.increment,
             self.heat_nodes,
             self.tool_temperature,
@@ -605,14 +701,15 @@ def _thermal_friction(simulation: CuttingSimulation) -> dict[str, float]:
     return {"friction_exponent": exponent, "friction_melting": melting}
 
 
+def _effusivity(material: WorkpieceMaterial, temperature: float) -> float:
+    conductivity = material.conductivity.at(temperature)
+    capacity = material.density_at(temperature) * material.heat_capacity.at(temperature)
+    return float(np.sqrt(conductivity * capacity))
+
+
 def _tool_heat(simulation: CuttingSimulation, spacing: float) -> ToolHeat:
     tool, material = simulation.tool_material, simulation.workpiece
-    temperature = simulation.conditions.initial_temperature
-    chip = np.sqrt(
-        material.conductivity.at(temperature)
-        * material.density_at(temperature)
-        * material.heat_capacity.at(temperature)
-    )
+    chip = _effusivity(material, simulation.conditions.initial_temperature)
     return ToolHeat(
         capacity=tool.density * tool.heat_capacity,
         conductivity=tool.conductivity,

@@ -6,6 +6,7 @@ from chipglow.quantities.part import Declared, Family, Parameter, Part, Settings
 from chipglow.quantities.section import (
     OR_NONE,
     FileBeside,
+    OrWord,
     Section,
     allowed,
     beside_the_study,
@@ -18,6 +19,7 @@ __all__ = [
     "Family",
     "FieldEntry",
     "FileBeside",
+    "OrWord",
     "Parameter",
     "Part",
     "Section",

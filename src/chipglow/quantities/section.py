@@ -2,6 +2,7 @@
 
 import reprlib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -64,6 +65,40 @@ OR_NONE: Final = OrNone()
 def or_the_word_none(schema: JsonSchemaValue) -> JsonSchemaValue:
     """JSON schema of a field that may also be the word none."""
     return {"anyOf": [schema, {"const": "none"}]}
+
+
+@dataclass(frozen=True)
+class OrWord:
+    """Annotation of a field that may also be one word.
+
+    Parameters
+    ----------
+    word : str
+        The word, which the field then holds.
+    """
+
+    word: str
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Schema of the field, or the word."""
+        schema = handler(source)
+        return core_schema.no_info_wrap_validator_function(
+            lambda value, rest: value if value == self.word else rest(value),
+            schema,
+            serialization=core_schema.wrap_serializer_function_ser_schema(
+                lambda value, rest: value if value == self.word else rest(value),
+                schema=schema,
+                when_used="json",
+            ),
+        )
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """JSON schema of the field, or the word."""
+        return {"anyOf": [handler(schema), {"const": self.word}]}
 
 
 def beside_the_study(file: str, info: ValidationInfo) -> str:

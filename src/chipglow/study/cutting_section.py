@@ -1,6 +1,6 @@
 """The section of the cut: the paper's Table 2 by default."""
 
-from typing import Final, Self
+from typing import Annotated, Final, Self
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
@@ -11,14 +11,22 @@ from chipglow.cutting import (
     Numerics,
     OutputWindow,
     Surroundings,
+    ToolBody,
     is_own_file,
     material_names,
     tool_material,
     workpiece,
 )
 from chipglow.io import ToolSection
-from chipglow.quantities import Declared, Settings, beside_the_study, described
-from chipglow.quantities.units import Length, Position
+from chipglow.quantities import (
+    OR_NONE,
+    Declared,
+    OrWord,
+    Settings,
+    beside_the_study,
+    described,
+)
+from chipglow.quantities.units import TEMPERATURE, Length, Position, Temperature
 from chipglow.scene import Raster
 
 _IN_REGION: Final = "the whole scene within the simulated region"
@@ -42,6 +50,36 @@ class FieldOfViewSection(Settings[Raster]):
         return Raster(self.left, self.top, self.spacing, self.rows, self.columns)
 
 
+STEADY: Final = "steady"
+"""Temperature of a tool that has been cutting for long."""
+
+
+class CutToolSection(ToolSection):
+    """The cutting tool, and how warm it is."""
+
+    temperature: Annotated[Temperature | None, OrWord(STEADY), OR_NONE] = described(
+        "none",
+        "Temperature of the tool when the cut begins; steady: that of a tool that has been\n"
+        "cutting for long; none: as cold as the workpiece, as the paper's.",
+        "none, steady, or a temperature of -70 degC to 1200 degC",
+    )
+    body: Declared[ToolBody] = described({}, "What the heat of a steady tool flows through.")
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        value = self.temperature
+        if isinstance(value, float) and not 200.0 <= value <= 1500.0:
+            raise ValueError(
+                f"temperature: {TEMPERATURE.text(value)}, expected -70 degC to 1200 degC"
+            )
+        return self
+
+    def start(self) -> float | ToolBody | None:
+        """What the simulation takes."""
+        given: object = self.temperature
+        return self.body.build() if given == STEADY else self.temperature
+
+
 class CuttingSection(Declared[CuttingConditions]):
     """The cutting simulation; the paper's Table 2."""
 
@@ -51,7 +89,7 @@ class CuttingSection(Declared[CuttingConditions]):
         f"{', '.join(material_names('workpiece'))}; with one of its sets of the\n"
         "flow stress after a slash (aisi-1045/ozel); or a file of your own (steel.yaml)",
     )
-    tool: ToolSection = described({}, "The cutting tool.")
+    tool: CutToolSection = described({}, "The cutting tool.")
     friction: Declared[Friction] = described({}, "Friction between chip and tool.")
     surroundings: Declared[Surroundings] = described(
         {}, "What the free surfaces of chip, workpiece and tool lose heat to; nothing by default."
@@ -97,4 +135,5 @@ class CuttingSection(Declared[CuttingConditions]):
             friction=self.friction.build(),
             numerics=self.numerics.build(),
             surroundings=self.surroundings.build(),
+            tool_temperature=self.tool.start(),
         )
