@@ -10,6 +10,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Strict, model_validator
 
 from chipglow.io.importing import Import, View
+from chipglow.io.sandbox import Isolated
 from chipglow.io.sources import (
     Placement,
     Source,
@@ -22,7 +23,6 @@ from chipglow.io.sources import (
 )
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.grid import GridSource
-from chipglow.io.sources.isolated import Isolated
 from chipglow.io.sources.mesh import MeshSource
 from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap, metre_per_pixel
 from chipglow.io.sources.unit_text import parse_unit

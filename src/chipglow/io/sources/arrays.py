@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.file_order import natural
-from chipglow.io.sources.source import SourceError, missing_extra
+from chipglow.io.sources.source import SourceError, damaged, missing_extra
 from chipglow.io.sources.text_table import TextTable, lines_of_text
 
 MOST_SAMPLES: Final = 100_000_000
@@ -86,10 +86,7 @@ def reading(name: object) -> Iterator[None]:
     except (SourceError, FileNotFoundError, PermissionError, MemoryError):
         raise
     except Exception as error:  # readers of damaged files raise anything
-        said = " ".join(f"{type(error).__name__}: {error}".split())[:160]
-        raise SourceError(
-            f"{name}: cannot be read, it is damaged or of another kind ({said})"
-        ) from error
+        raise damaged(name, error) from error
 
 
 def check_samples(name: str, count: int) -> None:

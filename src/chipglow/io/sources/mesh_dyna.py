@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.mesh_block import Block
 from chipglow.io.sources.mesh_reader import MeshReader
-from chipglow.io.sources.source import SourceError, missing_extra
+from chipglow.io.sources.source import SourceError, damaged, missing_extra
 
+_KIND: Final = "LS-DYNA d3plot"
 _FAMILIES: Final = ("shell", "solid")
 _AVERAGED: Final = ("effective_plastic_strain", "thermal_data")
 _TRIANGLE, _QUAD, _TETRA, _HEXA = 5, 9, 10, 12
@@ -38,7 +39,7 @@ class DynaReader(MeshReader):
         arrays = self._arrays(state_array_filter=["timesteps"]).arrays
         self.times = tuple(float(time) for time in arrays.get("timesteps", ()))
         self.count = len(self.times)
-        self.kind = f"mesh, LS-DYNA d3plot with {self.count} states"
+        self.kind = f"mesh, {_KIND} with {self.count} states"
         if not self.count:
             raise SourceError(f"{file}: has no state, expected a d3plot with one or more")
 
@@ -52,7 +53,7 @@ class DynaReader(MeshReader):
         try:
             blocks = tuple(_blocks(plot.arrays))
         except (KeyError, IndexError, ValueError) as error:
-            raise self._damaged(error) from error
+            raise damaged(self._file, error, _KIND) from error
         if not blocks:
             raise SourceError(f"{self._file}: has no shells or solids, expected a mesh")
         return blocks
@@ -64,20 +65,13 @@ class DynaReader(MeshReader):
             raise missing_extra(self._file, "lasso-python", "dyna") from None
         logging.getLogger("lasso").setLevel(logging.CRITICAL)
         if self._file.stat().st_size == 0:
-            raise SourceError(f"{self._file}: is empty, expected an LS-DYNA d3plot")
+            raise SourceError(f"{self._file}: is empty, expected an {_KIND}")
         try:
             return D3plot(str(self._file), buffered_reading=True, **filters)
         except (OSError, MemoryError):
             raise
         except Exception as error:  # lasso raises what it likes for what is no d3plot
-            raise self._damaged(error) from error
-
-    def _damaged(self, error: Exception) -> SourceError:
-        said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-        return SourceError(
-            f"{self._file}: cannot be read as LS-DYNA d3plot, it is damaged or of another kind "
-            f"({said})"
-        )
+            raise damaged(self._file, error, _KIND) from error
 
 
 def _blocks(arrays: Mapping[str, Any]) -> Iterator[Block]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.mesh_block import Block
 from chipglow.io.sources.mesh_reader import MeshReader
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import SourceError, damaged
 
 KINDS: Final[Mapping[str, str]] = {
     ".msh": "Gmsh",
@@ -54,23 +54,13 @@ class MeshioReader(MeshReader):
             # PyVista stumbles over sets that are none of elements, such as Gmsh's.
             mesh.cell_sets, mesh.point_sets = {}, {}
             grid = pyvista.from_meshio(mesh)
-        except (OSError, MemoryError) as error:
-            if isinstance(error, FileNotFoundError | MemoryError):
-                raise
-            raise _damaged(file, error) from error
+        except (FileNotFoundError, MemoryError):
+            raise
         except (Exception, SystemExit) as error:  # meshio ends the program for some files
-            raise _damaged(file, error) from error
+            raise damaged(file, error, KINDS[file.suffix.lower()]) from error
         if not grid.n_cells:
             raise SourceError(f"{file}: has no elements, expected a mesh")
         return (Block((), grid, sets),)
-
-
-def _damaged(file: Path, error: BaseException) -> SourceError:
-    said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-    return SourceError(
-        f"{file}: cannot be read as {KINDS[file.suffix.lower()]}, it is damaged or of another "
-        f"kind ({said})"
-    )
 
 
 def _sets(mesh: Any) -> dict[str, NDArray[np.bool_]]:

@@ -16,6 +16,7 @@ __all__ = [
     "SourceError",
     "SourceRemarks",
     "Survey",
+    "damaged",
     "missing_extra",
     "span_of",
 ]
@@ -28,6 +29,15 @@ class SourceError(ValueError):
 def missing_extra(file: object, needs: str, extra: str) -> SourceError:
     """The error for a file that a library reads which is not installed, and how it comes."""
     return SourceError(f"{file}: needs {needs}, expected pip install 'chipglow[{extra}]'")
+
+
+def damaged(file: object, error: BaseException, kind: str = "") -> SourceError:
+    """The error for a file whose reader, of a kind of files, stumbles over it."""
+    said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+    as_kind = f" as {kind}" if kind else ""
+    return SourceError(
+        f"{file}: cannot be read{as_kind}, it is damaged or of another kind ({said})"
+    )
 
 
 @dataclass
