@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from refusals import PNG, refused_on
 
-from chipglow.io.sources import CELSIUS, Placement, SourceError, Unit, Units
+from chipglow.io.sources import Placement, SourceError, Units
 from chipglow.io.sources.cloud import CloudSource
+from chipglow.quantities.units import CELSIUS, Unit
 from chipglow.scene import Raster
 from chipglow.scene.cloud import Cloud, neighbour_distance, sample_cloud
 

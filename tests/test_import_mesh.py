@@ -9,8 +9,9 @@ from exodus_file import Exodus, write_exodus
 from fuzz.cgns_file import write_cgns
 from fuzz.foam_case import write_foam
 
-from chipglow.io.sources import CELSIUS, Placement, SourceError, Unit, Units
+from chipglow.io.sources import Placement, SourceError, Units
 from chipglow.io.sources.mesh import MeshSource
+from chipglow.quantities.units import CELSIUS, Unit
 from chipglow.scene import Material, Raster
 
 pv = pytest.importorskip("pyvista")

@@ -14,7 +14,6 @@ from chipglow.io.sandbox import Isolated
 from chipglow.io.sources import (
     Placement,
     Source,
-    Unit,
     Units,
     lammps_dump,
     mesh_meshio,
@@ -22,13 +21,13 @@ from chipglow.io.sources import (
     mesh_vtk,
 )
 from chipglow.io.sources.cloud import CloudSource
+from chipglow.io.sources.conventions import SI_UNITS
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.mesh import MeshSource
 from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap, metre_per_pixel
-from chipglow.io.sources.unit_text import parse_unit
 from chipglow.io.tool_section import ToolSection
 from chipglow.quantities import OR_NONE, FileBeside, Section, Settings, described
-from chipglow.quantities.units import Length, Position, Speed, Temperature, Time
+from chipglow.quantities.units import Length, Position, Speed, Temperature, Time, Unit, parse_unit
 from chipglow.scene.completion import Completion
 from chipglow.text import commented_yaml, described_by
 
@@ -65,23 +64,18 @@ class UnitsSection(Settings[Units]):
     def build(self) -> Units:
         """The units."""
         return Units(
-            length=_unit("x", "length", self.length),
-            time=_unit("time", "time", self.time),
-            temperature=_unit("temperature", "temperature", self.temperature),
-            velocity=_maybe(self.velocity, "velocity", "velocity"),
-            strain_rate=_maybe(self.strain_rate, "plastic_strain_rate", "strain_rate"),
+            length=self._unit("length", "m"),
+            time=self._unit("time", "s"),
+            temperature=self._unit("temperature", "K"),
+            velocity=None if self.velocity is None else self._unit("velocity", "m/s"),
+            strain_rate=None if self.strain_rate is None else self._unit("strain_rate", "1/s"),
         )
 
-
-def _maybe(text: str | None, quantity: str, name: str) -> Unit | None:
-    return None if text is None else _unit(quantity, name, text)
-
-
-def _unit(quantity: str, name: str, text: str) -> Unit:
-    try:
-        return parse_unit(quantity, text)
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
+    def _unit(self, name: str, base: str) -> Unit:
+        try:
+            return parse_unit(getattr(self, name), base, name)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
 
 
 class PlacementSection(Settings[Placement]):
@@ -284,7 +278,7 @@ def _value(place: str, field: str, value: str | int | float) -> float:
     if not unit and field != "plastic_strain":
         raise ValueError(f"{place}: {text!r} has no unit, expected one such as {_EXAMPLES[field]}")
     try:
-        return float(parse_unit(field, unit).to_si(float(number)))
+        return float(parse_unit(unit, SI_UNITS[field], field).to_si(float(number)))
     except ValueError:
         raise ValueError(
             f"{place}: {text!r}, expected a value such as {_EXAMPLES[field]}"

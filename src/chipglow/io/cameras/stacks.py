@@ -14,7 +14,7 @@ from chipglow.camera import Recording
 from chipglow.camera.recording import QUANTITIES, Quantity
 from chipglow.io.cameras.binary import check_picture, chosen_frames, even_times
 from chipglow.io.cameras.remarks import FileRemarks
-from chipglow.io.sources import SI, SourceError
+from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import (
     ARRAY_READERS,
     MOST_ON_A_SIDE,
@@ -34,6 +34,7 @@ from chipglow.io.sources.layout import (
     unpacked,
 )
 from chipglow.io.sources.source import SourceRemarks
+from chipglow.quantities.units import SI
 
 RECORDING_UNITS: Final[Mapping[str, tuple[Quantity, float]]] = {
     "counts": ("counts", 0.0),

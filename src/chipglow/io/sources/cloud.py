@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from chipglow.io.sources.conventions import (
     COMMON_NAMES,
     Placement,
-    Unit,
     Units,
     match_names,
     simple,
@@ -20,6 +19,7 @@ from chipglow.io.sources.conventions import (
 from chipglow.io.sources.layout import check_times, unit_of
 from chipglow.io.sources.point_files import MOST_POINTS, PointFrames, PointTable, open_points
 from chipglow.io.sources.source import Source, SourceError, SourceRemarks, Survey, span_of
+from chipglow.quantities.units import Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.cloud import Cloud, neighbour_distance, sample_cloud
 

@@ -6,10 +6,21 @@ from math import isfinite
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from chipglow.io.sources.source import SourceError
+from chipglow.quantities.units import SI, Unit
 from chipglow.scene import READABLE
+from chipglow.scene.scene import FIELD_UNITS, MATERIAL_COORDINATE_UNITS
+
+SI_UNITS: Final[Mapping[str, str]] = {
+    **FIELD_UNITS,
+    **MATERIAL_COORDINATE_UNITS,
+    **dict.fromkeys("xyz", "m"),
+    "velocity": "m/s",
+    "time": "s",
+}
+"""SI unit of every field of a scene and of the coordinates; 1 for a mere number."""
 
 COMMON_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
     "temperature": (
@@ -82,26 +93,6 @@ def match_names(
             if match and match[0] not in result.values():
                 result[ours] = match[0]
     return result
-
-
-@dataclass(frozen=True)
-class Unit:
-    """A unit: a value in SI is ``scale * value + offset``."""
-
-    scale: float
-    offset: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not (isfinite(self.scale) and self.scale > 0 and isfinite(self.offset)):
-            raise ValueError(f"unit: scale {self.scale!r} must be finite and over 0")
-
-    def to_si(self, values: ArrayLike) -> NDArray[np.float32]:
-        """Values in SI."""
-        return np.asarray(np.asarray(values, np.float64) * self.scale + self.offset, np.float32)
-
-
-SI: Final = Unit(1.0)
-CELSIUS: Final = Unit(1.0, 273.15)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from chipglow.io.sources.arrays import (
     open_arrays,
     reading,
 )
-from chipglow.io.sources.conventions import SI, Placement, Unit, Units
+from chipglow.io.sources.conventions import Placement, Units
 from chipglow.io.sources.layout import (
     AXES,
     COORDINATES,
@@ -33,6 +33,7 @@ from chipglow.io.sources.layout import (
     unused_names,
 )
 from chipglow.io.sources.source import Source, SourceError, SourceRemarks, Survey, span_of
+from chipglow.quantities.units import SI, Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.regrid import regrid, taps
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.arrays import StoredArray, check_samples, reading
-from chipglow.io.sources.conventions import SI, Unit, match_names, simple
+from chipglow.io.sources.conventions import SI_UNITS, match_names, simple
 from chipglow.io.sources.source import SourceError, SourceRemarks
-from chipglow.io.sources.unit_text import SI_UNITS, parse_unit
+from chipglow.quantities.units import SI, Unit, parse_unit
 
 AXES: Final = ("time", "y", "x")
 COORDINATES: Final[Mapping[str, tuple[str, ...]]] = {
@@ -175,11 +175,11 @@ def unit_of(name: str, label: str, text: object, own: Unit, remarks: SourceRemar
             remarks.from_file.append(f"{short} is in {text!r}, but the unit given is taken")
         return own
     if not isinstance(text, str):
-        if SI_UNITS[name]:
+        if SI_UNITS[name] != "1":
             remarks.assumed.append(f"{short} is in {SI_UNITS[name]}: the file says no unit")
         return own
     try:
-        unit = parse_unit(name, text)
+        unit = parse_unit(text, SI_UNITS[name], name)
     except ValueError as error:
         raise SourceError(f"{label}: {error}") from None
     if unit != SI:
