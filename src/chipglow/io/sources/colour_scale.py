@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import sqrt
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 from numba import njit
@@ -15,6 +15,9 @@ from chipglow.io.sources.source import SourceError
 
 RAINBOW: Final = "rainbow"
 """Blue, cyan, green, yellow, red at full saturation, as finite-element programs draw it."""
+
+Picture: TypeAlias = NDArray[np.uint8]
+"""Red, green and blue of the pixels, row 0 at the top, shape (y, x, 3)."""
 
 _LEVELS: Final = 256
 _SAME: Final = 7.0  # a difference in Lab that a codec makes between two pixels of one colour
@@ -222,13 +225,8 @@ class ColourScale:
         below = np.maximum(np.arange(count) - reach, 0)
         return self.knots[above] - self.knots[below], self.labs[above] - self.labs[below]
 
-    def invert(self, picture: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def invert(self, picture: Picture) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Values that the colours of a picture stand for.
-
-        Parameters
-        ----------
-        picture : ndarray
-            Red, green and blue, shape (y, x, 3), uint8.
 
         Returns
         -------

@@ -11,7 +11,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.colour_scale import ColourScale, ColourUncertainty, colour_uncertainty
+from chipglow.io.sources.colour_scale import (
+    ColourScale,
+    ColourUncertainty,
+    Picture,
+    colour_uncertainty,
+)
 from chipglow.io.sources.conventions import Placement
 from chipglow.io.sources.legend import (
     LEAST_EXPLAINED,
@@ -321,7 +326,7 @@ class MovieSource(Source):
         return readers, tuple(assumed)
 
     def _background(
-        self, picture: NDArray[np.uint8], scale: ColourScale
+        self, picture: Picture, scale: ColourScale
     ) -> tuple[tuple[Colour, ...], tuple[str, ...]]:
         if self.background is not None:
             return self.background, ()
@@ -340,9 +345,7 @@ class MovieSource(Source):
         said += [f"{colour} at the border is taken for a value" for colour in refused]
         return found, tuple(said)
 
-    def _read(
-        self, name: str, reader: FieldReader, picture: NDArray[np.uint8], number: int
-    ) -> FieldPicture:
+    def _read(self, name: str, reader: FieldReader, picture: Picture, number: int) -> FieldPicture:
         """Read a picture, which may be all void but not all lines."""
         read = reader.read(self._cropped(picture))
         workpiece = read.material == Material.WORKPIECE
@@ -459,7 +462,7 @@ def _sample(index: MovieIndex) -> tuple[int, ...]:
 
 
 def _scale(
-    movie: FieldMovie, picture: NDArray[np.uint8]
+    movie: FieldMovie, picture: Picture
 ) -> tuple[ColourScale, tuple[Box, ...], tuple[str, ...]]:
     """Scale of a movie, where its legend is, and what was assumed."""
     if isinstance(movie.colours, NamedMap):
@@ -484,7 +487,7 @@ def _scale(
     return scale, (box,), (f"{found}legend of {kind}, {ends}",)
 
 
-def _check_legend(picture: NDArray[np.uint8], box: Box, scale: ColourScale) -> None:
+def _check_legend(picture: Picture, box: Box, scale: ColourScale) -> None:
     share = explained(picture, box, scale)
     if share < LEAST_EXPLAINED:
         raise SourceError(

@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.io.sources.colour_scale import Picture
 from chipglow.io.sources.source import SourceError, missing_extra
 
 _MOST_PIXELS: Final = 1 << 26
@@ -84,9 +85,7 @@ def index_movie(path: Path) -> MovieIndex:
     return _index(path, state.st_size, state.st_mtime_ns)
 
 
-def pictures(
-    path: Path, index: MovieIndex, start: int = 0, every: int = 1
-) -> Iterator[NDArray[np.uint8]]:
+def pictures(path: Path, index: MovieIndex, start: int = 0, every: int = 1) -> Iterator[Picture]:
     """Decode pictures one at a time.
 
     Parameters
@@ -99,11 +98,6 @@ def pictures(
         Number of the first picture; it is searched if the movie allows.
     every : int
         Distance from each picture to the next.
-
-    Yields
-    ------
-    ndarray
-        Red, green and blue, shape (rows, columns, 3), uint8.
 
     Raises
     ------
