@@ -322,7 +322,7 @@ def main() -> None:
 
 def _failure(name: str, error: Exception) -> Message:
     if isinstance(error, FileNotFoundError):
-        text = f"{error.filename}: there is no such file" if error.filename else str(error)
+        text = f"{error.filename}: {error.strerror}" if error.filename else str(error)
         return Message({"text": text}, kind="missing")
     if isinstance(error, MemoryError):
         text = f"{name}: needs more memory than a reader may take"

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
-from glob import glob, has_magic
 from math import prod
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
@@ -16,7 +15,7 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.file_order import natural
+from chipglow.io.sources.file_order import files_of
 from chipglow.io.sources.source import SourceError, damaged, missing_extra
 from chipglow.io.sources.text_table import TextTable, lines_of_text
 
@@ -101,22 +100,6 @@ def check_samples(name: str, count: int) -> None:
         raise SourceError(f"{name}: {count:.3g} samples at once, expected up to {MOST_SAMPLES:.3g}")
 
 
-def matching_files(pattern: str) -> list[Path]:
-    """Files that a pattern such as ``T_*.csv`` means, numbers in their names in order.
-
-    Raises
-    ------
-    SourceError
-        If there is none.
-    """
-    if Path(pattern).exists() or not has_magic(pattern):
-        return [Path(pattern)]
-    paths = sorted(glob(pattern), key=natural)  # noqa: PTH207  also absolute
-    if not paths:
-        raise SourceError(f"{pattern}: no file has such a name")
-    return [Path(path) for path in paths]
-
-
 def open_arrays(
     pattern: str, stack: ExitStack, reader: ArrayReader | None = None
 ) -> dict[str, StoredArray]:
@@ -139,7 +122,7 @@ def open_arrays(
     OSError
         If it is missing or not accessible.
     """
-    paths = matching_files(pattern)
+    paths = files_of(pattern)
     several = len(paths) > 1 or paths[0] != Path(pattern)
     first = _open_file(paths[0], stack, reader)
     if not first:

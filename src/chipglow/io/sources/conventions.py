@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import isfinite
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,6 +124,8 @@ class Units:
         return self.length if name.startswith("material_") else SI
 
 
+Floats = TypeVar("Floats", np.float32, np.float64)
+
 _AXES: Final = ("x", "y", "z")
 
 
@@ -185,6 +187,21 @@ class Placement:
         """Components along the scene's x and y, shape (n, 2), of vectors of shape (n, 3)."""
         turned: NDArray[np.float64] = vectors[:, self.axes] * self.signs
         return turned
+
+    def in_file(self, name: str) -> str:
+        """Name that a field of the scene, which may be a component, has in the file's axes."""
+        if not name.endswith(("_x", "_y")):
+            return name
+        return name[:-1] + _AXES[self.axes["xy".index(name[-1])]]
+
+    def field(self, name: str, values: NDArray[Floats]) -> NDArray[Floats]:
+        """Values of a field in the scene, of those in SI along the axes of the file."""
+        if not name.endswith(("_x", "_y")):
+            return values
+        number = "xy".index(name[-1])
+        if name.startswith("material"):
+            values = values - self.origin[number]
+        return values * self.signs[number]
 
     @property
     def _names(self) -> tuple[str, str]:

@@ -32,7 +32,14 @@ from chipglow.io.sources.layout import (
     unpacked,
     unused_names,
 )
-from chipglow.io.sources.source import Source, SourceError, SourceRemarks, Survey, span_of
+from chipglow.io.sources.source import (
+    Source,
+    SourceError,
+    SourceRemarks,
+    Survey,
+    even_times,
+    span_of,
+)
 from chipglow.quantities.units import SI, Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.regrid import regrid, taps
@@ -309,11 +316,7 @@ class _Grid:
 
     def _in_scene(self, name: str, raw: NDArray[np.float32]) -> NDArray[np.float32]:
         layer, placement = self.layers[name], self.source.placement
-        values = layer.unit.to_si(raw)
-        if name.endswith(("_x", "_y")):
-            number = 0 if name.endswith("_x") else 1
-            origin = placement.origin[number] if name.startswith("material") else 0.0
-            values = np.asarray((values - origin) * placement.signs[number], np.float32)
+        values = np.asarray(placement.field(name, layer.unit.to_si(raw)), np.float32)
         values[~np.isfinite(values)] = np.nan
         return values
 
@@ -350,7 +353,7 @@ def _open(source: GridSource, stack: ExitStack) -> _Grid:
     used = {one.label for one in chosen.values()} | set(source.names.values())
     return _Grid(
         kind=f"grid of {first.length('y')} x {first.length('x')} samples, {', '.join(files)}",
-        layers={_placed_name(name, source.placement): layer for name, layer in layers.items()},
+        layers={source.placement.in_file(name): layer for name, layer in layers.items()},
         material=material,
         source=source,
         times=_times(source, files, first, remarks),
@@ -428,14 +431,12 @@ def _positions(
 def _times(
     source: GridSource, files: Mapping[str, Arrays], layer: _Layer, remarks: SourceRemarks
 ) -> NDArray[np.float64]:
-    count = layer.frames
-    if source.interval is not None:
-        return source.interval * np.arange(count, dtype=np.float64)
-    one = coordinate("time", files, source.names.get("time"), layer.dim("time"), count)
+    one = None
+    if source.interval is None:
+        dim = layer.dim("time")
+        one = coordinate("time", files, source.names.get("time"), dim, layer.frames)
     if one is None:
-        if count > 1:
-            remarks.assumed.append("no times in the files: frames are 1 s apart")
-        return np.arange(count, dtype=np.float64)
+        return even_times(layer.frames, source.interval, remarks)
     return check_times(
         str(one), read_list(one, unit_of("time", str(one), one.unit, source.units.time, remarks))
     )
@@ -454,10 +455,3 @@ def _placed(
     back, rising = bool(along[0] > along[-1]), bool(up[0] < up[-1])
     turned = (placement.axes == (1, 0), back, rising)
     return along[::-1] if back else along, up[::-1] if rising else up, turned
-
-
-def _placed_name(name: str, placement: Placement) -> str:
-    """Name of a component in the scene, of its name in the file."""
-    if placement.axes == (0, 1) or not name.endswith(("_x", "_y")):
-        return name
-    return name[:-1] + ("y" if name.endswith("x") else "x")

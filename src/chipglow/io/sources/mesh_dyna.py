@@ -1,14 +1,14 @@
 """Meshes of LS-DYNA: d3plot files, read by lasso-python."""
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.mesh_block import Block
+from chipglow.io.sources.mesh_block import Block, grid_of
 from chipglow.io.sources.mesh_reader import MeshReader
 from chipglow.io.sources.source import SourceError, damaged, missing_extra
 
@@ -19,33 +19,17 @@ _TRIANGLE, _QUAD, _TETRA, _HEXA = 5, 9, 10, 12
 
 
 class DynaReader(MeshReader):
-    """The states of a d3plot file and of those that follow it, ``d3plot01`` and so on.
+    """The states of a d3plot file and of those that follow it, ``d3plot01`` and so on."""
 
-    Parameters
-    ----------
-    file : Path
-        The first file.
-
-    Raises
-    ------
-    SourceError
-        If it is no d3plot, or lasso-python is missing.
-    """
-
-    def __init__(self, file: Path) -> None:
-        if not file.is_file():
-            raise FileNotFoundError(f"{file}: no such file")
-        self._file = file
+    def __init__(self, files: Sequence[Path]) -> None:
+        super().__init__(files, _KIND)
+        self._file = files[0]
         arrays = self._arrays(state_array_filter=["timesteps"]).arrays
         self.times = tuple(float(time) for time in arrays.get("timesteps", ()))
         self.count = len(self.times)
         self.kind = f"mesh, {_KIND} with {self.count} states"
         if not self.count:
-            raise SourceError(f"{file}: has no state, expected a d3plot with one or more")
-
-    def file(self, number: int) -> Path:
-        """The first file of the d3plot."""
-        return self._file
+            raise SourceError(f"{self._file}: has no state, expected a d3plot with one or more")
 
     def read(self, number: int) -> tuple[Block, ...]:
         """The mesh of a state; see `MeshReader.read`."""
@@ -75,8 +59,6 @@ class DynaReader(MeshReader):
 
 
 def _blocks(arrays: Mapping[str, Any]) -> Iterator[Block]:
-    import pyvista
-
     points, of_nodes = _of_nodes(arrays)
     for family in _FAMILIES:
         prefix = f"element_{family}_"
@@ -86,11 +68,8 @@ def _blocks(arrays: Mapping[str, Any]) -> Iterator[Block]:
         of_elements = _of_elements(arrays, prefix)
         alive = of_elements.pop("is_alive", np.ones(len(nodes))) > 0
         cells, kinds = _cells(np.asarray(nodes)[alive], family)
-        grid = pyvista.UnstructuredGrid(cells, kinds, points)
-        for name, values in of_nodes.items():
-            grid.point_data[name] = values
-        for name, values in of_elements.items():
-            grid.cell_data[name] = values[alive]
+        living = {name: values[alive] for name, values in of_elements.items()}
+        grid = grid_of(cells, kinds, points, of_nodes, living)
         yield Block((family,), grid, _parts(arrays, prefix, alive))
 
 

@@ -20,31 +20,14 @@ KINDS: Final[Mapping[str, str]] = {
 
 
 class MeshioReader(MeshReader):
-    """One file for each frame.
-
-    Parameters
-    ----------
-    files : sequence of Path
-        The files.
-    """
-
-    times = None
+    """One file for each frame."""
 
     def __init__(self, files: Sequence[Path]) -> None:
-        self._files = files
-        self.count = len(files)
-        kind = KINDS[files[0].suffix.lower()]
-        self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of {kind}"
-
-    def file(self, number: int) -> Path:
-        """The file of a frame."""
-        return self._files[number]
+        super().__init__(files, KINDS[files[0].suffix.lower()])
 
     def read(self, number: int) -> tuple[Block, ...]:
         """The mesh of a frame; see `MeshReader.read`."""
-        file = self._files[number]
-        if not file.is_file():
-            raise FileNotFoundError(f"{file}: no such file")
+        file = self.file(number)
         import meshio
         import pyvista
 

@@ -30,29 +30,13 @@ class TecplotReader(MeshReader):
 
     Times are ``SOLUTIONTIME`` of ASCII files and the solution times of zones in strands of binary
     ones. Zones without are there at all times.
-
-    Parameters
-    ----------
-    files : sequence of Path
-        The files.
-
-    Raises
-    ------
-    SourceError
-        If a file is none of Tecplot.
     """
 
     def __init__(self, files: Sequence[Path]) -> None:
-        self._files = files
+        super().__init__(files, f"Tecplot {'binary' if _is_binary(files[0]) else 'ASCII'}")
         self._zones = _zones(files[0]) if len(files) == 1 else ()
         self.times = _times(self._zones) if self._zones else _times_of_series(files)
         self.count = max(len(self.times or ()), len(files))
-        form = "binary" if _is_binary(files[0]) else "ASCII"
-        self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of Tecplot {form}"
-
-    def file(self, number: int) -> Path:
-        """The file of a frame."""
-        return self._files[min(number, len(self._files) - 1)]
 
     def read(self, number: int) -> tuple[Block, ...]:
         """The mesh of a frame; see `MeshReader.read`."""
@@ -108,12 +92,8 @@ class _AsciiZone(Zone):
                 f"{self.file}: zone {self.number}: SOLUTIONTIME is {text!r}, expected a number"
             ) from None
 
-    def read(self) -> Block:
-        """Its mesh and fields."""
-        try:
-            return _block(self)
-        except (ValueError, KeyError, IndexError) as error:
-            raise self.refusal(error) from None
+    def _block(self) -> Block:
+        return _block(self)
 
 
 def _ascii_zones(file: Path) -> tuple[Zone, ...]:

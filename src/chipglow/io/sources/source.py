@@ -7,19 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.scene import READABLE, Raster, SampledFrame
-
-__all__ = [
-    "READABLE",
-    "SampledFrame",
-    "Source",
-    "SourceError",
-    "SourceRemarks",
-    "Survey",
-    "damaged",
-    "missing_extra",
-    "span_of",
-]
+from chipglow.scene import Raster, SampledFrame
 
 
 class SourceError(ValueError):
@@ -70,7 +58,7 @@ class Survey:
         Left, right, bottom and top of what is there in m, in the scene's frame of reference: of
         the first and the last frame together.
     found : mapping
-        Which of `READABLE` come from which field of the source.
+        Which of `chipglow.scene.READABLE` come from which field of the source.
     unused : tuple of str
         Fields of the source that nothing is taken from.
     spacing : float, optional
@@ -93,6 +81,13 @@ class Survey:
     assumed: tuple[str, ...] = ()
     from_file: tuple[str, ...] = ()
     temperatures: tuple[float, float] | None = None
+
+
+def even_times(count: int, interval: float | None, remarks: SourceRemarks) -> NDArray[np.float64]:
+    """Times in s of frames that are as far apart: by 1 s if nobody says it, which is remarked."""
+    if interval is None and count > 1:
+        remarks.assumed.append("no times in the files: frames are 1 s apart")
+    return (1.0 if interval is None else interval) * np.arange(count, dtype=np.float64)
 
 
 def span_of(values: ArrayLike) -> tuple[float, float]:
