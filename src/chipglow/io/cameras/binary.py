@@ -140,41 +140,6 @@ def chosen_frames(path: Path, frames: slice | None, count: int, samples: int) ->
     return numbers
 
 
-def say_cut(remarks: FileRemarks, said: int, whole: int) -> None:
-    """Say that a file ends before its last frame, if it does.
-
-    Parameters
-    ----------
-    remarks : FileRemarks
-        Takes it as a warning.
-    said, whole : int
-        How many frames the file should have, and how many of them are whole.
-    """
-    if whole < said:
-        remarks.warnings.append(
-            f"the file is cut short: of its {said} frames the first {whole} are whole, the others "
-            "are left out."
-        )
-
-
-def say_cut_behind(remarks: FileRemarks, whole: int, left: int) -> None:
-    """Say that a file, which does not tell its number of frames, ends within one.
-
-    Parameters
-    ----------
-    remarks : FileRemarks
-        Takes it as a warning.
-    whole : int
-        How many frames are whole.
-    left : int
-        How many bytes lie behind them.
-    """
-    remarks.warnings.append(
-        f"the file is cut short: its first {whole} frames are whole, the {left} bytes behind them "
-        "are no whole frame and are left out."
-    )
-
-
 def check_picture(path: Path, rows: int, columns: int, most: int = 65_535) -> None:
     """Refuse pictures without or with absurdly many rows or columns.
 

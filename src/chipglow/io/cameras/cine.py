@@ -20,7 +20,6 @@ from chipglow.io.cameras.binary import (
     first_moment,
     layout,
     opened,
-    say_cut,
     stamped_times,
 )
 from chipglow.io.cameras.remarks import FileRemarks
@@ -82,27 +81,11 @@ class _Pictures:
 
 
 def read_cine(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
-    """Read frames of Phantom's CINE as counts.
+    """Read frames of Phantom's CINE as counts; see `CameraFormat`.
 
     Pictures of 8 and 16 bits, and 10 and 12 bits packed, in grey. Packed 10 bits are codes of a
     curve like that of Recommendation ITU-R BT.709 and become 12 bits that are proportional to
     light.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    frames : slice, optional
-        Which frames to read.
-    interval : float, optional
-        Time between frames in s, in the place of the file's own times.
-
-    Raises
-    ------
-    SourceError
-        If it is damaged, cut short, compressed, in colours or of another kind.
-    OSError
-        If it is missing or not accessible.
     """
     with opened(path) as binary:
         header = binary.record(0, _FILE, "the header")
@@ -125,7 +108,7 @@ def read_cine(path: Path, frames: slice | None = None, interval: float | None = 
             start = _image_start(binary, int(places[number]), pictures, number)
             signal[position] = pictures.image(binary.read(start, pictures.size, f"frame {number}"))
         remarks = FileRemarks(notes=[f"Frame 0 is number {header['first']} of the recording."])
-        say_cut(remarks, count, whole)
+        remarks.say_cut(count, whole)
         blocks = _blocks(binary, header, setup)
         times = _times(binary, blocks, header, setup["rate"], chosen, interval, remarks)
         integration_time = _integration_time(binary, blocks, header, setup, chosen, remarks)

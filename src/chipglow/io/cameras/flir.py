@@ -23,7 +23,6 @@ from chipglow.io.cameras.binary import (
     first_moment,
     object_parameters,
     opened,
-    say_cut_behind,
     stamped_times,
     text_of,
 )
@@ -86,23 +85,7 @@ class _Fields:
 
 
 def read_flir(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
-    """Read frames of FLIR's radiometric JPEG, FFF, SEQ or CSQ as counts.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    frames : slice, optional
-        Which frames to read.
-    interval : float, optional
-        Time between frames in s, in the place of the file's own times.
-
-    Raises
-    ------
-    SourceError
-        If it is damaged, cut short or of another kind.
-    OSError
-        If it is missing or not accessible.
+    """Read frames of FLIR's radiometric JPEG, FFF, SEQ or CSQ as counts; see `CameraFormat`.
 
     Notes
     -----
@@ -183,7 +166,7 @@ def _frames(binary: Binary, remarks: FileRemarks) -> list[_Frame]:
         except CutShortError:
             if not found:
                 raise
-            say_cut_behind(remarks, len(found), binary.size - place)
+            remarks.say_cut_behind(len(found), binary.size - place)
             break
         if len(found) > MOST_FRAMES:
             raise SourceError(f"{binary.path}: has over {MOST_FRAMES} frames")

@@ -21,7 +21,6 @@ from chipglow.io.cameras.binary import (
     first_moment,
     layout,
     opened,
-    say_cut_behind,
     stamped_times,
 )
 from chipglow.io.cameras.remarks import FileRemarks
@@ -72,26 +71,10 @@ def is_hcc(head: bytes) -> bool:
 
 
 def read_hcc(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
-    """Read frames of Telops' HCC.
+    """Read frames of Telops' HCC; see `CameraFormat`.
 
     Raw and corrected samples are counts. Calibrated ones are temperature or in-band radiance,
     sample · 2^DataExp + DataOffset, frame by frame.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    frames : slice, optional
-        Which frames to read.
-    interval : float, optional
-        Time between frames in s, in the place of the file's own times.
-
-    Raises
-    ------
-    SourceError
-        If it is damaged, cut short or of another kind.
-    OSError
-        If it is missing or not accessible.
     """
     with opened(path) as binary:
         first = binary.record(0, _HEADER, "the first header")
@@ -117,7 +100,7 @@ def read_hcc(path: Path, frames: slice | None = None, interval: float | None = N
     version = f"Telops header {first['major']}.{first['minor']}"
     remarks = FileRemarks(notes=[f"The samples are {label} ({version})."])
     if rest:
-        say_cut_behind(remarks, whole, rest)
+        remarks.say_cut_behind(whole, rest)
     recording = Recording(
         signal=_signal(stored, quantity, path),
         quantity=quantity,

@@ -17,7 +17,6 @@ from chipglow.io.cameras.binary import (
     layout,
     object_parameters,
     opened,
-    say_cut,
     stamped_times,
     text_of,
 )
@@ -83,24 +82,7 @@ def is_ptw(head: bytes) -> bool:
 
 
 def read_ptw(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
-    """Read frames of FLIR's PTW as counts.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    frames : slice, optional
-        Which frames to read.
-    interval : float, optional
-        Time between frames in s, in the place of the file's own.
-
-    Raises
-    ------
-    SourceError
-        If it is damaged, cut short or of another kind.
-    OSError
-        If it is missing or not accessible.
-    """
+    """Read frames of FLIR's PTW as counts; see `CameraFormat`."""
     with opened(path) as binary:
         signature = binary.read(0, 3, "the signature")
         if signature != b"CED":
@@ -120,7 +102,7 @@ def read_ptw(path: Path, frames: slice | None = None, interval: float | None = N
                 start + number * stride, rows * columns, "<u2", what
             ).reshape(rows, columns)
         remarks = FileRemarks(notes=_notes(header, skipped))
-        say_cut(remarks, header["frames"], whole)
+        remarks.say_cut(header["frames"], whole)
         times = _times(binary, header, stride, chosen, interval, remarks)
     recording = Recording(
         signal=signal,
