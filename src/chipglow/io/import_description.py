@@ -26,8 +26,8 @@ from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.mesh import MeshSource
 from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap, metre_per_pixel
 from chipglow.io.tool_section import ToolSection
-from chipglow.quantities import OR_NONE, FileBeside, Section, Settings, described
-from chipglow.quantities.units import Length, Position, Speed, Temperature, Time, Unit, parse_unit
+from chipglow.quantities import OR_NONE, Declared, FileBeside, Section, Settings, described
+from chipglow.quantities.units import Length, Position, Time, Unit, parse_unit
 from chipglow.scene.completion import Completion
 from chipglow.text import commented_yaml, described_by
 
@@ -43,7 +43,6 @@ KINDS: Final[Mapping[str, tuple[str, ...]]] = {
 """Kinds of sources by how the file's name ends; most sources of points have to be called so."""
 
 Pixels = Annotated[tuple[float, float], Strict(False)]
-Corners = Annotated[tuple[tuple[Position, Position], ...], Strict(False)]
 ColourSection = Annotated[tuple[int, int, int], Strict(False)]
 BoxSection = Annotated[tuple[int, int, int, int], Strict(False)]
 
@@ -98,58 +97,6 @@ class PlacementSection(Settings[Placement]):
         """The placement."""
         origin = self.origin_horizontal, self.origin_vertical
         return Placement(self.horizontal, self.vertical, origin)
-
-
-class ViewSection(Settings[View]):
-    """Where the scene is sampled; what is not said is as in the source."""
-
-    left: Annotated[Position | None, OR_NONE] = described("none", "Left edge.")
-    right: Annotated[Position | None, OR_NONE] = described("none", "Right edge.")
-    bottom: Annotated[Position | None, OR_NONE] = described("none", "Lower edge.")
-    top: Annotated[Position | None, OR_NONE] = described("none", "Upper edge.")
-    spacing: Annotated[Length | None, OR_NONE] = described(
-        "none",
-        "Side of a sample; none: the source's own, or 900 samples along the longer side.",
-        "none, or over 0 um",
-    )
-
-    def build(self) -> View:
-        """The view."""
-        return View(self.left, self.right, self.bottom, self.top, self.spacing)
-
-
-class CompletionSection(Settings[Completion]):
-    """What stands in for what the source does not have."""
-
-    surroundings: Temperature = described(
-        "20 degC", "Temperature where there is no material, and of a tool that has none."
-    )
-    cutting_speed: Annotated[Speed | None, OR_NONE] = described(
-        "none", "Speed of the workpiece, for a source without velocity.", "none, or over 0 m/min"
-    )
-    chip: Annotated[Corners | None, OR_NONE] = described(
-        "none",
-        "Corners of the chip, for a source without plastic strain.",
-        "none, or [[-300 um, 0 um], [-50 um, 0 um], [-50 um, 400 um]]",
-    )
-    motion: Literal["auto", "flow", "none"] = described(
-        "auto",
-        "Velocity of a source that has none: flow (the optical flow), none, or auto: the flow\n"
-        "where there is a strain, a chip or a cutting speed.",
-    )
-    rate_frames: int = described(
-        1, "Frames over which a missing strain rate is taken: more are smoother.", "1 to 20"
-    )
-
-    def build(self) -> Completion:
-        """The completion."""
-        return Completion(
-            surroundings=self.surroundings,
-            cutting_speed=self.cutting_speed,
-            chip=self.chip,
-            motion=self.motion,
-            rate_frames=self.rate_frames,
-        )
 
 
 class SourceSection(Section):
@@ -426,11 +373,11 @@ class ImportDescription(Section):
         "none", "Time from frame to frame; none: as the source says."
     )
     placement: PlacementSection = described({}, "How the source's axes lie in the scene.")
-    field_of_view: ViewSection = described({}, "Where the scene is sampled.")
+    field_of_view: Declared[View] = described({}, "Where the scene is sampled.")
     tool: Annotated[ToolSection | None, OR_NONE] = described(
         "none", "The tool's outline with its tip at the origin: what is in it is tool."
     )
-    completion: CompletionSection = described({}, "What stands in for what the source lacks.")
+    completion: Declared[Completion] = described({}, "What stands in for what the source lacks.")
     mesh: MeshSection = described({}, "More of a mesh.")
     movie: MovieSection = described({}, "More of a movie.")
     points: PointsSection = described({}, "More of points.")
