@@ -58,6 +58,7 @@ POINT_COLUMNS: Final = (TEMPERATURE, Column("counts"), *_POINT_UNCERTAINTIES)
 """Points of a calibration."""
 
 _RESPONSE_COLUMNS: Final = (Column("wavelength", "um", "m"), Column("response"))
+_CORNER_COLUMNS: Final = (Column("x", "um", "m"), Column("y", "um", "m"))
 _PIXEL_COLUMNS: Final = (Column("column"), Column("row"))
 
 
@@ -86,7 +87,13 @@ def read_columns(
     OSError
         If it cannot be read.
     """
-    path = Path(path)
+    return _table(Path(path), columns)[0]
+
+
+def _table(
+    path: Path, columns: Sequence[Column]
+) -> tuple[dict[str, NDArray[np.float64]], list[int]]:
+    """Columns by name, and which line of the file each row is."""
     lines = read_small_text(path).splitlines()
     rows = [(number, row) for number, row in enumerate(csv.reader(lines), 1) if any(row)]
     if len(rows) < 2:
@@ -105,10 +112,11 @@ def read_columns(
         if names.count(column.name) > 1 or (column.required and column.name not in names):
             raise ValueError(f"{path}, line 1: expected a column {column.title!r}, once")
     numbers = np.array([_numbers(path, number, row, found) for number, row in rows[1:]])
-    return {
+    table = {
         column.name: unit.scale * values + (0.0 if column.difference else unit.offset)
         for (column, unit), values in zip(found, numbers.T, strict=True)
     }
+    return table, [number for number, _ in rows[1:]]
 
 
 def read_calibration_points(
@@ -182,6 +190,27 @@ def _is_number(text: str) -> bool:
         return isfinite(float(text))
     except ValueError:
         return False
+
+
+def read_polyline(path: Path) -> tuple[NDArray[np.float64], list[int]]:
+    """Read the corners of a polyline from a CSV file: ``x_um,y_um``.
+
+    Returns
+    -------
+    corners : ndarray
+        x and y in m, shape (n, 2).
+    lines : list of int
+        Which line of the file each is.
+
+    Raises
+    ------
+    ValueError
+        If the file is no such table; the message names the file and the line.
+    OSError
+        If it cannot be read.
+    """
+    table, lines = _table(path, _CORNER_COLUMNS)
+    return np.stack([table["x"], table["y"]], axis=1), lines
 
 
 def read_response(path: str | os.PathLike[str]) -> TabulatedResponse:

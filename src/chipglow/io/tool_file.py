@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from chipglow.io.polyline_file import read_polyline
+from chipglow.io.column_file import read_polyline
 from chipglow.scene import ToolOutline, ToolOutlineError
 
 
@@ -26,8 +26,8 @@ def read_tool_outline(path: str | os.PathLike[str]) -> ToolOutline:
         If it cannot be read.
     """
     path = Path(path)
-    points = read_polyline(path)
+    points, lines = read_polyline(path)
     try:
         return ToolOutline.placed(points)
     except ToolOutlineError as error:
-        raise ValueError(f"{path}, line {error.point + 2}: {error}") from None
+        raise ValueError(f"{path}, line {lines[error.point]}: {error}") from None
