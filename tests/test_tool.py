@@ -358,6 +358,14 @@ def test_a_bad_file_is_one_line_with_file_line_value_and_expectation(text, messa
     assert "\n" not in str(caught.value)
 
 
+def test_an_outline_may_be_in_any_unit_of_length(tmp_path):
+    path = tmp_path / "edge.csv"
+    path.write_text("x_mm,y_mm\n0,0.5\n0,0.02\n0.02,0\n0.6,0.06\n")
+    (tmp_path / "same.csv").write_text("x_um,y_um\n" + GOOD)
+    same = read_tool_outline(tmp_path / "same.csv")
+    np.testing.assert_allclose(read_tool_outline(path).corners, same.corners, atol=1e-18)
+
+
 def test_a_file_that_is_no_text_is_refused(tmp_path):
     (tmp_path / "edge.csv").write_bytes(b"x_um,y_um\n\xff\xfe\n")
     with pytest.raises(ValueError, match=r"edge\.csv: expected text in UTF-8"):

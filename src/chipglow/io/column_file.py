@@ -193,7 +193,7 @@ def _is_number(text: str) -> bool:
 
 
 def read_polyline(path: Path) -> tuple[NDArray[np.float64], list[int]]:
-    """Read the corners of a polyline from a CSV file: ``x_um,y_um``.
+    """Read the corners of a polyline from a CSV file: ``x_um,y_um``, in any unit of length.
 
     Returns
     -------

@@ -32,8 +32,8 @@ def read_curve(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     Parameters
     ----------
     path : path-like
-        First line ``x_um,y_um``, then a corner of the polyline a line in um, in the coordinates of
-        the measurement.
+        First line ``x_um,y_um``, or another unit of length, then a corner of the polyline a line,
+        in the coordinates of the measurement.
 
     Returns
     -------
