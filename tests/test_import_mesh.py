@@ -638,7 +638,7 @@ def test_an_openfoam_case_is_cut_and_its_cells_are_constant(tmp_path):
 
 def test_an_extra_that_is_missing_is_named(tmp_path, monkeypatch):
     written(tmp_path, "chip.vtu")
-    monkeypatch.setattr("chipglow.io.sources.mesh.find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "pyvista", None)
     with pytest.raises(SourceError, match=r"pip install 'chipglow\[mesh\]'"):
         MeshSource(tmp_path / "chip.vtu").survey()
     monkeypatch.undo()

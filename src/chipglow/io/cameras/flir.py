@@ -29,6 +29,7 @@ from chipglow.io.cameras.binary import (
 from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import reading
+from chipglow.io.sources.source import required
 from chipglow.radiometry import ObjectParameters
 
 _MAGIC: Final = b"FFF\0"
@@ -322,15 +323,11 @@ def _from_png(stored: bytes, shape: tuple[int, int]) -> NDArray[Any]:
 
 
 def _from_jpeg_ls(name: str, stored: bytes, shape: tuple[int, int]) -> NDArray[Any]:
-    try:
-        from imagecodecs import jpegls_decode
-    except ImportError:
-        raise SourceError(f"{name}: is in JPEG-LS, pip install 'chipglow[camera]'") from None
-
+    imagecodecs = required("imagecodecs", name, "camera", "imagecodecs for JPEG-LS")
     height, width = unpack_from(">HH", stored, stored.index(_JPEG_LS) + 5)
     if (height, width) != shape:
         raise ValueError(f"JPEG-LS of {(width, height)} pixels, expected {shape[::-1]}")
-    return np.asarray(jpegls_decode(stored))
+    return np.asarray(imagecodecs.jpegls_decode(stored))
 
 
 def _in_order(values: NDArray[np.uint16]) -> NDArray[np.uint16]:

@@ -188,20 +188,10 @@ def _clocked_times(
     chosen: range,
     remarks: FileRemarks,
 ) -> NDArray[np.float64]:
-    """Times by the period, or by the frames' own stamps where these say something else.
+    """Times by the header's period, or by the frames' own stamps where these say something else.
 
-    Parameters
-    ----------
-    since : ndarray
-        Stamps of the frames in s after the first of the file, in whole milliseconds.
-    mean : float
-        Mean time from frame to frame in s by the stamps.
-    period : float
-        The period of the header in s.
-    chosen : range
-        Numbers of the frames.
-    remarks : FileRemarks
-        Takes what had to be assumed.
+    The stamps are in s after the first frame of the file, in whole milliseconds; their mean step is
+    that of all frames.
     """
     allowed = _STAMPED + _CLOCK * float(since.max())
     times = even_times(chosen, period)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.file_order import files_of
-from chipglow.io.sources.source import SourceError, damaged, missing_extra
+from chipglow.io.sources.source import SourceError, damaged, required
 from chipglow.io.sources.text_table import TextTable, lines_of_text
 
 MOST_SAMPLES: Final = 100_000_000
@@ -441,7 +441,7 @@ class _MatlabArray:
 
 
 def _tiff(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
-    tifffile = _extra("tifffile", path)
+    tifffile = required("tifffile", path, "grid")
     with _complaints("tifffile") as complaints:
         file = stack.enter_context(tifffile.TiffFile(path))
         every = list(file.series)
@@ -518,20 +518,11 @@ def _tiff_page(path: Path, page: Any) -> NDArray[Any]:
     return values
 
 
-def _extra(module: str, path: Path) -> Any:
-    from importlib import import_module
-
-    try:
-        return import_module(module)
-    except ImportError:
-        raise missing_extra(path, module, "grid") from None
-
-
 # Zarr
 
 
 def _zarr(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
-    zarr = _extra("zarr", path)
+    zarr = required("zarr", path, "grid")
     if path.is_dir():
         store = zarr.storage.LocalStore(path, read_only=True)
     else:

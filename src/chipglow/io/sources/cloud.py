@@ -24,6 +24,7 @@ from chipglow.io.sources.source import (
     SourceRemarks,
     Survey,
     even_times,
+    naming,
     span_of,
 )
 from chipglow.quantities.units import Unit
@@ -195,10 +196,8 @@ class _Points:
         area = volume[good] / (source.thickness or 1.0) if self._solid else volume[good]
         places = placement.place(solid[good])
         self._check_filling(path, places, spacing, area)
-        try:
+        with naming(path):
             return Cloud(places, values[good], material[good], spacing, area)
-        except ValueError as error:
-            raise SourceError(f"{path}: {error}") from None
 
     @property
     def _where(self) -> str:
@@ -226,10 +225,8 @@ class _Points:
         unknown = sorted(set(source.names) - set(COMMON_NAMES) - set(_EXTRA) - {"time"})
         if unknown:
             raise SourceError(f"fields: unknown {unknown[0]!r}, expected one of {READABLE}")
-        try:
+        with naming(path):
             self._labels = match_names(labels, given, READABLE)
-        except SourceError as error:
-            raise SourceError(f"{path}: {error}") from None
         if not self._labels:
             listed = ", ".join(labels[:20]) or "none"
             raise SourceError(f"{path}: no column is known as temperature, it has {listed}")

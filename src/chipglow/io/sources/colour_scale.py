@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import erfc
 
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import SourceError, naming
 
 RAINBOW: Final = "rainbow"
 """Blue, cyan, green, yellow, red at full saturation, as finite-element programs draw it."""
@@ -110,10 +110,8 @@ class ColourScale:
             If there is no such map, or a colour of it stands for two values.
         """
         count = bands or _LEVELS
-        try:
+        with naming(name):
             return cls._linear(_map_colours(name, count), values, banded=bands > 0)
-        except SourceError as error:
-            raise SourceError(f"{name}: {error}") from error
 
     @classmethod
     def from_legend(cls, pixels: NDArray[np.uint8], values: tuple[float, float]) -> "ColourScale":

@@ -15,7 +15,6 @@ from chipglow.io.sources.arrays import (
     StoredArray,
     check_samples,
     open_arrays,
-    reading,
 )
 from chipglow.io.sources.conventions import Placement, Units
 from chipglow.io.sources.layout import (
@@ -27,9 +26,9 @@ from chipglow.io.sources.layout import (
     check_times,
     coordinate,
     find_fields,
+    read_frames,
     read_list,
     unit_of,
-    unpacked,
     unused_names,
 )
 from chipglow.io.sources.source import (
@@ -215,18 +214,7 @@ class _Layer:
         return values
 
     def _load(self, first: int, last: int) -> NDArray[np.float32]:
-        key = tuple(slice(first, last) if axis == "time" else slice(None) for axis in self.axes)
-        with reading(self.chosen):
-            raw = self.array.read(key)
-        if "time" not in self.axes:
-            raw = raw[None]
-        axes = self.axes if "time" in self.axes else ("time", *self.axes)
-        expected = (last - first, self.length("y"), self.length("x"))
-        raw = raw.transpose([axes.index(axis) for axis in AXES])
-        if raw.shape != expected:
-            raise SourceError(f"{self.chosen}: has shape {raw.shape}, expected {expected}")
-        with reading(self.chosen):
-            return np.asarray(unpacked(raw, self.array.attributes), np.float32)
+        return np.asarray(read_frames(self.chosen, self.axes, slice(first, last)), np.float32)
 
 
 @dataclass(frozen=True)
@@ -416,10 +404,7 @@ def _positions(
             raise SourceError(
                 f"{layer.chosen.path}: has no coordinate {axis!r}, expected grid.spacing"
             )
-        return check_even(
-            str(one),
-            read_list(one, unit_of(axis, str(one), one.unit, source.units.length, remarks)),
-        )
+        return check_even(str(one), read_list(axis, one, source.units.length, remarks))
     if coordinate(axis, files, source.names.get(axis), layer.dim(axis), count) is not None:
         remarks.from_file.append(f"its coordinate {axis} is not used, as the spacing is given")
     if axis == "x":
@@ -437,9 +422,7 @@ def _times(
         one = coordinate("time", files, source.names.get("time"), dim, layer.frames)
     if one is None:
         return even_times(layer.frames, source.interval, remarks)
-    return check_times(
-        str(one), read_list(one, unit_of("time", str(one), one.unit, source.units.time, remarks))
-    )
+    return check_times(str(one), read_list("time", one, source.units.time, remarks))
 
 
 def _placed(

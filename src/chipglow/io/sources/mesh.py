@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
 from typing import Final, Literal
@@ -24,7 +23,8 @@ from chipglow.io.sources.source import (
     SourceRemarks,
     Survey,
     even_times,
-    missing_extra,
+    naming,
+    required,
     span_of,
 )
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
@@ -159,8 +159,7 @@ class MeshSource(Source):
         return {number: restricted.of_blocks(there) for number, there in ends.items()}, restricted
 
     def _reader(self) -> MeshReader:
-        if find_spec("pyvista") is None or find_spec("meshio") is None:
-            raise missing_extra(self.path, "PyVista and meshio", "mesh")
+        required("pyvista", self.path, "mesh", "PyVista")
         suffix = self.path.suffix.lower()
         dyna = suffix in ("", ".d3plot") or "d3plot" in self.path.name.lower()
         reader = _READERS.get(suffix, DynaReader if dyna else None)
@@ -206,15 +205,13 @@ class MeshSource(Source):
         known = [name for name in READABLE if name not in _COMPONENTS]
         if not {_VECTOR, *_COMPONENTS} & set(given) and self.placement.axes == (0, 1):
             known += _COMPONENTS
-        try:
+        with naming(file):
             found = match_names(sizes, given, ())
             found |= match_names(scalars, {k: v for k, v in given.items() if v in scalars}, known)
             if not set(_COMPONENTS) & set(given):
                 found |= match_names(
                     vectors, {k: v for k, v in given.items() if v in vectors}, (_VECTOR,)
                 )
-        except SourceError as error:
-            raise SourceError(f"{file}: {error}") from None
         if _VECTOR in found:
             found |= dict.fromkeys(_COMPONENTS, found.pop(_VECTOR))
         elif not set(_COMPONENTS) <= set(found):

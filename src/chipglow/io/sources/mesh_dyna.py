@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.mesh_block import Block, grid_of
 from chipglow.io.sources.mesh_reader import MeshReader
-from chipglow.io.sources.source import SourceError, damaged, missing_extra
+from chipglow.io.sources.source import SourceError, damaged, required
 
 _KIND: Final = "LS-DYNA d3plot"
 _FAMILIES: Final = ("shell", "solid")
@@ -43,15 +43,12 @@ class DynaReader(MeshReader):
         return blocks
 
     def _arrays(self, **filters: Any) -> Any:
-        try:
-            from lasso.dyna import D3plot
-        except ImportError:
-            raise missing_extra(self._file, "lasso-python", "dyna") from None
+        dyna = required("lasso.dyna", self._file, "dyna", "lasso-python")
         logging.getLogger("lasso").setLevel(logging.CRITICAL)
         if self._file.stat().st_size == 0:
             raise SourceError(f"{self._file}: is empty, expected an {_KIND}")
         try:
-            return D3plot(str(self._file), buffered_reading=True, **filters)
+            return dyna.D3plot(str(self._file), buffered_reading=True, **filters)
         except (OSError, MemoryError):
             raise
         except Exception as error:  # lasso raises what it likes for what is no d3plot

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.mesh_block import Block
 from chipglow.io.sources.mesh_reader import MeshReader
-from chipglow.io.sources.source import SourceError, damaged
+from chipglow.io.sources.source import SourceError, damaged, required
 
 KINDS: Final[Mapping[str, str]] = {
     ".msh": "Gmsh",
@@ -28,7 +28,7 @@ class MeshioReader(MeshReader):
     def read(self, number: int) -> tuple[Block, ...]:
         """The mesh of a frame; see `MeshReader.read`."""
         file = self.file(number)
-        import meshio
+        meshio = required("meshio", file, "mesh")
         import pyvista
 
         try:

@@ -93,7 +93,30 @@ class _AsciiZone(Zone):
             ) from None
 
     def _block(self) -> Block:
-        return _block(self)
+        keys = self.keys
+        for key in _NOT_READ:
+            if key in keys:
+                raise ValueError(f"{key} is not read")
+        kind = keys.get("ZONETYPE", keys.get("ET", keys.get("F", "ORDERED"))).upper()
+        kind = kind.removeprefix("FE")
+        with self.file.open("rb") as stream:
+            stream.seek(self.begin)
+            text = stream.read(self.end - self.begin)
+            words = re.sub(rb"(?m)^\s*#.*$", b"", text).split()
+        if kind in _ORDERED:
+            across, down, deep = (int(keys.get(axis, "1")) for axis in "IJK")
+            counts = (across, down, deep)
+            nodes, elements = int(np.prod(counts)), int(np.prod([max(c - 1, 1) for c in counts]))
+        else:
+            nodes = int(keys.get("N") or keys["NODES"])
+            elements = int(keys.get("E") or keys["ELEMENTS"])
+        columns, rest = _columns(self, words, nodes, elements)
+        names = tuple(filter(None, (keys.get("T", "").strip(), str(self.number))))
+        centred = _centred(keys, self.names)
+        if kind in _ORDERED:
+            return block_of(names, columns, centred, ORDERED, counts)
+        cells = np.array(rest, np.int64).reshape(elements, ELEMENTS[kind][0]) - 1
+        return block_of(names, columns, centred, kind, cells)
 
 
 def _ascii_zones(file: Path) -> tuple[Zone, ...]:
@@ -138,33 +161,6 @@ def _names(header: str) -> tuple[str, ...]:
 def _keys(text: str) -> dict[str, str]:
     pairs = re.findall(_KEY, re.sub(r"^\s*ZONE", "", text, flags=re.I))
     return {key.upper(): value.strip('"') for key, value in pairs}
-
-
-def _block(zone: _AsciiZone) -> Block:
-    keys = zone.keys
-    for key in _NOT_READ:
-        if key in keys:
-            raise ValueError(f"{key} is not read")
-    kind = keys.get("ZONETYPE", keys.get("ET", keys.get("F", "ORDERED"))).upper()
-    kind = kind.removeprefix("FE")
-    with zone.file.open("rb") as stream:
-        stream.seek(zone.begin)
-        text = stream.read(zone.end - zone.begin)
-        words = re.sub(rb"(?m)^\s*#.*$", b"", text).split()
-    if kind in _ORDERED:
-        across, down, deep = (int(keys.get(axis, "1")) for axis in "IJK")
-        counts = (across, down, deep)
-        nodes, elements = int(np.prod(counts)), int(np.prod([max(c - 1, 1) for c in counts]))
-    else:
-        nodes = int(keys.get("N") or keys["NODES"])
-        elements = int(keys.get("E") or keys["ELEMENTS"])
-    columns, rest = _columns(zone, words, nodes, elements)
-    names = tuple(filter(None, (keys.get("T", "").strip(), str(zone.number))))
-    centred = _centred(keys, zone.names)
-    if kind in _ORDERED:
-        return block_of(names, columns, centred, ORDERED, counts)
-    cells = np.array(rest, np.int64).reshape(elements, ELEMENTS[kind][0]) - 1
-    return block_of(names, columns, centred, kind, cells)
 
 
 def _columns(

@@ -1,7 +1,6 @@
 """Movies of fields with a colour scale: a source of scenes."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from math import hypot, isfinite, sqrt
 from pathlib import Path
@@ -36,7 +35,7 @@ from chipglow.io.sources.overlays import (
     polygon_mask,
 )
 from chipglow.io.sources.picture_sampling import PictureSampling
-from chipglow.io.sources.source import Source, SourceError, Survey
+from chipglow.io.sources.source import Source, SourceError, Survey, naming
 from chipglow.scene import FIELD_UNITS, FILLED, Material, Raster, SampledFrame
 from chipglow.scene.nearest import fill
 
@@ -313,7 +312,7 @@ class MovieSource(Source):
         for name in self._names:
             movie = self.movies[name]
             picture = next(pictures(movie.path, indices[name]))
-            with _naming(movie.path):
+            with naming(movie.path):
                 scale, legend, said = _scale(movie, picture)
                 covered = box_mask(shape, self.covered) | box_mask(shape, legend, _LEGEND_MARGIN)
                 cropped = self._cropped(picture)
@@ -518,12 +517,3 @@ def _doubts(uncertainty: Mapping[str, ColourUncertainty]) -> Iterator[str]:
             + (f", {warning.lines:.3g} by the lines drawn over them" if warning.lines else "")
             + ")"
         )
-
-
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    """Put the file's name before what is wrong with its pictures."""
-    try:
-        yield
-    except SourceError as error:
-        raise SourceError(f"{path}: {error}") from error

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,7 +22,7 @@ from chipglow.io.sources.arrays import (
 from chipglow.io.sources.conventions import COMMON_NAMES, simple
 from chipglow.io.sources.file_order import files_of
 from chipglow.io.sources.lammps_dump import ENDINGS, LammpsDump, is_dump
-from chipglow.io.sources.source import SourceError, missing_extra
+from chipglow.io.sources.source import SourceError, required
 from chipglow.io.sources.text_table import TextTable, line_of
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")
@@ -469,10 +468,7 @@ def _components(name: str, values: NDArray[Any]) -> dict[str, NDArray[Any]]:
 
 
 def _read_vtk(path: Path) -> PointTable:
-    if find_spec("pyvista") is None:
-        raise missing_extra(path, "PyVista", "mesh")
-    import pyvista
-
+    pyvista = required("pyvista", path, "mesh", "PyVista")
     mesh = mesh_vtk.read_data(path)
     if not isinstance(mesh, pyvista.DataSet) or mesh.n_points == 0:
         raise SourceError(f"{path}: has no points")

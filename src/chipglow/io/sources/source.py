@@ -2,7 +2,10 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,9 +17,40 @@ class SourceError(ValueError):
     """A source that cannot be read: the message names the file, the field and what was expected."""
 
 
-def missing_extra(file: object, needs: str, extra: str) -> SourceError:
-    """The error for a file that a library reads which is not installed, and how it comes."""
-    return SourceError(f"{file}: needs {needs}, expected pip install 'chipglow[{extra}]'")
+def required(module: str, file: object, extra: str, called: str = "") -> Any:
+    """A library that reads a file and comes with an extra of chipglow.
+
+    Parameters
+    ----------
+    module : str
+        What is imported.
+    file : object
+        The file, as the error calls it.
+    extra : str
+        The extra.
+    called : str
+        The library's name, if it is not the module's.
+
+    Raises
+    ------
+    SourceError
+        If it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError:
+        needs = called or module
+        expected = f"expected pip install 'chipglow[{extra}]'"
+        raise SourceError(f"{file}: needs {needs}, {expected}") from None
+
+
+@contextmanager
+def naming(name: object) -> Iterator[None]:
+    """Put a name, such as that of the file, before what is wrong, which is a SourceError then."""
+    try:
+        yield
+    except ValueError as error:
+        raise SourceError(f"{name}: {error}") from error
 
 
 def damaged(file: object, error: BaseException, kind: str = "") -> SourceError:
