@@ -345,6 +345,15 @@ def test_an_answer_of_another_kind_is_one_error(monkeypatch, tmp_path):
         Isolated(MovingBlock(WHOLE), "block").survey()
 
 
+def test_a_reader_that_ends_before_it_is_asked_is_one_error(monkeypatch):
+    ended = "import os; os.close(0); os._exit(3)"
+    monkeypatch.setattr("chipglow.io.sandbox._CHILD", ("-c", ended))
+    # More than a pipe holds.
+    source = MovingBlock(tuple("x" * 1_000_000 for _ in range(2)))
+    with pytest.raises(SourceError, match="block: its reader ended with code 3"):
+        Isolated(source, "block").survey()
+
+
 def test_nothing_beside_the_data_is_taken_for_a_module(tmp_path, monkeypatch, worker_finds_tests):
     (tmp_path / "json.py").write_text("raise SystemExit(7)")
     monkeypatch.chdir(tmp_path)

@@ -123,8 +123,9 @@ class Sandbox:
         ) as process:
             assert process.stdin is not None
             try:
-                process.stdin.write(request)
-                process.stdin.close()
+                with suppress(BrokenPipeError):  # it ended: what it answers tells
+                    process.stdin.write(request)
+                    process.stdin.close()
                 yield self._messages(process, most)
             finally:
                 process.kill()
