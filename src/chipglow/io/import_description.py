@@ -11,19 +11,12 @@ from pydantic import Strict, model_validator
 
 from chipglow.io.importing import Import, View
 from chipglow.io.sandbox import Isolated
-from chipglow.io.sources import (
-    Placement,
-    Source,
-    Units,
-    lammps_dump,
-    mesh_meshio,
-    mesh_tecplot,
-    mesh_vtk,
-)
+from chipglow.io.sources import Placement, Source, Units, lammps_dump
+from chipglow.io.sources.arrays import ARRAY_READERS
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.conventions import SI_UNITS
 from chipglow.io.sources.grid import GridSource
-from chipglow.io.sources.mesh import MeshSource
+from chipglow.io.sources.mesh import MESH_READERS, MeshSource
 from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap, metre_per_pixel
 from chipglow.io.tool_section import ToolSection
 from chipglow.quantities import OR_NONE, Declared, FileBeside, Section, Settings, described
@@ -33,13 +26,10 @@ from chipglow.text import commented_yaml, described_by
 
 KINDS: Final[Mapping[str, tuple[str, ...]]] = {
     "movie": (".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif"),
-    "mesh": (*mesh_vtk.KINDS, *mesh_meshio.KINDS, *mesh_tecplot.ENDINGS, ".inp", "d3plot"),
+    "mesh": (*MESH_READERS, "d3plot"),
     "points": lammps_dump.ENDINGS,
-    "grid": (
-        ".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr", ".npy", ".npz", ".mat", ".tif", ".tiff",
-        ".csv", ".txt", ".hdf", ".he5", ".zip",
-    ),
-}  # fmt: skip
+    "grid": tuple(ARRAY_READERS),
+}
 """Kinds of sources by how the file's name ends; most sources of points have to be called so."""
 
 Pixels = Annotated[tuple[float, float], Strict(False)]

@@ -35,12 +35,14 @@ _PART_FIELDS: Final = (
     "region", "region_id", "regionid", "object_id", "objectid", "elementblockids", "block_id",
     "gmsh_physical", "cell_tags",
 )  # fmt: skip
-_READERS: Final[Mapping[str, Callable[[Sequence[Path]], MeshReader]]] = {
+MESH_READERS: Final[Mapping[str, Callable[[Sequence[Path]], MeshReader]]] = {
     **dict.fromkeys(mesh_vtk.KINDS, mesh_vtk.VtkReader),
     **dict.fromkeys(mesh_meshio.KINDS, mesh_meshio.MeshioReader),
     **dict.fromkeys(mesh_tecplot.ENDINGS, mesh_tecplot.TecplotReader),
     ".inp": AbaqusReader,
 }
+"""Readers of meshes by the ending of the file's name; LS-DYNA's d3plot has none."""
+
 _VECTOR: Final = "velocity"
 _COMPONENTS: Final = ("velocity_x", "velocity_y")
 _VECTOR_SIZES: Final = (2, 3)
@@ -162,9 +164,9 @@ class MeshSource(Source):
         required("pyvista", self.path, "mesh", "PyVista")
         suffix = self.path.suffix.lower()
         dyna = suffix in ("", ".d3plot") or "d3plot" in self.path.name.lower()
-        reader = _READERS.get(suffix, DynaReader if dyna else None)
+        reader = MESH_READERS.get(suffix, DynaReader if dyna else None)
         if reader is None:
-            known = " ".join(sorted(_READERS))
+            known = " ".join(sorted(MESH_READERS))
             raise SourceError(
                 f"{self.path}: {suffix} is no mesh, expected d3plot or one of {known}"
             )
