@@ -1,6 +1,6 @@
 """What the readers of cameras' own formats share: bytes that are there, and frames chosen."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -168,45 +168,60 @@ def first_moment(seconds: float) -> tuple[str, ...]:
     return (f"Frame 0 was taken at {when}.",)
 
 
-def even_times(frames: Sequence[int], interval: float) -> NDArray[np.float64]:
-    """Times in s of frames that are as far apart, from the first one of the file on."""
-    return np.asarray(frames, np.float64) * interval
-
-
-def stamped_times(
-    path: Path, stamps: NDArray[np.float64], frames: range, rate: float, remarks: FileRemarks
-) -> NDArray[np.float64]:
-    """Times of frames from their stamps, or from the frame rate where the stamps are no good.
+@dataclass(frozen=True)
+class Timing:
+    """When the frames that are read were taken.
 
     Parameters
     ----------
     path : Path
-        The file.
-    stamps : ndarray
-        Stamps of the frames in s after the first one of the file, shape (frames,).
+        The file, as errors call it.
     frames : range
-        Their numbers.
-    rate : float
-        Frame rate in Hz; 0 if it is not known.
+        Numbers of the frames.
+    interval : float, optional
+        Time between frames in s, if the user says it.
     remarks : FileRemarks
         Takes what had to be assumed.
-
-    Raises
-    ------
-    SourceError
-        If the stamps do not ascend and the frame rate is not known.
     """
-    steps = np.diff(stamps) * np.sign(frames.step)
-    if np.isfinite(stamps).all() and (steps > 0).all():
-        return stamps
-    if not (np.isfinite(rate) and rate > 0):
-        raise SourceError(
-            f"{path}: has neither time stamps that ascend nor a frame rate, give an interval"
+
+    path: Path
+    frames: range
+    interval: float | None
+    remarks: FileRemarks
+
+    def even(self, interval: float) -> NDArray[np.float64]:
+        """Times in s of frames that are as far apart, from the first one of the file on."""
+        return np.asarray(self.frames, np.float64) * interval
+
+    def stamped(self, stamps: NDArray[np.float64] | None, rate: float) -> NDArray[np.float64]:
+        """Times in s from stamps, or from the frame rate where they are no good.
+
+        Parameters
+        ----------
+        stamps : ndarray, optional
+            Stamps of the frames in s after the first one of the file, shape (frames,).
+        rate : float
+            Frame rate in Hz; 0 if it is not known.
+
+        Raises
+        ------
+        SourceError
+            If the stamps do not ascend and the frame rate is not known.
+        """
+        if stamps is not None:
+            steps = np.diff(stamps) * np.sign(self.frames.step)
+            if np.isfinite(stamps).all() and (steps > 0).all():
+                return stamps
+        if not (np.isfinite(rate) and rate > 0):
+            raise SourceError(
+                f"{self.path}: has neither time stamps that ascend nor a frame rate, give an "
+                "interval"
+            )
+        self.remarks.assumptions.append(
+            f"the frames are 1/{rate:g} s apart, as the file says; it has no time stamps that "
+            "ascend."
         )
-    remarks.assumptions.append(
-        f"the frames are 1/{rate:g} s apart, as the file says; it has no time stamps that ascend."
-    )
-    return even_times(frames, 1 / rate)
+        return self.even(1 / rate)
 
 
 def common_exposure(exposures: NDArray[np.float64], remarks: FileRemarks) -> float | None:

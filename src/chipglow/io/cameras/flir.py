@@ -17,13 +17,12 @@ from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
     CutShortError,
+    Timing,
     check_picture,
     chosen_frames,
-    even_times,
     first_moment,
     object_parameters,
     opened,
-    stamped_times,
     text_of,
 )
 from chipglow.io.cameras.remarks import FileRemarks
@@ -109,7 +108,7 @@ def read_flir(path: Path, frames: slice | None = None, interval: float | None = 
     recording = Recording(
         signal=signal,
         quantity="counts",
-        times=_times(path, stamps, fields, chosen, interval, len(places), remarks),
+        times=_times(stamps, fields, len(places), Timing(path, chosen, interval, remarks)),
         camera=_camera(fields),
         saturation=_saturation(fields),
         conversion=_conversion(fields, remarks),
@@ -361,18 +360,11 @@ def _moment(fields: _Fields) -> float:
 
 
 def _times(
-    path: Path,
-    stamps: NDArray[np.float64],
-    fields: _Fields,
-    chosen: range,
-    interval: float | None,
-    count: int,
-    remarks: FileRemarks,
+    stamps: NDArray[np.float64], fields: _Fields, count: int, timing: Timing
 ) -> NDArray[np.float64]:
-    if interval is not None or count == 1:
-        return even_times(chosen, interval or 0.0)
-    rate = fields.number(0x464, "H")
-    return stamped_times(path, np.round(stamps, 3), chosen, rate, remarks)
+    if timing.interval is not None or count == 1:
+        return timing.even(timing.interval or 0.0)
+    return timing.stamped(np.round(stamps, 3), fields.number(0x464, "H"))
 
 
 def _camera(fields: _Fields) -> str:

@@ -11,13 +11,12 @@ from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
     CutShortError,
+    Timing,
     check_picture,
     chosen_frames,
-    even_times,
     layout,
     object_parameters,
     opened,
-    stamped_times,
     text_of,
 )
 from chipglow.io.cameras.remarks import FileRemarks
@@ -103,7 +102,7 @@ def read_ptw(path: Path, frames: slice | None = None, interval: float | None = N
             ).reshape(rows, columns)
         remarks = FileRemarks(notes=_notes(header, skipped))
         remarks.say_cut(header["frames"], whole)
-        times = _times(binary, header, stride, chosen, interval, remarks)
+        times = _times(binary, header, stride, Timing(path, chosen, interval, remarks))
     recording = Recording(
         signal=signal,
         quantity="counts",
@@ -157,36 +156,26 @@ def _lock_in(
 
 
 def _times(
-    binary: Binary,
-    header: dict[str, Any],
-    stride: int,
-    chosen: range,
-    interval: float | None,
-    remarks: FileRemarks,
+    binary: Binary, header: dict[str, Any], stride: int, timing: Timing
 ) -> NDArray[np.float64]:
-    if interval is not None:
-        return even_times(chosen, interval)
+    if timing.interval is not None:
+        return timing.even(timing.interval)
     period = header["period"] if 0 < header["period"] < _LONGEST_PERIOD else None
+    rate = 1 / period if period else 0.0
     if header["frame_header_size"] < _STAMP.itemsize:
-        nowhere = np.full(len(chosen), np.nan)
-        return stamped_times(binary.path, nowhere, chosen, 1 / period if period else 0.0, remarks)
+        return timing.stamped(None, rate)
     last = (binary.size - header["header_size"]) // stride - 1
-    numbers = (0, *chosen, min(last, header["frames"] - 1))
+    numbers = (0, *timing.frames, min(last, header["frames"] - 1))
     stamps = np.array([_stamp(binary, header["header_size"] + n * stride) for n in numbers])
     since = np.mod(stamps[1:] - stamps[0], _DAY)
     since, mean = since[:-1], since[-1] / max(numbers[-1], 1)
     if period is None or not since.any():
-        rate = 1 / period if period else 0.0
-        return stamped_times(binary.path, since, chosen, rate, remarks)
-    return _clocked_times(since, mean, period, chosen, remarks)
+        return timing.stamped(since, rate)
+    return _clocked_times(since, mean, period, timing)
 
 
 def _clocked_times(
-    since: NDArray[np.float64],
-    mean: float,
-    period: float,
-    chosen: range,
-    remarks: FileRemarks,
+    since: NDArray[np.float64], mean: float, period: float, timing: Timing
 ) -> NDArray[np.float64]:
     """Times by the header's period, or by the frames' own stamps where these say something else.
 
@@ -194,20 +183,20 @@ def _clocked_times(
     that of all frames.
     """
     allowed = _STAMPED + _CLOCK * float(since.max())
-    times = even_times(chosen, period)
+    times = timing.even(period)
     # The stamps are whole milliseconds, so that a period that fits them is the finer measure.
     apart = float(np.abs(times - since).max())
     if apart <= allowed:
         return times
     for own in (round(mean / period) * period, mean):
-        evenly = even_times(chosen, own)
+        evenly = timing.even(own)
         if np.abs(evenly - since).max() <= allowed:
-            remarks.assumptions.append(
+            timing.remarks.assumptions.append(
                 f"the frames are {own * 1e6:g} us apart, as their stamps say; the period in the "
                 f"header is {period * 1e6:g} us."
             )
             return evenly
-    remarks.warnings.append(
+    timing.remarks.warnings.append(
         f"the times are from the frame period, {period * 1e6:g} us; the frames' own stamps are up "
         f"to {apart:.3g} s off: frames may be missing."
     )

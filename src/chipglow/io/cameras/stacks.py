@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Recording
 from chipglow.camera.recording import QUANTITIES, Quantity
-from chipglow.io.cameras.binary import check_picture, chosen_frames, even_times
+from chipglow.io.cameras.binary import check_picture, chosen_frames
 from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import (
@@ -206,7 +206,7 @@ def _times(
 ) -> NDArray[np.float64] | None:
     """Times of the chosen frames in s; None if neither the user nor the file says them."""
     if told.interval is not None:
-        return even_times(chosen, told.interval)
+        return np.asarray(chosen, np.float64) * told.interval
     count = one.array.shape[axes.index("time")] if "time" in axes else 1
     if count == 1:
         return np.zeros(1)
