@@ -48,6 +48,7 @@ MOST_PATIENCE: Final = 1800.0
 
 _MOST_FILES: Final = 100_000
 _MOST_ARRAYS: Final = 16
+_MOST_TIMES: Final = 10_000_000
 _LONGEST_HEADER: Final = 10_000_000
 # -P: nothing beside the data is taken for a module.
 _CHILD: Final = ("-P", "-c", "from chipglow.io.sandbox import main; main()")
@@ -193,7 +194,7 @@ class Isolated(Source):
 
     def survey(self) -> Survey:
         """Look at what is there; see `Source.survey`."""
-        with self._sandbox.answers(partial(_survey, self.source)) as answers:
+        with self._sandbox.answers(partial(_survey, self.source), _MOST_TIMES) as answers:
             answer = next(answers)
         return Survey(**{**answer.header, **answer.arrays})
 
