@@ -420,11 +420,11 @@ def test_what_the_command_cannot_do_is_one_line(file, tmp_path, options, message
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("x,y\n1,2\n", "line 1: 'x,y', expected 'x_um,y_um'"),
+        ("x,y\n1,2\n", "line 1: 'x' has no unit, expected one such as x_um"),
         ("x_um,y_um\n1,2\n", "1 points, expected 2 or more"),
-        ("x_um,y_um\n1,2\n3\n", "line 3: '3', expected two numbers"),
-        ("x_um,y_um\n1,2\nnan,3\n", "line 3: expected finite numbers"),
-        ("", "line 1: '', expected 'x_um,y_um'"),
+        ("x_um,y_um\n1,2\n3\n", "line 3: '3', expected 2 numbers"),
+        ("x_um,y_um\n1,2\nnan,3\n", "line 3: 'nan,3', expected 2 numbers"),
+        ("", "expected a first line such as x_um,y_um"),
     ],
 )
 def test_a_file_that_is_no_curve_is_one_error(tmp_path, text, message):

@@ -15,7 +15,7 @@ from chipglow.cli.pictures import write_picture
 from chipglow.cli.times import parse_instant
 from chipglow.drawing.frames import shown_frame
 from chipglow.io import StoredScene, open_scene
-from chipglow.io.contents import holds
+from chipglow.io.measurement_file import holds
 from chipglow.quantities.format import rounded_text
 from chipglow.report import SceneSummary, draw_scene, scene_summary
 from chipglow.scene import ENERGY_UNITS, Raster, Scene, Tool, ToolGeometry

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chipglow.io.polyline_file import read_polyline
+from chipglow.io.column_file import read_polyline
 from chipglow.io.table_file import celsius_text, number_text, write_table_or_dataset
 from chipglow.laboratory.chip.band_profile import BAND_BUDGET, BandProfile
 from chipglow.laboratory.chip.budget_columns import budget_columns, budget_values
@@ -32,8 +32,8 @@ def read_curve(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     Parameters
     ----------
     path : path-like
-        First line ``x_um,y_um``, then a corner of the polyline a line in um, in the coordinates of
-        the measurement.
+        First line ``x_um,y_um``, or another unit of length, then a corner of the polyline a line,
+        in the coordinates of the measurement.
 
     Returns
     -------
@@ -48,13 +48,9 @@ def read_curve(path: str | os.PathLike[str]) -> NDArray[np.float64]:
         If it cannot be read.
     """
     path = Path(path)
-    points = read_polyline(path)
-    if len(points) < 2:
-        raise ValueError(f"{path}: {len(points)} points, expected 2 or more")
-    curve = np.array(points)
-    finite = np.isfinite(curve).all(axis=1)
-    if not finite.all():
-        raise ValueError(f"{path}, line {int(finite.argmin()) + 2}: expected finite numbers")
+    curve, _ = read_polyline(path)
+    if len(curve) < 2:
+        raise ValueError(f"{path}: {len(curve)} points, expected 2 or more")
     return curve
 
 
