@@ -501,7 +501,7 @@ def test_a_measurement_becomes_an_image():
     assert image.footprint == pytest.approx(PITCH)
     assert any("fill factor 1" in note for note in image.notes)
     measurement.data.attrs |= {"fill_factor": 0.81, "psf_order": "detector"}
-    measurement.data.attrs |= {"assumed": "No pixel is saturated.", "doubtful": "A few are old."}
+    measurement.data.attrs |= {"assumed": "No pixel is saturated.", "warnings": "A few are old."}
     told = edge_image(measurement, "m")
     assert told.warnings == ("A few are old.",)
     assert told.footprint == pytest.approx(0.9 * PITCH)

@@ -264,7 +264,7 @@ def test_without_object_parameters_it_is_said_what_is_assumed():
     np.testing.assert_allclose(measured.radiance_temperature(), 900.0, atol=1e-3)
     assert "emissivity of 1" in measured.data.attrs["assumed"]
     assert "lower left corner" in measured.data.attrs["assumed"]
-    assert "not known" in measured.data.attrs["doubtful"]
+    assert "not known" in measured.data.attrs["warnings"]
     assert measured.calibration_uncertainty is None
 
 
@@ -274,7 +274,7 @@ def test_what_the_file_says_is_kept_apart_from_what_was_assumed_and_is_doubtful(
     attributes = measured.data.attrs
     assert attributes["notes"] == "Lens: 25 mm."
     assert "an even rate." in attributes["assumed"].splitlines()
-    assert "a gap." in attributes["doubtful"].splitlines()
+    assert "a gap." in attributes["warnings"].splitlines()
 
 
 def test_radiance_is_taken_as_it_is():
@@ -300,9 +300,9 @@ def test_full_counts_are_doubted_unless_the_saturation_is_known():
     counts = np.full((1, 4, 4), 2000, np.uint16)
     counts[0, :2, 0] = 4095
     doubted = calibrate_recording(recording(counts), LINE)
-    assert "2 values are 4095" in doubted.data.attrs["doubtful"]
+    assert "2 values are 4095" in doubted.data.attrs["warnings"]
     known = calibrate_recording(recording(counts, saturation=4094), LINE)
-    assert "doubtful" not in known.data.attrs
+    assert "warnings" not in known.data.attrs
     assert (known.flags[0, :2, 0] == Flag.SATURATED).all()
 
 

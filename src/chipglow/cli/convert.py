@@ -28,7 +28,7 @@ def convert(
     """Make a measurement of a camera's file."""
     from rich.console import Console
 
-    from chipglow.cli.assumed import say_assumed, say_doubtful
+    from chipglow.cli.assumed import say_assumed, say_warnings
     from chipglow.cli.showing import listed
     from chipglow.cli.showing_measurement import say_measurement
     from chipglow.io import is_measurement, write_measurement
@@ -49,7 +49,7 @@ def convert(
             raise
         console.print(f"\nIt is no measurement yet. {error}")
         say_assumed(recording.assumptions)
-        say_doubtful(recording.warnings)
+        say_warnings(recording.warnings)
         return
     console.print("\nThe measurement:")
     say_measurement(measurement)

@@ -25,7 +25,7 @@ _FLAG_NAMES: Final = {
     Flag.DEAD: "dead",
     Flag.REPLACED: "replaced by neighbours",
 }
-_SAID_APART: Final = ("assumed", "doubtful", "band_lower", "band_upper", "pitch", "tool_")
+_SAID_APART: Final = ("assumed", "warnings", "band_lower", "band_upper", "pitch", "tool_")
 _IN_FACTS: Final = ("integration_time", "lower_limit")
 
 

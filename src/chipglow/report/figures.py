@@ -225,7 +225,7 @@ def point_spread(result: StudyResult) -> Figure | None:
         vmin=-4.0,
         vmax=0.0,
     )
-    _draw_sensor(left, result.camera.pitch)
+    _draw_pixel(left, result.camera.pitch)
     left.set_xlabel("x / µm")
     left.set_ylabel("y / µm")
     left.set_title("a) kernel")
@@ -443,7 +443,7 @@ def _draw_point(axes: Axes, at: float, value: float, colour: str, label: str) ->
     )
 
 
-def _draw_sensor(axes: Axes, pitch: float) -> None:
+def _draw_pixel(axes: Axes, pitch: float) -> None:
     side = pitch * 1e6 / 2
     axes.plot([-side, side, side, -side, -side], [-side, -side, side, side, -side], color="white")
 

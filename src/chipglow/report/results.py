@@ -28,7 +28,7 @@ def results_dataset(result: StudyResult, provenance: Mapping[str, str]) -> xr.Da
     Returns
     -------
     xarray.Dataset
-        Dimensions: ``y``, ``x`` the scene's samples; ``sensor_y``, ``sensor_x`` the pixels;
+        Dimensions: ``y``, ``x`` the scene's samples; ``pixel_y``, ``pixel_x`` the pixels;
         ``instant`` the exposures; ``surface`` the surfaces; ``ridge_point`` along the shear band,
         NaN beyond its end; ``rake_distance`` and ``band_distance`` along the analysis lines;
         ``contact_distance`` up the rake face; ``segment``, ``texture`` and ``pixel_phase`` the
@@ -37,7 +37,7 @@ def results_dataset(result: StudyResult, provenance: Mapping[str, str]) -> xr.Da
     """
     variables = {
         **_scene(result),
-        **_sensors(result),
+        **_pixels(result),
         **_ridges(result),
         **_lines(result),
         **_draws(result),
@@ -148,8 +148,8 @@ def _scene(result: StudyResult) -> dict[str, Any]:
     }
 
 
-def _sensors(result: StudyResult) -> dict[str, Any]:
-    place, surfaces = ("sensor_y", "sensor_x"), result.surfaces.values()
+def _pixels(result: StudyResult) -> dict[str, Any]:
+    place, surfaces = ("pixel_y", "pixel_x"), result.surfaces.values()
     raster = next(iter(surfaces)).errors.raster
     measured = np.stack([s.measurement.radiance_temperature() for s in surfaces])
     flags = np.stack([s.measurement.flags for s in surfaces])
@@ -160,8 +160,8 @@ def _sensors(result: StudyResult) -> dict[str, Any]:
         "error_psf_portion": [s.errors.psf_portion for s in surfaces],
     }
     return {
-        "sensor_y": ("sensor_y", raster.y, {"units": "m"}),
-        "sensor_x": ("sensor_x", raster.x, {"units": "m"}),
+        "pixel_y": ("pixel_y", raster.y, {"units": "m"}),
+        "pixel_x": ("pixel_x", raster.x, {"units": "m"}),
         "radiance_temperature": (("surface", "instant", *place), measured, {"units": "K"}),
         "flags": (("surface", "instant", *place), flags, {"units": "1"}),
         **{

@@ -229,8 +229,8 @@ def _summary(result: SceneErrors, provenance: Mapping[str, str]) -> dict[str, An
 def _dataset(result: SceneErrors, provenance: Mapping[str, str]) -> xr.Dataset:
     """Arrays behind the figures, in SI units, each with a ``units`` attribute."""
     surfaces = list(result.surfaces.values())
-    sensors, kelvin = surfaces[0].errors.raster, {"units": "K"}
-    pixels = ("surface", "sensor_y", "sensor_x")
+    grid, kelvin = surfaces[0].errors.raster, {"units": "K"}
+    pixels = ("surface", "pixel_y", "pixel_x")
     variables: dict[str, Any] = {
         "temperature": (("y", "x"), result.frame.temperature, kelvin),
         "emissivity": (
@@ -266,8 +266,8 @@ def _dataset(result: SceneErrors, provenance: Mapping[str, str]) -> xr.Dataset:
         "exposure": ("exposure", result.starts, {"units": "s"}),
         "y": ("y", result.raster.y, {"units": "m"}),
         "x": ("x", result.raster.x, {"units": "m"}),
-        "sensor_y": ("sensor_y", sensors.y, {"units": "m"}),
-        "sensor_x": ("sensor_x", sensors.x, {"units": "m"}),
+        "pixel_y": ("pixel_y", grid.y, {"units": "m"}),
+        "pixel_x": ("pixel_x", grid.x, {"units": "m"}),
     }
     attributes: dict[str, Any] = {
         "error_reference": result.plan.reference,

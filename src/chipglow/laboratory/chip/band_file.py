@@ -1,29 +1,17 @@
 """Curves through a shear band, and the temperature along them, in files."""
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.io.polyline_file import read_polyline
-from chipglow.io.table_file import celsius_text, number_text, write_table_or_dataset
-from chipglow.laboratory.chip.band_profile import BAND_BUDGET, BandProfile
-from chipglow.laboratory.chip.budget_columns import budget_columns, budget_values
+from chipglow.io.table_file import write_table_or_dataset
+from chipglow.laboratory.chip.band_profile import BandProfile
+from chipglow.laboratory.frame_file import columns_and_rows
 from chipglow.uncertainty import to_xarray
-
-_COLUMNS: Final = (
-    "time_us",
-    "stage",
-    "distance_um",
-    "x_um",
-    "y_um",
-    "radiance_temperature_degC",
-    *budget_columns(BAND_BUDGET),
-)
 
 
 def read_curve(path: str | os.PathLike[str]) -> NDArray[np.float64]:
@@ -78,18 +66,7 @@ def write_band_profile(profile: BandProfile, path: Path) -> None:
     OSError
         If the file cannot be written.
     """
-    write_table_or_dataset(path, _COLUMNS, _rows(profile), lambda: _dataset(profile))
-
-
-def _rows(profile: BandProfile) -> Iterator[tuple[Any, ...]]:
-    budget = budget_values(profile.estimate, BAND_BUDGET)
-    for frame, (time, stage) in enumerate(zip(profile.times, profile.stage, strict=True)):
-        for n in np.flatnonzero(np.isfinite(profile.points[frame, :, 0])):
-            x, y = profile.points[frame, n]
-            places = [f"{1e6 * value:.6g}" for value in (profile.distance[n], x, y)]
-            value = celsius_text(profile.temperature[frame, n])
-            parts = map(number_text, budget[frame, n])
-            yield (f"{1e6 * time:.10g}", stage.value, *places, value, *parts)
+    write_table_or_dataset(path, *columns_and_rows(profile.to_frame()), lambda: _dataset(profile))
 
 
 def _dataset(profile: BandProfile) -> xr.Dataset:
@@ -115,6 +92,6 @@ def _dataset(profile: BandProfile) -> xr.Dataset:
         .assign_attrs(
             width=profile.width,
             assumed="\n".join(profile.assumptions),
-            doubtful="\n".join(profile.warnings),
+            warnings="\n".join(profile.warnings),
         )
     )

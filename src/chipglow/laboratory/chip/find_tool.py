@@ -103,7 +103,7 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
     angle_error, place_error = _jackknife(image, rows, fit)
     angle = atan(fit[1])
     tip_row, tip_seen = _tip_row(image, fit, rows)
-    warnings = _doubts(angle, angle_error, place_error, angles, coarse.prominence, tip_seen)
+    warnings = _warnings(angle, angle_error, place_error, angles, coarse.prominence, tip_seen)
     pitch = raster.spacing
     tool = _placed(replace(shape, rake_angle=angle), raster, fit, tip_row)
     uncertainty = ToolUncertainty(
@@ -364,7 +364,7 @@ def _up_the_face(tool: PlacedTool, raster: Raster, row: float) -> float:
     return (y - float(tool.rake_foot[1])) / cos(tool.rake_angle)
 
 
-def _doubts(
+def _warnings(
     angle: float,
     angle_error: float,
     place_error: float,

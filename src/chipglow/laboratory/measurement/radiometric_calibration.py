@@ -110,7 +110,7 @@ def calibrate_recording(
     Measurement
         Pixels over the recording's saturation, or hotter than the calibration reaches, are
         `Flag.SATURATED`; colder ones `Flag.UNDER_RANGE`. Attributes, each with a sentence a line:
-        ``notes`` (what the file says), ``assumed`` and ``doubtful``.
+        ``notes`` (what the file says), ``assumed`` and ``warnings``.
 
     Raises
     ------
@@ -342,7 +342,7 @@ def _attributes(
         "object_parameters": _told(recording),
         "notes": "\n".join(recording.notes),
         "assumed": "\n".join(_assumed(recording, calibration, position)),
-        "doubtful": "\n".join(_doubtful(recording, calibration, errors_known)),
+        "warnings": "\n".join(_warnings(recording, calibration, errors_known)),
     }
     return {name: value for name, value in attributes.items() if value not in (None, "")}
 
@@ -397,7 +397,7 @@ def _assumed(
         yield "The origin of coordinates is the image's lower left corner: no tip was given."
 
 
-def _doubtful(
+def _warnings(
     recording: Recording, calibration: Calibration | None, errors_known: bool
 ) -> Iterator[str]:
     yield from recording.warnings

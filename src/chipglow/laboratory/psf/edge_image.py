@@ -110,7 +110,7 @@ def edge_image(
         footprint=image.pitch * sqrt(float(attributes.get("fill_factor", 1.0))),
         wavelength=(band.lower + band.upper) / 2 if band else None,
         notes=tuple(notes),
-        warnings=tuple(str(attributes.get("doubtful", "")).splitlines()),
+        warnings=tuple(str(attributes.get("warnings", "")).splitlines()),
     )
 
 
