@@ -241,8 +241,8 @@ def test_how_sure_the_best_is(cold, hot, stated):
         # 4000 draws: 0.8 %.
         assert place.confidence == pytest.approx(expected, abs=0.025)
         assert not place.is_sure
-        assert "cannot be told apart (cold is nearest" in place.sentence
-    assert result.statement.startswith("The sets cannot be told apart")
+        assert "cannot be distinguished (cold is nearest" in place.sentence
+    assert result.statement.startswith("The sets cannot be distinguished")
 
 
 def test_a_single_simulation_has_a_statement_too():

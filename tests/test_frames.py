@@ -5,8 +5,8 @@ import pandas as pd
 from rich.console import Console
 
 from chipglow.cli.tables import screen_table
-from chipglow.laboratory.frame_file import columns_and_rows
 from chipglow.laboratory.registration import fit_points
+from chipglow.laboratory.result_file import columns_and_rows
 from chipglow.scene import Raster
 
 RASTER = Raster(0.0, 1e-3, 1e-5, 100, 100)

@@ -15,7 +15,7 @@ from chipglow.camera import (
     fit_linear,
     replace_bad_pixels,
 )
-from chipglow.laboratory.measurement import ImagePosition, calibrate_recording, flag_shares
+from chipglow.laboratory.measurement import ImagePosition, calibrate_recording, flag_fractions
 from chipglow.radiometry import Band, ObjectParameters
 
 BAND = Band(3.8e-6, 5.1e-6)
@@ -193,7 +193,7 @@ def test_the_range_of_calibration_and_detector_is_flagged():
         np.isnan(measured.radiance_temperature()[0, 0]).tolist()
         == [True] * 2 + [False] * 2 + [True] * 2
     )
-    assert flag_shares(measured)[Flag.SATURATED] == pytest.approx(1 / 3)
+    assert flag_fractions(measured)[Flag.SATURATED] == pytest.approx(1 / 3)
     # At the detector's limit, within the calibrated range.
     measured = calibrate_recording(recording(counts, saturation=counts[0, 0, 2]), LINE)
     assert measured.flags[0, 0, 3] == over

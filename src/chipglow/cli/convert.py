@@ -39,8 +39,8 @@ def convert(
     description = load_description(source, settings or ())
     recording = load_recording(description)
     console = Console(highlight=False, markup=False, soft_wrap=True)
-    told = bool(settings) or source.suffix.lower() in (".yaml", ".yml")
-    console.print("The file, and what you said of it:" if told else "The file says:")
+    given = bool(settings) or source.suffix.lower() in (".yaml", ".yml")
+    console.print("The file, and what you said of it:" if given else "The file says:")
     console.print(listed(_facts(recording)))
     try:
         measurement = measurement_of(description, recording, str(source))
@@ -78,11 +78,11 @@ def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:
         yield "pitch", f"{1e6 * recording.pitch:.6g} µm"
     if recording.conversion is not None:
         yield "conversion", "the maker's, of unknown uncertainty"
-    told = recording.object_parameters
-    if told is not None:
-        yield "emissivity", f"{told.emissivity:g}"
-        yield "reflected", f"{told.reflected - 273.15:.2f} °C"
-        yield "transmittance", f"{told.transmittance:g}"
-        yield "atmosphere", f"{told.atmosphere - 273.15:.2f} °C"
+    stated = recording.object_parameters
+    if stated is not None:
+        yield "emissivity", f"{stated.emissivity:g}"
+        yield "reflected", f"{stated.reflected - 273.15:.2f} °C"
+        yield "transmittance", f"{stated.transmittance:g}"
+        yield "atmosphere", f"{stated.atmosphere - 273.15:.2f} °C"
     for note in recording.notes:
         yield "note", note

@@ -173,7 +173,7 @@ def _print_study(console: "Console", found: "RegionEmissivities") -> None:
 
 def _write(found: "RegionEmissivities", out: Path | None, table: Path | None) -> None:
     from chipglow.laboratory.emissivity import write_emissivity
-    from chipglow.laboratory.frame_file import write_frame
+    from chipglow.laboratory.result_file import write_frame
 
     if out is not None:
         write_emissivity(found, out)

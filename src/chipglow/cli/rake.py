@@ -54,10 +54,10 @@ def rake(
         ToolUncertainty,
         chosen_tool,
         rake_grid,
-        write_rake_grid,
     )
     from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
     from chipglow.laboratory.measurement import load_measurement
+    from chipglow.laboratory.result_file import write_result
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import LENGTH
 
@@ -79,7 +79,7 @@ def rake(
     say_assumed(chosen.assumptions)
     say_warnings((*chosen.warnings, *grid.warnings))
     if out is not None:
-        write_rake_grid(grid, out)
+        write_result(grid, out)
         print(out)
     if plot is not None:
         write_picture(draw_rake_grid(measured, grid), plot)

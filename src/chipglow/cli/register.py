@@ -116,7 +116,6 @@ def register(
     from chipglow.cli.assumed import say_assumed, say_of_measurements, say_warnings
     from chipglow.cli.pictures import write_picture
     from chipglow.laboratory.chip import tool_of
-    from chipglow.laboratory.frame_file import write_frame
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.registration import (
         align_recordings,
@@ -128,6 +127,7 @@ def register(
     )
     from chipglow.laboratory.registration.figure import blink_pictures, draw_registration
     from chipglow.laboratory.registration.picture_file import write_blink
+    from chipglow.laboratory.result_file import write_frame
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import TIME
 

@@ -71,10 +71,10 @@ def shearband(
         band_profile,
         chosen_tool,
         read_curve,
-        write_band_profile,
     )
     from chipglow.laboratory.chip.band_figure import draw_band_profile
     from chipglow.laboratory.measurement import load_measurement
+    from chipglow.laboratory.result_file import write_result
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import LENGTH
 
@@ -102,7 +102,7 @@ def shearband(
     say_assumed((*chosen.assumptions, *profile.assumptions))
     say_warnings((*chosen.warnings, *profile.warnings))
     if out is not None:
-        write_band_profile(profile, out)
+        write_result(profile, out)
         print(out)
     if plot is not None:
         write_picture(draw_band_profile(measured, chosen.tool, profile), plot)

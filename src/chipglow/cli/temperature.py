@@ -74,8 +74,8 @@ def temperature(
 
     from chipglow.cli.assumed import say_assumed, say_of_measurements, say_warnings
     from chipglow.laboratory.emissivity import load_regions, true_temperatures
-    from chipglow.laboratory.frame_file import write_frame
     from chipglow.laboratory.measurement import load_calibration, load_measurement
+    from chipglow.laboratory.result_file import write_frame
 
     named = load_regions(regions)
     surroundings = _surroundings(reflected, reflected_uncertainty)

@@ -17,7 +17,7 @@ from chipglow.scene import Frame, Line, Material, Raster, Scene, Tool
 from chipglow.surface import EmissivityField, Surface
 
 Progress = Callable[[str, float], None]
-"""Told what is being done and which part of it, from 0 to 1, is done."""
+"""Called with what is being done and which part of it, from 0 to 1, is done."""
 
 CAUSES = ("exposure", "texture", "pixel phase")
 """What is drawn anew: the axes of every `Distribution`."""
@@ -200,7 +200,7 @@ def scene_errors(
     plan : ScenePlan
         What to analyse.
     progress : callable, optional
-        Told what is being done and how far it is.
+        Called with what is being done and how far it is.
     missing : sequence of str
         What of another analysis is not there, for the report.
 

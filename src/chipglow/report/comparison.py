@@ -38,7 +38,8 @@ class Row:
     one_draw : float or None
         What the paper's procedure gives, from one frame.
     uncertainty : float or None
-        Standard uncertainty of `here` where it was not drawn, if it is known.
+        Standard uncertainty of `here` where it was not drawn, or how it varies over time or from
+        segment to segment, if it is known.
     """
 
     key: str
@@ -80,6 +81,16 @@ class Row:
             return self._text(self.here)
         number, spread = (quantity_text(value, "", self.decimals) for value in (self.here, scatter))
         return f"{number} ± {spread} {self.unit}".strip()
+
+    @property
+    def value_text(self) -> str:
+        """Our figure alone with its unit, or a dash."""
+        return self._text(self.here)
+
+    @property
+    def spread_text(self) -> str:
+        """Its scatter or uncertainty with its unit, or a dash."""
+        return self._text(self.uncertainty)
 
     @property
     def range_text(self) -> str:
@@ -184,15 +195,15 @@ def _error_rows(result: StudyResult) -> Iterator[Row]:
         "rake",
         f"Error at the rake face, mid-contact ({on_rake})",
         rake.face,
-        (PAPER.rake_error, PAPER.rake_psf_share),
-        (evidence.rake_error(result), evidence.rake_share(result)),
+        (PAPER.rake_error, PAPER.rake_psf_fraction),
+        (evidence.rake_error(result), evidence.rake_fraction(result)),
     )
     yield from _headline(
         result,
         "rake_extremum",
         f"Most negative error within two pixels of the rake face ({on_rake})",
         rake.extremum,
-        (PAPER.rake_error, PAPER.rake_psf_share),
+        (PAPER.rake_error, PAPER.rake_psf_fraction),
         (
             "On the same line. The error rises steeply to either side of its extremum, which "
             "moves with the pixels; read at the face it is often less.",
@@ -212,15 +223,15 @@ def _error_rows(result: StudyResult) -> Iterator[Row]:
         "band",
         f"Error at the centre of the shear band, by the ridge of strain rate ({on_band})",
         band.centre,
-        (PAPER.band_error, PAPER.band_psf_share),
-        (evidence.band_error(result), evidence.band_share(result)),
+        (PAPER.band_error, PAPER.band_psf_fraction),
+        (evidence.band_error(result), evidence.band_fraction(result)),
     )
     yield from _headline(
         result,
         "band_measured",
         f"The same, by the ridge of measured temperature ({on_band})",
         band.measured_centre,
-        (PAPER.band_error, PAPER.band_psf_share),
+        (PAPER.band_error, PAPER.band_psf_fraction),
         (
             "Where the measured temperature is greatest within two pixels of the ridge of strain "
             "rate: the centre for somebody who has the image alone.",
@@ -295,19 +306,19 @@ def _period_rows(result: StudyResult) -> list[Row]:
             "elastic energy lost by sharing dilation: what the solver's grid dissipates.",
         ),
         _own(
-            "kinetic_share_percent",
+            "kinetic_fraction_percent",
             "Kinetic energy of the scaled mass over the work, at most",
             "%",
-            inert.kinetic_share * 100,
+            inert.kinetic_fraction * 100,
             2,
             "Its change since the start, after the build-up: how much the scaling of the mass can "
             f"matter. {inert.warning}".strip(),
         ),
         _own(
-            "inertia_force_share_percent",
+            "inertia_force_fraction_percent",
             "Momentum flux of the scaled mass over the cutting force",
             "%",
-            inert.force_share * 100,
+            inert.force_fraction * 100,
             2,
             "Density times speed squared times uncut chip thickness: what stops it is part of the "
             f"force. The true mass has 1/{inert.mass_scaling:g} of it.",
@@ -386,17 +397,17 @@ def _headline(
     headline = result.draws.headlines.get(name)
     paper = paper if result.plan.beside_paper else (None, None)
     error = headline.error if headline else None
-    share = headline.psf_share if headline else None
+    share = headline.psf_fraction if headline else None
     yield _drawn(
         f"{name}_error_degC", quantity, "°C", paper[0], error, one_draw.error, explanations[0]
     )
     yield _drawn(
-        f"{name}_psf_share_percent",
+        f"{name}_psf_fraction_percent",
         "PSF's portion of it",
         "%",
         paper[1],
         share,
-        one_draw.psf_share,
+        one_draw.psf_fraction,
         explanations[1],
         scale=100.0,
     )

@@ -193,8 +193,8 @@ def error_lines(result: StudyResult) -> Figure:
 def _draw_papers_points(left: Axes, right: Axes) -> None:
     """The figures that the paper states, on the lines of its Figure 11."""
     for axes, error, share in (
-        (left, PAPER.rake_error.value, PAPER.rake_psf_share.value),
-        (right, PAPER.band_error.value, PAPER.band_psf_share.value),
+        (left, PAPER.rake_error.value, PAPER.rake_psf_fraction.value),
+        (right, PAPER.band_error.value, PAPER.band_psf_fraction.value),
     ):
         _draw_point(axes, 0.0, error, BLUE, "the paper's error")
         _draw_point(axes, 0.0, error * share, VERMILLION, "the paper's PSF portion")
@@ -229,7 +229,7 @@ def point_spread(result: StudyResult) -> Figure | None:
     left.set_xlabel("x / µm")
     left.set_ylabel("y / µm")
     left.set_title("a) kernel")
-    drawing.colour_bar(figure, picture, left, "log₁₀ of the share over the greatest")
+    drawing.colour_bar(figure, picture, left, "log₁₀ of the fraction of the greatest")
     _draw_section(right, psf, density[middle, near], spacing)
     return figure
 
@@ -348,7 +348,7 @@ def _sensitivity_panels(result: StudyResult) -> tuple[_SensitivityPanel, ...]:
     own = {}
     for name in ("rake", "band"):
         headline = result.draws.headlines.get(name)
-        share = headline.psf_share if headline else None
+        share = headline.psf_fraction if headline else None
         own[name] = (headline.error.mean if headline else None, share.mean if share else None)
     return (
         _SensitivityPanel(
@@ -367,17 +367,17 @@ def _sensitivity_panels(result: StudyResult) -> tuple[_SensitivityPanel, ...]:
         ),
         _SensitivityPanel(
             "c) PSF's portion, rake face",
-            lambda series: series.psf_share("rake"),
+            lambda series: series.psf_fraction("rake"),
             100,
             own["rake"][1],
-            PAPER.rake_psf_share.value,
+            PAPER.rake_psf_fraction.value,
         ),
         _SensitivityPanel(
             "d) PSF's portion, band's centre",
-            lambda series: series.psf_share("band"),
+            lambda series: series.psf_fraction("band"),
             100,
             own["band"][1],
-            PAPER.band_psf_share.value,
+            PAPER.band_psf_fraction.value,
         ),
     )
 
@@ -464,7 +464,7 @@ def _draw_section(
     )
     axes.set_ylim(0.0)
     axes.set_xlabel("x / µm")
-    axes.set_ylabel("share over the greatest")
+    axes.set_ylabel("fraction of the greatest")
     axes.set_title("b) cross-section")
 
 

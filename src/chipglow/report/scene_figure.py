@@ -46,8 +46,8 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
     has_quality = frame.quality is not None and bool(
         frame.quality[frame.material != Material.VOID].any()
     )
-    told_apart = tool is not None or bool((frame.material != Material.WORKPIECE).any())
-    rows = ceil((len(panels) + told_apart + has_quality) / 2)
+    has_kinds = tool is not None or bool((frame.material != Material.WORKPIECE).any())
+    rows = ceil((len(panels) + has_kinds + has_quality) / 2)
     histogram_rows = ceil(len(panels) / 2)
     with drawing.style():
         images = rows * (_panel_height(raster) + _AROUND) + _AROUND
@@ -63,7 +63,7 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
             panel.draw(top, axes, raster, tool)
             if panel.label == _SPEED:
                 _draw_arrows(axes, frame, raster)
-        if told_apart:
+        if has_kinds:
             _draw_material(top, next(places), frame, raster, tool)
         if has_quality and frame.quality is not None:
             _draw_quality(top, next(places), frame, frame.quality, raster, tool)
@@ -76,7 +76,7 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
         for axes in below.flat[len(panels) :]:
             axes.remove()
         whose = " of the workpiece's samples" if histogram_rows > 1 else ""
-        bottom.supylabel(f"share{whose} / %", fontsize=9.5)
+        bottom.supylabel(f"fraction{whose} / %", fontsize=9.5)
     return figure
 
 

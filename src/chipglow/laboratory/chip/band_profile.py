@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 from scipy.ndimage import map_coordinates
@@ -26,7 +27,7 @@ from chipglow.laboratory.chip.tool_position import (
 )
 from chipglow.scene import Line, Tool, sample
 from chipglow.text.remarks import Remarks
-from chipglow.uncertainty import Estimate
+from chipglow.uncertainty import Estimate, to_xarray
 
 POSITION: Final = "position"
 """Name of the component of uncertainty that the place of a curve makes."""
@@ -167,6 +168,42 @@ class BandProfile:
             **budget_columns(self.estimate, BAND_BUDGET),
         }
         return pd.DataFrame(columns)[there].reset_index(drop=True)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Every point of each frame's band as arrays in SI units.
+
+        Returns
+        -------
+        xarray.Dataset
+            Of the dimensions (time, distance): ``temperature`` with its components as
+            `chipglow.uncertainty.from_xarray` reads them, ``standard_uncertainty``, ``x`` and
+            ``y``; ``offset`` and ``stage`` of each frame; and the reference.
+        """
+        both = ("time", "distance")
+        data = to_xarray(self.estimate, "temperature", both, "K")
+        data["temperature"].attrs["long_name"] = "radiance temperature"
+        metres = {"units": "m"}
+        return (
+            data.assign(
+                standard_uncertainty=(both, self.estimate.standard_uncertainty, {"units": "K"}),
+                x=(both, self.points[..., 0], metres),
+                y=(both, self.points[..., 1], metres),
+                offset=("time", self.offset, metres),
+                stage=("time", [stage.value for stage in self.stage]),
+                reference_x=("reference_distance", self.reference.points[:, 0], metres),
+                reference_y=("reference_distance", self.reference.points[:, 1], metres),
+            )
+            .assign_coords(
+                time=("time", self.times, {"units": "s"}),
+                distance=("distance", self.distance, metres),
+                reference_distance=("reference_distance", self.reference.distance, metres),
+            )
+            .assign_attrs(
+                width=self.width,
+                assumed="\n".join(self.assumptions),
+                warnings="\n".join(self.warnings),
+            )
+        )
 
     def stage_frame(self) -> pd.DataFrame:
         """Each frame's band, a row each.

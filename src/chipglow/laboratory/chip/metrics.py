@@ -142,7 +142,7 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     Parameters
     ----------
     scene : Scene
-        The scene; it must tell its tool. Where it has a force history, that gives the period.
+        The scene; it must state its tool. Where it has a force history, that gives the period.
     feed : float, optional
         Uncut chip thickness in m; by default it is read from the workpiece at the left of the
         view: from the material coordinates of its free surface where the scene has them, else
@@ -151,7 +151,7 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     Raises
     ------
     ValueError
-        If the scene tells no tool, or the feed is not positive.
+        If the scene states no tool, or the feed is not positive.
 
     Notes
     -----
@@ -165,7 +165,7 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     """
     tool = scene.tool
     if tool is None:
-        raise ValueError("scene: it does not tell its tool, which the rake face needs")
+        raise ValueError("scene: it does not state its tool, which the rake face needs")
     if feed is not None and not feed > 0:
         raise ValueError(f"feed is {feed!r}, expected over 0 m")
     frames = _frame_numbers(scene)

@@ -8,13 +8,18 @@ from typing import Final
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from numpy.typing import NDArray
 from scipy import sparse
 
 from chipglow.camera import UNUSABLE, Measurement
 from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage
-from chipglow.laboratory.chip.budget_columns import budget_columns, celsius
+from chipglow.laboratory.chip.budget_columns import (
+    budget_columns,
+    celsius,
+    known_uncertainty,
+)
 from chipglow.laboratory.chip.frame_scatter import FRAMES, FrameScatter
 from chipglow.laboratory.chip.frames import frame_numbers
 from chipglow.laboratory.chip.tool_position import (
@@ -24,7 +29,8 @@ from chipglow.laboratory.chip.tool_position import (
     tool_in,
 )
 from chipglow.scene import Raster, Tool
-from chipglow.uncertainty import Component, Estimate
+from chipglow.scene.tool_attributes import tool_attributes
+from chipglow.uncertainty import Component, Estimate, to_xarray
 
 PIXELS: Final = 3.0
 """Side of the paper's squares in pixels."""
@@ -109,8 +115,8 @@ class RakeGrid:
     def frame_estimate(self) -> Estimate:
         """Mean of `mean` over the frames in which a square is usable in K, shape (m, n).
 
-        The component ``frames`` is what they tell of their mean (`FrameScatter`): what differs
-        from frame to frame, the pixels' noise included. One frame tells nothing of it.
+        The component ``frames`` is what they show of their mean (`FrameScatter`): what differs
+        from frame to frame, the pixels' noise included. One frame shows nothing of it.
         """
         there = Estimate(
             np.nan_to_num(self.mean),
@@ -156,6 +162,33 @@ class RakeGrid:
                 "usable_pixels": self.count.ravel(),
                 **budget_columns(self.estimate, RAKE_BUDGET),
             }
+        )
+
+    def to_dataset(self) -> xr.Dataset:
+        """Every square of every frame as arrays in SI units.
+
+        Returns
+        -------
+        xarray.Dataset
+            Of the dimensions (time, depth, along): ``mean`` with its components as
+            `chipglow.uncertainty.from_xarray` reads them, ``standard_uncertainty``, ``deviation``
+            and ``count``; and the tool as a scene has it.
+        """
+        dimensions = ("time", "depth", "along")
+        data = to_xarray(self.estimate, "mean", dimensions, "K")
+        data["mean"].attrs["long_name"] = "radiance temperature"
+        return (
+            data.assign(
+                standard_uncertainty=(dimensions, known_uncertainty(self.estimate), {"units": "K"}),
+                deviation=(dimensions, self.deviation, {"units": "K"}),
+                count=(dimensions, self.count, {"units": "1"}),
+            )
+            .assign_coords(
+                time=("time", self.times, {"units": "s"}),
+                depth=("depth", self.depth, {"units": "m"}),
+                along=("along", self.along, {"units": "m"}),
+            )
+            .assign_attrs(size=self.size, **tool_attributes(self.tool))
         )
 
     def mean_frame(self) -> pd.DataFrame:

@@ -123,7 +123,7 @@ class PlaceResult:
         if self.is_sure:
             return f"{_upper(self.place)} {best.label} fits best (in {how}): it is {what}; {rest}."
         return (
-            f"{_upper(self.place)} the sets cannot be told apart ({best.label} is nearest, in "
+            f"{_upper(self.place)} the sets cannot be distinguished ({best.label} is nearest, in "
             f"{how}): {best.label} is {what}; {rest}."
         )
 
@@ -266,7 +266,7 @@ class Comparison:
                 parts.append(f"{label} fits best {'; '.join(where)}.")
         unsure = [r.place.rstrip(",") for r in self.places if not r.is_sure]
         if unsure:
-            parts.append(f"The sets cannot be told apart {'; '.join(unsure)}.")
+            parts.append(f"The sets cannot be distinguished {'; '.join(unsure)}.")
         return " ".join(parts)
 
 

@@ -8,8 +8,8 @@ from typing import Any
 from chipglow.camera import Measurement
 from chipglow.io.atomic import RESULT_MARK
 from chipglow.laboratory.comparison.comparison import Comparison
-from chipglow.laboratory.frame_file import write_frame
 from chipglow.laboratory.measurement import load_measurement
+from chipglow.laboratory.result_file import write_frame
 
 
 def labelled_simulations(paths: Iterable[str | Path]) -> dict[str, Measurement]:

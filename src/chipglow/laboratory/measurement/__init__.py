@@ -26,7 +26,7 @@ from chipglow.laboratory.measurement.description import (
 from chipglow.laboratory.measurement.radiometric_calibration import (
     ImagePosition,
     calibrate_recording,
-    flag_shares,
+    flag_fractions,
     repaired_signal,
 )
 from chipglow.laboratory.measurement.summary import MeasurementSummary, measurement_summary
@@ -41,7 +41,7 @@ __all__ = [
     "calibrate_blackbodies",
     "calibrate_recording",
     "calibration_text",
-    "flag_shares",
+    "flag_fractions",
     "load_calibration",
     "load_description",
     "load_measurement",

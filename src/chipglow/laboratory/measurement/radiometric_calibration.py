@@ -87,7 +87,7 @@ def calibrate_recording(
 
     Counts become radiance by the calibration, which needs no object parameters. Radiance is taken
     as the camera received it. Temperatures become the radiance that the camera received: what it
-    was told of the object is taken back (`ObjectParameters.apparent_radiance`).
+    was set to for the object is taken back (`ObjectParameters.apparent_radiance`).
 
     Parameters
     ----------
@@ -249,7 +249,7 @@ def _develop_frames(
     non_uniformity: NonUniformity | None,
     bad_pixels: NDArray[np.bool_] | None,
 ) -> _Developed:
-    """Radiance in 32 bits, which hold more than counts can tell, with flags."""
+    """Radiance in 32 bits, which hold more than counts do, with flags."""
     signal, flags = repaired_signal(recording, non_uniformity, bad_pixels)
     radiance = _radiance(recording, calibration, band, signal)
     if calibration is not None and calibration.highest < np.inf:
@@ -322,8 +322,8 @@ def _radiance(
         return calibration.radiance(signal)
     if recording.quantity == "radiance":
         return signal
-    told = recording.object_parameters or ObjectParameters()
-    return told.apparent_radiance(signal, band)
+    settings = recording.object_parameters or ObjectParameters()
+    return settings.apparent_radiance(signal, band)
 
 
 def _attributes(
@@ -354,9 +354,9 @@ def _known(recording: Recording, calibration: Calibration | None, name: str) -> 
 
 
 def _told(recording: Recording) -> str | None:
-    """What the camera was told of the object, and what became of it."""
-    told = recording.object_parameters
-    if told is None:
+    """What the camera was set to for the object, and what became of it."""
+    settings = recording.object_parameters
+    if settings is None:
         return None
     became = {
         "counts": "counts do not depend on it",
@@ -364,9 +364,9 @@ def _told(recording: Recording) -> str | None:
         "temperature": "taken back",
     }
     return (
-        f"emissivity {told.emissivity:g}, reflected {told.reflected - 273.15:g} degC, "
-        f"transmittance {told.transmittance:g}, atmosphere {told.atmosphere - 273.15:g} degC: "
-        f"{became[recording.quantity]}"
+        f"emissivity {settings.emissivity:g}, reflected {settings.reflected - 273.15:g} degC, "
+        f"transmittance {settings.transmittance:g}, "
+        f"atmosphere {settings.atmosphere - 273.15:g} degC: {became[recording.quantity]}"
     )
 
 
@@ -374,8 +374,8 @@ def _assumed(
     recording: Recording, calibration: Calibration | None, position: ImagePosition
 ) -> Iterator[str]:
     yield from recording.assumptions
-    told = recording.object_parameters
-    if recording.quantity == "temperature" and told is None:
+    settings = recording.object_parameters
+    if recording.quantity == "temperature" and settings is None:
         yield (
             "The temperatures are radiance temperatures, as with an emissivity of 1: the file says "
             "nothing of the object."
@@ -416,7 +416,7 @@ def _warnings(
             )
 
 
-def flag_shares(measurement: Measurement) -> dict[Flag, float]:
+def flag_fractions(measurement: Measurement) -> dict[Flag, float]:
     """Share of the pixels of all frames that has each flag.
 
     Parameters

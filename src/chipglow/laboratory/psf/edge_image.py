@@ -177,7 +177,7 @@ def _mean_image(
 ) -> EdgeImage:
     """Mean and flags of a region of frames."""
     part = region or np.s_[:, :]
-    told = np.bitwise_or.reduce(flags, axis=0)[part]
+    found = np.bitwise_or.reduce(flags, axis=0)[part]
     radiance = np.asarray(frames.mean(axis=0)[part], np.float64)
     if min(radiance.shape) < 8:
         raise ValueError(
@@ -188,9 +188,9 @@ def _mean_image(
         radiance,
         raster.x[part[1]],
         raster.y[part[0]],
-        ((told & (Flag.DEAD | Flag.REPLACED)) != 0) | ~np.isfinite(radiance),
-        (told & Flag.SATURATED) != 0,
-        (told & Flag.UNDER_RANGE) != 0,
+        ((found & (Flag.DEAD | Flag.REPLACED)) != 0) | ~np.isfinite(radiance),
+        (found & Flag.SATURATED) != 0,
+        (found & Flag.UNDER_RANGE) != 0,
         raster.spacing,
         None,
         name,
@@ -210,7 +210,7 @@ def _notes(measurement: Measurement) -> tuple[str, ...]:
 
 
 def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
-    """Find the edge in an image, and the pixels that tell of it.
+    """Find the edge in an image, and the pixels that show it.
 
     Where pixels are saturated or under range, all pixels from there on outward are left
     out: to leave out only those whose noise goes over the limit would shift the mean of the others.
@@ -297,7 +297,7 @@ def _check_edge(pixels: EdgePixels, quick: ModelFit) -> None:
 
 
 def _piled_up(image: EdgeImage) -> NDArray[np.bool_]:
-    """Pixels at a limit that no flag tells: many of just the greatest value, among noisy ones."""
+    """Pixels at a limit that no flag marks: many of just the greatest value, among noisy ones."""
     values, counts = np.unique(image.radiance[image.usable], return_counts=True)
     if values.size < 3:
         return np.zeros_like(image.dead)

@@ -141,5 +141,5 @@ def _draw_apertures(axes: Axes, found: KnifeEdge) -> None:
     axes.set_xscale("log")
     axes.set_title("size-of-source effect: signal in the middle of an aperture")
     axes.set_xlabel("diameter / µm")
-    axes.set_ylabel("share of an endless source / %")
+    axes.set_ylabel("fraction of an endless source / %")
     axes.legend(loc="lower right")

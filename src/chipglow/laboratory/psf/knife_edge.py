@@ -273,7 +273,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
         Images of a straight edge, best of several orientations.
     apertures : sequence of ApertureImage, optional
         Images of round apertures of several diameters before one source: how much brighter the
-        middle of a large one is tells of the tails.
+        middle of a large one is shows the tails.
 
     Raises
     ------
@@ -322,7 +322,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
 def _models(
     images: Sequence[EdgeImage], edges: Sequence[EdgePixels]
 ) -> tuple[list[PSFModel], list[str]]:
-    """Models that the images can tell apart, and what is assumed with them."""
+    """Models that the images can distinguish, and what is assumed with them."""
     models: list[PSFModel] = [
         GaussianModel(),
         GaussianTailModel(),
@@ -333,7 +333,7 @@ def _models(
     wavelength = images[0].wavelength
     if wavelength is None:
         assumptions.append(
-            "diffraction was not tried: the measurement does not tell the limits of its band."
+            "diffraction was not tried: the measurement does not state the limits of its band."
         )
     else:
         models.append(AnnularModel(wavelength))
@@ -411,7 +411,7 @@ def _edge_warnings(best: ModelFit, k: int, result: EdgeResult) -> list[str]:
     if short < _PLATEAU * result.line_fwhm:
         warnings.append(
             f"{name}: only {short * 1e6:.3g} um of one side of the edge are seen, under "
-            f"{_PLATEAU:g} widths: tails and brightness of the side cannot be told apart."
+            f"{_PLATEAU:g} widths: tails and brightness of the side cannot be distinguished."
         )
     return warnings
 

@@ -213,7 +213,7 @@ def fit_model(
     edges : sequence of EdgePixels
         One or more edges.
     apertures : ApertureSignals, optional
-        Signals of apertures, which tell of the tails.
+        Signals of apertures, which show the tails.
     start : ModelFit, optional
         An earlier fit of the same model to begin with.
     tolerance : float

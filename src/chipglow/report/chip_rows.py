@@ -1,52 +1,12 @@
 """The chip's metrics as the report's second table."""
 
-from dataclasses import dataclass
 from math import degrees, isfinite, nan
 
-from chipglow.laboratory.chip.metrics import ChipMetrics
-from chipglow.quantities.format import quantity_text
+from chipglow.laboratory.chip import ChipMetrics
+from chipglow.report.comparison import Row
 
 
-@dataclass(frozen=True)
-class ChipRow:
-    """One quantity of the chip.
-
-    Parameters
-    ----------
-    key : str
-        Name for scripts, with the unit at its end.
-    quantity : str
-        What it is.
-    unit : str
-        Unit of the numbers, as printed.
-    value, spread : float or None
-        The number and its spread or uncertainty; None where it is unknown.
-    decimals : int
-        Decimals worth printing.
-    explanation : str
-        How it is measured.
-    """
-
-    key: str
-    quantity: str
-    unit: str
-    value: float | None
-    spread: float | None
-    decimals: int
-    explanation: str
-
-    @property
-    def value_text(self) -> str:
-        """The number with its unit, or a dash."""
-        return quantity_text(self.value, self.unit, self.decimals)
-
-    @property
-    def spread_text(self) -> str:
-        """The spread with its unit, or a dash."""
-        return quantity_text(self.spread, self.unit, self.decimals)
-
-
-def chip_rows(chip: ChipMetrics) -> list[ChipRow]:
+def chip_rows(chip: ChipMetrics) -> list[Row]:
     """What describes the chip, in the units of the report.
 
     Parameters
@@ -57,7 +17,7 @@ def chip_rows(chip: ChipMetrics) -> list[ChipRow]:
     return [*_segment_rows(chip), *_thickness_rows(chip), *_contact_rows(chip), *_band_rows(chip)]
 
 
-def _segment_rows(chip: ChipMetrics) -> list[ChipRow]:
+def _segment_rows(chip: ChipMetrics) -> list[Row]:
     return [
         _row(
             "segment_frequency_kHz",
@@ -84,7 +44,7 @@ def _segment_rows(chip: ChipMetrics) -> list[ChipRow]:
     ]
 
 
-def _thickness_rows(chip: ChipMetrics) -> list[ChipRow]:
+def _thickness_rows(chip: ChipMetrics) -> list[Row]:
     return [
         _micrometres(
             "feed_um",
@@ -131,7 +91,7 @@ def _thickness_rows(chip: ChipMetrics) -> list[ChipRow]:
     ]
 
 
-def _contact_rows(chip: ChipMetrics) -> list[ChipRow]:
+def _contact_rows(chip: ChipMetrics) -> list[Row]:
     return [
         _row(
             "chip_speed_m_per_s",
@@ -154,7 +114,7 @@ def _contact_rows(chip: ChipMetrics) -> list[ChipRow]:
     ]
 
 
-def _band_rows(chip: ChipMetrics) -> list[ChipRow]:
+def _band_rows(chip: ChipMetrics) -> list[Row]:
     developed = "While the band is developed: to the surface, and at half its greatest rate or more"
     return [
         _row(
@@ -207,7 +167,7 @@ def _segments_text(chip: ChipMetrics) -> str:
 
 def _micrometres(
     key: str, quantity: str, value: float, explanation: str, spread: float = nan, decimals: int = 0
-) -> ChipRow:
+) -> Row:
     return _row(key, quantity, "µm", value * 1e6, decimals, explanation, spread * 1e6)
 
 
@@ -219,6 +179,6 @@ def _row(
     decimals: int,
     explanation: str,
     spread: float = nan,
-) -> ChipRow:
-    known = [float(number) if isfinite(number) else None for number in (value, spread)]
-    return ChipRow(key, quantity, unit, known[0], known[1], decimals, explanation)
+) -> Row:
+    here, uncertainty = (float(one) if isfinite(one) else None for one in (value, spread))
+    return Row(key, quantity, unit, None, here, decimals, explanation, uncertainty=uncertainty)
