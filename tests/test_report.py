@@ -14,7 +14,7 @@ from chipglow.camera import Camera
 from chipglow.errors import Distribution, Plan, analyse
 from chipglow.errors.draws import CAUSES
 from chipglow.laboratory.chip import Inertia, rake_grid
-from chipglow.report import Row, comparison_rows, write_report
+from chipglow.report import Row, comparison_frame, comparison_rows, write_report
 from chipglow.report.chip_rows import chip_rows
 from chipglow.report.comparison import cause_rows
 from chipglow.report.evidence import answer, crossing, place
@@ -244,6 +244,13 @@ def test_the_comparison_holds_what_the_paper_states(result):
     assert rows["contact_length_um"].paper_text == "–"
     assert all(row.explanation.endswith(".") for row in rows.values())
     assert PAPER.rake_error.where in rows["rake_error_degC"].where
+    frame = comparison_frame(result)
+    assert list(frame.index) == list(rows)
+    assert frame["paper"].dropna().to_dict() == paper
+    draws = rows["rake_error_degC"].draws
+    error = frame.loc["rake_error_degC"]
+    assert (error["least"], error["greatest"]) == draws.range
+    assert error["standard_deviation"] == draws.standard_deviation
 
 
 def test_a_band_that_begins_away_from_the_edge_is_as_long_as_itself(result):

@@ -149,7 +149,7 @@ class SurfaceResult:
 class CuttingForces:
     """Forces per width of cut in N/m over time in s, each of shape (n,), and their segments.
 
-    `unaccounted` is the share of the drive's work that the cutting simulation's energy balance does
+    `unaccounted` is the part of the drive's work that the cutting simulation's energy balance does
     not find again in the end; NaN where the scene has no account.
     """
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.camera import Camera, Exposure, Measurement, expose_all
@@ -177,6 +178,33 @@ class SceneErrors:
     frame: Frame
     surfaces: Mapping[str, SurfaceErrors]
     missing: tuple[str, ...]
+
+    def to_frame(self) -> pd.DataFrame:
+        """Every reading at every place with every surface, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``surface``, ``place``, ``reading``, ``draws``, and the means over the draws
+            ``reference_degC``, ``error_K`` and ``psf_portion_K``, of the error also the
+            ``standard_deviation_K`` and the ``least_K`` and ``greatest_K``.
+        """
+        return pd.DataFrame(
+            {
+                "surface": name,
+                "place": one.place,
+                "reading": one.reading,
+                "draws": one.error.draws,
+                "reference_degC": one.reference.mean - 273.15,
+                "error_K": one.error.mean,
+                "standard_deviation_K": one.error.standard_deviation,
+                "least_K": one.error.range[0],
+                "greatest_K": one.error.range[1],
+                "psf_portion_K": one.psf_portion.mean,
+            }
+            for name, surface in self.surfaces.items()
+            for one in surface.readings
+        )
 
 
 def scene_errors(

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.errors import Distribution, LocalError, StudyResult
@@ -161,6 +162,29 @@ def comparison_rows(result: StudyResult) -> list[Row]:
     if result.plan.beside_paper:
         return rows
     return [replace(row, paper=None, where="") for row in rows]
+
+
+def comparison_frame(result: StudyResult) -> pd.DataFrame:
+    """The numbers of `comparison_rows`, a row each.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    pandas.DataFrame
+        By their key: columns ``quantity``, ``unit``, ``paper``, ``here``, the
+        ``standard_deviation`` of its draws with the ``least`` and the ``greatest``, ``one_draw``,
+        the ``uncertainty`` of what was not drawn, and ``differs``; None or NaN where unknown.
+    """
+    rows = comparison_rows(result)
+    draws = [(row.draws.standard_deviation, *row.draws.range) if row.draws else () for row in rows]
+    scatter = pd.DataFrame(draws, columns=["standard_deviation", "least", "greatest"])
+    names = ("quantity", "unit", "paper", "here", "one_draw", "uncertainty", "differs")
+    frame = pd.DataFrame([{name: getattr(row, name) for name in names} for row in rows])
+    return frame.join(scatter).set_index(pd.Index([row.key for row in rows], name="key"))
 
 
 def cause_rows(result: StudyResult) -> list[CauseRow]:
