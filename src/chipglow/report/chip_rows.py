@@ -63,14 +63,14 @@ def _thickness_rows(chip: ChipMetrics) -> list[Row]:
             "Chip thickness, peaks",
             chip.peak,
             _segments_text(chip),
-            chip.peak_spread,
+            chip.peak_standard_deviation,
         ),
         _micrometres(
             "chip_valley_um",
             "Chip thickness, valleys",
             chip.valley,
             _segments_text(chip),
-            chip.valley_spread,
+            chip.valley_standard_deviation,
         ),
         _row(
             "segmentation_degree_percent",
@@ -100,7 +100,7 @@ def _contact_rows(chip: ChipMetrics) -> list[Row]:
             chip.chip_speed,
             2,
             "Up the rake face where the thickness is read; the spread is over time.",
-            chip.chip_speed_spread,
+            chip.chip_speed_standard_deviation,
         ),
         _micrometres(
             "chip_contact_um",
@@ -109,7 +109,7 @@ def _contact_rows(chip: ChipMetrics) -> list[Row]:
             "From the edge up the rake face."
             if isfinite(chip.contact)
             else "Unknown: the contact reaches the border of the view.",
-            chip.contact_spread,
+            chip.contact_standard_deviation,
         ),
     ]
 
@@ -124,14 +124,14 @@ def _band_rows(chip: ChipMetrics) -> list[Row]:
             degrees(chip.shear_angle),
             1,
             f"{developed}. Line through the band's middle half.",
-            degrees(chip.shear_angle_spread),
+            degrees(chip.shear_angle_standard_deviation),
         ),
         _micrometres(
             "shear_band_width_um",
             "Width of the shear band, mean over time",
             chip.band_width,
             f"{developed}. Full width at half maximum of the strain rate.",
-            chip.band_width_spread,
+            chip.band_width_standard_deviation,
             decimals=1,
         ),
         _row(

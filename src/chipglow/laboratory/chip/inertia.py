@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from chipglow.laboratory.chip.segmentation import end_of_build_up
 from chipglow.scene import Scene
 
-LARGEST_SHARE: Final = 0.01
+LARGEST_FRACTION: Final = 0.01
 """Share of work or force from which inertia counts as too much."""
 
 
@@ -42,11 +42,11 @@ class Inertia:
             (self.kinetic_fraction, "kinetic energy reaches {} of the work"),
             (self.force_fraction, "momentum is worth {} of the cutting force"),
         )
-        over = [text.format(f"{s:.1%}") for s, text in shares if s > LARGEST_SHARE]
+        over = [text.format(f"{s:.1%}") for s, text in shares if s > LARGEST_FRACTION]
         if not over:
             return ""
         return (
-            f"The scaled mass's {' and its '.join(over)}, expected up to {LARGEST_SHARE:.0%}: "
+            f"The scaled mass's {' and its '.join(over)}, expected up to {LARGEST_FRACTION:.0%}: "
             f"lower mass_scaling, now {self.mass_scaling:g}."
         )
 

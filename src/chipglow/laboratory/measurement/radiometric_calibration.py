@@ -339,7 +339,7 @@ def _attributes(
         "integration_time": _known(recording, calibration, "integration_time"),
         "range": _known(recording, calibration, "range_name"),
         "calibration": calibration.description if calibration else None,
-        "object_parameters": _told(recording),
+        "object_parameters": _object_text(recording),
         "notes": "\n".join(recording.notes),
         "assumed": "\n".join(_assumed(recording, calibration, position)),
         "warnings": "\n".join(_warnings(recording, calibration, errors_known)),
@@ -353,7 +353,7 @@ def _known(recording: Recording, calibration: Calibration | None, name: str) -> 
     return getattr(calibration, name, None) if said is None else said
 
 
-def _told(recording: Recording) -> str | None:
+def _object_text(recording: Recording) -> str | None:
     """What the camera was set to for the object, and what became of it."""
     settings = recording.object_parameters
     if settings is None:
@@ -417,7 +417,7 @@ def _warnings(
 
 
 def flag_fractions(measurement: Measurement) -> dict[Flag, float]:
-    """Share of the pixels of all frames that has each flag.
+    """Fraction of the pixels of all frames that has each flag.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ _SECOND_EDGE: Final = 0.12
 _BLOCK: Final = 5
 _ROUGHLY: Final = 1e-5
 _LEAST_PILE: Final = 10
-_CLIPPED_SHARE: Final = 0.02
+_MANY_CLIPPED: Final = 0.02
 _WHOLE_SQUARE: Final = "the whole square of a pixel takes light (fill factor 1)."
 
 
@@ -225,7 +225,7 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
     EdgePixels
         The pixels, x and y from the image's middle, with even noise.
     list of str
-        What may make them doubtful.
+        Why they may not be trusted.
 
     Raises
     ------
@@ -331,7 +331,7 @@ def _first_clipped(
     index = ((distance - first) / (pitch / 2)).astype(np.int64).ravel()
     count = np.bincount(index)
     share = np.bincount(index, clipped.ravel()) / np.maximum(count, 1)
-    found = np.flatnonzero((share > _CLIPPED_SHARE) & (share * count >= 2))
+    found = np.flatnonzero((share > _MANY_CLIPPED) & (share * count >= 2))
     return first + float(found[0]) * pitch / 2 if found.size else np.inf
 
 
