@@ -83,7 +83,7 @@ def test_a_tail_is_kept_in_the_file(folder):
     write_edge(folder / "tail.nc", edge=tailed_edge(8e-6, 0.2, 20e-6), side=64)
     code, output = psf("tail.nc", "--out", "psf.nc")
     assert code == 0
-    assert "tail share" in output
+    assert "tail fraction" in output
     read = MeasuredPSF.from_file("psf.nc")
     half = len(read.weights) // 2
     x = (np.arange(len(read.weights)) - half) * read.spacing

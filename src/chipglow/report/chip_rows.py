@@ -3,7 +3,7 @@
 from math import degrees, isfinite, nan
 
 from chipglow.laboratory.chip import ChipMetrics
-from chipglow.report.comparison import Row
+from chipglow.report.comparison import Row, own_row
 
 
 def chip_rows(chip: ChipMetrics) -> list[Row]:
@@ -19,14 +19,14 @@ def chip_rows(chip: ChipMetrics) -> list[Row]:
 
 def _segment_rows(chip: ChipMetrics) -> list[Row]:
     return [
-        _row(
+        own_row(
             "segment_frequency_kHz",
             "Segmentation frequency",
             "kHz",
             chip.frequency * 1e-3,
             1,
             "1 over the period of the forces; the spread is its standard uncertainty.",
-            spread=chip.frequency * chip.period_uncertainty / chip.period * 1e-3,
+            chip.frequency * chip.period_uncertainty / chip.period * 1e-3,
         ),
         _micrometres(
             "segment_spacing_um",
@@ -72,7 +72,7 @@ def _thickness_rows(chip: ChipMetrics) -> list[Row]:
             _segments_text(chip),
             chip.valley_standard_deviation,
         ),
-        _row(
+        own_row(
             "segmentation_degree_percent",
             "Degree of segmentation",
             "%",
@@ -80,7 +80,7 @@ def _thickness_rows(chip: ChipMetrics) -> list[Row]:
             0,
             "Peak less valley, over peak.",
         ),
-        _row(
+        own_row(
             "chip_ratio",
             "Chip ratio",
             "",
@@ -93,7 +93,7 @@ def _thickness_rows(chip: ChipMetrics) -> list[Row]:
 
 def _contact_rows(chip: ChipMetrics) -> list[Row]:
     return [
-        _row(
+        own_row(
             "chip_speed_m_per_s",
             "Chip speed",
             "m/s",
@@ -117,7 +117,7 @@ def _contact_rows(chip: ChipMetrics) -> list[Row]:
 def _band_rows(chip: ChipMetrics) -> list[Row]:
     developed = "While the band is developed: to the surface, and at half its greatest rate or more"
     return [
-        _row(
+        own_row(
             "shear_angle_deg",
             "Shear angle",
             "°",
@@ -134,7 +134,7 @@ def _band_rows(chip: ChipMetrics) -> list[Row]:
             chip.band_width_standard_deviation,
             decimals=1,
         ),
-        _row(
+        own_row(
             "shear_band_rate_per_s",
             "Strain rate of the shear band",
             "1/s",
@@ -142,7 +142,7 @@ def _band_rows(chip: ChipMetrics) -> list[Row]:
             -3,
             "Median over the band's middle half, at its greatest.",
         ),
-        _row(
+        own_row(
             "shear_band_strain",
             "Plastic strain of a formed band",
             "",
@@ -168,17 +168,4 @@ def _segments_text(chip: ChipMetrics) -> str:
 def _micrometres(
     key: str, quantity: str, value: float, explanation: str, spread: float = nan, decimals: int = 0
 ) -> Row:
-    return _row(key, quantity, "µm", value * 1e6, decimals, explanation, spread * 1e6)
-
-
-def _row(
-    key: str,
-    quantity: str,
-    unit: str,
-    value: float,
-    decimals: int,
-    explanation: str,
-    spread: float = nan,
-) -> Row:
-    here, uncertainty = (float(one) if isfinite(one) else None for one in (value, spread))
-    return Row(key, quantity, unit, None, here, decimals, explanation, uncertainty=uncertainty)
+    return own_row(key, quantity, "µm", value * 1e6, decimals, explanation, spread * 1e6)

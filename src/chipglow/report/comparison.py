@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import isfinite, nan
 
 import numpy as np
 import pandas as pd
@@ -288,7 +288,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             PAPER.segment_period.where,
             uncertainty=_known(segments.period_uncertainty * 1e6),
         ),
-        _own(
+        own_row(
             "force_segments_count",
             "Segments in the force history",
             "",
@@ -296,7 +296,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             0,
             f"Peaks of the cutting force after {segments.start * 1e6:.0f} µs.",
         ),
-        _own(
+        own_row(
             "cutting_force_mean_N_per_mm",
             "Mean cutting force",
             "N/mm",
@@ -304,7 +304,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             0,
             evidence.beside(result, "Per width of cut.", "The paper gives no forces."),
         ),
-        _own(
+        own_row(
             "cutting_force_swing_N_per_mm",
             "Swing of the cutting force",
             "N/mm",
@@ -312,7 +312,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             0,
             "Mean height of the peaks over the valleys between them.",
         ),
-        _own(
+        own_row(
             "thrust_force_mean_N_per_mm",
             "Mean thrust force",
             "N/mm",
@@ -320,7 +320,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             0,
             evidence.beside(result, "Per width of cut.", "The paper gives no forces."),
         ),
-        _own(
+        own_row(
             "energy_unaccounted_percent",
             "Work that the energy balance does not find",
             "%",
@@ -329,7 +329,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             "Work of the drive less kinetic and elastic energy, plastic and friction work, and the "
             "elastic energy lost by sharing dilation: what the solver's grid dissipates.",
         ),
-        _own(
+        own_row(
             "kinetic_fraction_percent",
             "Kinetic energy of the scaled mass over the work, at most",
             "%",
@@ -338,7 +338,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             "Its change since the start, after the build-up: how much the scaling of the mass can "
             f"matter. {inert.warning}".strip(),
         ),
-        _own(
+        own_row(
             "inertia_force_fraction_percent",
             "Momentum flux of the scaled mass over the cutting force",
             "%",
@@ -482,8 +482,20 @@ def _of_segments(
     )
 
 
-def _own(key: str, quantity: str, unit: str, here: float, decimals: int, explanation: str) -> Row:
-    return Row(key, quantity, unit, None, _known(here), decimals, explanation)
+def own_row(
+    key: str,
+    quantity: str,
+    unit: str,
+    here: float,
+    decimals: int,
+    explanation: str,
+    uncertainty: float = nan,
+) -> Row:
+    """A quantity that is not the paper's; see `Row`, NaN for what is unknown."""
+    return Row(
+        key, quantity, unit, None, _known(here), decimals, explanation,
+        uncertainty=_known(uncertainty),
+    )  # fmt: skip
 
 
 def _known(value: float) -> float | None:
