@@ -137,8 +137,10 @@ def _tool_text(tool: Tool) -> str:
 
 
 def _state(summary: SceneSummary) -> _Rows:
-    shares = (f"{kind.name.lower()} {100 * share:.3g} %" for kind, share in summary.shares.items())
-    yield "samples that show", ", ".join(shares)
+    fractions = (
+        f"{kind.name.lower()} {100 * share:.3g} %" for kind, share in summary.fractions.items()
+    )
+    yield "samples that show", ", ".join(fractions)
     quality = summary.quality
     if quality is not None:
         yield "filled", f"{100 * quality.filled:.3g} % of the samples with material"
