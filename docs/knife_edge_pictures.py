@@ -72,9 +72,8 @@ def in_temperature(measurement: Measurement) -> Measurement:
 def width(found: KnifeEdge) -> str:
     """The width of the Gaussian in um."""
     fit = found.fit("gaussian")
-    return (
-        f"{with_uncertainty(fit.fwhm * 1e6, fit.fwhm_uncertainty * 1e6)} (misfit {fit.misfit:.1f})"
-    )
+    width = with_uncertainty(fit.fwhm * 1e6, fit.fwhm_uncertainty * 1e6)
+    return f"{width} (reduced chi-squared {fit.reduced_chi_squared:.1f})"
 
 
 def main() -> None:

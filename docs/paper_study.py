@@ -33,7 +33,7 @@ def _errors(summary: dict[str, dict[str, dict[str, float]]]) -> str:
     lines = ["| error | paper / °C | here / °C | range / °C | PSF, paper / % | PSF, here / % |"]
     lines.append("|---|---|---|---|---|---|")
     for key, name in NAMES.items():
-        share = key.replace("_error_degC", "_psf_share_percent")
+        share = key.replace("_error_degC", "_psf_fraction_percent")
         error, portion = summary["draws"][key], summary["draws"][share]
         texts = (
             name,

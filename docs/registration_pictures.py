@@ -45,7 +45,7 @@ def draw_target() -> None:
         measured.radiance_temperature()[0],
         RASTER,
         target.visible,
-        points=(fit.positions, fit.pixels),
+        points=(fit.points.positions, fit.points.pixels),
     )
     figure.savefig(HERE / "registration-dots.png", dpi=150)
 

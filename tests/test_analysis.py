@@ -391,10 +391,10 @@ def test_lines_across_the_rake_face_follow_its_normal():
     np.testing.assert_allclose(rake.contact_case_1, -40.0, atol=1e-9)
     assert rake.face.error == pytest.approx(-40.0)
     assert rake.along_contact.error == pytest.approx(-40.0)
-    assert rake.face.psf_share == pytest.approx(0.25)
+    assert rake.face.psf_fraction == pytest.approx(0.25)
     # Two pixels into the tool, the last place that belongs to the face.
     assert rake.extremum.error == pytest.approx(-52.0)
-    assert rake.extremum.psf_share == pytest.approx(0.25)
+    assert rake.extremum.psf_fraction == pytest.approx(0.25)
     assert rake.contact.distance[-1] == 120e-6
 
 
@@ -642,7 +642,7 @@ def test_the_sensitivity_meets_the_study_at_its_own_width(study):
         expected = rake_errors(errors, contact, TOOL, 60e-6, 1e-6).face.error
         assert face == pytest.approx(expected, abs=1e-4)
         assert (np.diff(series.error("band")) < 0).all()
-        assert (np.diff(series.psf_share("rake")) > 0).all()
+        assert (np.diff(series.psf_fraction("rake")) > 0).all()
 
 
 def exposure_at(study, name):
@@ -677,7 +677,7 @@ def test_a_study_that_can_not_be_is_refused(chip):
             Plan(**{name: 0})
     bare = scene.data.copy()
     bare.attrs = {}
-    with pytest.raises(ValueError, match="does not tell its tool"):
+    with pytest.raises(ValueError, match="does not state its tool"):
         analyse(type(scene)(bare), surfaces, CAMERA, plan)
     cold = scene.data.copy()
     cold["plastic_strain_rate"] = cold["plastic_strain_rate"] * 0 + np.float32(1.0)

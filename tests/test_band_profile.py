@@ -24,6 +24,7 @@ from chipglow.laboratory.chip import (
     read_curve,
 )
 from chipglow.laboratory.chip.band_figure import draw_band_profile
+from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN
 from chipglow.scene import Line, PlacedTool
 from chipglow.uncertainty import Estimate, from_xarray
 
@@ -247,7 +248,8 @@ def test_a_given_curve_is_the_place_of_the_reference():
 
 
 def test_a_single_band_has_a_doubtful_stage():
-    profile = band_profile(measured([BandImage().temperature(), NO_BANDS["uniform"]]), TOOL)
+    frames = [BandImage().temperature(), NO_BANDS["uniform"]]
+    profile = band_profile(measured(frames, relative_uncertainty=0.01), TOOL)
     assert profile.warnings == ("one frame has a band; without another its stage says nothing.",)
 
 
@@ -341,7 +343,6 @@ def test_the_command_writes_what_it_shows(file, tmp_path):
     assert result.exit_code == 0, result.output
     assert "developing" in result.output
     assert "fully developed" in result.output
-    assert "Doubtful" not in result.output
     with (tmp_path / "band.csv").open(encoding="utf-8") as table:
         rows = list(csv.DictReader(table))
     profile = band_profile(
@@ -368,8 +369,10 @@ def test_the_command_writes_what_it_shows(file, tmp_path):
 
 
 def test_an_unknown_calibration_is_doubtful(tmp_path):
-    write_measurement(measured([BandImage().temperature()]), tmp_path / "m.nc")
-    assert "Warning: the measurement does not tell" in run(tmp_path / "m.nc").output
+    unknown = measured([BandImage().temperature()])
+    write_measurement(unknown, tmp_path / "m.nc")
+    assert "Warning: the measurement does not state" in run(tmp_path / "m.nc").output
+    assert CALIBRATION_UNKNOWN in band_profile(unknown, TOOL).warnings
 
 
 def test_the_netcdf_file_holds_si_units(file, tmp_path):
@@ -420,11 +423,11 @@ def test_what_the_command_cannot_do_is_one_line(file, tmp_path, options, message
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("x,y\n1,2\n", "line 1: 'x,y', expected 'x_um,y_um'"),
+        ("x,y\n1,2\n", "line 1: 'x' has no unit, expected one such as x_um"),
         ("x_um,y_um\n1,2\n", "1 points, expected 2 or more"),
-        ("x_um,y_um\n1,2\n3\n", "line 3: '3', expected two numbers"),
-        ("x_um,y_um\n1,2\nnan,3\n", "line 3: expected finite numbers"),
-        ("", "line 1: '', expected 'x_um,y_um'"),
+        ("x_um,y_um\n1,2\n3\n", "line 3: '3', expected 2 numbers"),
+        ("x_um,y_um\n1,2\nnan,3\n", "line 3: 'nan,3', expected 2 numbers"),
+        ("", "expected a first line such as x_um,y_um"),
     ],
 )
 def test_a_file_that_is_no_curve_is_one_error(tmp_path, text, message):

@@ -403,7 +403,7 @@ def test_it_is_said_where_the_border_of_the_scene_matters(order):
     # The rule, the scene goes on as at its edge, makes of a hot column a hot half plane.
     assert wrong[3, 0] > 50.0
     assert abs(wrong[3, -1]) < ROUNDING
-    (said,) = measured.data.attrs["doubtful"].splitlines()
+    (said,) = measured.data.attrs["warnings"].splitlines()
     found = re.search(
         r"The border of the scene: .* ([\d.]+) % .*up to ([\d.]+) µm .* 1 K, by ([\d.]+) K", said
     )
@@ -421,7 +421,7 @@ def test_nothing_is_said_of_a_border_that_does_not_matter(order):
     temperature[:, 42:48, 42:48] = 1300.0
     camera = Camera(psf=GaussianPSF(4e-6), psf_order=order)
     measured = camera.measure(make_scene(temperature), BLACK, 0.0)
-    assert "doubtful" not in measured.data.attrs
+    assert "warnings" not in measured.data.attrs
 
 
 def test_light_from_beyond_the_scene():

@@ -2,8 +2,8 @@
 
 import lzma
 import struct
-import subprocess
 from functools import partial
+from io import BufferedReader, BytesIO
 from pathlib import Path
 
 import camera_files as files
@@ -16,11 +16,13 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 
 from chipglow.camera import PlanckConversion, Recording
-from chipglow.io.cameras import apart, camera_formats, read_recording, write_hcc
+from chipglow.io import sandbox
+from chipglow.io.cameras import camera_formats, read_recording, recordings, write_hcc
 from chipglow.io.cameras.cine import _CURVE
 from chipglow.io.cameras.formats import find_format, read_here
 from chipglow.io.cameras.stacks import Told
 from chipglow.io.sources import SourceError
+from chipglow.radiometry import ObjectParameters
 
 REFERENCE = Path(__file__).parent / "reference" / "flir"
 PICTURES = files.pictures()
@@ -559,26 +561,35 @@ def test_absurd_dimensions_are_refused_before_memory_is_taken(tmp_path):
 
 def test_a_reader_that_dies_or_hangs_is_one_error(tmp_path, monkeypatch):
     path, _ = stack_tiff(tmp_path)
-    died = subprocess.CompletedProcess([], -11, stdout=b"\x50half a hea")
-    monkeypatch.setattr(subprocess, "run", lambda *_, **__: died)
-    with pytest.raises(SourceError, match="its reader ended with code -11"):
+    monkeypatch.setattr(sandbox, "_CHILD", ("-c", "import os; os.abort()"))
+    with pytest.raises(SourceError, match="its reader ended with code -6"):
         read_recording(path, quantity="counts", interval=1.0)
-
-    def hang(*_, timeout, **__):
-        raise subprocess.TimeoutExpired([], timeout)
-
-    monkeypatch.setattr(subprocess, "run", hang)
-    with pytest.raises(SourceError, match="no answer in 30 s"):
+    monkeypatch.setattr(sandbox, "_CHILD", ("-c", "import time; time.sleep(100)"))
+    monkeypatch.setattr(sandbox, "PATIENCE", 1.0)
+    with pytest.raises(SourceError, match="no answer in 1 s"):
         read_recording(path, quantity="counts", interval=1.0)
 
 
-def test_an_answer_that_is_not_whole_is_no_recording():
-    recording = Recording(PICTURES, "counts", np.arange(5.0), "any")
-    header = {**apart._header(recording), "kind": "<u2"}
-    assert np.array_equal(apart._recording(header, memoryview(PICTURES.tobytes())).signal, PICTURES)
-    for wrong in ({"kind": "<u4"}, {"kind": "O"}, {"shape": [10**6, 10**6, 1]}):
-        with pytest.raises(SourceError, match="no whole answer"):
-            apart._recording({**header, **wrong}, memoryview(PICTURES.tobytes()))
+def test_a_recording_comes_out_of_the_subprocess_as_it_is():
+    recording = Recording(
+        PICTURES,
+        "counts",
+        np.arange(5.0) / 3,
+        "any",
+        conversion=PlanckConversion(**files.PLANCK),
+        object_parameters=ObjectParameters(emissivity=0.9),
+        warnings=("one", "two"),
+        fill_factor=0.9,
+    )
+    stream = BytesIO()
+    sandbox.write_message(stream, recordings._message(recording))
+    stream.seek(0)
+    message = sandbox.read_message(BufferedReader(stream), PICTURES.size)
+    again = recordings._recording(message)
+    assert np.array_equal(again.signal, PICTURES)
+    assert np.array_equal(again.times, recording.times)
+    nothing = {"signal": None, "times": None}
+    assert {**vars(again), **nothing} == {**vars(recording), **nothing}
 
 
 def test_what_a_process_of_its_own_refuses_is_the_same_error(tmp_path):

@@ -26,8 +26,8 @@ def test_thickness_and_segments(metrics):
     missed = 6e-6
     assert metrics.peak == pytest.approx(CHIP.peak, abs=missed + SAMPLE)
     assert metrics.valley == pytest.approx(CHIP.valley, abs=missed + SAMPLE)
-    assert metrics.peak_spread < missed
-    assert metrics.valley_spread < missed
+    assert metrics.peak_standard_deviation < missed
+    assert metrics.valley_standard_deviation < missed
     # The sum over 61 frames is a rectangle rule; the last window's ends miss half a frame each.
     assert metrics.thickness == pytest.approx(CHIP.thickness, abs=SAMPLE)
     assert metrics.ratio == pytest.approx(CHIP.feed / CHIP.thickness, rel=0.01)
@@ -46,7 +46,7 @@ def test_period_spacing_and_speeds(metrics):
     assert metrics.chip_speed == pytest.approx(CHIP.chip_speed, rel=0.015)
     assert metrics.chip_spacing == pytest.approx(CHIP.chip_speed * CHIP.period, rel=0.02)
     swing = CHIP.unsteadiness * CHIP.chip_speed / np.sqrt(2)
-    assert metrics.chip_speed_spread == pytest.approx(swing, rel=0.05)
+    assert metrics.chip_speed_standard_deviation == pytest.approx(swing, rel=0.05)
 
 
 def test_the_mean_is_over_the_chips_length_not_over_time():
@@ -69,7 +69,7 @@ def test_band(metrics):
 def test_contact(metrics):
     # The next sample of the face's staircase, and the two of a bilinear foot.
     assert metrics.contact == pytest.approx(CHIP.contact, abs=3 * SAMPLE)
-    assert metrics.contact_spread < 1e-3 * SAMPLE
+    assert metrics.contact_standard_deviation < 1e-3 * SAMPLE
 
 
 def test_feed_is_read_from_the_surface_before_the_cut(metrics):

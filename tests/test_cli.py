@@ -16,7 +16,12 @@ from chipglow.camera import Camera, Measurement
 from chipglow.cli import app
 from chipglow.cutting import CuttingSimulation, SolverError
 from chipglow.io import open_scene, read_measurement, write_scene
-from chipglow.laboratory.emissivity import Heating, determine_emissivity, write_emissivity
+from chipglow.laboratory.emissivity import (
+    Heating,
+    RegionEmissivities,
+    determine_emissivity,
+    write_emissivity,
+)
 from chipglow.radiometry import Band
 from chipglow.report import QUICK
 from chipglow.scene import Area, Material, Raster
@@ -335,7 +340,7 @@ def test_measure_lays_a_measured_emissivity_map_on_the_scene(folder, scene, chip
     )
     found = determine_emissivity([image], Heating(800.0, reflected=200.0))
     everywhere = Area("all", "chip", np.ones(raster.shape, bool), whole=True)
-    write_emissivity([found], [[found.of(everywhere)]], "e.nc")
+    write_emissivity(RegionEmissivities((found,), ((found.of(everywhere),),)), "e.nc")
     study = (
         "surface: {maps: {seen: e.nc}}\nanalysis: {band_chip: seen}\n"
         "camera: {psf: none, lower_limit: none}"

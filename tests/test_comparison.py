@@ -194,7 +194,7 @@ def test_few_frames_and_an_unknown_calibration_are_doubtful():
     warnings = compare(one, {"same": frames(field(X, Y))}, TOOL, CURVE).warnings
     assert any("1 frame only" in warning for warning in warnings)
     assert any(
-        "does not tell the uncertainty of its calibration" in warning for warning in warnings
+        "does not state the uncertainty of its calibration" in warning for warning in warnings
     )
     assert not any(
         "calibration" in warning
@@ -241,8 +241,8 @@ def test_how_sure_the_best_is(cold, hot, stated):
         # 4000 draws: 0.8 %.
         assert place.confidence == pytest.approx(expected, abs=0.025)
         assert not place.is_sure
-        assert "cannot be told apart (cold is nearest" in place.sentence
-    assert result.statement.startswith("The sets cannot be told apart")
+        assert "cannot be distinguished (cold is nearest" in place.sentence
+    assert result.statement.startswith("The sets cannot be distinguished")
 
 
 def test_a_single_simulation_has_a_statement_too():
@@ -322,7 +322,7 @@ def test_another_rake_angle_and_no_tool_are_said():
     data.attrs = {k: v for k, v in data.attrs.items() if not k.startswith("tool_")}
     result = compare(base, {"other": other, "none": Measurement(data)}, TOOL, CURVE, STATED)
     assert "the rake angle of other differs by 7 degrees." in result.warnings
-    assert any("none tells no tool" in text for text in result.assumptions)
+    assert any("none states no tool" in text for text in result.assumptions)
 
 
 @pytest.mark.parametrize(
@@ -407,7 +407,7 @@ def test_two_uncertainties_of_one_measurement_are_refused(folder):
     write_measurement(frames(field(X, Y), relative_uncertainty=0.01), folder / "own.nc")
     result = run("own.nc", "one.nc", *USUAL)
     assert result.exit_code == 2
-    assert "--uncertainty: 5 K beside the uncertainty that own.nc tells" in result.output
+    assert "uncertainty: 5 K beside the uncertainty that the measurement states" in result.output
 
 
 # Noise that is alike from place to place and from frame to frame

@@ -16,6 +16,7 @@ from chipglow.cli import app
 from chipglow.io import write_measurement
 from chipglow.laboratory.emissivity import (
     Heating,
+    RegionEmissivities,
     determine_emissivity,
     emissivity_covariance,
     emissivity_line,
@@ -489,7 +490,7 @@ def command(*arguments):
 def test_the_map_comes_back_from_its_file(folder):
     found = determine_emissivity([measured(table_1())], HEATING)
     rows = [found.of(area) for area in areas(load_regions("regions.yaml"), RASTER)]
-    write_emissivity([found], [rows], "e.nc")
+    write_emissivity(RegionEmissivities((found,), (tuple(rows),)), "e.nc")
     surface = read_emissivity_map("e.nc")
     np.testing.assert_allclose(surface.values, found.emissivity, rtol=1e-15)
     np.testing.assert_allclose(surface.raster.extent, RASTER.extent, atol=1e-12)
@@ -580,7 +581,9 @@ def test_images_of_different_pixels_are_one_line(folder):
     write_measurement(small, folder / "small.nc")
     result = command("a.nc", "small.nc", "--reference", "391degC", "--reference", "500degC")
     assert result.exit_code == 2
-    assert result.output.startswith("chipglow: small.nc: has other pixels than a.nc, expected")
+    assert result.output.startswith(
+        "chipglow: small.nc: has other pixels, or another band, than a.nc, expected"
+    )
 
 
 def test_what_is_assumed_and_doubtful_is_said(folder):

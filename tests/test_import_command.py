@@ -6,7 +6,14 @@ import pytest
 from typer.testing import CliRunner
 
 from chipglow.cli.app import app
-from chipglow.io import ImportDescription, load_import, open_scene, prospect, read_measurement
+from chipglow.io import (
+    ImportDescription,
+    import_text,
+    load_import,
+    open_scene,
+    prospect,
+    read_measurement,
+)
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.movie import Legend, MovieSource, NamedMap
 from chipglow.scene import Material, ToolGeometry
@@ -203,6 +210,14 @@ def test_temperatures_that_are_none_are_refused(tmp_path, values, wrong):
     assert result.exit_code == 2
     assert wrong in " ".join(result.output.split())
     assert not (tmp_path / "s.nc").exists()
+
+
+def test_corners_of_the_chip_are_read_and_written_as_they_are(arrays, tmp_path):
+    chip = "completion.chip=[[-300 um, 0 um], [-50 um, 0 um], [-50 um, 400 um]]"
+    described = load_import(arrays, [*SETTINGS, chip])
+    assert described.completion.build().chip == ((-3e-4, 0.0), (-5e-5, 0.0), (-5e-5, 4e-4))
+    (tmp_path / "again.yaml").write_text(import_text(described))
+    assert load_import(tmp_path / "again.yaml").completion == described.completion
 
 
 @pytest.mark.parametrize(

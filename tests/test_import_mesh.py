@@ -9,8 +9,9 @@ from exodus_file import Exodus, write_exodus
 from fuzz.cgns_file import write_cgns
 from fuzz.foam_case import write_foam
 
-from chipglow.io.sources import CELSIUS, Placement, SourceError, Unit, Units
+from chipglow.io.sources import Placement, SourceError, Units
 from chipglow.io.sources.mesh import MeshSource
+from chipglow.quantities.units import CELSIUS, Unit
 from chipglow.scene import Material, Raster
 
 pv = pytest.importorskip("pyvista")
@@ -637,7 +638,7 @@ def test_an_openfoam_case_is_cut_and_its_cells_are_constant(tmp_path):
 
 def test_an_extra_that_is_missing_is_named(tmp_path, monkeypatch):
     written(tmp_path, "chip.vtu")
-    monkeypatch.setattr("chipglow.io.sources.mesh.find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "pyvista", None)
     with pytest.raises(SourceError, match=r"pip install 'chipglow\[mesh\]'"):
         MeshSource(tmp_path / "chip.vtu").survey()
     monkeypatch.undo()

@@ -33,7 +33,7 @@ def scene_with(momentum_flow=None, **energies):
     return Scene(data)
 
 
-def test_kinetic_share_is_the_greatest_after_the_build_up():
+def test_kinetic_fraction_is_the_greatest_after_the_build_up():
     time = CHIP.forces()[0]
     work = 1e3 * time / time[-1] + 1e-9
     kinetic = -0.002 * work
@@ -41,15 +41,15 @@ def test_kinetic_share_is_the_greatest_after_the_build_up():
     kinetic[time.size // 2] = 0.007 * work[time.size // 2]
     found = inertia(scene_with(drive_work=work, kinetic_energy=kinetic))
     assert found is not None
-    assert found.kinetic_share == pytest.approx(0.007, rel=1e-12)
-    assert np.isnan(found.force_share)
+    assert found.kinetic_fraction == pytest.approx(0.007, rel=1e-12)
+    assert np.isnan(found.force_fraction)
 
 
-def test_force_share_is_momentum_over_mean_force():
+def test_force_fraction_is_momentum_over_mean_force():
     found = inertia(scene_with(4.5e3, drive_work=np.linspace(1.0, 2.0, CHIP.forces()[0].size)))
     assert found is not None
     # The chip's force is 450 N/mm but for the rise, noise and a swing of 30 N/mm over some periods.
-    assert found.force_share == pytest.approx(0.01, rel=0.02)
+    assert found.force_fraction == pytest.approx(0.01, rel=0.02)
     assert found.mass_scaling == 100.0
 
 
@@ -58,7 +58,7 @@ def test_a_scene_without_forces_or_account():
     assert inertia(Scene(bare.data.drop_vars(["cutting_force", "thrust_force"]))) is None
     found = inertia(bare)
     assert found is not None
-    assert np.isnan([found.kinetic_share, found.force_share, found.mass_scaling]).all()
+    assert np.isnan([found.kinetic_fraction, found.force_fraction, found.mass_scaling]).all()
     assert found.warning == ""
 
 
@@ -67,7 +67,7 @@ def test_before_the_tool_touches_nothing_is_known():
     data = scene_with(1.0, drive_work=nothing).data
     found = inertia(Scene(data.assign(cutting_force=data["cutting_force"] * 0)))
     assert found is not None
-    assert np.isnan([found.kinetic_share, found.force_share]).all()
+    assert np.isnan([found.kinetic_fraction, found.force_fraction]).all()
 
 
 @pytest.mark.parametrize("speed", [50.0, 100.0, 250.0, 400.0])

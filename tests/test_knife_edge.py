@@ -249,7 +249,7 @@ def test_an_elliptical_spread_is_told_from_a_round_one():
 def test_light_around_a_point_is_returned_without_a_model():
     found = knife_edge([an_image(5.0, truth_of("annular")[2], 0.05, side=64)])
     radial = found.radial
-    assert (radial.shares >= 0).all()
+    assert (radial.fractions >= 0).all()
     unit = WAVELENGTH / (2 * pi * MIRROR[0])
     v = np.linspace(0.0, float(radial.edges[-1]) / unit, 20001)
     light = annular_density(v, MIRROR[1]) * v * (1 - MIRROR[1] ** 2) / 2
@@ -501,7 +501,7 @@ def test_a_measurement_becomes_an_image():
     assert image.footprint == pytest.approx(PITCH)
     assert any("fill factor 1" in note for note in image.notes)
     measurement.data.attrs |= {"fill_factor": 0.81, "psf_order": "detector"}
-    measurement.data.attrs |= {"assumed": "No pixel is saturated.", "doubtful": "A few are old."}
+    measurement.data.attrs |= {"assumed": "No pixel is saturated.", "warnings": "A few are old."}
     told = edge_image(measurement, "m")
     assert told.warnings == ("A few are old.",)
     assert told.footprint == pytest.approx(0.9 * PITCH)

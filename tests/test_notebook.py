@@ -37,7 +37,7 @@ def measurement(tool=TOOL):
     band, flags = Band(3.8e-6, 5.1e-6), np.array([[[0, 0, Flag.DEAD]], [[0, 0, 0]]], np.uint8)
     times, raster = np.array([0.0, 5e-3]), Raster(-9e-6, 0.0, 6e-6, 1, 3)
     made = Measurement.from_radiance(
-        band.radiance(kelvin), band, times, raster, flags=flags, attributes={"doubtful": "A.\nB."}
+        band.radiance(kelvin), band, times, raster, flags=flags, attributes={"warnings": "A.\nB."}
     )
     return made.with_tool(tool) if tool else made
 

@@ -227,9 +227,9 @@ def test_a_part_of_an_error_of_unknown_sign_is_not_told():
     causes = ("segment", "texture", "pixel phase")
     error = Distribution(np.array([[[-30.0, 1.0, -20.0]]]), causes)
     portion = Distribution(np.array([[[-10.0, -10.0, -10.0]]]), causes)
-    assert Headline(error, portion).psf_share is None
+    assert Headline(error, portion).psf_fraction is None
     known = Distribution(np.array([[[-30.0, -10.0, -20.0]]]), causes)
-    assert Headline(known, portion).psf_share.mean == pytest.approx((1 / 3 + 1 + 1 / 2) / 3)
+    assert Headline(known, portion).psf_fraction.mean == pytest.approx((1 / 3 + 1 + 1 / 2) / 3)
 
 
 def test_a_camera_by_name_has_its_data_sheets_numbers_and_says_where_they_stand():

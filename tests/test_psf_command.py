@@ -53,7 +53,7 @@ def test_the_command_says_what_was_found(folder):
     assert "kind: gaussian, fwhm: " in output
     assert "they agree" in output
     assert "Assumed: the whole square of a pixel takes light" in output
-    assert "Doubtful" not in output
+    assert "Warning" not in output
 
 
 def test_doubts_are_printed(folder):
@@ -83,7 +83,7 @@ def test_a_tail_is_kept_in_the_file(folder):
     write_edge(folder / "tail.nc", edge=tailed_edge(8e-6, 0.2, 20e-6), side=64)
     code, output = psf("tail.nc", "--out", "psf.nc")
     assert code == 0
-    assert "tail share" in output
+    assert "tail fraction" in output
     read = MeasuredPSF.from_file("psf.nc")
     half = len(read.weights) // 2
     x = (np.arange(len(read.weights)) - half) * read.spacing
@@ -207,7 +207,7 @@ def test_a_blade_colder_than_the_calibration_serves_for_an_edge(folder):
     code, output = psf("edge.npy", *given)
     assert code == 0, output
     assert abs(found_width(output)[0] - 10.0) < 0.6
-    assert "Doubtful" not in output
+    assert "Warning" not in output
 
 
 def test_a_measurement_under_the_cameras_range_serves_for_an_edge(folder):

@@ -15,7 +15,7 @@ from chipglow.camera import (
     fit_linear,
     replace_bad_pixels,
 )
-from chipglow.laboratory.measurement import ImagePosition, calibrate_recording, flag_shares
+from chipglow.laboratory.measurement import ImagePosition, calibrate_recording, flag_fractions
 from chipglow.radiometry import Band, ObjectParameters
 
 BAND = Band(3.8e-6, 5.1e-6)
@@ -193,7 +193,7 @@ def test_the_range_of_calibration_and_detector_is_flagged():
         np.isnan(measured.radiance_temperature()[0, 0]).tolist()
         == [True] * 2 + [False] * 2 + [True] * 2
     )
-    assert flag_shares(measured)[Flag.SATURATED] == pytest.approx(1 / 3)
+    assert flag_fractions(measured)[Flag.SATURATED] == pytest.approx(1 / 3)
     # At the detector's limit, within the calibrated range.
     measured = calibrate_recording(recording(counts, saturation=counts[0, 0, 2]), LINE)
     assert measured.flags[0, 0, 3] == over
@@ -264,7 +264,7 @@ def test_without_object_parameters_it_is_said_what_is_assumed():
     np.testing.assert_allclose(measured.radiance_temperature(), 900.0, atol=1e-3)
     assert "emissivity of 1" in measured.data.attrs["assumed"]
     assert "lower left corner" in measured.data.attrs["assumed"]
-    assert "not known" in measured.data.attrs["doubtful"]
+    assert "not known" in measured.data.attrs["warnings"]
     assert measured.calibration_uncertainty is None
 
 
@@ -274,7 +274,7 @@ def test_what_the_file_says_is_kept_apart_from_what_was_assumed_and_is_doubtful(
     attributes = measured.data.attrs
     assert attributes["notes"] == "Lens: 25 mm."
     assert "an even rate." in attributes["assumed"].splitlines()
-    assert "a gap." in attributes["doubtful"].splitlines()
+    assert "a gap." in attributes["warnings"].splitlines()
 
 
 def test_radiance_is_taken_as_it_is():
@@ -300,9 +300,9 @@ def test_full_counts_are_doubted_unless_the_saturation_is_known():
     counts = np.full((1, 4, 4), 2000, np.uint16)
     counts[0, :2, 0] = 4095
     doubted = calibrate_recording(recording(counts), LINE)
-    assert "2 values are 4095" in doubted.data.attrs["doubtful"]
+    assert "2 values are 4095" in doubted.data.attrs["warnings"]
     known = calibrate_recording(recording(counts, saturation=4094), LINE)
-    assert "doubtful" not in known.data.attrs
+    assert "warnings" not in known.data.attrs
     assert (known.flags[0, :2, 0] == Flag.SATURATED).all()
 
 

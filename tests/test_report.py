@@ -14,8 +14,8 @@ from chipglow.camera import Camera
 from chipglow.errors import Distribution, Plan, analyse
 from chipglow.errors.draws import CAUSES
 from chipglow.laboratory.chip import Inertia, rake_grid
-from chipglow.laboratory.chip.metrics_table import chip_rows
-from chipglow.report import Row, comparison_rows, write_report
+from chipglow.report import Row, comparison_frame, comparison_rows, write_report
+from chipglow.report.chip_rows import chip_rows
 from chipglow.report.comparison import cause_rows
 from chipglow.report.evidence import answer, crossing, place
 from chipglow.report.paper import PAPER, TABLE_1, table_1, table_2
@@ -165,15 +165,15 @@ def test_the_answer_states_scatter_and_whether_the_paper_differs(result):
 
 def test_inertia_that_is_too_much_is_said(result):
     def rows(share):
-        inert = Inertia(kinetic_share=share, force_share=0.004, mass_scaling=300.0)
+        inert = Inertia(kinetic_fraction=share, force_fraction=0.004, mass_scaling=300.0)
         found = comparison_rows(replace(result, forces=replace(result.forces, inertia=inert)))
         return {row.key: row for row in found}
 
-    assert rows(0.02)["kinetic_share_percent"].here_text == "2.00 %"
-    assert "lower mass_scaling, now 300" in rows(0.02)["kinetic_share_percent"].explanation
-    assert "lower" not in rows(0.009)["kinetic_share_percent"].explanation
-    assert rows(0.009)["inertia_force_share_percent"].here_text == "0.40 %"
-    assert "1/300 of it" in rows(0.009)["inertia_force_share_percent"].explanation
+    assert rows(0.02)["kinetic_fraction_percent"].here_text == "2.00 %"
+    assert "lower mass_scaling, now 300" in rows(0.02)["kinetic_fraction_percent"].explanation
+    assert "lower" not in rows(0.009)["kinetic_fraction_percent"].explanation
+    assert rows(0.009)["inertia_force_fraction_percent"].here_text == "0.40 %"
+    assert "1/300 of it" in rows(0.009)["inertia_force_fraction_percent"].explanation
 
 
 def test_the_summary_is_strict_json(folder, result):
@@ -229,13 +229,13 @@ def test_the_comparison_holds_what_the_paper_states(result):
     paper = {key: row.paper for key, row in rows.items() if row.paper is not None}
     assert paper == {
         "rake_error_degC": -42.0,
-        "rake_psf_share_percent": 45.0,
+        "rake_psf_fraction_percent": 45.0,
         "rake_extremum_error_degC": -42.0,
-        "rake_extremum_psf_share_percent": 45.0,
+        "rake_extremum_psf_fraction_percent": 45.0,
         "band_error_degC": -46.0,
-        "band_psf_share_percent": 15.0,
+        "band_psf_fraction_percent": 15.0,
         "band_measured_error_degC": -46.0,
-        "band_measured_psf_share_percent": 15.0,
+        "band_measured_psf_fraction_percent": 15.0,
         "band_worst_error_degC": -120.0,
         "segment_period_us": pytest.approx(90.0),
     }
@@ -244,6 +244,13 @@ def test_the_comparison_holds_what_the_paper_states(result):
     assert rows["contact_length_um"].paper_text == "–"
     assert all(row.explanation.endswith(".") for row in rows.values())
     assert PAPER.rake_error.where in rows["rake_error_degC"].where
+    frame = comparison_frame(result)
+    assert list(frame.index) == list(rows)
+    assert frame["paper"].dropna().to_dict() == paper
+    draws = rows["rake_error_degC"].draws
+    error = frame.loc["rake_error_degC"]
+    assert (error["least"], error["greatest"]) == draws.range
+    assert error["standard_deviation"] == draws.standard_deviation
 
 
 def test_a_band_that_begins_away_from_the_edge_is_as_long_as_itself(result):

@@ -12,9 +12,9 @@ from chipglow.report import QUICK
 
 PAPER_ROWS = [
     "rake_error_degC",
-    "rake_psf_share_percent",
+    "rake_psf_fraction_percent",
     "band_error_degC",
-    "band_psf_share_percent",
+    "band_psf_fraction_percent",
     "band_worst_error_degC",
     "segment_period_us",
 ]
@@ -55,7 +55,7 @@ def test_summary_holds_the_papers_figures_beside_ours(results):
     assert -150 < here["rake_error_degC"] < -10
     assert -150 < here["band_error_degC"] < -10
     assert here["band_worst_error_degC"] < here["band_error_degC"]
-    assert 0 < here["rake_psf_share_percent"] < 100
+    assert 0 < here["rake_psf_fraction_percent"] < 100
 
 
 def test_the_quick_studys_remark_states_its_own_errors_and_those_of_the_page(results):

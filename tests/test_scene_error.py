@@ -108,6 +108,9 @@ def test_lines_and_regions_give_mean_and_extremes():
     assert (worst.values < mean.values).all() and (mean.values < most.values).all()
     assert worst.mean < -20 and most.mean > 20  # cold spills into hot, and hot into cold
     assert abs(reading(result, "pad", "mean").error.mean) < 1.0  # far from the edge
+    frame = result.to_frame().set_index(["place", "reading"])
+    assert frame.loc[("across", "mean"), "error_K"] == mean.mean
+    assert frame.loc[("across", "greatest"), "greatest_K"] == most.range[1]
     profile = result.surfaces["plate"].profiles[0]
     errors = result.surfaces["plate"].errors
     assert profile.line.distance[-1] == pytest.approx(80e-6)

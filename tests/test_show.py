@@ -77,7 +77,7 @@ def test_the_summary_is_of_the_workpiece_at_that_time():
     assert values["velocity_y"] == (-4.0, -4.0, -4.0)
     assert values["plastic_strain_rate"] == (2e4, 2e4, 2e4)
     assert "material_x" not in values
-    assert summary.shares == pytest.approx(
+    assert summary.fractions == pytest.approx(
         {Material.VOID: 0.2, Material.WORKPIECE: 0.6, Material.TOOL: 0.2}
     )
     assert summary.quality is None

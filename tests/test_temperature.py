@@ -15,6 +15,7 @@ from chipglow.laboratory.emissivity import (
     Heating,
     KnownEmissivity,
     ReflectedTemperature,
+    RegionEmissivities,
     determine_emissivity,
     read_region_emissivity,
     true_temperature,
@@ -214,7 +215,7 @@ def test_the_emissivity_of_a_file_is_the_one_that_was_written(tmp_path):
     hot = developed(calibration, HOT, 0.42, 5, 20.0, seed=9)
     found = determine_emissivity([heated], HEATING)
     row = found.of(WHOLE)
-    write_emissivity([found], [[row]], tmp_path / "emissivity.nc")
+    write_emissivity(RegionEmissivities((found,), ((row,),)), tmp_path / "emissivity.nc")
     stored = read_region_emissivity(tmp_path / "emissivity.nc")["chip"]
     assert stored.heating == replace(HEATING, camera_uncertainty=None)
     for cause in ("reference", "reflected", "calibration"):
@@ -229,7 +230,7 @@ def test_the_emissivity_of_a_file_is_the_one_that_was_written(tmp_path):
         assert second.estimate.contribution(cause) == pytest.approx(
             first.estimate.contribution(cause), nan_ok=True
         )
-    write_emissivity([found, found], [[row], [row]], tmp_path / "two.nc")
+    write_emissivity(RegionEmissivities((found, found), ((row,), (row,))), tmp_path / "two.nc")
     with pytest.raises(ValueError, match=r"two.nc: has emissivities at 2 true temperatures"):
         read_region_emissivity(tmp_path / "two.nc")
     (tmp_path / "none.nc").write_bytes(b"")
@@ -252,7 +253,7 @@ def test_regions_in_a_file_correlate_as_obsarray_says(tmp_path):
     heating = replace(HEATING, drift=0.01, camera_uncertainty=1.0)
     found = determine_emissivity([measured(values, HEATING.reference, ROOM, frames=5)], heating)
     rows = [found.of(area) for area in halves]
-    write_emissivity([found], [rows], tmp_path / "e.nc")
+    write_emissivity(RegionEmissivities((found,), (tuple(rows),)), tmp_path / "e.nc")
     with xr.open_dataset(tmp_path / "e.nc", engine="h5netcdf") as data:
         estimate = from_xarray(data.load(), "region_mean")
     expected = Estimate.stack([row.estimate for row in rows])
@@ -269,7 +270,7 @@ def test_warnings_of_the_emissivity_travel_to_the_temperature(tmp_path):
     flags = np.zeros((1, *RASTER.shape), np.uint8)
     flags[:, :, :10] = Flag.SATURATED
     found = determine_emissivity([image(kelvins=HEATING.reference, flags=flags)], HEATING)
-    write_emissivity([found], [[found.of(WHOLE)]], tmp_path / "e.nc")
+    write_emissivity(RegionEmissivities((found,), ((found.of(WHOLE),),)), tmp_path / "e.nc")
     stored = read_region_emissivity(tmp_path / "e.nc")["chip"]
     for emissivity in (found.of(WHOLE), stored):
         (warning,) = true_temperature([image()], WHOLE, emissivity).estimate.warnings
@@ -284,7 +285,7 @@ def test_two_temperatures_by_one_emissivity_have_its_errors_in_common():
 
 def test_a_file_of_an_earlier_version_is_refused(tmp_path):
     found = determine_emissivity([image(kelvins=HEATING.reference)], HEATING)
-    write_emissivity([found], [[found.of(WHOLE)]], tmp_path / "e.nc")
+    write_emissivity(RegionEmissivities((found,), ((found.of(WHOLE),),)), tmp_path / "e.nc")
     with xr.open_dataset(tmp_path / "e.nc", engine="h5netcdf") as data:
         data.load().drop_vars("observations").to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
     with pytest.raises(ValueError, match="of an earlier version"):
@@ -367,7 +368,7 @@ def test_an_emissivity_of_another_temperature_is_doubtful(folder):
         found = determine_emissivity([image(kelvins=reference)], heating)
         names = ("body left", "body right", "fissure 1", "fissure 2")
         rows = [replace(found.of(WHOLE), name=name) for name in names]
-        write_emissivity([found], [rows], folder / "e.nc")
+        write_emissivity(RegionEmissivities((found,), (tuple(rows),)), folder / "e.nc")
         code, output = run("hot.nc", "--regions", "regions.yaml", "--emissivity", "e.nc")
         assert code == 0, output
         assert "Assumed: the emissivity is the same at all temperatures" in output
@@ -382,7 +383,7 @@ def test_an_emissivity_of_another_temperature_is_doubtful(folder):
         (["--emissivity", "1.5"], "emissivity: is 1.5, expected over 0 to 1"),
         (["--emissivity", "0.4", "--reflected", "warm"], "--reflected: 'warm'"),
         (["--emissivity", "e.nc", "--emissivity-uncertainty", "1"], "expected none with a file"),
-        (["--emissivity", "e.nc"], "tells of other, expected one of the regions"),
+        (["--emissivity", "e.nc"], "is known of other, expected one of the regions"),
         (["--emissivity", "0.4", "--set", "pitch=6 um"], "describes nothing"),
         (["--emissivity", "0.4", "--table", "no/t.csv"], "no"),
     ],
@@ -390,7 +391,7 @@ def test_an_emissivity_of_another_temperature_is_doubtful(folder):
 def test_bad_input_is_one_line(folder, arguments, message):
     found = determine_emissivity([image(kelvins=HEATING.reference)], HEATING)
     row = replace(found.of(WHOLE), name="other")
-    write_emissivity([found], [[row]], folder / "e.nc")
+    write_emissivity(RegionEmissivities((found,), ((row,),)), folder / "e.nc")
     code, output = run("hot.nc", "--regions", "regions.yaml", *arguments)
     assert code != 0
     assert message in output

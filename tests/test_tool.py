@@ -318,15 +318,15 @@ GOOD = "0,500\n0,20\n20,0\n600,60\n"
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "line 1: '', expected 'x_um,y_um', the unit named"),
-        ("x_mm,y_mm\n" + GOOD, "line 1: 'x_mm,y_mm', expected 'x_um,y_um'"),
-        (GOOD, "line 1: '0,500', expected 'x_um,y_um'"),
-        ("x_um,y_um\n0,500\n0,ten\n", "line 3: '0,ten', expected two numbers"),
-        ("x_um,y_um\n0,500\n0;20\n", "line 3: '0;20', expected two numbers"),
-        ("x_um,y_um\n0,500\n\n600,60\n", "line 3: '', expected two numbers"),
+        ("", "there is no number in it, expected a first line such as x_um,y_um"),
+        ("x,y\n" + GOOD, "line 1: 'x' has no unit, expected one such as x_um"),
+        (GOOD, "line 1: unknown column '0', expected x_um, y_um"),
+        ("x_um,y_um\n0,500\n0,ten\n", "line 3: '0,ten', expected 2 numbers"),
+        ("x_um,y_um\n0,500\n0;20\n", "line 3: '0;20', expected 2 numbers"),
+        ("x_um,y_um\n0,500\n\n600,60\n", "line 4: 2 points, expected 3 to 1000"),
         ("x_um,y_um\n0,500\n20,0\n", "line 3: 2 points, expected 3 to 1000"),
-        ("x_um,y_um\n", "line 2: 0 points, expected 3 to 1000"),
-        ("x_um,y_um\n0,500\n0,nan\n600,60\n", "line 3: point .* expected finite numbers"),
+        ("x_um,y_um\n", "there is no number in it"),
+        ("x_um,y_um\n0,500\n0,nan\n600,60\n", "line 3: '0,nan', expected 2 numbers"),
         ("x_um,y_um\n0,500\n0,20\n0,20\n600,60\n", "line 4: the same point as the one before"),
         ("x_um,y_um\n0,500\n0,20\n0,90\n600,95\n", "line 3: the line turns back"),
         (
@@ -356,6 +356,14 @@ def test_a_bad_file_is_one_line_with_file_line_value_and_expectation(text, messa
         read_tool_outline(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_an_outline_may_be_in_any_unit_of_length(tmp_path):
+    path = tmp_path / "edge.csv"
+    path.write_text("x_mm,y_mm\n0,0.5\n0,0.02\n0.02,0\n0.6,0.06\n")
+    (tmp_path / "same.csv").write_text("x_um,y_um\n" + GOOD)
+    same = read_tool_outline(tmp_path / "same.csv")
+    np.testing.assert_allclose(read_tool_outline(path).corners, same.corners, atol=1e-18)
 
 
 def test_a_file_that_is_no_text_is_refused(tmp_path):

@@ -5,7 +5,7 @@
 Real and generated files of every format are damaged by Hypothesis: cut, bytes changed, numbers made
 huge, parts repeated, removed or exchanged with another file. They are read in forks of this
 process, 200 cases each, with limits of memory and time as the product sets them. Whatever is no
-plain refusal is read once more the way the product does, in `chipglow.io.sources.isolated`, and has
+plain refusal is read once more the way the product does, in `chipglow.io.sandbox`, and has
 to end in one `SourceError` there (three of a kind and file). After 50 hangs a file is left. The
 command fails if a case is not contained.
 Linux only.
@@ -26,9 +26,8 @@ from pathlib import Path
 from hypothesis import HealthCheck, Phase, given, settings, strategies as st
 from seeds import seeds
 
+from chipglow.io.sandbox import Isolated, limit_memory
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.isolated import Isolated
-from chipglow.io.sources.worker import limit_memory
 from chipglow.scene import Raster
 
 RASTER = Raster(0.0, 1.0, 1.0 / 24, 24, 24)

@@ -230,7 +230,7 @@ class Camera:
         Returns
         -------
         Measurement
-            As many frames as exposures. Its attribute ``doubtful`` says how far the border of the
+            As many frames as exposures. Its attribute ``warnings`` says how far the border of the
             scene matters, if it changes a pixel by over `BORDER_TOLERANCE`.
 
         Raises
@@ -262,7 +262,7 @@ class Camera:
         measured = self._measurement(np.stack(frames), np.array(starts), sensors)
         if alike:
             other = np.asarray(self.band.temperature(np.stack(alike)), np.float64)
-            measured.data.attrs |= _border_doubt(measured, other, exposure.raster)
+            measured.data.attrs |= _border_warning(measured, other, exposure.raster)
         return measured
 
     def measure(
@@ -407,7 +407,7 @@ def _laid(surface: Surface, scene: Scene) -> EmissivityField:
     return surface.on(scene)
 
 
-def _border_doubt(
+def _border_warning(
     measured: Measurement, other: NDArray[np.float64], scene: Raster
 ) -> dict[str, str]:
     """What the border of the scene may change, beside temperatures under another assumption."""
@@ -420,7 +420,7 @@ def _border_doubt(
     down = np.minimum(top - at.y, at.y - bottom)
     reach = np.minimum(across, down[:, None])[changed.any(axis=0)].max()
     return {
-        "doubtful": (
+        "warnings": (
             "The border of the scene: beyond it the surface is taken to be as at the edge. With "
             "the like of what each pixel sees within the scene there instead, "
             f"{100 * changed.mean():.3g} % of the pixels (up to {1e6 * reach:.3g} µm from the "

@@ -152,7 +152,7 @@ class Measurement:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Why it may not be relied on, a sentence each."""
-        return tuple(str(self.data.attrs.get("doubtful", "")).splitlines())
+        return tuple(str(self.data.attrs.get("warnings", "")).splitlines())
 
     @cached_property
     def band(self) -> Band:

@@ -159,7 +159,7 @@ def error(
     ] = None,
     out: ResultFolder = ERROR_FOLDER,
 ) -> None:
-    """Tell a camera's error on any scene: of a cut, a weld, a melt pool, a plate."""
+    """Give a camera's error on any scene: of a cut, a weld, a melt pool, a plate."""
     from chipglow.cli.results import write_errors
     from chipglow.cli.scene_error import study_of
 

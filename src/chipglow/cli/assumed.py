@@ -1,4 +1,4 @@
-"""What had to be assumed, and what is doubtful, on the terminal."""
+"""Assumptions and warnings of results, on the terminal."""
 
 from collections.abc import Iterable
 
@@ -14,8 +14,8 @@ def say_assumed(sentences: Iterable[str]) -> None:
         console.print(f"Assumed: {sentence}")
 
 
-def say_doubtful(sentences: Iterable[str]) -> None:
-    """Say beside the results what cannot be relied on, a sentence each."""
+def say_warnings(sentences: Iterable[str]) -> None:
+    """Say beside the results their warnings, a sentence each."""
     console = Console(highlight=False, markup=False, soft_wrap=True)
     for sentence in sentences:
         console.print(f"Warning: {sentence}")
@@ -29,12 +29,12 @@ def say_missing(sentences: Iterable[str]) -> None:
 
 
 def say_of_measurements(*measurements: Measurement) -> None:
-    """Say what was assumed of measurements and what is doubtful of them, each sentence once.
+    """Say what was assumed of measurements, and their warnings, each sentence once.
 
     Measurements of a camera's file keep both as attributes, a sentence a line.
     """
     say_assumed(_sentences(measurements, "assumed"))
-    say_doubtful(_sentences(measurements, "doubtful"))
+    say_warnings(_sentences(measurements, "warnings"))
 
 
 def _sentences(measurements: Iterable[Measurement], kind: str) -> list[str]:

@@ -1,22 +1,18 @@
 """The command ``chipglow calibrate``: counts of blackbodies to a calibration."""
 
-from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
     from rich.console import Console
 
     from chipglow.camera import CalibrationFit, FittedCalibration
-
-    Fits = Mapping[str, CalibrationFit[FittedCalibration]]
+    from chipglow.laboratory.measurement import BlackbodyCalibration
 
 
 class Model(StrEnum):
@@ -82,116 +78,72 @@ def calibrate(
     """
     from rich.console import Console
 
-    from chipglow.camera import MODELS, Blackbody, fit_models, preferred
-    from chipglow.cli.assumed import say_assumed, say_doubtful
-    from chipglow.io.column_file import read_calibration_points
-    from chipglow.laboratory.measurement import FlatFieldSources, uniform_counts
+    from chipglow.camera import MODELS
+    from chipglow.cli.assumed import say_assumed, say_warnings
+    from chipglow.laboratory.measurement import calibrate_blackbodies, write_calibration
     from chipglow.laboratory.measurement.description import band_of
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import TEMPERATURE, TEMPERATURE_DIFFERENCE, TIME
 
-    recordings, uniform = [], FlatFieldSources()
-
-    def counts_of(file: str) -> float:
-        recordings.append(file)
-        return uniform_counts(points.parent / file, settings or (), uniform)
-
-    table = read_calibration_points(points, counts_of)
-    if settings and not recordings:
-        raise ValueError(
-            f"--set: {settings[0]!r} describes nothing, as {points} names no recordings (file)"
-        )
-    room = parse("--surroundings", TEMPERATURE, surroundings)
-    try:
-        blackbody = Blackbody(
-            1.0 if emissivity is None else emissivity,
-            emissivity_uncertainty,
-            293.15 if room is None else room,
-        )
-    except ValueError as error:
-        raise ValueError(f"--{str(error).replace('_', '-', 1)}") from None
-    known: dict[str, Any] = {
-        "blackbody": blackbody,
-        "count_uncertainty": table.get("count_uncertainty"),
-        "temperature_uncertainty": table.get("temperature_uncertainty"),
-        "common_uncertainty": parse(
-            "--common-uncertainty", TEMPERATURE_DIFFERENCE, common_uncertainty
-        )
-        or 0.0,
-        "integration_time": parse("--integration-time", TIME, integration_time),
-        "range_name": range_name,
-    }
-    wanted = tuple(MODELS) if model is Model.BOTH else (model.value,)
     try:
         seen = band_of(band)
     except ValueError as error:
         raise ValueError(f"--band: {error}") from None
-    try:
-        fits = fit_models(table["temperature"], table["counts"], seen, wanted, **known)
-    except ValueError as error:
-        raise ValueError(f"{points}: {error}") from None
+    found = calibrate_blackbodies(
+        points,
+        seen,
+        tuple(MODELS) if model is Model.BOTH else (model.value,),
+        settings or (),
+        emissivity=emissivity,
+        emissivity_uncertainty=emissivity_uncertainty,
+        surroundings=parse("--surroundings", TEMPERATURE, surroundings),
+        common_uncertainty=parse(
+            "--common-uncertainty", TEMPERATURE_DIFFERENCE, common_uncertainty
+        ),
+        integration_time=parse("--integration-time", TIME, integration_time),
+        range_name=range_name,
+    )
     console = Console(highlight=False, markup=False, soft_wrap=True)
-    for name, fit in fits.items():
-        _print_fit(console, name, fit)
-    chosen = preferred(fits)
-    if len(fits) > 1:
-        _print_comparison(console, fits, chosen)
-    say_assumed(_assumed(emissivity, surroundings, table["temperature"]))
-    say_doubtful(_doubtful(chosen, fits[chosen], common_uncertainty is not None))
+    for name in found.fits:
+        _print_fit(console, found, name)
+    if len(found.fits) > 1:
+        _print_comparison(console, found)
+    say_assumed(found.assumptions)
+    say_warnings(found.warnings)
     if out is not None:
-        _write(fits[chosen], out)
+        write_calibration(found.fits[found.preferred], out)
         print(out)
     if plot is not None:
         from chipglow.cli.pictures import write_picture
         from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
 
-        write_picture(draw_calibrations(fits), plot)
+        write_picture(draw_calibrations(found.fits), plot)
 
 
-def _write(fit: "CalibrationFit[FittedCalibration]", out: Path) -> None:
-    from chipglow.io import atomic_path
-    from chipglow.laboratory.measurement import CalibrationDescription, calibration_text
+def _print_fit(console: "Console", found: "BlackbodyCalibration", name: str) -> None:
+    from chipglow.cli.tables import screen_table
 
-    with atomic_path(out) as temporary:
-        text = calibration_text(CalibrationDescription.of(fit))
-        temporary.write_text(text, encoding="utf-8")
-
-
-def _print_fit(console: "Console", name: str, fit: "CalibrationFit[FittedCalibration]") -> None:
-    import numpy as np
-    from rich.table import Table
-
-    calibration = fit.calibration
+    calibration = found.fits[name].calibration
     console.print(
         f"\n{name}: {calibration.description}, {calibration.lowest - 273.15:.5g} °C to "
         f"{calibration.highest - 273.15:.5g} °C"
     )
-    parameters = Table("parameter", "value", "standard uncertainty", "unit", box=None)
-    deviations = np.sqrt(np.diag(calibration.covariance))
-    for label, value, deviation, unit in zip(
-        calibration.NAMES, calibration.parameters, deviations, calibration.UNITS, strict=True
-    ):
-        parameters.add_row(label, f"{value:.7g}", f"{deviation:.2g}", unit)
-    console.print(parameters)
-    table = Table(
-        "blackbody / °C", "counts", "residual / counts", "residual / K", "u / K",
-        box=None,
-    )  # fmt: skip
-    for column in table.columns:
-        column.justify = "right"
-    uncertainty = calibration.uncertainty(calibration.counts(fit.temperatures))
-    uncertainty = uncertainty / calibration.band.slope(fit.temperatures)
-    rows = zip(
-        fit.temperatures, fit.counts, fit.residuals, fit.residuals_temperature, uncertainty,
-        strict=True,
-    )  # fmt: skip
-    for kelvins, counts, residual, error, deviation in rows:
-        table.add_row(
-            f"{kelvins - 273.15:.2f}", f"{counts:.6g}", f"{residual:.3g}", f"{error:.3g}",
-            f"{deviation:.2g}",
-        )  # fmt: skip
-    console.print(table)
-    console.print(_quality(fit))
+    cells = {
+        "parameter": "{parameter}",
+        "value": "{value:.7g}",
+        "standard uncertainty": "{standard_uncertainty:.2g}",
+        "unit": "{unit}",
+    }
+    console.print(screen_table(found.parameter_frame().query("model == @name"), cells))
+    cells = {
+        "blackbody / °C": "{temperature_degC:.2f}",
+        "counts": "{counts:.6g}",
+        "residual / counts": "{residual_counts:.3g}",
+        "residual / K": "{residual_K:.3g}",
+        "u / K": "{standard_uncertainty_K:.2g}",
+    }
+    console.print(screen_table(found.to_frame().query("model == @name"), cells))
+    console.print(_quality(found.fits[name]))
 
 
 def _quality(fit: "CalibrationFit[FittedCalibration]") -> str:
@@ -209,45 +161,9 @@ def _quality(fit: "CalibrationFit[FittedCalibration]") -> str:
     )
 
 
-def _print_comparison(console: "Console", fits: "Fits", chosen: str) -> None:
-    criteria = ", ".join(f"{name} {fit.information_criterion:.4g}" for name, fit in fits.items())
+def _print_comparison(console: "Console", found: "BlackbodyCalibration") -> None:
+    criteria = ", ".join(
+        f"{name} {fit.information_criterion:.4g}" for name, fit in found.fits.items()
+    )
     console.print(f"\nInformation criterion (Akaike's, corrected): {criteria}.")
-    console.print(f"Preferred: {chosen}, which has the least.")
-
-
-def _assumed(
-    emissivity: float | None, surroundings: str | None, kelvins: "NDArray[np.float64]"
-) -> Iterator[str]:
-    import numpy as np
-
-    if emissivity is None:
-        yield (
-            "The blackbody's emissivity is 1 (--emissivity); 0.97 would make 5.4 K at 500 degC "
-            "between 3.8 um and 5.1 um."
-        )
-    elif emissivity < 1 and surroundings is None:
-        yield "The blackbody reflects 20 degC (--surroundings)."
-    steps = np.diff(kelvins)
-    if (steps > 0).all() or (steps < 0).all():
-        yield (
-            "The camera did not drift during the calibration: the points follow one another in the "
-            "order of their temperatures, in which a drift looks like a part of the curve. Some "
-            "points again, in another order, would show it."
-        )
-
-
-def _doubtful(
-    name: str, fit: "CalibrationFit[FittedCalibration]", common_known: bool
-) -> Iterator[str]:
-    for warning in fit.calibration.warnings:
-        yield f"{name}: {warning[0].lower()}{warning[1:]}"
-    if not fit.stated:
-        yield (
-            "The uncertainty is from the scatter of the points, as if all counts were equally "
-            "uncertain: count_uncertainty and temperature_uncertainty_K would tell it."
-        )
-    if not common_known:
-        yield (
-            "The uncertainty holds no error that all temperatures of the blackbody have in common "
-            "(--common-uncertainty)."
-        )
+    console.print(f"Preferred: {found.preferred}, which has the least.")

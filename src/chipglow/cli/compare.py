@@ -10,7 +10,6 @@ from chipglow.cli.options import Settings, ToolChoice, picture_option
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from chipglow.camera import Measurement
     from chipglow.laboratory.comparison import Comparison, StatedUncertainties
 
 
@@ -46,13 +45,13 @@ def compare(
         typer.Option(
             metavar="KELVINS",
             help="Standard uncertainty of the measured radiance temperatures, such as '10 K', for "
-            "a measurement that does not tell its own.",
+            "a measurement that does not state its own.",
         ),
     ] = None,
     emissivity_uncertainty: Annotated[
         float,
         typer.Option(
-            metavar="SHARE",
+            metavar="FRACTION",
             help="Relative standard uncertainty of the emissivities of the simulations, of 1.",
         ),
     ] = 0.0,
@@ -74,30 +73,25 @@ def compare(
     plot: Annotated[Path | None, picture_option("Draw the comparison")] = None,
     settings: Settings = None,
 ) -> None:
-    """Lay a measurement and simulations over each other and tell which fits where."""
+    """Lay a measurement and simulations over each other and say which fits where."""
     from dataclasses import replace
 
     from rich.console import Console
 
-    from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
+    from chipglow.cli.assumed import say_assumed, say_of_measurements, say_warnings
     from chipglow.cli.pictures import write_picture
     from chipglow.cli.times import frame_at
     from chipglow.laboratory.chip import chosen_tool, read_curve
-    from chipglow.laboratory.comparison import compare as compare_all
+    from chipglow.laboratory.comparison import compare as compare_all, labelled_simulations
     from chipglow.laboratory.comparison.figure import draw_comparison
     from chipglow.laboratory.measurement import load_measurement
 
     stated = _stated(uncertainty, emissivity_uncertainty, position)
     whole = load_measurement(measured, settings or ())
-    if uncertainty is not None and whole.calibration_errors is not None:
-        raise ValueError(
-            f"--uncertainty: {uncertainty} beside the uncertainty that {measured} tells, "
-            "expected one or the other"
-        )
     chosen = chosen_tool(whole, tool, position)
     result = compare_all(
         whole,
-        _labelled(simulated),
+        labelled_simulations(simulated),
         chosen.tool,
         None if curve is None else read_curve(curve),
         replace(stated, tool=chosen.uncertainty),
@@ -109,7 +103,7 @@ def compare(
         console.print(sentence)
     say_of_measurements(whole)
     say_assumed((*chosen.assumptions, *result.assumptions))
-    say_doubtful((*chosen.warnings, *result.warnings))
+    say_warnings((*chosen.warnings, *result.warnings))
     console.print()
     for place in result.places:
         console.print(place.sentence)
@@ -136,55 +130,30 @@ def _stated(
     return StatedUncertainties(kelvins or 0.0, emissivity, parse("--position", LENGTH, position))
 
 
-def _labelled(paths: list[Path]) -> "dict[str, Measurement]":
-    from chipglow.laboratory.measurement import load_measurement
-
-    found: dict[str, Measurement] = {}
-    for path in paths:
-        item = load_measurement(path)
-        label = str(item.data.attrs.get("surface", path.stem))
-        if label in found:
-            label = f"{label} ({path.stem})"
-        if label in found:
-            raise ValueError(f"{path}: is there twice, expected each simulation once")
-        found[label] = item
-    return found
-
-
 def _table(result: "Comparison") -> "Table":
-    from rich.table import Table
-
+    from chipglow.cli.tables import screen_table
     from chipglow.laboratory.comparison.comparison import COVERAGE
 
-    table = Table(
-        "place",
-        "simulation",
-        "bias / K",
-        "RMS / K",
-        "E_n up to 1",
-        box=None,
-        title="simulated less measured radiance temperature, ± expanded uncertainty "
-        f"(k = {COVERAGE:g})",
-        title_justify="left",
+    frame = result.fit_frame()
+    frame["bias_expanded_K"] = COVERAGE * frame["bias_standard_uncertainty_K"]
+    frame.loc[frame["place"].duplicated(), "place"] = ""
+    return screen_table(
+        frame,
+        {
+            "place": "{place}",
+            "simulation": "{simulation}",
+            "bias / K": "{bias_K:+.1f} ± {bias_expanded_K:.1f}",
+            "RMS / K": "{rms_K:.1f}",
+            "E_n up to 1": "{values_with_E_n_up_to_1} of {values}",
+        },
+        f"simulated less measured radiance temperature, ± expanded uncertainty (k = {COVERAGE:g})",
     )
-    for place in result.places:
-        for i, fit in enumerate(place.fits):
-            table.add_row(
-                "" if i else place.place.rstrip(","),
-                fit.label,
-                f"{fit.bias:+.1f} ± {COVERAGE * fit.bias_uncertainty:.1f}",
-                f"{fit.rms:.1f}",
-                f"{fit.agreeing} of {fit.count}",
-            )
-    return table
 
 
 def _write(result: "Comparison", out: Path) -> None:
     from chipglow.drawing import drawing
     from chipglow.io import atomic_folder
-    from chipglow.laboratory.comparison import (
-        write_comparison,
-    )
+    from chipglow.laboratory.comparison import write_comparison
     from chipglow.laboratory.comparison.figure import draw_comparison
 
     with atomic_folder(out) as folder:

@@ -28,7 +28,7 @@ def convert(
     """Make a measurement of a camera's file."""
     from rich.console import Console
 
-    from chipglow.cli.assumed import say_assumed, say_doubtful
+    from chipglow.cli.assumed import say_assumed, say_warnings
     from chipglow.cli.showing import listed
     from chipglow.cli.showing_measurement import say_measurement
     from chipglow.io import is_measurement, write_measurement
@@ -39,8 +39,8 @@ def convert(
     description = load_description(source, settings or ())
     recording = load_recording(description)
     console = Console(highlight=False, markup=False, soft_wrap=True)
-    told = bool(settings) or source.suffix.lower() in (".yaml", ".yml")
-    console.print("The file, and what you said of it:" if told else "The file says:")
+    given = bool(settings) or source.suffix.lower() in (".yaml", ".yml")
+    console.print("The file, and what you said of it:" if given else "The file says:")
     console.print(listed(_facts(recording)))
     try:
         measurement = measurement_of(description, recording, str(source))
@@ -49,7 +49,7 @@ def convert(
             raise
         console.print(f"\nIt is no measurement yet. {error}")
         say_assumed(recording.assumptions)
-        say_doubtful(recording.warnings)
+        say_warnings(recording.warnings)
         return
     console.print("\nThe measurement:")
     say_measurement(measurement)
@@ -78,11 +78,11 @@ def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:
         yield "pitch", f"{1e6 * recording.pitch:.6g} µm"
     if recording.conversion is not None:
         yield "conversion", "the maker's, of unknown uncertainty"
-    told = recording.object_parameters
-    if told is not None:
-        yield "emissivity", f"{told.emissivity:g}"
-        yield "reflected", f"{told.reflected - 273.15:.2f} °C"
-        yield "transmittance", f"{told.transmittance:g}"
-        yield "atmosphere", f"{told.atmosphere - 273.15:.2f} °C"
+    stated = recording.object_parameters
+    if stated is not None:
+        yield "emissivity", f"{stated.emissivity:g}"
+        yield "reflected", f"{stated.reflected - 273.15:.2f} °C"
+        yield "transmittance", f"{stated.transmittance:g}"
+        yield "atmosphere", f"{stated.atmosphere - 273.15:.2f} °C"
     for note in recording.notes:
         yield "note", note

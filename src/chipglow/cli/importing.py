@@ -34,7 +34,7 @@ def import_fields(description: ImportDescription, out: Path | None, resume: bool
         import_scene(
             wanted,
             out,
-            lambda share: progress("import", share),
+            lambda fraction: progress("import", fraction),
             looked=looked,
             resume=kept if resume else None,
         )

@@ -12,8 +12,8 @@ def say_inertia(inertia: Inertia | None) -> None:
     if inertia is None:
         return
     known = (
-        (inertia.kinetic_share, "kinetic energy at most {} of the work"),
-        (inertia.force_share, "momentum flux {} of the mean cutting force"),
+        (inertia.kinetic_fraction, "kinetic energy at most {} of the work"),
+        (inertia.force_fraction, "momentum flux {} of the mean cutting force"),
     )
     parts = [text.format(f"{share:.2%}") for share, text in known if isfinite(share)]
     console = Console(stderr=True, highlight=False, soft_wrap=True)

@@ -30,7 +30,7 @@ ToolChoice: TypeAlias = Annotated[
     typer.Option(
         metavar="FILE|found",
         help="The tool, a YAML file with the keys of a study's cutting.tool and tip; or 'found', "
-        "to look for the rake face in the image; by default what the measurement tells, as a "
+        "to look for the rake face in the image; by default what the measurement states, as a "
         "simulated one does.",
     ),
 ]

@@ -8,6 +8,7 @@ import typer
 from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
+    from chipglow.cli.tables import Cell
     from chipglow.laboratory.psf import KnifeEdge
 
 
@@ -22,8 +23,8 @@ def psf(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="A YAML file that lists images of round apertures with their diameters; they tell "
-            "of the tails.",
+            help="A YAML file that lists images of round apertures with their diameters, which "
+            "show the tails.",
         ),
     ] = None,
     region: Annotated[
@@ -98,15 +99,38 @@ def _region(text: str) -> tuple[slice, slice]:
 def _print(found: "KnifeEdge") -> None:
     from rich.console import Console
 
-    from chipglow.cli.assumed import say_assumed, say_doubtful
-    from chipglow.laboratory.psf.summary import edge_table, model_table, sentences
+    from chipglow.cli.assumed import say_assumed, say_warnings
+    from chipglow.cli.tables import screen_table
+    from chipglow.laboratory.psf.summary import sentences
 
     console = Console(highlight=False, markup=False)
-    console.print(model_table(found))
-    console.print()
-    console.print(edge_table(found))
-    console.print()
+    models = {
+        "model": "{model}",
+        "FWHM / um": _uncertain("fwhm_um", "fwhm_uncertainty_um"),
+        "AICc": "{aicc:+.1f}",
+        "BIC": "{bic:+.1f}",
+        "weight": "{weight:.3f}",
+        "reduced chi²": "{reduced_chi_squared:.3g}",
+    }
+    edges = {
+        "image": "{image}",
+        "normal / deg": _uncertain("normal_deg", "normal_uncertainty_deg"),
+        "FWHM / um": _uncertain("fwhm_um", "fwhm_uncertainty_um"),
+        "LSF / um": "{line_fwhm_um:.4g}",
+        "step/noise": "{step_over_noise:.3g}",
+        "MTF(Nyquist)": _uncertain("mtf_at_nyquist", "mtf_at_nyquist_uncertainty"),
+    }
+    for table in (screen_table(found.to_frame(), models), screen_table(found.edge_frame(), edges)):
+        console.print(table)
+        console.print()
     for sentence in sentences(found):
         console.print(sentence, soft_wrap=True)
     say_assumed(found.assumptions)
-    say_doubtful(found.warnings)
+    say_warnings(found.warnings)
+
+
+def _uncertain(value: str, uncertainty: str) -> "Cell":
+    """Cell of a value with its uncertainty, by the names of their columns."""
+    from chipglow.laboratory.psf.summary import with_uncertainty
+
+    return lambda row: with_uncertainty(row[value], row[uncertainty])

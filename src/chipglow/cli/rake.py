@@ -8,8 +8,6 @@ import typer
 from chipglow.cli.options import MeasurementFile, Settings, ToolChoice, picture_option, table_option
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from rich.table import Table
 
     from chipglow.camera import Measurement
@@ -49,17 +47,17 @@ def rake(
     """Average radiance temperature in squares along the rake face, as the paper's Figure 7."""
     from rich.console import Console
 
-    from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
-    from chipglow.cli.budget import budget_table
+    from chipglow.cli.assumed import say_assumed, say_of_measurements, say_warnings
     from chipglow.cli.pictures import write_picture
+    from chipglow.cli.tables import budget_table
     from chipglow.laboratory.chip import (
         ToolUncertainty,
         chosen_tool,
         rake_grid,
-        write_rake_grid,
     )
     from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
     from chipglow.laboratory.measurement import load_measurement
+    from chipglow.laboratory.result_file import write_result
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import LENGTH
 
@@ -75,13 +73,13 @@ def rake(
     console.print("\nStandard uncertainty of the squares' means")
     console.print(budget_table(grid.frame_estimate))
     console.print()
-    for sentence in (*chosen.found, *_common(grid), *_left_out(grid)):
+    for sentence in (*chosen.found, *grid.notes):
         console.print(sentence)
     say_of_measurements(measured)
     say_assumed(chosen.assumptions)
-    say_doubtful((*chosen.warnings, *_doubts(grid)))
+    say_warnings((*chosen.warnings, *grid.warnings))
     if out is not None:
-        write_rake_grid(grid, out)
+        write_result(grid, out)
         print(out)
     if plot is not None:
         write_picture(draw_rake_grid(measured, grid), plot)
@@ -104,61 +102,18 @@ def _frames(measurement: "Measurement", frame: str, at: str | None) -> list[int]
 
 
 def _table(grid: "RakeGrid") -> "Table":
-    from rich.table import Table
+    from chipglow.cli.tables import screen_table
 
     several = grid.times.size > 1
-    mean = grid.frame_mean - 273.15
-    deviation = grid.frame_deviation if several else grid.deviation[0]
     over = f"between {grid.times.size} frames" if several else "over a square's pixels"
-    table = Table(
-        "along / µm",
-        *(f"{1e6 * depth:.4g} µm deep" for depth in grid.depth),
-        box=None,
-        title=f"radiance temperature / °C ± standard deviation {over}",
-        title_justify="left",
-    )
-    for column in table.columns:
-        column.justify = "right"
-        column.no_wrap = True
-    for n, along in enumerate(grid.along):
-        values = zip(mean[:, n], deviation[:, n], strict=True)
-        table.add_row(f"{1e6 * along:.4g}", *(_cell(*value) for value in values))
-    return table
-
-
-def _cell(mean: float, deviation: float) -> str:
-    from math import isnan
-
-    if isnan(mean):
-        return "–"
-    return f"{mean:.1f}" if isnan(deviation) else f"{mean:.1f} ± {deviation:.1f}"
-
-
-def _common(grid: "RakeGrid") -> "Iterator[str]":
-    """What the deviations do not hold."""
-    causes = [one.cause.name for one in grid.estimate.components]
-    if causes:
-        yield (
-            f"Errors of {' and '.join(causes)} move all squares together and are not in the "
-            "deviations."
-        )
-
-
-def _left_out(grid: "RakeGrid") -> "Iterator[str]":
-    """What is not in the table."""
-    seen = grid.frame_count
-    if (seen == 0).any():
-        yield (
-            f"{int((seen == 0).sum())} of {seen.size} squares are left out (–): a pixel of theirs "
-            "is under the camera's lower range limit, saturated or dead, or outside the image."
-        )
-
-
-def _doubts(grid: "RakeGrid") -> "Iterator[str]":
-    seen, frames = grid.frame_count, grid.times.size
-    partly = int(((seen > 0) & (seen < frames)).sum())
-    if partly:
-        yield (
-            f"{partly} squares are usable in some of the {frames} frames only; their means are of "
-            "those frames, which are the hotter ones where the lower range limit is the reason."
-        )
+    squares = grid.mean_frame()
+    wide = squares.pivot(index="along_um", columns="depth_um")
+    depths = wide["mean_degC"].columns
+    wide.columns = [f"{name}_{depths.get_loc(depth)}" for name, depth in wide.columns]
+    cells = {
+        f"{depth:.4g} µm deep": f"{{mean_degC_{n}:.1f}} ± {{deviation_K_{n}:.1f}}"
+        for n, depth in enumerate(depths)
+    }
+    cells = {"along / µm": "{along_um:.4g}", **cells}
+    title = f"radiance temperature / °C ± standard deviation {over}"
+    return screen_table(wide.reset_index(), cells, title, unbroken=cells)

@@ -1,9 +1,8 @@
 """The command ``chipglow register``: infrared images on visible pictures."""
 
-from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,13 +13,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from rich.console import Console
 
-    from chipglow.camera import Measurement, Recording
-    from chipglow.laboratory.registration import DotFit, ImageFit, PointFit, Registration
+    from chipglow.camera import Measurement
+    from chipglow.laboratory.registration import (
+        DotFit,
+        ImageFit,
+        PointFit,
+        RecordingAlignment,
+        Registration,
+    )
 
     Points = tuple[NDArray[np.float64], NDArray[np.float64]]
-
-_BEST_PICKED: Final = 0.02
-"""Scatter in visible pixels under which points are not picked: that of dots' middles."""
 
 
 class ModelName(StrEnum):
@@ -76,7 +78,7 @@ def register(
         typer.Option(
             metavar="FILE",
             help="The tool to draw, a YAML file with the keys of a study's cutting.tool and tip; "
-            "by default what the measurement tells, if it does.",
+            "by default what the measurement states, if it does.",
         ),
     ] = None,
     frame: Annotated[int, typer.Option(metavar="N", help="Number of the infrared frame.")] = 0,
@@ -105,17 +107,19 @@ def register(
         file_option("With --align, write each infrared frame's visible ones, CSV.", ".csv"),
     ] = None,
     overlay: Annotated[Path | None, picture_option("Draw both images on each other")] = None,
-    blink: Annotated[Path | None, file_option("Show both images in turns, .gif.", ".gif")] = None,
+    blink: Annotated[Path | None, file_option("Show both images in turn, .gif.", ".gif")] = None,
     settings: Settings = None,
 ) -> None:
     """Find where each point of an infrared image is in a visible picture."""
     from rich.console import Console
 
-    from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
+    from chipglow.cli.assumed import say_assumed, say_of_measurements, say_warnings
     from chipglow.cli.pictures import write_picture
     from chipglow.laboratory.chip import tool_of
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.registration import (
+        align_recordings,
+        fit_points,
         load_registration,
         read_pictures,
         read_points,
@@ -123,6 +127,7 @@ def register(
     )
     from chipglow.laboratory.registration.figure import blink_pictures, draw_registration
     from chipglow.laboratory.registration.picture_file import write_blink
+    from chipglow.laboratory.result_file import write_frame
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import TIME
 
@@ -133,35 +138,50 @@ def register(
     region = None if align is None else _region(align)
     measured, seen = load_measurement(infrared, settings or ()), read_pictures(visible, interval)
     if region is not None:
-        _check_times(visible, measured, seen, interval)
+        _check_times(visible, interval)
     _check_frame("--frame", frame, measured.times.size)
     _check_frame("--visible-frame", visible_frame, seen.times.size)
     picture = seen.signal[visible_frame]
     outline = measured.tool if tool is None else tool_of(measured, tool)
     console = Console(highlight=False, markup=False)
+    fit: PointFit | DotFit | ImageFit | None = None
     if known is not None:
-        found, marked = load_registration(known), None
-    elif points is not None:
-        marked = read_points(points, measured.raster, picture.shape)
-        found = _by_points(console, marked, model)
+        found = load_registration(known)
     else:
-        found, marked = _by_images(console, measured, frame, picture, model, method)
+        if points is not None:
+            fit = fit_points(*read_points(points, measured.raster, picture.shape), model.value)
+        else:
+            fit = _by_images(measured, frame, picture, model, method)
+        _print_fit(console, fit)
+        found = fit.registration
     _say(console, found, measured)
     say_of_measurements(measured)
     say_assumed(f"{visible}: {sentence}" for sentence in seen.assumptions)
-    say_doubtful(f"{visible}: {sentence}" for sentence in seen.warnings)
-    if align is not None and region is not None:
-        _align(console, found, measured, seen, region, pairs)
+    say_warnings(f"{visible}: {sentence}" for sentence in seen.warnings)
+    if region is not None:
+        clocks = align_recordings(found, measured, seen, region)
+        _say_clocks(console, clocks)
+        if pairs is not None:
+            write_frame(clocks.to_frame(), pairs)
+            print(pairs)
     if out is not None:
         write_registration(found, out)
         print(out)
     temperature = measured.radiance_temperature()[frame]
     shown = found, temperature, measured.raster, picture, outline
     if overlay is not None:
-        write_picture(draw_registration(*shown, marked), overlay)
+        write_picture(draw_registration(*shown, _marked(fit)), overlay)
     if blink is not None:
         write_blink(blink_pictures(*shown), blink)
         print(blink)
+
+
+def _marked(fit: "PointFit | DotFit | ImageFit | None") -> "Points | None":
+    """Points to draw on both images."""
+    from chipglow.laboratory.registration import DotFit, PointFit
+
+    points = fit.points if isinstance(fit, DotFit) else fit
+    return (points.positions, points.pixels) if isinstance(points, PointFit) else None
 
 
 def _check_method(method: MethodName | None, points: Path | None, known: Path | None) -> None:
@@ -193,176 +213,97 @@ def _check_frame(option: str, number: int, count: int) -> None:
         raise ValueError(f"{option}: {number}, expected 0 to {count - 1}")
 
 
-def _check_times(
-    path: Path, measured: "Measurement", seen: "Recording", interval: float | None
-) -> None:
+def _check_times(path: Path, interval: float | None) -> None:
     from chipglow.laboratory.registration.picture_file import PICTURE_SUFFIXES
 
     if path.suffix.lower() in PICTURE_SUFFIXES and interval is None:
-        raise ValueError(f"--align: {path} tells no times, expected --visible-interval")
-    if "integration_time" not in measured.data.attrs:
-        raise ValueError("--align: the measurement does not tell its integration_time")
-
-
-def _by_points(console: "Console", given: "Points", model: ModelName) -> "Registration":
-    from chipglow.laboratory.registration import fit_points
-
-    fit = fit_points(*given, model.value)
-    _print_points(console, fit, given)
-    if fit.scatter >= _BEST_PICKED:
-        return fit.registration
-    warning = (
-        f"the points agree to {fit.scatter:.1g} visible pixels, better than anyone picks them: "
-        "they may be computed from each other, and the uncertainty that follows is too small"
-    )
-    return replace(fit.registration, warnings=(*fit.registration.warnings, warning))
+        raise ValueError(f"--align: {path} states no times, expected --visible-interval")
 
 
 def _by_images(
-    console: "Console",
     measured: "Measurement",
     frame: int,
     picture: "NDArray[Any]",
     model: ModelName,
     method: MethodName | None,
-) -> "tuple[Registration, Points | None]":
-    """The registration, its numbers printed, and the dots that gave it."""
-    import numpy as np
+) -> "DotFit | ImageFit":
+    from chipglow.laboratory.registration import fit_dots, fit_images, infrared_radiance
 
-    from chipglow.camera import Flag
-    from chipglow.laboratory.registration import fit_dots, fit_images
-
-    dead = measured.flags[frame] & Flag.DEAD > 0
-    radiance = np.where(dead, np.nan, measured.radiance[frame])
-    if method == MethodName.DOTS:
-        dots = fit_dots(radiance, measured.raster, picture, model.value)
-        _print_dots(console, dots)
-        return dots.registration, (dots.positions, dots.pixels)
-    fit = fit_images(radiance, measured.raster, picture, model.value)
-    _print_images(console, fit)
-    return fit.registration, None
+    fit = fit_dots if method == MethodName.DOTS else fit_images
+    return fit(infrared_radiance(measured, frame), measured.raster, picture, model.value)
 
 
-def _print_points(console: "Console", fit: "PointFit", given: "Points") -> None:
-    from rich.table import Table
+def _print_fit(console: "Console", fit: "PointFit | DotFit | ImageFit") -> None:
+    from chipglow.cli.assumed import say_assumed
+    from chipglow.laboratory.registration import DotFit, ImageFit
 
-    table = Table("point", "x / um", "y / um", "column", "row", "off by / pixel", box=None)
-    for number, (place, pixel, off) in enumerate(zip(*given, fit.residuals, strict=True), 1):
-        cells = (f"{1e6 * place[0]:.1f}", f"{1e6 * place[1]:.1f}", *(f"{v:.1f}" for v in pixel))
-        table.add_row(str(number), *cells, f"{float((off @ off) ** 0.5):.2f}")
-    console.print(table)
+    if isinstance(fit, ImageFit):
+        console.print(
+            f"Mutual information: {fit.information:.3f} bits a pixel; score of the placement "
+            f"{fit.placement:.3g}, of {fit.by_chance.size} unrelated images at most "
+            f"{fit.by_chance.max():.3g}."
+        )
+    else:
+        _print_points(console, fit.points if isinstance(fit, DotFit) else fit)
+    if isinstance(fit, DotFit):
+        match = len(fit.points.pixels)
+        for name, dots in (("Infrared", fit.infrared), ("Visible", fit.visible)):
+            console.print(
+                f"{name}: {len(dots.pixels)} {'bright' if dots.bright else 'dark'} dots of a "
+                f"radius of {dots.radius:.1f} {name.lower()} pixels; {match} match."
+            )
+    if isinstance(fit, DotFit | ImageFit):
+        say_assumed(fit.assumptions)
+
+
+def _print_points(console: "Console", fit: "PointFit") -> None:
+    from chipglow.cli.tables import screen_table
+
+    cells = {
+        "point": "{point}",
+        "x / um": "{x_um:.1f}",
+        "y / um": "{y_um:.1f}",
+        "column": "{visible_column:.1f}",
+        "row": "{visible_row:.1f}",
+        "off by / pixel": "{residual:.2f}",
+    }
+    console.print(screen_table(fit.to_frame(), cells))
     console.print(
         f"Scatter of the points: {fit.scatter:.2f} visible pixels in column and in row, with "
         f"{fit.registration.degrees_of_freedom:.0f} degrees of freedom."
     )
 
 
-def _print_dots(console: "Console", fit: "DotFit") -> None:
-    from chipglow.cli.assumed import say_assumed
-
-    _print_points(console, fit.points, (fit.positions, fit.pixels))
-    for name, dots, pixel in (
-        ("Infrared", fit.infrared, "infrared"),
-        ("Visible", fit.visible, "visible"),
-    ):
-        console.print(
-            f"{name}: {len(dots.pixels)} {'bright' if dots.bright else 'dark'} dots of a radius of "
-            f"{dots.radius:.1f} {pixel} pixels; {len(fit.pixels)} match."
-        )
-    say_assumed(
-        [
-            "the visible picture is not mirrored, is turned by up to 30 degrees, and shows half "
-            "to twice the infrared image's width; else give --points."
-        ]
-    )
-
-
-def _print_images(console: "Console", fit: "ImageFit") -> None:
-    from chipglow.cli.assumed import say_assumed
-
-    console.print(
-        f"Mutual information: {fit.information:.3f} bits a pixel; score of the placement "
-        f"{fit.placement:.3g}, of {fit.by_chance.size} unrelated images at most "
-        f"{fit.by_chance.max():.3g}."
-    )
-    say_assumed(
-        [
-            "the visible picture is not mirrored, and shows the infrared image's width within "
-            "25 % and its middle within a quarter of the width; else give --points."
-        ]
-    )
-
-
 def _say(console: "Console", found: "Registration", measured: "Measurement") -> None:
-    import numpy as np
-
-    from chipglow.cli.assumed import say_doubtful
+    from chipglow.cli.assumed import say_warnings
 
     raster = measured.raster
-    left, right, bottom, top = raster.extent
-    slope = found.jacobian(np.array([(left + right) / 2, (bottom + top) / 2]))
-    size = 1e6 / np.sqrt(abs(np.linalg.det(slope)))
+    size, turn, mirrored = found.geometry(raster)
     typical, worst = found.uncertainty(raster)
-    mirrored = ", mirrored" if np.linalg.det(slope) > 0 else ""
-    turn = np.degrees(np.arctan2(-slope[1, 0] * np.sign(np.linalg.det(slope)), slope[0, 0]))
     console.print(
-        f"A visible pixel is {size:.4g} um in the middle of the infrared image, turned by "
-        f"{turn:.2f} degrees{mirrored}."
+        f"A visible pixel is {1e6 * size:.4g} um in the middle of the infrared image, turned by "
+        f"{turn:.2f} degrees{', mirrored' if mirrored else ''}."
     )
     console.print(
         f"Standard uncertainty of a mapped position: {1e6 * typical:.2g} um "
         f"({typical / raster.spacing:.2g} infrared pixels) in the median, {1e6 * worst:.2g} um "
         "at most."
     )
-    say_doubtful(f"{warning}." for warning in found.warnings)
+    say_warnings(f"{warning}." for warning in found.warnings)
 
 
-def _align(
-    console: "Console",
-    found: "Registration",
-    measured: "Measurement",
-    seen: "Recording",
-    region: tuple[float, float, float, float],
-    pairs: Path | None,
-) -> None:
-    import numpy as np
+def _say_clocks(console: "Console", found: "RecordingAlignment") -> None:
+    from chipglow.cli.assumed import say_assumed, say_warnings
 
-    from chipglow.cli.assumed import say_assumed, say_doubtful
-    from chipglow.laboratory.registration import align_times, simultaneous_frames
-    from chipglow.laboratory.registration.time_alignment import region_signals
-
-    integration = float(measured.data.attrs["integration_time"])
-    frames, pictures = region_signals(
-        found, measured.radiance, measured.raster, seen.signal, region
-    )
-    exposure = seen.integration_time or float(np.median(np.diff(seen.times)))
-    if seen.integration_time is None:
-        say_assumed([f"a visible exposure lasts as long as its frame, {1e6 * exposure:.4g} us."])
-    alignment = align_times(
-        measured.times + integration / 2, frames, seen.times + exposure / 2, pictures
-    )
-    unsure = float(np.sqrt(alignment.covariance[0, 0]))
+    say_assumed(found.assumptions)
+    unsure = float(found.clocks.covariance[0, 0]) ** 0.5
     console.print(
-        f"Visible clock = infrared clock + {1e6 * alignment.offset:.2f} us, standard uncertainty "
-        f"{1e6 * unsure:.2g} us, correlation {alignment.correlation:.3f}."
+        f"Visible clock = infrared clock + {1e6 * found.clocks.offset:.2f} us, standard "
+        f"uncertainty {1e6 * unsure:.2g} us, correlation {found.clocks.correlation:.3f}."
     )
-    say_doubtful(f"{warning}." for warning in alignment.warnings)
-    within = simultaneous_frames(alignment, measured.times, integration, seen.times, exposure)
-    empty = sum(1 for numbers in within if numbers.size == 0)
+    say_warnings(f"{warning}." for warning in found.clocks.warnings)
+    empty = sum(numbers.size == 0 for numbers in found.visible_frames)
     if empty:
-        console.print(f"{empty} of {len(within)} infrared frames have no visible one.")
-    if pairs is not None:
-        _write_pairs(pairs, measured.times, within)
-
-
-def _write_pairs(
-    path: Path, times: "NDArray[np.float64]", within: "list[NDArray[np.int64]]"
-) -> None:
-    from chipglow.io.table_file import write_table
-
-    rows = (
-        (number, f"{1e6 * time:.9g}", " ".join(map(str, frames.tolist())))
-        for number, (time, frames) in enumerate(zip(times, within, strict=True))
-    )
-    write_table(path, ("infrared_frame", "infrared_time_us", "visible_frames"), rows)
-    print(path)
+        console.print(
+            f"{empty} of {found.infrared_times.size} infrared frames have no visible one."
+        )

@@ -63,18 +63,18 @@ def shearband(
     """Read the radiance temperature along the shear band, as the paper's Figure 9."""
     from rich.console import Console
 
-    from chipglow.cli.assumed import say_assumed, say_doubtful, say_of_measurements
-    from chipglow.cli.budget import budget_table
+    from chipglow.cli.assumed import say_assumed, say_of_measurements, say_warnings
     from chipglow.cli.pictures import write_picture
+    from chipglow.cli.tables import budget_table
     from chipglow.cli.times import frame_at
     from chipglow.laboratory.chip import (
         band_profile,
         chosen_tool,
         read_curve,
-        write_band_profile,
     )
     from chipglow.laboratory.chip.band_figure import draw_band_profile
     from chipglow.laboratory.measurement import load_measurement
+    from chipglow.laboratory.result_file import write_result
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import LENGTH
 
@@ -100,56 +100,29 @@ def shearband(
         console.print(sentence)
     say_of_measurements(measured)
     say_assumed((*chosen.assumptions, *profile.assumptions))
-    say_doubtful((*chosen.warnings, *profile.warnings))
-    if measured.calibration_errors is None:
-        say_doubtful(
-            [
-                "the measurement does not tell the uncertainty of its calibration, which is not in "
-                "the uncertainty here."
-            ]
-        )
+    say_warnings((*chosen.warnings, *profile.warnings))
     if out is not None:
-        write_band_profile(profile, out)
+        write_result(profile, out)
         print(out)
     if plot is not None:
         write_picture(draw_band_profile(measured, chosen.tool, profile), plot)
 
 
 def _table(profile: "BandProfile") -> "Table":
-    import numpy as np
-    from rich.table import Table
+    from chipglow.cli.tables import screen_table
 
-    table = Table(
-        "at / µs",
-        "stage",
-        "offset / µm",
-        "from / µm",
-        "to / µm",
-        "mean / °C",
-        "most / °C",
-        "u / K",
-        box=None,
-        title=f"radiance temperature along the band, over a width of {1e6 * profile.width:.4g} µm",
-        title_justify="left",
+    return screen_table(
+        profile.stage_frame(),
+        {
+            "at / µs": "{time_us:.7g}",
+            "stage": "{stage}",
+            "offset / µm": "{offset_um:+.1f}",
+            "from / µm": "{from_um:.0f}",
+            "to / µm": "{to_um:.0f}",
+            "mean / °C": "{mean_degC:.1f}",
+            "most / °C": "{greatest_degC:.1f}",
+            "u / K": "{standard_uncertainty_K:.1f}",
+        },
+        f"radiance temperature along the band, over a width of {1e6 * profile.width:.4g} µm",
+        unbroken=("stage",),
     )
-    table.columns[1].no_wrap = True
-    uncertainty = profile.estimate.standard_uncertainty
-    for frame, time in enumerate(profile.times):
-        values = profile.temperature[frame]
-        known = np.isfinite(values)
-        row = [f"{1e6 * time:.7g}", str(profile.stage[frame])]
-        offset = profile.offset[frame]
-        row.append(f"{1e6 * offset:+.1f}" if np.isfinite(offset) else "–")
-        if known.any():
-            ends = profile.distance[known][[0, -1]] * 1e6
-            row += [
-                f"{ends[0]:.0f}",
-                f"{ends[1]:.0f}",
-                f"{values[known].mean() - 273.15:.1f}",
-                f"{values[known].max() - 273.15:.1f}",
-                f"{np.sqrt((uncertainty[frame, known] ** 2).mean()):.1f}",
-            ]
-        else:
-            row += ["–"] * 5
-        table.add_row(*row)
-    return table

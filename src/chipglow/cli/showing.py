@@ -15,7 +15,7 @@ from chipglow.cli.pictures import write_picture
 from chipglow.cli.times import parse_instant
 from chipglow.drawing.frames import shown_frame
 from chipglow.io import StoredScene, open_scene
-from chipglow.io.contents import holds
+from chipglow.io.measurement_file import holds
 from chipglow.quantities.format import rounded_text
 from chipglow.report import SceneSummary, draw_scene, scene_summary
 from chipglow.scene import ENERGY_UNITS, Raster, Scene, Tool, ToolGeometry
@@ -137,8 +137,10 @@ def _tool_text(tool: Tool) -> str:
 
 
 def _state(summary: SceneSummary) -> _Rows:
-    shares = (f"{kind.name.lower()} {100 * share:.3g} %" for kind, share in summary.shares.items())
-    yield "samples that show", ", ".join(shares)
+    fractions = (
+        f"{kind.name.lower()} {100 * share:.3g} %" for kind, share in summary.fractions.items()
+    )
+    yield "samples that show", ", ".join(fractions)
     quality = summary.quality
     if quality is not None:
         yield "filled", f"{100 * quality.filled:.3g} % of the samples with material"

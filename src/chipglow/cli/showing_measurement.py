@@ -25,7 +25,7 @@ _FLAG_NAMES: Final = {
     Flag.DEAD: "dead",
     Flag.REPLACED: "replaced by neighbours",
 }
-_SAID_APART: Final = ("assumed", "doubtful", "band_lower", "band_upper", "pitch", "tool_")
+_SAID_APART: Final = ("assumed", "warnings", "band_lower", "band_upper", "pitch", "tool_")
 _IN_FACTS: Final = ("integration_time", "lower_limit")
 
 
@@ -104,8 +104,8 @@ def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tu
         yield "its calibration", f"standard uncertainty {least:.2g} K to {greatest:.2g} K"
     yield "usable pixels", f"{100 * summary.usable:.4g} %"
     for flag, name in _FLAG_NAMES.items():
-        if summary.shares[flag]:
-            yield name, f"{100 * summary.shares[flag]:.3g} %"
+        if summary.fractions[flag]:
+            yield name, f"{100 * summary.fractions[flag]:.3g} %"
 
 
 def _celsius(kelvins: tuple[float, float, float] | None) -> str:

@@ -1,8 +1,9 @@
 """How figures look: sizes, colours, images on micrometre axes."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Generic, TypeVar
 
 import matplotlib
 import numpy as np
@@ -14,6 +15,8 @@ from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
 from chipglow.scene import Raster, Tool
+
+Result = TypeVar("Result")
 
 WIDTH: Final = 7.2
 """Width of a figure in inches: a page's text."""
@@ -208,12 +211,90 @@ class ImagePanel:
         axes.label_outer()
 
 
+def shade(
+    axes: Axes,
+    along: NDArray[np.float64],
+    middle: NDArray[np.float64],
+    half: NDArray[np.float64],
+    colour: Any,
+    opacity: float = 0.15,
+    label: str = "",
+) -> None:
+    """A band of a half width to either side of a curve, such as its uncertainty."""
+    axes.fill_between(
+        along, middle - half, middle + half, color=colour, alpha=opacity, linewidth=0, label=label
+    )
+
+
+def crop(axes: Axes, points: NDArray[np.float64], raster: Raster, around: float) -> None:
+    """Show the part of an image on micrometre axes that holds points in m, and what is around."""
+    left, right, bottom, top = (1e6 * edge for edge in raster.extent)
+    known = 1e6 * points[np.isfinite(points).all(axis=-1)]
+    (x_least, y_least), (x_most, y_most) = known.min(axis=0), known.max(axis=0)
+    axes.set_xlim(max(left, x_least - 1e6 * around), min(right, x_most + 1e6 * around))
+    axes.set_ylim(max(bottom, y_least - 1e6 * around), min(top, y_most + 1e6 * around))
+
+
+def ends(
+    image: NDArray[Any], low: float = 0.0, high: float = 100.0, least: float = 0.0
+) -> tuple[float, float]:
+    """Ends of the colours of an image: two percentiles of what is known, apart from each other.
+
+    Parameters
+    ----------
+    image : ndarray
+        Values, NaN where there is none.
+    low, high : float
+        The percentiles.
+    least : float
+        How far apart they are at least.
+    """
+    known = image[np.isfinite(image)]
+    if known.size == 0:
+        return 0.0, 1.0
+    first, last = map(float, np.percentile(known, (low, high)))
+    last = max(last, first + least)
+    return first, last if last - first > 1e-6 * abs(last) else first + 1.0
+
+
 def round_limit(values: NDArray[np.float64], percentile: float, step: float) -> float:
     """Limit of a scale: a percentile of the magnitudes, up to the next whole step."""
     known = np.abs(values[np.isfinite(values)])
     if known.size == 0:
         return step
     return max(step, float(np.ceil(np.percentile(known, percentile) / step)) * step)
+
+
+@dataclass(frozen=True)
+class Drawing(Generic[Result]):
+    """How one figure of a report is drawn.
+
+    Parameters
+    ----------
+    name, title, paper : str
+        As those of the `FigureFile`.
+    caption, alt : callable
+        Texts of a result.
+    draw : callable
+        Figure of a result; None where it has nothing for it.
+    """
+
+    name: str
+    title: str
+    paper: str
+    caption: Callable[[Result], str]
+    alt: Callable[[Result], str]
+    draw: Callable[[Result], Figure | None]
+
+    def write(self, result: Result, folder: Path) -> "FigureFile | None":
+        """Draw it into a folder, as PNG and SVG."""
+        with style():
+            figure = self.draw(result)
+            if figure is None:
+                return None
+            files = save(figure, folder, self.name)
+        texts = self.caption(result), self.alt(result)
+        return FigureFile(self.name, self.title, self.paper, *texts, *files)
 
 
 @dataclass(frozen=True)

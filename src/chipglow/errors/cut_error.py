@@ -39,7 +39,7 @@ from chipglow.scene import ENERGY_UNITS, Frame, Raster, Scene, Tool, sample
 from chipglow.surface import EmissivityField, Surface
 
 _USUAL_SPACING: Final = 180e-6
-"""Distance of shear bands along a chip in m, where the forces tell no period."""
+"""Distance of shear bands along a chip in m, where the forces show no period."""
 
 _DEVELOPED: Final = 0.95
 """Rise of a developed band's mean temperature, as a part of the greatest."""
@@ -48,7 +48,7 @@ _AROUND: Final = 2
 """Instants from the developed band to the one that still develops, and to the one that moved."""
 
 Progress = Callable[[str, float], None]
-"""Told what is being done and which part of it, from 0 to 1, is done."""
+"""Called with what is being done and which part of it, from 0 to 1, is done."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ class SurfaceResult:
 class CuttingForces:
     """Forces per width of cut in N/m over time in s, each of shape (n,), and their segments.
 
-    `unaccounted` is the share of the drive's work that the cutting simulation's energy balance does
+    `unaccounted` is the part of the drive's work that the cutting simulation's energy balance does
     not find again in the end; NaN where the scene has no account.
     """
 
@@ -266,7 +266,7 @@ def analyse(
     Parameters
     ----------
     scene : Scene
-        What is truly there; it must tell its tool.
+        What is truly there; it must state its tool.
     surfaces : mapping
         Surfaces by name, such as chip 1 and chip 2.
     camera : Camera
@@ -274,12 +274,12 @@ def analyse(
     plan : Plan
         What to analyse.
     progress : callable, optional
-        Told what is being done and how far it is.
+        Called with what is being done and how far it is.
 
     Raises
     ------
     ValueError
-        If the plan names a surface that is not there, the scene tells no tool, is shorter than an
+        If the plan names a surface that is not there, the scene states no tool, is shorter than an
         exposure or has no shear band or no contact at the rake face.
     """
     _check(scene, surfaces, plan)
@@ -331,7 +331,7 @@ def _check(scene: Scene, surfaces: Mapping[str, Surface], plan: Plan) -> None:
         if name not in surfaces:
             raise ValueError(f"plan: surface {name!r} is not one of {list(surfaces)}")
     if scene.tool is None:
-        raise ValueError("scene: it does not tell its tool, which the rake face needs")
+        raise ValueError("scene: it does not state its tool, which the rake face needs")
 
 
 def _say_nothing(label: str, part: float) -> None:

@@ -59,7 +59,7 @@ class Headline:
     psf_portion: Distribution
 
     @property
-    def psf_share(self) -> Distribution | None:
+    def psf_fraction(self) -> Distribution | None:
         """The point spread function's part, of 1, draw by draw.
 
         None where some draws of the error are negative and some are not: near 0 a part of it says
@@ -204,7 +204,7 @@ def draw_errors(
     phases : int
         Positions of the pixels along each axis, see `pixel_phases`.
     progress : callable
-        Told how much is done, 0 to 1.
+        Called with how much is done, 0 to 1.
     """
     cameras = pixel_phases(camera, phases)
     rake: list[RakeErrors] = []

@@ -158,28 +158,28 @@ def reference_temperature(
     ValueError
         If the meaning is unknown.
     """
-    sensors = camera.pixels(exposure.raster)
+    pixels = camera.pixels(exposure.raster)
     if kind == "maximum":
-        return _temperature(camera, _maximum(exposure.peak_radiance, camera, exposure, sensors))
+        return _temperature(camera, _maximum(exposure.peak_radiance, camera, exposure, pixels))
     if kind == "mean":
-        mean = integrate(exposure.mean_radiance, exposure.raster, sensors, camera.fill_factor)
+        mean = integrate(exposure.mean_radiance, exposure.raster, pixels, camera.fill_factor)
         return _temperature(camera, mean)
     if kind == "centre":
-        points = np.stack(np.meshgrid(sensors.x, sensors.y), axis=-1)
+        points = np.stack(np.meshgrid(pixels.x, pixels.y), axis=-1)
         return _temperature(camera, nearest(exposure.centre_radiance, exposure.raster, points))
     if kind == "true":
-        return _maximum(exposure.peak_temperature, camera, exposure, sensors)
+        return _maximum(exposure.peak_temperature, camera, exposure, pixels)
     raise ValueError(f"reference: unknown {kind!r}, expected one of {get_args(ReferenceKind)}")
 
 
 def _maximum(
-    values: NDArray[np.floating], camera: Camera, exposure: Exposure, sensors: Raster
+    values: NDArray[np.floating], camera: Camera, exposure: Exposure, pixels: Raster
 ) -> NDArray[np.float64]:
     """Greatest value of the samples in every pixel's sensitive square; NaN for none."""
     grid, side = exposure.raster, camera.pitch * sqrt(camera.fill_factor)
     known = np.where(np.isnan(values), -np.inf, values).astype(np.float64)
-    columns = _covered(sensors.x - grid.left, side, grid.columns, grid.spacing)
-    rows = _covered(grid.top - sensors.y, side, grid.rows, grid.spacing)
+    columns = _covered(pixels.x - grid.left, side, grid.columns, grid.spacing)
+    rows = _covered(grid.top - pixels.y, side, grid.rows, grid.spacing)
     across = np.stack([known[:, part].max(axis=1) for part in columns], axis=1)
     greatest = np.stack([across[part].max(axis=0) for part in rows])
     return np.where(np.isfinite(greatest), greatest, np.nan)

@@ -29,7 +29,7 @@ class LocalError:
     psf_portion: float
 
     @property
-    def psf_share(self) -> float:
+    def psf_fraction(self) -> float:
         """The part of the error that the point spread function makes, of 1; NaN for no error."""
         return self.psf_portion / self.error if self.error else nan
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.camera import Camera, Exposure, Measurement, expose_all
@@ -17,7 +18,7 @@ from chipglow.scene import Frame, Line, Material, Raster, Scene, Tool
 from chipglow.surface import EmissivityField, Surface
 
 Progress = Callable[[str, float], None]
-"""Told what is being done and which part of it, from 0 to 1, is done."""
+"""Called with what is being done and which part of it, from 0 to 1, is done."""
 
 CAUSES = ("exposure", "texture", "pixel phase")
 """What is drawn anew: the axes of every `Distribution`."""
@@ -178,6 +179,33 @@ class SceneErrors:
     surfaces: Mapping[str, SurfaceErrors]
     missing: tuple[str, ...]
 
+    def to_frame(self) -> pd.DataFrame:
+        """Every reading at every place with every surface, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``surface``, ``place``, ``reading``, ``draws``, and the means over the draws
+            ``reference_degC``, ``error_K`` and ``psf_portion_K``, of the error also the
+            ``standard_deviation_K`` and the ``least_K`` and ``greatest_K``.
+        """
+        return pd.DataFrame(
+            {
+                "surface": name,
+                "place": one.place,
+                "reading": one.reading,
+                "draws": one.error.draws,
+                "reference_degC": one.reference.mean - 273.15,
+                "error_K": one.error.mean,
+                "standard_deviation_K": one.error.standard_deviation,
+                "least_K": one.error.range[0],
+                "greatest_K": one.error.range[1],
+                "psf_portion_K": one.psf_portion.mean,
+            }
+            for name, surface in self.surfaces.items()
+            for one in surface.readings
+        )
+
 
 def scene_errors(
     scene: Scene,
@@ -200,7 +228,7 @@ def scene_errors(
     plan : ScenePlan
         What to analyse.
     progress : callable, optional
-        Told what is being done and how far it is.
+        Called with what is being done and how far it is.
     missing : sequence of str
         What of another analysis is not there, for the report.
 

@@ -42,7 +42,7 @@ class Sensitivity:
         """Mean error over the draws in K, shape (n,)."""
         return np.asarray(self.errors[name].mean(axis=1))
 
-    def psf_share(self, name: str) -> NDArray[np.float64]:
+    def psf_fraction(self, name: str) -> NDArray[np.float64]:
         """Mean over the draws of the point spread function's part, of 1, shape (n,)."""
         return np.asarray((self.psf_portions[name] / self.errors[name]).mean(axis=1))
 
@@ -67,7 +67,7 @@ def sensitivity(
     phases : int
         Positions of the pixels along each axis, see `pixel_phases`.
     progress : callable
-        Told how much is done, 0 to 1.
+        Called with how much is done, 0 to 1.
     """
     found: dict[PsfOrder, list[list[dict[str, LocalError]]]] = {order: [] for order in PSF_ORDERS}
     for i, site in enumerate(sites):

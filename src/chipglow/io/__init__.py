@@ -19,8 +19,7 @@ from chipglow.io.scene_file import (
     write_scene,
 )
 from chipglow.io.table_file import check_table_path
-from chipglow.io.tool_file import read_tool_outline
-from chipglow.io.tool_section import ToolSection
+from chipglow.io.tool_section import ToolSection, read_tool_outline
 from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 
 __all__ = [

@@ -11,8 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources import Unit
-from chipglow.io.sources.unit_text import parse_unit
+from chipglow.quantities.units import SI, Unit, parse_unit
 from chipglow.radiometry import TabulatedResponse
 from chipglow.text import read_small_text
 
@@ -27,8 +26,8 @@ class Column:
         Its name; in the table's first line the unit follows: ``temperature_degC``.
     example : str
         A unit that it may have; empty for a plain number.
-    quantity : str
-        What kind of unit that is, as `parse_unit` has it: ``temperature``, ``x`` for lengths.
+    base : str
+        The SI unit of the same quantity; empty for a plain number.
     difference : bool
         Whether it is a difference, of which the zero of the unit does not count.
     required : bool
@@ -39,7 +38,7 @@ class Column:
 
     name: str
     example: str = ""
-    quantity: str = ""
+    base: str = ""
     difference: bool = False
     required: bool = True
     number_of: Callable[[str], float] | None = None
@@ -50,15 +49,16 @@ class Column:
         return f"{self.name}_{self.example}" if self.example else self.name
 
 
-TEMPERATURE: Final = Column("temperature", "degC", "temperature")
+TEMPERATURE: Final = Column("temperature", "degC", "K")
 _POINT_UNCERTAINTIES: Final = (
     Column("count_uncertainty", required=False),
-    Column("temperature_uncertainty", "K", "temperature", difference=True, required=False),
+    Column("temperature_uncertainty", "K", "K", difference=True, required=False),
 )
 POINT_COLUMNS: Final = (TEMPERATURE, Column("counts"), *_POINT_UNCERTAINTIES)
 """Points of a calibration."""
 
-_RESPONSE_COLUMNS: Final = (Column("wavelength", "um", "x"), Column("response"))
+_RESPONSE_COLUMNS: Final = (Column("wavelength", "um", "m"), Column("response"))
+_CORNER_COLUMNS: Final = (Column("x", "um", "m"), Column("y", "um", "m"))
 _PIXEL_COLUMNS: Final = (Column("column"), Column("row"))
 
 
@@ -87,7 +87,13 @@ def read_columns(
     OSError
         If it cannot be read.
     """
-    path = Path(path)
+    return _table(Path(path), columns)[0]
+
+
+def _table(
+    path: Path, columns: Sequence[Column]
+) -> tuple[dict[str, NDArray[np.float64]], list[int]]:
+    """Columns by name, and which line of the file each row is."""
     lines = read_small_text(path).splitlines()
     rows = [(number, row) for number, row in enumerate(csv.reader(lines), 1) if any(row)]
     if len(rows) < 2:
@@ -106,10 +112,11 @@ def read_columns(
         if names.count(column.name) > 1 or (column.required and column.name not in names):
             raise ValueError(f"{path}, line 1: expected a column {column.title!r}, once")
     numbers = np.array([_numbers(path, number, row, found) for number, row in rows[1:]])
-    return {
+    table = {
         column.name: unit.scale * values + (0.0 if column.difference else unit.offset)
         for (column, unit), values in zip(found, numbers.T, strict=True)
     }
+    return table, [number for number, _ in rows[1:]]
 
 
 def read_calibration_points(
@@ -148,15 +155,15 @@ def read_calibration_points(
 def _column(path: Path, cell: str, columns: Sequence[Column]) -> tuple[Column, Unit]:
     """The column that a cell of the first line names, and its unit."""
     for column in sorted(columns, key=lambda one: -len(one.name)):
-        if cell == column.name and not column.quantity:
-            return column, Unit(1.0)
+        if cell == column.name and not column.base:
+            return column, SI
         if cell == column.name:
             raise ValueError(
                 f"{path}, line 1: {cell!r} has no unit, expected one such as {column.title}"
             )
-        if cell.startswith(f"{column.name}_") and column.quantity:
+        if cell.startswith(f"{column.name}_") and column.base:
             try:
-                return column, parse_unit(column.quantity, cell[len(column.name) + 1 :])
+                return column, parse_unit(cell[len(column.name) + 1 :], column.base, column.name)
             except ValueError as error:
                 raise ValueError(f"{path}, line 1: {error}") from None
     expected = ", ".join(column.title for column in columns)
@@ -183,6 +190,27 @@ def _is_number(text: str) -> bool:
         return isfinite(float(text))
     except ValueError:
         return False
+
+
+def read_polyline(path: Path) -> tuple[NDArray[np.float64], list[int]]:
+    """Read the corners of a polyline from a CSV file: ``x_um,y_um``, in any unit of length.
+
+    Returns
+    -------
+    corners : ndarray
+        x and y in m, shape (n, 2).
+    lines : list of int
+        Which line of the file each is.
+
+    Raises
+    ------
+    ValueError
+        If the file is no such table; the message names the file and the line.
+    OSError
+        If it cannot be read.
+    """
+    table, lines = _table(path, _CORNER_COLUMNS)
+    return np.stack([table["x"], table["y"]], axis=1), lines
 
 
 def read_response(path: str | os.PathLike[str]) -> TabulatedResponse:

@@ -10,41 +10,29 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Strict, model_validator
 
 from chipglow.io.importing import Import, View
-from chipglow.io.sources import (
-    Placement,
-    Source,
-    Unit,
-    Units,
-    lammps_dump,
-    mesh_meshio,
-    mesh_tecplot,
-    mesh_vtk,
-)
+from chipglow.io.sandbox import Isolated
+from chipglow.io.sources import Placement, Source, Units, lammps_dump
+from chipglow.io.sources.arrays import ARRAY_READERS
 from chipglow.io.sources.cloud import CloudSource
+from chipglow.io.sources.conventions import SI_UNITS
 from chipglow.io.sources.grid import GridSource
-from chipglow.io.sources.isolated import Isolated
-from chipglow.io.sources.mesh import MeshSource
+from chipglow.io.sources.mesh import MESH_READERS, MeshSource
 from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap, metre_per_pixel
-from chipglow.io.sources.unit_text import parse_unit
 from chipglow.io.tool_section import ToolSection
-from chipglow.quantities import OR_NONE, FileBeside, Section, Settings, described
-from chipglow.quantities.units import Length, Position, Speed, Temperature, Time
+from chipglow.quantities import OR_NONE, Declared, FileBeside, Section, Settings, described
+from chipglow.quantities.units import Length, Position, Time, Unit, parse_unit
 from chipglow.scene.completion import Completion
 from chipglow.text import commented_yaml, described_by
 
 KINDS: Final[Mapping[str, tuple[str, ...]]] = {
     "movie": (".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif"),
-    "mesh": (*mesh_vtk.KINDS, *mesh_meshio.KINDS, *mesh_tecplot.ENDINGS, ".inp", "d3plot"),
+    "mesh": (*MESH_READERS, "d3plot"),
     "points": lammps_dump.ENDINGS,
-    "grid": (
-        ".nc", ".nc4", ".cdf", ".h5", ".hdf5", ".zarr", ".npy", ".npz", ".mat", ".tif", ".tiff",
-        ".csv", ".txt", ".hdf", ".he5", ".zip",
-    ),
-}  # fmt: skip
+    "grid": tuple(ARRAY_READERS),
+}
 """Kinds of sources by how the file's name ends; most sources of points have to be called so."""
 
 Pixels = Annotated[tuple[float, float], Strict(False)]
-Corners = Annotated[tuple[tuple[Position, Position], ...], Strict(False)]
 ColourSection = Annotated[tuple[int, int, int], Strict(False)]
 BoxSection = Annotated[tuple[int, int, int, int], Strict(False)]
 
@@ -65,23 +53,18 @@ class UnitsSection(Settings[Units]):
     def build(self) -> Units:
         """The units."""
         return Units(
-            length=_unit("x", "length", self.length),
-            time=_unit("time", "time", self.time),
-            temperature=_unit("temperature", "temperature", self.temperature),
-            velocity=_maybe(self.velocity, "velocity", "velocity"),
-            strain_rate=_maybe(self.strain_rate, "plastic_strain_rate", "strain_rate"),
+            length=self._unit("length", "m"),
+            time=self._unit("time", "s"),
+            temperature=self._unit("temperature", "K"),
+            velocity=None if self.velocity is None else self._unit("velocity", "m/s"),
+            strain_rate=None if self.strain_rate is None else self._unit("strain_rate", "1/s"),
         )
 
-
-def _maybe(text: str | None, quantity: str, name: str) -> Unit | None:
-    return None if text is None else _unit(quantity, name, text)
-
-
-def _unit(quantity: str, name: str, text: str) -> Unit:
-    try:
-        return parse_unit(quantity, text)
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
+    def _unit(self, name: str, base: str) -> Unit:
+        try:
+            return parse_unit(getattr(self, name), base, name)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
 
 
 class PlacementSection(Settings[Placement]):
@@ -104,58 +87,6 @@ class PlacementSection(Settings[Placement]):
         """The placement."""
         origin = self.origin_horizontal, self.origin_vertical
         return Placement(self.horizontal, self.vertical, origin)
-
-
-class ViewSection(Settings[View]):
-    """Where the scene is sampled; what is not said is as in the source."""
-
-    left: Annotated[Position | None, OR_NONE] = described("none", "Left edge.")
-    right: Annotated[Position | None, OR_NONE] = described("none", "Right edge.")
-    bottom: Annotated[Position | None, OR_NONE] = described("none", "Lower edge.")
-    top: Annotated[Position | None, OR_NONE] = described("none", "Upper edge.")
-    spacing: Annotated[Length | None, OR_NONE] = described(
-        "none",
-        "Side of a sample; none: the source's own, or 900 samples along the longer side.",
-        "none, or over 0 um",
-    )
-
-    def build(self) -> View:
-        """The view."""
-        return View(self.left, self.right, self.bottom, self.top, self.spacing)
-
-
-class CompletionSection(Settings[Completion]):
-    """What stands in for what the source does not have."""
-
-    surroundings: Temperature = described(
-        "20 degC", "Temperature where there is no material, and of a tool that has none."
-    )
-    cutting_speed: Annotated[Speed | None, OR_NONE] = described(
-        "none", "Speed of the workpiece, for a source without velocity.", "none, or over 0 m/min"
-    )
-    chip: Annotated[Corners | None, OR_NONE] = described(
-        "none",
-        "Corners of the chip, for a source without plastic strain.",
-        "none, or [[-300 um, 0 um], [-50 um, 0 um], [-50 um, 400 um]]",
-    )
-    motion: Literal["auto", "flow", "none"] = described(
-        "auto",
-        "Velocity of a source that has none: flow (the optical flow), none, or auto: the flow\n"
-        "where there is a strain, a chip or a cutting speed.",
-    )
-    rate_frames: int = described(
-        1, "Frames over which a missing strain rate is taken: more are smoother.", "1 to 20"
-    )
-
-    def build(self) -> Completion:
-        """The completion."""
-        return Completion(
-            surroundings=self.surroundings,
-            cutting_speed=self.cutting_speed,
-            chip=self.chip,
-            motion=self.motion,
-            rate_frames=self.rate_frames,
-        )
 
 
 class SourceSection(Section):
@@ -284,7 +215,7 @@ def _value(place: str, field: str, value: str | int | float) -> float:
     if not unit and field != "plastic_strain":
         raise ValueError(f"{place}: {text!r} has no unit, expected one such as {_EXAMPLES[field]}")
     try:
-        return float(parse_unit(field, unit).to_si(float(number)))
+        return float(parse_unit(unit, SI_UNITS[field], field).to_si(float(number)))
     except ValueError:
         raise ValueError(
             f"{place}: {text!r}, expected a value such as {_EXAMPLES[field]}"
@@ -432,11 +363,11 @@ class ImportDescription(Section):
         "none", "Time from frame to frame; none: as the source says."
     )
     placement: PlacementSection = described({}, "How the source's axes lie in the scene.")
-    field_of_view: ViewSection = described({}, "Where the scene is sampled.")
+    field_of_view: Declared[View] = described({}, "Where the scene is sampled.")
     tool: Annotated[ToolSection | None, OR_NONE] = described(
         "none", "The tool's outline with its tip at the origin: what is in it is tool."
     )
-    completion: CompletionSection = described({}, "What stands in for what the source lacks.")
+    completion: Declared[Completion] = described({}, "What stands in for what the source lacks.")
     mesh: MeshSection = described({}, "More of a mesh.")
     movie: MovieSection = described({}, "More of a movie.")
     points: PointsSection = described({}, "More of points.")

@@ -9,13 +9,15 @@ from itertools import islice
 from math import ceil, isfinite
 from pathlib import Path
 from time import monotonic
-from typing import Any, Final, TypeAlias
+from typing import Annotated, Any, Final, TypeAlias
 
 import numpy as np
 
 from chipglow.io.scene_file import SceneWriter
 from chipglow.io.sources import Source, SourceError, Survey
 from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
+from chipglow.quantities import Parameter, Part
+from chipglow.quantities.units import LENGTH, POSITION
 from chipglow.scene import Frame, Raster, Scene
 from chipglow.scene.completion import Completion, complete
 from chipglow.scene.scene import COLDEST_PLAUSIBLE, HOTTEST_PLAUSIBLE
@@ -36,15 +38,8 @@ _KELVIN: Final = (
 
 
 @dataclass(frozen=True)
-class View:
-    """Where a scene is sampled; what is None is as in the source.
-
-    Parameters
-    ----------
-    left, right, bottom, top : float, optional
-        Edges in m.
-    spacing : float, optional
-        Side of a sample in m; by default that of the source, or a 900th of the longer side.
+class View(Part):
+    """Where the scene is sampled; what is not said is as in the source.
 
     Raises
     ------
@@ -52,13 +47,21 @@ class View:
         If the right edge is not right of the left one, or the upper one not over the lower one.
     """
 
-    left: float | None = None
-    right: float | None = None
-    bottom: float | None = None
-    top: float | None = None
-    spacing: float | None = None
+    left: Annotated[float | None, Parameter("Left edge.", POSITION)] = None
+    right: Annotated[float | None, Parameter("Right edge.", POSITION)] = None
+    bottom: Annotated[float | None, Parameter("Lower edge.", POSITION)] = None
+    top: Annotated[float | None, Parameter("Upper edge.", POSITION)] = None
+    spacing: Annotated[
+        float | None,
+        Parameter(
+            "Side of a sample; none: the source's own, or 900 samples along the longer side.",
+            LENGTH,
+            over=0.0,
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for low, high in (("left", "right"), ("bottom", "top")):
             first, last = getattr(self, low), getattr(self, high)
             if first is not None and last is not None and not first < last:

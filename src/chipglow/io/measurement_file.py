@@ -1,17 +1,17 @@
 """Measurements in NetCDF-4 files."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TypeVar
 
+import h5py
 import numpy as np
 import xarray as xr
 
 from chipglow.camera import Measurement
 from chipglow.camera.measurement import MEASUREMENT_UNITS
 from chipglow.io.atomic import KeptErrorFile, atomic_path
-from chipglow.io.contents import holds
 
 Made = TypeVar("Made")
 
@@ -101,3 +101,15 @@ def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, k
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         reason = str(error).split("\n", 1)[0]
         raise ValueError(f"{path}: not {what}, or cut short, expected {kind}: {reason}") from error
+
+
+def holds(path: str | os.PathLike[str], names: Iterable[str]) -> bool:
+    """Whether a file is HDF5, whole enough to be opened, and has all these at its root."""
+    path = Path(path)
+    if not path.is_file() or not h5py.is_hdf5(path):
+        return False
+    try:
+        with h5py.File(path, "r") as file:
+            return all(name in file for name in names)
+    except OSError:
+        return False

@@ -16,8 +16,8 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.io.atomic import KeptErrorFile, atomic_path
-from chipglow.io.contents import holds
 from chipglow.io.interrupts import uninterrupted
+from chipglow.io.measurement_file import holds
 from chipglow.io.packing import CUT, HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
 from chipglow.io.unfinished import (
     UnfinishedScene,

@@ -2,7 +2,6 @@
 
 import csv
 from collections.abc import Callable, Iterable, Sequence
-from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,7 +10,6 @@ import xarray as xr
 from chipglow.io.atomic import atomic_path, check_folder
 from chipglow.io.measurement_file import write_dataset
 
-_ZERO_CELSIUS: Final = 273.15
 _KINDS: Final = (".csv", ".nc")
 
 
@@ -69,13 +67,3 @@ def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]
         table = csv.writer(file)
         table.writerow(columns)
         table.writerows(rows)
-
-
-def celsius_text(kelvins: float) -> str:
-    """A temperature in K as a cell in degrees Celsius, to 0.1 mK; empty where there is none."""
-    return number_text(kelvins - _ZERO_CELSIUS)
-
-
-def number_text(value: float) -> str:
-    """A number as a cell, to four digits after the point; empty where there is none."""
-    return f"{value:.4f}" if isfinite(value) else ""

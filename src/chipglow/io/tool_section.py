@@ -1,14 +1,16 @@
-"""The cutting tool as a section of YAML files."""
+"""The cutting tool as a section of YAML files, and its outline as a file."""
 
+import os
+from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import field_validator, model_validator
 
 from chipglow.cutting import material_names, tool_material
-from chipglow.io.tool_file import read_tool_outline
+from chipglow.io.column_file import read_polyline
 from chipglow.quantities import OR_NONE, Declared, FileBeside, Settings, described
 from chipglow.quantities.units import Angle, Length
-from chipglow.scene import Chamfer, Hone, Tool, ToolGeometry
+from chipglow.scene import Chamfer, Hone, Tool, ToolGeometry, ToolOutline, ToolOutlineError
 
 
 class ToolSection(Settings[Tool]):
@@ -80,3 +82,29 @@ class ToolSection(Settings[Tool]):
             self.chamfer.build() if self.chamfer else None,
             self.hone.build() if self.hone else None,
         )
+
+
+def read_tool_outline(path: str | os.PathLike[str]) -> ToolOutline:
+    """Read a tool's outline from a CSV file and place it.
+
+    Parameters
+    ----------
+    path : path-like
+        First line ``x_um,y_um``, or another unit of length, then a point a line, separated by a
+        comma: from the rake face round the edge to the flank face, x with the workpiece's motion,
+        y upward. Where the origin is does not matter: see `ToolOutline.placed`.
+
+    Raises
+    ------
+    ValueError
+        If the file is no such table, or no tool can have this outline; the message names the file
+        and the line.
+    OSError
+        If it cannot be read.
+    """
+    path = Path(path)
+    points, lines = read_polyline(path)
+    try:
+        return ToolOutline.placed(points)
+    except ToolOutlineError as error:
+        raise ValueError(f"{path}, line {lines[error.point]}: {error}") from None

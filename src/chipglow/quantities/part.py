@@ -127,9 +127,8 @@ class Parameter:
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         """JSON schema: a text with a unit, or a plain value with its limits."""
-        if self.quantity is not None:
-            return {"type": "string", "examples": [self.quantity.example]}
-        json = handler(schema)
+        text = {"type": "string", "examples": [self.quantity.example]} if self.quantity else None
+        json: JsonSchemaValue = text or handler(schema)
         if json.get("type") in ("number", "integer"):
             names = ("exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
             limits = (self.over, self.least, self.under, self.most)

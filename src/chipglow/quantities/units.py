@@ -1,4 +1,7 @@
-"""Quantities with units at the border: text such as ``10 us`` to SI numbers and back."""
+"""Quantities with units at the border: text such as ``10 us`` to SI numbers and back.
+
+And units alone, as other people's files write them: ``degC``, ``m s-1``, ``us since 2000-01-01``.
+"""
 
 import re
 from dataclasses import dataclass
@@ -8,6 +11,8 @@ from functools import cache
 from math import isfinite
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
@@ -24,6 +29,76 @@ _BARE: Final = re.compile(rf"\s*[-+−]?(?:{_NUMBER})\s*")
 _MOST_DIGITS: Final = 21
 _LONGEST_NUMBER: Final = 12
 _LARGEST_DENOMINATOR: Final = 99
+
+_SPELLINGS: Final = {
+    "c": "degC",
+    "celsius": "degC",
+    "deg_c": "degC",
+    "degree_c": "degC",
+    "degrees_c": "degC",
+    "°c": "degC",
+    "degree_celsius": "degC",
+    "degrees_celsius": "degC",
+    "f": "degF",
+    "°f": "degF",
+    "microns": "micron",
+    "k": "K",
+    "%": "percent",
+}
+_NO_UNIT: Final = ("", "1", "-", "none", "dimensionless", "m/m", "mm/mm", "m m-1")
+# One digit of exponent: pint would compute any power that a file asks for.
+_TERM: Final = r"(?:1|[A-Za-z°µμ%_]{1,24}(?:(?:\^|\*\*)?[-+]?[1-9])?)"
+_TERMS: Final = re.compile(rf"{_TERM}(?:\s*[*/.·]\s*{_TERM}|\s+{_TERM}){{0,5}}")
+_EXPONENT: Final = re.compile(r"([A-Za-z°µμ%_])(?:\^|\*\*)?([-+]?[1-9])")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: a value in SI is ``scale * value + offset``."""
+
+    scale: float
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.scale) and self.scale > 0 and isfinite(self.offset)):
+            raise ValueError(f"unit: scale {self.scale!r} must be finite and over 0")
+
+    def to_si(self, values: ArrayLike) -> NDArray[np.float32]:
+        """Values in SI."""
+        return np.asarray(np.asarray(values, np.float64) * self.scale + self.offset, np.float32)
+
+
+SI: Final = Unit(1.0)
+CELSIUS: Final = Unit(1.0, 273.15)
+
+
+def parse_unit(text: str, base: str, field: str) -> Unit:
+    """A unit from its text in a file.
+
+    Parameters
+    ----------
+    text : str
+        The unit, as CF conventions, udunits or pint write it; a date after ``since`` is left out.
+    base : str
+        The SI unit of the same quantity; 1 for a mere number.
+    field : str
+        What has this unit, as errors call it.
+
+    Raises
+    ------
+    ValueError
+        If it is no unit of such a quantity.
+    """
+    clean = text.split(" since ")[0].strip()
+    if base == "1" and clean.lower() in _NO_UNIT:
+        return SI
+    try:
+        zero, one = (_in_base(Decimal(value), clean, base) for value in (0, 1))
+    # A malformed or foreign unit ends in pint as anything from AssertionError to TokenError.
+    except Exception:
+        expected = f"expected a unit such as {base}"
+        raise ValueError(f"unknown unit {text[:60]!r} of {field}, {expected}") from None
+    return Unit(float(one - zero), float(zero))
 
 
 @dataclass(frozen=True)
@@ -124,8 +199,7 @@ class Quantity:
 
     def _to_base(self, value: str, number: str, unit: str) -> float:
         try:
-            decimal = _decimal(number.replace("−", "-"))
-            result = float(_registry().Quantity(decimal, _unit(unit)).to(self.base).magnitude)
+            result = float(self._exact(_decimal(number.replace("−", "-")), unit))
         # 1/0, or a malformed or foreign unit: anything from AssertionError to TokenError.
         except Exception:
             raise ValueError(self._not_this_kind(value)) from None
@@ -134,6 +208,9 @@ class Quantity:
         if self.positive and result <= 0:
             raise ValueError(f"{value} is not over 0{self._zero}, {self.expected}")
         return result
+
+    def _exact(self, number: Decimal, unit: str) -> Decimal:
+        return _in_base(number, unit, self.base)
 
     def _not_this_kind(self, value: object) -> str:
         return f"{value!r} is not {self.kind}, expected one such as {self.example}"
@@ -165,23 +242,14 @@ class Quantity:
         raise ValueError(f"{value!r} {self.base} cannot be written in {self.unit}")
 
     def _reads_back(self, number: str, value: float) -> bool:
-        decimal = _decimal(number)
-        return float(_registry().Quantity(decimal, self.unit).to(self.base).magnitude) == value
+        return float(_in_base(_decimal(number), self.unit, self.base)) == value
 
 
 class Difference(Quantity):
     """How a difference of temperatures is written: 2 degC is then as much as 2 K."""
 
-    def _to_base(self, value: str, number: str, unit: str) -> float:
-        return super()._to_base(value, number, _DIFFERENCES.get(unit.strip(), unit))
-
-
-_DIFFERENCES: Final = {
-    "degC": "delta_degC",
-    "°C": "delta_degC",
-    "degF": "delta_degF",
-    "°F": "delta_degF",
-}
+    def _exact(self, number: Decimal, unit: str) -> Decimal:
+        return super()._exact(number, unit) - super()._exact(Decimal(0), unit)
 
 
 def is_bare_number(value: object) -> bool:
@@ -233,6 +301,16 @@ def _registry() -> "UnitRegistry[Decimal]":
     return pint.UnitRegistry(non_int_type=Decimal)
 
 
+def _in_base(number: Decimal, unit: str, base: str) -> Decimal:
+    magnitude: Decimal = _registry().Quantity(number, _unit(unit)).to(base).magnitude
+    return magnitude
+
+
 @cache
 def _unit(text: str) -> Any:
-    return _registry().parse_units(text.strip())
+    clean = text.strip()
+    spelled = _SPELLINGS.get(clean.lower().replace(" ", "_"), clean)
+    if not _TERMS.fullmatch(spelled):
+        raise ValueError(f"{text!r} is no unit")
+    written = re.sub(r"(?<=[\w°%])[\s.·]+(?=[A-Za-z°µμ])", "*", spelled)
+    return _registry().parse_units(_EXPONENT.sub(r"\1**\2", written))

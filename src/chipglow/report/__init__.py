@@ -1,6 +1,6 @@
 """The report: the paper's figures beside ours, as a page, pictures, numbers and arrays; movies."""
 
-from chipglow.report.comparison import Row, comparison_rows
+from chipglow.report.comparison import Row, comparison_frame, comparison_rows
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
 from chipglow.report.paper import QUICK, table_2
 from chipglow.report.report import write_report
@@ -23,6 +23,7 @@ __all__ = [
     "Row",
     "SceneSummary",
     "ShownField",
+    "comparison_frame",
     "comparison_rows",
     "cut_movie",
     "draw_scene",

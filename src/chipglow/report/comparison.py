@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import isfinite, nan
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.errors import Distribution, LocalError, StudyResult
@@ -38,7 +39,8 @@ class Row:
     one_draw : float or None
         What the paper's procedure gives, from one frame.
     uncertainty : float or None
-        Standard uncertainty of `here` where it was not drawn, if it is known.
+        Standard uncertainty of `here` where it was not drawn, or how it varies over time or from
+        segment to segment, if it is known.
     """
 
     key: str
@@ -80,6 +82,16 @@ class Row:
             return self._text(self.here)
         number, spread = (quantity_text(value, "", self.decimals) for value in (self.here, scatter))
         return f"{number} ± {spread} {self.unit}".strip()
+
+    @property
+    def value_text(self) -> str:
+        """Our figure alone with its unit, or a dash."""
+        return self._text(self.here)
+
+    @property
+    def spread_text(self) -> str:
+        """Its scatter or uncertainty with its unit, or a dash."""
+        return self._text(self.uncertainty)
 
     @property
     def range_text(self) -> str:
@@ -152,6 +164,29 @@ def comparison_rows(result: StudyResult) -> list[Row]:
     return [replace(row, paper=None, where="") for row in rows]
 
 
+def comparison_frame(result: StudyResult) -> pd.DataFrame:
+    """The numbers of `comparison_rows`, a row each.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+
+    Returns
+    -------
+    pandas.DataFrame
+        By their key: columns ``quantity``, ``unit``, ``paper``, ``here``, the
+        ``standard_deviation`` of its draws with the ``least`` and the ``greatest``, ``one_draw``,
+        the ``uncertainty`` of what was not drawn, and ``differs``; None or NaN where unknown.
+    """
+    rows = comparison_rows(result)
+    draws = [(row.draws.standard_deviation, *row.draws.range) if row.draws else () for row in rows]
+    scatter = pd.DataFrame(draws, columns=["standard_deviation", "least", "greatest"])
+    names = ("quantity", "unit", "paper", "here", "one_draw", "uncertainty", "differs")
+    frame = pd.DataFrame([{name: getattr(row, name) for name in names} for row in rows])
+    return frame.join(scatter).set_index(pd.Index([row.key for row in rows], name="key"))
+
+
 def cause_rows(result: StudyResult) -> list[CauseRow]:
     """What makes the headlines scatter.
 
@@ -184,15 +219,15 @@ def _error_rows(result: StudyResult) -> Iterator[Row]:
         "rake",
         f"Error at the rake face, mid-contact ({on_rake})",
         rake.face,
-        (PAPER.rake_error, PAPER.rake_psf_share),
-        (evidence.rake_error(result), evidence.rake_share(result)),
+        (PAPER.rake_error, PAPER.rake_psf_fraction),
+        (evidence.rake_error(result), evidence.rake_fraction(result)),
     )
     yield from _headline(
         result,
         "rake_extremum",
         f"Most negative error within two pixels of the rake face ({on_rake})",
         rake.extremum,
-        (PAPER.rake_error, PAPER.rake_psf_share),
+        (PAPER.rake_error, PAPER.rake_psf_fraction),
         (
             "On the same line. The error rises steeply to either side of its extremum, which "
             "moves with the pixels; read at the face it is often less.",
@@ -212,15 +247,15 @@ def _error_rows(result: StudyResult) -> Iterator[Row]:
         "band",
         f"Error at the centre of the shear band, by the ridge of strain rate ({on_band})",
         band.centre,
-        (PAPER.band_error, PAPER.band_psf_share),
-        (evidence.band_error(result), evidence.band_share(result)),
+        (PAPER.band_error, PAPER.band_psf_fraction),
+        (evidence.band_error(result), evidence.band_fraction(result)),
     )
     yield from _headline(
         result,
         "band_measured",
         f"The same, by the ridge of measured temperature ({on_band})",
         band.measured_centre,
-        (PAPER.band_error, PAPER.band_psf_share),
+        (PAPER.band_error, PAPER.band_psf_fraction),
         (
             "Where the measured temperature is greatest within two pixels of the ridge of strain "
             "rate: the centre for somebody who has the image alone.",
@@ -253,7 +288,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             PAPER.segment_period.where,
             uncertainty=_known(segments.period_uncertainty * 1e6),
         ),
-        _own(
+        own_row(
             "force_segments_count",
             "Segments in the force history",
             "",
@@ -261,7 +296,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             0,
             f"Peaks of the cutting force after {segments.start * 1e6:.0f} µs.",
         ),
-        _own(
+        own_row(
             "cutting_force_mean_N_per_mm",
             "Mean cutting force",
             "N/mm",
@@ -269,7 +304,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             0,
             evidence.beside(result, "Per width of cut.", "The paper gives no forces."),
         ),
-        _own(
+        own_row(
             "cutting_force_swing_N_per_mm",
             "Swing of the cutting force",
             "N/mm",
@@ -277,7 +312,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             0,
             "Mean height of the peaks over the valleys between them.",
         ),
-        _own(
+        own_row(
             "thrust_force_mean_N_per_mm",
             "Mean thrust force",
             "N/mm",
@@ -285,7 +320,7 @@ def _period_rows(result: StudyResult) -> list[Row]:
             0,
             evidence.beside(result, "Per width of cut.", "The paper gives no forces."),
         ),
-        _own(
+        own_row(
             "energy_unaccounted_percent",
             "Work that the energy balance does not find",
             "%",
@@ -294,20 +329,20 @@ def _period_rows(result: StudyResult) -> list[Row]:
             "Work of the drive less kinetic and elastic energy, plastic and friction work, and the "
             "elastic energy lost by sharing dilation: what the solver's grid dissipates.",
         ),
-        _own(
-            "kinetic_share_percent",
+        own_row(
+            "kinetic_fraction_percent",
             "Kinetic energy of the scaled mass over the work, at most",
             "%",
-            inert.kinetic_share * 100,
+            inert.kinetic_fraction * 100,
             2,
             "Its change since the start, after the build-up: how much the scaling of the mass can "
             f"matter. {inert.warning}".strip(),
         ),
-        _own(
-            "inertia_force_share_percent",
+        own_row(
+            "inertia_force_fraction_percent",
             "Momentum flux of the scaled mass over the cutting force",
             "%",
-            inert.force_share * 100,
+            inert.force_fraction * 100,
             2,
             "Density times speed squared times uncut chip thickness: what stops it is part of the "
             f"force. The true mass has 1/{inert.mass_scaling:g} of it.",
@@ -386,17 +421,17 @@ def _headline(
     headline = result.draws.headlines.get(name)
     paper = paper if result.plan.beside_paper else (None, None)
     error = headline.error if headline else None
-    share = headline.psf_share if headline else None
+    share = headline.psf_fraction if headline else None
     yield _drawn(
         f"{name}_error_degC", quantity, "°C", paper[0], error, one_draw.error, explanations[0]
     )
     yield _drawn(
-        f"{name}_psf_share_percent",
+        f"{name}_psf_fraction_percent",
         "PSF's portion of it",
         "%",
         paper[1],
         share,
-        one_draw.psf_share,
+        one_draw.psf_fraction,
         explanations[1],
         scale=100.0,
     )
@@ -447,8 +482,20 @@ def _of_segments(
     )
 
 
-def _own(key: str, quantity: str, unit: str, here: float, decimals: int, explanation: str) -> Row:
-    return Row(key, quantity, unit, None, _known(here), decimals, explanation)
+def own_row(
+    key: str,
+    quantity: str,
+    unit: str,
+    here: float,
+    decimals: int,
+    explanation: str,
+    uncertainty: float = nan,
+) -> Row:
+    """A quantity that is not the paper's; see `Row`, NaN for what is unknown."""
+    return Row(
+        key, quantity, unit, None, _known(here), decimals, explanation,
+        uncertainty=_known(uncertainty),
+    )  # fmt: skip
 
 
 def _known(value: float) -> float | None:

@@ -68,7 +68,7 @@ def _answer_text(result: StudyResult, name: str, begin: str, end: str) -> str:
     if headline is None:
         return ""
     low, high = headline.error.range
-    share = headline.psf_share
+    share = headline.psf_fraction
     psf = ""
     if share is not None and share.mean > 0:  # beside the band the blur may bring light
         psf = f", of which the point spread function makes {_spread(share, 100)} %"
@@ -115,12 +115,12 @@ def rake_error(result: StudyResult) -> str:
     )
 
 
-def rake_share(result: StudyResult) -> str:
+def rake_fraction(result: StudyResult) -> str:
     """What makes the PSF's portion at the rake face."""
     return joined(
         _psf_text(result),
         _wings_text(result, "rake"),
-        _reach(result, lambda s: s.psf_share("rake"), PAPER.rake_psf_share.value, _percent),
+        _reach(result, lambda s: s.psf_fraction("rake"), PAPER.rake_psf_fraction.value, _percent),
     )
 
 
@@ -148,7 +148,7 @@ def band_error(result: StudyResult) -> str:
     )
 
 
-def band_share(result: StudyResult) -> str:
+def band_fraction(result: StudyResult) -> str:
     """What makes the PSF's portion at the centre of the shear band."""
     width, psf = _band_width(result), result.camera.psf
     compared = ""
@@ -160,7 +160,7 @@ def band_share(result: StudyResult) -> str:
     return joined(
         compared,
         _wings_text(result, "band"),
-        _reach(result, lambda s: s.psf_share("band"), PAPER.band_psf_share.value, _percent),
+        _reach(result, lambda s: s.psf_fraction("band"), PAPER.band_psf_fraction.value, _percent),
     )
 
 
@@ -277,10 +277,10 @@ def _psf_text(result: StudyResult) -> str:
 def _wings_text(result: StudyResult, name: str) -> str:
     """What a Gaussian as wide at half maximum as the camera's PSF would make: the rest is wings."""
     psf, found, headline = result.camera.psf, _same_order(result), result.draws.headlines.get(name)
-    share = headline.psf_share if headline else None
+    share = headline.psf_fraction if headline else None
     if psf is None or share is None or not found.widths[0] <= psf.fwhm <= found.widths[-1]:
         return ""
-    gaussian = float(np.interp(psf.fwhm, found.widths, found.psf_share(name)))
+    gaussian = float(np.interp(psf.fwhm, found.widths, found.psf_fraction(name)))
     if not isfinite(gaussian):
         return ""
     return (

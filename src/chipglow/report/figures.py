@@ -1,7 +1,7 @@
 """The figures of the report: the paper's, in its order, and what goes beyond it."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 
 from chipglow.camera import PointSpreadFunction
 from chipglow.drawing import drawing
-from chipglow.drawing.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, FigureFile, ImagePanel
+from chipglow.drawing.drawing import (
+    BLUE,
+    GREEN,
+    GREY,
+    KELVIN,
+    VERMILLION,
+    Drawing,
+    FigureFile,
+    ImagePanel,
+)
 from chipglow.errors import LineDraws, Sensitivity, StudyResult
 from chipglow.errors.cut_error import SurfaceResult
 from chipglow.report.evidence import beside, error_definition
@@ -32,18 +41,6 @@ _ORDER_STYLE: Final = {
 }
 
 
-@dataclass(frozen=True)
-class _Drawing:
-    """How one figure is drawn; `draw` gives None where the study has nothing for it."""
-
-    name: str
-    title: str
-    paper: str
-    caption: Callable[[StudyResult], str]
-    alt: Callable[[StudyResult], str]
-    draw: Callable[[StudyResult], Figure | None]
-
-
 def draw_figures(result: StudyResult, folder: Path) -> Iterator[FigureFile]:
     """Draw every figure of the study into a folder, one after the other.
 
@@ -54,18 +51,12 @@ def draw_figures(result: StudyResult, folder: Path) -> Iterator[FigureFile]:
     folder : Path
         An existing folder; ``<name>.png`` and ``<name>.svg`` are written.
     """
-    for drawing_ in _DRAWINGS:
-        paper, name = drawing_.paper, drawing_.name
+    for one in _DRAWINGS:
         if not result.plan.beside_paper:
-            name = name.removeprefix(f"{paper.lower().replace(' ', '-')}-")
-            paper = ""
-        with drawing.style():
-            figure = drawing_.draw(result)
-            if figure is None:
-                continue
-            png, svg = drawing.save(figure, folder, name)
-        caption, alt = drawing_.caption(result), drawing_.alt(result)
-        yield FigureFile(name, drawing_.title, paper, caption, alt, png, svg)
+            name = one.name.removeprefix(f"{one.paper.lower().replace(' ', '-')}-")
+            one = replace(one, name=name, paper="")
+        if (figure := one.write(result, folder)) is not None:
+            yield figure
 
 
 def fields(result: StudyResult) -> Figure:
@@ -193,8 +184,8 @@ def error_lines(result: StudyResult) -> Figure:
 def _draw_papers_points(left: Axes, right: Axes) -> None:
     """The figures that the paper states, on the lines of its Figure 11."""
     for axes, error, share in (
-        (left, PAPER.rake_error.value, PAPER.rake_psf_share.value),
-        (right, PAPER.band_error.value, PAPER.band_psf_share.value),
+        (left, PAPER.rake_error.value, PAPER.rake_psf_fraction.value),
+        (right, PAPER.band_error.value, PAPER.band_psf_fraction.value),
     ):
         _draw_point(axes, 0.0, error, BLUE, "the paper's error")
         _draw_point(axes, 0.0, error * share, VERMILLION, "the paper's PSF portion")
@@ -225,11 +216,11 @@ def point_spread(result: StudyResult) -> Figure | None:
         vmin=-4.0,
         vmax=0.0,
     )
-    _draw_sensor(left, result.camera.pitch)
+    _draw_pixel(left, result.camera.pitch)
     left.set_xlabel("x / µm")
     left.set_ylabel("y / µm")
     left.set_title("a) kernel")
-    drawing.colour_bar(figure, picture, left, "log₁₀ of the share over the greatest")
+    drawing.colour_bar(figure, picture, left, "log₁₀ of the fraction of the greatest")
     _draw_section(right, psf, density[middle, near], spacing)
     return figure
 
@@ -348,7 +339,7 @@ def _sensitivity_panels(result: StudyResult) -> tuple[_SensitivityPanel, ...]:
     own = {}
     for name in ("rake", "band"):
         headline = result.draws.headlines.get(name)
-        share = headline.psf_share if headline else None
+        share = headline.psf_fraction if headline else None
         own[name] = (headline.error.mean if headline else None, share.mean if share else None)
     return (
         _SensitivityPanel(
@@ -367,17 +358,17 @@ def _sensitivity_panels(result: StudyResult) -> tuple[_SensitivityPanel, ...]:
         ),
         _SensitivityPanel(
             "c) PSF's portion, rake face",
-            lambda series: series.psf_share("rake"),
+            lambda series: series.psf_fraction("rake"),
             100,
             own["rake"][1],
-            PAPER.rake_psf_share.value,
+            PAPER.rake_psf_fraction.value,
         ),
         _SensitivityPanel(
             "d) PSF's portion, band's centre",
-            lambda series: series.psf_share("band"),
+            lambda series: series.psf_fraction("band"),
             100,
             own["band"][1],
-            PAPER.band_psf_share.value,
+            PAPER.band_psf_fraction.value,
         ),
     )
 
@@ -417,16 +408,7 @@ def _draw_error_line(
         mean, deviation = lines.mean(axis=0), lines.std(axis=0)
         at = draws.distance * 1e6
         axes.plot(at, mean, color=colour, label=f"{name}, mean")
-        label = f"{name}, ± 1 sd"
-        axes.fill_between(
-            at,
-            mean - deviation,
-            mean + deviation,
-            color=colour,
-            alpha=0.2,
-            linewidth=0,
-            label=label,
-        )
+        drawing.shade(axes, at, mean, deviation, colour, 0.2, f"{name}, ± 1 sd")
         axes.plot(at, one, color=colour, linewidth=0.9, linestyle=":", label=f"{name}, one draw")
 
 
@@ -443,7 +425,7 @@ def _draw_point(axes: Axes, at: float, value: float, colour: str, label: str) ->
     )
 
 
-def _draw_sensor(axes: Axes, pitch: float) -> None:
+def _draw_pixel(axes: Axes, pitch: float) -> None:
     side = pitch * 1e6 / 2
     axes.plot([-side, side, side, -side, -side], [-side, -side, side, side, -side], color="white")
 
@@ -464,7 +446,7 @@ def _draw_section(
     )
     axes.set_ylim(0.0)
     axes.set_xlabel("x / µm")
-    axes.set_ylabel("share over the greatest")
+    axes.set_ylabel("fraction of the greatest")
     axes.set_title("b) cross-section")
 
 
@@ -734,8 +716,8 @@ def _dual_alt(result: StudyResult) -> str:
     )
 
 
-_DRAWINGS: Final = (
-    _Drawing(
+_DRAWINGS: Final[tuple[Drawing[StudyResult], ...]] = (
+    Drawing(
         "figure-2-psf",
         "The camera's point spread function",
         "Figure 2",
@@ -743,7 +725,7 @@ _DRAWINGS: Final = (
         _psf_alt,
         point_spread,
     ),
-    _Drawing(
+    Drawing(
         "figure-3-heated-chips",
         "Heated chips",
         "Figure 3",
@@ -751,7 +733,7 @@ _DRAWINGS: Final = (
         _heated_alt,
         heated_chips,
     ),
-    _Drawing(
+    Drawing(
         "figure-4-heated-tool",
         "Heated tool",
         "Figure 4",
@@ -759,8 +741,8 @@ _DRAWINGS: Final = (
         _heated_tool_alt,
         heated_tool,
     ),
-    _Drawing("figure-5-scene", "The scene", "Figure 5", _fields_caption, _fields_alt, fields),
-    _Drawing(
+    Drawing("figure-5-scene", "The scene", "Figure 5", _fields_caption, _fields_alt, fields),
+    Drawing(
         "figure-6-measurement",
         "The measurement",
         "Figure 6",
@@ -768,7 +750,7 @@ _DRAWINGS: Final = (
         _measurement_alt,
         measurement,
     ),
-    _Drawing(
+    Drawing(
         "figure-7-rake-profiles",
         "The chip beside the rake face",
         "Figure 7",
@@ -776,7 +758,7 @@ _DRAWINGS: Final = (
         _profiles_alt,
         rake_profiles,
     ),
-    _Drawing(
+    Drawing(
         "figure-8-dual-spectrum",
         "Visible and infrared",
         "Figure 8",
@@ -784,7 +766,7 @@ _DRAWINGS: Final = (
         _dual_alt,
         dual_spectrum,
     ),
-    _Drawing(
+    Drawing(
         "figure-9-band-curves",
         "The shear band as it develops",
         "Figure 9",
@@ -792,7 +774,7 @@ _DRAWINGS: Final = (
         _curves_alt,
         band_curves,
     ),
-    _Drawing(
+    Drawing(
         "figure-10-error-images",
         "The measurement error",
         "Figure 10",
@@ -800,7 +782,7 @@ _DRAWINGS: Final = (
         _images_alt,
         error_images,
     ),
-    _Drawing(
+    Drawing(
         "figure-11-error-lines",
         "Across the rake face and the shear band",
         "Figure 11",
@@ -808,7 +790,7 @@ _DRAWINGS: Final = (
         _lines_alt,
         error_lines,
     ),
-    _Drawing(
+    Drawing(
         "psf-sensitivity",
         "How much the PSF's width decides",
         "",
@@ -816,6 +798,6 @@ _DRAWINGS: Final = (
         _sensitivity_alt,
         psf_sensitivity,
     ),
-    _Drawing("forces", "The forces", "", _forces_caption, _forces_alt, forces),
-    _Drawing("chip-thickness", "The chip's thickness", "", _chip_caption, _chip_alt, chip),
+    Drawing("forces", "The forces", "", _forces_caption, _forces_alt, forces),
+    Drawing("chip-thickness", "The chip's thickness", "", _chip_caption, _chip_alt, chip),
 )

@@ -1,9 +1,14 @@
 """What every report's page is made of: one self-contained HTML file of sections."""
 
+import json
 from base64 import b64encode
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from importlib.resources import files
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import xarray as xr
 
 from chipglow import __version__
 from chipglow.drawing.drawing import FigureFile
@@ -56,25 +61,46 @@ def answer_part(answer: Sequence[str], remarks: Sequence[str]) -> str:
     return f'<div class="answer">\n{sentences}</div>\n{boxes}'
 
 
-def table_part(heads: Sequence[str], body: Iterable[str]) -> str:
-    """A table of rows of HTML; all columns but the first are numbers."""
+class Line(NamedTuple):
+    """A line of a table: its texts, of which all but the first are numbers, and what explains it.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        One for each column.
+    explanation : str
+        Stands in a row of its own below; empty for none.
+    where : str
+        Stands under the first text.
+    """
+
+    texts: Sequence[str]
+    explanation: str = ""
+    where: str = ""
+
+
+def table_part(text: str, heads: Sequence[str], lines: Iterable[Line]) -> str:
+    """A paragraph, if there is a text, and a table; all its columns but the first are numbers."""
     first, *numbers = heads
     head = f"<th>{escape(first)}</th>" + "".join(
         f'<th class="number">{escape(name)}</th>' for name in numbers
     )
-    return (
-        f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n"
-        + "\n".join(body)
-        + ("\n</tbody></table>")
-    )
+    body = "\n".join(row for line in lines for row in _rows(line, heads))
+    paragraph = f"<p>{escape(text)}</p>\n" if text else ""
+    return f"{paragraph}<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table>"
 
 
-def number_cells(texts: Sequence[str], heads: Sequence[str]) -> str:
-    """Cells of numbers; on a narrow screen each says the head of its column itself."""
-    return "".join(
+def _rows(line: Line, heads: Sequence[str]) -> Iterator[str]:
+    """Rows of a line; on a narrow screen each number says the head of its column itself."""
+    first, *numbers = line.texts
+    where = f'<span class="where">{escape(line.where)}</span>' if line.where else ""
+    cells = "".join(
         f'<td class="number" data-head="{escape(head)}">{escape(text)}</td>'
-        for text, head in zip(texts, heads, strict=True)
+        for text, head in zip(numbers, heads[1:], strict=True)
     )
+    yield f"<tr><td>{escape(first)}{where}</td>{cells}</tr>"
+    if line.explanation:
+        yield f'<tr class="why"><td colspan="{len(heads)}">{escape(line.explanation)}</td></tr>'
 
 
 def figure_part(figure: FigureFile) -> str:
@@ -94,3 +120,53 @@ def definition_list(provenance: Mapping[str, str]) -> str:
         f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>\n" for name, value in provenance.items()
     )
     return f"<dl>\n{items}</dl>"
+
+
+def closing_sections(study_text: str, provenance: Mapping[str, str]) -> list[tuple[str, str, str]]:
+    """The sections with which every page ends: the study, and how the report was made."""
+    return [
+        ("study", "The study as run", f"<pre><code>{escape(study_text)}</code></pre>"),
+        ("versions", "How it was made", definition_list(provenance)),
+    ]
+
+
+def write_files(
+    folder: Path, page: str, data: xr.Dataset, numbers: Mapping[str, Any], study_text: str
+) -> Path:
+    """Write page, arrays, numbers and study into a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        An existing folder.
+    page : str
+        Written as ``report.html``.
+    data : xarray.Dataset
+        Written as ``results.nc``.
+    numbers : mapping
+        Written as ``summary.json``.
+    study_text : str
+        Written as ``study.yaml``.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    OSError
+        If something can't be written.
+    """
+    packed = {
+        str(name): {"zlib": True, "complevel": 4}
+        for name, values in data.data_vars.items()
+        if values.ndim > 1
+    }
+    data.to_netcdf(folder / "results.nc", engine="h5netcdf", encoding=packed)
+    text = json.dumps(numbers, indent=2, ensure_ascii=False, allow_nan=False)
+    (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+    (folder / "study.yaml").write_text(study_text, encoding="utf-8")
+    report = folder / "report.html"
+    report.write_text(page, encoding="utf-8")
+    return report

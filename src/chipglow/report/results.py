@@ -9,7 +9,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.errors import Distribution, StudyResult
-from chipglow.laboratory.chip.metrics_table import ChipRow
 from chipglow.report.comparison import CauseRow, Row
 from chipglow.scene import FIELD_UNITS
 from chipglow.scene.tool_attributes import tool_attributes
@@ -28,7 +27,7 @@ def results_dataset(result: StudyResult, provenance: Mapping[str, str]) -> xr.Da
     Returns
     -------
     xarray.Dataset
-        Dimensions: ``y``, ``x`` the scene's samples; ``sensor_y``, ``sensor_x`` the pixels;
+        Dimensions: ``y``, ``x`` the scene's samples; ``pixel_y``, ``pixel_x`` the pixels;
         ``instant`` the exposures; ``surface`` the surfaces; ``ridge_point`` along the shear band,
         NaN beyond its end; ``rake_distance`` and ``band_distance`` along the analysis lines;
         ``contact_distance`` up the rake face; ``segment``, ``texture`` and ``pixel_phase`` the
@@ -37,7 +36,7 @@ def results_dataset(result: StudyResult, provenance: Mapping[str, str]) -> xr.Da
     """
     variables = {
         **_scene(result),
-        **_sensors(result),
+        **_pixels(result),
         **_ridges(result),
         **_lines(result),
         **_draws(result),
@@ -64,19 +63,10 @@ def results_dataset(result: StudyResult, provenance: Mapping[str, str]) -> xr.Da
     return xr.Dataset(variables, coords=coordinates, attrs=attributes)
 
 
-def compression(data: xr.Dataset) -> dict[str, dict[str, Any]]:
-    """How the arrays are packed in a file that every reader of NetCDF opens."""
-    return {
-        str(name): {"zlib": True, "complevel": 4}
-        for name, values in data.data_vars.items()
-        if values.ndim > 1
-    }
-
-
 def summary(
     rows: Sequence[Row],
     causes: Sequence[CauseRow],
-    chip: Sequence[ChipRow],
+    chip: Sequence[Row],
     provenance: Mapping[str, str],
 ) -> dict[str, Any]:
     """Numbers of the study for scripts; a name ends in its unit, what is unknown is None.
@@ -87,7 +77,7 @@ def summary(
         The comparison.
     causes : sequence of CauseRow
         What makes the headlines scatter.
-    chip : sequence of ChipRow
+    chip : sequence of Row
         What describes the chip.
     provenance : mapping
         What, when, version, seed and the like.
@@ -98,8 +88,8 @@ def summary(
         "draws": {row.key: scatter(row.draws) for row in rows if row.draws is not None},
         "causes": {row.key: _causes(row) for row in causes},
         "one_draw": {row.key: row.one_draw for row in rows if row.one_draw is not None},
-        "chip": {row.key: row.value for row in chip},
-        "chip_spread": {row.key: row.spread for row in chip if row.spread is not None},
+        "chip": {row.key: row.here for row in chip},
+        "chip_spread": {row.key: row.uncertainty for row in chip if row.uncertainty is not None},
         "paper": {row.key: row.paper for row in rows if row.paper is not None},
         "differs": {row.key: row.differs for row in rows if row.paper is not None},
         "explanation": {row.key: row.explanation for row in rows},
@@ -148,8 +138,8 @@ def _scene(result: StudyResult) -> dict[str, Any]:
     }
 
 
-def _sensors(result: StudyResult) -> dict[str, Any]:
-    place, surfaces = ("sensor_y", "sensor_x"), result.surfaces.values()
+def _pixels(result: StudyResult) -> dict[str, Any]:
+    place, surfaces = ("pixel_y", "pixel_x"), result.surfaces.values()
     raster = next(iter(surfaces)).errors.raster
     measured = np.stack([s.measurement.radiance_temperature() for s in surfaces])
     flags = np.stack([s.measurement.flags for s in surfaces])
@@ -160,8 +150,8 @@ def _sensors(result: StudyResult) -> dict[str, Any]:
         "error_psf_portion": [s.errors.psf_portion for s in surfaces],
     }
     return {
-        "sensor_y": ("sensor_y", raster.y, {"units": "m"}),
-        "sensor_x": ("sensor_x", raster.x, {"units": "m"}),
+        "pixel_y": ("pixel_y", raster.y, {"units": "m"}),
+        "pixel_x": ("pixel_x", raster.x, {"units": "m"}),
         "radiance_temperature": (("surface", "instant", *place), measured, {"units": "K"}),
         "flags": (("surface", "instant", *place), flags, {"units": "1"}),
         **{

@@ -1,7 +1,6 @@
 """Figures of a scene's measurement error: without a word of cutting."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -11,24 +10,22 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.drawing import drawing
-from chipglow.drawing.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, FigureFile, ImagePanel
+from chipglow.drawing.drawing import (
+    BLUE,
+    GREEN,
+    GREY,
+    KELVIN,
+    VERMILLION,
+    Drawing,
+    FigureFile,
+    ImagePanel,
+)
 from chipglow.errors import SceneErrors
 from chipglow.errors.scene_error import PlaceErrors, Profile, SurfaceErrors
 from chipglow.report.evidence import definition_of
 from chipglow.scene import Material
 
 _MOST_CURVES: Final = 6
-
-
-@dataclass(frozen=True)
-class _Drawing:
-    """How one figure is drawn; `draw` gives None where the scene has nothing for it."""
-
-    name: str
-    title: str
-    caption: Callable[[SceneErrors], str]
-    alt: str
-    draw: Callable[[SceneErrors], Figure | None]
 
 
 def draw_scene_errors(result: SceneErrors, folder: Path) -> Iterator[FigureFile]:
@@ -42,12 +39,8 @@ def draw_scene_errors(result: SceneErrors, folder: Path) -> Iterator[FigureFile]
         An existing folder; ``<name>.png`` and ``<name>.svg`` are written.
     """
     for one in _DRAWINGS:
-        with drawing.style():
-            figure = one.draw(result)
-            if figure is None:
-                continue
-            png, svg = drawing.save(figure, folder, one.name)
-        yield FigureFile(one.name, one.title, "", one.caption(result), one.alt, png, svg)
+        if (figure := one.write(result, folder)) is not None:
+            yield figure
 
 
 def scene(result: SceneErrors) -> Figure:
@@ -56,7 +49,7 @@ def scene(result: SceneErrors) -> Figure:
     there = frame.material != Material.VOID
     temperature = np.where(there, frame.temperature - KELVIN, np.nan)
     known = temperature[there]
-    ends = _ends(known, 0.0, 99.9)
+    ends = drawing.ends(known, 0.0, 99.9, 1.0)
     panels = [ImagePanel("temperature", "temperature / °C", temperature, ends, drawing.HEAT)]
     for name, surface in result.surfaces.items():
         emissivity = np.where(there, surface.emissivity, np.nan)
@@ -75,7 +68,7 @@ def measurement(result: SceneErrors) -> Figure:
         truth = surface.scene_temperature - KELVIN
         measured = surface.measurement.radiance_temperature()[result.shown] - KELVIN
         lower_limit = result.camera.lower_limit
-        low, high = _ends(truth[np.isfinite(truth)], 0.5, 99.9)
+        low, high = drawing.ends(truth, 0.5, 99.9, 1.0)
         low = low if lower_limit is None else max(lower_limit - KELVIN - 50.0, low)
         shown = (low, max(high, low + 50.0))
         drawing.show_image(axes[0], truth, result.raster, result.tool, drawing.HEAT, shown)
@@ -132,9 +125,7 @@ def profiles(result: SceneErrors) -> Figure | None:
         ):
             mean, deviation = _over_draws(values)
             right.plot(along, mean, color=colour, label=label)
-            right.fill_between(
-                along, mean - deviation, mean + deviation, color=colour, alpha=0.2, linewidth=0
-            )
+            drawing.shade(right, along, mean, deviation, colour, 0.2)
         right.axhline(0.0, color=GREY, linewidth=0.6)
         left.set_title(title)
         left.set_ylabel("radiance temperature / °C")
@@ -192,9 +183,7 @@ def _draw_temperatures(axes: Axes, along: NDArray[np.float64], one: Profile) -> 
     measured, deviation = _over_draws(one.reference + one.error - KELVIN)
     axes.plot(along, truth, color=GREY, label="reference")
     axes.plot(along, measured, color=BLUE, label="measured")
-    axes.fill_between(
-        along, measured - deviation, measured + deviation, color=BLUE, alpha=0.2, linewidth=0
-    )
+    drawing.shade(axes, along, measured, deviation, BLUE, 0.2)
 
 
 def _over_draws(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -223,14 +212,6 @@ def _grid_of(panels: list[ImagePanel], result: SceneErrors) -> Figure:
     for axes in grid.flat[len(panels) :]:
         axes.remove()
     return figure
-
-
-def _ends(values: NDArray[np.floating], low: float, high: float) -> tuple[float, float]:
-    """Two percentiles of what is known, a kelvin apart or more."""
-    if values.size == 0:
-        return 0.0, 1.0
-    ends = np.percentile(values, (low, high))
-    return float(ends[0]), float(max(ends[1], ends[0] + 1.0))
 
 
 def _time_unit(longest: float) -> tuple[float, str]:
@@ -284,34 +265,45 @@ def _time_caption(result: SceneErrors) -> str:
     return "Error at each place, exposure by exposure; bars: standard deviation over the draws."
 
 
-_DRAWINGS: Final = (
-    _Drawing("scene", "The scene", _scene_caption, "Images of temperature and emissivity.", scene),
-    _Drawing(
+_DRAWINGS: Final[tuple[Drawing[SceneErrors], ...]] = (
+    Drawing(
+        "scene",
+        "The scene",
+        "",
+        _scene_caption,
+        lambda _: "Images of temperature and emissivity.",
+        scene,
+    ),
+    Drawing(
         "measurement",
         "The measurement",
+        "",
         _measurement_caption,
-        "Images of the radiance temperature as it is and as measured.",
+        lambda _: "Images of the radiance temperature as it is and as measured.",
         measurement,
     ),
-    _Drawing(
+    Drawing(
         "error-images",
         "The measurement error",
+        "",
         _errors_caption,
-        "Images of the error and of the part that the point spread function makes.",
+        lambda _: "Images of the error and of the part that the point spread function makes.",
         error_images,
     ),
-    _Drawing(
+    Drawing(
         "profiles",
         "Along the lines",
+        "",
         _profiles_caption,
-        "Curves of temperature and error along each line.",
+        lambda _: "Curves of temperature and error along each line.",
         profiles,
     ),
-    _Drawing(
+    Drawing(
         "over-time",
         "Over time",
+        "",
         _time_caption,
-        "Curves of the error at each place over the exposures.",
+        lambda _: "Curves of the error at each place over the exposures.",
         over_time,
     ),
 )

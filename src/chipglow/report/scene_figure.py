@@ -46,8 +46,8 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
     has_quality = frame.quality is not None and bool(
         frame.quality[frame.material != Material.VOID].any()
     )
-    told_apart = tool is not None or bool((frame.material != Material.WORKPIECE).any())
-    rows = ceil((len(panels) + told_apart + has_quality) / 2)
+    has_kinds = tool is not None or bool((frame.material != Material.WORKPIECE).any())
+    rows = ceil((len(panels) + has_kinds + has_quality) / 2)
     histogram_rows = ceil(len(panels) / 2)
     with drawing.style():
         images = rows * (_panel_height(raster) + _AROUND) + _AROUND
@@ -63,7 +63,7 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
             panel.draw(top, axes, raster, tool)
             if panel.label == _SPEED:
                 _draw_arrows(axes, frame, raster)
-        if told_apart:
+        if has_kinds:
             _draw_material(top, next(places), frame, raster, tool)
         if has_quality and frame.quality is not None:
             _draw_quality(top, next(places), frame, frame.quality, raster, tool)
@@ -76,7 +76,7 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
         for axes in below.flat[len(panels) :]:
             axes.remove()
         whose = " of the workpiece's samples" if histogram_rows > 1 else ""
-        bottom.supylabel(f"share{whose} / %", fontsize=9.5)
+        bottom.supylabel(f"fraction{whose} / %", fontsize=9.5)
     return figure
 
 
@@ -84,11 +84,11 @@ def _panels(frame: Frame) -> list[ImagePanel]:
     """Temperature, and of strain, strain rate and speed what the frame has."""
     there, solid = frame.material != Material.VOID, frame.material == Material.WORKPIECE
     temperature = np.where(there, TEMPERATURE(frame.temperature), np.nan)
-    heat = _ends(temperature, (0.1, 99.9))
+    heat = drawing.ends(temperature, 0.1, 99.9)
     panels = [ImagePanel("temperature", TEMPERATURE.label, temperature, heat, drawing.HEAT)]
     if frame.plastic_strain is not None:
         strain = np.where(solid, frame.plastic_strain, np.nan)
-        ends = (0.0, _ends(strain, (0.0, 99.9))[1])
+        ends = (0.0, drawing.ends(strain, 0.0, 99.9)[1])
         panels.append(ImagePanel("plastic strain", STRAIN.label, strain, ends))
     if frame.plastic_strain_rate is not None:
         rate = np.where(solid, frame.plastic_strain_rate, np.nan)
@@ -105,20 +105,13 @@ def _panels(frame: Frame) -> list[ImagePanel]:
         )
     if frame.velocity_x is not None and frame.velocity_y is not None:
         speed = np.where(solid, np.hypot(frame.velocity_x, frame.velocity_y), np.nan)
-        panels.append(ImagePanel("speed", _SPEED, speed, (0.0, _ends(speed, (0.0, 99.9))[1])))
+        panels.append(ImagePanel("speed", _SPEED, speed, (0.0, drawing.ends(speed, 0.0, 99.9)[1])))
     return panels
-
-
-def _ends(image: NDArray[Any], percentiles: tuple[float, float]) -> tuple[float, float]:
-    """Two percentiles of what is known, apart from each other."""
-    known = image[np.isfinite(image)]
-    low, high = map(float, np.percentile(known, percentiles)) if known.size else (0.0, 1.0)
-    return low, high if high - low > 1e-6 * abs(high) else low + 1.0
 
 
 def _decades(rate: NDArray[Any]) -> tuple[float, float]:
     """Whole decades, the last of which has the fastest."""
-    fastest = _ends(rate, (0.0, 99.9))[1]
+    fastest = drawing.ends(rate, 0.0, 99.9)[1]
     top = float(np.ceil(np.log10(max(fastest, 1e-30)) - 1e-9))
     return 10.0 ** (top - _DECADES), 10.0**top
 
@@ -167,7 +160,7 @@ def _draw_quality(
     there = frame.material != Material.VOID
     filled = there & (flags == FILLED)
     distance = np.where(there & ~filled, flags, np.nan)
-    ends = (0.0, _ends(distance, (0.0, 99.0))[1])
+    ends = (0.0, drawing.ends(distance, 0.0, 99.0)[1])
     title = f"quality; red: filled, {100 * filled.sum() / there.sum():.2g} %"
     ImagePanel(title, "colour distance / ΔE", distance, ends).draw(figure, axes, raster, tool)
     drawing.veil(axes, filled, raster, VERMILLION, 1.0)
@@ -187,7 +180,7 @@ def _draw_histogram(axes: Axes, panel: ImagePanel, values: NDArray[Any]) -> None
     if values.size == 0:
         axes.set_title("no workpiece")
         return
-    low, high = _ends(values, (0.0, 100.0))
+    low, high = drawing.ends(values, 0.0, 100.0)
     bins = np.geomspace(low, high, _BINS) if panel.log else np.linspace(low, high, _BINS)
     axes.hist(values, bins.tolist(), weights=np.full(values.size, 100.0 / values.size), color=BLUE)
     axes.set_yscale("log")

@@ -1,6 +1,5 @@
 """The report of a scene's measurement error: page, figures, numbers and arrays."""
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -15,14 +14,15 @@ from chipglow.errors.distribution import TOGETHER
 from chipglow.errors.scene_error import PlaceErrors
 from chipglow.report.evidence import definition_of
 from chipglow.report.page import (
+    Line,
     answer_part,
-    definition_list,
+    closing_sections,
     document,
     figure_part,
-    number_cells,
     table_part,
+    write_files,
 )
-from chipglow.report.results import compression, scatter
+from chipglow.report.results import scatter
 from chipglow.report.scene_error_figures import draw_scene_errors
 
 _HEADS: Final = ("Place", "Reference", "Error", "Range", "PSF's portion")
@@ -102,39 +102,37 @@ def write_scene_report(
     pictures = folder / "figures"
     pictures.mkdir()
     figures = [figure_part(figure) for figure in draw_scene_errors(result, pictures)]
+    missing = "".join(f"<p>{escape(sentence)}</p>\n" for sentence in result.missing)
     sections = [
         ("answer", "The answer", answer_part(list(_answer(result)), remarks)),
         ("places", "The error at each place", _places(result)),
         ("scatter", "What makes the scatter", _causes(result)),
         ("figures", "Figures", "\n".join(figures)),
-        ("missing", "What is not here", _missing(result.missing)),
-        ("study", "The study as run", f"<pre><code>{escape(study_text)}</code></pre>"),
-        ("versions", "How it was made", definition_list(provenance)),
+        *([("missing", "What is not here", missing)] if missing else []),
+        *closing_sections(study_text, provenance),
     ]
-    data = _dataset(result, provenance)
-    data.to_netcdf(folder / "results.nc", engine="h5netcdf", encoding=compression(data))
-    text = json.dumps(_summary(result, provenance), indent=2, ensure_ascii=False, allow_nan=False)
-    (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
-    (folder / "study.yaml").write_text(study_text, encoding="utf-8")
-    report = folder / "report.html"
-    shown = [section for section in sections if section[0] != "missing" or result.missing]
-    report.write_text(document(title, shown), encoding="utf-8")
-    return report
+    return write_files(
+        folder,
+        document(title, sections),
+        _dataset(result, provenance),
+        _summary(result, provenance),
+        study_text,
+    )
 
 
 def _answer(result: SceneErrors) -> Iterator[str]:
     """The first reading of every place with every surface, as sentences."""
     for name, surface in result.surfaces.items():
-        told: set[str] = set()
+        said: set[str] = set()
         for one in surface.readings:
-            if one.place in told:
+            if one.place in said:
                 continue
-            told.add(one.place)
+            said.add(one.place)
             of_surface = f" ({name})" if len(result.surfaces) > 1 else ""
-            yield f"{one.place.capitalize()}, {one.reading}{of_surface}: {_told(one)}"
+            yield f"{one.place.capitalize()}, {one.reading}{of_surface}: {_sentence(one)}"
 
 
-def _told(one: PlaceErrors) -> str:
+def _sentence(one: PlaceErrors) -> str:
     mean = one.error.mean
     way = "little" if mean < 0 else "much"
     scale = -1.0 if mean < 0 else 1.0
@@ -154,11 +152,7 @@ def _places(result: SceneErrors) -> str:
         f"{definition_of(result.plan.reference)} PSF: point spread function. Mean ± standard "
         f"deviation over the draws of {len(result.starts)} exposures, of textures and pixel phases."
     )
-    body = (
-        f"<tr><td>{escape(row.place)}</td>{number_cells(row[1:], _HEADS[1:])}</tr>"
-        for row in place_rows(result)
-    )
-    return f"<p>{escape(text)}</p>\n" + table_part(_HEADS, body)
+    return table_part(text, _HEADS, map(Line, place_rows(result)))
 
 
 def _causes(result: SceneErrors) -> str:
@@ -171,27 +165,21 @@ def _causes(result: SceneErrors) -> str:
     if not readings:
         return "<p>One draw only: it says nothing of the scatter.</p>"
     heads = ("Error", *readings[0][1].error.causes, TOGETHER)
-    body = (
-        f"<tr><td>{escape(name)}</td>"
-        + number_cells([_cause_text(part) for part in one.error.parts.values()], heads[1:])
-        + "</tr>"
-        for name, one in readings
-    )
     text = (
         "Each cause in the mean over the others: standard deviation, and its part of the sum of "
         "squares. Causes together: what none of them makes by itself."
     )
-    return f"<p>{escape(text)}</p>\n" + table_part(heads, body)
+    lines = (
+        Line((name, *(_cause_text(part) for part in one.error.parts.values())))
+        for name, one in readings
+    )
+    return table_part(text, heads, lines)
 
 
 def _cause_text(part: Any) -> str:
     if part.draws < 2 or not np.isfinite(part.standard_deviation):
         return "–"
     return f"{part.standard_deviation:.1f} °C ({100 * part.fraction:.0f} %)"
-
-
-def _missing(sentences: Sequence[str]) -> str:
-    return "".join(f"<p>{escape(sentence)}</p>\n" for sentence in sentences)
 
 
 def _spread(draws: Distribution, offset: float = 0.0) -> str:
@@ -229,8 +217,8 @@ def _summary(result: SceneErrors, provenance: Mapping[str, str]) -> dict[str, An
 def _dataset(result: SceneErrors, provenance: Mapping[str, str]) -> xr.Dataset:
     """Arrays behind the figures, in SI units, each with a ``units`` attribute."""
     surfaces = list(result.surfaces.values())
-    sensors, kelvin = surfaces[0].errors.raster, {"units": "K"}
-    pixels = ("surface", "sensor_y", "sensor_x")
+    grid, kelvin = surfaces[0].errors.raster, {"units": "K"}
+    pixels = ("surface", "pixel_y", "pixel_x")
     variables: dict[str, Any] = {
         "temperature": (("y", "x"), result.frame.temperature, kelvin),
         "emissivity": (
@@ -266,8 +254,8 @@ def _dataset(result: SceneErrors, provenance: Mapping[str, str]) -> xr.Dataset:
         "exposure": ("exposure", result.starts, {"units": "s"}),
         "y": ("y", result.raster.y, {"units": "m"}),
         "x": ("x", result.raster.x, {"units": "m"}),
-        "sensor_y": ("sensor_y", sensors.y, {"units": "m"}),
-        "sensor_x": ("sensor_x", sensors.x, {"units": "m"}),
+        "pixel_y": ("pixel_y", grid.y, {"units": "m"}),
+        "pixel_x": ("pixel_x", grid.x, {"units": "m"}),
     }
     attributes: dict[str, Any] = {
         "error_reference": result.plan.reference,

@@ -88,7 +88,7 @@ class QualitySummary:
     Parameters
     ----------
     filled : float
-        Share of those samples whose value is their neighbours'.
+        Fraction of those samples whose value is their neighbours'.
     median, percentile_95 : float
         Distance of the other samples' colours from the colour scale in CIE L*a*b*; 0 if all are
         filled.
@@ -115,8 +115,8 @@ class SceneSummary:
         Numbers of all frames that were read.
     fields : tuple of FieldSummary
         Every field of numbers.
-    shares : mapping
-        Share of the samples that show each material.
+    fractions : mapping
+        Fraction of the samples that show each material.
     quality : QualitySummary, optional
         None if the scene has no flags of its quality.
     """
@@ -126,7 +126,7 @@ class SceneSummary:
     index: int
     sampled: tuple[int, ...]
     fields: tuple[FieldSummary, ...]
-    shares: Mapping[Material, float]
+    fractions: Mapping[Material, float]
     quality: QualitySummary | None
 
 
@@ -156,7 +156,7 @@ def scene_summary(scene: Scene, time: float | None = None) -> SceneSummary:
         index=index,
         sampled=sampled,
         fields=tuple(_fields(frame, limits)),
-        shares={kind: float(np.mean(frame.material == kind)) for kind in Material},
+        fractions={kind: float(np.mean(frame.material == kind)) for kind in Material},
         quality=quality_of(frame),
     )
 

@@ -3,12 +3,14 @@
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from math import isfinite
-from typing import Final, Literal, TypeAlias
+from typing import Annotated, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Strict
 
+from chipglow.quantities import Parameter, Part
+from chipglow.quantities.units import SPEED, TEMPERATURE, Position
 from chipglow.scene.motion import optical_flow, strain_rate_along
 from chipglow.scene.nearest import fill
 from chipglow.scene.polygon import in_polygon
@@ -27,34 +29,19 @@ from chipglow.scene.tool import Tool
 STRAIN_OF_CHIP: Final = 1.0
 """Plastic strain of the region that is said to be chip, where a source has no strain."""
 
+_Corner: TypeAlias = Annotated[tuple[Position, Position], Strict(False)]
 _VELOCITY: Final = frozenset(("velocity_x", "velocity_y"))
 _CHIP_STARTS, _CHIP_ENDS = 0.3, 0.5
 _MOST_FILLED: Final = 0.5
-_MOST_FRAMES: Final = 20
 _FLOW_FRAMES: Final = 5
 """The optical flow is that over so many frames: from one to the next little moves."""
 
 
 @dataclass(frozen=True)
-class Completion:
-    """What stands in for the fields that a source does not have.
+class Completion(Part):
+    """What stands in for what the source does not have.
 
-    Parameters
-    ----------
-    surroundings : float
-        Temperature in K where there is no material.
-    tool : Tool, optional
-        Its outline: samples in it are tool, whatever the source says.
-    cutting_speed : float, optional
-        Speed of the workpiece along x in m/s, for a source without velocity.
-    chip : tuple of points, optional
-        Outline of the chip in m, ((x, y), ...): for a source without plastic strain.
-    motion : {"auto", "flow", "none"}
-        Velocity of a source that has none: that of the optical flow, or none. "auto": the flow
-        where there is a strain, a chip or a cutting speed, for what is cut moves.
-    rate_frames : int
-        Number of frames over which the strain rate is taken, for a source without it: more of them
-        make less noise and more blur.
+    Its ``tool`` is an outline: samples in it are tool, whatever the source says.
 
     Raises
     ------
@@ -62,26 +49,53 @@ class Completion:
         If a number is not possible or the chip has under three corners.
     """
 
-    surroundings: float = 293.15
+    surroundings: Annotated[
+        float,
+        Parameter(
+            "Temperature where there is no material, and of a tool that has none.",
+            TEMPERATURE,
+            over=0.0,
+        ),
+    ] = 293.15
     tool: Tool | None = None
-    cutting_speed: float | None = None
-    chip: tuple[tuple[float, float], ...] | None = None
-    motion: Literal["auto", "flow", "none"] = "auto"
-    rate_frames: int = 1
+    cutting_speed: Annotated[
+        float | None,
+        Parameter(
+            "Speed of the workpiece such as 250 m/min, for a source without velocity.", SPEED
+        ),
+    ] = None
+    chip: Annotated[
+        Annotated[tuple[_Corner, ...], Strict(False)] | None,
+        Parameter(
+            "Corners of the chip, for a source without plastic strain, such as\n"
+            "[[-300 um, 0 um], [-50 um, 0 um], [-50 um, 400 um]]."
+        ),
+    ] = None
+    motion: Annotated[
+        Literal["auto", "flow", "none"],
+        Parameter(
+            "Velocity of a source that has none: flow (the optical flow), none, or auto: the flow\n"
+            "where there is a strain, a chip or a cutting speed, for what is cut moves."
+        ),
+    ] = "auto"
+    rate_frames: Annotated[
+        int,
+        Parameter(
+            "Frames over which a missing strain rate is taken: more of them make less noise and\n"
+            "more blur.",
+            least=1,
+            most=20,
+        ),
+    ] = 1
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.surroundings) and self.surroundings > 0):
-            raise ValueError(f"surroundings: {self.surroundings!r} K, expected over 0 K")
-        if self.cutting_speed is not None and not isfinite(self.cutting_speed):
-            raise ValueError(f"cutting_speed: {self.cutting_speed!r} m/s, expected a finite speed")
+        super().__post_init__()
         if self.chip is not None and len(self.chip) < 3:
             raise ValueError(f"chip: {len(self.chip)} corners, expected 3 or more")
         if self.motion not in ("auto", "flow", "none"):
             raise ValueError(f"motion: {self.motion!r}, expected auto, flow or none")
         if self.motion == "none" and self.cutting_speed is not None:
             raise ValueError("motion: 'none' beside a cutting_speed, expected one or the other")
-        if not 1 <= self.rate_frames <= _MOST_FRAMES:
-            raise ValueError(f"rate_frames: {self.rate_frames}, expected 1 to {_MOST_FRAMES}")
 
     @property
     def memory(self) -> int:

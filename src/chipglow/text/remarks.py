@@ -1,4 +1,4 @@
-"""What had to be assumed and what is doubtful, collected on the way to a result."""
+"""Assumptions and warnings, collected on the way to a result."""
 
 from dataclasses import dataclass, field
 

@@ -1,6 +1,6 @@
 """What the readers of cameras' own formats share: bytes that are there, and frames chosen."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -140,41 +140,6 @@ def chosen_frames(path: Path, frames: slice | None, count: int, samples: int) ->
     return numbers
 
 
-def say_cut(remarks: FileRemarks, said: int, whole: int) -> None:
-    """Say that a file ends before its last frame, if it does.
-
-    Parameters
-    ----------
-    remarks : FileRemarks
-        Takes it as a warning.
-    said, whole : int
-        How many frames the file should have, and how many of them are whole.
-    """
-    if whole < said:
-        remarks.warnings.append(
-            f"the file is cut short: of its {said} frames the first {whole} are whole, the others "
-            "are left out."
-        )
-
-
-def say_cut_behind(remarks: FileRemarks, whole: int, left: int) -> None:
-    """Say that a file, which does not tell its number of frames, ends within one.
-
-    Parameters
-    ----------
-    remarks : FileRemarks
-        Takes it as a warning.
-    whole : int
-        How many frames are whole.
-    left : int
-        How many bytes lie behind them.
-    """
-    remarks.warnings.append(
-        f"the file is cut short: its first {whole} frames are whole, the {left} bytes behind them "
-        "are no whole frame and are left out."
-    )
-
-
 def check_picture(path: Path, rows: int, columns: int, most: int = 65_535) -> None:
     """Refuse pictures without or with absurdly many rows or columns.
 
@@ -203,45 +168,60 @@ def first_moment(seconds: float) -> tuple[str, ...]:
     return (f"Frame 0 was taken at {when}.",)
 
 
-def even_times(frames: Sequence[int], interval: float) -> NDArray[np.float64]:
-    """Times in s of frames that are as far apart, from the first one of the file on."""
-    return np.asarray(frames, np.float64) * interval
-
-
-def stamped_times(
-    path: Path, stamps: NDArray[np.float64], frames: range, rate: float, remarks: FileRemarks
-) -> NDArray[np.float64]:
-    """Times of frames from their stamps, or from the frame rate where the stamps are no good.
+@dataclass(frozen=True)
+class Timing:
+    """When the frames that are read were taken.
 
     Parameters
     ----------
     path : Path
-        The file.
-    stamps : ndarray
-        Stamps of the frames in s after the first one of the file, shape (frames,).
+        The file, as errors call it.
     frames : range
-        Their numbers.
-    rate : float
-        Frame rate in Hz; 0 if it is not known.
+        Numbers of the frames.
+    interval : float, optional
+        Time between frames in s, if the user says it.
     remarks : FileRemarks
         Takes what had to be assumed.
-
-    Raises
-    ------
-    SourceError
-        If the stamps do not ascend and the frame rate is not known.
     """
-    steps = np.diff(stamps) * np.sign(frames.step)
-    if np.isfinite(stamps).all() and (steps > 0).all():
-        return stamps
-    if not (np.isfinite(rate) and rate > 0):
-        raise SourceError(
-            f"{path}: has neither time stamps that ascend nor a frame rate, give an interval"
+
+    path: Path
+    frames: range
+    interval: float | None
+    remarks: FileRemarks
+
+    def even(self, interval: float) -> NDArray[np.float64]:
+        """Times in s of frames that are as far apart, from the first one of the file on."""
+        return np.asarray(self.frames, np.float64) * interval
+
+    def stamped(self, stamps: NDArray[np.float64] | None, rate: float) -> NDArray[np.float64]:
+        """Times in s from stamps, or from the frame rate where they are no good.
+
+        Parameters
+        ----------
+        stamps : ndarray, optional
+            Stamps of the frames in s after the first one of the file, shape (frames,).
+        rate : float
+            Frame rate in Hz; 0 if it is not known.
+
+        Raises
+        ------
+        SourceError
+            If the stamps do not ascend and the frame rate is not known.
+        """
+        if stamps is not None:
+            steps = np.diff(stamps) * np.sign(self.frames.step)
+            if np.isfinite(stamps).all() and (steps > 0).all():
+                return stamps
+        if not (np.isfinite(rate) and rate > 0):
+            raise SourceError(
+                f"{self.path}: has neither time stamps that ascend nor a frame rate, give an "
+                "interval"
+            )
+        self.remarks.assumptions.append(
+            f"the frames are 1/{rate:g} s apart, as the file says; it has no time stamps that "
+            "ascend."
         )
-    remarks.assumptions.append(
-        f"the frames are 1/{rate:g} s apart, as the file says; it has no time stamps that ascend."
-    )
-    return even_times(frames, 1 / rate)
+        return self.even(1 / rate)
 
 
 def common_exposure(exposures: NDArray[np.float64], remarks: FileRemarks) -> float | None:

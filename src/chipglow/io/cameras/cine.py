@@ -13,15 +13,13 @@ from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
     CutShortError,
+    Timing,
     check_picture,
     chosen_frames,
     common_exposure,
-    even_times,
     first_moment,
     layout,
     opened,
-    say_cut,
-    stamped_times,
 )
 from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources import SourceError
@@ -82,27 +80,11 @@ class _Pictures:
 
 
 def read_cine(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
-    """Read frames of Phantom's CINE as counts.
+    """Read frames of Phantom's CINE as counts; see `CameraFormat`.
 
     Pictures of 8 and 16 bits, and 10 and 12 bits packed, in grey. Packed 10 bits are codes of a
     curve like that of Recommendation ITU-R BT.709 and become 12 bits that are proportional to
     light.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    frames : slice, optional
-        Which frames to read.
-    interval : float, optional
-        Time between frames in s, in the place of the file's own times.
-
-    Raises
-    ------
-    SourceError
-        If it is damaged, cut short, compressed, in colours or of another kind.
-    OSError
-        If it is missing or not accessible.
     """
     with opened(path) as binary:
         header = binary.record(0, _FILE, "the header")
@@ -125,9 +107,11 @@ def read_cine(path: Path, frames: slice | None = None, interval: float | None = 
             start = _image_start(binary, int(places[number]), pictures, number)
             signal[position] = pictures.image(binary.read(start, pictures.size, f"frame {number}"))
         remarks = FileRemarks(notes=[f"Frame 0 is number {header['first']} of the recording."])
-        say_cut(remarks, count, whole)
+        remarks.say_cut(count, whole)
         blocks = _blocks(binary, header, setup)
-        times = _times(binary, blocks, header, setup["rate"], chosen, interval, remarks)
+        times = _times(
+            binary, blocks, header, setup["rate"], Timing(path, chosen, interval, remarks)
+        )
         integration_time = _integration_time(binary, blocks, header, setup, chosen, remarks)
     recording = Recording(
         signal=signal,
@@ -267,21 +251,20 @@ def _times(
     blocks: dict[int, tuple[int, int]],
     header: dict[str, Any],
     rate: int,
-    chosen: range,
-    interval: float | None,
-    remarks: FileRemarks,
+    timing: Timing,
 ) -> NDArray[np.float64]:
-    if interval is not None:
-        return even_times(chosen, interval)
+    if timing.interval is not None:
+        return timing.even(timing.interval)
     stamps = _of_frames(binary, blocks, _TIMES, header["count"], "<u8")
     if stamps is None:
-        return stamped_times(binary.path, np.full(len(chosen), np.nan), chosen, rate, remarks)
+        return timing.stamped(None, rate)
     ticks = stamps >> 2 << 2  # the two lowest bits are flags
     after = float(int(header["trigger"]) - int(ticks[0])) * _TICK
-    remarks.notes.extend(first_moment(float(ticks[0]) * _TICK))
-    remarks.notes.append(f"The trigger was at {after:.9g} s.")
-    since = (ticks[list(chosen)] - ticks[0]).astype(np.int64) * _TICK
-    return stamped_times(binary.path, since, chosen, rate, remarks)
+    notes = timing.remarks.notes
+    notes.extend(first_moment(float(ticks[0]) * _TICK))
+    notes.append(f"The trigger was at {after:.9g} s.")
+    since = (ticks[list(timing.frames)] - ticks[0]).astype(np.int64) * _TICK
+    return timing.stamped(since, rate)
 
 
 def _integration_time(

@@ -17,19 +17,18 @@ from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
     CutShortError,
+    Timing,
     check_picture,
     chosen_frames,
-    even_times,
     first_moment,
     object_parameters,
     opened,
-    say_cut_behind,
-    stamped_times,
     text_of,
 )
 from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import reading
+from chipglow.io.sources.source import required
 from chipglow.radiometry import ObjectParameters
 
 _MAGIC: Final = b"FFF\0"
@@ -86,23 +85,7 @@ class _Fields:
 
 
 def read_flir(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
-    """Read frames of FLIR's radiometric JPEG, FFF, SEQ or CSQ as counts.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    frames : slice, optional
-        Which frames to read.
-    interval : float, optional
-        Time between frames in s, in the place of the file's own times.
-
-    Raises
-    ------
-    SourceError
-        If it is damaged, cut short or of another kind.
-    OSError
-        If it is missing or not accessible.
+    """Read frames of FLIR's radiometric JPEG, FFF, SEQ or CSQ as counts; see `CameraFormat`.
 
     Notes
     -----
@@ -125,7 +108,7 @@ def read_flir(path: Path, frames: slice | None = None, interval: float | None = 
     recording = Recording(
         signal=signal,
         quantity="counts",
-        times=_times(path, stamps, fields, chosen, interval, len(places), remarks),
+        times=_times(stamps, fields, len(places), Timing(path, chosen, interval, remarks)),
         camera=_camera(fields),
         saturation=_saturation(fields),
         conversion=_conversion(fields, remarks),
@@ -183,7 +166,7 @@ def _frames(binary: Binary, remarks: FileRemarks) -> list[_Frame]:
         except CutShortError:
             if not found:
                 raise
-            say_cut_behind(remarks, len(found), binary.size - place)
+            remarks.say_cut_behind(len(found), binary.size - place)
             break
         if len(found) > MOST_FRAMES:
             raise SourceError(f"{binary.path}: has over {MOST_FRAMES} frames")
@@ -339,15 +322,11 @@ def _from_png(stored: bytes, shape: tuple[int, int]) -> NDArray[Any]:
 
 
 def _from_jpeg_ls(name: str, stored: bytes, shape: tuple[int, int]) -> NDArray[Any]:
-    try:
-        from imagecodecs import jpegls_decode
-    except ImportError:
-        raise SourceError(f"{name}: is in JPEG-LS, pip install 'chipglow[camera]'") from None
-
+    imagecodecs = required("imagecodecs", name, "camera", "imagecodecs for JPEG-LS")
     height, width = unpack_from(">HH", stored, stored.index(_JPEG_LS) + 5)
     if (height, width) != shape:
         raise ValueError(f"JPEG-LS of {(width, height)} pixels, expected {shape[::-1]}")
-    return np.asarray(jpegls_decode(stored))
+    return np.asarray(imagecodecs.jpegls_decode(stored))
 
 
 def _in_order(values: NDArray[np.uint16]) -> NDArray[np.uint16]:
@@ -381,18 +360,11 @@ def _moment(fields: _Fields) -> float:
 
 
 def _times(
-    path: Path,
-    stamps: NDArray[np.float64],
-    fields: _Fields,
-    chosen: range,
-    interval: float | None,
-    count: int,
-    remarks: FileRemarks,
+    stamps: NDArray[np.float64], fields: _Fields, count: int, timing: Timing
 ) -> NDArray[np.float64]:
-    if interval is not None or count == 1:
-        return even_times(chosen, interval or 0.0)
-    rate = fields.number(0x464, "H")
-    return stamped_times(path, np.round(stamps, 3), chosen, rate, remarks)
+    if timing.interval is not None or count == 1:
+        return timing.even(timing.interval or 0.0)
+    return timing.stamped(np.round(stamps, 3), fields.number(0x464, "H"))
 
 
 def _camera(fields: _Fields) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Final
 
@@ -13,7 +13,7 @@ from chipglow.io.cameras.hcc import is_hcc, read_hcc
 from chipglow.io.cameras.ptw import is_ptw, read_ptw
 from chipglow.io.cameras.stacks import Told, read_stack
 from chipglow.io.sources import SourceError
-from chipglow.io.sources.arrays import matching_files
+from chipglow.io.sources.file_order import files_of
 from chipglow.quantities import of_other_packages
 
 _HEAD: Final = 520
@@ -42,7 +42,9 @@ class CameraFormat:
         Whether a file is of this format, by its first bytes.
     read : callable, optional
         Reads frames of a file that says what was measured: its path, which frames, and the time
-        between frames in s or None. Without one the file holds an array, and the user says.
+        between frames in s, in the place of the file's own, or None. It raises SourceError for a
+        file that is damaged, cut short or of another kind, and OSError for one that is missing or
+        not accessible. Without it the file holds an array, and the user says.
     in_subprocess : callable
         Whether libraries in C or C++ would unpack a file: they do so in a subprocess.
     inside_hdf5 : bool
@@ -66,57 +68,32 @@ def _starts(*beginnings: bytes) -> Begins:
     return lambda head: head.startswith(beginnings)
 
 
-def _array(
-    description: str, *suffixes: str, begins: Begins | None = None, inside_hdf5: bool = False
-) -> CameraFormat:
-    """A format of arrays, which a library reads."""
-    return CameraFormat(
-        description, suffixes, begins, in_subprocess=lambda path: True, inside_hdf5=inside_hdf5
-    )
-
-
+_array: Final = partial(CameraFormat, in_subprocess=lambda path: True)
+_hdf5: Final = partial(_array, inside_hdf5=True)
 _HDF5: Final = b"\x89HDF\r\n\x1a\n"
+_TIFF: Final = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_FLIR: Final = (".jpg", ".jpeg", ".fff", ".seq", ".csq")
+
+
+def _is_hdf5(head: bytes) -> bool:
+    return _HDF5 in (head[:8], head[512:520])
+
+
 _OWN: Final[Mapping[str, CameraFormat]] = {
     "flir": CameraFormat(
-        "FLIR radiometric JPEG, FFF, SEQ, CSQ",
-        (".jpg", ".jpeg", ".fff", ".seq", ".csq"),
-        is_flir,
-        read_flir,
-        packed_counts,
+        "FLIR radiometric JPEG, FFF, SEQ, CSQ", _FLIR, is_flir, read_flir, packed_counts
     ),
     "ptw": CameraFormat("FLIR PTW (Cedip, Altair)", (".ptw",), is_ptw, read_ptw),
     "hcc": CameraFormat("Telops HCC", (".hcc",), is_hcc, read_hcc),
     "cine": CameraFormat("Phantom CINE", (".cine",), is_cine, read_cine),
-    "tiff": _array(
-        "TIFF, a stack or a file a frame",
-        ".tif",
-        ".tiff",
-        begins=_starts(b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"),
-    ),
+    "tiff": _array("TIFF, a stack or a file a frame", (".tif", ".tiff"), _starts(*_TIFF)),
     "npy": CameraFormat("NumPy array", (".npy",), _starts(b"\x93NUMPY")),
-    "npz": _array("NumPy arrays, zipped", ".npz"),
-    "mat": _array(
-        "MATLAB, versions 5 to 7.3", ".mat", begins=_starts(b"MATLAB "), inside_hdf5=True
-    ),
-    "netcdf": _array(
-        "NetCDF",
-        ".nc",
-        ".nc4",
-        ".cdf",
-        begins=_starts(b"CDF\x01", b"CDF\x02", b"CDF\x05"),
-        inside_hdf5=True,
-    ),
-    "hdf5": _array(
-        "HDF5",
-        ".h5",
-        ".hdf5",
-        ".hdf",
-        ".he5",
-        begins=lambda head: _HDF5 in (head[:8], head[512:520]),
-        inside_hdf5=True,
-    ),
-    "zarr": _array("Zarr, a folder or zipped", ".zarr", ".zip"),
-    "csv": _array("table of numbers in text, a file a frame", ".csv", ".txt", ".dat"),
+    "npz": _array("NumPy arrays, zipped", (".npz",)),
+    "mat": _hdf5("MATLAB, versions 5 to 7.3", (".mat",), _starts(b"MATLAB ")),
+    "netcdf": _hdf5("NetCDF", (".nc", ".nc4", ".cdf"), _starts(b"CDF\x01", b"CDF\x02", b"CDF\x05")),
+    "hdf5": _hdf5("HDF5", (".h5", ".hdf5", ".hdf", ".he5"), _is_hdf5),
+    "zarr": _array("Zarr, a folder or zipped", (".zarr", ".zip")),
+    "csv": _array("table of numbers in text, a file a frame", (".csv", ".txt", ".dat")),
 }
 
 
@@ -139,7 +116,7 @@ def find_format(path: Path) -> str:
     OSError
         If it is missing or not accessible.
     """
-    first = matching_files(str(path))[0]
+    first = files_of(path)[0]
     by_name = {
         suffix: name for name, one in camera_formats().items() for suffix in one.suffixes
     }.get(first.suffix.lower())
@@ -169,19 +146,7 @@ def _by_content(head: bytes) -> str | None:
 
 
 def read_here(path: Path, kind: str, frames: slice | None, told: Told) -> Recording:
-    """Read frames in this process; see `read_recording`.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    kind : str
-        One of `camera_formats`.
-    frames : slice, optional
-        Which frames to read.
-    told : Told
-        What the user says of it.
-    """
+    """Read frames of one of `camera_formats` in this process; see `read_recording`."""
     one = camera_formats()[kind]
     if one.read is not None:
         return one.read(path, frames, told.interval)

@@ -14,15 +14,13 @@ from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
     CutShortError,
+    Timing,
     check_picture,
     chosen_frames,
     common_exposure,
-    even_times,
     first_moment,
     layout,
     opened,
-    say_cut_behind,
-    stamped_times,
 )
 from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources import SourceError
@@ -72,26 +70,10 @@ def is_hcc(head: bytes) -> bool:
 
 
 def read_hcc(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
-    """Read frames of Telops' HCC.
+    """Read frames of Telops' HCC; see `CameraFormat`.
 
     Raw and corrected samples are counts. Calibrated ones are temperature or in-band radiance,
     sample · 2^DataExp + DataOffset, frame by frame.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    frames : slice, optional
-        Which frames to read.
-    interval : float, optional
-        Time between frames in s, in the place of the file's own times.
-
-    Raises
-    ------
-    SourceError
-        If it is damaged, cut short or of another kind.
-    OSError
-        If it is missing or not accessible.
     """
     with opened(path) as binary:
         first = binary.record(0, _HEADER, "the first header")
@@ -117,11 +99,11 @@ def read_hcc(path: Path, frames: slice | None = None, interval: float | None = N
     version = f"Telops header {first['major']}.{first['minor']}"
     remarks = FileRemarks(notes=[f"The samples are {label} ({version})."])
     if rest:
-        say_cut_behind(remarks, whole, rest)
+        remarks.say_cut_behind(whole, rest)
     recording = Recording(
         signal=_signal(stored, quantity, path),
         quantity=quantity,
-        times=_times(path, headers, first, chosen, interval, remarks),
+        times=_times(headers, first, Timing(path, chosen, interval, remarks)),
         camera=f"Telops, serial number {first['serial']}" if first["serial"] else "Telops",
         integration_time=_integration_time(headers, remarks),
         saturation=_saturation(first),
@@ -178,28 +160,20 @@ def _signal(stored: NDArray[Any], quantity: Quantity, path: Path) -> NDArray[Any
     return np.asarray(stored["image"] * scale + offset, np.float32)
 
 
-def _times(
-    path: Path,
-    headers: NDArray[Any],
-    first: dict[str, Any],
-    chosen: range,
-    interval: float | None,
-    remarks: FileRemarks,
-) -> NDArray[np.float64]:
+def _times(headers: NDArray[Any], first: dict[str, Any], timing: Timing) -> NDArray[np.float64]:
     rate = first["rate"] * _RATE
-    if interval is not None:
-        return even_times(chosen, interval)
+    if timing.interval is not None:
+        return timing.even(timing.interval)
     if first["major"] < _WITH_TIME or not headers["seconds"].any():
-        nowhere = np.full(len(chosen), np.nan)
-        return stamped_times(path, nowhere, chosen, rate, remarks)
-    remarks.notes.extend(first_moment(first["seconds"] + _SUBSECOND * first["subseconds"]))
+        return timing.stamped(None, rate)
+    timing.remarks.notes.extend(first_moment(first["seconds"] + _SUBSECOND * first["subseconds"]))
     # Whole seconds first: their difference is exact.
     stamps = (
         headers["seconds"].astype(np.int64)
         - first["seconds"]
         + _SUBSECOND * (headers["subseconds"].astype(np.int64) - first["subseconds"])
     )
-    return stamped_times(path, stamps, chosen, rate, remarks)
+    return timing.stamped(stamps, rate)
 
 
 def _integration_time(headers: NDArray[Any], remarks: FileRemarks) -> float | None:

@@ -11,14 +11,12 @@ from chipglow.io.cameras.binary import (
     MOST_FRAMES,
     Binary,
     CutShortError,
+    Timing,
     check_picture,
     chosen_frames,
-    even_times,
     layout,
     object_parameters,
     opened,
-    say_cut,
-    stamped_times,
     text_of,
 )
 from chipglow.io.cameras.remarks import FileRemarks
@@ -83,24 +81,7 @@ def is_ptw(head: bytes) -> bool:
 
 
 def read_ptw(path: Path, frames: slice | None = None, interval: float | None = None) -> Recording:
-    """Read frames of FLIR's PTW as counts.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    frames : slice, optional
-        Which frames to read.
-    interval : float, optional
-        Time between frames in s, in the place of the file's own.
-
-    Raises
-    ------
-    SourceError
-        If it is damaged, cut short or of another kind.
-    OSError
-        If it is missing or not accessible.
-    """
+    """Read frames of FLIR's PTW as counts; see `CameraFormat`."""
     with opened(path) as binary:
         signature = binary.read(0, 3, "the signature")
         if signature != b"CED":
@@ -120,8 +101,8 @@ def read_ptw(path: Path, frames: slice | None = None, interval: float | None = N
                 start + number * stride, rows * columns, "<u2", what
             ).reshape(rows, columns)
         remarks = FileRemarks(notes=_notes(header, skipped))
-        say_cut(remarks, header["frames"], whole)
-        times = _times(binary, header, stride, chosen, interval, remarks)
+        remarks.say_cut(header["frames"], whole)
+        times = _times(binary, header, stride, Timing(path, chosen, interval, remarks))
     recording = Recording(
         signal=signal,
         quantity="counts",
@@ -175,67 +156,47 @@ def _lock_in(
 
 
 def _times(
-    binary: Binary,
-    header: dict[str, Any],
-    stride: int,
-    chosen: range,
-    interval: float | None,
-    remarks: FileRemarks,
+    binary: Binary, header: dict[str, Any], stride: int, timing: Timing
 ) -> NDArray[np.float64]:
-    if interval is not None:
-        return even_times(chosen, interval)
+    if timing.interval is not None:
+        return timing.even(timing.interval)
     period = header["period"] if 0 < header["period"] < _LONGEST_PERIOD else None
+    rate = 1 / period if period else 0.0
     if header["frame_header_size"] < _STAMP.itemsize:
-        nowhere = np.full(len(chosen), np.nan)
-        return stamped_times(binary.path, nowhere, chosen, 1 / period if period else 0.0, remarks)
+        return timing.stamped(None, rate)
     last = (binary.size - header["header_size"]) // stride - 1
-    numbers = (0, *chosen, min(last, header["frames"] - 1))
+    numbers = (0, *timing.frames, min(last, header["frames"] - 1))
     stamps = np.array([_stamp(binary, header["header_size"] + n * stride) for n in numbers])
     since = np.mod(stamps[1:] - stamps[0], _DAY)
     since, mean = since[:-1], since[-1] / max(numbers[-1], 1)
     if period is None or not since.any():
-        rate = 1 / period if period else 0.0
-        return stamped_times(binary.path, since, chosen, rate, remarks)
-    return _clocked_times(since, mean, period, chosen, remarks)
+        return timing.stamped(since, rate)
+    return _clocked_times(since, mean, period, timing)
 
 
 def _clocked_times(
-    since: NDArray[np.float64],
-    mean: float,
-    period: float,
-    chosen: range,
-    remarks: FileRemarks,
+    since: NDArray[np.float64], mean: float, period: float, timing: Timing
 ) -> NDArray[np.float64]:
-    """Times by the period, or by the frames' own stamps where these say something else.
+    """Times by the header's period, or by the frames' own stamps where these say something else.
 
-    Parameters
-    ----------
-    since : ndarray
-        Stamps of the frames in s after the first of the file, in whole milliseconds.
-    mean : float
-        Mean time from frame to frame in s by the stamps.
-    period : float
-        The period of the header in s.
-    chosen : range
-        Numbers of the frames.
-    remarks : FileRemarks
-        Takes what had to be assumed.
+    The stamps are in s after the first frame of the file, in whole milliseconds; their mean step is
+    that of all frames.
     """
     allowed = _STAMPED + _CLOCK * float(since.max())
-    times = even_times(chosen, period)
+    times = timing.even(period)
     # The stamps are whole milliseconds, so that a period that fits them is the finer measure.
     apart = float(np.abs(times - since).max())
     if apart <= allowed:
         return times
     for own in (round(mean / period) * period, mean):
-        evenly = even_times(chosen, own)
+        evenly = timing.even(own)
         if np.abs(evenly - since).max() <= allowed:
-            remarks.assumptions.append(
+            timing.remarks.assumptions.append(
                 f"the frames are {own * 1e6:g} us apart, as their stamps say; the period in the "
                 f"header is {period * 1e6:g} us."
             )
             return evenly
-    remarks.warnings.append(
+    timing.remarks.warnings.append(
         f"the times are from the frame period, {period * 1e6:g} us; the frames' own stamps are up "
         f"to {apart:.3g} s off: frames may be missing."
     )

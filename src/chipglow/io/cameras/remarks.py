@@ -26,3 +26,18 @@ class FileRemarks(Remarks):
             assumptions=tuple(self.assumptions),
             warnings=tuple(self.warnings),
         )
+
+    def say_cut(self, said: int, whole: int) -> None:
+        """Warn if a file, which should have so many frames, has fewer whole ones."""
+        if whole < said:
+            self.warnings.append(
+                f"the file is cut short: of its {said} frames the first {whole} are whole, the "
+                "others are left out."
+            )
+
+    def say_cut_behind(self, whole: int, left: int) -> None:
+        """Warn that a file, which does not say its number of frames, ends with bytes of one."""
+        self.warnings.append(
+            f"the file is cut short: its first {whole} frames are whole, the {left} bytes behind "
+            "them are no whole frame and are left out."
+        )

@@ -12,16 +12,15 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Recording
 from chipglow.camera.recording import QUANTITIES, Quantity
-from chipglow.io.cameras.binary import check_picture, chosen_frames, even_times
+from chipglow.io.cameras.binary import check_picture, chosen_frames
 from chipglow.io.cameras.remarks import FileRemarks
-from chipglow.io.sources import SI, SourceError
+from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import (
     ARRAY_READERS,
     MOST_ON_A_SIDE,
     StoredArray,
     exported_table,
     open_arrays,
-    reading,
 )
 from chipglow.io.sources.layout import (
     AXES,
@@ -29,11 +28,11 @@ from chipglow.io.sources.layout import (
     axes_of,
     check_times,
     coordinate,
+    read_frames,
     read_list,
-    unit_of,
-    unpacked,
 )
 from chipglow.io.sources.source import SourceRemarks
+from chipglow.quantities.units import SI
 
 RECORDING_UNITS: Final[Mapping[str, tuple[Quantity, float]]] = {
     "counts": ("counts", 0.0),
@@ -207,7 +206,7 @@ def _times(
 ) -> NDArray[np.float64] | None:
     """Times of the chosen frames in s; None if neither the user nor the file says them."""
     if told.interval is not None:
-        return even_times(chosen, told.interval)
+        return np.asarray(chosen, np.float64) * told.interval
     count = one.array.shape[axes.index("time")] if "time" in axes else 1
     if count == 1:
         return np.zeros(1)
@@ -215,8 +214,7 @@ def _times(
     found = coordinate("time", {one.path: arrays}, None, dim, count)
     if found is None or found.label == one.label:
         return None
-    unit = unit_of("time", str(found), found.unit, SI, remarks)
-    times = check_times(str(found), read_list(found, unit))
+    times = check_times(str(found), read_list("time", found, SI, remarks))
     if not isfinite(times[-1] - times[0]):
         raise SourceError(f"{found}: is not finite")
     since: NDArray[np.float64] = (times - times[0])[list(chosen)]
@@ -225,24 +223,12 @@ def _times(
 
 def _signal(one: Chosen, axes: tuple[str, ...], chosen: range) -> NDArray[Any]:
     """Samples of the chosen frames, shape (time, y, x)."""
-    if "time" not in axes:
-        parts = [_part(one, axes, slice(None))[None]]
-    elif abs(chosen.step) == 1:
+    if abs(chosen.step) == 1:
         first, last = min(chosen[0], chosen[-1]), max(chosen[0], chosen[-1])
-        parts = [_part(one, axes, slice(first, last + 1))[:: chosen.step]]
+        signal = read_frames(one, axes, slice(first, last + 1))[:: chosen.step]
     else:
-        parts = [_part(one, axes, slice(number, number + 1)) for number in chosen]
-    signal = np.concatenate(parts)
-    shape = (len(chosen), *(one.array.shape[axes.index(axis)] for axis in ("y", "x")))
-    if signal.shape != shape:
-        raise SourceError(f"{one}: has shape {signal.shape}, expected {shape}")
+        parts = [read_frames(one, axes, slice(number, number + 1)) for number in chosen]
+        signal = np.concatenate(parts)
     if np.isinf(signal).any():
         raise SourceError(f"{one}: has infinite numbers, expected finite ones or NaN")
     return signal.astype(np.uint8 if signal.dtype.kind == "b" else signal.dtype.newbyteorder("="))
-
-
-def _part(one: Chosen, axes: tuple[str, ...], frames: slice) -> NDArray[Any]:
-    key = tuple(frames if axis == "time" else slice(None) for axis in axes)
-    with reading(one):
-        raw = unpacked(one.array.read(key), one.array.attributes)
-        return raw.transpose([axes.index(axis) for axis in AXES if axis in axes])

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
-from glob import glob, has_magic
 from math import prod
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias
@@ -16,8 +15,8 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.file_order import natural
-from chipglow.io.sources.source import SourceError, missing_extra
+from chipglow.io.sources.file_order import files_of
+from chipglow.io.sources.source import SourceError, damaged, required
 from chipglow.io.sources.text_table import TextTable, lines_of_text
 
 MOST_SAMPLES: Final = 100_000_000
@@ -86,10 +85,7 @@ def reading(name: object) -> Iterator[None]:
     except (SourceError, FileNotFoundError, PermissionError, MemoryError):
         raise
     except Exception as error:  # readers of damaged files raise anything
-        said = " ".join(f"{type(error).__name__}: {error}".split())[:160]
-        raise SourceError(
-            f"{name}: cannot be read, it is damaged or of another kind ({said})"
-        ) from error
+        raise damaged(name, error) from error
 
 
 def check_samples(name: str, count: int) -> None:
@@ -102,22 +98,6 @@ def check_samples(name: str, count: int) -> None:
     """
     if count > MOST_SAMPLES:
         raise SourceError(f"{name}: {count:.3g} samples at once, expected up to {MOST_SAMPLES:.3g}")
-
-
-def matching_files(pattern: str) -> list[Path]:
-    """Files that a pattern such as ``T_*.csv`` means, numbers in their names in order.
-
-    Raises
-    ------
-    SourceError
-        If there is none.
-    """
-    if Path(pattern).exists() or not has_magic(pattern):
-        return [Path(pattern)]
-    paths = sorted(glob(pattern), key=natural)  # noqa: PTH207  also absolute
-    if not paths:
-        raise SourceError(f"{pattern}: no file has such a name")
-    return [Path(path) for path in paths]
 
 
 def open_arrays(
@@ -142,7 +122,7 @@ def open_arrays(
     OSError
         If it is missing or not accessible.
     """
-    paths = matching_files(pattern)
+    paths = files_of(pattern)
     several = len(paths) > 1 or paths[0] != Path(pattern)
     first = _open_file(paths[0], stack, reader)
     if not first:
@@ -461,7 +441,7 @@ class _MatlabArray:
 
 
 def _tiff(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
-    tifffile = _extra("tifffile", path)
+    tifffile = required("tifffile", path, "grid")
     with _complaints("tifffile") as complaints:
         file = stack.enter_context(tifffile.TiffFile(path))
         every = list(file.series)
@@ -538,20 +518,11 @@ def _tiff_page(path: Path, page: Any) -> NDArray[Any]:
     return values
 
 
-def _extra(module: str, path: Path) -> Any:
-    from importlib import import_module
-
-    try:
-        return import_module(module)
-    except ImportError:
-        raise missing_extra(path, module, "grid") from None
-
-
 # Zarr
 
 
 def _zarr(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
-    zarr = _extra("zarr", path)
+    zarr = required("zarr", path, "grid")
     if path.is_dir():
         store = zarr.storage.LocalStore(path, read_only=True)
     else:

@@ -12,14 +12,22 @@ from numpy.typing import NDArray
 from chipglow.io.sources.conventions import (
     COMMON_NAMES,
     Placement,
-    Unit,
     Units,
     match_names,
     simple,
 )
 from chipglow.io.sources.layout import check_times, unit_of
 from chipglow.io.sources.point_files import MOST_POINTS, PointFrames, PointTable, open_points
-from chipglow.io.sources.source import Source, SourceError, SourceRemarks, Survey, span_of
+from chipglow.io.sources.source import (
+    Source,
+    SourceError,
+    SourceRemarks,
+    Survey,
+    even_times,
+    naming,
+    span_of,
+)
+from chipglow.quantities.units import Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.cloud import Cloud, neighbour_distance, sample_cloud
 
@@ -188,10 +196,8 @@ class _Points:
         area = volume[good] / (source.thickness or 1.0) if self._solid else volume[good]
         places = placement.place(solid[good])
         self._check_filling(path, places, spacing, area)
-        try:
+        with naming(path):
             return Cloud(places, values[good], material[good], spacing, area)
-        except ValueError as error:
-            raise SourceError(f"{path}: {error}") from None
 
     @property
     def _where(self) -> str:
@@ -219,10 +225,8 @@ class _Points:
         unknown = sorted(set(source.names) - set(COMMON_NAMES) - set(_EXTRA) - {"time"})
         if unknown:
             raise SourceError(f"fields: unknown {unknown[0]!r}, expected one of {READABLE}")
-        try:
+        with naming(path):
             self._labels = match_names(labels, given, READABLE)
-        except SourceError as error:
-            raise SourceError(f"{path}: {error}") from None
         if not self._labels:
             listed = ", ".join(labels[:20]) or "none"
             raise SourceError(f"{path}: no column is known as temperature, it has {listed}")
@@ -232,7 +236,7 @@ class _Points:
         self.found = {
             name: self._labels[own]
             for name in READABLE
-            if (own := _in_file(name, source.placement)) in self._labels
+            if (own := source.placement.in_file(name)) in self._labels
         }
         self.unused = tuple(n for n in labels if n not in self.found.values() and n != "time")
 
@@ -242,13 +246,9 @@ class _Points:
         return unit_of(known, f"{path}: {label}", table.units.get(label), own, self.remarks)
 
     def _times(self, path: str) -> NDArray[np.float64]:
-        source, count = self._source, self.files.count
-        if source.interval is not None:
-            return source.interval * np.arange(count, dtype=np.float64)
-        if self.files.times is None:
-            if count > 1:
-                self.remarks.assumed.append("no times in the files: frames are 1 s apart")
-            return np.arange(count, dtype=np.float64)
+        source = self._source
+        if source.interval is not None or self.files.times is None:
+            return even_times(self.files.count, source.interval, self.remarks)
         name = f"{path}: time"
         unit = unit_of("time", name, self.files.time_unit, source.units.time, self.remarks)
         return check_times(name, self.files.times * unit.scale)
@@ -266,15 +266,10 @@ class _Points:
 
     def _value(self, path: str, table: PointTable, name: str) -> NDArray[np.float64]:
         placement = self._source.placement
-        own = _in_file(name, placement)
+        own = placement.in_file(name)
         values = _column(path, table, self._labels[own])
         values = values * self._units[own].scale + self._units[own].offset
-        if not name.endswith(("_x", "_y")):
-            return values
-        number = 0 if name.endswith("_x") else 1
-        if name.startswith("material"):
-            values = values - placement.origin[number]
-        return values * placement.signs[number]
+        return placement.field(name, values)
 
     def _volume(self, path: str, table: PointTable) -> NDArray[np.float64]:
         """Volume, or area in two dimensions, in SI."""
@@ -374,13 +369,6 @@ def _extra_columns(source: CloudSource, path: str, table: PointTable) -> dict[st
             f"{MOST_POINTS}"
         )
     return found
-
-
-def _in_file(name: str, placement: Placement) -> str:
-    """Name that a component of the scene has in the file's axes."""
-    if not name.endswith(("_x", "_y")):
-        return name
-    return name[:-1] + _AXES[placement.axes[0 if name.endswith("_x") else 1]]
 
 
 def _column(path: str, table: PointTable, label: str) -> NDArray[np.float64]:

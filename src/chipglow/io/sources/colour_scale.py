@@ -4,17 +4,20 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import sqrt
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import erfc
 
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import SourceError, naming
 
 RAINBOW: Final = "rainbow"
 """Blue, cyan, green, yellow, red at full saturation, as finite-element programs draw it."""
+
+Picture: TypeAlias = NDArray[np.uint8]
+"""Red, green and blue of the pixels, row 0 at the top, shape (y, x, 3)."""
 
 _LEVELS: Final = 256
 _SAME: Final = 7.0  # a difference in Lab that a codec makes between two pixels of one colour
@@ -107,10 +110,8 @@ class ColourScale:
             If there is no such map, or a colour of it stands for two values.
         """
         count = bands or _LEVELS
-        try:
+        with naming(name):
             return cls._linear(_map_colours(name, count), values, banded=bands > 0)
-        except SourceError as error:
-            raise SourceError(f"{name}: {error}") from error
 
     @classmethod
     def from_legend(cls, pixels: NDArray[np.uint8], values: tuple[float, float]) -> "ColourScale":
@@ -222,13 +223,8 @@ class ColourScale:
         below = np.maximum(np.arange(count) - reach, 0)
         return self.knots[above] - self.knots[below], self.labs[above] - self.labs[below]
 
-    def invert(self, picture: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def invert(self, picture: Picture) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Values that the colours of a picture stand for.
-
-        Parameters
-        ----------
-        picture : ndarray
-            Red, green and blue, shape (y, x, 3), uint8.
 
         Returns
         -------

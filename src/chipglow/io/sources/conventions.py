@@ -3,13 +3,24 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import isfinite
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from chipglow.io.sources.source import SourceError
+from chipglow.quantities.units import SI, Unit
 from chipglow.scene import READABLE
+from chipglow.scene.scene import FIELD_UNITS, MATERIAL_COORDINATE_UNITS
+
+SI_UNITS: Final[Mapping[str, str]] = {
+    **FIELD_UNITS,
+    **MATERIAL_COORDINATE_UNITS,
+    **dict.fromkeys("xyz", "m"),
+    "velocity": "m/s",
+    "time": "s",
+}
+"""SI unit of every field of a scene and of the coordinates; 1 for a mere number."""
 
 COMMON_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
     "temperature": (
@@ -85,26 +96,6 @@ def match_names(
 
 
 @dataclass(frozen=True)
-class Unit:
-    """A unit: a value in SI is ``scale * value + offset``."""
-
-    scale: float
-    offset: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not (isfinite(self.scale) and self.scale > 0 and isfinite(self.offset)):
-            raise ValueError(f"unit: scale {self.scale!r} must be finite and over 0")
-
-    def to_si(self, values: ArrayLike) -> NDArray[np.float32]:
-        """Values in SI."""
-        return np.asarray(np.asarray(values, np.float64) * self.scale + self.offset, np.float32)
-
-
-SI: Final = Unit(1.0)
-CELSIUS: Final = Unit(1.0, 273.15)
-
-
-@dataclass(frozen=True)
 class Units:
     """Units of a source.
 
@@ -132,6 +123,8 @@ class Units:
             return self.strain_rate or Unit(1.0 / self.time.scale)
         return self.length if name.startswith("material_") else SI
 
+
+Floats = TypeVar("Floats", np.float32, np.float64)
 
 _AXES: Final = ("x", "y", "z")
 
@@ -194,6 +187,21 @@ class Placement:
         """Components along the scene's x and y, shape (n, 2), of vectors of shape (n, 3)."""
         turned: NDArray[np.float64] = vectors[:, self.axes] * self.signs
         return turned
+
+    def in_file(self, name: str) -> str:
+        """Name that a field of the scene, which may be a component, has in the file's axes."""
+        if not name.endswith(("_x", "_y")):
+            return name
+        return name[:-1] + _AXES[self.axes["xy".index(name[-1])]]
+
+    def field(self, name: str, values: NDArray[Floats]) -> NDArray[Floats]:
+        """Values of a field in the scene, of those in SI along the axes of the file."""
+        if not name.endswith(("_x", "_y")):
+            return values
+        number = "xy".index(name[-1])
+        if name.startswith("material"):
+            values = values - self.origin[number]
+        return values * self.signs[number]
 
     @property
     def _names(self) -> tuple[str, str]:

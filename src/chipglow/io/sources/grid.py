@@ -15,9 +15,8 @@ from chipglow.io.sources.arrays import (
     StoredArray,
     check_samples,
     open_arrays,
-    reading,
 )
-from chipglow.io.sources.conventions import SI, Placement, Unit, Units
+from chipglow.io.sources.conventions import Placement, Units
 from chipglow.io.sources.layout import (
     AXES,
     COORDINATES,
@@ -27,12 +26,20 @@ from chipglow.io.sources.layout import (
     check_times,
     coordinate,
     find_fields,
+    read_frames,
     read_list,
     unit_of,
-    unpacked,
     unused_names,
 )
-from chipglow.io.sources.source import Source, SourceError, SourceRemarks, Survey, span_of
+from chipglow.io.sources.source import (
+    Source,
+    SourceError,
+    SourceRemarks,
+    Survey,
+    even_times,
+    span_of,
+)
+from chipglow.quantities.units import SI, Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.regrid import regrid, taps
 
@@ -207,18 +214,7 @@ class _Layer:
         return values
 
     def _load(self, first: int, last: int) -> NDArray[np.float32]:
-        key = tuple(slice(first, last) if axis == "time" else slice(None) for axis in self.axes)
-        with reading(self.chosen):
-            raw = self.array.read(key)
-        if "time" not in self.axes:
-            raw = raw[None]
-        axes = self.axes if "time" in self.axes else ("time", *self.axes)
-        expected = (last - first, self.length("y"), self.length("x"))
-        raw = raw.transpose([axes.index(axis) for axis in AXES])
-        if raw.shape != expected:
-            raise SourceError(f"{self.chosen}: has shape {raw.shape}, expected {expected}")
-        with reading(self.chosen):
-            return np.asarray(unpacked(raw, self.array.attributes), np.float32)
+        return np.asarray(read_frames(self.chosen, self.axes, slice(first, last)), np.float32)
 
 
 @dataclass(frozen=True)
@@ -308,11 +304,7 @@ class _Grid:
 
     def _in_scene(self, name: str, raw: NDArray[np.float32]) -> NDArray[np.float32]:
         layer, placement = self.layers[name], self.source.placement
-        values = layer.unit.to_si(raw)
-        if name.endswith(("_x", "_y")):
-            number = 0 if name.endswith("_x") else 1
-            origin = placement.origin[number] if name.startswith("material") else 0.0
-            values = np.asarray((values - origin) * placement.signs[number], np.float32)
+        values = np.asarray(placement.field(name, layer.unit.to_si(raw)), np.float32)
         values[~np.isfinite(values)] = np.nan
         return values
 
@@ -349,7 +341,7 @@ def _open(source: GridSource, stack: ExitStack) -> _Grid:
     used = {one.label for one in chosen.values()} | set(source.names.values())
     return _Grid(
         kind=f"grid of {first.length('y')} x {first.length('x')} samples, {', '.join(files)}",
-        layers={_placed_name(name, source.placement): layer for name, layer in layers.items()},
+        layers={source.placement.in_file(name): layer for name, layer in layers.items()},
         material=material,
         source=source,
         times=_times(source, files, first, remarks),
@@ -412,10 +404,7 @@ def _positions(
             raise SourceError(
                 f"{layer.chosen.path}: has no coordinate {axis!r}, expected grid.spacing"
             )
-        return check_even(
-            str(one),
-            read_list(one, unit_of(axis, str(one), one.unit, source.units.length, remarks)),
-        )
+        return check_even(str(one), read_list(axis, one, source.units.length, remarks))
     if coordinate(axis, files, source.names.get(axis), layer.dim(axis), count) is not None:
         remarks.from_file.append(f"its coordinate {axis} is not used, as the spacing is given")
     if axis == "x":
@@ -427,17 +416,13 @@ def _positions(
 def _times(
     source: GridSource, files: Mapping[str, Arrays], layer: _Layer, remarks: SourceRemarks
 ) -> NDArray[np.float64]:
-    count = layer.frames
-    if source.interval is not None:
-        return source.interval * np.arange(count, dtype=np.float64)
-    one = coordinate("time", files, source.names.get("time"), layer.dim("time"), count)
+    one = None
+    if source.interval is None:
+        dim = layer.dim("time")
+        one = coordinate("time", files, source.names.get("time"), dim, layer.frames)
     if one is None:
-        if count > 1:
-            remarks.assumed.append("no times in the files: frames are 1 s apart")
-        return np.arange(count, dtype=np.float64)
-    return check_times(
-        str(one), read_list(one, unit_of("time", str(one), one.unit, source.units.time, remarks))
-    )
+        return even_times(layer.frames, source.interval, remarks)
+    return check_times(str(one), read_list("time", one, source.units.time, remarks))
 
 
 def _placed(
@@ -453,10 +438,3 @@ def _placed(
     back, rising = bool(along[0] > along[-1]), bool(up[0] < up[-1])
     turned = (placement.axes == (1, 0), back, rising)
     return along[::-1] if back else along, up[::-1] if rising else up, turned
-
-
-def _placed_name(name: str, placement: Placement) -> str:
-    """Name of a component in the scene, of its name in the file."""
-    if placement.axes == (0, 1) or not name.endswith(("_x", "_y")):
-        return name
-    return name[:-1] + ("y" if name.endswith("x") else "x")

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.arrays import StoredArray, check_samples, reading
-from chipglow.io.sources.conventions import SI, Unit, match_names, simple
-from chipglow.io.sources.source import SourceError, SourceRemarks
-from chipglow.io.sources.unit_text import SI_UNITS, parse_unit
+from chipglow.io.sources.conventions import SI_UNITS, match_names, simple
+from chipglow.io.sources.source import SourceError, SourceRemarks, naming
+from chipglow.quantities.units import SI, Unit, parse_unit
 
 AXES: Final = ("time", "y", "x")
 COORDINATES: Final[Mapping[str, tuple[str, ...]]] = {
@@ -77,13 +77,11 @@ def find_fields(
     wanted = {name: labels.get(label, label) for name, label in given.items()}
     material = wanted.pop("material", None)
     with_fields = [name for name in known if name != "material"]
-    try:
+    with naming(path):
         found = match_names(arrays, wanted, ()) if wanted else {}
         rest = {short: label for short, label in labels.items() if label not in found.values()}
         matched = match_names(rest, {}, [name for name in with_fields if name not in found])
         found.update({name: rest[short] for name, short in matched.items()})
-    except SourceError as error:
-        raise SourceError(f"{path}: {error}") from None
     if material is None and "material" in known:
         material = next(
             (label for short, label in labels.items() if simple(short) == "material"), None
@@ -175,13 +173,11 @@ def unit_of(name: str, label: str, text: object, own: Unit, remarks: SourceRemar
             remarks.from_file.append(f"{short} is in {text!r}, but the unit given is taken")
         return own
     if not isinstance(text, str):
-        if SI_UNITS[name]:
+        if SI_UNITS[name] != "1":
             remarks.assumed.append(f"{short} is in {SI_UNITS[name]}: the file says no unit")
         return own
-    try:
-        unit = parse_unit(name, text)
-    except ValueError as error:
-        raise SourceError(f"{label}: {error}") from None
+    with naming(label):
+        unit = parse_unit(text, SI_UNITS[name], name)
     if unit != SI:
         remarks.from_file.append(f"{short} is in {text!r}")
     return unit
@@ -241,14 +237,15 @@ def _is_coordinate(label: str, axis: str, dim: str) -> bool:
     return short == dim or simple(short) in COORDINATES[axis]
 
 
-def read_list(chosen: Chosen, unit: Unit) -> NDArray[np.float64]:
-    """All values of a coordinate in SI.
+def read_list(axis: str, chosen: Chosen, own: Unit, remarks: SourceRemarks) -> NDArray[np.float64]:
+    """All values of a coordinate in SI; for its unit see `unit_of`.
 
     Raises
     ------
     SourceError
-        If one is not finite.
+        If one is not finite, or the unit is unknown.
     """
+    unit = unit_of(axis, str(chosen), chosen.unit, own, remarks)
     check_samples(str(chosen), int(np.prod(chosen.array.shape, dtype=np.float64)))
     with reading(chosen):
         raw = chosen.array.read((slice(None),) * len(chosen.array.shape))
@@ -257,16 +254,37 @@ def read_list(chosen: Chosen, unit: Unit) -> NDArray[np.float64]:
     return values
 
 
-def unpacked(raw: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[Any]:
-    """Numbers that may be packed as NetCDF's conventions say; NaN where there is none.
+def read_frames(chosen: Chosen, axes: Sequence[str], frames: slice) -> NDArray[Any]:
+    """Numbers of frames as they are in the file, shape (time, y, x); NaN where there is none.
 
     Parameters
     ----------
-    raw : ndarray
-        Numbers as they are in the file.
-    attributes : mapping
-        What it says of them: ``scale_factor``, ``add_offset``, ``_FillValue``, ``missing_value``.
+    chosen : Chosen
+        The array.
+    axes : sequence of str
+        What its axes are, as `axes_of` has them.
+    frames : slice
+        Which frames; an array without time has one.
+
+    Raises
+    ------
+    SourceError
+        If they cannot be read, or have another shape than the file says.
     """
+    lengths = dict(zip(axes, chosen.array.shape, strict=True))
+    key = tuple(frames if axis == "time" else slice(None) for axis in axes)
+    with reading(chosen):
+        values = _unpacked(chosen.array.read(key), chosen.array.attributes)
+        values = values.transpose([axes.index(axis) for axis in AXES if axis in axes])
+    values = values if "time" in axes else values[None]
+    expected = (len(range(lengths.get("time", 1))[frames]), lengths["y"], lengths["x"])
+    if values.shape != expected:
+        raise SourceError(f"{chosen}: has shape {values.shape}, expected {expected}")
+    return values
+
+
+def _unpacked(raw: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[Any]:
+    """Numbers that may be packed as NetCDF's conventions say; NaN where there is none."""
     values = raw
     scale, offset = (attributes.get(name) for name in ("scale_factor", "add_offset"))
     if scale is not None or offset is not None:

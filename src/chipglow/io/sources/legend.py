@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_closing
 
-from chipglow.io.sources.colour_scale import ColourScale, lab
+from chipglow.io.sources.colour_scale import ColourScale, Picture, lab
 from chipglow.io.sources.overlays import MARK_TOLERANCE, Box, dark_lines, plain_colours
 from chipglow.io.sources.source import SourceError
 
@@ -32,13 +32,8 @@ LEAST_EXPLAINED: Final = 0.7
 """Share of a picture that must have the colours of its legend."""
 
 
-def find_legend(picture: NDArray[np.uint8]) -> Box | None:
+def find_legend(picture: Picture) -> Box | None:
     """Where a legend is: the longest bar of one colour across and many along.
-
-    Parameters
-    ----------
-    picture : ndarray
-        Red, green and blue, shape (y, x, 3), uint8.
 
     Returns
     -------
@@ -67,16 +62,8 @@ def _area(box: Box) -> int:
     return (box[2] - box[0]) * (box[3] - box[1])
 
 
-def is_cut(picture: NDArray[np.uint8], box: Box) -> bool:
-    """Whether the colours go on beyond an end of a legend as they are there.
-
-    Parameters
-    ----------
-    picture : ndarray
-        Red, green and blue, shape (y, x, 3), uint8.
-    box : Box
-        The legend.
-    """
+def is_cut(picture: Picture, box: Box) -> bool:
+    """Whether the colours go on beyond an end of a legend as they are there."""
     along, first, last = _along(picture, box)
     return _goes_on(along[last:], along[first:last][::-1]) or _goes_on(
         along[:first][::-1], along[first:last]
@@ -93,7 +80,7 @@ def _goes_on(beyond: NDArray[np.float64], inside: NDArray[np.float64]) -> bool:
     return bool(jump < max(_END, _USUAL * usual))
 
 
-def _along(picture: NDArray[np.uint8], box: Box) -> tuple[NDArray[np.float64], int, int]:
+def _along(picture: Picture, box: Box) -> tuple[NDArray[np.float64], int, int]:
     """Colours of a row or column in the middle of a bar, where the bar begins, where it ends."""
     left, top, right, bottom = box
     upright = bottom - top >= right - left
@@ -102,7 +89,7 @@ def _along(picture: NDArray[np.uint8], box: Box) -> tuple[NDArray[np.float64], i
     return (along, top, bottom) if upright else (along, left, right)
 
 
-def _extended(picture: NDArray[np.uint8], box: Box) -> Box:
+def _extended(picture: Picture, box: Box) -> Box:
     """A bar up to where its colours do not run on: its sides may be too faint to be seen."""
     along, first, last = _along(picture, box)
     steps = np.linalg.norm(np.diff(along, axis=0), axis=1)
@@ -119,18 +106,8 @@ def _extended(picture: NDArray[np.uint8], box: Box) -> Box:
     return longer if last - first <= 2 * max(right - left, bottom - top) else box
 
 
-def explained(picture: NDArray[np.uint8], box: Box, scale: ColourScale) -> float:
-    """Share of what a picture shows, beside legend, background and lines, in colours of a scale.
-
-    Parameters
-    ----------
-    picture : ndarray
-        Red, green and blue, shape (y, x, 3), uint8.
-    box : Box
-        The legend.
-    scale : ColourScale
-        What it says.
-    """
+def explained(picture: Picture, box: Box, scale: ColourScale) -> float:
+    """Share of what a picture shows, beside legend, background and lines, in colours of a scale."""
     left, top, right, bottom = box
     shown = ~dark_lines(picture)
     shown[max(top - _AROUND, 0) : bottom + _AROUND, max(left - _AROUND, 0) : right + _AROUND] = (
@@ -151,13 +128,13 @@ def _path(scale: ColourScale) -> NDArray[np.float64]:
     return labs if scale.banded else np.concatenate([labs, (labs[1:] + labs[:-1]) / 2])
 
 
-def _worth(picture: NDArray[np.uint8], box: Box) -> tuple[float, int, int]:
+def _worth(picture: Picture, box: Box) -> tuple[float, int, int]:
     """How much of the picture a legend explains, in tenths; then as `_length_then_narrow`."""
     scale = ColourScale.from_legend(legend_pixels(picture, box), (0.0, 1.0))
     return (round(10 * explained(picture, box, scale)), *_length_then_narrow(box))
 
 
-def legend_pixels(picture: NDArray[np.uint8], box: Box) -> NDArray[np.uint8]:
+def legend_pixels(picture: Picture, box: Box) -> NDArray[np.uint8]:
     """Colours along a legend, from its bottom or left end, shape (n, 3).
 
     The median across its middle; where its ends are blurred, the colour next to them.
@@ -186,7 +163,7 @@ def _length_then_narrow(box: Box) -> tuple[int, int]:
     return max(width, height) // 8, -min(width, height)
 
 
-def _upright_bars(picture: NDArray[np.uint8]) -> Iterator[Box]:
+def _upright_bars(picture: Picture) -> Iterator[Box]:
     labs = lab(picture / 255.0)
     runs = _edges(labs)
     for index, (first, first_top, first_bottom) in enumerate(runs):
@@ -220,7 +197,7 @@ def _shortest(picture: NDArray[Any]) -> int:
     return max(_SHORTEST, len(picture) // 8)
 
 
-def _is_legend(picture: NDArray[np.uint8], labs: NDArray[np.float64], box: Box) -> bool:
+def _is_legend(picture: Picture, labs: NDArray[np.float64], box: Box) -> bool:
     left, top, right, bottom = box
     inner = _middle(labs[top:bottom, left:right])
     along = np.median(inner, axis=1)

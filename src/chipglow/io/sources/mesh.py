@@ -1,8 +1,7 @@
 """Meshes over time, from the programs that compute them."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
 from typing import Final, Literal
@@ -12,12 +11,22 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources import mesh_meshio, mesh_tecplot, mesh_vtk
 from chipglow.io.sources.conventions import Placement, Units, match_names, simple
+from chipglow.io.sources.file_order import files_of
 from chipglow.io.sources.mesh_abaqus import AbaqusReader
 from chipglow.io.sources.mesh_block import Block, FlatMesh, check_grid, fields_of, flatten
 from chipglow.io.sources.mesh_dyna import DynaReader
-from chipglow.io.sources.mesh_reader import MeshReader, files_of
+from chipglow.io.sources.mesh_reader import MeshReader
 from chipglow.io.sources.mesh_restricted import RestrictedFields
-from chipglow.io.sources.source import Source, SourceError, Survey, missing_extra, span_of
+from chipglow.io.sources.source import (
+    Source,
+    SourceError,
+    SourceRemarks,
+    Survey,
+    even_times,
+    naming,
+    required,
+    span_of,
+)
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.rasterise import NOTHING, rasterise
 
@@ -26,6 +35,14 @@ _PART_FIELDS: Final = (
     "region", "region_id", "regionid", "object_id", "objectid", "elementblockids", "block_id",
     "gmsh_physical", "cell_tags",
 )  # fmt: skip
+MESH_READERS: Final[Mapping[str, Callable[[Sequence[Path]], MeshReader]]] = {
+    **dict.fromkeys(mesh_vtk.KINDS, mesh_vtk.VtkReader),
+    **dict.fromkeys(mesh_meshio.KINDS, mesh_meshio.MeshioReader),
+    **dict.fromkeys(mesh_tecplot.ENDINGS, mesh_tecplot.TecplotReader),
+    ".inp": AbaqusReader,
+}
+"""Readers of meshes by the ending of the file's name; LS-DYNA's d3plot has none."""
+
 _VECTOR: Final = "velocity"
 _COMPONENTS: Final = ("velocity_x", "velocity_y")
 _VECTOR_SIZES: Final = (2, 3)
@@ -112,7 +129,8 @@ class MeshSource(Source):
         blocks = ends[0]
         found = self._found(reader, blocks, restricted)
         flat = [self._flat(reader, number, there, found) for number, there in ends.items()]
-        times, assumed = self._times(reader)
+        remarks = SourceRemarks()
+        times = self._times(reader, remarks)
         every = fields_of(blocks)
         return Survey(
             reader.kind,
@@ -120,7 +138,7 @@ class MeshSource(Source):
             self._extent(reader, flat),
             {ours: found[ours] for ours in READABLE if ours in found},
             tuple(sorted(set(every) - set(found.values()))),
-            assumed=(*reader.assumed, *assumed, *self._assumed(blocks, found)),
+            assumed=(*remarks.assumed, *self._assumed(blocks, found)),
             from_file=(*self._lacking(blocks, found), *_from_file(found, tuple(ends.values()))),
             temperatures=self._temperatures(flat, found),
         )
@@ -128,7 +146,7 @@ class MeshSource(Source):
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
         """Sample the meshes one after the other; see `Source.frames`."""
         reader = self._reader()
-        times, _ = self._times(reader)
+        times = self._times(reader, SourceRemarks())
         ends, restricted = self._ends(reader)
         found = self._found(reader, ends[0], restricted)
         for number in range(start, reader.count):
@@ -143,24 +161,16 @@ class MeshSource(Source):
         return {number: restricted.of_blocks(there) for number, there in ends.items()}, restricted
 
     def _reader(self) -> MeshReader:
-        if find_spec("pyvista") is None or find_spec("meshio") is None:
-            raise missing_extra(self.path, "PyVista and meshio", "mesh")
-        timed = bool(self.times)
+        required("pyvista", self.path, "mesh", "PyVista")
         suffix = self.path.suffix.lower()
-        if suffix in mesh_vtk.KINDS:
-            return mesh_vtk.VtkReader(files_of(self.path, gaps_allowed=timed))
-        if suffix in mesh_meshio.KINDS:
-            return mesh_meshio.MeshioReader(files_of(self.path, gaps_allowed=timed))
-        if suffix in mesh_tecplot.ENDINGS:
-            return mesh_tecplot.TecplotReader(files_of(self.path, gaps_allowed=timed))
-        if suffix == ".inp":
-            return AbaqusReader(files_of(self.path, gaps_allowed=timed))
-        if suffix in ("", ".d3plot") or "d3plot" in self.path.name.lower():
-            return DynaReader(self.path)
-        known = " ".join(
-            sorted((*mesh_vtk.KINDS, *mesh_meshio.KINDS, *mesh_tecplot.ENDINGS, ".inp"))
-        )
-        raise SourceError(f"{self.path}: {suffix} is no mesh, expected d3plot or one of {known}")
+        dyna = suffix in ("", ".d3plot") or "d3plot" in self.path.name.lower()
+        reader = MESH_READERS.get(suffix, DynaReader if dyna else None)
+        if reader is None:
+            known = " ".join(sorted(MESH_READERS))
+            raise SourceError(
+                f"{self.path}: {suffix} is no mesh, expected d3plot or one of {known}"
+            )
+        return reader(files_of(self.path, gaps_allowed=bool(self.times)))
 
     def _read(self, reader: MeshReader, number: int) -> tuple[Block, ...]:
         blocks = reader.read(number)
@@ -197,15 +207,13 @@ class MeshSource(Source):
         known = [name for name in READABLE if name not in _COMPONENTS]
         if not {_VECTOR, *_COMPONENTS} & set(given) and self.placement.axes == (0, 1):
             known += _COMPONENTS
-        try:
+        with naming(file):
             found = match_names(sizes, given, ())
             found |= match_names(scalars, {k: v for k, v in given.items() if v in scalars}, known)
             if not set(_COMPONENTS) & set(given):
                 found |= match_names(
                     vectors, {k: v for k, v in given.items() if v in vectors}, (_VECTOR,)
                 )
-        except SourceError as error:
-            raise SourceError(f"{file}: {error}") from None
         if _VECTOR in found:
             found |= dict.fromkeys(_COMPONENTS, found.pop(_VECTOR))
         elif not set(_COMPONENTS) <= set(found):
@@ -264,20 +272,17 @@ class MeshSource(Source):
                 what = "tool of the surroundings' temperature" if is_tool.any() else "void"
                 yield f"{named} has no temperature: it is {what}"
 
-    def _times(self, reader: MeshReader) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    def _times(self, reader: MeshReader, remarks: SourceRemarks) -> NDArray[np.float64]:
         count = reader.count
         if self.times:
             if len(self.times) != count:
                 raise SourceError(
                     f"{self.path}: times: {len(self.times)} for {count} frames, expected {count}"
                 )
-            return np.array(self.times, np.float64), ()
-        if self.interval is not None:
-            return np.arange(count, dtype=np.float64) * self.interval, ()
-        if reader.times is not None:
-            return np.array(reader.times, np.float64) * self.units.time.scale, ()
-        assumed = ("no times in the files: frames are 1 s apart",) if count > 1 else ()
-        return np.arange(count, dtype=np.float64), assumed
+            return np.array(self.times, np.float64)
+        if self.interval is None and reader.times is not None:
+            return np.array(reader.times, np.float64) * self.units.time.scale
+        return even_times(count, self.interval, remarks)
 
     def _assumed(self, blocks: Sequence[Block], found: Mapping[str, str]) -> tuple[str, ...]:
         sentences = []

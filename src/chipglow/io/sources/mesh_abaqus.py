@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.file_order import natural
-from chipglow.io.sources.mesh_block import Block
+from chipglow.io.sources.mesh_block import Block, grid_of
 from chipglow.io.sources.mesh_reader import MeshReader
 from chipglow.io.sources.source import SourceError
 
@@ -41,21 +41,10 @@ class AbaqusReader(MeshReader):
     nodes' positions, ``U1`` to ``U3`` what is added to those of the input file. Tables of elements
     and of nodes of the same frame are told apart by ``_nodes`` or ``_elements`` at the end of
     their names.
-
-    Parameters
-    ----------
-    files : sequence of Path
-        The input files.
-
-    Raises
-    ------
-    SourceError
-        If a file cannot be read or a table is missing.
     """
 
-    times = None
-
     def __init__(self, files: Sequence[Path]) -> None:
+        super().__init__(files, "Abaqus input")
         self._frames = [(file, frame) for file in files for frame in _tables(file)]
         if len(files) > 1 and len(self._frames) != len(files):
             raise SourceError(
@@ -212,8 +201,6 @@ def _read_table(file: Path) -> tuple[str, NDArray[np.int64], dict[str, NDArray[n
 def _block(
     deck: _Deck, tables: Sequence[tuple[Path, str, NDArray[np.int64], Mapping[str, Any]]]
 ) -> Block:
-    import pyvista
-
     at_node = {label: at for at, label in enumerate(deck.nodes)}
     at_element = {label: at for at, label in enumerate(deck.elements)}
     points = np.array(list(deck.nodes.values()))
@@ -232,12 +219,8 @@ def _block(
             found[name] = _by_label(file, index, labels, values)
     points = _moved(points, of_nodes)
     kinds = np.array([kind for kind, _ in deck.elements.values()], np.uint8)
-    grid = pyvista.UnstructuredGrid(
-        np.concatenate([np.array(cell) for cell in cells]), kinds, points
-    )
-    for data, fields in ((grid.point_data, of_nodes), (grid.cell_data, of_elements)):
-        for name, values in fields.items():
-            data[name] = values
+    table = np.concatenate([np.array(cell) for cell in cells])
+    grid = grid_of(table, kinds, points, of_nodes, of_elements)
     sets = {
         name: np.array([label in members for label in deck.elements])
         for name, members in deck.sets.items()

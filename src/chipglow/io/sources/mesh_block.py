@@ -73,6 +73,22 @@ class FlatMesh:
     tool: NDArray[np.bool_]
 
 
+def grid_of(
+    cells: NDArray[Any],
+    kinds: NDArray[np.uint8],
+    points: NDArray[np.float64],
+    of_nodes: Arrays,
+    of_elements: Arrays,
+) -> Any:
+    """A pyvista.UnstructuredGrid of positions, elements as VTK keeps them, and fields of both."""
+    import pyvista
+
+    grid = pyvista.UnstructuredGrid(cells, kinds, points)
+    grid.point_data.update(of_nodes, copy=False)
+    grid.cell_data.update(of_elements, copy=False)
+    return grid
+
+
 def offsets_of(grid: Any) -> NDArray[np.int64]:
     """Where the nodes of each element begin, and where those of the last one end."""
     # PyVista gave it another name in 0.49.

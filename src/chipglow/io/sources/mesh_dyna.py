@@ -1,50 +1,35 @@
 """Meshes of LS-DYNA: d3plot files, read by lasso-python."""
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.mesh_block import Block
+from chipglow.io.sources.mesh_block import Block, grid_of
 from chipglow.io.sources.mesh_reader import MeshReader
-from chipglow.io.sources.source import SourceError, missing_extra
+from chipglow.io.sources.source import SourceError, damaged, required
 
+_KIND: Final = "LS-DYNA d3plot"
 _FAMILIES: Final = ("shell", "solid")
 _AVERAGED: Final = ("effective_plastic_strain", "thermal_data")
 _TRIANGLE, _QUAD, _TETRA, _HEXA = 5, 9, 10, 12
 
 
 class DynaReader(MeshReader):
-    """The states of a d3plot file and of those that follow it, ``d3plot01`` and so on.
+    """The states of a d3plot file and of those that follow it, ``d3plot01`` and so on."""
 
-    Parameters
-    ----------
-    file : Path
-        The first file.
-
-    Raises
-    ------
-    SourceError
-        If it is no d3plot, or lasso-python is missing.
-    """
-
-    def __init__(self, file: Path) -> None:
-        if not file.is_file():
-            raise FileNotFoundError(f"{file}: no such file")
-        self._file = file
+    def __init__(self, files: Sequence[Path]) -> None:
+        super().__init__(files, _KIND)
+        self._file = files[0]
         arrays = self._arrays(state_array_filter=["timesteps"]).arrays
         self.times = tuple(float(time) for time in arrays.get("timesteps", ()))
         self.count = len(self.times)
-        self.kind = f"mesh, LS-DYNA d3plot with {self.count} states"
+        self.kind = f"mesh, {_KIND} with {self.count} states"
         if not self.count:
-            raise SourceError(f"{file}: has no state, expected a d3plot with one or more")
-
-    def file(self, number: int) -> Path:
-        """The first file of the d3plot."""
-        return self._file
+            raise SourceError(f"{self._file}: has no state, expected a d3plot with one or more")
 
     def read(self, number: int) -> tuple[Block, ...]:
         """The mesh of a state; see `MeshReader.read`."""
@@ -52,37 +37,25 @@ class DynaReader(MeshReader):
         try:
             blocks = tuple(_blocks(plot.arrays))
         except (KeyError, IndexError, ValueError) as error:
-            raise self._damaged(error) from error
+            raise damaged(self._file, error, _KIND) from error
         if not blocks:
             raise SourceError(f"{self._file}: has no shells or solids, expected a mesh")
         return blocks
 
     def _arrays(self, **filters: Any) -> Any:
-        try:
-            from lasso.dyna import D3plot
-        except ImportError:
-            raise missing_extra(self._file, "lasso-python", "dyna") from None
+        dyna = required("lasso.dyna", self._file, "dyna", "lasso-python")
         logging.getLogger("lasso").setLevel(logging.CRITICAL)
         if self._file.stat().st_size == 0:
-            raise SourceError(f"{self._file}: is empty, expected an LS-DYNA d3plot")
+            raise SourceError(f"{self._file}: is empty, expected an {_KIND}")
         try:
-            return D3plot(str(self._file), buffered_reading=True, **filters)
+            return dyna.D3plot(str(self._file), buffered_reading=True, **filters)
         except (OSError, MemoryError):
             raise
         except Exception as error:  # lasso raises what it likes for what is no d3plot
-            raise self._damaged(error) from error
-
-    def _damaged(self, error: Exception) -> SourceError:
-        said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-        return SourceError(
-            f"{self._file}: cannot be read as LS-DYNA d3plot, it is damaged or of another kind "
-            f"({said})"
-        )
+            raise damaged(self._file, error, _KIND) from error
 
 
 def _blocks(arrays: Mapping[str, Any]) -> Iterator[Block]:
-    import pyvista
-
     points, of_nodes = _of_nodes(arrays)
     for family in _FAMILIES:
         prefix = f"element_{family}_"
@@ -92,11 +65,8 @@ def _blocks(arrays: Mapping[str, Any]) -> Iterator[Block]:
         of_elements = _of_elements(arrays, prefix)
         alive = of_elements.pop("is_alive", np.ones(len(nodes))) > 0
         cells, kinds = _cells(np.asarray(nodes)[alive], family)
-        grid = pyvista.UnstructuredGrid(cells, kinds, points)
-        for name, values in of_nodes.items():
-            grid.point_data[name] = values
-        for name, values in of_elements.items():
-            grid.cell_data[name] = values[alive]
+        living = {name: values[alive] for name, values in of_elements.items()}
+        grid = grid_of(cells, kinds, points, of_nodes, living)
         yield Block((family,), grid, _parts(arrays, prefix, alive))
 
 

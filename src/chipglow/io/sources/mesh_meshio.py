@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.mesh_block import Block
 from chipglow.io.sources.mesh_reader import MeshReader
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import SourceError, damaged, required
 
 KINDS: Final[Mapping[str, str]] = {
     ".msh": "Gmsh",
@@ -20,32 +20,15 @@ KINDS: Final[Mapping[str, str]] = {
 
 
 class MeshioReader(MeshReader):
-    """One file for each frame.
-
-    Parameters
-    ----------
-    files : sequence of Path
-        The files.
-    """
-
-    times = None
+    """One file for each frame."""
 
     def __init__(self, files: Sequence[Path]) -> None:
-        self._files = files
-        self.count = len(files)
-        kind = KINDS[files[0].suffix.lower()]
-        self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of {kind}"
-
-    def file(self, number: int) -> Path:
-        """The file of a frame."""
-        return self._files[number]
+        super().__init__(files, KINDS[files[0].suffix.lower()])
 
     def read(self, number: int) -> tuple[Block, ...]:
         """The mesh of a frame; see `MeshReader.read`."""
-        file = self._files[number]
-        if not file.is_file():
-            raise FileNotFoundError(f"{file}: no such file")
-        import meshio
+        file = self.file(number)
+        meshio = required("meshio", file, "mesh")
         import pyvista
 
         try:
@@ -54,23 +37,13 @@ class MeshioReader(MeshReader):
             # PyVista stumbles over sets that are none of elements, such as Gmsh's.
             mesh.cell_sets, mesh.point_sets = {}, {}
             grid = pyvista.from_meshio(mesh)
-        except (OSError, MemoryError) as error:
-            if isinstance(error, FileNotFoundError | MemoryError):
-                raise
-            raise _damaged(file, error) from error
+        except (FileNotFoundError, MemoryError):
+            raise
         except (Exception, SystemExit) as error:  # meshio ends the program for some files
-            raise _damaged(file, error) from error
+            raise damaged(file, error, KINDS[file.suffix.lower()]) from error
         if not grid.n_cells:
             raise SourceError(f"{file}: has no elements, expected a mesh")
         return (Block((), grid, sets),)
-
-
-def _damaged(file: Path, error: BaseException) -> SourceError:
-    said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
-    return SourceError(
-        f"{file}: cannot be read as {KINDS[file.suffix.lower()]}, it is damaged or of another "
-        f"kind ({said})"
-    )
 
 
 def _sets(mesh: Any) -> dict[str, NDArray[np.bool_]]:

@@ -30,29 +30,13 @@ class TecplotReader(MeshReader):
 
     Times are ``SOLUTIONTIME`` of ASCII files and the solution times of zones in strands of binary
     ones. Zones without are there at all times.
-
-    Parameters
-    ----------
-    files : sequence of Path
-        The files.
-
-    Raises
-    ------
-    SourceError
-        If a file is none of Tecplot.
     """
 
     def __init__(self, files: Sequence[Path]) -> None:
-        self._files = files
+        super().__init__(files, f"Tecplot {'binary' if _is_binary(files[0]) else 'ASCII'}")
         self._zones = _zones(files[0]) if len(files) == 1 else ()
         self.times = _times(self._zones) if self._zones else _times_of_series(files)
         self.count = max(len(self.times or ()), len(files))
-        form = "binary" if _is_binary(files[0]) else "ASCII"
-        self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of Tecplot {form}"
-
-    def file(self, number: int) -> Path:
-        """The file of a frame."""
-        return self._files[min(number, len(self._files) - 1)]
 
     def read(self, number: int) -> tuple[Block, ...]:
         """The mesh of a frame; see `MeshReader.read`."""
@@ -108,12 +92,31 @@ class _AsciiZone(Zone):
                 f"{self.file}: zone {self.number}: SOLUTIONTIME is {text!r}, expected a number"
             ) from None
 
-    def read(self) -> Block:
-        """Its mesh and fields."""
-        try:
-            return _block(self)
-        except (ValueError, KeyError, IndexError) as error:
-            raise self.refusal(error) from None
+    def _block(self) -> Block:
+        keys = self.keys
+        for key in _NOT_READ:
+            if key in keys:
+                raise ValueError(f"{key} is not read")
+        kind = keys.get("ZONETYPE", keys.get("ET", keys.get("F", "ORDERED"))).upper()
+        kind = kind.removeprefix("FE")
+        with self.file.open("rb") as stream:
+            stream.seek(self.begin)
+            text = stream.read(self.end - self.begin)
+            words = re.sub(rb"(?m)^\s*#.*$", b"", text).split()
+        if kind in _ORDERED:
+            across, down, deep = (int(keys.get(axis, "1")) for axis in "IJK")
+            counts = (across, down, deep)
+            nodes, elements = int(np.prod(counts)), int(np.prod([max(c - 1, 1) for c in counts]))
+        else:
+            nodes = int(keys.get("N") or keys["NODES"])
+            elements = int(keys.get("E") or keys["ELEMENTS"])
+        columns, rest = _columns(self, words, nodes, elements)
+        names = tuple(filter(None, (keys.get("T", "").strip(), str(self.number))))
+        centred = _centred(keys, self.names)
+        if kind in _ORDERED:
+            return block_of(names, columns, centred, ORDERED, counts)
+        cells = np.array(rest, np.int64).reshape(elements, ELEMENTS[kind][0]) - 1
+        return block_of(names, columns, centred, kind, cells)
 
 
 def _ascii_zones(file: Path) -> tuple[Zone, ...]:
@@ -158,33 +161,6 @@ def _names(header: str) -> tuple[str, ...]:
 def _keys(text: str) -> dict[str, str]:
     pairs = re.findall(_KEY, re.sub(r"^\s*ZONE", "", text, flags=re.I))
     return {key.upper(): value.strip('"') for key, value in pairs}
-
-
-def _block(zone: _AsciiZone) -> Block:
-    keys = zone.keys
-    for key in _NOT_READ:
-        if key in keys:
-            raise ValueError(f"{key} is not read")
-    kind = keys.get("ZONETYPE", keys.get("ET", keys.get("F", "ORDERED"))).upper()
-    kind = kind.removeprefix("FE")
-    with zone.file.open("rb") as stream:
-        stream.seek(zone.begin)
-        text = stream.read(zone.end - zone.begin)
-        words = re.sub(rb"(?m)^\s*#.*$", b"", text).split()
-    if kind in _ORDERED:
-        across, down, deep = (int(keys.get(axis, "1")) for axis in "IJK")
-        counts = (across, down, deep)
-        nodes, elements = int(np.prod(counts)), int(np.prod([max(c - 1, 1) for c in counts]))
-    else:
-        nodes = int(keys.get("N") or keys["NODES"])
-        elements = int(keys.get("E") or keys["ELEMENTS"])
-    columns, rest = _columns(zone, words, nodes, elements)
-    names = tuple(filter(None, (keys.get("T", "").strip(), str(zone.number))))
-    centred = _centred(keys, zone.names)
-    if kind in _ORDERED:
-        return block_of(names, columns, centred, ORDERED, counts)
-    cells = np.array(rest, np.int64).reshape(elements, ELEMENTS[kind][0]) - 1
-    return block_of(names, columns, centred, kind, cells)
 
 
 def _columns(

@@ -61,26 +61,12 @@ _TIME: Final = rb'Name="(?:TimeValue|TIME)"[^>]*RangeMin="([-+.eE\d]+)"'
 
 
 class VtkReader(MeshReader):
-    """One file for each frame, or one file with times in it.
-
-    Parameters
-    ----------
-    files : sequence of Path
-        The files; with more than one each is a frame.
-
-    Raises
-    ------
-    SourceError
-        If a file cannot be read.
-    """
+    """One file for each frame, or one file with times in it."""
 
     def __init__(self, files: Sequence[Path]) -> None:
-        self._files = files
-        self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of {_kind(files[0])}"
+        super().__init__(files, _kind(files[0]))
         self.known = _NAMES.get(_kind(files[0]), {})
         self._opened: Any = None
-        self.times = None
-        self.count = len(files)
         if len(files) == 1:
             self._opened = _opened(files[0])
             self.times = _times_inside(self._opened, files[0])
@@ -92,20 +78,15 @@ class VtkReader(MeshReader):
             found = tuple(time for time in times if time is not None)
             self.times = found if len(found) == len(files) else None
 
-    def file(self, number: int) -> Path:
-        """The file that holds a frame."""
-        return self._files[min(number, len(self._files) - 1)]
-
     def read(self, number: int) -> tuple[Block, ...]:
         """The mesh of a frame; see `MeshReader.read`."""
         file = self.file(number)
-        with reading(file):
-            reader = self._opened
-            if reader is None:
-                data = _data(_opened(file))
-            else:
-                assert self.times is not None
-                data = _at_time(reader, number, self.times[number])
+        if self._opened is None:
+            data = read_data(file)
+        else:
+            assert self.times is not None
+            with reading(file):
+                data = _at_time(self._opened, number, self.times[number])
         # What a reader left half done may crash what comes next.
         with reading(file):
             blocks = tuple(_blocks(file, data, ()))
@@ -162,8 +143,6 @@ def _kind(file: Path) -> str:
 
 
 def _opened(file: Path) -> Any:
-    if not file.is_file():
-        raise FileNotFoundError(f"{file}: no such file")
     _check_head(file)
     with reading(file):
         import pyvista
@@ -249,13 +228,24 @@ def _times_inside(reader: Any, file: Path) -> tuple[float, ...] | None:
         return tuple(float(time) for time in times or ()) or None
 
 
-def _data(reader: Any) -> Any:
+def read_data(file: Path) -> Any:
+    """A pyvista object of what a file holds, at its first time if it has several.
+
+    Raises
+    ------
+    SourceError
+        If it cannot be read.
+    OSError
+        If it is missing or not accessible.
+    """
     import pyvista
 
-    if hasattr(reader, "read"):
-        return reader.read()
-    reader.Update()
-    return pyvista.wrap(reader.GetOutputDataObject(0))
+    reader = _opened(file)
+    with reading(file):
+        if hasattr(reader, "read"):
+            return reader.read()
+        reader.Update()
+        return pyvista.wrap(reader.GetOutputDataObject(0))
 
 
 def _at_time(reader: Any, number: int, time: float) -> Any:

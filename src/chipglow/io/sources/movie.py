@@ -1,7 +1,6 @@
 """Movies of fields with a colour scale: a source of scenes."""
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from math import hypot, isfinite, sqrt
 from pathlib import Path
@@ -11,7 +10,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.colour_scale import ColourScale, ColourUncertainty, colour_uncertainty
+from chipglow.io.sources.colour_scale import (
+    ColourScale,
+    ColourUncertainty,
+    Picture,
+    colour_uncertainty,
+)
 from chipglow.io.sources.conventions import Placement
 from chipglow.io.sources.legend import (
     LEAST_EXPLAINED,
@@ -31,7 +35,7 @@ from chipglow.io.sources.overlays import (
     polygon_mask,
 )
 from chipglow.io.sources.picture_sampling import PictureSampling
-from chipglow.io.sources.source import Source, SourceError, Survey
+from chipglow.io.sources.source import Source, SourceError, Survey, naming
 from chipglow.scene import FIELD_UNITS, FILLED, Material, Raster, SampledFrame
 from chipglow.scene.nearest import fill
 
@@ -308,7 +312,7 @@ class MovieSource(Source):
         for name in self._names:
             movie = self.movies[name]
             picture = next(pictures(movie.path, indices[name]))
-            with _naming(movie.path):
+            with naming(movie.path):
                 scale, legend, said = _scale(movie, picture)
                 covered = box_mask(shape, self.covered) | box_mask(shape, legend, _LEGEND_MARGIN)
                 cropped = self._cropped(picture)
@@ -321,7 +325,7 @@ class MovieSource(Source):
         return readers, tuple(assumed)
 
     def _background(
-        self, picture: NDArray[np.uint8], scale: ColourScale
+        self, picture: Picture, scale: ColourScale
     ) -> tuple[tuple[Colour, ...], tuple[str, ...]]:
         if self.background is not None:
             return self.background, ()
@@ -340,9 +344,7 @@ class MovieSource(Source):
         said += [f"{colour} at the border is taken for a value" for colour in refused]
         return found, tuple(said)
 
-    def _read(
-        self, name: str, reader: FieldReader, picture: NDArray[np.uint8], number: int
-    ) -> FieldPicture:
+    def _read(self, name: str, reader: FieldReader, picture: Picture, number: int) -> FieldPicture:
         """Read a picture, which may be all void but not all lines."""
         read = reader.read(self._cropped(picture))
         workpiece = read.material == Material.WORKPIECE
@@ -459,7 +461,7 @@ def _sample(index: MovieIndex) -> tuple[int, ...]:
 
 
 def _scale(
-    movie: FieldMovie, picture: NDArray[np.uint8]
+    movie: FieldMovie, picture: Picture
 ) -> tuple[ColourScale, tuple[Box, ...], tuple[str, ...]]:
     """Scale of a movie, where its legend is, and what was assumed."""
     if isinstance(movie.colours, NamedMap):
@@ -484,7 +486,7 @@ def _scale(
     return scale, (box,), (f"{found}legend of {kind}, {ends}",)
 
 
-def _check_legend(picture: NDArray[np.uint8], box: Box, scale: ColourScale) -> None:
+def _check_legend(picture: Picture, box: Box, scale: ColourScale) -> None:
     share = explained(picture, box, scale)
     if share < LEAST_EXPLAINED:
         raise SourceError(
@@ -515,12 +517,3 @@ def _doubts(uncertainty: Mapping[str, ColourUncertainty]) -> Iterator[str]:
             + (f", {warning.lines:.3g} by the lines drawn over them" if warning.lines else "")
             + ")"
         )
-
-
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    """Put the file's name before what is wrong with its pictures."""
-    try:
-        yield
-    except SourceError as error:
-        raise SourceError(f"{path}: {error}") from error

@@ -12,7 +12,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io.sources.source import SourceError, missing_extra
+from chipglow.io.sources.colour_scale import Picture
+from chipglow.io.sources.source import SourceError, required
 
 _MOST_PIXELS: Final = 1 << 26
 # No playlists, scripts or numbered files: a movie may not lead to other files or to the network.
@@ -84,9 +85,7 @@ def index_movie(path: Path) -> MovieIndex:
     return _index(path, state.st_size, state.st_mtime_ns)
 
 
-def pictures(
-    path: Path, index: MovieIndex, start: int = 0, every: int = 1
-) -> Iterator[NDArray[np.uint8]]:
+def pictures(path: Path, index: MovieIndex, start: int = 0, every: int = 1) -> Iterator[Picture]:
     """Decode pictures one at a time.
 
     Parameters
@@ -99,11 +98,6 @@ def pictures(
         Number of the first picture; it is searched if the movie allows.
     every : int
         Distance from each picture to the next.
-
-    Yields
-    ------
-    ndarray
-        Red, green and blue, shape (rows, columns, 3), uint8.
 
     Raises
     ------
@@ -233,11 +227,7 @@ def _check(path: Path, index: MovieIndex, frame: Any, number: int) -> None:
 @contextmanager
 def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
     """Open a movie; what FFmpeg says against it becomes a SourceError."""
-    try:
-        import av
-        from av.error import FFmpegError
-    except ImportError:
-        raise missing_extra(path, "PyAV", "movie") from None
+    av = required("av", path, "movie", "PyAV")
     try:
         with av.open(f"file:{path}", options=_OPTIONS, metadata_errors="replace") as container:
             if not container.streams.video:
@@ -246,7 +236,7 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
             _check_size(path, stream)
             stream.codec_context.options = {"max_pixels": str(_MOST_PIXELS)}
             yield container, stream
-    except FFmpegError as error:
+    except av.error.FFmpegError as error:
         raise SourceError(
             f"{path}: cannot be read as a movie: {error.strerror}, expected AVI, MP4, GIF, MKV or "
             "another format of FFmpeg"

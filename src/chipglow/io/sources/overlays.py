@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import grey_closing, maximum_filter, minimum_filter
 
-from chipglow.io.sources.colour_scale import ColourScale, lab
+from chipglow.io.sources.colour_scale import ColourScale, Picture, lab
 from chipglow.io.sources.source import SourceError
 from chipglow.scene import FILLED, Material
 from chipglow.scene.nearest import fill
@@ -106,8 +106,8 @@ class FieldReader:
                         f"{MARK_TOLERANCE:g} or more from the scale"
                     )
 
-    def read(self, picture: NDArray[np.uint8]) -> FieldPicture:
-        """Values, material and quality of a picture of shape (y, x, 3), uint8.
+    def read(self, picture: Picture) -> FieldPicture:
+        """Values, material and quality of a picture.
 
         What is drawn over the field takes the material and the value of the nearest pixel that
         shows them; in the tool, of the nearest one in the tool.
@@ -165,7 +165,7 @@ class FieldReader:
         )
 
     def _marked(
-        self, picture: NDArray[np.uint8], distance: NDArray[np.float32]
+        self, picture: Picture, distance: NDArray[np.float32]
     ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Pixels with the colour of the background, and of the tool; lines of it are neither."""
         if self._marks is None:
@@ -177,15 +177,10 @@ class FieldReader:
         return void, _without_lines(marked & (number >= len(self.background)))
 
 
-def dark_lines(picture: NDArray[np.uint8]) -> NDArray[np.bool_]:
+def dark_lines(picture: Picture) -> NDArray[np.bool_]:
     """Pixels of dark lines up to 2 wide, if they are so many that a mesh is drawn; else none.
 
     The colours of black lines may be of the scale, and a codec mixes them with those beside them.
-
-    Parameters
-    ----------
-    picture : ndarray
-        Red, green and blue, shape (y, x, 3), uint8.
     """
     light = picture @ _LUMA
     around = grey_closing(light, 5)
@@ -194,16 +189,9 @@ def dark_lines(picture: NDArray[np.uint8]) -> NDArray[np.bool_]:
 
 
 def find_background(
-    picture: NDArray[np.uint8], scale: ColourScale
+    picture: Picture, scale: ColourScale
 ) -> tuple[tuple[Colour, ...], tuple[Colour, ...]]:
     """Colours of the background: those that a part of the border has, and the scale has not.
-
-    Parameters
-    ----------
-    picture : ndarray
-        Red, green and blue, shape (y, x, 3), uint8.
-    scale : ColourScale
-        What the colours of values are.
 
     Returns
     -------
@@ -220,14 +208,8 @@ def find_background(
     return tuple(found), tuple(refused)
 
 
-def plain_colours(picture: NDArray[np.uint8]) -> tuple[Colour, ...]:
-    """Colours that cover a part of the border of a picture, not as lines, the most common first.
-
-    Parameters
-    ----------
-    picture : ndarray
-        Red, green and blue, shape (y, x, 3), uint8.
-    """
+def plain_colours(picture: Picture) -> tuple[Colour, ...]:
+    """Colours that cover a part of the border of a picture, not as lines, the most common first."""
     border = _border(picture)
     rest = border
     found: list[Colour] = []
@@ -280,7 +262,7 @@ def _border(picture: NDArray[Any]) -> NDArray[Any]:
     return np.concatenate([picture[0], picture[-1], picture[1:-1, 0], picture[1:-1, -1]])
 
 
-def _like(picture: NDArray[np.uint8], colour: Colour) -> NDArray[np.bool_]:
+def _like(picture: Picture, colour: Colour) -> NDArray[np.bool_]:
     """Pixels of a colour."""
     apart = lab(picture / 255.0) - lab(np.array(colour) / 255.0)
     return np.asarray(np.linalg.norm(apart, axis=-1) < MARK_TOLERANCE)

@@ -12,16 +12,17 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.io.sources import mesh_vtk
 from chipglow.io.sources.arrays import (
     StoredArray,
     check_samples,
-    matching_files,
     open_arrays,
     reading,
 )
 from chipglow.io.sources.conventions import COMMON_NAMES, simple
+from chipglow.io.sources.file_order import files_of
 from chipglow.io.sources.lammps_dump import ENDINGS, LammpsDump, is_dump
-from chipglow.io.sources.source import SourceError, missing_extra
+from chipglow.io.sources.source import SourceError, required
 from chipglow.io.sources.text_table import TextTable, line_of
 
 VTK_SUFFIXES: Final = (".vtk", ".vtp", ".vtu", ".vti", ".vts", ".vtr", ".ply")
@@ -36,8 +37,6 @@ _SURELY_TEMPERATURE: Final = tuple(
 )
 _LETTERS: Final = "xyz"
 _ROWS: Final = 200_000
-_HEAD: Final = 1_000_000
-_CLAIMS: Final = re.compile(rb"(?:NumberOfPoints\s*=\s*[\"']|\nPOINTS\s+)\s*(\d{1,30})")
 
 
 @dataclass(frozen=True)
@@ -127,7 +126,7 @@ def open_points(pattern: str, time: str | None, stack: ExitStack) -> PointFrames
     OSError
         If it is missing or not accessible.
     """
-    paths = matching_files(pattern)
+    paths = files_of(pattern)
     for path in paths[:1]:
         if path.stat().st_size == 0:
             raise SourceError(f"{path}: is empty")
@@ -469,14 +468,9 @@ def _components(name: str, values: NDArray[Any]) -> dict[str, NDArray[Any]]:
 
 
 def _read_vtk(path: Path) -> PointTable:
-    _check_claims(path)
-    try:
-        import pyvista as pv
-    except ImportError:
-        raise missing_extra(path, "PyVista", "mesh") from None
-    with pv.VtkErrorCatcher(raise_errors=True):
-        mesh = pv.read(path)
-    if not isinstance(mesh, pv.DataSet) or mesh.n_points == 0:
+    pyvista = required("pyvista", path, "mesh", "PyVista")
+    mesh = mesh_vtk.read_data(path)
+    if not isinstance(mesh, pyvista.DataSet) or mesh.n_points == 0:
         raise SourceError(f"{path}: has no points")
     columns = _components("points", np.asarray(mesh.points, np.float64))
     for name in mesh.point_data:
@@ -484,14 +478,3 @@ def _read_vtk(path: Path) -> PointTable:
         if values.dtype.kind in "fiub" and (values.ndim == 1 or values.shape[1] in (2, 3)):
             columns.update(_components(name, values))
     return PointTable(columns)
-
-
-def _check_claims(path: Path) -> None:
-    """Refuse more points than a file of this size can have, before VTK asks for their memory."""
-    with path.open("rb") as stream:
-        head = stream.read(_HEAD)
-    legacy = head.startswith(b"# vtk")
-    most = min(path.stat().st_size, MOST_POINTS) if legacy else MOST_POINTS
-    claimed = max((int(number) for number in _CLAIMS.findall(head)), default=0)
-    if claimed > most:
-        raise SourceError(f"{path}: says it has {claimed:.3g} points, expected up to {most:.3g}")

@@ -2,32 +2,64 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.scene import READABLE, Raster, SampledFrame
-
-__all__ = [
-    "READABLE",
-    "SampledFrame",
-    "Source",
-    "SourceError",
-    "SourceRemarks",
-    "Survey",
-    "missing_extra",
-    "span_of",
-]
+from chipglow.scene import Raster, SampledFrame
 
 
 class SourceError(ValueError):
     """A source that cannot be read: the message names the file, the field and what was expected."""
 
 
-def missing_extra(file: object, needs: str, extra: str) -> SourceError:
-    """The error for a file that a library reads which is not installed, and how it comes."""
-    return SourceError(f"{file}: needs {needs}, expected pip install 'chipglow[{extra}]'")
+def required(module: str, file: object, extra: str, called: str = "") -> Any:
+    """A library that reads a file and comes with an extra of chipglow.
+
+    Parameters
+    ----------
+    module : str
+        What is imported.
+    file : object
+        The file, as the error calls it.
+    extra : str
+        The extra.
+    called : str
+        The library's name, if it is not the module's.
+
+    Raises
+    ------
+    SourceError
+        If it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError:
+        needs = called or module
+        expected = f"expected pip install 'chipglow[{extra}]'"
+        raise SourceError(f"{file}: needs {needs}, {expected}") from None
+
+
+@contextmanager
+def naming(name: object) -> Iterator[None]:
+    """Put a name, such as that of the file, before what is wrong, which is a SourceError then."""
+    try:
+        yield
+    except ValueError as error:
+        raise SourceError(f"{name}: {error}") from error
+
+
+def damaged(file: object, error: BaseException, kind: str = "") -> SourceError:
+    """The error for a file whose reader, of a kind of files, stumbles over it."""
+    said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+    as_kind = f" as {kind}" if kind else ""
+    return SourceError(
+        f"{file}: cannot be read{as_kind}, it is damaged or of another kind ({said})"
+    )
 
 
 @dataclass
@@ -60,7 +92,7 @@ class Survey:
         Left, right, bottom and top of what is there in m, in the scene's frame of reference: of
         the first and the last frame together.
     found : mapping
-        Which of `READABLE` come from which field of the source.
+        Which of `chipglow.scene.READABLE` come from which field of the source.
     unused : tuple of str
         Fields of the source that nothing is taken from.
     spacing : float, optional
@@ -83,6 +115,13 @@ class Survey:
     assumed: tuple[str, ...] = ()
     from_file: tuple[str, ...] = ()
     temperatures: tuple[float, float] | None = None
+
+
+def even_times(count: int, interval: float | None, remarks: SourceRemarks) -> NDArray[np.float64]:
+    """Times in s of frames that are as far apart: by 1 s if nobody says it, which is remarked."""
+    if interval is None and count > 1:
+        remarks.assumed.append("no times in the files: frames are 1 s apart")
+    return (1.0 if interval is None else interval) * np.arange(count, dtype=np.float64)
 
 
 def span_of(values: ArrayLike) -> tuple[float, float]:

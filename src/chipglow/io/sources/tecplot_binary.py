@@ -109,14 +109,8 @@ class BinaryZone(Zone):
         """Its time; None for what Tecplot calls static: it is there at all times."""
         return None if self.header.strand == _STATIC else self.header.time
 
-    def read(self) -> Block:
-        """Its mesh and fields; variables that are passive here are not among them."""
-        try:
-            return self._block()
-        except (ValueError, KeyError, IndexError) as error:
-            raise self.refusal(error) from None
-
     def _block(self) -> Block:
+        """Its mesh and fields; variables that are passive here are not among them."""
         header = self.header
         columns = {
             name: self._values(variable, stored)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.mesh_block import Block
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import SourceError, damaged
 
 ORDERED: Final = "ORDERED"
 ELEMENTS: Final[Mapping[str, tuple[int, int]]] = {
@@ -39,17 +39,22 @@ class Zone(ABC):
         """Its time; None if it is there at all times."""
 
     @abstractmethod
-    def read(self) -> Block:
-        """Its mesh and fields."""
+    def _block(self) -> Block: ...
 
-    def refusal(self, error: Exception) -> SourceError:
-        """What to say of a zone that cannot be read."""
-        if isinstance(error, SourceError):
-            return error
-        said = " ".join(f"{type(error).__name__}: {error}".split())[:120]
-        return SourceError(
-            f"{self.file}: zone {self.number} is damaged or of a kind that is not read ({said})"
-        )
+    def read(self) -> Block:
+        """Its mesh and fields.
+
+        Raises
+        ------
+        SourceError
+            If it cannot be read.
+        """
+        try:
+            return self._block()
+        except SourceError:
+            raise
+        except (ValueError, KeyError, IndexError) as error:
+            raise damaged(f"{self.file}: zone {self.number}", error) from None
 
 
 def block_of(

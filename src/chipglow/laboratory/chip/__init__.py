@@ -1,15 +1,14 @@
 """The chip: rake face, shear band and segments, in scenes and in measurements."""
 
-from chipglow.laboratory.chip.band_file import read_curve, write_band_profile
 from chipglow.laboratory.chip.band_profile import BandProfile, Stage, band_profile
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
 from chipglow.laboratory.chip.chosen_tool import ChosenTool, chosen_tool
 from chipglow.laboratory.chip.contact import NoContactError, contact_length
+from chipglow.laboratory.chip.curve_file import read_curve
 from chipglow.laboratory.chip.find_tool import FoundTool, find_tool
 from chipglow.laboratory.chip.inertia import Inertia, inertia
 from chipglow.laboratory.chip.metrics import ChipMetrics, ChipScan, chip_metrics
 from chipglow.laboratory.chip.rake_grid import RakeGrid, rake_grid
-from chipglow.laboratory.chip.rake_grid_file import write_rake_grid
 from chipglow.laboratory.chip.resolution import resolution_warnings
 from chipglow.laboratory.chip.ridge import NoShearBandError
 from chipglow.laboratory.chip.segment import Instant, Segment
@@ -49,6 +48,4 @@ __all__ = [
     "resolution_warnings",
     "segmentation",
     "tool_of",
-    "write_band_profile",
-    "write_rake_grid",
 ]

@@ -15,7 +15,7 @@ from chipglow.laboratory.chip.band_profile import BandProfile, Stage
 from chipglow.scene import Tool
 
 _HEIGHT: Final = 4.2
-_AROUND: Final = 60.0
+_AROUND: Final = 60e-6
 _LEGEND_COLUMNS: Final = 3
 _MOST_NAMES: Final = 12
 _COLOURS: Final = matplotlib.colors.ListedColormap(
@@ -91,11 +91,7 @@ def _draw_image(
     for points, colour in zip(profile.points, colours, strict=True):
         axes.plot(*(1e6 * points).T, color=colour, linewidth=1.4)
     drawing.draw_line(axes, profile.reference.points, drawing.BLUE)
-    left, right, bottom, top = (1e6 * edge for edge in measurement.raster.extent)
-    shown = 1e6 * profile.points[np.isfinite(profile.points[..., 0])]
-    (x_least, y_least), (x_most, y_most) = shown.min(axis=0), shown.max(axis=0)
-    axes.set_xlim(max(left, x_least - _AROUND), min(right, x_most + _AROUND))
-    axes.set_ylim(max(bottom, y_least - _AROUND), min(top, y_most + _AROUND))
+    drawing.crop(axes, profile.points, measurement.raster, _AROUND)
     axes.set_title(f"a) {1e6 * profile.times[frame]:.4g} µs; blue: the reference")
     figure.colorbar(
         picture, ax=axes, label="radiance temperature / °C", location="bottom", aspect=25
@@ -112,6 +108,4 @@ def _draw_profile(
     stage = profile.stage[frame]
     label = f"{1e6 * profile.times[frame]:.4g} µs, {stage}"
     axes.plot(along, values, color=colour, linestyle=_LINES[stage], label=label)
-    axes.fill_between(
-        along, values - uncertainty, values + uncertainty, color=colour, alpha=0.15, linewidth=0
-    )
+    drawing.shade(axes, along, values, uncertainty, colour)

@@ -7,6 +7,8 @@ from math import isfinite, nan, sqrt
 from typing import Final
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 from scipy.ndimage import map_coordinates
@@ -14,6 +16,7 @@ from scipy.ndimage import map_coordinates
 from chipglow.camera import Measurement
 from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
+from chipglow.laboratory.chip.budget_columns import budget_columns, celsius
 from chipglow.laboratory.chip.frames import frame_numbers
 from chipglow.laboratory.chip.ridge import NoShearBandError, arc_length, normals_of
 from chipglow.laboratory.chip.tool_position import (
@@ -24,13 +27,19 @@ from chipglow.laboratory.chip.tool_position import (
 )
 from chipglow.scene import Line, Tool, sample
 from chipglow.text.remarks import Remarks
-from chipglow.uncertainty import Estimate
+from chipglow.uncertainty import Estimate, to_xarray
 
 POSITION: Final = "position"
 """Name of the component of uncertainty that the place of a curve makes."""
 
 BAND_BUDGET: Final = (CALIBRATION, POSITION, *TOOL_BUDGET)
 """Lines of the budget of a temperature along the band."""
+
+CALIBRATION_UNKNOWN: Final = (
+    "the measurement does not state the uncertainty of its calibration, which is not in the "
+    "uncertainty here."
+)
+"""Warning of a profile of such a measurement."""
 
 NEAR_THE_EDGE: Final = 15.0
 """Distance from the edge in pixels within which a band has not left it."""
@@ -41,8 +50,8 @@ MOVED: Final = 1.0
 _DEEP: Final = 40.0
 """A valley along one band is less deep in K: on bands of a simulated chip it was under 30 K."""
 
-_DEEP_SHARE: Final = 1.0 / 3.0
-"""Nor is it as large a share of the range of the temperature along the band."""
+_DEEP_FRACTION: Final = 1.0 / 3.0
+"""Nor is it as large a fraction of the range of the temperature along the band."""
 
 _STEP: Final = 0.5
 _FINE: Final = 4
@@ -136,6 +145,94 @@ class BandProfile:
         kept = (Stage.DEVELOPING, Stage.DEVELOPED)
         return np.array([stage in kept for stage in self.stage], dtype=np.bool_)
 
+    def to_frame(self) -> pd.DataFrame:
+        """Every point of each frame's band, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``time_us``, ``stage``, ``distance_um``, ``x_um``, ``y_um``,
+            ``radiance_temperature_degC``, and the standard uncertainty with its parts; NaN where
+            nothing is known.
+        """
+        there = np.isfinite(self.points[..., 0]).ravel()
+        frame, point = (index.ravel() for index in np.indices(self.temperature.shape))
+        stages = np.array([stage.value for stage in self.stage], dtype=object)
+        columns = {
+            "time_us": 1e6 * self.times[frame],
+            "stage": stages[frame],
+            "distance_um": 1e6 * self.distance[point],
+            "x_um": 1e6 * self.points[..., 0].ravel(),
+            "y_um": 1e6 * self.points[..., 1].ravel(),
+            "radiance_temperature_degC": celsius(self.temperature.ravel()),
+            **budget_columns(self.estimate, BAND_BUDGET),
+        }
+        return pd.DataFrame(columns)[there].reset_index(drop=True)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Every point of each frame's band as arrays in SI units.
+
+        Returns
+        -------
+        xarray.Dataset
+            Of the dimensions (time, distance): ``temperature`` with its components as
+            `chipglow.uncertainty.from_xarray` reads them, ``standard_uncertainty``, ``x`` and
+            ``y``; ``offset`` and ``stage`` of each frame; and the reference.
+        """
+        both = ("time", "distance")
+        data = to_xarray(self.estimate, "temperature", both, "K")
+        data["temperature"].attrs["long_name"] = "radiance temperature"
+        metres = {"units": "m"}
+        return (
+            data.assign(
+                standard_uncertainty=(both, self.estimate.standard_uncertainty, {"units": "K"}),
+                x=(both, self.points[..., 0], metres),
+                y=(both, self.points[..., 1], metres),
+                offset=("time", self.offset, metres),
+                stage=("time", [stage.value for stage in self.stage]),
+                reference_x=("reference_distance", self.reference.points[:, 0], metres),
+                reference_y=("reference_distance", self.reference.points[:, 1], metres),
+            )
+            .assign_coords(
+                time=("time", self.times, {"units": "s"}),
+                distance=("distance", self.distance, metres),
+                reference_distance=("reference_distance", self.reference.distance, metres),
+            )
+            .assign_attrs(
+                width=self.width,
+                assumed="\n".join(self.assumptions),
+                warnings="\n".join(self.warnings),
+            )
+        )
+
+    def stage_frame(self) -> pd.DataFrame:
+        """Each frame's band, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``time_us``, ``stage``, ``offset_um`` from the reference, ``from_um`` and
+            ``to_um`` of the distance, ``mean_degC``, ``greatest_degC`` and the root mean square
+            ``standard_uncertainty_K`` along it; NaN without a band.
+        """
+        return pd.DataFrame([self._stage_row(frame) for frame in range(self.times.size)])
+
+    def _stage_row(self, frame: int) -> dict[str, float | str]:
+        known = np.isfinite(self.temperature[frame])
+        values = celsius(self.temperature[frame, known])
+        ends = 1e6 * self.distance[known]
+        uncertainty = self.estimate.standard_uncertainty[frame, known]
+        return {
+            "time_us": 1e6 * self.times[frame],
+            "stage": self.stage[frame].value,
+            "offset_um": 1e6 * self.offset[frame],
+            "from_um": ends[0] if known.any() else nan,
+            "to_um": ends[-1] if known.any() else nan,
+            "mean_degC": values.mean() if known.any() else nan,
+            "greatest_degC": values.max() if known.any() else nan,
+            "standard_uncertainty_K": np.sqrt((uncertainty**2).mean()) if known.any() else nan,
+        }
+
 
 def band_profile(
     measurement: Measurement,
@@ -205,6 +302,8 @@ def band_profile(
     given = None if curve is None else _given(curve, tool, pitch)
     found, reason = _found(images, tool, numbers)
     remarks = Remarks()
+    if measurement.calibration_errors is None:
+        remarks.warnings.append(CALIBRATION_UNKNOWN)
     if given is None and not any(found):
         raise NoShearBandError(reason if numbers.size == 1 else _none(numbers.size, reason))
     base = _reference(measurement, images, tool, found, numbers, given, reference, remarks)
@@ -343,22 +442,22 @@ def _reference(
 def _joined(temperature: NDArray[np.float64], times: NDArray[np.float64]) -> tuple[str, ...]:
     """A warning of found curves that cross a deep valley between two hot places."""
     valleys = [_valley(values[np.isfinite(values)]) for values in temperature]
-    doubted = [
+    crossing = [
         (depth, time)
-        for (depth, share), time in zip(valleys, times, strict=True)
-        if depth > _DEEP and share > _DEEP_SHARE
+        for (depth, fraction), time in zip(valleys, times, strict=True)
+        if depth > _DEEP and fraction > _DEEP_FRACTION
     ]
-    if not doubted:
+    if not crossing:
         return ()
-    when = ", ".join(f"{time * 1e6:.6g}" for _, time in doubted)
+    when = ", ".join(f"{time * 1e6:.6g}" for _, time in crossing)
     return (
-        f"the curve at {when} µs crosses a valley, up to {max(doubted)[0]:.0f} K deep: "
+        f"the curve at {when} µs crosses a valley, up to {max(crossing)[0]:.0f} K deep: "
         "it may join two bands, or a band that has moved and the heat at the edge.",
     )
 
 
 def _valley(values: NDArray[np.float64]) -> tuple[float, float]:
-    """Depth of the deepest valley along a curve in K, and its share of the curve's range."""
+    """Depth of the deepest valley along a curve in K, and its fraction of the curve's range."""
     if values.size == 0:
         return 0.0, 0.0
     before = np.maximum.accumulate(values)

@@ -1,4 +1,4 @@
-"""Uncertainties and their parts as columns of tables."""
+"""Columns that the frames of temperatures have in common."""
 
 from collections.abc import Sequence
 
@@ -8,21 +8,27 @@ from numpy.typing import NDArray
 from chipglow.uncertainty import Estimate
 
 
-def budget_columns(causes: Sequence[str]) -> tuple[str, ...]:
-    """Names of the columns: the standard uncertainty, and its part from each cause."""
-    return (
-        "standard_uncertainty_K",
-        *(f"{cause.replace(' ', '_')}_uncertainty_K" for cause in causes),
-    )
+def celsius(kelvins: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Temperatures in K in degrees Celsius."""
+    return kelvins - 273.15
 
 
-def budget_values(estimate: Estimate, causes: Sequence[str]) -> NDArray[np.float64]:
-    """Their values, of the shape of the estimate with the columns as the last axis.
+def budget_columns(estimate: Estimate, causes: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    """Standard uncertainty of temperatures in K and its part from each cause, by their names.
 
-    NaN of a cause that is not in the budget, or of which nothing is known; of the whole if that is
-    so for all.
+    Each of shape (values,). NaN of a cause that is not in the budget, or of which nothing is known;
+    of the whole if that is so for all.
     """
-    unknown = np.full(estimate.shape, np.nan)
-    whole = estimate.standard_uncertainty if estimate.components else unknown
-    parts = [estimate.contribution(c) if c in estimate.names else unknown for c in causes]
-    return np.where(np.isfinite(estimate.values)[..., None], np.stack([whole, *parts], -1), np.nan)
+    known = np.isfinite(estimate.values)
+    columns = {"standard_uncertainty_K": known_uncertainty(estimate).ravel()}
+    for cause in causes:
+        part = estimate.contribution(cause) if cause in estimate.names else np.nan
+        name = f"{cause.replace(' ', '_')}_uncertainty_K"
+        columns[name] = np.where(known, part, np.nan).ravel()
+    return columns
+
+
+def known_uncertainty(estimate: Estimate) -> NDArray[np.float64]:
+    """Standard uncertainty of the values; NaN without any component."""
+    whole = estimate.standard_uncertainty if estimate.components else np.nan
+    return np.where(np.isfinite(estimate.values), whole, np.nan)

@@ -13,7 +13,7 @@ from chipglow.laboratory.chip.tool_position import ToolUncertainty
 from chipglow.scene import Tool
 
 _FACE: Final = 200e-6
-"""Length of the face in m on which a tool that was told is compared with one that is seen."""
+"""Length of the face in m on which a tool that was given is compared with one that is seen."""
 
 _CLEARLY: Final = 4.0
 """Two places of the face differ if they are this many standard uncertainties apart, or more."""
@@ -30,7 +30,7 @@ class ChosenTool:
     found, assumptions, warnings : tuple of str
         What was found, what was assumed, and why it may not be relied on.
     uncertainty : ToolUncertainty, optional
-        How well its place is known, if it was found and no option tells an uncertainty.
+        How well its place is known, if it was found and no option gives an uncertainty.
     """
 
     tool: Tool
@@ -48,10 +48,10 @@ def chosen_tool(
     Parameters
     ----------
     measurement : Measurement
-        Tells its tool, or shows it.
+        States its tool, or shows it.
     tool : str, optional
         A tool's YAML file; ``found``, to look for the rake face in the image; by default what the
-        measurement tells.
+        measurement states.
     position : str, optional
         What an option ``--position`` says, which takes the place of the uncertainty of a tool that
         is found.
@@ -66,8 +66,8 @@ def chosen_tool(
     if tool is None:
         return ChosenTool(tool_of(measurement, None))
     if tool != "found":
-        told = tool_of(measurement, tool)
-        return ChosenTool(told, warnings=_contradictions(measurement, told))
+        given = tool_of(measurement, tool)
+        return ChosenTool(given, warnings=_contradictions(measurement, given))
     found = find_tool(measurement)
     shape = found.tool.tool
     assumed = (
@@ -79,21 +79,21 @@ def chosen_tool(
     return ChosenTool(found.tool, said, (assumed,), found.warnings, used)
 
 
-def _contradictions(measurement: Measurement, told: Tool) -> tuple[str, ...]:
+def _contradictions(measurement: Measurement, given: Tool) -> tuple[str, ...]:
     """A warning, if the image clearly shows a rake face elsewhere than where the tool's is said."""
     try:
         found = find_tool(measurement)
     except ValueError:
         return ()
     seen = found.tool.rake_point(np.array([0.0, _FACE]))
-    offsets = (seen - told.rake_point(np.array([0.0, _FACE]))) @ np.array(told.rake_normal)
+    offsets = (seen - given.rake_point(np.array([0.0, _FACE]))) @ np.array(given.rake_normal)
     allowed = hypot(found.uncertainty.across, _FACE / 2.0 * found.uncertainty.angle)
     offset = float(np.abs(offsets).max())
     if offset <= _CLEARLY * allowed:
         return ()
     return (
         f"the rake face that shows in the image is {1e6 * offset:.0f} um from that "
-        f"of the tool's file (the file's rake angle is {degrees(told.rake_angle):.1f} deg, the "
+        f"of the tool's file (the file's rake angle is {degrees(given.rake_angle):.1f} deg, the "
         f"image's {degrees(found.tool.rake_angle):.1f} ± {degrees(found.uncertainty.angle):.1f} "
         "deg): the tip, the origin of coordinates, or which way the image is up may be wrong.",
     )

@@ -83,7 +83,7 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
     temperature, because the camera blurs radiance.
 
     The uncertainties are those of the jackknife over blocks of rows (JCGM 100 type A) and, as no
-    row tells how far the courses are from those of the model, of limits of a rectangular
+    row says how far the courses are from those of the model, of limits of a rectangular
     distribution (type B): half a pixel for the position as a whole, a pixel for either end of the
     face. The tip is where the radiance along the face has fallen to half of its greatest value; its
     uncertainty is set to 2 pixels and half the edge radius.
@@ -103,7 +103,7 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
     angle_error, place_error = _jackknife(image, rows, fit)
     angle = atan(fit[1])
     tip_row, tip_seen = _tip_row(image, fit, rows)
-    warnings = _doubts(angle, angle_error, place_error, angles, coarse.prominence, tip_seen)
+    warnings = _warnings(angle, angle_error, place_error, angles, coarse.prominence, tip_seen)
     pitch = raster.spacing
     tool = _placed(replace(shape, rake_angle=angle), raster, fit, tip_row)
     uncertainty = ToolUncertainty(
@@ -364,7 +364,7 @@ def _up_the_face(tool: PlacedTool, raster: Raster, row: float) -> float:
     return (y - float(tool.rake_foot[1])) / cos(tool.rake_angle)
 
 
-def _doubts(
+def _warnings(
     angle: float,
     angle_error: float,
     place_error: float,

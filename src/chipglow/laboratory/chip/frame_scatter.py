@@ -1,4 +1,4 @@
-"""What frames tell of the uncertainty of their mean, if they and their places are alike."""
+"""What frames show of the uncertainty of their mean, if they and their places are alike."""
 
 from dataclasses import dataclass
 from math import inf
@@ -35,7 +35,7 @@ class FrameScatter:
 
     @classmethod
     def of(cls, frames: NDArray[np.float64]) -> "FrameScatter":
-        """What frames of shape (frames, ...), NaN where there is nothing, tell.
+        """What frames of shape (frames, ...), NaN where there is nothing, show.
 
         Notes
         -----

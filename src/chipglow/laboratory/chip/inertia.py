@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from chipglow.laboratory.chip.segmentation import end_of_build_up
 from chipglow.scene import Scene
 
-LARGEST_SHARE: Final = 0.01
+LARGEST_FRACTION: Final = 0.01
 """Share of work or force from which inertia counts as too much."""
 
 
@@ -20,33 +20,33 @@ class Inertia:
 
     Parameters
     ----------
-    kinetic_share : float
+    kinetic_fraction : float
         Greatest change of the kinetic energy since the start over the work of the drive till then;
         NaN where the scene has no energy balance.
-    force_share : float
+    force_fraction : float
         Momentum that the scaled mass brings to the tool per time, ρV² times uncut chip thickness,
-        over the mean cutting force; NaN where the scene does not tell it. By the balance of
+        over the mean cutting force; NaN where the scene does not state it. By the balance of
         momentum a chip that leaves at v makes a share abs(V − v)/V of it a force.
     mass_scaling : float
         Factor on the density: the true mass has this much less of both.
     """
 
-    kinetic_share: float
-    force_share: float
+    kinetic_fraction: float
+    force_fraction: float
     mass_scaling: float
 
     @property
     def warning(self) -> str:
         """What is too much, and what to do; empty if nothing is."""
         shares = (
-            (self.kinetic_share, "kinetic energy reaches {} of the work"),
-            (self.force_share, "momentum is worth {} of the cutting force"),
+            (self.kinetic_fraction, "kinetic energy reaches {} of the work"),
+            (self.force_fraction, "momentum is worth {} of the cutting force"),
         )
-        over = [text.format(f"{s:.1%}") for s, text in shares if s > LARGEST_SHARE]
+        over = [text.format(f"{s:.1%}") for s, text in shares if s > LARGEST_FRACTION]
         if not over:
             return ""
         return (
-            f"The scaled mass's {' and its '.join(over)}, expected up to {LARGEST_SHARE:.0%}: "
+            f"The scaled mass's {' and its '.join(over)}, expected up to {LARGEST_FRACTION:.0%}: "
             f"lower mass_scaling, now {self.mass_scaling:g}."
         )
 
@@ -63,14 +63,14 @@ def inertia(scene: Scene) -> Inertia | None:
         return None
     cutting = _values(scene, "cutting_force")
     first = end_of_build_up(cutting)
-    kinetic_share = nan
+    kinetic_fraction = nan
     if "drive_work" in scene.data:
         kinetic, work = (_values(scene, n)[first:] for n in ("kinetic_energy", "drive_work"))
-        kinetic_share = np.fmax.reduce(_ratio(np.abs(kinetic), work))
+        kinetic_fraction = np.fmax.reduce(_ratio(np.abs(kinetic), work))
     flow = float(scene.data.attrs.get("momentum_flow", nan))
     scaling = float(scene.data.attrs.get("mass_scaling", nan))
-    force_share = _ratio(np.array(flow), cutting[first:].mean())
-    return Inertia(float(kinetic_share), float(force_share), scaling)
+    force_fraction = _ratio(np.array(flow), cutting[first:].mean())
+    return Inertia(float(kinetic_fraction), float(force_fraction), scaling)
 
 
 def _ratio(part: NDArray[np.float64], whole: NDArray[np.float64]) -> NDArray[np.float64]:

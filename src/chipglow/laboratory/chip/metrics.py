@@ -48,7 +48,7 @@ class ChipScan:
 class ChipMetrics:
     """What describes a segmented chip; lengths in m, times in s, forces in N/m of width.
 
-    A ``spread`` is the standard deviation of what the mean was taken over, NaN for one value.
+    A ``…_standard_deviation`` is that of what the mean was taken over, NaN for one value.
 
     Parameters
     ----------
@@ -69,24 +69,24 @@ class ChipMetrics:
     thickness : float
         Mean thickness of the chip, at right angles to the rake face; see `scan` for when it and
         what follows from it are NaN.
-    peak, peak_spread, valley, valley_spread : float
-        Mean of the greatest and the least thickness of each segment, and their spread over the
-        segments.
+    peak, peak_standard_deviation, valley, valley_standard_deviation : float
+        Mean of the greatest and the least thickness of each segment, and their standard
+        deviation over the segments.
     degree : float
         Degree of segmentation, (`peak` - `valley`) / `peak`.
     ratio : float
         Chip ratio, `feed` / `thickness`.
-    chip_speed, chip_speed_spread : float
-        Mean speed of the chip up the rake face in m/s where `scan` stands, and its spread over
-        the frames: a segmented chip moves by fits and starts.
-    contact, contact_spread : float
-        Length of contact on the rake face, mean and spread over the frames; NaN if it reaches the
-        border of the view in one of them.
-    shear_angle, shear_angle_spread : float
+    chip_speed, chip_speed_standard_deviation : float
+        Mean speed of the chip up the rake face in m/s where `scan` stands, and its standard
+        deviation over the frames: a segmented chip moves by fits and starts.
+    contact, contact_standard_deviation : float
+        Length of contact on the rake face, mean and standard deviation over the frames; NaN if
+        it reaches the border of the view in one of them.
+    shear_angle, shear_angle_standard_deviation : float
         Angle in rad from the direction of cutting to the straight line through the middle half of
         the shear band, over the frames in which the band is developed: where it reaches the free
         surface and its rate is at least half the greatest. NaN without such a frame, as the next.
-    band_width, band_width_spread : float
+    band_width, band_width_standard_deviation : float
         Full width at half maximum of the strain rate across the band, over the same frames.
     band_rate : float
         Greatest plastic strain rate of the band in 1/s: median over its middle half, in the frame
@@ -113,19 +113,19 @@ class ChipMetrics:
     feed: float
     thickness: float
     peak: float
-    peak_spread: float
+    peak_standard_deviation: float
     valley: float
-    valley_spread: float
+    valley_standard_deviation: float
     degree: float
     ratio: float
     chip_speed: float
-    chip_speed_spread: float
+    chip_speed_standard_deviation: float
     contact: float
-    contact_spread: float
+    contact_standard_deviation: float
     shear_angle: float
-    shear_angle_spread: float
+    shear_angle_standard_deviation: float
     band_width: float
-    band_width_spread: float
+    band_width_standard_deviation: float
     band_rate: float
     band_strain: float
     cutting_mean: float
@@ -142,7 +142,7 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     Parameters
     ----------
     scene : Scene
-        The scene; it must tell its tool. Where it has a force history, that gives the period.
+        The scene; it must state its tool. Where it has a force history, that gives the period.
     feed : float, optional
         Uncut chip thickness in m; by default it is read from the workpiece at the left of the
         view: from the material coordinates of its free surface where the scene has them, else
@@ -151,7 +151,7 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     Raises
     ------
     ValueError
-        If the scene tells no tool, or the feed is not positive.
+        If the scene states no tool, or the feed is not positive.
 
     Notes
     -----
@@ -165,7 +165,7 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     """
     tool = scene.tool
     if tool is None:
-        raise ValueError("scene: it does not tell its tool, which the rake face needs")
+        raise ValueError("scene: it does not state its tool, which the rake face needs")
     if feed is not None and not feed > 0:
         raise ValueError(f"feed is {feed!r}, expected over 0 m")
     frames = _frame_numbers(scene)
@@ -197,19 +197,19 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
         feed=feed,
         thickness=passing.thickness,
         peak=_mean(passing.peaks),
-        peak_spread=_spread(passing.peaks),
+        peak_standard_deviation=_deviation(passing.peaks),
         valley=_mean(passing.valleys),
-        valley_spread=_spread(passing.valleys),
+        valley_standard_deviation=_deviation(passing.valleys),
         degree=1 - _mean(passing.valleys) / _mean(passing.peaks),
         ratio=feed / passing.thickness,
         chip_speed=passing.speed,
-        chip_speed_spread=passing.speed_spread,
+        chip_speed_standard_deviation=passing.speed_standard_deviation,
         contact=float(contacts.mean()),
-        contact_spread=_spread(contacts),
+        contact_standard_deviation=_deviation(contacts),
         shear_angle=_mean(angles),
-        shear_angle_spread=_spread(angles),
+        shear_angle_standard_deviation=_deviation(angles),
         band_width=_mean(widths),
-        band_width_spread=_spread(widths),
+        band_width_standard_deviation=_deviation(widths),
         band_rate=max((band.middle_rate for band in bands), default=nan),
         band_strain=passing.strain,
         cutting_mean=forces.cutting_mean if forces else nan,
@@ -257,7 +257,7 @@ class _Passing:
     peaks: NDArray[np.float64]
     valleys: NDArray[np.float64]
     speed: float
-    speed_spread: float
+    speed_standard_deviation: float
     strain: float
 
     @classmethod
@@ -289,7 +289,7 @@ class _Passing:
             peaks=np.array([scan.thickness[window].max() for window in windows]),
             valleys=valleys,
             speed=float(speed[whole].mean()),
-            speed_spread=_spread(speed[whole]),
+            speed_standard_deviation=_deviation(speed[whole]),
             strain=float(np.mean(greatest)),
         )
 
@@ -413,5 +413,5 @@ def _mean(values: NDArray[np.float64]) -> float:
     return float(known.mean()) if known.size else nan
 
 
-def _spread(values: NDArray[np.float64]) -> float:
+def _deviation(values: NDArray[np.float64]) -> float:
     return float(np.std(values, ddof=1)) if values.size > 1 else nan

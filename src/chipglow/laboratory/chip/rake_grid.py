@@ -7,12 +7,19 @@ from math import isfinite
 from typing import Final
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 from numpy.typing import NDArray
 from scipy import sparse
 
 from chipglow.camera import UNUSABLE, Measurement
 from chipglow.camera.calibration.errors import CALIBRATION
 from chipglow.laboratory.chip.band_ridge import ThermalImage
+from chipglow.laboratory.chip.budget_columns import (
+    budget_columns,
+    celsius,
+    known_uncertainty,
+)
 from chipglow.laboratory.chip.frame_scatter import FRAMES, FrameScatter
 from chipglow.laboratory.chip.frames import frame_numbers
 from chipglow.laboratory.chip.tool_position import (
@@ -22,7 +29,8 @@ from chipglow.laboratory.chip.tool_position import (
     tool_in,
 )
 from chipglow.scene import Raster, Tool
-from chipglow.uncertainty import Component, Estimate
+from chipglow.scene.tool_attributes import tool_attributes
+from chipglow.uncertainty import Component, Estimate, to_xarray
 
 PIXELS: Final = 3.0
 """Side of the paper's squares in pixels."""
@@ -107,8 +115,8 @@ class RakeGrid:
     def frame_estimate(self) -> Estimate:
         """Mean of `mean` over the frames in which a square is usable in K, shape (m, n).
 
-        The component ``frames`` is what they tell of their mean (`FrameScatter`): what differs
-        from frame to frame, the pixels' noise included. One frame tells nothing of it.
+        The component ``frames`` is what they show of their mean (`FrameScatter`): what differs
+        from frame to frame, the pixels' noise included. One frame shows nothing of it.
         """
         there = Estimate(
             np.nan_to_num(self.mean),
@@ -131,6 +139,103 @@ class RakeGrid:
         """Standard deviation of `mean` between those frames in K, shape (m, n); NaN for one."""
         away = np.where(self.usable, self.mean - self.frame_mean, 0.0)
         return np.sqrt(_ratio((away**2).sum(axis=0), self.frame_count - 1))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Every square of every frame, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``time_us``, ``depth_um``, ``along_um``, ``mean_degC``, ``deviation_K`` over the
+            square's pixels, ``usable_pixels``, and the standard uncertainty with its parts; NaN
+            where a square is left out, or nothing is known.
+        """
+        places = np.meshgrid(self.times, self.depth, self.along, indexing="ij")
+        time, depth, along = (1e6 * place.ravel() for place in places)
+        return pd.DataFrame(
+            {
+                "time_us": time,
+                "depth_um": depth,
+                "along_um": along,
+                "mean_degC": celsius(self.mean.ravel()),
+                "deviation_K": self.deviation.ravel(),
+                "usable_pixels": self.count.ravel(),
+                **budget_columns(self.estimate, RAKE_BUDGET),
+            }
+        )
+
+    def to_dataset(self) -> xr.Dataset:
+        """Every square of every frame as arrays in SI units.
+
+        Returns
+        -------
+        xarray.Dataset
+            Of the dimensions (time, depth, along): ``mean`` with its components as
+            `chipglow.uncertainty.from_xarray` reads them, ``standard_uncertainty``, ``deviation``
+            and ``count``; and the tool as a scene has it.
+        """
+        dimensions = ("time", "depth", "along")
+        data = to_xarray(self.estimate, "mean", dimensions, "K")
+        data["mean"].attrs["long_name"] = "radiance temperature"
+        return (
+            data.assign(
+                standard_uncertainty=(dimensions, known_uncertainty(self.estimate), {"units": "K"}),
+                deviation=(dimensions, self.deviation, {"units": "K"}),
+                count=(dimensions, self.count, {"units": "1"}),
+            )
+            .assign_coords(
+                time=("time", self.times, {"units": "s"}),
+                depth=("depth", self.depth, {"units": "m"}),
+                along=("along", self.along, {"units": "m"}),
+            )
+            .assign_attrs(size=self.size, **tool_attributes(self.tool))
+        )
+
+    def mean_frame(self) -> pd.DataFrame:
+        """Every square in the mean over the frames, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``depth_um``, ``along_um``, ``mean_degC``, ``deviation_K`` between the frames
+            (of one frame over the square's pixels), and ``frames`` in which it is usable.
+        """
+        depth, along = np.meshgrid(1e6 * self.depth, 1e6 * self.along, indexing="ij")
+        deviation = self.frame_deviation if self.times.size > 1 else self.deviation[0]
+        return pd.DataFrame(
+            {
+                "depth_um": depth.ravel(),
+                "along_um": along.ravel(),
+                "mean_degC": celsius(self.frame_mean.ravel()),
+                "deviation_K": deviation.ravel(),
+                "frames": self.frame_count.ravel(),
+            }
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the numbers do not hold, a sentence each."""
+        causes = " and ".join(one.cause.name for one in self.estimate.components)
+        left_out = int((self.frame_count == 0).sum())
+        sentences = (
+            f"Errors of {causes} move all squares together and are not in the deviations.",
+            f"{left_out} of {self.frame_count.size} squares are left out (–): a pixel of theirs "
+            "is under the camera's lower range limit, saturated or dead, or outside the image.",
+        )
+        said = (bool(causes), left_out > 0)
+        return tuple(sentence for sentence, true in zip(sentences, said, strict=True) if true)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why it may not be relied on, a sentence each."""
+        seen, frames = self.frame_count, self.times.size
+        partly = int(((seen > 0) & (seen < frames)).sum())
+        if not partly:
+            return ()
+        return (
+            f"{partly} squares are usable in some of the {frames} frames only; their means are of "
+            "those frames, which are the hotter ones where the lower range limit is the reason.",
+        )
 
     def up_to(self, columns: int) -> "RakeGrid":
         """The same of the first squares along the face.

@@ -52,11 +52,7 @@ def _draw_image(figure: Figure, axes: Axes, measurement: Measurement, grid: Rake
     for line in (*corners, *corners.transpose(1, 0, 2)):
         axes.plot(*line.T, color="black", linewidth=1.1, alpha=0.6)
         axes.plot(*line.T, color="white", linewidth=0.6)
-    left, right, bottom, top = (1e6 * edge for edge in measurement.raster.extent)
-    (x_least, y_least), (x_most, y_most) = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-    around = 1e6 * _AROUND
-    axes.set_xlim(max(left, x_least - around), min(right, x_most + around))
-    axes.set_ylim(max(bottom, y_least - around), min(top, y_most + around))
+    drawing.crop(axes, grid.corners(), measurement.raster, _AROUND)
     axes.set_title("a) analysis grid")
     drawing.colour_bar(figure, picture, axes, "radiance temperature / °C")
 
@@ -75,7 +71,7 @@ def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
     several = grid.times.size > 1
     mean = grid.frame_mean - KELVIN
     bars = grid.frame_deviation if several else grid.deviation[0]
-    spread = grid.frame_estimate.standard_uncertainty
+    uncertainty = grid.frame_estimate.standard_uncertainty
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, grid.depth.size))
     for m, depth in enumerate(grid.depth):
         if not grid.usable[:, m].any():
@@ -96,8 +92,7 @@ def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
             label=f"{1e6 * depth:.3g} µm",
         )
         if grid.estimate.components:
-            ends = mean[m] - spread[m], mean[m] + spread[m]
-            axes.fill_between(along, *ends, color=colours[m], alpha=0.15, linewidth=0)
+            drawing.shade(axes, along, mean[m], uncertainty[m], colours[m])
         partly = grid.frame_count[m] < grid.times.size
         hollow = {"color": colours[m], "markerfacecolor": "white", "linestyle": "none"}
         axes.plot(along[partly], mean[m, partly], marker=marker, markersize=4, zorder=3, **hollow)

@@ -45,7 +45,7 @@ class Instant:
         Parameters
         ----------
         scene : Scene
-            The scene; it must tell its tool.
+            The scene; it must state its tool.
         start, duration : float
             When the exposure begins and how long it lasts, in s.
         """
@@ -109,7 +109,7 @@ class Segment:
         Parameters
         ----------
         scene : Scene
-            The scene; it must tell its tool.
+            The scene; it must state its tool.
         instant : Instant
             Its band, during the exposure.
         duration : float

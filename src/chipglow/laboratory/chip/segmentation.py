@@ -1,4 +1,4 @@
-"""Segmentation of the chip as the cutting force tells it."""
+"""Segmentation of the chip as the cutting force shows it."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -89,10 +89,10 @@ def segmentation(
     and from a fifth of its duration on at the earliest. A force whose range is under a tenth of its
     mean has no segments: a continuous chip ripples, by some per cent.
     The autocorrelation of what remains gives a first period. Segments that are too unequal for
-    that (105 and 75 us, say) are told by three or more peaks that stand out by a third of the range
-    when the force is smoothed over a quarter of the time in which it forgets itself. Then the force
-    is smoothed over a fifteenth of that period, and its peaks, at least six tenths of a period
-    apart and a fifth of the swing high, give the period and its uncertainty.
+    that (105 and 75 us, say) show as three or more peaks that stand out by a third of the range
+    when the force is smoothed over a quarter of the time in which it forgets itself. Then the
+    force is smoothed over a fifteenth of that period, and its peaks, at least six tenths of a
+    period apart and a fifth of the swing high, give the period and its uncertainty.
     """
     times = np.asarray(time, dtype=np.float64)
     cutting = np.asarray(cutting_force, dtype=np.float64)

@@ -56,19 +56,19 @@ def load_tool(path: str | Path) -> Tool:
 
 
 def tool_of(measurement: Measurement, path: str | Path | None) -> Tool:
-    """Tool of a file or, without one, the tool that a measurement tells.
+    """Tool of a file or, without one, the tool that a measurement states.
 
     Parameters
     ----------
     measurement : Measurement
-        A simulated measurement tells its scene's tool.
+        A simulated measurement states its scene's tool.
     path : str or Path, optional
         A tool's YAML file; see `load_tool`.
 
     Raises
     ------
     ValueError
-        If there is no file and the measurement tells no tool, or as `load_tool`.
+        If there is no file and the measurement states no tool, or as `load_tool`.
     OSError
         If the file cannot be read.
     """
@@ -77,7 +77,7 @@ def tool_of(measurement: Measurement, path: str | Path | None) -> Tool:
     tool = measurement.tool
     if tool is None:
         raise ValueError(
-            "--tool: the measurement tells no tool, expected a tool's YAML file, or 'found' to "
+            "--tool: the measurement states no tool, expected a tool's YAML file, or 'found' to "
             "look for the rake face in the image"
         )
     return tool

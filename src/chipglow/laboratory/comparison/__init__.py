@@ -10,7 +10,7 @@ from chipglow.laboratory.comparison.comparison import (
     compare,
     normalised_error,
 )
-from chipglow.laboratory.comparison.file import write_comparison
+from chipglow.laboratory.comparison.file import labelled_simulations, write_comparison
 
 __all__ = [
     "BandComparison",
@@ -20,6 +20,7 @@ __all__ = [
     "PlaceResult",
     "StatedUncertainties",
     "compare",
+    "labelled_simulations",
     "normalised_error",
     "write_comparison",
 ]

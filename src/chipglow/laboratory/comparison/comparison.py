@@ -1,11 +1,12 @@
 """Measured beside simulated: at the rake face and in the shear band, for several emissivities."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import degrees, isfinite, radians, sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.camera import Measurement
@@ -18,7 +19,7 @@ from chipglow.laboratory.chip import (
     band_profile,
     rake_grid,
 )
-from chipglow.laboratory.chip.band_profile import POSITION
+from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN, POSITION
 from chipglow.laboratory.chip.frame_scatter import FrameScatter
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
@@ -33,7 +34,7 @@ TIP_REACH: Final = 100e-6
 """Distance from the cutting edge in m within which the paper looks at the band by itself."""
 
 SURE: Final = 0.95
-"""Share of the draws in which the best set must be best to be called so."""
+"""Fraction of the draws in which the best set must be best to be called so."""
 
 _DRAWS: Final = 4000
 _SEED: Final = 2010
@@ -93,7 +94,7 @@ class PlaceResult:
     best : int
         Number of the one with the least root mean square.
     confidence : float
-        Share of draws of all uncertainties in which it has the least one.
+        Fraction of the draws of all uncertainties in which it has the least one.
     """
 
     place: str
@@ -122,7 +123,7 @@ class PlaceResult:
         if self.is_sure:
             return f"{_upper(self.place)} {best.label} fits best (in {how}): it is {what}; {rest}."
         return (
-            f"{_upper(self.place)} the sets cannot be told apart ({best.label} is nearest, in "
+            f"{_upper(self.place)} the sets cannot be distinguished ({best.label} is nearest, in "
             f"{how}): {best.label} is {what}; {rest}."
         )
 
@@ -206,6 +207,51 @@ class Comparison:
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
 
+    def to_frame(self) -> pd.DataFrame:
+        """Every value of each simulation, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``place``, ``along_um`` and ``depth_um`` of squares, ``distance_um`` of points
+            in the band, ``measured_degC``, ``simulation``, ``simulated_degC``, their expanded
+            uncertainties (k = 2) ``…_expanded_K``, ``difference_K`` and ``E_n``; NaN where there is
+            none.
+        """
+        parts: list[pd.DataFrame] = []
+        if self.grid is not None:
+            depth, along = np.meshgrid(1e6 * self.grid.depth, 1e6 * self.grid.along, indexing="ij")
+            place = {"along_um": along.ravel(), "depth_um": depth.ravel(), "distance_um": np.nan}
+            parts += _value_frames({"place": "rake face", **place}, self.labels, self.grid)
+        if self.band is not None:
+            distance = 1e6 * self.band.distance
+            place = {"along_um": np.nan, "depth_um": np.nan, "distance_um": distance}
+            parts += _value_frames({"place": "shear band", **place}, self.labels, self.band)
+        return pd.concat(parts, ignore_index=True)
+
+    def fit_frame(self) -> pd.DataFrame:
+        """How each simulation fits at each place, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``place``, ``simulation``, ``bias_K``, ``bias_standard_uncertainty_K``,
+            ``rms_K``, ``values`` and ``values_with_E_n_up_to_1``.
+        """
+        return pd.DataFrame(
+            {
+                "place": result.place.rstrip(","),
+                "simulation": fit.label,
+                "bias_K": fit.bias,
+                "bias_standard_uncertainty_K": fit.bias_uncertainty,
+                "rms_K": fit.rms,
+                "values": fit.count,
+                "values_with_E_n_up_to_1": fit.agreeing,
+            }
+            for result in self.places
+            for fit in result.fits
+        )
+
     @property
     def statement(self) -> str:
         """Which simulation fits where, as the paper's conclusion says it."""
@@ -220,13 +266,35 @@ class Comparison:
                 parts.append(f"{label} fits best {'; '.join(where)}.")
         unsure = [r.place.rstrip(",") for r in self.places if not r.is_sure]
         if unsure:
-            parts.append(f"The sets cannot be told apart {'; '.join(unsure)}.")
+            parts.append(f"The sets cannot be distinguished {'; '.join(unsure)}.")
         return " ".join(parts)
+
+
+def _value_frames(
+    place: Mapping[str, Any], labels: Sequence[str], pair: GridComparison | BandComparison
+) -> Iterator[pd.DataFrame]:
+    """Values of each simulation at one place."""
+    measured = pair.measured
+    for label, simulated in zip(labels, pair.simulated, strict=True):
+        columns = {
+            "measured_degC": measured.values - 273.15,
+            "measured_expanded_K": COVERAGE * measured.standard_uncertainty,
+            "simulation": label,
+            "simulated_degC": simulated.values - 273.15,
+            "simulated_expanded_K": COVERAGE * simulated.standard_uncertainty,
+            "difference_K": simulated.values - measured.values,
+            "E_n": normalised_error(measured, simulated),
+        }
+        yield pd.DataFrame({**place, **{name: _flat(values) for name, values in columns.items()}})
+
+
+def _flat(values: Any) -> Any:
+    return values if isinstance(values, str) else np.ravel(values)
 
 
 @dataclass(frozen=True)
 class StatedUncertainties:
-    """Uncertainties that the files do not tell.
+    """Uncertainties that the files do not state.
 
     Parameters
     ----------
@@ -278,20 +346,21 @@ def compare(
         Frames of the simulated camera by name, such as one for each set of emissivities. Pitch and
         grid of pixels may differ from the measured ones.
     tool : Tool
-        The tool, in the measurement's coordinates. A simulation that tells its own is placed by
+        The tool, in the measurement's coordinates. A simulation that states its own is placed by
         that.
     curve : ndarray, optional
         Polyline along which to read the shear band in all files, from the cutting edge outward, in
         the measurement's coordinates in m, shape (k, 2). By default the ridge of each frame.
     stated : StatedUncertainties, optional
-        Uncertainties that the files do not tell.
+        Uncertainties that the files do not state.
     reference : int, optional
         Number of the measured frame whose band is fully developed; see `band_profile`.
 
     Raises
     ------
     ValueError
-        If there is no simulation, or nothing that can be compared.
+        If there is no simulation, nothing that can be compared, or an uncertainty of the
+        temperature is stated beside that of the measurement itself.
 
     Notes
     -----
@@ -311,10 +380,15 @@ def compare(
     if not simulated:
         raise ValueError("comparison: no simulation, expected 1 or more")
     stated = stated or StatedUncertainties()
+    if stated.temperature > 0.0 and measured.calibration_errors is not None:
+        raise ValueError(
+            f"uncertainty: {stated.temperature:g} K beside the uncertainty that the measurement "
+            "states, expected one or the other"
+        )
     remarks = Remarks()
     if measured.calibration_errors is None and stated.temperature == 0.0:
         remarks.warnings.append(
-            "the measurement does not tell the uncertainty of its calibration and none is stated, "
+            "the measurement does not state the uncertainty of its calibration and none is stated, "
             "so that the E_n are too great."
         )
     allowed = max(_SAME_ANGLE, COVERAGE * stated.tool.angle if stated.tool else 0.0)
@@ -344,7 +418,7 @@ def _tool_of(
 ) -> Tool:
     own = simulated.tool
     if own is None:
-        remarks.assumptions.append(f"{label} tells no tool; it is where the measurement has it.")
+        remarks.assumptions.append(f"{label} states no tool; it is where the measurement has it.")
         return tool
     turn = abs(own.rake_angle - tool.rake_angle)
     if turn > allowed:
@@ -508,7 +582,9 @@ def _along(
     """
     used = profile.in_place
     remarks.assumptions.extend(f"{sentence} ({name})" for sentence in profile.assumptions)
-    remarks.warnings.extend(f"{sentence} ({name})" for sentence in profile.warnings)
+    remarks.warnings.extend(
+        f"{sentence} ({name})" for sentence in profile.warnings if sentence != CALIBRATION_UNKNOWN
+    )
     if not used.any():
         remarks.warnings.append(
             f"{name}: no frame has a band that is in place; all frames are used."
@@ -616,7 +692,7 @@ def _fit(label: str, measured: Estimate, simulated: Estimate) -> Fit:
 
 
 def _confidence(measured: Estimate, simulated: Sequence[Estimate], best: int) -> float:
-    """Share of draws of all uncertainties in which the best set stays the best."""
+    """Fraction of the draws of all uncertainties in which the best set stays the best."""
     base, *others = draw([measured, *simulated], _DRAWS, np.random.default_rng(_SEED))
     rms = [((other - base) ** 2).mean(axis=1) for other in others]
     return float((np.argmin(rms, axis=0) == best).mean())

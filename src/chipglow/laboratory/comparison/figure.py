@@ -69,26 +69,12 @@ def _draw_values(
     measured, *simulated = readings
     x, values = 1e6 * place, measured.values - KELVIN
     axes.plot(x, values, "k.", markersize=4, label="measured")
-    axes.fill_between(
-        x,
-        values - COVERAGE * measured.standard_uncertainty,
-        values + COVERAGE * measured.standard_uncertainty,
-        color=GREY,
-        alpha=0.3,
-        linewidth=0,
-        label="expanded uncertainty, k = 2",
-    )
+    expanded = COVERAGE * measured.standard_uncertainty
+    drawing.shade(axes, x, values, expanded, GREY, 0.3, "expanded uncertainty, k = 2")
     for i, (reading, label) in enumerate(zip(simulated, labels, strict=True)):
         values = reading.values - KELVIN
         axes.plot(x, values, color=_colour(i), label=label)
-        axes.fill_between(
-            x,
-            values - COVERAGE * reading.standard_uncertainty,
-            values + COVERAGE * reading.standard_uncertainty,
-            color=_colour(i),
-            alpha=0.15,
-            linewidth=0,
-        )
+        drawing.shade(axes, x, values, COVERAGE * reading.standard_uncertainty, _colour(i))
 
 
 def _draw_deeper(axes: Axes, grid: GridComparison) -> None:

@@ -1,36 +1,42 @@
 """A comparison of measured and simulated in files."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-import numpy as np
-
+from chipglow.camera import Measurement
 from chipglow.io.atomic import RESULT_MARK
-from chipglow.io.table_file import celsius_text, number_text, write_table
-from chipglow.laboratory.comparison.comparison import (
-    COVERAGE,
-    Comparison,
-    PlaceResult,
-    normalised_error,
-)
-from chipglow.uncertainty import Estimate
+from chipglow.laboratory.comparison.comparison import Comparison
+from chipglow.laboratory.measurement import load_measurement
+from chipglow.laboratory.result_file import write_frame
 
-_TABLE: Final = "comparison.csv"
-_COLUMNS: Final = (
-    "place",
-    "along_um",
-    "depth_um",
-    "distance_um",
-    "measured_degC",
-    "measured_expanded_K",
-    "simulation",
-    "simulated_degC",
-    "simulated_expanded_K",
-    "difference_K",
-    "E_n",
-)
+
+def labelled_simulations(paths: Iterable[str | Path]) -> dict[str, Measurement]:
+    """Read simulated measurements, by their attribute ``surface`` or their file's name.
+
+    Parameters
+    ----------
+    paths : iterable of path
+        Their files.
+
+    Raises
+    ------
+    ValueError
+        If one is no measurement, or there twice; the message names the file.
+    OSError
+        If one cannot be read.
+    """
+    found: dict[str, Measurement] = {}
+    for path in map(Path, paths):
+        item = load_measurement(path)
+        label = str(item.data.attrs.get("surface", path.stem))
+        if label in found:
+            label = f"{label} ({path.stem})"
+        if label in found:
+            raise ValueError(f"{path}: is there twice, expected each simulation once")
+        found[label] = item
+    return found
 
 
 def write_comparison(comparison: Comparison, folder: Path) -> None:
@@ -42,70 +48,28 @@ def write_comparison(comparison: Comparison, folder: Path) -> None:
         What to write.
     folder : Path
         Gets ``comparison.csv``, a line for each value of each simulation with its expanded
-        uncertainty (k = 2), and ``summary.json``, the fits, sentences and what is
-        assumed or doubtful; both with units in the names of the columns and keys.
+        uncertainty (k = 2), and ``summary.json``, the fits, sentences, assumptions
+        and warnings; both with units in the names of the columns and keys.
     """
-    write_table(folder / _TABLE, _COLUMNS, _rows(comparison))
+    write_frame(comparison.to_frame(), folder / "comparison.csv")
     summary = {
         "statement": comparison.statement,
         "simulations": list(comparison.labels),
-        "places": [_place(result) for result in comparison.places],
+        "places": [_place(comparison, number) for number in range(len(comparison.places))],
         "assumed": list(comparison.assumptions),
-        "doubtful": list(comparison.warnings),
+        "warnings": list(comparison.warnings),
     }
     text = json.dumps(summary, indent=1, ensure_ascii=False)
     (folder / RESULT_MARK).write_text(f"{text}\n", encoding="utf-8")
 
 
-def _rows(comparison: Comparison) -> Iterator[tuple[Any, ...]]:
-    grid, band = comparison.grid, comparison.band
-    if grid is not None:
-        for label, simulated in zip(comparison.labels, grid.simulated, strict=True):
-            for m, n in np.ndindex(grid.measured.values.shape):
-                middle = float(grid.along[n]), float(grid.depth[m])
-                place = ("rake face", *_micro(*middle), "")
-                yield (*place, *_values(grid.measured, label, simulated, (m, n)))
-    if band is not None:
-        for label, simulated in zip(comparison.labels, band.simulated, strict=True):
-            for n, distance in enumerate(band.distance):
-                place = ("shear band", "", "", *_micro(float(distance)))
-                yield (*place, *_values(band.measured, label, simulated, (n,)))
-
-
-def _micro(*lengths: float) -> list[str]:
-    return [f"{1e6 * length:.8g}" for length in lengths]
-
-
-def _values(
-    measured: Estimate, label: str, simulated: Estimate, at: tuple[int, ...]
-) -> tuple[str, ...]:
-    own, other = measured.values[at], simulated.values[at]
-    return (
-        celsius_text(own),
-        number_text(COVERAGE * measured.standard_uncertainty[at]),
-        label,
-        celsius_text(other),
-        number_text(COVERAGE * simulated.standard_uncertainty[at]),
-        number_text(other - own),
-        number_text(normalised_error(measured, simulated)[at]),
-    )
-
-
-def _place(result: PlaceResult) -> dict[str, Any]:
+def _place(comparison: Comparison, number: int) -> dict[str, Any]:
+    result, fits = comparison.places[number], comparison.fit_frame()
+    place = result.place.rstrip(",")
     return {
-        "place": result.place.rstrip(","),
+        "place": place,
         "sentence": result.sentence,
         "best": result.fits[result.best].label,
         "confidence": result.confidence,
-        "fits": [
-            {
-                "simulation": fit.label,
-                "bias_K": fit.bias,
-                "bias_standard_uncertainty_K": fit.bias_uncertainty,
-                "rms_K": fit.rms,
-                "values": fit.count,
-                "values_with_E_n_up_to_1": fit.agreeing,
-            }
-            for fit in result.fits
-        ],
+        "fits": fits[fits["place"] == place].drop(columns="place").to_dict("records"),
     }

@@ -15,17 +15,21 @@ from chipglow.laboratory.emissivity.file import (
     read_emissivity_map,
     read_region_emissivity,
     write_emissivity,
-    write_emissivity_table,
-    write_temperature_table,
 )
 from chipglow.laboratory.emissivity.heated import HeatedObject, HeatedRow
+from chipglow.laboratory.emissivity.region_emissivities import (
+    RegionEmissivities,
+    determine_emissivities,
+)
 from chipglow.laboratory.emissivity.regions import RegionSection, load_regions
 from chipglow.laboratory.emissivity.study_sections import surface_text
 from chipglow.laboratory.emissivity.temperature import (
     KnownEmissivity,
     ReflectedTemperature,
+    RegionTemperatures,
     TrueTemperature,
     true_temperature,
+    true_temperatures,
 )
 
 __all__ = [
@@ -37,10 +41,13 @@ __all__ = [
     "Heating",
     "KnownEmissivity",
     "ReflectedTemperature",
+    "RegionEmissivities",
     "RegionEmissivity",
     "RegionSection",
+    "RegionTemperatures",
     "StoredEmissivity",
     "TrueTemperature",
+    "determine_emissivities",
     "determine_emissivity",
     "emissivity_covariance",
     "emissivity_line",
@@ -49,7 +56,6 @@ __all__ = [
     "read_region_emissivity",
     "surface_text",
     "true_temperature",
+    "true_temperatures",
     "write_emissivity",
-    "write_emissivity_table",
-    "write_temperature_table",
 ]

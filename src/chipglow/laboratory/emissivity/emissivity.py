@@ -20,7 +20,7 @@ from chipglow.laboratory.emissivity.observations import (
     left_out_warning,
     observed_flags,
     observed_radiance,
-    told_calibration,
+    stated_calibration,
 )
 from chipglow.radiometry import Band
 from chipglow.scene import Area, Raster
@@ -49,11 +49,11 @@ class Heating:
         True temperature of the object, as of a thermocouple.
     reflected : float
         Temperature of the surroundings that it reflects; the paper's 293 K by default.
-    truth_uncertainty, environment_uncertainty : float
+    reference_uncertainty, reflected_uncertainty : float
         Standard uncertainties.
     camera_uncertainty : float, optional
         Standard uncertainty of the radiance temperature from the camera's calibration, common to
-        all pixels; by default that which the measurement tells.
+        all pixels; by default that which the measurement states.
     drift : float, optional
         Relative standard uncertainty of the radiance from one recording to the next, such as 0.01
         of a camera that warms up. By default it is what several recordings show; of one it is not
@@ -537,7 +537,7 @@ def _calibration(
         temperature = np.asarray(band.temperature(radiance), np.float64)
         ends = [band.radiance(temperature + sign * spread) for sign in (-1.0, 1.0)]
         return np.asarray((ends[1] - ends[0]) / 2, np.float64)
-    return told_calibration(measurements)
+    return stated_calibration(measurements)
 
 
 def _residual(about_line: NDArray[np.float64]) -> float:

@@ -43,14 +43,14 @@ def draw_emissivity(
             "radiance temperature",
             "°C",
             temperature,
-            _ends(temperature),
+            drawing.ends(temperature, 0.5, 99.5),
             drawing.HEAT,
         ),
         ImagePanel(
             f"emissivity, object at {found.heating.reference - KELVIN:.4g} °C",
             "emissivity",
             found.emissivity,
-            _ends(found.emissivity),
+            drawing.ends(found.emissivity, 0.5, 99.5),
         ),
     )
     height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, 1.0), 5.0) + _AROUND
@@ -64,12 +64,6 @@ def draw_emissivity(
         if lines:
             _draw_lines(parts[1].subplots(), lines, _colours(regions))
     return figure
-
-
-def _ends(image: NDArray[np.float64]) -> tuple[float, float]:
-    known = image[np.isfinite(image)]
-    low, high = map(float, np.percentile(known, (0.5, 99.5))) if known.size else (0.0, 1.0)
-    return low, high if high > low else low + 1.0
 
 
 def _draw_regions(axes: Axes, regions: Sequence[Region], raster: Raster, named: bool) -> None:
@@ -121,9 +115,8 @@ def _draw_lines(axes: Axes, lines: Sequence[EmissivityLine], colours: Mapping[st
         )
         along = np.linspace(celsius.min(), celsius.max(), 50)
         found = line.at(along + KELVIN)
-        value, spread = found.values, found.standard_uncertainty
-        axes.plot(along, value, color=colour)
-        axes.fill_between(along, value - 2 * spread, value + 2 * spread, color=colour, alpha=0.15)
+        axes.plot(along, found.values, color=colour)
+        drawing.shade(axes, along, found.values, 2 * found.standard_uncertainty, colour)
     axes.set_xlabel("true temperature / °C")
     axes.set_ylabel("emissivity")
     axes.set_title("means over the pixels; bars and bands: 2 standard uncertainties")

@@ -1,7 +1,7 @@
 """Determined emissivities in files: maps and regions as NetCDF-4, the table of regions as CSV."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final
@@ -9,20 +9,16 @@ from typing import Annotated, Any, ClassVar, Final
 import numpy as np
 import xarray as xr
 
-from chipglow.camera import Flag
 from chipglow.io import write_dataset
 from chipglow.io.measurement_file import Made, read_dataset
-from chipglow.io.table_file import write_table
 from chipglow.laboratory.emissivity.emissivity import (
     BUDGET,
     COMMON,
-    EmissivityMap,
     Heating,
-    RegionEmissivity,
     emissivity_covariance,
 )
 from chipglow.laboratory.emissivity.observations import RANDOM
-from chipglow.laboratory.emissivity.temperature import TEMPERATURE_BUDGET, TrueTemperature
+from chipglow.laboratory.emissivity.region_emissivities import RegionEmissivities
 from chipglow.quantities import FileBeside, Parameter
 from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
@@ -33,31 +29,29 @@ _KIND: Final = "emissivity map"
 _HEATING: Final = ("reflected", "reference_uncertainty", "reflected_uncertainty")
 
 
-def write_emissivity(
-    maps: Sequence[EmissivityMap],
-    rows: Sequence[Sequence[RegionEmissivity]],
-    path: str | os.PathLike[str],
-) -> None:
+def write_emissivity(found: RegionEmissivities, path: str | os.PathLike[str]) -> None:
     """Write emissivity maps and their regions to a NetCDF-4 file.
 
     Parameters
     ----------
-    maps : sequence of EmissivityMap
-        Of one object, one for each true temperature.
-    rows : sequence of sequence of RegionEmissivity
-        The same areas of each map.
+    found : RegionEmissivities
+        Of one object, at one true temperature or several.
     path : path-like
         The file to write; one that is there is replaced at the end.
     """
+    maps, rows = found.maps, found.rows
     raster = maps[0].raster
     images: dict[str, Any] = {
         "emissivity": np.stack([one.emissivity for one in maps]),
         "standard_uncertainty": np.stack([one.estimate.standard_uncertainty for one in maps]),
         "flags": np.stack([one.flags for one in maps]),
     }
-    tables = {f"region_{name}": _column(rows, name) for name in _COLUMNS}
+    table = found.to_frame().loc[:, "pixels":"expanded_uncertainty"].astype(float)
+    tables: dict[str, Any] = {
+        f"region_{name}": table[name].to_numpy().reshape(len(maps), -1) for name in table
+    }
     for cause in BUDGET:
-        effect = _effect if cause in COMMON else Estimate.contribution
+        effect = Estimate.effect if cause in COMMON else Estimate.contribution
         tables[f"region_{cause}_uncertainty"] = [
             [float(effect(row.estimate, cause)) for row in of] for of in rows
         ]
@@ -104,7 +98,7 @@ _FORMS: Final = {
     "repeatability": ("random", "random"),
     "noise": ("random", "random"),
 }
-"""How errors of the regions correlate along truth and region, as obsarray names it."""
+"""How errors of the regions correlate along reference and region, as obsarray names it."""
 
 
 def _say_correlations(data: xr.Dataset) -> None:
@@ -120,10 +114,6 @@ def _say_correlations(data: xr.Dataset) -> None:
         if np.isfinite(part.values).all():
             known.append(part.name)
     data["region_mean"].attrs["unc_comps"] = known
-
-
-def _effect(estimate: Estimate, cause: str) -> Any:
-    return estimate.effect(cause)
 
 
 @dataclass(frozen=True)
@@ -247,100 +237,6 @@ def _read(path: Path, made_of: Callable[[xr.Dataset], Made]) -> Made:
         return made_of(data)
 
     return read_dataset(path, checked, "an emissivity map", "a file of chipglow emissivity")
-
-
-def write_emissivity_table(rows: Sequence[RegionEmissivity], path: str | os.PathLike[str]) -> None:
-    """Write the table of regions as CSV, a line for each region and true temperature.
-
-    Parameters
-    ----------
-    rows : sequence of RegionEmissivity
-        The regions.
-    path : path-like
-        The file to write; one that is there is replaced at the end.
-    """
-    head = ["region", "feature", "truth_K", "environment_K", *_COLUMNS]
-    head += [f"{cause}_uncertainty" for cause in BUDGET]
-    write_table(Path(path), head, map(_line, rows))
-
-
-def _line(row: RegionEmissivity) -> list[str]:
-    numbers = [row.heating.reference, row.heating.reflected]
-    numbers += [_value(row, name) for name in _COLUMNS]
-    numbers += [float(row.estimate.contribution(cause)) for cause in BUDGET]
-    return [row.name, row.feature, *(f"{number:.9g}" for number in numbers)]
-
-
-def write_temperature_table(rows: Sequence[TrueTemperature], path: str | os.PathLike[str]) -> None:
-    """Write true temperatures of regions as CSV, a line each, in K.
-
-    Parameters
-    ----------
-    rows : sequence of TrueTemperature
-        The regions.
-    path : path-like
-        The file to write; one that is there is replaced at the end.
-    """
-    numbers = (
-        "emissivity", "radiance_temperature", "true_temperature", "deviation",
-        "standard_uncertainty", "degrees_of_freedom", "coverage_factor", "expanded_uncertainty",
-    )  # fmt: skip
-    head = ["region", "pixels", "left_out", *numbers]
-    head += [f"{cause}_uncertainty" for cause in TEMPERATURE_BUDGET]
-
-    def line(row: TrueTemperature) -> list[Any]:
-        found = row.estimate
-        values = [row.emissivity, row.radiance_temperature, found.values, row.deviation]
-        values += _stated(found).values()
-        values += [found.contribution(cause) for cause in TEMPERATURE_BUDGET]
-        texts = (f"{np.asarray(value).item():.9g}" for value in values)
-        return [row.name, row.pixels, row.left_out, *texts]
-
-    write_table(Path(path), head, map(line, rows))
-
-
-_COLUMNS: Final = (
-    "pixels",
-    "under_range",
-    "saturated",
-    "dead",
-    "under_0",
-    "over_1",
-    "mean",
-    "deviation",
-    "standard_uncertainty",
-    "degrees_of_freedom",
-    "coverage_factor",
-    "expanded_uncertainty",
-)
-
-
-def _value(row: RegionEmissivity, name: str) -> float:
-    special = {
-        "under_range": row.flagged[Flag.UNDER_RANGE],
-        "saturated": row.flagged[Flag.SATURATED],
-        "dead": row.flagged[Flag.DEAD],
-        "under_0": row.outside[0],
-        "over_1": row.outside[1],
-    }
-    stated = _stated(row.estimate)
-    if name in stated:
-        return stated[name]
-    return float(special[name] if name in special else getattr(row, name))
-
-
-def _stated(estimate: Estimate) -> dict[str, float]:
-    """What a table says of the uncertainty."""
-    return {
-        "standard_uncertainty": float(estimate.standard_uncertainty),
-        "degrees_of_freedom": float(estimate.degrees_of_freedom),
-        "coverage_factor": float(estimate.coverage_factor()),
-        "expanded_uncertainty": float(estimate.expanded_uncertainty()),
-    }
-
-
-def _column(rows: Sequence[Sequence[RegionEmissivity]], name: str) -> list[list[float]]:
-    return [[_value(row, name) for row in of] for of in rows]
 
 
 @SURFACES.part

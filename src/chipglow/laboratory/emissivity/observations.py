@@ -13,8 +13,8 @@ from chipglow.uncertainty import Cause, Component, Estimate
 RANDOM: Final = "random"
 """Name of the component of what observations show of chance."""
 
-_DOUBTFUL_SHARE: Final = 0.05
-"""Share of an area's pixels that may be left out before its result is doubtful."""
+_MANY_LEFT_OUT: Final = 0.05
+"""Fraction of an area's pixels from which on it is a warning that they are left out."""
 
 
 def area_estimate(mean: float, values: NDArray[np.float64], identity: str) -> Estimate:
@@ -57,23 +57,38 @@ def _random(mean: float, parts: dict[str, float], freedom: float, identity: str)
     return Estimate(np.array(mean), (Component(cause, np.array([list(parts.values())])),))
 
 
+def uncertainty_columns(estimate: Estimate, causes: Sequence[str]) -> dict[str, float]:
+    """What a table says of the uncertainty of one value: the whole, and its parts."""
+    whole = {
+        "standard_uncertainty": estimate.standard_uncertainty,
+        "degrees_of_freedom": estimate.degrees_of_freedom,
+        "coverage_factor": estimate.coverage_factor(),
+        "expanded_uncertainty": estimate.expanded_uncertainty(),
+    }
+    parts = {f"{cause}_uncertainty": estimate.contribution(cause) for cause in causes}
+    return {name: float(value) for name, value in (whole | parts).items()}
+
+
 def left_out_warning(name: str, pixels: int, left_out: int, flagged: dict[Flag, int]) -> str | None:
     """A sentence, without its full stop, if many of an area's pixels are left out."""
     total = pixels + left_out
-    if left_out <= _DOUBTFUL_SHARE * total:
+    if left_out <= _MANY_LEFT_OUT * total:
         return None
     return f"{name}: {left_out} of {total} pixels are left out ({flag_text(flagged)})"
 
 
-def check_same_pixels(measurements: Sequence[Measurement], purpose: str) -> None:
+def check_same_pixels(
+    measurements: Sequence[Measurement], purpose: str, names: Sequence[str] = ()
+) -> None:
     """Raise ValueError unless there are images, all of one camera that see the same place."""
     if not measurements:
         raise ValueError(f"{purpose}: there is no image, expected 1 or more")
+    names = names or [f"image {number}" for number, _ in enumerate(measurements, 1)]
     first = measurements[0]
-    for number, other in enumerate(measurements[1:], 2):
+    for name, other in zip(names, measurements, strict=True):
         if other.raster != first.raster or other.band != first.band:
             raise ValueError(
-                f"image {number}: has other pixels, or another band, than image 1, "
+                f"{name}: has other pixels, or another band, than {names[0]}, "
                 "expected images of one camera that see the same place"
             )
 
@@ -93,14 +108,14 @@ def observed_flags(measurements: Sequence[Measurement]) -> NDArray[np.uint8]:
     return np.asarray(np.bitwise_or.reduce(flags, axis=0), np.uint8)
 
 
-def told_calibration(measurements: Sequence[Measurement]) -> NDArray[np.float64] | None:
+def stated_calibration(measurements: Sequence[Measurement]) -> NDArray[np.float64] | None:
     """Standard uncertainty of the mean radiance from the calibration, shape (y, x).
 
-    In W/(m² sr); None unless all measurements tell it.
+    In W/(m² sr); None unless all measurements state it.
     """
     known = [measurement.calibration_uncertainty for measurement in measurements]
-    told = [image.mean(axis=0) for image in known if image is not None]
-    return np.asarray(np.mean(told, axis=0), np.float64) if len(told) == len(known) else None
+    stated = [image.mean(axis=0) for image in known if image is not None]
+    return np.asarray(np.mean(stated, axis=0), np.float64) if len(stated) == len(known) else None
 
 
 def count_flags(flags: NDArray[np.uint8]) -> dict[Flag, int]:
@@ -118,8 +133,8 @@ def flag_text(flagged: dict[Flag, int]) -> str:
         Flag.SATURATED: "saturated",
         Flag.DEAD: "dead",
     }
-    told = [f"{count} {words[flag]}" for flag, count in flagged.items() if count]
-    return ", ".join(told) or "none flagged"
+    texts = [f"{count} {words[flag]}" for flag, count in flagged.items() if count]
+    return ", ".join(texts) or "none flagged"
 
 
 def _usable_radiance(measurement: Measurement) -> NDArray[np.float64]:

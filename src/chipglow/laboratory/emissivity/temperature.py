@@ -1,13 +1,14 @@
 """True temperature of an area whose emissivity is known, with its uncertainty."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, sqrt
+from math import inf, isnan, sqrt
 from typing import Any, Final, Protocol
 from uuid import uuid4
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from chipglow.camera import FittedCalibration, Flag, Measurement
@@ -21,10 +22,11 @@ from chipglow.laboratory.emissivity.observations import (
     left_out_warning,
     observed_flags,
     observed_radiance,
-    told_calibration,
+    stated_calibration,
+    uncertainty_columns,
 )
 from chipglow.radiometry import Band
-from chipglow.scene import Area
+from chipglow.scene import Area, Region, areas
 from chipglow.uncertainty import Estimate, propagate
 
 TEMPERATURE_BUDGET: Final = (
@@ -32,6 +34,9 @@ TEMPERATURE_BUDGET: Final = (
     *("drift", "repeatability", "noise"),
 )
 """Lines of the budget of a true temperature."""
+
+FAR: Final = 50.0
+"""Difference of temperature in K from which on an emissivity may well be another."""
 
 _UNEVEN: Final = 0.5
 _NO_MATTER: Final = 0.01
@@ -187,7 +192,7 @@ def true_temperature(
         What the area reflects. By default those in which the emissivity was determined, with the
         same error; of a `KnownEmissivity` the paper's 293 K.
     calibration : FittedCalibration, optional
-        The camera's calibration with which both emissivity and area were measured: it tells how
+        The camera's calibration with which both emissivity and area were measured: it says how
         far its errors at the two radiances are the same.
     drift : float, optional
         Relative standard uncertainty of the radiance from one recording to the next; by default
@@ -205,7 +210,7 @@ def true_temperature(
     uncertainty is propagated to first order (JCGM 100:2008, Equation 13). Emissivity and area have
     errors in common, which partly cancel: a camera that shows too little radiance makes the
     emissivity too small. What is reflected is the same for both, unless another is given. The
-    calibration's have the correlation that its covariance tells; without `calibration`
+    calibration's have the correlation that its covariance says; without `calibration`
     none is taken, which is too much rather than too little as long as they are of one sign.
     """
     check_same_pixels(measurements, "temperature")
@@ -227,8 +232,8 @@ def true_temperature(
     correlation = _correlation(emissivity, mean, calibration, band)
     determined = not isinstance(emissivity, KnownEmissivity)
     shared = (correlation or 0.0) if determined else 1.0
-    told = told_calibration(measurements)
-    error = 0.0 if told is None else float(told[usable].mean())
+    stated = stated_calibration(measurements)
+    error = 0.0 if stated is None else float(stated[usable].mean())
     seen = _seen(values, error, shared, drift, len(measurements))
     found = propagate(
         lambda _, seen, __: equation.temperature(seen),
@@ -256,6 +261,150 @@ def true_temperature(
         estimate=replace(found, warnings=tuple(warnings)),
         correlation=correlation,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class RegionTemperatures:
+    """True temperatures of regions; made by `true_temperatures`.
+
+    Parameters
+    ----------
+    rows : tuple of TrueTemperature
+        One for each region of known emissivity.
+    assumptions, warnings : tuple of str
+        What had to be assumed, and why the result may not be relied on, a sentence each.
+    """
+
+    rows: tuple[TrueTemperature, ...]
+    assumptions: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def to_frame(self) -> pd.DataFrame:
+        """Every region, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            In K: columns ``region``, ``pixels``, ``left_out``, ``emissivity``,
+            ``radiance_temperature``, ``true_temperature``, ``deviation`` over the pixels,
+            ``standard_uncertainty``, ``degrees_of_freedom``, ``coverage_factor``,
+            ``expanded_uncertainty``, and the parts ``…_uncertainty`` of the standard uncertainty;
+            NaN where nothing is known.
+        """
+        return pd.DataFrame(
+            {
+                "region": row.name,
+                "pixels": row.pixels,
+                "left_out": row.left_out,
+                "emissivity": row.emissivity,
+                "radiance_temperature": row.radiance_temperature,
+                "true_temperature": float(row.estimate.values),
+                "deviation": row.deviation,
+                **uncertainty_columns(row.estimate, TEMPERATURE_BUDGET),
+            }
+            for row in self.rows
+        )
+
+
+def true_temperatures(
+    measurements: Sequence[Measurement],
+    regions: Sequence[Region],
+    emissivities: Mapping[str, DeterminedEmissivity] | KnownEmissivity,
+    surroundings: ReflectedTemperature | None = None,
+    calibration: FittedCalibration | None = None,
+    drift: float | None = None,
+    names: Sequence[str] = (),
+) -> RegionTemperatures:
+    """True temperatures of the regions of an image.
+
+    Parameters
+    ----------
+    measurements : sequence of Measurement
+        Images of the object; several of them are repetitions.
+    regions : sequence of Region
+        Regions of uniform temperature.
+    emissivities : mapping or KnownEmissivity
+        By the regions' names, as `read_region_emissivity` gives them; a region without one is left
+        out. Or one for all.
+    surroundings, calibration, drift
+        As for `true_temperature`.
+    names : sequence of str
+        Names of the images, for errors; their numbers by default.
+
+    Raises
+    ------
+    ValueError
+        If the emissivity of no region is known, or as `true_temperature`.
+    """
+    check_same_pixels(measurements, "temperature", names)
+    found = areas(regions, measurements[0].raster)
+    if isinstance(emissivities, KnownEmissivity):
+        known: Mapping[str, DeterminedEmissivity | KnownEmissivity] = dict.fromkeys(
+            (area.name for area in found), emissivities
+        )
+    else:
+        known = {area.name: emissivities[area.name] for area in found if area.name in emissivities}
+        if not known:
+            raise ValueError(
+                f"emissivity: is known of {', '.join(emissivities)}, expected one of the regions "
+                f"{', '.join(area.name for area in found)}"
+            )
+    rows = tuple(
+        true_temperature(measurements, area, known[area.name], surroundings, calibration, drift)
+        for area in found
+        if area.name in known
+    )
+    warnings = [warning for row in rows for warning in row.estimate.warnings]
+    if not isinstance(emissivities, KnownEmissivity):
+        warnings.extend(_far_from_the_heating(rows, emissivities))
+    unknown_drift = drift is None and len(measurements) == 1
+    unknown_drift |= any(isnan(one.estimate.contribution("drift")) for one in known.values())
+    fixed = isinstance(emissivities, KnownEmissivity)
+    assumed = _assumptions(rows, fixed, surroundings is None, unknown_drift)
+    return RegionTemperatures(rows, tuple(assumed), tuple(warnings))
+
+
+def _far_from_the_heating(
+    rows: Iterable[TrueTemperature], emissivities: Mapping[str, DeterminedEmissivity]
+) -> Iterator[str]:
+    """Regions whose temperature is another than that at which their emissivity was determined."""
+    for row in rows:
+        heated = emissivities[row.name].heating.reference
+        difference = abs(float(row.estimate.values) - heated)
+        if difference > FAR:
+            yield (
+                f"{row.name}: is {difference:.0f} K from the {heated - 273.15:.0f} °C "
+                "at which its emissivity was determined; what the temperature changes in the "
+                "emissivity is not in u."
+            )
+
+
+def _assumptions(
+    rows: Sequence[TrueTemperature], known: bool, same_surroundings: bool, unknown_drift: bool
+) -> Iterator[str]:
+    yield "every region is of uniform temperature and emissivity."
+    if not known:
+        yield "the emissivity is the same at all temperatures."
+    if known and not any(row.estimate.contribution("emissivity") for row in rows):
+        yield "the emissivity is exact (emissivity_uncertainty)."
+    if known and same_surroundings:
+        yield "the object reflects 293 K exactly (reflected, reflected_uncertainty)."
+    if not known and same_surroundings:
+        yield "the object reflects what it did when its emissivity was determined."
+    if not any(row.estimate.contribution("calibration") for row in rows):
+        yield "the camera's calibration is exact, as the measurement states no uncertainty of it."
+    elif not known and rows[0].correlation is None:
+        yield (
+            "the calibration's errors in the emissivity and here are independent, which makes u "
+            "too large rather than too small (calibration)."
+        )
+    if unknown_drift:
+        yield (
+            "the camera does not drift from one recording to the next: there is one image here or "
+            "of the emissivity, which does not show it, and u holds nothing of it (drift)."
+        )
+    if any(isnan(row.estimate.contribution("repeatability")) for row in rows):
+        yield "nothing changes from frame to frame, as there is one only."
 
 
 def _seen(

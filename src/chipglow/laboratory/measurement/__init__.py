@@ -1,9 +1,14 @@
 """From a file of a camera to a measurement in radiance temperature."""
 
+from chipglow.laboratory.measurement.blackbody_calibration import (
+    BlackbodyCalibration,
+    calibrate_blackbodies,
+)
 from chipglow.laboratory.measurement.calibration_file import (
     CalibrationDescription,
     calibration_text,
     load_calibration,
+    write_calibration,
 )
 from chipglow.laboratory.measurement.camera_file import (
     FlatFieldSources,
@@ -21,20 +26,22 @@ from chipglow.laboratory.measurement.description import (
 from chipglow.laboratory.measurement.radiometric_calibration import (
     ImagePosition,
     calibrate_recording,
-    flag_shares,
+    flag_fractions,
     repaired_signal,
 )
 from chipglow.laboratory.measurement.summary import MeasurementSummary, measurement_summary
 
 __all__ = [
+    "BlackbodyCalibration",
     "CalibrationDescription",
     "FlatFieldSources",
     "ImagePosition",
     "MeasurementDescription",
     "MeasurementSummary",
+    "calibrate_blackbodies",
     "calibrate_recording",
     "calibration_text",
-    "flag_shares",
+    "flag_fractions",
     "load_calibration",
     "load_description",
     "load_measurement",
@@ -45,4 +52,5 @@ __all__ = [
     "pixel_correction",
     "repaired_signal",
     "uniform_counts",
+    "write_calibration",
 ]

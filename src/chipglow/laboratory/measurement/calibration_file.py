@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field, Strict
 
 from chipglow.camera import CalibrationFit, FittedCalibration, LinearCalibration, SakumaHattori
+from chipglow.io import atomic_path
 from chipglow.quantities import OR_NONE, Settings, described
 from chipglow.quantities.units import Temperature, Time, WavelengthRange
 from chipglow.radiometry import Band, TabulatedResponse
@@ -36,10 +37,10 @@ class CalibrationDescription(Settings[FittedCalibration]):
     lowest: Temperature = Field(description="Coldest blackbody: colder pixels are flagged.")
     highest: Temperature = Field(description="Hottest blackbody: hotter pixels are flagged.")
     integration_time: Annotated[Time | None, OR_NONE] = described(
-        "none", "Integration time for which it holds; none: not told, not checked."
+        "none", "Integration time for which it holds; none: not stated, not checked."
     )
     range: Annotated[str | None, OR_NONE] = described(
-        "none", "The camera's measuring range for which it holds; none: not told, not checked."
+        "none", "The camera's measuring range for which it holds; none: not stated, not checked."
     )
     parameters: dict[str, float] = Field(
         description="offset and C in counts, gain in counts per W/(m^2 sr), A in m, B in m K."
@@ -129,6 +130,19 @@ def load_calibration(path: str | Path) -> FittedCalibration:
         If the file cannot be read.
     """
     return load_described(CalibrationDescription, path).build()
+
+
+def write_calibration(fit: CalibrationFit[FittedCalibration], path: str | Path) -> None:
+    """Write a calibration to a YAML file, which `load_calibration` reads.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    text = calibration_text(CalibrationDescription.of(fit))
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def calibration_text(description: CalibrationDescription) -> str:

@@ -29,7 +29,7 @@ from chipglow.laboratory.measurement.radiometric_calibration import (
 from chipglow.text import DescriptionError
 
 _MOST_SATURATED: Final = 0.05
-"""Share of frames of a flat-field source that may be saturated, as bad pixels are."""
+"""Fraction of frames of a flat-field source that may be saturated, as bad pixels are."""
 
 
 def load_measurement(source: str | Path, settings: Iterable[str] = ()) -> Measurement:
@@ -255,7 +255,7 @@ class FlatFieldSources:
         # Which frames of which file are corrected makes no difference to what corrects them.
         uniform = self._read(description.model_copy(update={"file": None, "frames": None}))
         for name, found in (("high", uniform.high), ("low", uniform.low)):
-            problem = None if found is None else _misfit(found, recording)
+            problem = None if found is None else _unsuitable(found, recording)
             if problem is not None:
                 raise ValueError(f"flat_field.{name}: {problem}")
         return uniform
@@ -298,7 +298,7 @@ def _uniform(description: MeasurementDescription, file: str) -> Recording:
     return _read(description, file, every=True)
 
 
-def _misfit(uniform: Recording, recording: Recording) -> str | None:
+def _unsuitable(uniform: Recording, recording: Recording) -> str | None:
     """Why frames of a flat-field source are of no use for a recording."""
     if uniform.quantity != recording.quantity:
         return f"holds {uniform.quantity}, expected {recording.quantity} as the recording"

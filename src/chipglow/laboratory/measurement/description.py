@@ -67,7 +67,7 @@ def band_of(text: str) -> Band:
 
 
 class ObjectSection(Section):
-    """What the camera was told of the object, where the file does not say it or says it wrong."""
+    """The camera's settings of the object, where the file does not say them or says them wrong."""
 
     emissivity: Annotated[float | None, OR_NONE] = described(
         "none", "Emissivity of the object.", "none, or over 0 to 1"
@@ -83,7 +83,7 @@ class ObjectSection(Section):
     )
 
     def applied_to(self, recorded: ObjectParameters | None) -> ObjectParameters | None:
-        """What the camera was told: as recorded, but for what is said here."""
+        """What the camera was set to: as recorded, but for what is said here."""
         said: dict[str, float] = {name: value for name, value in self if value is not None}
         return replace(recorded or ObjectParameters(), **said) if said else recorded
 
@@ -109,7 +109,7 @@ class MeasurementDescription(Section):
         "none", "The camera's file; of TIFF and tables also a pattern: frame_*.tif."
     )
     format: Annotated[str | None, OR_NONE] = described(
-        "none", "What the file is; none: told by its content.", "none, flir, ptw, hcc, tiff, ..."
+        "none", "What the file is; none: known by its content.", "none, flir, ptw, hcc, tiff, ..."
     )
     frames: Annotated[str | None, OR_NONE] = described(
         "none",
@@ -147,7 +147,7 @@ class MeasurementDescription(Section):
     )
     fill_factor: Annotated[float | None, OR_NONE] = described(
         "none",
-        "Portion of a pixel's square that takes light; none: not told, 1 is assumed for an edge.",
+        "Portion of a pixel's square that takes light; none: not stated, 1 is assumed for an edge.",
         "none, or over 0 to 1",
     )
     quarter_turns: int = described(
@@ -168,7 +168,7 @@ class MeasurementDescription(Section):
         "none", "Integration time; none: as the file says."
     )
     range: Annotated[str | None, OR_NONE] = described(
-        "none", "Measuring range of the camera by its name; none: not told."
+        "none", "Measuring range of the camera by its name; none: not stated."
     )
     saturation: Annotated[float | None, OR_NONE] = described(
         "none", "Greatest number in the file that is not saturated; none: as the file says."
@@ -188,7 +188,7 @@ class MeasurementDescription(Section):
     )
     object_parameters: ObjectSection = described(
         {},
-        "What the camera was told of the object; none: as the file says. Of temperatures it is\n"
+        "What the camera was set to for the object; none: as the file says. Of temperatures it is\n"
         "taken back: chipglow takes radiance as the camera received it.",
     )
     flat_field: FlatFieldSection = described({}, "Frames of flat-field sources.")

@@ -49,7 +49,7 @@ def draw_measurement(measurement: Measurement, time: float | None = None) -> Fig
         upper, lower = figure.subplots(2, 1, height_ratios=(height, _HISTOGRAM))
         title = f"{measurement.times[index] * 1e6:.6g} µs"
         panel = ImagePanel(
-            title, "radiance temperature / °C", celsius, _ends(celsius), drawing.HEAT
+            title, "radiance temperature / °C", celsius, drawing.ends(celsius), drawing.HEAT
         )
         panel.draw(figure, upper, raster, measurement.tool)
         upper.set_xlabel("x / µm")
@@ -57,12 +57,6 @@ def draw_measurement(measurement: Measurement, time: float | None = None) -> Fig
         _draw_flags(upper, flags, measurement)
         _draw_histogram(lower, celsius)
     return figure
-
-
-def _ends(image: NDArray[np.float64]) -> tuple[float, float]:
-    known = image[np.isfinite(image)]
-    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
-    return low, high if high - low > 1e-6 * abs(high) else low + 1.0
 
 
 def _draw_flags(axes: Axes, flags: NDArray[np.uint8], measurement: Measurement) -> None:
@@ -85,5 +79,5 @@ def _draw_histogram(axes: Axes, celsius: NDArray[np.float64]) -> None:
     axes.set_xlabel("radiance temperature / °C")
     axes.set_ylabel("pixels")
     if known.size:
-        low, high = _ends(known)
+        low, high = drawing.ends(known)
         axes.hist(known, np.linspace(low, high, _BINS).tolist(), color=BLUE)

@@ -87,7 +87,7 @@ def calibrate_recording(
 
     Counts become radiance by the calibration, which needs no object parameters. Radiance is taken
     as the camera received it. Temperatures become the radiance that the camera received: what it
-    was told of the object is taken back (`ObjectParameters.apparent_radiance`).
+    was set to for the object is taken back (`ObjectParameters.apparent_radiance`).
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def calibrate_recording(
     Measurement
         Pixels over the recording's saturation, or hotter than the calibration reaches, are
         `Flag.SATURATED`; colder ones `Flag.UNDER_RANGE`. Attributes, each with a sentence a line:
-        ``notes`` (what the file says), ``assumed`` and ``doubtful``.
+        ``notes`` (what the file says), ``assumed`` and ``warnings``.
 
     Raises
     ------
@@ -249,7 +249,7 @@ def _develop_frames(
     non_uniformity: NonUniformity | None,
     bad_pixels: NDArray[np.bool_] | None,
 ) -> _Developed:
-    """Radiance in 32 bits, which hold more than counts can tell, with flags."""
+    """Radiance in 32 bits, which hold more than counts do, with flags."""
     signal, flags = repaired_signal(recording, non_uniformity, bad_pixels)
     radiance = _radiance(recording, calibration, band, signal)
     if calibration is not None and calibration.highest < np.inf:
@@ -322,8 +322,8 @@ def _radiance(
         return calibration.radiance(signal)
     if recording.quantity == "radiance":
         return signal
-    told = recording.object_parameters or ObjectParameters()
-    return told.apparent_radiance(signal, band)
+    settings = recording.object_parameters or ObjectParameters()
+    return settings.apparent_radiance(signal, band)
 
 
 def _attributes(
@@ -339,10 +339,10 @@ def _attributes(
         "integration_time": _known(recording, calibration, "integration_time"),
         "range": _known(recording, calibration, "range_name"),
         "calibration": calibration.description if calibration else None,
-        "object_parameters": _told(recording),
+        "object_parameters": _object_text(recording),
         "notes": "\n".join(recording.notes),
         "assumed": "\n".join(_assumed(recording, calibration, position)),
-        "doubtful": "\n".join(_doubtful(recording, calibration, errors_known)),
+        "warnings": "\n".join(_warnings(recording, calibration, errors_known)),
     }
     return {name: value for name, value in attributes.items() if value not in (None, "")}
 
@@ -353,10 +353,10 @@ def _known(recording: Recording, calibration: Calibration | None, name: str) -> 
     return getattr(calibration, name, None) if said is None else said
 
 
-def _told(recording: Recording) -> str | None:
-    """What the camera was told of the object, and what became of it."""
-    told = recording.object_parameters
-    if told is None:
+def _object_text(recording: Recording) -> str | None:
+    """What the camera was set to for the object, and what became of it."""
+    settings = recording.object_parameters
+    if settings is None:
         return None
     became = {
         "counts": "counts do not depend on it",
@@ -364,9 +364,9 @@ def _told(recording: Recording) -> str | None:
         "temperature": "taken back",
     }
     return (
-        f"emissivity {told.emissivity:g}, reflected {told.reflected - 273.15:g} degC, "
-        f"transmittance {told.transmittance:g}, atmosphere {told.atmosphere - 273.15:g} degC: "
-        f"{became[recording.quantity]}"
+        f"emissivity {settings.emissivity:g}, reflected {settings.reflected - 273.15:g} degC, "
+        f"transmittance {settings.transmittance:g}, "
+        f"atmosphere {settings.atmosphere - 273.15:g} degC: {became[recording.quantity]}"
     )
 
 
@@ -374,8 +374,8 @@ def _assumed(
     recording: Recording, calibration: Calibration | None, position: ImagePosition
 ) -> Iterator[str]:
     yield from recording.assumptions
-    told = recording.object_parameters
-    if recording.quantity == "temperature" and told is None:
+    settings = recording.object_parameters
+    if recording.quantity == "temperature" and settings is None:
         yield (
             "The temperatures are radiance temperatures, as with an emissivity of 1: the file says "
             "nothing of the object."
@@ -397,7 +397,7 @@ def _assumed(
         yield "The origin of coordinates is the image's lower left corner: no tip was given."
 
 
-def _doubtful(
+def _warnings(
     recording: Recording, calibration: Calibration | None, errors_known: bool
 ) -> Iterator[str]:
     yield from recording.warnings
@@ -416,8 +416,8 @@ def _doubtful(
             )
 
 
-def flag_shares(measurement: Measurement) -> dict[Flag, float]:
-    """Share of the pixels of all frames that has each flag.
+def flag_fractions(measurement: Measurement) -> dict[Flag, float]:
+    """Fraction of the pixels of all frames that has each flag.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
 from chipglow.drawing.frames import shown_frame
-from chipglow.laboratory.measurement.radiometric_calibration import flag_shares
+from chipglow.laboratory.measurement.radiometric_calibration import flag_fractions
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,9 @@ class MeasurementSummary:
     index : int
         The frame that is looked at.
     usable : float
-        Share of the pixels of all frames with a radiance temperature.
-    shares : mapping
-        Share of the pixels of all frames that has each flag.
+        Fraction of the pixels of all frames with a radiance temperature.
+    fractions : mapping
+        Fraction of the pixels of all frames that has each flag.
     now, overall : tuple of float or None
         Least, median and greatest radiance temperature in K of that frame and of all; None if no
         pixel has one.
@@ -33,7 +33,7 @@ class MeasurementSummary:
 
     index: int
     usable: float
-    shares: Mapping[Flag, float]
+    fractions: Mapping[Flag, float]
     now: tuple[float, float, float] | None
     overall: tuple[float, float, float] | None
     uncertainty: tuple[float, float] | None
@@ -59,7 +59,7 @@ def measurement_summary(measurement: Measurement, time: float | None = None) -> 
     return MeasurementSummary(
         index,
         float(np.mean(measurement.usable)),
-        flag_shares(measurement),
+        flag_fractions(measurement),
         _spread(kelvins[index]),
         _spread(kelvins),
         _uncertainty(measurement, kelvins),

@@ -20,7 +20,7 @@ _SECOND_EDGE: Final = 0.12
 _BLOCK: Final = 5
 _ROUGHLY: Final = 1e-5
 _LEAST_PILE: Final = 10
-_CLIPPED_SHARE: Final = 0.02
+_MANY_CLIPPED: Final = 0.02
 _WHOLE_SQUARE: Final = "the whole square of a pixel takes light (fill factor 1)."
 
 
@@ -110,7 +110,7 @@ def edge_image(
         footprint=image.pitch * sqrt(float(attributes.get("fill_factor", 1.0))),
         wavelength=(band.lower + band.upper) / 2 if band else None,
         notes=tuple(notes),
-        warnings=tuple(str(attributes.get("doubtful", "")).splitlines()),
+        warnings=tuple(str(attributes.get("warnings", "")).splitlines()),
     )
 
 
@@ -177,7 +177,7 @@ def _mean_image(
 ) -> EdgeImage:
     """Mean and flags of a region of frames."""
     part = region or np.s_[:, :]
-    told = np.bitwise_or.reduce(flags, axis=0)[part]
+    found = np.bitwise_or.reduce(flags, axis=0)[part]
     radiance = np.asarray(frames.mean(axis=0)[part], np.float64)
     if min(radiance.shape) < 8:
         raise ValueError(
@@ -188,9 +188,9 @@ def _mean_image(
         radiance,
         raster.x[part[1]],
         raster.y[part[0]],
-        ((told & (Flag.DEAD | Flag.REPLACED)) != 0) | ~np.isfinite(radiance),
-        (told & Flag.SATURATED) != 0,
-        (told & Flag.UNDER_RANGE) != 0,
+        ((found & (Flag.DEAD | Flag.REPLACED)) != 0) | ~np.isfinite(radiance),
+        (found & Flag.SATURATED) != 0,
+        (found & Flag.UNDER_RANGE) != 0,
         raster.spacing,
         None,
         name,
@@ -210,7 +210,7 @@ def _notes(measurement: Measurement) -> tuple[str, ...]:
 
 
 def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
-    """Find the edge in an image, and the pixels that tell of it.
+    """Find the edge in an image, and the pixels that show it.
 
     Where pixels are saturated or under range, all pixels from there on outward are left
     out: to leave out only those whose noise goes over the limit would shift the mean of the others.
@@ -225,7 +225,7 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
     EdgePixels
         The pixels, x and y from the image's middle, with even noise.
     list of str
-        What may make them doubtful.
+        Why they may not be trusted.
 
     Raises
     ------
@@ -297,7 +297,7 @@ def _check_edge(pixels: EdgePixels, quick: ModelFit) -> None:
 
 
 def _piled_up(image: EdgeImage) -> NDArray[np.bool_]:
-    """Pixels at a limit that no flag tells: many of just the greatest value, among noisy ones."""
+    """Pixels at a limit that no flag marks: many of just the greatest value, among noisy ones."""
     values, counts = np.unique(image.radiance[image.usable], return_counts=True)
     if values.size < 3:
         return np.zeros_like(image.dead)
@@ -331,7 +331,7 @@ def _first_clipped(
     index = ((distance - first) / (pitch / 2)).astype(np.int64).ravel()
     count = np.bincount(index)
     share = np.bincount(index, clipped.ravel()) / np.maximum(count, 1)
-    found = np.flatnonzero((share > _CLIPPED_SHARE) & (share * count >= 2))
+    found = np.flatnonzero((share > _MANY_CLIPPED) & (share * count >= 2))
     return first + float(found[0]) * pitch / 2 if found.size else np.inf
 
 

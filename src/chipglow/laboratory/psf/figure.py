@@ -112,8 +112,7 @@ def _draw_line(axes: Axes, edge: EdgeResult, distance: Any, model: Any) -> None:
 def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
     transfer = edge.transfer
     frequency = transfer.frequency * 1e-3
-    low, high = (transfer.value + sign * 2 * transfer.uncertainty for sign in (-1, 1))
-    axes.fill_between(frequency, low, high, color=GREY, alpha=0.3, linewidth=0)
+    drawing.shade(axes, frequency, transfer.value, 2 * transfer.uncertainty, GREY, 0.3)
     axes.plot(frequency, transfer.value, color=GREY, label="measured, 2 u")
     axes.plot(frequency, transfer.model, color=VERMILLION, label="fit: optics and pixel")
     axes.plot(frequency, transfer.optics, color=BLUE, linestyle="--", label="fit: optics alone")
@@ -141,5 +140,5 @@ def _draw_apertures(axes: Axes, found: KnifeEdge) -> None:
     axes.set_xscale("log")
     axes.set_title("size-of-source effect: signal in the middle of an aperture")
     axes.set_xlabel("diameter / µm")
-    axes.set_ylabel("share of an endless source / %")
+    axes.set_ylabel("fraction of an endless source / %")
     axes.legend(loc="lower right")

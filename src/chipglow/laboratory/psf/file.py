@@ -41,7 +41,7 @@ def write_psf(
         fwhm=knife.fwhm,
         fwhm_uncertainty=knife.fwhm_uncertainty,
         model=knife.best.model.name,
-        doubtful="\n".join(knife.warnings),
+        warnings="\n".join(knife.warnings),
         assumed="\n".join(knife.assumptions),
     )
     for fit, weight in zip(knife.fits, knife.weights, strict=True):
@@ -68,7 +68,7 @@ def _fit_variables(name: str, fit: ModelFit, weight: float) -> dict[str, xr.Vari
         "aicc": fit.aicc,
         "bic": fit.bic,
         "weight": weight,
-        "misfit": fit.misfit,
+        "reduced_chi_squared": fit.reduced_chi_squared,
     }
     dimension = f"{name}_parameter"
     return {

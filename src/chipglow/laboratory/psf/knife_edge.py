@@ -11,6 +11,7 @@ from math import degrees, exp, sqrt
 from typing import Final, Literal
 
 import numpy as np
+import pandas as pd
 from scipy.ndimage import uniform_filter
 from scipy.optimize import brentq
 from scipy.stats import chi2
@@ -29,6 +30,7 @@ from chipglow.laboratory.psf.edge_spread import (
 from chipglow.laboratory.psf.psf_fit import (
     ApertureSignals,
     EdgePixels,
+    FittedEdge,
     ModelFit,
     fit_model,
     orientations,
@@ -50,10 +52,10 @@ RADIAL: Final = "radial"
 """Name of the point spread function without a model."""
 
 _ROUGHLY: Final = 1e-6
-_MISFIT: Final = 1.6
+_NOISE_ALONE: Final = 1.6
 _BY_CHANCE: Final = 0.01
 _TRIES: Final = 6
-_APERTURE_MISFIT: Final = 4.0
+_APERTURES_APART: Final = 4.0
 _NOTHING: Final = 5e-4
 _PLATEAU: Final = 3.0
 _UNRESOLVED: Final = 0.3
@@ -168,7 +170,42 @@ class KnifeEdge:
         bins = sum(edge.spread.distance.size for edge in self.edges)
         free = max(bins - self.best.free, 1)
         chance = float(chi2.isf(_BY_CHANCE, free)) / free
-        return self.best.misfit > chance and max(map(_left, self.edges)) > _NOTHING
+        return self.best.reduced_chi_squared > chance and max(map(_left, self.edges)) > _NOTHING
+
+    def to_frame(self) -> pd.DataFrame:
+        """The models, a row each, the best first.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``model``, ``fwhm_um`` of the optics with its ``fwhm_uncertainty_um``, Akaike's
+            and the Bayesian information criterion less those of the best, ``aicc`` and ``bic``, the
+            ``weight``, and the ``reduced_chi_squared``.
+        """
+        return pd.DataFrame(
+            {
+                "model": fit.model.name,
+                "fwhm_um": 1e6 * fit.fwhm,
+                "fwhm_uncertainty_um": 1e6 * fit.fwhm_uncertainty,
+                "aicc": fit.aicc - self.best.aicc,
+                "bic": fit.bic - self.best.bic,
+                "weight": weight,
+                "reduced_chi_squared": fit.reduced_chi_squared,
+            }
+            for fit, weight in zip(self.fits, self.weights, strict=True)
+        )
+
+    def edge_frame(self) -> pd.DataFrame:
+        """The images, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``image``, ``normal_deg`` of the edge, ``fwhm_um`` of the optics by it alone,
+            ``mtf_at_nyquist``, each with its uncertainty; ``line_fwhm_um`` of the line-spread
+            function, and ``step_over_noise``.
+        """
+        return pd.DataFrame(map(_edge_row, self.edges, self.best.edges))
 
     def fit(self, name: str) -> ModelFit:
         """The fit of a model by its name.
@@ -208,7 +245,23 @@ class KnifeEdge:
             optics: PointSpreadFunction = self.radial.psf()
         else:
             optics = (self.best if model is None else self.fit(model)).psf()
-        return optics if part == "optics" else _with_sensor(optics, self.edges[0].image.footprint)
+        return optics if part == "optics" else _with_pixel(optics, self.edges[0].image.footprint)
+
+
+def _edge_row(edge: EdgeResult, fitted: FittedEdge) -> dict[str, float | str]:
+    transfer = edge.transfer
+    half = int(np.argmin(np.abs(transfer.frequency - 0.5 / edge.image.pitch)))
+    return {
+        "image": edge.image.name,
+        "normal_deg": degrees(fitted.line.normal),
+        "normal_uncertainty_deg": degrees(fitted.normal_uncertainty),
+        "fwhm_um": 1e6 * edge.fwhm,
+        "fwhm_uncertainty_um": 1e6 * edge.fwhm_uncertainty,
+        "line_fwhm_um": 1e6 * edge.line_fwhm,
+        "step_over_noise": fitted.step / edge.noise,
+        "mtf_at_nyquist": float(transfer.value[half]),
+        "mtf_at_nyquist_uncertainty": float(transfer.uncertainty[half]),
+    }
 
 
 def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] = ()) -> KnifeEdge:
@@ -220,7 +273,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
         Images of a straight edge, best of several orientations.
     apertures : sequence of ApertureImage, optional
         Images of round apertures of several diameters before one source: how much brighter the
-        middle of a large one is tells of the tails.
+        middle of a large one is shows the tails.
 
     Raises
     ------
@@ -245,7 +298,7 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
     models, assumptions = _models(images, edges)
     assumptions += dict.fromkeys(note for image in images for note in image.notes)
     first = [fit_model(model, edges, signals, tolerance=_ROUGHLY) for model in models]
-    if min(fit.misfit for fit in first) > _MISFIT:
+    if min(fit.reduced_chi_squared for fit in first) > _NOISE_ALONE:
         # Where much is clipped there are several minima.
         first = [fit_model(model, edges, signals, None, _ROUGHLY, _TRIES) for model in models]
     found = min(first, key=lambda fit: fit.bic)
@@ -260,16 +313,16 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
         _result(best, k, images[k], edges[k], spreads[k], alone) for k in range(len(edges))
     )
     for k, result in enumerate(results):
-        warnings += _edge_doubts(best, k, result)
-    warnings += _fit_doubts(best, results)
-    warnings += _aperture_doubts(best, signals) if signals is not None else []
+        warnings += _edge_warnings(best, k, result)
+    warnings += _fit_warnings(best, results)
+    warnings += _aperture_warnings(best, signals) if signals is not None else []
     return KnifeEdge(results, tuple(fits), signals, tuple(warnings), tuple(assumptions))
 
 
 def _models(
     images: Sequence[EdgeImage], edges: Sequence[EdgePixels]
 ) -> tuple[list[PSFModel], list[str]]:
-    """Models that the images can tell apart, and what is assumed with them."""
+    """Models that the images can distinguish, and what is assumed with them."""
     models: list[PSFModel] = [
         GaussianModel(),
         GaussianTailModel(),
@@ -280,7 +333,7 @@ def _models(
     wavelength = images[0].wavelength
     if wavelength is None:
         assumptions.append(
-            "diffraction was not tried: the measurement does not tell the limits of its band."
+            "diffraction was not tried: the measurement does not state the limits of its band."
         )
     else:
         models.append(AnnularModel(wavelength))
@@ -341,7 +394,7 @@ def _line_fwhm(best: ModelFit, k: int, pixels: EdgePixels) -> float:
     return 2 * float(found)
 
 
-def _edge_doubts(best: ModelFit, k: int, result: EdgeResult) -> list[str]:
+def _edge_warnings(best: ModelFit, k: int, result: EdgeResult) -> list[str]:
     """What of an edge's place may make the results wrong."""
     pixels, name = result.pixels, result.image.name
     distance = best.edges[k].line.distance(pixels.x, pixels.y)
@@ -358,12 +411,12 @@ def _edge_doubts(best: ModelFit, k: int, result: EdgeResult) -> list[str]:
     if short < _PLATEAU * result.line_fwhm:
         warnings.append(
             f"{name}: only {short * 1e6:.3g} um of one side of the edge are seen, under "
-            f"{_PLATEAU:g} widths: tails and brightness of the side cannot be told apart."
+            f"{_PLATEAU:g} widths: tails and brightness of the side cannot be distinguished."
         )
     return warnings
 
 
-def _fit_doubts(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
+def _fit_warnings(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
     """What of the best fit may make the results wrong."""
     warnings = []
     footprint = max(edge.image.footprint for edge in edges)
@@ -373,23 +426,23 @@ def _fit_doubts(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
             f"{footprint * 1e6:.3g} um: take it for an upper limit."
         )
     left = max(_left(edge) for edge in edges)
-    if best.misfit > _MISFIT and left > _NOTHING:
+    if best.reduced_chi_squared > _NOISE_ALONE and left > _NOTHING:
         warnings.append(
-            f"no model fits: the best, {best.model.name}, leaves {sqrt(best.misfit):.2g} times the "
-            f"noise in the means at a distance, {100 * left:.2g} % of the step near the edge; "
-            "uncertainties are enlarged by it, and the point spread function without a model "
-            "(radial) may be nearer."
+            f"no model fits: the best, {best.model.name}, leaves "
+            f"{sqrt(best.reduced_chi_squared):.2g} times the noise in the means at a distance, "
+            f"{100 * left:.2g} % of the step near the edge; uncertainties are enlarged by it, "
+            "and the point spread function without a model (radial) may be nearer."
         )
     return warnings
 
 
-def _aperture_doubts(best: ModelFit, signals: ApertureSignals) -> list[str]:
+def _aperture_warnings(best: ModelFit, signals: ApertureSignals) -> list[str]:
     """Whether apertures say something else than the edges."""
     shares = signals.weights @ best.model.mean_transfer(best.values, signals.frequency)
     left = (signals.radiance - best.aperture_background) / best.source - shares
     square = float(np.sum((left * best.source / signals.sigma) ** 2))
     greatest = int(np.argmax(np.abs(left)))
-    if square < _APERTURE_MISFIT * left.size or abs(left[greatest]) < _NOTHING:
+    if square < _APERTURES_APART * left.size or abs(left[greatest]) < _NOTHING:
         return []
     return [
         f"the apertures and the edges contradict each other: the signal of "
@@ -404,7 +457,7 @@ def _left(edge: EdgeResult) -> float:
     return float(np.sqrt(np.mean(edge.spread.residual[near] ** 2)))
 
 
-def _with_sensor(optics: PointSpreadFunction, footprint: float) -> MeasuredPSF:
+def _with_pixel(optics: PointSpreadFunction, footprint: float) -> MeasuredPSF:
     """Kernel of optics and a square pixel."""
     spacing = footprint / _SUBSAMPLES
     kernel = np.pad(optics.kernel(spacing), _SUBSAMPLES // 2)

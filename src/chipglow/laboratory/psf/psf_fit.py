@@ -147,7 +147,7 @@ class ModelFit:
         Sum of the squared residuals over their noise.
     count, free : int
         Number of pixels and apertures, and of parameters.
-    misfit : float
+    reduced_chi_squared : float
         Squared residuals of the means at a distance over their noise, per degree of freedom: 1 if
         nothing but noise is left.
     """
@@ -163,7 +163,7 @@ class ModelFit:
     chi_square: float
     count: int
     free: int
-    misfit: float
+    reduced_chi_squared: float
 
     @property
     def aicc(self) -> float:
@@ -213,7 +213,7 @@ def fit_model(
     edges : sequence of EdgePixels
         One or more edges.
     apertures : ApertureSignals, optional
-        Signals of apertures, which tell of the tails.
+        Signals of apertures, which show the tails.
     start : ModelFit, optional
         An earlier fit of the same model to begin with.
     tolerance : float
@@ -339,13 +339,13 @@ class _Problem:
     def fitted(self, vector: NDArray[np.float64]) -> ModelFit:
         """The result, with what the residuals say of it."""
         residual, jacobian = self.residual(vector), self.jacobian(vector)
-        misfit = self._misfit(vector, residual)
+        reduced = self._reduced_chi_squared(vector, residual)
         scaled = jacobian * self.scales
         inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-13, hermitian=True)
         inverse = inverse * np.outer(self.scales, self.scales)
         # What is left beyond the noise acts as more of it (Birge).
         noise = float(residual @ residual) / max(residual.size - vector.size, 1)
-        covariance = inverse * max(misfit, 1.0) * noise
+        covariance = inverse * max(reduced, 1.0) * noise
         values = vector[: self.shapes]
         inner = covariance[: self.shapes, : self.shapes]
         fwhm, gradient = self._fwhm(values)
@@ -363,7 +363,7 @@ class _Problem:
             float(residual @ residual),
             residual.size,
             vector.size,
-            misfit,
+            reduced,
         )
 
     @property
@@ -398,7 +398,9 @@ class _Problem:
             gradient[k] = change / (above[k] - below[k])
         return self.model.fwhm(values), gradient
 
-    def _misfit(self, vector: NDArray[np.float64], residual: NDArray[np.float64]) -> float:
+    def _reduced_chi_squared(
+        self, vector: NDArray[np.float64], residual: NDArray[np.float64]
+    ) -> float:
         """Means of the residuals at a distance, squared and over their noise, per freedom."""
         total, bins, row = 0.0, 0, 0
         for edge, (_, _, line) in zip(self.edges, self._places(vector), strict=True):

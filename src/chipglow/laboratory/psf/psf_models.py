@@ -136,7 +136,7 @@ class GaussianTailModel(PSFModel):
     """
 
     name = "gaussian with tail"
-    parameters = ("core_fwhm", "tail_share", "tail_ratio")
+    parameters = ("core_fwhm", "tail_fraction", "tail_ratio")
 
     def starts(self, fwhm: float) -> list[list[float]]:
         """See `PSFModel.starts`."""
@@ -192,7 +192,7 @@ class AnnularModel(PSFModel):
     Parameters
     ----------
     wavelength : float
-        In m. Only its ratio to the numerical aperture can be told from an image.
+        In m. Only its ratio to the numerical aperture is known from an image.
     """
 
     wavelength: float

@@ -3,7 +3,7 @@
 The light is shared among rings about the point. Each ring has a known edge-spread function, so
 that the shares follow from the measured one by least squares: the inversion of Abel's integral.
 Alone that would blow up the noise. No share is negative, and the difference to the best model
-changes as smoothly from ring to ring as the data let it: what the data do not tell, as the finest
+changes as smoothly from ring to ring as the data let it: what the data do not show, as the finest
 of the core and the farthest of the tails, is the model's.
 """
 
@@ -66,7 +66,7 @@ class RadialPSF:
     smoothness: float
 
     @property
-    def shares(self) -> NDArray[np.float64]:
+    def fractions(self) -> NDArray[np.float64]:
         """Values of `estimate`."""
         return self.estimate.values
 
@@ -76,7 +76,7 @@ class RadialPSF:
 
         Both are read from the rings, so that what these are too coarse for drops out.
         """
-        return _ring_width(self.edges, self.shares) - _ring_width(self.edges, self.model)
+        return _ring_width(self.edges, self.fractions) - _ring_width(self.edges, self.model)
 
     @property
     def radius(self) -> NDArray[np.float64]:
@@ -86,16 +86,16 @@ class RadialPSF:
     @property
     def density(self) -> NDArray[np.float64]:
         """Light per area in 1/m²."""
-        return np.asarray(self.shares / (np.pi * np.diff(self.edges**2)))
+        return np.asarray(self.fractions / (np.pi * np.diff(self.edges**2)))
 
     @property
     def encircled(self) -> Estimate:
         """Share of the light within each of the radii `edges`."""
-        return self.estimate.linear(np.tri(self.edges.size, self.shares.size, -1))
+        return self.estimate.linear(np.tri(self.edges.size, self.fractions.size, -1))
 
     def psf(self) -> MeasuredPSF:
         """The kernel with its uncertainty, straight lines between the rings' middles."""
-        kernel, spacing = self._kernel(self.shares)
+        kernel, spacing = self._kernel(self.fractions)
         (found,) = self.estimate.components
         directions, sizes, _ = np.linalg.svd(found.effects, full_matrices=False)
         kept = 1 + int(np.searchsorted(np.cumsum(sizes**2), _KEPT * np.sum(sizes**2)))

@@ -1,48 +1,13 @@
-"""A point spread function by the knife edge in tables and sentences."""
+"""A point spread function by the knife edge in sentences."""
 
-from math import degrees, sqrt
+from math import sqrt
 
 import numpy as np
-from rich.table import Table
 
 from chipglow.camera import AnnularAperturePSF, GaussianPSF
 from chipglow.laboratory.psf.knife_edge import KnifeEdge
 from chipglow.laboratory.psf.psf_fit import ModelFit
 from chipglow.laboratory.psf.psf_models import is_length
-
-
-def model_table(found: KnifeEdge) -> Table:
-    """The models, the best first."""
-    table = Table("model", "FWHM / um", "AICc", "BIC", "weight", "misfit", box=None)
-    for fit, weight in zip(found.fits, found.weights, strict=True):
-        table.add_row(
-            fit.model.name,
-            with_uncertainty(fit.fwhm * 1e6, fit.fwhm_uncertainty * 1e6),
-            f"{fit.aicc - found.best.aicc:+.1f}",
-            f"{fit.bic - found.best.bic:+.1f}",
-            f"{weight:.3f}",
-            f"{fit.misfit:.3g}",
-        )
-    return table
-
-
-def edge_table(found: KnifeEdge) -> Table:
-    """The images: the edge's normal, the optics' width by it alone, the line spread's width."""
-    table = Table(
-        "image", "normal / deg", "FWHM / um", "LSF / um", "step/noise", "MTF(Nyquist)", box=None
-    )  # fmt: skip
-    for edge, fitted in zip(found.edges, found.best.edges, strict=True):
-        transfer = edge.transfer
-        half = int(np.argmin(np.abs(transfer.frequency - 0.5 / edge.image.pitch)))
-        table.add_row(
-            edge.image.name,
-            with_uncertainty(degrees(fitted.line.normal), degrees(fitted.normal_uncertainty)),
-            with_uncertainty(edge.fwhm * 1e6, edge.fwhm_uncertainty * 1e6),
-            f"{edge.line_fwhm * 1e6:.4g}",
-            f"{fitted.step / edge.noise:.3g}",
-            with_uncertainty(float(transfer.value[half]), float(transfer.uncertainty[half])),
-        )
-    return table
 
 
 def sentences(found: KnifeEdge) -> list[str]:

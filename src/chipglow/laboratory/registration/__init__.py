@@ -5,6 +5,11 @@ from chipglow.laboratory.registration.file import load_registration, write_regis
 from chipglow.laboratory.registration.mutual_information import ImageFit, fit_images
 from chipglow.laboratory.registration.picture_file import read_pictures
 from chipglow.laboratory.registration.points_file import read_points
+from chipglow.laboratory.registration.recordings import (
+    RecordingAlignment,
+    align_recordings,
+    infrared_radiance,
+)
 from chipglow.laboratory.registration.registration import PointFit, Registration, fit_points
 from chipglow.laboratory.registration.time_alignment import (
     TimeAlignment,
@@ -17,13 +22,16 @@ __all__ = [
     "Dots",
     "ImageFit",
     "PointFit",
+    "RecordingAlignment",
     "Registration",
     "TimeAlignment",
+    "align_recordings",
     "align_times",
     "find_dots",
     "fit_dots",
     "fit_images",
     "fit_points",
+    "infrared_radiance",
     "load_registration",
     "read_pictures",
     "read_points",

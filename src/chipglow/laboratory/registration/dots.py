@@ -1,7 +1,7 @@
 """Dots of a target that both cameras see, and the registration that they give."""
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,18 +64,19 @@ class DotFit:
     Parameters
     ----------
     points : PointFit
-        The registration, with each dot's residual.
-    positions : ndarray
-        x and y in m of the dots that were seen in both, shape (n, 2).
-    pixels : ndarray
-        Their columns and rows in the visible picture, shape (n, 2).
+        The registration, with the dots that were seen in both and their residuals.
     infrared, visible : Dots
         All that were found.
+    assumptions : tuple of str
+        What had to be assumed, a sentence each.
     """
 
+    assumptions: ClassVar[tuple[str, ...]] = (
+        "the visible picture is not mirrored, is turned by up to 30 degrees, and shows half to "
+        "twice the infrared image's width; else give points.",
+    )
+
     points: PointFit
-    positions: NDArray[np.float64]
-    pixels: NDArray[np.float64]
     infrared: Dots
     visible: Dots
 
@@ -127,14 +128,14 @@ def fit_dots(
         [raster.x[0] + columns * raster.spacing, raster.y[0] - rows * raster.spacing], axis=1
     )
     pixels = dots[1].pixels[match.second]
-    fit = fit_points(positions, pixels, model)
+    fit = fit_points(positions, pixels, model, picked=False)
     scale = raster.spacing * np.sqrt(abs(np.linalg.det(fit.registration.jacobian(positions))))
     variance = (scale * dots[0].uncertainty[match.first]) ** 2
     expected = float(np.sqrt((variance + dots[1].uncertainty[match.second] ** 2).mean()))
     warnings = (*fit.registration.warnings, *match.warnings, *_scattered(fit.scatter, expected))
     covariance = fit.registration.covariance + _systematic(fit.registration, raster)
     found = replace(fit.registration, covariance=covariance, method="dots", warnings=warnings)
-    return DotFit(replace(fit, registration=found), positions, pixels, *dots)
+    return DotFit(replace(fit, registration=found), *dots)
 
 
 def find_dots(image: NDArray[np.generic], name: str = "image") -> Dots:

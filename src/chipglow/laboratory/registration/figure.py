@@ -45,7 +45,7 @@ def draw_registration(
         Points that were given: positions in m, and visible columns and rows.
     """
     celsius = np.asarray(temperature) - KELVIN
-    limits = _limits(celsius)
+    limits = drawing.ends(celsius, 0.5, 99.8, 1.0)
     with drawing.style():
         figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
         FigureCanvasAgg(figure)
@@ -89,7 +89,7 @@ def blink_pictures(
     """
     shape = (visible.shape[0], visible.shape[1])
     celsius = registration.warp(np.asarray(temperature) - KELVIN, raster, shape)
-    limits = _limits(celsius)
+    limits = drawing.ends(celsius, 0.5, 99.8, 1.0)
     plain = _rendered(registration, visible, tool)
     hot = _rendered(registration, visible, tool, celsius, limits)
     return plain, hot
@@ -135,11 +135,3 @@ def _draw_tool(
         axes.plot(*line.T, color="black", linewidth=1.0)
     axes.set_xlim(-0.5, shape[1] - 0.5)
     axes.set_ylim(shape[0] - 0.5, -0.5)
-
-
-def _limits(celsius: NDArray[np.floating]) -> tuple[float, float]:
-    known = celsius[np.isfinite(celsius)]
-    if known.size == 0:
-        return 0.0, 1.0
-    low, high = (float(value) for value in np.percentile(known, (0.5, 99.8)))
-    return low, max(high, low + 1.0)

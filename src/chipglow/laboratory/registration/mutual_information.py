@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from math import cos, hypot, log, radians, sin
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +70,14 @@ class ImageFit:
     by_chance : ndarray
         The same for infrared images that are turned over and moved round, so that they have
         nothing to do with the visible picture, shape (n,).
+    assumptions : tuple of str
+        What had to be assumed, a sentence each.
     """
+
+    assumptions: ClassVar[tuple[str, ...]] = (
+        "the visible picture is not mirrored, and shows the infrared image's width within 25 % and "
+        "its middle within a quarter of the width; else give points.",
+    )
 
     registration: Registration
     information: float

@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 from math import ceil, hypot
-from typing import Final, Literal, TypeAlias
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 from scipy.stats import f as f_distribution
@@ -21,6 +22,27 @@ _FLATTEST: Final = 0.01
 _WORST_CONDITION: Final = 1e6
 _UNLIKELY: Final = 0.01
 _EXACT: Final = 1e-9
+
+_BEST_PICKED: Final = 0.02
+"""Scatter in visible pixels under which points are not picked: that of dots' middles."""
+
+
+class Geometry(NamedTuple):
+    """How a visible picture lies on an infrared image.
+
+    Parameters
+    ----------
+    pixel_size : float
+        Side of a visible pixel in m.
+    turn : float
+        In degrees.
+    mirrored : bool
+        Whether one is the mirror image of the other.
+    """
+
+    pixel_size: float
+    turn: float
+    mirrored: bool
 
 
 @dataclass(frozen=True)
@@ -128,6 +150,14 @@ class Registration:
         found = np.sqrt(np.maximum(variance, 0.0))
         return float(np.median(found)), float(found.max())
 
+    def geometry(self, raster: Raster) -> Geometry:
+        """Size and turn of the visible picture in the middle of an infrared image."""
+        left, right, bottom, top = raster.extent
+        slope = self.jacobian(np.array([(left + right) / 2, (bottom + top) / 2]))
+        area = float(np.linalg.det(slope))
+        turn = float(np.degrees(np.arctan2(-slope[1, 0] * np.sign(area), slope[0, 0])))
+        return Geometry(1 / float(np.sqrt(abs(area))), turn, area > 0)
+
     def warp(
         self, image: NDArray[np.floating], raster: Raster, shape: tuple[int, int]
     ) -> NDArray[np.float64]:
@@ -171,15 +201,41 @@ class PointFit:
         Standard deviation of a point's column or row in visible pixels: of both pickings.
     misplaced : ndarray
         Whether a point lies farther off than the others make likely, shape (n,).
+    positions, pixels : ndarray
+        The points: x and y in m, and column and row in the visible picture, each of shape (n, 2).
     """
 
     registration: Registration
     residuals: NDArray[np.float64]
     scatter: float
     misplaced: NDArray[np.bool_]
+    positions: NDArray[np.float64]
+    pixels: NDArray[np.float64]
+
+    def to_frame(self) -> pd.DataFrame:
+        """Every point, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``point``, from 1, ``x_um``, ``y_um``, ``visible_column``, ``visible_row``, and
+            how far off it is found in visible pixels, ``residual``.
+        """
+        return pd.DataFrame(
+            {
+                "point": np.arange(1, len(self.positions) + 1),
+                "x_um": 1e6 * self.positions[:, 0],
+                "y_um": 1e6 * self.positions[:, 1],
+                "visible_column": self.pixels[:, 0],
+                "visible_row": self.pixels[:, 1],
+                "residual": np.hypot(*self.residuals.T),
+            }
+        )
 
 
-def fit_points(positions: ArrayLike, pixels: ArrayLike, model: Model = "affine") -> PointFit:
+def fit_points(
+    positions: ArrayLike, pixels: ArrayLike, model: Model = "affine", *, picked: bool = True
+) -> PointFit:
     """Register two images by points that are seen in both.
 
     Parameters
@@ -190,6 +246,9 @@ def fit_points(positions: ArrayLike, pixels: ArrayLike, model: Model = "affine")
         Column and row in the visible picture, shape (n, 2).
     model : {"similarity", "affine", "homography"}
         Turn and scale, mirrored or not; or with shear; or with perspective.
+    picked : bool
+        Whether people picked the points, who are not as exact as dots that are fitted: it is a
+        warning if the points agree better.
 
     Raises
     ------
@@ -228,11 +287,19 @@ def fit_points(positions: ArrayLike, pixels: ArrayLike, model: Model = "affine")
         "pixels from where the others expect it"
         for i in np.flatnonzero(misplaced)
     )
+    scatter = float(np.sqrt(variance)) * frame.pixel_scale
+    if picked and scatter < _BEST_PICKED:
+        warnings += (
+            f"the points agree to {scatter:.1g} visible pixels, better than anyone picks them: "
+            "they may be computed from each other, and the uncertainty that follows is too small",
+        )
     return PointFit(
         Registration(full, spread, model, "points", float(freedom), warnings),
         residual.reshape(-1, 2) * frame.pixel_scale,
-        float(np.sqrt(variance)) * frame.pixel_scale,
+        scatter,
         misplaced,
+        given,
+        seen,
     )
 
 
@@ -371,7 +438,7 @@ def _checked(
     if len(given) < least:
         raise ValueError(
             f"points: {len(given)} for the model {model!r}, expected {least} or more: one more "
-            "than it needs, so that the residuals tell the uncertainty"
+            "than it needs, so that the residuals show the uncertainty"
         )
     for name, points in (("infrared image", given), ("visible picture", seen)):
         _, lengths, _ = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)

@@ -79,7 +79,7 @@ def align_times(
     infrared_times, visible_times : ndarray
         Middles of the exposures in s of each camera's own clock, ascending, shapes (n,) and (m,).
     infrared_signal, visible_signal : ndarray
-        A number a frame that tells of the same event: the position of the chip's edge, or the mean
+        A number a frame that shows the same event: the position of the chip's edge, or the mean
         brightness of a region. One may fall where the other rises.
     drift : bool
         Whether one clock may be faster than the other.

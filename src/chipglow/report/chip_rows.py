@@ -1,52 +1,12 @@
 """The chip's metrics as the report's second table."""
 
-from dataclasses import dataclass
 from math import degrees, isfinite, nan
 
-from chipglow.laboratory.chip.metrics import ChipMetrics
-from chipglow.quantities.format import quantity_text
+from chipglow.laboratory.chip import ChipMetrics
+from chipglow.report.comparison import Row, own_row
 
 
-@dataclass(frozen=True)
-class ChipRow:
-    """One quantity of the chip.
-
-    Parameters
-    ----------
-    key : str
-        Name for scripts, with the unit at its end.
-    quantity : str
-        What it is.
-    unit : str
-        Unit of the numbers, as printed.
-    value, spread : float or None
-        The number and its spread or uncertainty; None where it is unknown.
-    decimals : int
-        Decimals worth printing.
-    explanation : str
-        How it is measured.
-    """
-
-    key: str
-    quantity: str
-    unit: str
-    value: float | None
-    spread: float | None
-    decimals: int
-    explanation: str
-
-    @property
-    def value_text(self) -> str:
-        """The number with its unit, or a dash."""
-        return quantity_text(self.value, self.unit, self.decimals)
-
-    @property
-    def spread_text(self) -> str:
-        """The spread with its unit, or a dash."""
-        return quantity_text(self.spread, self.unit, self.decimals)
-
-
-def chip_rows(chip: ChipMetrics) -> list[ChipRow]:
+def chip_rows(chip: ChipMetrics) -> list[Row]:
     """What describes the chip, in the units of the report.
 
     Parameters
@@ -57,16 +17,16 @@ def chip_rows(chip: ChipMetrics) -> list[ChipRow]:
     return [*_segment_rows(chip), *_thickness_rows(chip), *_contact_rows(chip), *_band_rows(chip)]
 
 
-def _segment_rows(chip: ChipMetrics) -> list[ChipRow]:
+def _segment_rows(chip: ChipMetrics) -> list[Row]:
     return [
-        _row(
+        own_row(
             "segment_frequency_kHz",
             "Segmentation frequency",
             "kHz",
             chip.frequency * 1e-3,
             1,
             "1 over the period of the forces; the spread is its standard uncertainty.",
-            spread=chip.frequency * chip.period_uncertainty / chip.period * 1e-3,
+            chip.frequency * chip.period_uncertainty / chip.period * 1e-3,
         ),
         _micrometres(
             "segment_spacing_um",
@@ -84,7 +44,7 @@ def _segment_rows(chip: ChipMetrics) -> list[ChipRow]:
     ]
 
 
-def _thickness_rows(chip: ChipMetrics) -> list[ChipRow]:
+def _thickness_rows(chip: ChipMetrics) -> list[Row]:
     return [
         _micrometres(
             "feed_um",
@@ -103,16 +63,16 @@ def _thickness_rows(chip: ChipMetrics) -> list[ChipRow]:
             "Chip thickness, peaks",
             chip.peak,
             _segments_text(chip),
-            chip.peak_spread,
+            chip.peak_standard_deviation,
         ),
         _micrometres(
             "chip_valley_um",
             "Chip thickness, valleys",
             chip.valley,
             _segments_text(chip),
-            chip.valley_spread,
+            chip.valley_standard_deviation,
         ),
-        _row(
+        own_row(
             "segmentation_degree_percent",
             "Degree of segmentation",
             "%",
@@ -120,7 +80,7 @@ def _thickness_rows(chip: ChipMetrics) -> list[ChipRow]:
             0,
             "Peak less valley, over peak.",
         ),
-        _row(
+        own_row(
             "chip_ratio",
             "Chip ratio",
             "",
@@ -131,16 +91,16 @@ def _thickness_rows(chip: ChipMetrics) -> list[ChipRow]:
     ]
 
 
-def _contact_rows(chip: ChipMetrics) -> list[ChipRow]:
+def _contact_rows(chip: ChipMetrics) -> list[Row]:
     return [
-        _row(
+        own_row(
             "chip_speed_m_per_s",
             "Chip speed",
             "m/s",
             chip.chip_speed,
             2,
             "Up the rake face where the thickness is read; the spread is over time.",
-            chip.chip_speed_spread,
+            chip.chip_speed_standard_deviation,
         ),
         _micrometres(
             "chip_contact_um",
@@ -149,32 +109,32 @@ def _contact_rows(chip: ChipMetrics) -> list[ChipRow]:
             "From the edge up the rake face."
             if isfinite(chip.contact)
             else "Unknown: the contact reaches the border of the view.",
-            chip.contact_spread,
+            chip.contact_standard_deviation,
         ),
     ]
 
 
-def _band_rows(chip: ChipMetrics) -> list[ChipRow]:
+def _band_rows(chip: ChipMetrics) -> list[Row]:
     developed = "While the band is developed: to the surface, and at half its greatest rate or more"
     return [
-        _row(
+        own_row(
             "shear_angle_deg",
             "Shear angle",
             "°",
             degrees(chip.shear_angle),
             1,
             f"{developed}. Line through the band's middle half.",
-            degrees(chip.shear_angle_spread),
+            degrees(chip.shear_angle_standard_deviation),
         ),
         _micrometres(
             "shear_band_width_um",
             "Width of the shear band, mean over time",
             chip.band_width,
             f"{developed}. Full width at half maximum of the strain rate.",
-            chip.band_width_spread,
+            chip.band_width_standard_deviation,
             decimals=1,
         ),
-        _row(
+        own_row(
             "shear_band_rate_per_s",
             "Strain rate of the shear band",
             "1/s",
@@ -182,7 +142,7 @@ def _band_rows(chip: ChipMetrics) -> list[ChipRow]:
             -3,
             "Median over the band's middle half, at its greatest.",
         ),
-        _row(
+        own_row(
             "shear_band_strain",
             "Plastic strain of a formed band",
             "",
@@ -207,18 +167,5 @@ def _segments_text(chip: ChipMetrics) -> str:
 
 def _micrometres(
     key: str, quantity: str, value: float, explanation: str, spread: float = nan, decimals: int = 0
-) -> ChipRow:
-    return _row(key, quantity, "µm", value * 1e6, decimals, explanation, spread * 1e6)
-
-
-def _row(
-    key: str,
-    quantity: str,
-    unit: str,
-    value: float,
-    decimals: int,
-    explanation: str,
-    spread: float = nan,
-) -> ChipRow:
-    known = [float(number) if isfinite(number) else None for number in (value, spread)]
-    return ChipRow(key, quantity, unit, known[0], known[1], decimals, explanation)
+) -> Row:
+    return own_row(key, quantity, "µm", value * 1e6, decimals, explanation, spread * 1e6)

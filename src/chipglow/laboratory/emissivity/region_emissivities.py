@@ -1,0 +1,186 @@
+"""Emissivity of the regions of an image, at one true temperature or several."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pandas as pd
+
+from chipglow.camera import Flag, Measurement
+from chipglow.laboratory.emissivity.emissivity import (
+    BUDGET,
+    EmissivityLine,
+    EmissivityMap,
+    Heating,
+    RegionEmissivity,
+    determine_emissivity,
+    emissivity_line,
+)
+from chipglow.laboratory.emissivity.observations import check_same_pixels, uncertainty_columns
+from chipglow.scene import Region, areas, shared_pixels
+from chipglow.text.remarks import Remarks
+
+
+@dataclass(frozen=True, eq=False)
+class RegionEmissivities:
+    """Emissivity of the regions of an image; made by `determine_emissivities`.
+
+    Parameters
+    ----------
+    maps : tuple of EmissivityMap
+        One for each heating.
+    rows : tuple of tuple of RegionEmissivity
+        The same areas of each map.
+    lines : tuple of EmissivityLine
+        Each area over the temperature; empty for one heating.
+    assumptions, warnings : list of str
+        What had to be assumed, and why the result may not be relied on, a sentence each.
+    """
+
+    maps: tuple[EmissivityMap, ...]
+    rows: tuple[tuple[RegionEmissivity, ...], ...]
+    lines: tuple[EmissivityLine, ...] = ()
+    assumptions: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Every region at every temperature, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``region``, ``feature``, ``reference_K``, ``reflected_K``, ``pixels``, how many
+            of them are flagged, under 0 and over 1, ``mean``, ``deviation`` over the pixels,
+            ``standard_uncertainty``, ``degrees_of_freedom``, ``coverage_factor``,
+            ``expanded_uncertainty``, and the parts ``…_uncertainty`` of the standard uncertainty;
+            NaN where nothing is known.
+        """
+        return pd.DataFrame(_row(row) for of in self.rows for row in of)
+
+    def line_frame(self) -> pd.DataFrame:
+        """Emissivity over the temperature, a row a region.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``region``, ``temperature_degC`` in the middle, ``emissivity`` there,
+            ``change_in_100_K``, their standard uncertainties ``…_uncertainty``, and the standard
+            deviation about the line, ``residual``.
+        """
+        return pd.DataFrame(map(_line_row, self.lines))
+
+
+def determine_emissivities(
+    measurements: Sequence[Measurement],
+    heatings: Sequence[Heating],
+    regions: Sequence[Region],
+    names: Sequence[str] = (),
+) -> RegionEmissivities:
+    """Determine the emissivity of regions of a heated object.
+
+    Parameters
+    ----------
+    measurements : sequence of Measurement
+        Images of the object.
+    heatings : sequence of Heating
+        How it was heated for each image. Images of one heating are repetitions.
+    regions : sequence of Region
+        Regions of the image.
+    names : sequence of str
+        Names of the images, for errors; their numbers by default.
+
+    Raises
+    ------
+    ValueError
+        If the images are of different pixels, there are not as many heatings, or as
+        `determine_emissivity` and `EmissivityMap.of`.
+    """
+    if len(heatings) != len(measurements):
+        raise ValueError(f"{len(heatings)} heatings for {len(measurements)} images, expected one")
+    check_same_pixels(measurements, "emissivity", names)
+    groups: dict[Heating, list[Measurement]] = {}
+    for measurement, heating in zip(measurements, heatings, strict=True):
+        groups.setdefault(heating, []).append(measurement)
+    maps = tuple(determine_emissivity(group, heating) for heating, group in groups.items())
+    found = areas(regions, maps[0].raster)
+    rows = tuple(tuple(one.of(area) for area in found) for one in maps)
+    lines = map(emissivity_line, zip(*rows, strict=True)) if len(maps) > 1 else ()
+    remarks = _remarks(maps, rows)
+    remarks.assumptions.extend(
+        f"{one} and {other} share {count} pixels, which count in both."
+        for (one, other), count in shared_pixels(regions, maps[0].raster).items()
+    )
+    return RegionEmissivities(maps, rows, tuple(lines), remarks.assumptions, remarks.warnings)
+
+
+def _row(row: RegionEmissivity) -> Mapping[str, float | str]:
+    return {
+        "region": row.name,
+        "feature": row.feature,
+        "reference_K": row.heating.reference,
+        "reflected_K": row.heating.reflected,
+        "pixels": row.pixels,
+        "under_range": row.flagged[Flag.UNDER_RANGE],
+        "saturated": row.flagged[Flag.SATURATED],
+        "dead": row.flagged[Flag.DEAD],
+        "under_0": row.outside[0],
+        "over_1": row.outside[1],
+        "mean": row.mean,
+        "deviation": row.deviation,
+        **uncertainty_columns(row.estimate, BUDGET),
+    }
+
+
+def _line_row(line: EmissivityLine) -> Mapping[str, float | str]:
+    middle, slope = line.estimate.values
+    of_middle, of_slope = line.estimate.standard_uncertainty
+    return {
+        "region": line.name,
+        "temperature_degC": line.middle - 273.15,
+        "emissivity": middle,
+        "emissivity_uncertainty": of_middle,
+        "change_in_100_K": 100 * slope,
+        "change_in_100_K_uncertainty": 100 * of_slope,
+        "residual": line.residual,
+    }
+
+
+def _remarks(maps: Sequence[EmissivityMap], rows: Sequence[Sequence[RegionEmissivity]]) -> Remarks:
+    heating, remarks = maps[0].heating, Remarks()
+    said = remarks.assumptions.append
+    if not heating.reference_uncertainty:
+        said("the true temperature is exact (reference_uncertainty).")
+    if not heating.reflected_uncertainty:
+        said(
+            f"the object reflects just {heating.reflected - 273.15:.4g} degC; reflected apparent "
+            f"temperature 100 K higher would make {_of_reflected(maps[0]):+.2g} of the emissivity "
+            "(reflected, reflected_uncertainty)."
+        )
+    if heating.drift is None and any(one.recordings == 1 for one in maps):
+        said(
+            "the camera does not drift from one recording to the next: there is one image, which "
+            "does not show it, and u holds nothing of it (drift)."
+        )
+    if any(one.calibration is None for one in maps):
+        said(
+            "the camera's calibration is exact, as the measurement states no uncertainty of it "
+            "(camera_uncertainty)."
+        )
+    if any(one.observations == 1 for one in maps):
+        said(
+            "nothing changes from frame to frame, as there is one only; noise is at most the "
+            "standard deviation over the pixels."
+        )
+    for of in rows:
+        at = f" (object at {of[0].heating.reference - 273.15:.6g} °C)" if len(rows) > 1 else ""
+        for warning in (warning for row in of for warning in row.estimate.warnings):
+            remarks.warnings.append(f"{warning.removesuffix('.')}{at}.")
+    return remarks
+
+
+def _of_reflected(one: EmissivityMap) -> float:
+    """Change of the mean emissivity if what is reflected is 100 K hotter."""
+    heating = one.heating
+    hotter = min(heating.reflected + 100.0, (heating.reflected + heating.reference) / 2)
+    exact = replace(heating, reflected=hotter, reflected_uncertainty=0.0, reference_uncertainty=0.0)
+    return float(np.nanmean(replace(one, heating=exact).emissivity) - np.nanmean(one.emissivity))

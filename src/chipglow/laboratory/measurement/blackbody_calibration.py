@@ -1,0 +1,209 @@
+"""A camera's calibration by blackbodies: from a table of points to fits with their warnings."""
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from chipglow.camera import Blackbody, CalibrationFit, FittedCalibration, fit_models, preferred
+from chipglow.io.column_file import read_calibration_points
+from chipglow.laboratory.measurement.camera_file import FlatFieldSources, uniform_counts
+from chipglow.radiometry import Band
+
+
+@dataclass(frozen=True, eq=False)
+class BlackbodyCalibration:
+    """Calibrations fitted to the same blackbodies; made by `calibrate_blackbodies`.
+
+    Parameters
+    ----------
+    fits : mapping
+        By the names of their models.
+    assumptions, warnings : tuple of str
+        What had to be assumed, and why the preferred one may not be relied on, a sentence each.
+    """
+
+    fits: Mapping[str, CalibrationFit[FittedCalibration]]
+    assumptions: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def preferred(self) -> str:
+        """Name of the model with the least information criterion."""
+        return preferred(self.fits)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Every point of each fit, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``model``, radiance ``temperature_degC`` of the blackbody, ``counts``,
+            ``residual_counts``, ``residual_K``, and the fit's ``standard_uncertainty_K`` there.
+        """
+        return pd.concat([_points(name, fit) for name, fit in self.fits.items()], ignore_index=True)
+
+    def parameter_frame(self) -> pd.DataFrame:
+        """Every parameter of each fit, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``model``, ``parameter``, ``value``, ``standard_uncertainty`` and ``unit``.
+        """
+        return pd.concat(
+            [
+                pd.DataFrame(
+                    {
+                        "model": name,
+                        "parameter": fit.calibration.NAMES,
+                        "value": fit.calibration.parameters,
+                        "standard_uncertainty": np.sqrt(np.diag(fit.calibration.covariance)),
+                        "unit": fit.calibration.UNITS,
+                    }
+                )
+                for name, fit in self.fits.items()
+            ],
+            ignore_index=True,
+        )
+
+
+def calibrate_blackbodies(
+    points: str | os.PathLike[str],
+    band: Band,
+    models: Sequence[str] = ("linear",),
+    settings: Iterable[str] = (),
+    *,
+    emissivity: float | None = None,
+    emissivity_uncertainty: float = 0.0,
+    surroundings: float | None = None,
+    common_uncertainty: float | None = None,
+    integration_time: float | None = None,
+    range_name: str | None = None,
+) -> BlackbodyCalibration:
+    """Fit calibrations of a camera's counts to blackbodies.
+
+    Parameters
+    ----------
+    points : path-like
+        A CSV file with the columns ``temperature_degC`` (or ``_K``), ``counts`` (or ``file``, a
+        recording of each) and, if known, their standard uncertainties ``count_uncertainty`` and
+        ``temperature_uncertainty_K``.
+    band : Band
+        The camera's band.
+    models : sequence of str
+        Names of `MODELS`.
+    settings : iterable of str
+        Fields of the description of the recordings.
+    emissivity, emissivity_uncertainty : float
+        Of the blackbody; 1 is assumed.
+    surroundings : float, optional
+        Temperature in K of what a blackbody of less than 1 reflects; 20 degC is assumed.
+    common_uncertainty : float, optional
+        Standard uncertainty in K of the blackbody's temperature that all points have in common.
+    integration_time : float, optional
+        In s.
+    range_name : str, optional
+        The camera's measuring range.
+
+    Raises
+    ------
+    ValueError
+        If the points are no such table, a value is impossible, or the points cannot be fitted.
+    OSError
+        If a file cannot be read.
+    """
+    points, settings = Path(points), list(settings)
+    recordings, uniform = [], FlatFieldSources()
+
+    def counts_of(file: str) -> float:
+        recordings.append(file)
+        return uniform_counts(points.parent / file, settings, uniform)
+
+    table = read_calibration_points(points, counts_of)
+    if settings and not recordings:
+        raise ValueError(
+            f"--set: {settings[0]!r} describes nothing, as {points} names no recordings (file)"
+        )
+    ideal = Blackbody()
+    blackbody = Blackbody(
+        ideal.emissivity if emissivity is None else emissivity,
+        emissivity_uncertainty,
+        ideal.surroundings if surroundings is None else surroundings,
+    )
+    try:
+        fits = fit_models(
+            table["temperature"],
+            table["counts"],
+            band,
+            models,
+            blackbody=blackbody,
+            count_uncertainty=table.get("count_uncertainty"),
+            temperature_uncertainty=table.get("temperature_uncertainty"),
+            common_uncertainty=common_uncertainty or 0.0,
+            integration_time=integration_time,
+            range_name=range_name,
+        )
+    except ValueError as error:
+        raise ValueError(f"{points}: {error}") from None
+    best = preferred(fits)
+    return BlackbodyCalibration(
+        fits,
+        tuple(_assumptions(emissivity, surroundings, table["temperature"])),
+        tuple(_warnings(best, fits[best], common_uncertainty is not None)),
+    )
+
+
+def _points(name: str, fit: CalibrationFit[FittedCalibration]) -> pd.DataFrame:
+    calibration = fit.calibration
+    uncertainty = calibration.uncertainty(calibration.counts(fit.temperatures))
+    return pd.DataFrame(
+        {
+            "model": name,
+            "temperature_degC": fit.temperatures - 273.15,
+            "counts": fit.counts,
+            "residual_counts": fit.residuals,
+            "residual_K": fit.residuals_temperature,
+            "standard_uncertainty_K": uncertainty / calibration.band.slope(fit.temperatures),
+        }
+    )
+
+
+def _assumptions(
+    emissivity: float | None, surroundings: float | None, kelvins: NDArray[np.float64]
+) -> Iterator[str]:
+    if emissivity is None:
+        yield (
+            "The blackbody's emissivity is 1 (emissivity); 0.97 would make 5.4 K at 500 degC "
+            "between 3.8 um and 5.1 um."
+        )
+    elif emissivity < 1 and surroundings is None:
+        yield "The blackbody reflects 20 degC (surroundings)."
+    steps = np.diff(kelvins)
+    if (steps > 0).all() or (steps < 0).all():
+        yield (
+            "The camera did not drift during the calibration: the points follow one another in the "
+            "order of their temperatures, in which a drift looks like a part of the curve. Some "
+            "points again, in another order, would show it."
+        )
+
+
+def _warnings(
+    name: str, fit: CalibrationFit[FittedCalibration], common_known: bool
+) -> Iterator[str]:
+    for warning in fit.calibration.warnings:
+        yield f"{name}: {warning[0].lower()}{warning[1:]}"
+    if not fit.stated:
+        yield (
+            "The uncertainty is from the scatter of the points, as if all counts were equally "
+            "uncertain: count_uncertainty and temperature_uncertainty_K would state it."
+        )
+    if not common_known:
+        yield (
+            "The uncertainty holds no error that all temperatures of the blackbody have in common "
+            "(common_uncertainty)."
+        )

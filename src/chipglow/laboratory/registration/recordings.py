@@ -1,0 +1,111 @@
+"""What two cameras recorded, put on one clock."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from chipglow.camera import Flag, Measurement, Recording
+from chipglow.laboratory.registration.registration import Registration
+from chipglow.laboratory.registration.time_alignment import (
+    TimeAlignment,
+    align_times,
+    region_signals,
+    simultaneous_frames,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordingAlignment:
+    """The clocks of two recordings; made by `align_recordings`.
+
+    Parameters
+    ----------
+    clocks : TimeAlignment
+        How they go by each other.
+    infrared_times : ndarray
+        When each infrared integration began in s, shape (n,).
+    visible_frames : list of ndarray
+        Numbers of the visible frames that were exposed within each, from 0.
+    assumptions : tuple of str
+        What had to be assumed, a sentence each.
+    """
+
+    clocks: TimeAlignment
+    infrared_times: NDArray[np.float64]
+    visible_frames: list[NDArray[np.int64]]
+    assumptions: tuple[str, ...] = ()
+
+    def to_frame(self) -> pd.DataFrame:
+        """Every infrared frame, a row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns ``infrared_frame``, ``infrared_time_us`` and ``visible_frames``, their numbers
+            with blanks between them.
+        """
+        return pd.DataFrame(
+            {
+                "infrared_frame": np.arange(self.infrared_times.size),
+                "infrared_time_us": 1e6 * self.infrared_times,
+                "visible_frames": [" ".join(map(str, found)) for found in self.visible_frames],
+            }
+        )
+
+
+def align_recordings(
+    registration: Registration,
+    infrared: Measurement,
+    visible: Recording,
+    region: tuple[float, float, float, float],
+) -> RecordingAlignment:
+    """Find the offset of two cameras' clocks by the mean brightness of a region.
+
+    Parameters
+    ----------
+    registration : Registration
+        Where the infrared image is in the visible picture.
+    infrared : Measurement
+        Frames of the infrared camera.
+    visible : Recording
+        Frames of the visible one. Without an integration time it is taken to be exposed all the
+        time.
+    region : tuple of float
+        Left, bottom, right and top in m, in the measurement's coordinates.
+
+    Raises
+    ------
+    ValueError
+        If the measurement states no integration time, the region is outside an image, or as
+        `align_times`.
+    """
+    if "integration_time" not in infrared.data.attrs:
+        raise ValueError("the measurement does not state its integration_time")
+    integration = float(infrared.data.attrs["integration_time"])
+    hot, bright = region_signals(
+        registration, infrared.radiance, infrared.raster, visible.signal, region
+    )
+    exposure = visible.integration_time or float(np.median(np.diff(visible.times)))
+    assumed = f"a visible exposure lasts as long as its frame, {1e6 * exposure:.4g} us."
+    times = infrared.times
+    clocks = align_times(times + integration / 2, hot, visible.times + exposure / 2, bright)
+    within = simultaneous_frames(clocks, times, integration, visible.times, exposure)
+    return RecordingAlignment(
+        clocks, times, within, (assumed,) if visible.integration_time is None else ()
+    )
+
+
+def infrared_radiance(measurement: Measurement, frame: int) -> NDArray[np.float64]:
+    """Radiance of a frame as `fit_images` and `fit_dots` take it: NaN where a pixel is dead.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Frames of the infrared camera.
+    frame : int
+        Number of the frame, from 0.
+    """
+    dead = measurement.flags[frame] & Flag.DEAD > 0
+    return np.where(dead, np.nan, measurement.radiance[frame])

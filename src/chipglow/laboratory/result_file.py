@@ -1,0 +1,72 @@
+"""Results in files: their frames as CSV, their arrays as NetCDF-4."""
+
+import os
+from pathlib import Path
+from typing import Any, Protocol
+
+import pandas as pd
+import xarray as xr
+
+from chipglow.io.table_file import write_table, write_table_or_dataset
+
+
+class Result(Protocol):
+    """What can be written as a table and as arrays."""
+
+    def to_frame(self) -> pd.DataFrame:
+        """A row for each value, with the units in the names of the columns."""
+
+    def to_dataset(self) -> xr.Dataset:
+        """Arrays in SI units."""
+
+
+def write_result(result: Result, path: str | os.PathLike[str]) -> None:
+    """Write a result as what the file's name says.
+
+    Parameters
+    ----------
+    result : Result
+        Such as a `RakeGrid` or a `BandProfile`.
+    path : path-like
+        ``.csv`` for its frame as `write_frame` writes it, ``.nc`` for its arrays as NetCDF-4; a
+        file that is there is replaced at the end.
+
+    Raises
+    ------
+    ValueError
+        If the name ends in something else.
+    OSError
+        If the file cannot be written.
+    """
+    write_table_or_dataset(Path(path), *columns_and_rows(result.to_frame()), result.to_dataset)
+
+
+def write_frame(frame: pd.DataFrame, path: str | os.PathLike[str]) -> None:
+    """Write a result's frame as CSV: the names of its columns, then a line a row.
+
+    Numbers have nine digits; a cell is empty where there is none.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        What a result's ``to_frame`` gives.
+    path : path-like
+        The file to write; one that is there is replaced at the end.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    write_table(Path(path), *columns_and_rows(frame))
+
+
+def columns_and_rows(frame: pd.DataFrame) -> tuple[list[str], list[list[str]]]:
+    """Names of a frame's columns, and the text of its cells row by row."""
+    return list(frame.columns), [list(map(_cell, row)) for row in frame.itertuples(index=False)]
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float):
+        return "" if value != value else f"{value:.9g}"
+    return str(value)
