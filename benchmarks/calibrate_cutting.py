@@ -1,6 +1,6 @@
 """Fit what no source gives of AISI 1045 in a cut: onset, loss and energy of its failure.
 
-    python benchmarks/calibrate_cutting.py [--points 24] [--processes 2] [--markdown]
+    python benchmarks/calibrate_cutting.py [--processes 2] [--refine 2] [--markdown]
 
 The four cuts of the assessment of machining models whose forces are known, and the paper's, are
 computed at every point of a design; each cut takes minutes, all are kept in build/experiments. The
@@ -11,14 +11,20 @@ What is found: the best point, what a cut there gives, the valley of points that
 which combinations of the numbers the forces do not tell apart.
 """
 
+import argparse
+import os
 from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from math import exp, log
+from math import exp, log, sqrt
+from multiprocessing import get_context
 
 import numpy as np
-from experiments import Experiment, Means, means_of
+from experiments import Experiment, Means, aligned, markdown, means_of, read_experiments
+from numpy.typing import NDArray
+from scipy.optimize import minimize
 
-from chipglow.cutting import AISI_1045, CuttingSimulation, Numerics
+from chipglow.cutting import AISI_1045, SOLVER_VERSION, CuttingSimulation
 
 CELL = 20e-6
 LENGTHS = {"amm-200-0.15": 1.0e-3, "amm-200-0.30": 1.5e-3, "paper": 2.8e-3}
@@ -70,8 +76,7 @@ def simulation(experiment: Experiment, place: Iterable[float]) -> CuttingSimulat
         fracture_energy=energy,
     )
     tool = cut.tool if experiment.name == "paper" else replace(cut.tool, edge_radius=edge)
-    numerics: Numerics = cut.numerics
-    return replace(cut, workpiece=replace(AISI_1045, damage=damage), tool=tool, numerics=numerics)
+    return replace(cut, workpiece=replace(AISI_1045, damage=damage), tool=tool)
 
 
 def compute(task: tuple[Experiment, tuple[float, ...]]) -> Means:
@@ -84,3 +89,191 @@ def design() -> list[tuple[float, ...]]:
     """Places of the design: the middle, then each number alone below and above it."""
     axes = np.eye(len(RANGES)) * AXIAL
     return [(0.0,) * len(RANGES), *(tuple(sign * axis) for axis in axes for sign in (-1, 1))]
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What is compared: a cut's quantity, its measured value and relative standard uncertainty."""
+
+    cut: str
+    quantity: str
+    value: float
+    uncertainty: float
+
+
+def observations(experiments: Iterable[Experiment]) -> list[Observation]:
+    """Measured forces of the four cuts, and the period of the paper's."""
+    forces = [
+        Observation(one.name, entry.quantity, entry.value, FORCES[entry.quantity])
+        for one in experiments
+        for entry in one.published
+        if entry.kind == "measured" and entry.quantity in FORCES
+    ]
+    return [*forces, Observation("paper", "period", PERIOD, PERIOD_UNCERTAINTY / PERIOD)]
+
+
+def terms(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Terms of the surface: one, each number, each squared; shape (n, 1 + 2 numbers)."""
+    return np.column_stack([np.ones(len(places)), places, places**2])
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Logarithm of a quantity over the numbers: at most quadratic, without their products."""
+
+    weights: NDArray[np.float64]
+    scatter: float
+
+    @classmethod
+    def through(cls, places: NDArray[np.float64], values: NDArray[np.float64]) -> "Surface":
+        """Least squares over the points where the quantity is known; few leave out squares."""
+        known = np.isfinite(values)
+        basis = terms(places[known])
+        if known.sum() <= basis.shape[1]:
+            basis[:, 1 + places.shape[1] :] = 0.0
+        weights, *_ = np.linalg.lstsq(basis, np.log(values[known]), rcond=None)
+        rest = np.log(values[known]) - basis @ weights
+        free = max(known.sum() - np.linalg.matrix_rank(basis), 1)
+        return cls(weights, float(np.sqrt((rest**2).sum() / free)))
+
+    def at(self, place: NDArray[np.float64]) -> float:
+        """Logarithm of the quantity."""
+        return float((terms(place[None]) @ self.weights)[0])
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Best place, how far each observation is from it, and the covariance of the logarithms."""
+
+    place: NDArray[np.float64]
+    residuals: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+
+def fit(surfaces: list[Surface], observed: list[Observation]) -> Fit:
+    """Weighted least squares over the ranges; each range counts as a rectangular distribution."""
+    wanted = np.log([one.value for one in observed])
+    # The surface's own scatter is part of what a difference may be.
+    widths = np.hypot([one.uncertainty for one in observed], [one.scatter for one in surfaces])
+
+    def differences(place: NDArray[np.float64]) -> NDArray[np.float64]:
+        return (np.array([surface.at(place) for surface in surfaces]) - wanted) / widths
+
+    limits = [(-1.0, 1.0)] * len(RANGES)
+    starts = [np.zeros(len(RANGES)), *np.array(design()[1:])]
+    found = min(
+        (
+            minimize(lambda place: float((differences(place) ** 2).sum()), start, bounds=limits)
+            for start in starts
+        ),
+        key=lambda result: result.fun,
+    )
+    step = 1e-4
+    slopes = np.array(
+        [
+            (differences(found.x + step * axis) - differences(found.x - step * axis)) / (2 * step)
+            for axis in np.eye(len(RANGES))
+        ]
+    )
+    # Of a rectangular distribution from -1 to 1 the variance is 1/3.
+    covariance = np.linalg.inv(slopes @ slopes.T + 3.0 * np.eye(len(RANGES)))
+    half = np.array([0.5 * log(one.high / one.low) for one in RANGES])
+    return Fit(found.x, differences(found.x) * widths, covariance * np.outer(half, half))
+
+
+def column(runs: list[dict[str, Means]], one: Observation) -> NDArray[np.float64]:
+    """A quantity of a cut at all places; NaN where a cut has no period."""
+    values = [getattr(run[one.cut], one.quantity) for run in runs]
+    return np.array(values, dtype=np.float64)
+
+
+def computed(
+    experiments: list[Experiment], places: list[tuple[float, ...]], processes: int
+) -> list[dict[str, Means]]:
+    """Means of every cut at every place. The paper's edge is known: it does not vary."""
+    tasks = [
+        (one, (*place[:-1], 0.0) if one.name == "paper" else place)
+        for place in places
+        for one in experiments
+    ]
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        means = list(pool.map(compute, tasks))
+    size = len(experiments)
+    return [
+        {one.name: mean for one, mean in zip(experiments, means[k : k + size], strict=True)}
+        for k in range(0, len(means), size)
+    ]
+
+
+def number_table(best: Fit) -> list[list[str]]:
+    """Rows of what was found: each number, its standard uncertainty and correlations."""
+    deviations = np.sqrt(np.diag(best.covariance))
+    correlations = best.covariance / np.outer(deviations, deviations)
+    rows = [["number", "found", "range", "standard uncertainty / %", *"1234"]]
+    for k, (one, place) in enumerate(zip(RANGES, best.place, strict=True)):
+        rows.append(
+            [
+                one.name,
+                f"{one.at(place) / one.scale:.3g} {one.unit}".strip(),
+                f"{one.low:g} to {one.high:g}",
+                f"{100 * deviations[k]:.0f}",
+                *(f"{value:+.2f}".replace("-", "−") for value in correlations[k]),
+            ]
+        )
+    return rows
+
+
+def valley_table(best: Fit) -> list[list[str]]:
+    """Rows of the axes of the covariance: the longest is the valley of equally good sets."""
+    lengths, axes = np.linalg.eigh(best.covariance)
+    rows = [["axis", "standard deviation / %", *(one.name for one in RANGES)]]
+    for k in range(len(lengths) - 1, -1, -1):
+        along = [f"{100 * sqrt(lengths[k]) * part:+.0f} %" for part in axes[:, k]]
+        label = "the valley" if k == len(lengths) - 1 else ""
+        rows.append([label, f"{100 * sqrt(lengths[k]):.0f}", *along])
+    return [[cell.replace("-", "−") for cell in row] for row in rows]
+
+
+def run_table(
+    places: list[tuple[float, ...]], runs: list[dict[str, Means]], observed: list[Observation]
+) -> list[list[str]]:
+    """Rows of all places: the numbers, and the difference from each measured value."""
+    heads = [f"{one.cut} {one.quantity.split('_')[0]}" for one in observed]
+    rows = [[*(one.name for one in RANGES), *heads, "degree of the paper's / %"]]
+    for place, run in zip(places, runs, strict=True):
+        numbers = [f"{r.at(p) / r.scale:.3g}" for r, p in zip(RANGES, place, strict=True)]
+        here = [getattr(run[one.cut], one.quantity) / one.value - 1 for one in observed]
+        texts = ["–" if value != value else f"{100 * value:+.0f} %" for value in here]
+        rows.append([*numbers, *texts, f"{100 * run['paper'].degree:.0f}"])
+    return [[cell.replace("-", "−") for cell in row] for row in rows]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--processes", type=int, default=2, help="cuts at a time, one thread each")
+    parser.add_argument("--refine", type=int, default=2, help="times the best point is computed")
+    parser.add_argument("--markdown", action="store_true", help="print Markdown tables")
+    given = parser.parse_args()
+    os.environ.setdefault("NUMBA_NUM_THREADS", "1")
+    experiments = [
+        one
+        for one in read_experiments()[1]
+        if one.name == "paper" or any(entry.kind == "measured" for entry in one.published)
+    ]
+    observed = observations(experiments)
+    places, best = design(), None
+    for _ in range(given.refine + 1):
+        if best is not None:
+            places.append(tuple(best.place))
+        runs = computed(experiments, places, given.processes)
+        surfaces = [Surface.through(np.array(places), column(runs, one)) for one in observed]
+        best = fit(surfaces, observed)
+    assert best is not None
+    table = markdown if given.markdown else aligned
+    print(f"Cell {CELL * 1e6:g} um, solver {SOLVER_VERSION}, {len(places)} points.\n")
+    for rows in (run_table(places, runs, observed), number_table(best), valley_table(best)):
+        print(f"{table(rows)}\n")
+
+
+if __name__ == "__main__":
+    main()

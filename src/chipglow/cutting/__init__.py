@@ -8,7 +8,7 @@ from chipglow.cutting.conditions import (
     OutputWindow,
     Surroundings,
 )
-from chipglow.cutting.damage import JohnsonCookDamage
+from chipglow.cutting.damage import FittedDamage, JohnsonCookDamage
 from chipglow.cutting.energy import EnergyHistory
 from chipglow.cutting.flow_stress import FlowStress, flow_stress_law
 from chipglow.cutting.laws import HyperbolicTangent, JohnsonCook, MarusichOrtiz, ZerilliArmstrong
@@ -37,6 +37,7 @@ __all__ = [
     "CuttingConditions",
     "CuttingSimulation",
     "EnergyHistory",
+    "FittedDamage",
     "FlowStress",
     "ForceHistory",
     "Friction",

@@ -1,6 +1,6 @@
 """Damage: the strain at which material begins to fail, and the energy that failing takes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from math import isfinite
 from typing import Final, NamedTuple
 
@@ -16,6 +16,9 @@ TRIAXIALITIES: Final = (-1.5, 1.5)
 BAND_CELLS: Final = 2.0
 """Width in cells over which the solver spreads what fails: quadratic B-splines cannot be narrower.
 The energy of a square metre of failed surface is that of a layer so thick."""
+
+
+_LARGEST_LOSS: Final = 0.99
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,64 @@ class JohnsonCookDamage:
         check_positive("damage fracture_energy", self.fracture_energy)
         check_positive("damage reference_rate", self.reference_rate)
         check_melting("damage", self.reference_temperature, self.melting_temperature)
+
+
+@dataclass(frozen=True)
+class FittedDamage:
+    """How well the numbers of a damage are known that were fitted to measured cuts.
+
+    Parameters
+    ----------
+    numbers : tuple of str
+        Names of the fitted fields of `JohnsonCookDamage`.
+    relative_covariance : tuple of tuple of float
+        Covariance of their natural logarithms, shape (n, n).
+    """
+
+    numbers: tuple[str, ...]
+    relative_covariance: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        known = {one.name for one in fields(JohnsonCookDamage)}
+        for name in self.numbers:
+            if name not in known:
+                raise ValueError(
+                    f"fitted_damage numbers: {name!r}, expected one of {sorted(known)}"
+                )
+        covariance = np.array(self.relative_covariance, dtype=np.float64)
+        size = len(self.numbers)
+        if covariance.shape != (size, size):
+            raise ValueError(
+                f"relative_covariance: {covariance.shape[0]} rows, expected "
+                f"{size} rows of {size} numbers"
+            )
+        lowest = np.linalg.eigvalsh(covariance).min() if size else 0.0
+        if not np.allclose(covariance, covariance.T) or lowest < -1e-9 * covariance.max():
+            raise ValueError(
+                "relative_covariance: expected one that is symmetric, without negative variances"
+            )
+
+    def draw(self, damage: JohnsonCookDamage, generator: np.random.Generator) -> JohnsonCookDamage:
+        """A damage that the measured cuts allow as well: log-normal about the one in use.
+
+        Parameters
+        ----------
+        damage : JohnsonCookDamage
+            The one in use.
+        generator : numpy.random.Generator
+            What draws.
+        """
+        size = len(self.numbers)
+        drawn = generator.multivariate_normal(
+            np.zeros(size), self.relative_covariance, method="eigh"
+        )
+        values = {
+            name: getattr(damage, name) * float(np.exp(change))
+            for name, change in zip(self.numbers, drawn, strict=True)
+        }
+        if "loss" in values:
+            values["loss"] = min(values["loss"], _LARGEST_LOSS)
+        return replace(damage, **values)
 
 
 class Damage(NamedTuple):

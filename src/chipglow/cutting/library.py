@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from chipglow.cutting import laws as _laws  # noqa: F401  (registers the laws)
-from chipglow.cutting.damage import JohnsonCookDamage
+from chipglow.cutting.damage import FittedDamage, JohnsonCookDamage
 from chipglow.cutting.flow_stress import LAWS, comes_with_chipglow
 from chipglow.cutting.material import RateTable, TemperatureTable, ToolMaterial, WorkpieceMaterial
 from chipglow.text import read_yaml
@@ -253,6 +253,8 @@ class _Reader:
         if kind not in ("workpiece", "tool"):
             raise self._wrong("kind", kind, "workpiece or tool")
         parts = tuple(_TOOL) if kind == "tool" else _WORKPIECE_PARTS
+        if isinstance(data, Mapping) and kind == "workpiece" and "fitted_damage" in data:
+            parts = (*parts, "fitted_damage")
         data = self._mapping("", data, (*_HEADER, *parts))
         name, description = self._text("name", data), self._text("description", data)
         sets: dict[str, WorkpieceMaterial] = {}
@@ -274,6 +276,7 @@ class _Reader:
         share = self._share("taylor_quinney", data["taylor_quinney"])
         tables = {key: self._table(key, data[key], quantity) for key, quantity in _TABLES.items()}
         damage = self._damage(data["damage"])
+        fitted = self._fitted(data["fitted_damage"]) if "fitted_damage" in data else None
         laws = data["flow_stress"]
         if not isinstance(laws, Mapping) or not laws:
             raise self._wrong("flow_stress", laws, "one set or more by name")
@@ -285,6 +288,7 @@ class _Reader:
                 "name": f"{name}, flow stress {chosen}",
                 "flow_stress": flow_stress,
                 "damage": damage if fails else None,
+                "fitted_damage": fitted if fails else None,
                 "taylor_quinney": share,
                 **constant_or_table,
                 **tables,
@@ -299,6 +303,25 @@ class _Reader:
             "damage", JohnsonCookDamage, self._group("damage", data, _DAMAGE)
         )
         return damage
+
+    def _fitted(self, data: object) -> FittedDamage:
+        """How well the damage is known; a number that is no number is the class's to refuse."""
+        keys = ("numbers", "relative_covariance", "source")
+        data = self._mapping("fitted_damage", data, keys)
+        source = self._text("fitted_damage.source", data)
+        numbers, rows = data["numbers"], data["relative_covariance"]
+        if not isinstance(numbers, list) or not all(isinstance(one, str) for one in numbers):
+            raise self._wrong("fitted_damage.numbers", numbers, "names, such as [d1, loss]")
+        if not isinstance(rows, list) or not all(
+            isinstance(row, list) and all(isinstance(one, int | float) for one in row)
+            for row in rows
+        ):
+            raise self._wrong("fitted_damage.relative_covariance", rows, "rows of numbers")
+        for name, row in zip(numbers, rows, strict=False):
+            self._properties.append(Property(f"fitted_damage.{name}", str(row), source))
+        values = {"numbers": tuple(numbers), "relative_covariance": tuple(map(tuple, rows))}
+        fitted: FittedDamage = self._build("fitted_damage", FittedDamage, values)
+        return fitted
 
     def _flow_stress(self, place: str, data: object) -> tuple[bool, Any]:
         """Whether the damage of the file applies, and the law."""

@@ -1,12 +1,12 @@
 """Materials of the cut: mechanics and heat."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.cutting.damage import JohnsonCookDamage
+from chipglow.cutting.damage import FittedDamage, JohnsonCookDamage
 from chipglow.cutting.flow_stress import FlowStress
 from chipglow.cutting.laws import check_positive
 
@@ -114,6 +114,8 @@ class WorkpieceMaterial:
         In W/(m K) and J/(kg K).
     taylor_quinney : float or RateTable
         Share of the plastic work that becomes heat: constant, or over the plastic strain rate.
+    fitted_damage : FittedDamage, optional
+        How well the damage is known, where measured cuts determined it.
     """
 
     name: str
@@ -125,6 +127,7 @@ class WorkpieceMaterial:
     conductivity: TemperatureTable
     heat_capacity: TemperatureTable
     taylor_quinney: float | RateTable = 0.9
+    fitted_damage: FittedDamage | None = None
 
     def __post_init__(self) -> None:
         for value in _values(self.density):
@@ -170,6 +173,23 @@ class WorkpieceMaterial:
         volume = self.density_at(ROOM_TEMPERATURE) / self.density_at(kelvins)
         rise = np.diff(volume, append=volume[-1])
         return np.stack([*ratios, volume, rise], axis=-1)
+
+    def drawn(self, generator: np.random.Generator) -> "WorkpieceMaterial":
+        """The material with a damage that the cuts it was fitted to allow as well.
+
+        Parameters
+        ----------
+        generator : numpy.random.Generator
+            What draws.
+
+        Raises
+        ------
+        ValueError
+            If the damage was not fitted.
+        """
+        if self.damage is None or self.fitted_damage is None:
+            raise ValueError(f"{self.name}: its damage was not fitted, nothing to draw from")
+        return replace(self, damage=self.fitted_damage.draw(self.damage, generator))
 
     def sound_speed(self) -> float:
         """Speed of longitudinal waves in m/s at the temperature where it is highest."""

@@ -59,7 +59,7 @@ from chipglow.cutting.watch import Trouble, fastest_point, find_lost, find_off_g
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.tool_surface import ToolSurface, surface_distance
 
-SOLVER_VERSION: Final = "9"
+SOLVER_VERSION: Final = "10"
 """Changes whenever the same input gives another result."""
 
 _MARGIN: Final = 4
@@ -426,6 +426,7 @@ class _State:
         `number` is that of the round; from the fourth on the mean of the rounds is kept.
         """
         self.entered[:] = 0.0
+        begin = self.tool_temperature.copy()
         self.advance()
         heat, area = np.moveaxis(self.entered, -1, 0) / self.interval
         contact = area.sum()
@@ -436,13 +437,13 @@ class _State:
         effusivity = _effusivity(material, start)
         # Jaeger's slider at high speed: mean rise q √(L / V) / (0.94 e) over a contact of length L.
         draining = 0.94 * effusivity * sqrt(self.speed / contact) * area
-        before = self.tool_temperature
-        after = steady_temperature(
+        met = 0.5 * (begin + self.tool_temperature)
+        found = steady_temperature(
             self.grid, self.tool_fraction, self.tool_heat, body,
-            np.maximum(heat + draining * before, 0.0), draining,
+            np.maximum(heat + draining * met, 0.0), draining,
         )  # fmt: skip
         part = 1.0 / max(number - _FULL_STEPS, 1)
-        self.tool_temperature = before + part * (after - before)
+        self.tool_temperature = begin + part * (found - begin)
         self.tool_beyond = beyond(self.grid, self.tool_border, self.tool_temperature, body)
         return float((self.contact_area * self.tool_temperature).sum() / self.contact_area.sum())
 

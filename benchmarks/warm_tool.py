@@ -1,0 +1,81 @@
+"""How much hotter the rake face is when the tool has been cutting for long.
+
+    python benchmarks/warm_tool.py [--cell 20] [--length 2]
+
+Cuts the paper's chip with a cold tool and with a steady one, and prints the mean temperature within
+15 um of the rake face along the contact, in the chip and in the tool, over the frames of the last
+three fifths of the cut, and the forces. Cell in um, length of cut in mm. Minutes.
+"""
+
+import argparse
+from dataclasses import replace
+
+import numpy as np
+from experiments import BUILD_UP, aligned, view
+from numpy.typing import NDArray
+
+from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow, ToolBody
+from chipglow.laboratory.chip.contact import contact_length
+from chipglow.scene import Frame
+
+BESIDE = 15e-6
+INTERVAL = 5e-6
+
+
+class RakeFace:
+    """Gathers the temperatures beside the contact, frame by frame."""
+
+    def __init__(self, simulation: CuttingSimulation) -> None:
+        self.raster, self.tool = view(simulation), simulation.tool
+        x, y = np.meshgrid(self.raster.x, self.raster.y)
+        self.distance = self.tool.signed_distance(x, y)
+        (left, up), foot = self.tool.rake_direction, self.tool.rake_foot
+        self.along = (x - foot[0]) * left + (y - foot[1]) * up
+        self.means: list[tuple[float, float, float]] = []
+
+    def add(self, frame: Frame) -> None:
+        """Mean temperature in K of chip and tool within `BESIDE`, and the contact's length in m."""
+        workpiece: NDArray[np.bool_] = np.isfinite(frame.plastic_strain)
+        contact = contact_length(self.raster, workpiece, self.tool, 2 * self.raster.spacing)
+        beside = (np.abs(self.distance) < BESIDE) & (self.along > 0) & (self.along < contact)
+        chip, inside = beside & workpiece, beside & (self.distance < 0)
+        means = (frame.temperature[chip].mean(), frame.temperature[inside].mean())
+        self.means.append((*map(float, means), contact))
+
+
+def row(name: str, simulation: CuttingSimulation) -> list[str]:
+    """Cut once and return a row of the table."""
+    length = simulation.conditions.cutting_length
+    face = RakeFace(simulation)
+    window = OutputWindow(BUILD_UP * length, length, INTERVAL, later_bands=0)
+    history = simulation.run(window, face.raster, face.add)
+    late = history.time > BUILD_UP * history.time[-1]
+    chip, inside, contact = np.mean(face.means, axis=0)
+    scatter = np.std([one[0] for one in face.means])
+    forces = (history.cutting[late].mean() / 1e3, history.thrust[late].mean() / 1e3)
+    return [
+        name,
+        f"{chip - 273.15:.0f} ± {scatter:.0f}",
+        f"{inside - 273.15:.0f}",
+        f"{contact * 1e6:.0f}",
+        *(f"{force:.0f}" for force in forces),
+    ]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--cell", type=float, default=20.0, help="side of a cell in um")
+    parser.add_argument("--length", type=float, default=2.0, help="cutting length in mm")
+    given = parser.parse_args()
+    cold = CuttingSimulation(
+        conditions=CuttingConditions(cutting_length=given.length * 1e-3),
+        numerics=Numerics(given.cell * 1e-6),
+    )
+    head = ["tool", "chip / °C", "tool / °C", "contact / um", "Fc / (N/mm)", "Ft / (N/mm)"]
+    steady = replace(cold, tool_temperature=ToolBody())
+    rows = [head, row("cold", cold), row("steady", steady)]
+    print(aligned(rows))
+
+
+if __name__ == "__main__":
+    main()
