@@ -12,13 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 from experiments import BUILD_UP, aligned, view
-from numpy.typing import NDArray
 
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow, ToolBody
 from chipglow.laboratory.chip.contact import contact_length
-from chipglow.scene import Frame
+from chipglow.scene import Frame, Material
 
 BESIDE = 15e-6
+TOUCHING = 5e-6
 INTERVAL = 5e-6
 
 
@@ -35,8 +35,8 @@ class RakeFace:
 
     def add(self, frame: Frame) -> None:
         """Mean temperature in K of chip and tool within `BESIDE`, and the contact's length in m."""
-        workpiece: NDArray[np.bool_] = np.isfinite(frame.plastic_strain)
-        contact = contact_length(self.raster, workpiece, self.tool, 2 * self.raster.spacing)
+        workpiece = frame.material == Material.WORKPIECE
+        contact = contact_length(self.raster, workpiece, self.tool, TOUCHING)
         beside = (np.abs(self.distance) < BESIDE) & (self.along > 0) & (self.along < contact)
         chip, inside = beside & workpiece, beside & (self.distance < 0)
         means = (frame.temperature[chip].mean(), frame.temperature[inside].mean())

@@ -98,9 +98,7 @@ class FittedDamage:
         known = {one.name for one in fields(JohnsonCookDamage)}
         for name in self.numbers:
             if name not in known:
-                raise ValueError(
-                    f"fitted_damage numbers: {name!r}, expected one of {sorted(known)}"
-                )
+                raise ValueError(f"numbers: {name!r}, expected one of {sorted(known)}")
         covariance = np.array(self.relative_covariance, dtype=np.float64)
         size = len(self.numbers)
         if covariance.shape != (size, size):
