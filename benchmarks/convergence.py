@@ -8,6 +8,7 @@ otherwise, frames every 1 us in the paper's window. Prints a Markdown table.
 
 import sys
 from dataclasses import dataclass, field
+from math import isfinite
 from time import perf_counter
 
 import numpy as np
@@ -57,13 +58,18 @@ def row(cell):
         f"{segments.cutting_mean / 1e3:.0f}",
         f"{segments.cutting_swing / 1e3:.0f}",
         f"{segments.thrust_mean / 1e3:.0f}",
-        f"{segments.period * 1e6:.0f} ± {segments.period_uncertainty * 1e6:.0f}",
+        f"{segments.period * 1e6:.0f}{deviation(segments.period_uncertainty)}",
         f"{max(fields.hottest) - 273.15:.0f}",
         f"{np.median(np.array(fields.widths)[active]) * 1e6:.0f}",
         f"{np.median(np.array(fields.rates)[active]) / 1e3:.0f}",
         f"{history.energy.closing_error[-1] * 100:.1f}",
         f"{seconds:.0f}",
     ]
+
+
+def deviation(seconds: float) -> str:
+    """Uncertainty in us after a mean; nothing for a single period."""
+    return f" ± {seconds * 1e6:.0f}" if isfinite(seconds) else ""
 
 
 def main():

@@ -1,6 +1,6 @@
 """Cuts of AISI 1045 that others have published, beside the same cuts computed here.
 
-    python benchmarks/experiments.py [--cell 20] [--length 2] [--markdown] [NAME ...]
+    python benchmarks/experiments.py [--cell 20] [--length 2] [--figure F] [--markdown] [NAME ...]
 
 The cuts, what is published of them and where it stands are in experiments.yaml. Each cut takes
 minutes at a cell of 20 um; its means are kept in build/experiments, so that an interrupted run goes
@@ -31,6 +31,7 @@ from chipglow.cutting import (
     OutputWindow,
     tool_material,
 )
+from chipglow.drawing.drawing import BLUE, GREY, VERMILLION, new_figure, style
 from chipglow.io import atomic_path
 from chipglow.laboratory.chip import ChipMetrics, chip_metrics, contact_length, segmentation
 from chipglow.quantities.units import Quantity
@@ -293,6 +294,33 @@ def cuts(computed: Iterable[tuple[Experiment, Means]]) -> list[list[str]]:
     return rows
 
 
+@style()
+def draw_residuals(computed: Iterable[tuple[Experiment, Means]], path: Path) -> None:
+    """Draw how far every computed force is from each published one, and write the figure."""
+    rows = [
+        (f"{one.name}, {entry.source.partition('-')[0]}", entry, getattr(means, entry.quantity))
+        for one, means in computed
+        for entry in one.published
+        if QUANTITIES[entry.quantity] is FORCE
+    ]
+    names = list(dict.fromkeys(name for name, _, _ in rows))
+    figure = new_figure(0.8 + 0.27 * len(names))
+    axes = figure.subplots()
+    for quantity, marker in (("cutting_force", "o"), ("thrust_force", "s")):
+        chosen = [row for row in rows if row[1].quantity == quantity]
+        residuals = [100 * (here / entry.value - 1) for _, entry, here in chosen]
+        places = [names.index(name) for name, _, _ in chosen]
+        colour = BLUE if marker == "o" else VERMILLION
+        axes.plot(residuals, places, marker, color=colour, label=quantity.replace("_", " "))
+    axes.axvline(0.0, color=GREY, linewidth=0.8)
+    axes.set_yticks(range(len(names)), names)
+    axes.invert_yaxis()
+    axes.set_xlabel("computed over published force, less one / %")
+    axes.legend()
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format="png")
+
+
 def number(value: float, unit: Quantity) -> str:
     """Three digits in the quantity's unit; a dash for NaN."""
     if not isfinite(value):
@@ -322,6 +350,7 @@ def arguments(names: list[str]) -> argparse.Namespace:
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
     parser.add_argument("--cell", type=float, default=20.0, help="side of a cell in um")
     parser.add_argument("--length", type=float, default=2.0, help="cutting length in mm")
+    parser.add_argument("--figure", type=Path, help="draw the residuals of the forces, a PNG file")
     parser.add_argument("--markdown", action="store_true", help="print Markdown tables")
     given = parser.parse_args()
     if unknown := sorted(set(given.names) - set(names)):
@@ -339,6 +368,8 @@ def main() -> None:
         print(experiment.name, file=sys.stderr, flush=True)
         simulation = experiment.simulation(given.cell * 1e-6, given.length * 1e-3)
         computed.append((experiment, means_of(simulation, experiment.name)))
+    if given.figure:
+        draw_residuals(computed, given.figure)
     table = markdown if given.markdown else aligned
     print(f"Cell {given.cell:g} um, cutting length {given.length:g} mm, solver {SOLVER_VERSION}.")
     print(f"{NOT_READ}: the source was not read, look the number up before you quote it.")

@@ -11,6 +11,7 @@ import argparse
 from dataclasses import asdict, replace
 from math import nan
 
+from convergence import deviation
 from experiments import cut
 
 from chipglow.cutting import (
@@ -61,7 +62,7 @@ def row(name: str, cell: float) -> list[str]:
         (chip.cutting_mean / 1e3, "{:.0f}"),
         (chip.cutting_swing / 1e3, "{:.0f}"),
         (chip.thrust_mean / 1e3, "{:.0f}"),
-        (chip.period * 1e6, f"{{:.0f}} ± {chip.period_uncertainty * 1e6:.0f}"),
+        (chip.period * 1e6, "{:.0f}" + deviation(chip.period_uncertainty)),
         (chip.frequency / 1e3, "{:.1f}"),
         (chip.spacing * 1e6, "{:.0f}"),
         (chip.degree * 100 if chip.segments > 1 else nan, "{:.0f}"),

@@ -98,8 +98,9 @@ class AnalyticChip:
         work = np.cumsum(np.maximum(cutting, 0.0)) * 0.5e-6 * 250.0 / 60.0 + 1e-3
         nothing = np.zeros(time.size)
         energy = EnergyHistory(
-            work, nothing, nothing, nothing, 0.9 * work, 0.08 * work, nothing, nothing, nothing
-        )
+            work, nothing, nothing, nothing, 0.9 * work, 0.08 * work, nothing, nothing, nothing,
+            nothing,
+        )  # fmt: skip
         return ForceHistory(time, cutting, thrust, energy)
 
     def _fields(self, time: float) -> dict[str, NDArray[np.generic]]:

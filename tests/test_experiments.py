@@ -116,7 +116,7 @@ def test_differences_are_computed_over_published_and_what_is_missing_is_a_dash()
     conditions = experiments.cuts([(replace(cut, read=False), MEANS)])[1]
     assert conditions == [
         *("ours", "200", "0.15", "5", "someone †", "edge radius"),
-        *("3", "−2", "0.8", "60"),
+        *("3", "20", "−2", "0.8", "60"),
     ]
 
 

@@ -77,10 +77,10 @@ STEADY: Final = 1.0
 """Change in K of a warm tool's mean temperature in the contact that is left."""
 
 _ROUND: Final = 2.0
-_COARSE: Final = 15.0
+_COARSE: Final = 12.0
 _FULL_STEPS: Final = 3
 _SETTLED: Final = 3
-_MOST_ROUNDS: Final = 24
+_MOST_ROUNDS: Final = 48
 
 
 class SolverError(RuntimeError):
