@@ -81,6 +81,7 @@ _COARSE: Final = 12.0
 _FULL_STEPS: Final = 3
 _SETTLED: Final = 3
 _MOST_ROUNDS: Final = 48
+_USUAL_ROUNDS: Final = 18
 
 
 class SolverError(RuntimeError):
@@ -253,12 +254,18 @@ class CuttingSimulation:
 
     @property
     def point_steps(self) -> float:
-        """Material points times time steps of the whole cut, about: its time follows them."""
+        """Material points times time steps of the whole cut, about: its time follows them.
+
+        With a steady tool those of the cut that warms it are in it.
+        """
         numerics, conditions = self.numerics, self.conditions
         side = numerics.cell / numerics.points_per_side
         points = (numerics.upstream + numerics.downstream) * (numerics.depth + conditions.feed)
         step = numerics.courant * numerics.cell / (_sound(self) + conditions.speed)
-        return points / side**2 * conditions.cutting_length / conditions.speed / step
+        own = points / side**2 * conditions.cutting_length / conditions.speed / step
+        if not isinstance(self.tool_temperature, ToolBody):
+            return own
+        return own + self._long_cut().point_steps * _USUAL_ROUNDS / _MOST_ROUNDS
 
     def steady_tool(self) -> SteadyTool:
         """The tool after a long cut: cut and conduct in turn till its temperature stays.
@@ -279,14 +286,8 @@ class CuttingSimulation:
         body = self.tool_temperature
         if not isinstance(body, ToolBody):
             raise ValueError(f"tool_temperature: {body!r}, expected the body of a tool")
-        feed = self.conditions.feed
-        distance = _ROUND * feed
-        coarse = replace(
-            self,
-            conditions=replace(self.conditions, cutting_length=_MOST_ROUNDS * distance),
-            numerics=replace(self.numerics, cell=max(self.numerics.cell, feed / _COARSE)),
-            tool_temperature=None,
-        )
+        coarse = self._long_cut()
+        distance = coarse.conditions.cutting_length / _MOST_ROUNDS
         state = _State(coarse, distance / self.conditions.speed)
         rounds: list[float] = []
         for number in range(1, _MOST_ROUNDS + 1):
@@ -300,6 +301,16 @@ class CuttingSimulation:
                 f"{max(recent) - min(recent):.1f} K in {_SETTLED} rounds, expected under {STEADY:g}"
             )
         return SteadyTool(state.grid, state.tool_fraction, state.tool_temperature, tuple(rounds))
+
+    def _long_cut(self) -> "CuttingSimulation":
+        """The cut that tells the heat of a steady tool, as long as it may become."""
+        feed = self.conditions.feed
+        return replace(
+            self,
+            conditions=replace(self.conditions, cutting_length=_MOST_ROUNDS * _ROUND * feed),
+            numerics=replace(self.numerics, cell=max(self.numerics.cell, feed / _COARSE)),
+            tool_temperature=None,
+        )
 
     def _recorder(self, window: OutputWindow) -> Recorder:
         return Recorder(window, self.conditions.speed, self.conditions.cutting_length)
