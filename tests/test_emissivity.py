@@ -561,7 +561,7 @@ def test_the_command_fits_over_the_temperature(folder):
             ["a.nc", "--reference", "1 K", "--reference", "2 K"],
             "--reference: 2 temperatures for 1 images",
         ),
-        (["none.nc", "--reference", "391degC"], "none.nc: No such file"),
+        (["none.nc", "--reference", "391degC"], "none.nc: there is no such file"),
         (["a.nc", "--reference", "391degC", "--plot", "p.doc"], "--plot: p.doc"),
         (["a.nc", "--reference", "391degC", "--out", "no/e.nc"], "there is no folder no"),
         (["a.nc", "--reference", "391degC", "--set", "band=1"], "--set"),

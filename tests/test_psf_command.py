@@ -133,7 +133,7 @@ def test_a_region_is_cut_out(folder):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("missing.nc",), "missing.nc: No such file"),
+        (("missing.nc",), "missing.nc: there is no such file"),
         (("edge.nc", "--out", "psf.csv"), "--out: psf.csv, expected a file that ends in .nc"),
         (("edge.nc", "--plot", "psf.bmp"), "--plot: psf.bmp"),
         (("edge.nc", "--model", "lorentz"), "'lorentz' was not fitted"),

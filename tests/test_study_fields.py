@@ -41,7 +41,7 @@ def limits(text):
 
     What follows after a semicolon depends on other fields.
     """
-    words = text.split(";")[0]
+    words = text.split(";")[0].removeprefix("none, or ")
     if match := _RANGE.fullmatch(words):
         low, low_unit, high, high_unit = match.groups()
         return [(float(low), low_unit, -1, INCLUSIVE), (float(high), high_unit, 1, INCLUSIVE)]

@@ -140,7 +140,7 @@ def test_a_cut_that_stops_is_told_and_the_others_stay(monkeypatch, capsys):
 
 
 def test_forces_of_one_width_tell_it(monkeypatch):
-    means = titanium.Means(200e3, 100e3, 0.12e-3, 0.2e-3, 80e-6, 5, -0.02, 0.012, 60.0)
+    means = titanium.Means(200e3, 100e3, 0.12e-3, 0.2e-3, 80e-6, 5, 0.2, -0.02, 0.012, 60.0)
     tests = {Condition(SLOW, FINE): [trial(), trial(cutting_force=110.0)]}
     head, row = titanium.cuts_made({(Condition(SLOW, FINE), 0.0): means}, tests)
     told = dict(zip(head, row, strict=True))

@@ -62,6 +62,6 @@ def with_preset(camera: Mapping[str, Any]) -> Mapping[str, Any]:
     name = camera.get("preset")
     if name in (None, "none"):
         return camera
-    if name not in CAMERAS:
+    if not isinstance(name, str) or name not in CAMERAS:
         raise ValueError(f"preset: {name!r} is unknown, expected one of {', '.join(CAMERAS)}")
     return {**CAMERAS[name].fields, **camera}

@@ -61,17 +61,16 @@ class CutToolSection(ToolSection):
         "none",
         "Temperature of the tool when the cut begins; steady: that of a tool that has been\n"
         "cutting for long; none: as cold as the workpiece, as the paper's.",
-        "none, steady, or a temperature of -70 degC to 1200 degC",
+        "-73.15 degC to 1226.85 degC; none; or steady",
     )
     body: Declared[ToolBody] = described({}, "What the heat of a steady tool flows through.")
 
     @model_validator(mode="after")
-    def _possible(self) -> Self:
-        value = self.temperature
-        if isinstance(value, float) and not 200.0 <= value <= 1500.0:
-            raise ValueError(
-                f"temperature: {TEMPERATURE.text(value)}, expected -70 degC to 1200 degC"
-            )
+    def _warm_within_reason(self) -> Self:
+        given: object = self.temperature
+        if isinstance(given, float) and not 200.0 <= given <= 1500.0:
+            low, high = TEMPERATURE.text(200.0), TEMPERATURE.text(1500.0)
+            raise ValueError(f"temperature: {TEMPERATURE.text(given)}, expected {low} to {high}")
         return self
 
     def start(self) -> float | ToolBody | None:
