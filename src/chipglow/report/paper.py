@@ -45,8 +45,8 @@ TABLE_1: Final = {
 
 QUICK: Final = (
     "For a first look only: --quick cuts with a cell of 20 µm in place of 10 µm, on samples of "
-    "1.5 µm in place of 2/3 µm. Its errors are too small: −39 °C in place of −48 °C at the rake "
-    "face, −35 °C in place of −54 °C at the centre of the shear band, −81 °C in place of −109 °C "
+    "1.5 µm in place of 2/3 µm. Its errors are too small: −63 °C in place of −73 °C at the rake "
+    "face, −40 °C in place of −67 °C at the centre of the shear band, −66 °C in place of −104 °C "
     "beside it. For figures to quote, run without --quick."
 )
 """What to know before quoting the quick study; means over the draws of both studies."""
