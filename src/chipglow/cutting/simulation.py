@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import ceil, inf, sqrt
 from typing import Final
 
@@ -229,7 +230,7 @@ class CuttingSimulation:
         density = cold * self.mass_scaling
         return density * self.conditions.speed**2 * self.conditions.feed
 
-    @property
+    @cached_property
     def mass_scaling(self) -> float:
         """Factor on the density in the equation of motion.
 
