@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from chipglow.cutting.stress import BULK, SHEAR, kelvin_index
+from chipglow.cutting.stress import BULK, SHEAR, elastic_energy, kelvin_index
 
 
 @dataclass(frozen=True)
@@ -77,9 +77,7 @@ def held_energy(points, count, step, elastic, cell):  # type: ignore[no-untyped-
         spread = p.cxx * p.cxx + p.cxy * p.cxy + p.cyx * p.cyx + p.cyy * p.cyy
         kinetic += p.own_vx * p.own_vx + p.own_vy * p.own_vy + 0.25 * cell * cell * spread
         warm = kelvin_index(p.temperature, elastic.shape[0])
-        dilation = p.volume / p.free_volume - 1.0
-        square = p.dxx * p.dxx + p.dyy * p.dyy + p.dxx * p.dyy + p.dxy * p.dxy
-        strained += 0.5 * elastic[warm, SHEAR] * square / step.shear_modulus * p.volume
-        bulk = elastic[warm, BULK] * step.bulk_modulus
-        strained += 0.5 * bulk * dilation * dilation * p.free_volume
+        sheared, pressed = elastic_energy(p, elastic[warm, SHEAR], elastic[warm, BULK], step)
+        strained += sheared
+        strained += pressed
     return 0.5 * step.mass * kinetic, strained

@@ -152,6 +152,20 @@ def _return(b, count, step, law, damage):  # type: ignore[no-untyped-def]
         b[TRIAL + k] = stress
 
 
+# Inlined before it is compiled: its arithmetic follows the rules of the kernel that calls it.
+@njit(inline="always")
+def elastic_energy(p, shear, bulk, step):  # type: ignore[no-untyped-def]
+    """Energy in J/m that a point's shear and dilation hold, sheared and pressed.
+
+    `shear` and `bulk` are the moduli over those at room temperature.
+    """
+    square = p.dxx * p.dxx + p.dyy * p.dyy + p.dxx * p.dyy + p.dxy * p.dxy
+    dilation = p.volume / p.free_volume - 1.0
+    sheared = 0.5 * shear * square / step.shear_modulus * p.volume
+    pressed = 0.5 * bulk * step.bulk_modulus * dilation * dilation * p.free_volume
+    return sheared, pressed
+
+
 @njit(**INLINE)
 def _moduli_loss(p, warm, elastic, step):  # type: ignore[no-untyped-def]
     """Elastic energy (J/m) that a point lost since its last step, as its moduli fell.
@@ -161,11 +175,10 @@ def _moduli_loss(p, warm, elastic, step):  # type: ignore[no-untyped-def]
     before = kelvin_index(p.elastic_temperature, elastic.shape[0])
     if before == warm:
         return 0.0
-    square = p.dxx * p.dxx + p.dyy * p.dyy + p.dxx * p.dyy + p.dxy * p.dxy
-    dilation = p.volume / p.free_volume - 1.0
-    sheared = (elastic[before, SHEAR] - elastic[warm, SHEAR]) * square / step.shear_modulus
-    pressed = (elastic[before, BULK] - elastic[warm, BULK]) * step.bulk_modulus * dilation**2
-    return 0.5 * (sheared * p.volume + pressed * p.free_volume)
+    shear = elastic[before, SHEAR] - elastic[warm, SHEAR]
+    bulk = elastic[before, BULK] - elastic[warm, BULK]
+    sheared, pressed = elastic_energy(p, shear, bulk, step)
+    return sheared + pressed
 
 
 @njit(**FAST)
