@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
 
-from chipglow.cli.inertia import say_inertia
+from chipglow.cli.inertia import say_of_cut
 from chipglow.cutting import (
     AISI_1045,
     CuttingConditions,
@@ -122,11 +122,12 @@ def test_momentum_flow_of_the_papers_cut():
 def test_a_warning_over_one_per_cent(kinetic, force, words, capsys):
     share = Inertia(kinetic, force, 100.0)
     assert bool(share.warning) == bool(words)
-    say_inertia(share)
+    say_of_cut(share, ["The feed is 2 cells [small]."])
     said = capsys.readouterr().err
     assert f"kinetic energy at most {kinetic:.2%} of the work" in said
     assert f"momentum flux {force:.2%} of the mean cutting force" in said
-    assert ("Warning" in said) == bool(words)
+    assert "Warning: The feed is 2 cells [small]." in said
+    assert said.count("Warning") == 1 + bool(words)
     assert all(word in share.warning and word in said for word in words)
 
 

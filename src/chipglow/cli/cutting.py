@@ -7,7 +7,7 @@ from shutil import copyfile
 
 from rich.console import Console
 
-from chipglow.cli.inertia import say_inertia
+from chipglow.cli.inertia import say_of_cut
 from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.io import atomic_path, open_scene
 from chipglow.laboratory.chip import inertia, resolution_warnings
@@ -39,9 +39,7 @@ def cut_study(study: Study, out: Path, preview: Path | None, resume: bool, agree
         with progress_bars() as progress:
             copyfile(cut(study, progress, resume, on_preview), temporary)
     scene = open_scene(out)
-    say_inertia(inertia(scene))
-    for warning in resolution_warnings(scene):
-        Console(stderr=True, highlight=False, soft_wrap=True).print(f"Warning: {warning}")
+    say_of_cut(inertia(scene), resolution_warnings(scene))
     scene.data.close()
 
 

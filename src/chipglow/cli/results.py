@@ -9,8 +9,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from chipglow.cli.assumed import say_assumed, say_missing
-from chipglow.cli.inertia import say_inertia
+from chipglow.cli.assumed import say_assumed, say_missing, say_warnings
+from chipglow.cli.inertia import say_of_cut
 from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.cutting import SOLVER_VERSION
 from chipglow.errors import SceneErrors, StudyResult
@@ -74,10 +74,11 @@ def _write(
             progress("report", 1.0)
     say_assumed(assumed)
     _print_table(result)
-    for remark in (*remarks, *_warnings(result)):
+    for remark in remarks:
         print(remark)
+    say_warnings(_warnings(result))
     if isinstance(result, StudyResult):
-        say_inertia(result.forces.inertia if result.forces else None)
+        say_of_cut(result.forces.inertia if result.forces else None)
     else:
         say_missing(result.missing)
     print(f"Report: {folder / report.relative_to(temporary)}")
@@ -98,7 +99,7 @@ def _report(
 
 
 def _warnings(result: StudyResult | SceneErrors) -> list[str]:
-    """What to know of the cut and of the images."""
+    """Warnings of the cut and of the images."""
     of_images = [
         f"Image of {name}. {warning}"
         for name, surface in result.surfaces.items()
