@@ -31,7 +31,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, create_model, m
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from chipglow.quantities.section import Section, described, or_none, or_the_word_none
+from chipglow.quantities.section import OR_NONE, Section, described, or_the_word, or_word
 from chipglow.quantities.units import Quantity
 
 Built = TypeVar("Built")
@@ -121,7 +121,7 @@ class Parameter:
         else:
             schema = self.quantity.__get_pydantic_core_schema__(plain, handler)
         schema = core_schema.no_info_after_validator_function(self._within, schema)
-        return or_none(schema) if optional else schema
+        return or_word(schema, OR_NONE.word, OR_NONE.value) if optional else schema
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -133,8 +133,8 @@ class Parameter:
             names = ("exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
             limits = (self.over, self.least, self.under, self.most)
             json |= {k: v for k, v in zip(names, limits, strict=True) if v is not None}
-        optional = schema["type"] == "function-before"  # `or_none` made it
-        return or_the_word_none(json) if optional else json
+        optional = schema["type"] == "function-wrap"  # `or_word` made it
+        return or_the_word(json, OR_NONE.word) if optional else json
 
     def _within(self, value: Any) -> Any:
         if not self.holds(value):

@@ -16,6 +16,7 @@ from pydantic import (
     GetJsonSchemaHandler,
     SerializerFunctionWrapHandler,
     ValidationInfo,
+    ValidatorFunctionWrapHandler,
     model_validator,
 )
 from pydantic.fields import FieldInfo
@@ -23,82 +24,59 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 
-def _none_of_text(value: object) -> object:
-    return None if value == "none" else value
+def or_word(schema: CoreSchema, word: str, value: object) -> CoreSchema:
+    """Schema of a field that may also hold one value, which descriptions write as a word."""
 
+    def read(given: object, rest: ValidatorFunctionWrapHandler) -> object:
+        return value if given is value or given == word else rest(given)
 
-def _text_of_none(value: object, handler: SerializerFunctionWrapHandler) -> object:
-    return "none" if value is None else handler(value)
+    def written(held: object, rest: SerializerFunctionWrapHandler) -> object:
+        return word if held == value else rest(held)
 
-
-def or_none(schema: CoreSchema) -> CoreSchema:
-    """Schema of a field that may be none, which descriptions write as the word."""
-    return core_schema.no_info_before_validator_function(
-        _none_of_text,
-        core_schema.nullable_schema(schema),
+    return core_schema.no_info_wrap_validator_function(
+        read,
+        schema,
         serialization=core_schema.wrap_serializer_function_ser_schema(
-            _text_of_none, when_used="json"
+            written, schema=schema, when_used="json"
         ),
     )
 
 
-class OrNone:
-    """Annotation of a field that may be none, which descriptions write as the word."""
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Schema of the field, or the word none."""
-        return or_none(handler(source))
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        """JSON schema of the field, or the word none."""
-        return or_the_word_none(handler(schema))
-
-
-OR_NONE: Final = OrNone()
-"""The annotation."""
-
-
-def or_the_word_none(schema: JsonSchemaValue) -> JsonSchemaValue:
-    """JSON schema of a field that may also be the word none."""
-    return {"anyOf": [schema, {"const": "none"}]}
+def or_the_word(schema: JsonSchemaValue, word: str) -> JsonSchemaValue:
+    """JSON schema of a field that may also be a word."""
+    return {"anyOf": [schema, {"const": word}]}
 
 
 @dataclass(frozen=True)
 class OrWord:
-    """Annotation of a field that may also be one word.
+    """Annotation of a field that may also hold one value, which descriptions write as a word.
 
     Parameters
     ----------
     word : str
-        The word, which the field then holds.
+        The word.
+    value : object
+        What the field then holds.
     """
 
     word: str
+    value: object
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Schema of the field, or the word."""
-        schema = handler(source)
-        return core_schema.no_info_wrap_validator_function(
-            lambda value, rest: value if value == self.word else rest(value),
-            schema,
-            serialization=core_schema.wrap_serializer_function_ser_schema(
-                lambda value, rest: value if value == self.word else rest(value),
-                schema=schema,
-                when_used="json",
-            ),
-        )
+        return or_word(handler(source), self.word, self.value)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         """JSON schema of the field, or the word."""
-        return {"anyOf": [handler(schema), {"const": self.word}]}
+        return or_the_word(handler(schema), self.word)
+
+
+OR_NONE: Final = OrWord("none", None)
+"""Annotation of a field that may be none."""
 
 
 def beside_the_study(file: str, info: ValidationInfo) -> str:

@@ -57,7 +57,7 @@ STEADY: Final = "steady"
 class CutToolSection(ToolSection):
     """The cutting tool, and how warm it is."""
 
-    temperature: Annotated[Temperature | None, OrWord(STEADY), OR_NONE] = described(
+    temperature: Annotated[Temperature | None, OrWord(STEADY, STEADY), OR_NONE] = described(
         "none",
         "Temperature of the tool when the cut begins; steady: that of a tool that has been\n"
         "cutting for long; none: as cold as the workpiece, as the paper's.",
