@@ -1,10 +1,12 @@
 """What the grid of a cutting simulation does not resolve."""
 
+from math import nan
+
 from chipglow.cutting import unresolved
 from chipglow.scene import Scene
 
 
-def resolution_warnings(scene: Scene, band_width: float | None = None) -> tuple[str, ...]:
+def resolution_warnings(scene: Scene, band_width: float = nan) -> tuple[str, ...]:
     """Sentences about lengths of a cut that its grid does not resolve.
 
     Parameters
@@ -12,9 +14,8 @@ def resolution_warnings(scene: Scene, band_width: float | None = None) -> tuple[
     scene : Scene
         A scene of the cutting simulation; of another nothing is said.
     band_width : float, optional
-        Width of the shear band in m, which is known after the cut only.
+        Width of the shear band in m, which is known after the cut only; NaN: not known.
     """
     known = str(scene.data.attrs.get("resolution_warnings", ""))
     cell = float(scene.data.attrs.get("cell", 0.0))
-    of_band = unresolved({"shear band": band_width}, cell) if band_width is not None else ()
-    return (*known.splitlines(), *of_band)
+    return (*known.splitlines(), *unresolved({"shear band": band_width}, cell))
