@@ -241,6 +241,16 @@ def load(text, folder):
             "-280 degC is not over 0 K",
         ),
         (
+            "cutting: {tool: {temperature: 1300 degC}}",
+            "cutting.tool.temperature",
+            "1300 degC, expected -73.15 degC to 1226.85 degC",
+        ),
+        (
+            "cutting: {tool: {temperature: hot}}",
+            "cutting.tool.temperature",
+            "'hot' is not a temperature",
+        ),
+        (
             "cutting: {tool: {rake_angle: 80 deg}}",
             "cutting.tool",
             "rake_angle: expected -60 to 60 degrees",

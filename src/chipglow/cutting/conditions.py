@@ -13,6 +13,11 @@ from chipglow.quantities.units import (
     TIME,
 )
 
+INITIAL_TEMPERATURE: Final = Parameter(
+    "Temperature of workpiece and tool before the cut.", TEMPERATURE, least=200.0, most=1500.0
+)
+"""Its limits hold for all that a cut may begin with."""
+
 _FROM_CONTACT: Final = replace(CUT_LENGTH, positive=False)
 
 
@@ -33,15 +38,7 @@ class CuttingConditions(Part):
             over=0.0,
         ),
     ] = 2.6e-3
-    initial_temperature: Annotated[
-        float,
-        Parameter(
-            "Temperature of workpiece and tool before the cut.",
-            TEMPERATURE,
-            least=200.0,
-            most=1500.0,
-        ),
-    ] = 293.15
+    initial_temperature: Annotated[float, INITIAL_TEMPERATURE] = 293.15
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ a wedge of the angle θ and a holder at R.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Final
 
 import numpy as np
@@ -17,11 +17,12 @@ from scipy.interpolate import NearestNDInterpolator, RegularGridInterpolator
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import spsolve
 
+from chipglow.cutting.conditions import INITIAL_TEMPERATURE
 from chipglow.cutting.heat import ToolHeat
 from chipglow.cutting.points import Grid
 from chipglow.cutting.tool_border import CELLS, GROWTH, border_nodes
 from chipglow.quantities import Parameter, Part
-from chipglow.quantities.units import LENGTH, TEMPERATURE
+from chipglow.quantities.units import LENGTH
 
 Field = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ class ToolBody(Part):
         Parameter("Distance from the edge to the holder, over 2 mm.", LENGTH, over=2e-3, most=1.0),
     ] = 10e-3
     holder_temperature: Annotated[
-        float, Parameter("Temperature of the holder.", TEMPERATURE, least=200.0, most=1500.0)
+        float, replace(INITIAL_TEMPERATURE, meaning="Temperature of the holder.")
     ] = 293.15
 
     def fall(self, r: Field) -> Field:

@@ -17,16 +17,16 @@ from chipglow.cutting import (
     tool_material,
     workpiece,
 )
+from chipglow.cutting.conditions import INITIAL_TEMPERATURE
 from chipglow.io import ToolSection
 from chipglow.quantities import (
-    OR_NONE,
     Declared,
     OrWord,
     Settings,
     beside_the_study,
     described,
 )
-from chipglow.quantities.units import TEMPERATURE, Length, Position, Temperature
+from chipglow.quantities.units import Length, Position
 from chipglow.scene import Raster
 
 _IN_REGION: Final = "the whole scene within the simulated region"
@@ -57,21 +57,13 @@ STEADY: Final = "steady"
 class CutToolSection(ToolSection):
     """The cutting tool, and how warm it is."""
 
-    temperature: Annotated[Temperature | None, OrWord(STEADY, STEADY), OR_NONE] = described(
+    temperature: Annotated[float | None, INITIAL_TEMPERATURE, OrWord(STEADY, STEADY)] = described(
         "none",
         "Temperature of the tool when the cut begins; steady: that of a tool that has been\n"
         "cutting for long; none: as cold as the workpiece, as the paper's.",
-        "-73.15 degC to 1226.85 degC; none; or steady",
+        f"{INITIAL_TEMPERATURE.limits}; none; or steady",
     )
     body: Declared[ToolBody] = described({}, "What the heat of a steady tool flows through.")
-
-    @model_validator(mode="after")
-    def _warm_within_reason(self) -> Self:
-        given: object = self.temperature
-        if isinstance(given, float) and not 200.0 <= given <= 1500.0:
-            low, high = TEMPERATURE.text(200.0), TEMPERATURE.text(1500.0)
-            raise ValueError(f"temperature: {TEMPERATURE.text(given)}, expected {low} to {high}")
-        return self
 
     def start(self) -> float | ToolBody | None:
         """What the simulation takes."""
