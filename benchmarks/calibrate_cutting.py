@@ -137,14 +137,11 @@ class Surface:
 
     @classmethod
     def through(cls, places: NDArray[np.float64], values: NDArray[np.float64]) -> "Surface":
-        """Least squares over the points where the quantity is known; few leave out squares."""
-        known = np.isfinite(values)
-        basis = terms(places[known])
-        if known.sum() <= basis.shape[1]:
-            basis[:, 1 + places.shape[1] :] = 0.0
-        weights, *_ = np.linalg.lstsq(basis, np.log(values[known]), rcond=None)
-        rest = np.log(values[known]) - basis @ weights
-        free = max(known.sum() - np.linalg.matrix_rank(basis), 1)
+        """Least squares over the points."""
+        basis, logs = terms(places), np.log(values)
+        weights, *_ = np.linalg.lstsq(basis, logs, rcond=None)
+        rest = logs - basis @ weights
+        free = max(len(values) - np.linalg.matrix_rank(basis), 1)
         return cls(weights, float(np.sqrt((rest**2).sum() / free)))
 
     def at(self, place: NDArray[np.float64]) -> float:
@@ -196,7 +193,7 @@ def covariance_at(
 
 
 def column(runs: list[dict[str, Means]], one: Observation) -> NDArray[np.float64]:
-    """A quantity of a cut at all places; NaN where a cut has no period."""
+    """A quantity of a cut at all places."""
     values = [getattr(run[one.cut], one.quantity) for run in runs]
     return np.array(values, dtype=np.float64)
 
