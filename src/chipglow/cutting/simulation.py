@@ -74,8 +74,9 @@ _INERTIA_SHARE: Final = 0.0045
 _LARGEST_SCALING: Final = 1000.0
 
 
-STEADY: Final = 1.0
-"""Change in K of a warm tool's mean temperature in the contact that is left."""
+STEADY_TOLERANCE: Final = 1.0
+"""Change in K of the contact's mean temperature, over the last rounds, under which a tool counts as
+steady."""
 
 _ROUND: Final = 2.0
 _COARSE: Final = 12.0
@@ -294,12 +295,13 @@ class CuttingSimulation:
         for number in range(1, _MOST_ROUNDS + 1):
             rounds.append(state.heat_through(body, number))
             recent = rounds[-_SETTLED:]
-            if number > _FULL_STEPS + _SETTLED and max(recent) - min(recent) < STEADY:
+            if number > _FULL_STEPS + _SETTLED and max(recent) - min(recent) < STEADY_TOLERANCE:
                 break
         else:
             raise SolverError(
                 f"warm tool: the contact's temperature still changes by "
-                f"{max(recent) - min(recent):.1f} K in {_SETTLED} rounds, expected under {STEADY:g}"
+                f"{max(recent) - min(recent):.1f} K in {_SETTLED} rounds, "
+                f"expected under {STEADY_TOLERANCE:g}"
             )
         return SteadyTool(state.grid, state.tool_fraction, state.tool_temperature, tuple(rounds))
 
@@ -395,8 +397,8 @@ class _State:
         self.capacity = material.heat_capacity.sampled()
         self.heat_shares = heat_shares(material.taylor_quinney)
         self.conductivity = material.conductivity.sampled()
-        self.diffusivity = _diffusivity(material, conditions.initial_temperature)
-        self.tool_heat = _tool_heat(simulation, spacing)
+        self.diffusivity, self.effusivity = _conduction(material, conditions.initial_temperature)
+        self.tool_heat = _tool_heat(simulation, self.effusivity, spacing)
         self.loss = HeatLoss.of(simulation.surroundings, numerics)
         self.tool_fraction = fraction_of_tool(self.grid, self.tool)
         shape = (self.grid.columns, self.grid.rows)
@@ -445,10 +447,8 @@ class _State:
         self.contact_area += area
         if contact <= 0.0:
             raise SolverError("warm tool: the chip did not touch the tool")
-        material, start = self.simulation.workpiece, self.simulation.conditions.initial_temperature
-        effusivity = _effusivity(material, start)
         # Jaeger's slider at high speed: mean rise q √(L / V) / (0.94 e) over a contact of length L.
-        draining = 0.94 * effusivity * sqrt(self.speed / contact) * area
+        draining = 0.94 * self.effusivity * sqrt(self.speed / contact) * area
         met = 0.5 * (begin + self.tool_temperature)
         found = steady_temperature(
             self.grid, self.tool_fraction, self.tool_heat, body,
@@ -700,9 +700,11 @@ def _time_steps(
     return cycles, steps, interval / cycles / steps
 
 
-def _diffusivity(material: WorkpieceMaterial, temperature: float) -> float:
+def _conduction(material: WorkpieceMaterial, temperature: float) -> tuple[float, float]:
+    """Thermal diffusivity in m²/s and effusivity in W s^½/(m² K)."""
+    conductivity = material.conductivity.at(temperature)
     capacity = material.density_at(temperature) * material.heat_capacity.at(temperature)
-    return float(material.conductivity.at(temperature) / capacity)
+    return float(conductivity / capacity), float(np.sqrt(conductivity * capacity))
 
 
 def _thermal_friction(simulation: CuttingSimulation) -> dict[str, float]:
@@ -714,15 +716,9 @@ def _thermal_friction(simulation: CuttingSimulation) -> dict[str, float]:
     return {"friction_exponent": exponent, "friction_melting": melting}
 
 
-def _effusivity(material: WorkpieceMaterial, temperature: float) -> float:
-    conductivity = material.conductivity.at(temperature)
-    capacity = material.density_at(temperature) * material.heat_capacity.at(temperature)
-    return float(np.sqrt(conductivity * capacity))
-
-
-def _tool_heat(simulation: CuttingSimulation, spacing: float) -> ToolHeat:
-    tool, material = simulation.tool_material, simulation.workpiece
-    chip = _effusivity(material, simulation.conditions.initial_temperature)
+def _tool_heat(simulation: CuttingSimulation, chip: float, spacing: float) -> ToolHeat:
+    """Heat of the tool, beside a chip of that effusivity."""
+    tool = simulation.tool_material
     return ToolHeat(
         capacity=tool.density * tool.heat_capacity,
         conductivity=tool.conductivity,
