@@ -14,8 +14,8 @@ TRIAXIALITIES: Final = (-1.5, 1.5)
 """Triaxialities at which the strain to failure is held: beyond, it was never measured."""
 
 BAND_CELLS: Final = 2.0
-"""Width in cells over which the solver spreads what fails: quadratic B-splines cannot be narrower.
-The energy of a square metre of failed surface is that of a layer so thick."""
+"""Width in cells of the layer over which the solver spreads a failure: quadratic B-splines cannot
+resolve a narrower one. What this layer takes is the energy of the failed surface."""
 
 
 _LARGEST_LOSS: Final = 0.99
@@ -81,7 +81,7 @@ class JohnsonCookDamage:
 
 @dataclass(frozen=True)
 class FittedDamage:
-    """How well the numbers of a damage are known that were fitted to measured cuts.
+    """How well the numbers of a damage law that were fitted to measured cuts are known.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class FittedDamage:
             )
 
     def draw(self, damage: JohnsonCookDamage, generator: np.random.Generator) -> JohnsonCookDamage:
-        """A damage that the measured cuts allow as well: log-normal about the one in use.
+        """Another damage law that the measured cuts allow: log-normal about the one in use.
 
         Parameters
         ----------

@@ -37,7 +37,7 @@ class EnergyHistory:
         0 if material under stress cooled.
     lost_heat : ndarray
         Heat that free surfaces lost to the surroundings, shape (n,). It was plastic or friction
-        work before, so it is no entry of the mechanical account.
+        work before, so it is no entry of the mechanical balance.
     """
 
     drive_work: NDArray[np.float64]
@@ -53,7 +53,7 @@ class EnergyHistory:
 
     @property
     def closing_error(self) -> NDArray[np.float64]:
-        """Share of the work that the account does not find again: what the grid dissipates."""
+        """Share of the work that the balance does not account for: what the grid dissipates."""
         held = self.kinetic_energy + self.elastic_energy
         used = self.plastic_work + self.friction_work + self.sharing_loss + self.moduli_loss
         done = self.drive_work + self.contact_work + self.expansion_work
@@ -61,15 +61,15 @@ class EnergyHistory:
 
 
 ENERGIES: Final = len(fields(EnergyHistory))
-"""Number of an account's entries."""
+"""Number of entries of the balance."""
 
 
 @njit(cache=True)
 def held_energy(points, count, step, elastic, cell):  # type: ignore[no-untyped-def]
     """Kinetic and elastic energy of the points in J/m; the affine velocity's part included.
 
-    `elastic` is `WorkpieceMaterial.elastic_ratios`: elastic strain holds the less energy the warmer
-    a point is.
+    `elastic` is `WorkpieceMaterial.elastic_ratios`: the warmer a point is, the less energy its
+    elastic strain holds.
     """
     kinetic = strained = 0.0
     for k in range(count):

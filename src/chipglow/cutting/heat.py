@@ -49,8 +49,8 @@ def conduct(  # type: ignore[no-untyped-def]
     free surface wherever the surface lies between the nodes.
 
     Increments leave differences between the points of a cell as they are, so a point much colder
-    than the others would be cooled with them. `share` is taken off what the grid does not see:
-    all of the noise, and of a smooth field only a fourth derivative.
+    than the others would be cooled with them. A `share` of what the grid does not see is taken
+    away: that is all of the noise, but of a smooth field only a fourth derivative.
     """
     _gather_heat(points, count, nodes, capacity, heat_mass, grid)
     increment[:] = 0.0

@@ -14,7 +14,7 @@ FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract", "arcp", "ns
 multiplying; never the freedom to change the order of sums or to ignore what is not finite."""
 
 INLINE: Final[Any] = {**FAST, "forceinline": True}
-"""How functions are compiled that loops call for every point: a call would stop vectorisation."""
+"""How functions that loops call for every point are compiled: a call would stop vectorisation."""
 
 _LN2 = 0.6931471805599453
 _LN2_HIGH = 0.693147180369123816490

@@ -135,9 +135,9 @@ class CuttingSimulation:
     surroundings : Surroundings
         What free surfaces lose heat to.
     tool_temperature : float or ToolBody, optional
-        The tool's temperature in K when the cut begins; a body: that of a tool that has been
-        cutting for long, whose heat flows through it. None: as cold as the workpiece, as the
-        paper's.
+        The tool's temperature in K when the cut begins. A body: the temperature of a tool that has
+        been cutting for long, by the flow of heat through this body. None: as cold as the
+        workpiece, as in the paper.
     """
 
     conditions: CuttingConditions = field(default_factory=CuttingConditions)
@@ -179,7 +179,7 @@ class CuttingSimulation:
             Called with the state after every interval, when its frame was handed over. The arrays
             are the simulation's own: write or copy them before you return.
         preview : Preview, optional
-            Who looks at the whole cut while it is computed, from where it starts or is resumed.
+            How the whole cut is shown while it is computed, from where it starts or is resumed.
 
         Returns
         -------
@@ -258,7 +258,7 @@ class CuttingSimulation:
     def point_steps(self) -> float:
         """Material points times time steps of the whole cut, about: its time follows them.
 
-        With a steady tool those of the cut that warms it are in it.
+        With a steady tool it includes those of the cut that warms the tool.
         """
         numerics, conditions = self.numerics, self.conditions
         side = numerics.cell / numerics.points_per_side
@@ -270,13 +270,13 @@ class CuttingSimulation:
         return own + self._long_cut().point_steps * _USUAL_ROUNDS / _MOST_ROUNDS
 
     def steady_tool(self) -> SteadyTool:
-        """The tool after a long cut: cut and conduct in turn till its temperature stays.
+        """The tool after a long cut: cut and conduct in turn until its temperature is steady.
 
-        A cut on a coarser grid tells the heat that enters the tool, averaged over about two
-        segments; conduction in the tool's body tells the temperature that this heat makes. The
-        chip would take the more heat the warmer the tool is: as much as a half-space that slides
-        past the contact (Jaeger). By that slope each round comes close to where both agree; from
-        the fourth on rounds are averaged, since no two segments are alike.
+        A cut on a coarser grid gives the heat that enters the tool, averaged over about two
+        segments; conduction in the tool's body gives the temperature that this heat makes. The
+        warmer the tool is, the more of the heat the chip takes, as a half-space would that slides
+        past the contact (Jaeger). With that slope each round comes close to where cut and
+        conduction agree; from the fourth on rounds are averaged, since no two segments are alike.
 
         Raises
         ------
