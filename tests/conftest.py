@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pytest
 
-from chipglow.cutting.flow_stress import LAWS
+from chipglow.cutting import FLOW_LAWS
 
 MOST_SECONDS = 1200
 
@@ -63,7 +63,7 @@ def wait_for(file):
 @pytest.fixture
 def own_laws():
     """Forget the laws that a test registers."""
-    before = dict(LAWS)
+    before = dict(FLOW_LAWS._own)
     yield
-    LAWS.clear()
-    LAWS.update(before)
+    FLOW_LAWS._own.clear()
+    FLOW_LAWS._own.update(before)

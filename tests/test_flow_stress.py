@@ -1,28 +1,35 @@
 """Flow-stress laws, one's own among them, damage with a fracture energy, and their arithmetic."""
 
+import os
+import subprocess
+import sys
 from dataclasses import asdict, dataclass, replace
 from math import exp, sqrt
 from pathlib import Path
+from typing import Annotated, ClassVar
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given, settings, strategies as st
 from numba import njit
 from solver import Block
 
 from chipglow.cutting import (
     AISI_1045,
+    FLOW_LAWS,
     CuttingSimulation,
     FlowStress,
     HyperbolicTangent,
     JohnsonCook,
     MarusichOrtiz,
     ZerilliArmstrong,
-    flow_stress_law,
 )
 from chipglow.cutting.damage import BAND_CELLS, Damage, damage_growth, weakening
-from chipglow.cutting.flow_stress import LAWS, stress_and_slopes
+from chipglow.cutting.flow_stress import stress_and_slopes
 from chipglow.cutting.lanes import exponential, logarithm
+from chipglow.quantities import Parameter
+from chipglow.quantities.units import STRESS
 
 STEEL = AISI_1045.flow_stress
 TITANIUM = HyperbolicTangent(
@@ -50,7 +57,7 @@ def test_law_of_the_documentation_is_what_the_solver_follows(own_laws):
     """Isothermal simple shear at 1e5 /s; the law and its arguments are all in the result."""
     names = documented()
     law = names["law"]
-    assert LAWS["power"] is names["PowerLaw"]
+    assert FLOW_LAWS.find("power") is names["PowerLaw"]
     assert isinstance(names["simulation"], CuttingSimulation)
     rate = 1e5
     material = replace(AISI_1045, flow_stress=law, damage=None, taylor_quinney=0.0)
@@ -73,18 +80,19 @@ def test_law_of_the_documentation_is_what_the_solver_follows(own_laws):
 
 
 def test_a_name_is_taken_but_by_the_same_class(own_laws):
-    with pytest.raises(ValueError, match="flow-stress law 'tanh': the name is taken"):
-        flow_stress_law("tanh")(type("Mine", (FlowStress,), {}))
+    with pytest.raises(ValueError, match="flow_law: 'tanh' is no new kind"):
+        FLOW_LAWS.part(type("Mine", (FlowStress,), {"kind": "tanh"}))
     # Not even by a class that is called the same.
-    with pytest.raises(ValueError, match="the name is taken"):
-        flow_stress_law("johnson-cook")(type("JohnsonCook", (FlowStress,), {}))
-    assert LAWS["johnson-cook"] is JohnsonCook
+    with pytest.raises(ValueError, match="is no new kind"):
+        FLOW_LAWS.part(type("JohnsonCook", (FlowStress,), {"kind": "johnson-cook"}))
+    assert FLOW_LAWS.find("johnson-cook") is JohnsonCook
 
     def define(factor):
-        @flow_stress_law("constant")
+        @FLOW_LAWS.part
         @dataclass(frozen=True)
         class Constant(FlowStress):
-            value: float
+            kind: ClassVar[str] = "constant"
+            value: Annotated[float, Parameter("Of the stress.", STRESS)]
 
             @staticmethod
             def stress(strain, rate, temperature, law):
@@ -94,6 +102,62 @@ def test_a_name_is_taken_but_by_the_same_class(own_laws):
 
     # Again and again, as a notebook's cell is run: the last one counts, though all look alike.
     assert [define(factor).at(0.1, 1.0, 300.0) for factor in (1.0, 2.0)] == [1e9, 2e9]
+
+
+def test_a_law_with_another_stress_has_its_own_slopes():
+    """A law that derives from one with slopes of its own: not those of its parent."""
+
+    class Doubled(JohnsonCook):
+        @staticmethod
+        def stress(strain, rate, temperature, law):
+            return 2e9 * strain
+
+    law = Doubled(*STEEL.numbers())
+    stress, by_strain, by_rate = slopes(0.25, 1e4, 500.0, law.numbers())
+    assert stress == law.at(0.25, 1e4, 500.0) == 0.5e9
+    assert by_strain == pytest.approx(2e9, rel=1e-9)
+    assert by_rate == 0.0
+
+
+def test_a_law_of_another_package_is_found_by_its_entry_point(tmp_path):
+    """In a process of its own: a package with a law and a material that names it."""
+    recipes = Path(__file__).parents[1] / "examples" / "recipes"
+    (tmp_path / "voce.py").write_bytes((recipes / "voce.py").read_bytes())
+    material = yaml.safe_load((recipes / "my-steel.yaml").read_text(encoding="utf-8"))
+    numbers = {
+        "yield_stress": "400 MPa", "saturation_stress": "900 MPa", "hardening_strain": 0.2,
+        "rate_exponent": 0.02, "reference_rate": "1 1/s", "melting_temperature": "1700 K",
+    }  # fmt: skip
+    material["flow_stress"] = {"mine": {"law": "voce", "source": "made up", **numbers}}
+    (tmp_path / "steel.yaml").write_text(yaml.safe_dump(material), encoding="utf-8")
+    (tmp_path / "steels.py").write_text(
+        "from pathlib import Path\nMINE = Path(__file__).with_name('steel.yaml')\n"
+    )
+    metadata = tmp_path / "mine-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text(
+        "[chipglow.flow_law]\nvoce = voce:Voce\n[chipglow.material]\nmy-steel = steels:MINE\n"
+    )
+    program = (
+        "from chipglow.cutting import material_names, workpiece\n"
+        "law = workpiece('my-steel').flow_stress\n"
+        "print(type(law).__module__, 'my-steel' in material_names('workpiece'))\n"
+        "print(float(law.at(0.1, 1e4, 600.0)))"
+    )
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", program],
+        env={**os.environ, "PYTHONPATH": path},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    module, stress = done.stdout.splitlines()
+    assert module == "voce True"
+    by_hand = (900e6 - 500e6 * exp(-0.5)) * 1e4**0.02 * (1 - 600 / 1700)
+    assert float(stress) == pytest.approx(by_hand, rel=1e-12)
 
 
 def test_tanh_by_hand():
@@ -132,7 +196,7 @@ def test_limits_of_tanh(rate, temperature, sharpness):
     ("field", "value"), [("sharpness", 0.0), ("recovery_strain", -1.0), ("hardening", -1.0)]
 )
 def test_tanh_refuses(field, value):
-    with pytest.raises(ValueError, match=rf"TANH {field}: expected .*, got {value}"):
+    with pytest.raises(ValueError, match=rf"Tangent\.{field}: {value:g}.*, expected .*0"):
         replace(TITANIUM, **{field: value})
 
 
@@ -169,7 +233,7 @@ def test_marusich_ortiz_by_hand():
     assert law.at(0.31, 1e6, 1500.0) == pytest.approx(678.052e6 / 60, rel=1e-5)
     assert law.melting_temperature == 1300.0
     assert replace(law, thermal_softening=0.0).melting_temperature == 3000.0
-    with pytest.raises(ValueError, match="rate_exponent: expected over 0, got -1"):
+    with pytest.raises(ValueError, match=r"MarusichOrtiz\.rate_exponent: -1, expected over 0"):
         replace(law, rate_exponent=-1)
 
 
@@ -181,7 +245,7 @@ def test_zerilli_armstrong_by_hand():
     # Hot and slow what is left is 100 + 350 MPa, and exp(-15) of 1000 MPa.
     assert law.at(0.25, 1.0, 3000.0) == pytest.approx(450.000306e6, rel=1e-8)
     with pytest.raises(
-        ValueError, match="Zerilli-Armstrong rate_hardening: expected 0 or more, got -1"
+        ValueError, match=r"Armstrong\.rate_hardening: -1 1/K, expected 0 1/K or more"
     ):
         replace(law, rate_hardening=-1)
 

@@ -163,22 +163,22 @@ def _write(path: Path, old: str, new: str) -> Path:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("212 GPa", "212", "young_modulus: 212, expected a stress such as 553.1 MPa or 205 GPa"),
-        ("212 GPa", "212 kg", "young_modulus: '212 kg', expected a stress"),
-        ("212 GPa", "true GPa", "young_modulus: 'true GPa', expected a stress"),
-        ("212 GPa", ".nan GPa", "young_modulus: '.nan GPa', expected a stress"),
-        ("value: 0.3\n", "value: 0.6\n", "workpiece: poisson_ratio: expected 0 to 0.49, got 0.6"),
+        ("212 GPa", "212", "young_modulus: 212 has no unit, expected a stress such as 553.1 MPa"),
+        ("212 GPa", "212 kg", "young_modulus: '212 kg' is not a stress"),
+        ("212 GPa", "true GPa", "young_modulus: 'true GPa' is not a stress"),
+        ("212 GPa", ".nan GPa", "young_modulus: '.nan GPa' is not a stress"),
+        ("value: 0.3\n", "value: 0.6\n", "poisson_ratio: 0.6, expected 0 to 0.49"),
         (
             "value: 0.3\n",
             "value: [[20 degC, 0.3], [100 degC, 0.6]]\n",
-            "expected 0 to 0.49, got 0.6",
+            "poisson_ratio: 0.6, expected 0 to 0.49",
         ),
         ("[400 degC, 184 GPa]", "[400 degC]", "young_modulus: ['400 degC'], expected [temperature"),
         ("[400 degC, 184 GPa]", "[100 degC, 184 GPa]", "young_modulus: temperature table: temp"),
         ("poisson_ratio", "poison_ratio", "poison_ratio: unknown, expected one of kind, name"),
         ("    hardening: 580 MPa\n", "", "flow_stress.pantale.hardening: is missing"),
         ("d3: -2.12", "d3: steep", "damage.d3: 'steep', expected a number without a unit"),
-        ("d2: 3.44", "d2: -3.44", "damage: damage: d1 + d2 exp(d3 triaxiality) falls to"),
+        ("d2: 3.44", "d2: -3.44", "damage: d1 + d2 exp(d3 triaxiality) falls to"),
         ("kind: workpiece", "kind: chip", "kind: 'chip', expected workpiece or tool"),
         (
             "[200 degC, 42",
@@ -186,11 +186,15 @@ def _write(path: Path, old: str, new: str) -> Path:
             "conductivity: temperature table: temperatures must ascend",
         ),
         ("[200 degC, 42.3 W/(m K)]", "42.3 W/(m K)", "expected [temperature, value]"),
-        ("[200 degC, 42.3", "[200, 42.3", "conductivity: 200, expected a temperature"),
+        ("[200 degC, 42.3", "[200, 42.3", "conductivity: 200 has no unit, expected a temperature"),
         ("  loss: 0.5\n", "  loss: 0.5\n  loss: 0.8\n", "key 'loss' is there twice"),
-        ("value: 0.9\n", "value: 1.9\n", "workpiece: taylor_quinney: expected 0 to 1, got 1.9"),
-        ("value: 0.9\n", f"value: {RATES}\n".replace("1/s", "K"), "'1 K', expected a strain rate"),
-        ("value: 0.9\n", f"value: {RATES}\n".replace("0.6", "6"), "rate table: value: expected 0"),
+        ("value: 0.9\n", "value: 1.9\n", "taylor_quinney: 1.9, expected 0 to 1"),
+        ("value: 0.9\n", f"value: {RATES}\n".replace("1/s", "K"), "'1 K' is not a strain rate"),
+        (
+            "value: 0.9\n",
+            f"value: {RATES}\n".replace("0.6", "6"),
+            "taylor_quinney: 6, expected 0 to 1",
+        ),
         ("value: 0.9\n", f"value: {RATES}\n".replace("1000", "0.1"), "rates must ascend"),
         ("value: 0.9\n", "value: [0.9]\n", "taylor_quinney: 0.9, expected [strain rate, value]"),
         (
@@ -208,7 +212,7 @@ def _write(path: Path, old: str, new: str) -> Path:
         (
             "15 kJ/m2",
             "15 kJ",
-            "fracture_energy: '15 kJ', expected a fracture energy such as 15 kJ/m2",
+            "fracture_energy: '15 kJ' is not a fracture energy, expected one such as 15 kJ/m2",
         ),
         ("kind: workpiece", "kind: [", "expected YAML"),
         ("kind: workpiece", "kind: !!python/object:os.system x", "expected YAML"),
@@ -294,7 +298,15 @@ def test_elastic_constants_over_the_temperature(tmp_path: Path) -> None:
     assert still.elastic_ratios().tolist() == [[1.0, 1.0, 1.0, 0.0]]
 
 
-def test_heat_share_over_the_strain_rate(tmp_path: Path) -> None:
+def test_limits_hold_for_every_value_of_a_table() -> None:
+    table = replace(AISI_1045.conductivity, values=(-1.0,) * len(AISI_1045.conductivity.values))
+    with pytest.raises(ValueError, match=r"Material\.conductivity: -1 W/m/K, expected over 0"):
+        replace(AISI_1045, conductivity=table)
+    with pytest.raises(ValueError, match=r"Material\.taylor_quinney: 1\.5, expected 0 to 1"):
+        replace(AISI_1045, taylor_quinney=RateTable((1.0, 2.0), (0.5, 1.5)))
+
+
+def test_heat_fraction_over_the_strain_rate(tmp_path: Path) -> None:
     path = _write(tmp_path / "steel.yaml", "value: 0.9\n", f"value: {RATES}\n")
     file = read_material(path)
     assert workpiece(str(path)).taylor_quinney == RateTable((1.0, 1000.0), (0.6, 0.9))

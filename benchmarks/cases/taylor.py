@@ -35,7 +35,7 @@ STEEL = replace(
     density=7830.0,
     young_modulus=206.9e9,
     poisson_ratio=0.3,
-    flow_stress=JohnsonCook(806e6, 614e6, 0.168, 0.0089, 1.1, 1813.15, 293.15),
+    flow_stress=JohnsonCook(806e6, 614e6, 0.168, 0.0089, 1.1, 1813.15, 293.15, 1.0),
     heat_capacity=TemperatureTable((293.15,), (460.0,)),
 )
 

@@ -26,7 +26,6 @@ from .cutting import (
     AISI_1045 as AISI_1045,
     CuttingSimulation as CuttingSimulation,
     FlowStress as FlowStress,
-    flow_stress_law as flow_stress_law,
 )
 from .errors import (
     Plan as Plan,

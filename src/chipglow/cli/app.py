@@ -113,7 +113,7 @@ def init(
     ] = False,
 ) -> None:
     """Write the paper's study as a commented YAML file."""
-    from chipglow.io import ImportDescription, atomic_path, import_text
+    from chipglow.io import atomic_path, import_description, import_text
     from chipglow.laboratory.measurement import MeasurementDescription, measurement_text
     from chipglow.study import Study, study_text
     from chipglow.text import json_schema
@@ -124,7 +124,8 @@ def init(
         raise FileExistsError(f"{path}: is there already, expected a new name or --force")
     with atomic_path(path) as temporary:
         if of_import:
-            text = json_schema(ImportDescription) if schema else import_text(ImportDescription())
+            imported = import_description()
+            text = json_schema(imported) if schema else import_text(imported())
         elif of_measurement:
             measurement = MeasurementDescription
             text = json_schema(measurement) if schema else measurement_text(measurement())

@@ -10,7 +10,7 @@ from chipglow.cutting.conditions import (
 )
 from chipglow.cutting.damage import FittedDamage, JohnsonCookDamage
 from chipglow.cutting.energy import EnergyHistory
-from chipglow.cutting.flow_stress import FlowStress, flow_stress_law
+from chipglow.cutting.flow_stress import FLOW_LAWS, FlowStress
 from chipglow.cutting.laws import HyperbolicTangent, JohnsonCook, MarusichOrtiz, ZerilliArmstrong
 from chipglow.cutting.library import (
     AISI_1045,
@@ -32,6 +32,7 @@ from chipglow.cutting.steady_tool import SteadyTool, ToolBody
 __all__ = [
     "AISI_1045",
     "CARBIDE",
+    "FLOW_LAWS",
     "SOLVER_VERSION",
     "Checkpoint",
     "CuttingConditions",
@@ -59,7 +60,6 @@ __all__ = [
     "ToolMaterial",
     "WorkpieceMaterial",
     "ZerilliArmstrong",
-    "flow_stress_law",
     "is_own_file",
     "material_file",
     "material_names",

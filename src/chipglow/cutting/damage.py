@@ -1,14 +1,15 @@
 """Damage: the strain at which material begins to fail, and the energy that failing takes."""
 
 from dataclasses import dataclass, fields, replace
-from math import isfinite
-from typing import Final, NamedTuple
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from chipglow.cutting.lanes import INLINE, exponential, logarithm
-from chipglow.cutting.laws import check_melting, check_positive, homologous
+from chipglow.cutting.laws import check_melting, homologous
+from chipglow.quantities import Parameter, Part
+from chipglow.quantities.units import FRACTURE_ENERGY, KELVINS, STRAIN_RATE
 
 TRIAXIALITIES: Final = (-1.5, 1.5)
 """Triaxialities at which the strain to failure is held: beyond, it was never measured."""
@@ -22,7 +23,7 @@ _LARGEST_LOSS: Final = 0.99
 
 
 @dataclass(frozen=True)
-class JohnsonCookDamage:
+class JohnsonCookDamage(Part):
     """Failure as Johnson and Cook (1985) say, softening by fracture energy (Hillerborg 1976).
 
     Damage is the sum of plastic strain over the strain to failure,
@@ -32,51 +33,36 @@ class JohnsonCookDamage:
     failing layer, dw = σ L dε / (2 G), σ being the undamaged flow stress and L the layer's
     thickness in the solver. The energy thus does not depend on the cell: the layer takes up
     (2 − loss) G, of which loss · G is above the strength that remains.
-
-    Parameters
-    ----------
-    d1, d2, d3, d4, d5 : float
-        Constants of the strain to failure.
-    fracture_energy : float
-        G in J/m².
-    loss : float
-        Share of the flow stress that is lost in the end, 0 to less than 1: cracks that are pressed
-        shut still rub.
-    melting_temperature, reference_temperature : float
-        Of θ, in K.
-    reference_rate : float
-        ε̇₀ in 1/s.
     """
 
-    d1: float
-    d2: float
-    d3: float
-    d4: float
-    d5: float
-    fracture_energy: float
-    loss: float
-    melting_temperature: float
-    reference_temperature: float = 293.0
-    reference_rate: float = 1.0
+    d1: Annotated[float, Parameter("D₁.")]
+    d2: Annotated[float, Parameter("D₂.")]
+    d3: Annotated[float, Parameter("D₃.")]
+    d4: Annotated[float, Parameter("D₄.", least=0.0)]
+    d5: Annotated[float, Parameter("D₅.", over=-1.0)]
+    fracture_energy: Annotated[float, Parameter("G.", FRACTURE_ENERGY, over=0.0)]
+    loss: Annotated[
+        float,
+        Parameter(
+            "Fraction of the flow stress that is lost in the end: cracks that are pressed shut\n"
+            "still rub.",
+            least=0.0,
+            under=1.0,
+        ),
+    ]
+    melting_temperature: Annotated[float, Parameter("T_melt of θ.", KELVINS)]
+    reference_temperature: Annotated[float, Parameter("T₀ of θ.", KELVINS)] = 293.0
+    reference_rate: Annotated[float, Parameter("ε̇₀.", STRAIN_RATE, over=0.0)] = 1.0
 
     def __post_init__(self) -> None:
-        if not all(isfinite(d) for d in (self.d1, self.d2, self.d3, self.d4, self.d5)):
-            raise ValueError("damage: d1 to d5 must be finite")
+        super().__post_init__()
         ends = [self.d1 + self.d2 * np.exp(self.d3 * end) for end in TRIAXIALITIES]
         if min(ends) <= 0:
             raise ValueError(
-                f"damage: d1 + d2 exp(d3 triaxiality) falls to {min(ends):.3g}, expected over 0 "
+                f"d1 + d2 exp(d3 triaxiality) falls to {min(ends):.3g}, expected over 0 "
                 f"from {TRIAXIALITIES[0]:g} to {TRIAXIALITIES[1]:g}"
             )
-        if self.d4 < 0 or self.d5 <= -1:
-            raise ValueError(
-                f"damage: expected d4 of 0 or more and d5 over -1, got {self.d4!r}, {self.d5!r}"
-            )
-        if not 0 <= self.loss < 1:
-            raise ValueError(f"damage loss: expected 0 to less than 1, got {self.loss!r}")
-        check_positive("damage fracture_energy", self.fracture_energy)
-        check_positive("damage reference_rate", self.reference_rate)
-        check_melting("damage", self.reference_temperature, self.melting_temperature)
+        check_melting(type(self), self.reference_temperature, self.melting_temperature)
 
 
 @dataclass(frozen=True)

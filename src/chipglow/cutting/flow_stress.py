@@ -1,13 +1,14 @@
-"""Flow-stress laws: what a law is, and the registry that the solver finds it in.
+"""Flow-stress laws: what a law is, and where the solver finds its numbers and its function.
 
-A law is a frozen dataclass of numbers in SI units with a static method `stress`. Registered, it can
-be given to the solver and named in a material's file::
+A law is a part: a frozen dataclass whose fields declare their `Parameter`, with a static method
+`stress`. A material's file names it by its kind::
 
-    @flow_stress_law("hollomon")
+    @FLOW_LAWS.part
     @dataclass(frozen=True)
     class Hollomon(FlowStress):
-        strength: float
-        exponent: float
+        kind: ClassVar[str] = "hollomon"
+        strength: Annotated[float, Parameter("K.", STRESS, over=0.0)]
+        exponent: Annotated[float, Parameter("n.", least=0.0)]
 
         @staticmethod
         def stress(strain, rate, temperature, law):
@@ -17,7 +18,9 @@ be given to the solver and named in a material's file::
 from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import fields
-from typing import Any, ClassVar, Final, TypeVar
+from functools import cache
+from itertools import count
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from numba import njit
@@ -25,15 +28,34 @@ from numba.extending import overload
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.cutting.lanes import INLINE
+from chipglow.quantities import Family, Part
+
+FLOW_LAWS: Final = Family("flow_law")
+"""Laws by their kind."""
 
 _DIFFERENCE: Final = 1e-6
-_Law = TypeVar("_Law", bound="type[FlowStress]")
+_KERNELS: Final[dict[Any, Any]] = {}
+_OWN_LAWS: Final = count(1)
 
 
-class FlowStress:
-    """Base of the flow-stress laws."""
+class _NumbersOfLaw:
+    """Named tuple of a law's numbers, made when it is asked for: the fields are known by then."""
 
-    Numbers: ClassVar[Any]
+    def __get__(self, instance: object, law: Any) -> Any:
+        return _numbers_of(law)
+
+
+class FlowStress(Part):
+    """Base of the flow-stress laws: a law defines `stress`, or for speed `stress_and_slopes`.
+
+    Attributes
+    ----------
+    stress_and_slopes : compiled function
+        Of the arguments of `stress`: the flow stress and its derivatives by strain and by the
+        logarithm of the rate. Taken from differences of `stress` without it.
+    """
+
+    Numbers: ClassVar[Any] = _NumbersOfLaw()
     """Named tuple of the law's numbers: what kernels get."""
 
     @staticmethod
@@ -63,50 +85,31 @@ class FlowStress:
         return np.array(values).reshape(each[0].shape)
 
 
-LAWS: Final[dict[str, type[FlowStress]]] = {}
-"""Laws by name."""
-
-_KERNELS: Final[dict[Any, Any]] = {}
-
-
-def flow_stress_law(name: str, stress_and_slopes: Any = None) -> Callable[[_Law], _Law]:
-    """Class decorator that registers a law, to be put above ``@dataclass(frozen=True)``.
-
-    Parameters
-    ----------
-    name : str
-        What a material's file calls it.
-    stress_and_slopes : compiled function, optional
-        For speed: of the arguments of `FlowStress.stress`, the flow stress and its derivatives by
-        strain and by the logarithm of the rate. Taken from differences of `stress` without it.
-
-    Raises
-    ------
-    ValueError
-        If the name is taken by another law.
-    """
-
-    def register(law: _Law) -> _Law:
-        taken = LAWS.get(name, law)
-        if (taken.__module__, taken.__qualname__) != (law.__module__, law.__qualname__):
-            raise ValueError(f"flow-stress law {name!r}: the name is taken")
-        # Numba tells compiled functions apart by the names of their arguments' types.
-        typename = f"Law{len(_KERNELS)}"
-        numbers: Any = namedtuple(typename, [f.name for f in fields(law)])  # type: ignore[arg-type,misc]
-        # Numba's cache finds the type again by these.
-        numbers.__module__ = law.__module__
-        numbers.__qualname__ = f"{law.__qualname__}.Numbers"
-        law.Numbers = numbers
-        LAWS[name] = law
-        _KERNELS[numbers] = stress_and_slopes or _by_differences(law.stress)
-        return law
-
-    return register
-
-
 def comes_with_chipglow(kind: type) -> bool:
     """Whether a law, or the named tuple of its numbers, is not a user's own."""
     return kind.__module__.startswith("chipglow.")
+
+
+@cache
+def _numbers_of(law: Any) -> Any:
+    # Numba tells compiled functions apart by the names of their arguments' types, those that it
+    # has on disk among them: a law that is defined anew needs another name.
+    number = "" if comes_with_chipglow(law) else next(_OWN_LAWS)
+    names = [one.name for one in fields(law)]
+    numbers: Any = namedtuple(f"{law.__name__}{number}", names)  # type: ignore[misc]
+    # Numba's cache finds the type again by these.
+    numbers.__module__ = law.__module__
+    numbers.__qualname__ = f"{law.__qualname__}.Numbers"
+    _KERNELS[numbers] = _kernel(law)
+    return numbers
+
+
+def _kernel(law: Any) -> Any:
+    """What the nearest class defines: a law whose `stress` is another has other slopes."""
+    nearest = next(one for one in law.__mro__ if {"stress", "stress_and_slopes"} & vars(one).keys())
+    if "stress_and_slopes" in vars(nearest):
+        return law.stress_and_slopes
+    return _by_differences(law.stress)
 
 
 def _by_differences(stress: Callable[..., Any]) -> Any:

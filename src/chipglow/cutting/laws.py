@@ -1,21 +1,18 @@
 """The flow-stress laws that come with chipglow."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from math import isfinite
-from typing import Final
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numba import njit
 
-from chipglow.cutting.flow_stress import FlowStress, flow_stress_law
+from chipglow.cutting.flow_stress import FLOW_LAWS, FlowStress
 from chipglow.cutting.lanes import INLINE, exponential, logarithm
+from chipglow.quantities import Parameter
+from chipglow.quantities.units import KELVINS, PER_KELVIN, STRAIN_RATE, STRESS
 
 MELTING_LIMIT = 3000.0
 """No metal that is cut melts above, in K."""
-
-_POSITIVE: Final = ("yield_stress", "hardening_exponent", "thermal_exponent", "reference_rate")
-_NOT_NEGATIVE: Final = ("hardening", "rate_sensitivity")
 
 
 @njit(**INLINE)
@@ -48,90 +45,49 @@ def _johnson_cook(strain, rate, temperature, law):  # type: ignore[no-untyped-de
     return base * fast, hardened * n / held * fast * thermal, base * c if ratio > 1.0 else 0.0
 
 
-@flow_stress_law("johnson-cook", _johnson_cook)
+@FLOW_LAWS.part
 @dataclass(frozen=True)
 class JohnsonCook(FlowStress):
     """Flow stress of Johnson and Cook (1983).
 
     σ = (A + B εⁿ)(1 + C ln(ε̇/ε̇₀))(1 − θᵐ), with θ = (T − T₀)/(T_melt − T₀), 0 below T₀, and
     ε̇/ε̇₀ at least 1.
-
-    Parameters
-    ----------
-    yield_stress, hardening : float
-        A and B in Pa.
-    hardening_exponent, rate_sensitivity, thermal_exponent : float
-        n, C and m.
-    melting_temperature, reference_temperature : float
-        T_melt and T₀ in K.
-    reference_rate : float
-        ε̇₀ in 1/s.
     """
 
-    yield_stress: float
-    hardening: float
-    hardening_exponent: float
-    rate_sensitivity: float
-    thermal_exponent: float
-    melting_temperature: float
-    reference_temperature: float = 293.0
-    reference_rate: float = 1.0
+    kind: ClassVar[str] = "johnson-cook"
+    yield_stress: Annotated[float, Parameter("A.", STRESS, over=0.0)]
+    hardening: Annotated[float, Parameter("B.", STRESS, least=0.0)]
+    hardening_exponent: Annotated[float, Parameter("n.", over=0.0)]
+    rate_sensitivity: Annotated[float, Parameter("C.", least=0.0)]
+    thermal_exponent: Annotated[float, Parameter("m.", over=0.0)]
+    melting_temperature: Annotated[float, Parameter("T_melt.", KELVINS)]
+    reference_temperature: Annotated[float, Parameter("T₀.", KELVINS)]
+    reference_rate: Annotated[float, Parameter("ε̇₀.", STRAIN_RATE, over=0.0)]
+
+    stress_and_slopes = staticmethod(_johnson_cook)
 
     def __post_init__(self) -> None:
-        _check_numbers("Johnson-Cook", self, _POSITIVE, _NOT_NEGATIVE)
-        check_melting("Johnson-Cook", self.reference_temperature, self.melting_temperature)
-
-    @staticmethod
-    def stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
-        """Flow stress in Pa."""
-        return _johnson_cook(strain, rate, temperature, law)[0]
+        super().__post_init__()
+        check_melting(type(self), self.reference_temperature, self.melting_temperature)
 
 
-@flow_stress_law("tanh")
+@FLOW_LAWS.part
 @dataclass(frozen=True)
-class HyperbolicTangent(FlowStress):
+class HyperbolicTangent(JohnsonCook):
     """Johnson and Cook's law with strain softening: the TANH law of Calamaz et al. (2008).
 
     σ = (A + B εⁿ / exp(εᵃ))(1 + C ln(ε̇/ε̇₀))(1 − θᵐ)(D + (1 − D) tanhˢ(1 / (ε + S)ᶜ)), with
     D = 1 − (T/T_melt)ᵈ, S = (T/T_melt)ᵇ and T in K: the hotter the material, the more it loses
     beyond some strain. With s = 1 it is Calamaz et al.'s, Int. J. Mach. Tools Manuf. 48, 275;
     the exponent s is that of Sima and Özel (2010), Int. J. Mach. Tools Manuf. 50, 943.
-
-    Parameters
-    ----------
-    yield_stress, hardening : float
-        A and B in Pa.
-    hardening_exponent, rate_sensitivity, thermal_exponent : float
-        n, C and m.
-    melting_temperature, reference_temperature : float
-        T_melt and T₀ in K.
-    reference_rate : float
-        ε̇₀ in 1/s.
-    hardening_limit, recovery_temperature, recovery_strain, softening_temperature : float
-        a, b, c and d.
-    sharpness : float
-        s.
     """
 
-    yield_stress: float
-    hardening: float
-    hardening_exponent: float
-    rate_sensitivity: float
-    thermal_exponent: float
-    melting_temperature: float
-    reference_temperature: float
-    reference_rate: float
-    hardening_limit: float
-    recovery_temperature: float
-    recovery_strain: float
-    softening_temperature: float
-    sharpness: float = 1.0
-
-    def __post_init__(self) -> None:
-        own = ("hardening_limit", "recovery_temperature", "softening_temperature")
-        positive = (*_POSITIVE, "recovery_strain", "sharpness")
-        _check_numbers("TANH", self, positive, (*_NOT_NEGATIVE, *own))
-        check_melting("TANH", self.reference_temperature, self.melting_temperature)
+    kind: ClassVar[str] = "tanh"
+    hardening_limit: Annotated[float, Parameter("a.", least=0.0)]
+    recovery_temperature: Annotated[float, Parameter("b.", least=0.0)]
+    recovery_strain: Annotated[float, Parameter("c.", over=0.0)]
+    softening_temperature: Annotated[float, Parameter("d.", least=0.0)]
+    sharpness: Annotated[float, Parameter("s.", over=0.0)] = 1.0
 
     @staticmethod
     def stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
@@ -147,7 +103,7 @@ class HyperbolicTangent(FlowStress):
         return strength * (residual + (1.0 - residual) * kept)
 
 
-@flow_stress_law("marusich-ortiz")
+@FLOW_LAWS.part
 @dataclass(frozen=True)
 class MarusichOrtiz(FlowStress):
     """Power law of Marusich and Ortiz (1995), Int. J. Numer. Methods Eng. 38, 3675.
@@ -155,33 +111,16 @@ class MarusichOrtiz(FlowStress):
     σ = σ₀ (1 − α (T − T₀)) (1 + ε/ε₀)^(1/n) (1 + ε̇/ε̇₀)^(1/m): it hardens by powers and loses
     strength linearly with temperature, down to 1 % of it. (Equation as widely cited; the paper was
     not seen.)
-
-    Parameters
-    ----------
-    yield_stress : float
-        σ₀ in Pa.
-    reference_strain, reference_rate, reference_temperature : float
-        ε₀, ε̇₀ in 1/s and T₀ in K.
-    hardening_exponent, rate_exponent : float
-        n and m.
-    thermal_softening : float
-        α in 1/K.
     """
 
-    yield_stress: float
-    reference_strain: float
-    reference_rate: float
-    reference_temperature: float
-    hardening_exponent: float
-    rate_exponent: float
-    thermal_softening: float
-
-    def __post_init__(self) -> None:
-        positive = (
-            "yield_stress", "reference_strain", "reference_rate", "reference_temperature",
-            "hardening_exponent", "rate_exponent",
-        )  # fmt: skip
-        _check_numbers("Marusich-Ortiz", self, positive, ("thermal_softening",))
+    kind: ClassVar[str] = "marusich-ortiz"
+    yield_stress: Annotated[float, Parameter("σ₀.", STRESS, over=0.0)]
+    reference_strain: Annotated[float, Parameter("ε₀.", over=0.0)]
+    reference_rate: Annotated[float, Parameter("ε̇₀.", STRAIN_RATE, over=0.0)]
+    reference_temperature: Annotated[float, Parameter("T₀.", KELVINS, over=0.0)]
+    hardening_exponent: Annotated[float, Parameter("n.", over=0.0)]
+    rate_exponent: Annotated[float, Parameter("m.", over=0.0)]
+    thermal_softening: Annotated[float, Parameter("α.", PER_KELVIN, least=0.0)]
 
     @property
     def melting_temperature(self) -> float:
@@ -209,7 +148,7 @@ def _zerilli_armstrong(strain, rate, temperature, law):  # type: ignore[no-untyp
     return law.athermal_stress + thermal + hardened, hardened * n / held, thermal * by_rate
 
 
-@flow_stress_law("zerilli-armstrong", _zerilli_armstrong)
+@FLOW_LAWS.part
 @dataclass(frozen=True)
 class ZerilliArmstrong(FlowStress):
     """Flow stress of Zerilli and Armstrong (1987), J. Appl. Phys. 61, 1816, for bcc metals.
@@ -217,60 +156,24 @@ class ZerilliArmstrong(FlowStress):
     σ = C₀ + C₁ exp(−C₃ T + C₄ T ln(ε̇/ε̇₀)) + C₅ εⁿ, T in K: strength falls exponentially with
     temperature to what hardening and C₀ leave, and does not know a melting point. (Equation as
     widely cited; the paper was not seen.)
-
-    Parameters
-    ----------
-    athermal_stress, thermal_stress, hardening : float
-        C₀, C₁ and C₅ in Pa.
-    thermal_softening, rate_hardening : float
-        C₃ and C₄ in 1/K.
-    hardening_exponent : float
-        n.
-    reference_rate : float
-        ε̇₀ in 1/s.
     """
 
-    athermal_stress: float
-    thermal_stress: float
-    thermal_softening: float
-    rate_hardening: float
-    hardening: float
-    hardening_exponent: float
-    reference_rate: float = 1.0
+    kind: ClassVar[str] = "zerilli-armstrong"
+    athermal_stress: Annotated[float, Parameter("C₀.", STRESS, over=0.0)]
+    thermal_stress: Annotated[float, Parameter("C₁.", STRESS, least=0.0)]
+    thermal_softening: Annotated[float, Parameter("C₃.", PER_KELVIN, least=0.0)]
+    rate_hardening: Annotated[float, Parameter("C₄.", PER_KELVIN, least=0.0)]
+    hardening: Annotated[float, Parameter("C₅.", STRESS, least=0.0)]
+    hardening_exponent: Annotated[float, Parameter("n.", over=0.0)]
+    reference_rate: Annotated[float, Parameter("ε̇₀.", STRAIN_RATE, over=0.0)] = 1.0
 
-    def __post_init__(self) -> None:
-        positive = ("athermal_stress", "hardening_exponent", "reference_rate")
-        others = ("thermal_stress", "thermal_softening", "rate_hardening", "hardening")
-        _check_numbers("Zerilli-Armstrong", self, positive, others)
-
-    @staticmethod
-    def stress(strain, rate, temperature, law):  # type: ignore[no-untyped-def]
-        """Flow stress in Pa."""
-        return _zerilli_armstrong(strain, rate, temperature, law)[0]
+    stress_and_slopes = staticmethod(_zerilli_armstrong)
 
 
-def _check_numbers(
-    title: str, law: FlowStress, positive: Iterable[str], not_negative: Iterable[str]
-) -> None:
-    """Raise ValueError unless numbers of a law are finite and over 0, and others 0 or more."""
-    for name in positive:
-        check_positive(f"{title} {name}", getattr(law, name))
-    for name in not_negative:
-        value = getattr(law, name)
-        if not 0 <= value < np.inf:
-            raise ValueError(f"{title} {name}: expected 0 or more, got {value!r}")
-
-
-def check_positive(name: str, value: float) -> None:
-    """Raise ValueError unless a value is finite and over 0."""
-    if not (isfinite(value) and value > 0):
-        raise ValueError(f"{name}: expected over 0, got {value!r}")
-
-
-def check_melting(name: str, reference: float, melting: float) -> None:
+def check_melting(part: type, reference: float, melting: float) -> None:
     """Raise ValueError unless a melting temperature is over the reference temperature (K)."""
     if not reference < melting < MELTING_LIMIT:
         raise ValueError(
-            f"{name} melting_temperature: expected {reference:g} K to {MELTING_LIMIT:g} K, "
-            f"got {melting!r} K"
+            f"{part.__name__}.melting_temperature: {melting:g} K, expected {reference:g} K to "
+            f"{MELTING_LIMIT:g} K"
         )

@@ -2,19 +2,22 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from decimal import Decimal
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from chipglow.cutting import laws as _laws  # noqa: F401  (registers the laws)
 from chipglow.cutting.damage import FittedDamage, JohnsonCookDamage
-from chipglow.cutting.flow_stress import LAWS, comes_with_chipglow
+from chipglow.cutting.flow_stress import FLOW_LAWS
 from chipglow.cutting.material import RateTable, TemperatureTable, ToolMaterial, WorkpieceMaterial
+from chipglow.quantities import Parameter, of_other_packages
+from chipglow.quantities.part import parameters
+from chipglow.quantities.units import KELVINS, STRAIN_RATE
 from chipglow.text import read_yaml
 
 FOLDER: Final = Path(__file__).with_name("materials")
+_OWN: Final = {path.stem: path for path in FOLDER.glob("*.yaml")}
 
 
 class MaterialError(ValueError):
@@ -55,85 +58,28 @@ class MaterialFile:
     tool: ToolMaterial | None
 
 
-class _Quantity(NamedTuple):
-    expectation: str
-    units: Mapping[str, tuple[str, str]]
-
-
-def _quantity(**factors: str) -> Mapping[str, tuple[str, str]]:
-    return {unit: (factor, "0") for unit, factor in factors.items()}
-
-
-_STRESS: Final = _Quantity(
-    "a stress such as 553.1 MPa or 205 GPa", _quantity(Pa="1", MPa="1e6", GPa="1e9")
-)
-_TEMPERATURE: Final = _Quantity(
-    "a temperature such as 1733 K or 20 degC", {"K": ("1", "0"), "degC": ("1", "273.15")}
-)
-_RATE: Final = _Quantity("a strain rate such as 1 1/s", {"1/s": ("1", "0")})
-_DENSITY: Final = _Quantity("a density such as 7850 kg/m3", {"kg/m3": ("1", "0")})
-_CONDUCTIVITY: Final = _Quantity(
-    "a conductivity such as 45 W/(m K)", {"W/(m K)": ("1", "0"), "W/m/K": ("1", "0")}
-)
-_HEAT_CAPACITY: Final = _Quantity(
-    "a heat capacity such as 480 J/(kg K)", {"J/(kg K)": ("1", "0"), "J/kg/K": ("1", "0")}
-)
-_NUMBER: Final = _Quantity("a number without a unit", {"": ("1", "0")})
-
-_PER_KELVIN: Final = _Quantity("a softening such as 7e-4 1/K", _quantity(**{"1/K": "1"}))
-_FRACTURE_ENERGY: Final = _Quantity(
-    "a fracture energy such as 15 kJ/m2", _quantity(**{"J/m2": "1", "kJ/m2": "1e3"})
-)
-_LAW_FIELDS: Final = {
-    "yield_stress": _STRESS,
-    "hardening": _STRESS,
-    "athermal_stress": _STRESS,
-    "thermal_stress": _STRESS,
-    "melting_temperature": _TEMPERATURE,
-    "reference_temperature": _TEMPERATURE,
-    "reference_rate": _RATE,
-    "thermal_softening": _PER_KELVIN,
-    "rate_hardening": _PER_KELVIN,
-}
-_ANY: Final = _Quantity(
-    "a number, or a stress, temperature or strain rate with its unit",
-    {**_NUMBER.units, **_STRESS.units, **_TEMPERATURE.units, **_RATE.units},
-)
-"""Fields of laws that chipglow does not know: their class says what they are."""
-_DAMAGE: Final = {
-    **dict.fromkeys(("d1", "d2", "d3", "d4", "d5", "loss"), _NUMBER),
-    "fracture_energy": _FRACTURE_ENERGY,
-    "melting_temperature": _TEMPERATURE,
-    "reference_temperature": _TEMPERATURE,
-    "reference_rate": _RATE,
-}
-_TOOL: Final = {
-    "density": _DENSITY,
-    "conductivity": _CONDUCTIVITY,
-    "heat_capacity": _HEAT_CAPACITY,
-}
-_TABLES: Final = {"conductivity": _CONDUCTIVITY, "heat_capacity": _HEAT_CAPACITY}
-_CONSTANT_OR_TABLE: Final = {
-    "density": _DENSITY,
-    "young_modulus": _STRESS,
-    "poisson_ratio": _NUMBER,
-}
+_RATE: Final = Parameter("Strain rate.", STRAIN_RATE, over=0.0)
+_TEMPERATURE: Final = Parameter("Temperature.", KELVINS)
+_CONSTANT_OR_TABLE: Final = ("density", "young_modulus", "poisson_ratio")
+_TABLES: Final = ("conductivity", "heat_capacity")
+_GROUP: Final = "chipglow.material"
 _HEADER: Final = ("kind", "name", "description")
 _WORKPIECE_PARTS: Final = (*_CONSTANT_OR_TABLE, "taylor_quinney", *_TABLES, "flow_stress", "damage")
-_VALUE: Final = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?:\s+(\S.*))?")
 _OWN_FILE: Final = re.compile(r"(.+\.ya?ml)(?:/([^/]+))?")
 
 
 def material_names(kind: str | None = None) -> list[str]:
-    """Names of the library's materials.
+    """Names of the library's materials, with those of other packages.
+
+    A package adds its own by entry points in the group ``chipglow.material``: the path of a file.
 
     Parameters
     ----------
     kind : {'workpiece', 'tool'}, optional
         Only these.
     """
-    names = sorted(path.stem for path in FOLDER.glob("*.yaml"))
-    return [n for n in names if kind is None or _is_tool(n) == (kind == "tool")]
+    names = sorted(of_other_packages(_GROUP).keys() | _OWN.keys())
+    return [n for n in names if kind is None or bool(material_file(n).tool) == (kind == "tool")]
 
 
 def is_own_file(name: str) -> bool:
@@ -160,10 +106,11 @@ def workpiece(name: str) -> WorkpieceMaterial:
     """
     own = _OWN_FILE.fullmatch(name)
     file, chosen = (own[1], own[2]) if own else (name.split("/")[0], _after_slash(name))
-    if not own and file not in material_names("workpiece"):
+    material = read_material(Path(file)) if own else _in_library(file)
+    if material is None or (material.tool and not own):
         known = ", ".join(material_names("workpiece"))
         raise MaterialError(f"{name!r} is unknown, expected one of {known}, or a file like my.yaml")
-    sets = material_file(file).workpieces
+    sets = material.workpieces
     if not sets:
         raise MaterialError(f"{file}: kind: 'tool', expected workpiece")
     if chosen is None:
@@ -181,12 +128,11 @@ def tool_material(name: str) -> ToolMaterial:
     MaterialError
         If there is none of that name.
     """
-    known = material_names("tool")
-    if name not in known:
-        raise MaterialError(f"{name!r} is unknown, expected one of {', '.join(known)}")
-    tool = material_file(name).tool
-    assert tool is not None
-    return tool
+    material = _in_library(name)
+    if material is None or material.tool is None:
+        known = ", ".join(material_names("tool"))
+        raise MaterialError(f"{name!r} is unknown, expected one of {known}")
+    return material.tool
 
 
 def material_file(name: str) -> MaterialFile:
@@ -201,9 +147,10 @@ def material_file(name: str) -> MaterialFile:
     """
     if _OWN_FILE.fullmatch(name):
         return read_material(Path(name))
-    if name not in material_names():
+    material = _in_library(name)
+    if material is None:
         raise MaterialError(f"{name!r} is unknown, expected one of {', '.join(material_names())}")
-    return _of_library(name)
+    return material
 
 
 def read_material(path: Path) -> MaterialFile:
@@ -229,12 +176,10 @@ def _after_slash(name: str) -> str | None:
 
 
 @cache
-def _of_library(name: str) -> MaterialFile:
-    return read_material(FOLDER / f"{name}.yaml")
-
-
-def _is_tool(name: str) -> bool:
-    return _of_library(name).tool is not None
+def _in_library(name: str) -> MaterialFile | None:
+    """Of the library's own, or else of other packages: those load only if they are needed."""
+    path = _OWN.get(name) or of_other_packages(_GROUP).get(name)
+    return None if path is None else read_material(Path(path))
 
 
 def _has_rows(data: object) -> bool:
@@ -252,7 +197,7 @@ class _Reader:
         kind = data.get("kind") if isinstance(data, Mapping) else None
         if kind not in ("workpiece", "tool"):
             raise self._wrong("kind", kind, "workpiece or tool")
-        parts = tuple(_TOOL) if kind == "tool" else _WORKPIECE_PARTS
+        parts = tuple(parameters(ToolMaterial)) if kind == "tool" else _WORKPIECE_PARTS
         if isinstance(data, Mapping) and kind == "workpiece" and "fitted_damage" in data:
             parts = (*parts, "fitted_damage")
         data = self._mapping("", data, (*_HEADER, *parts))
@@ -263,18 +208,20 @@ class _Reader:
             sets = self._workpieces(name, data)
         else:
             numbers = {
-                key: self._sourced(key, data[key], quantity) for key, quantity in _TOOL.items()
+                key: self._sourced(key, data[key], one)
+                for key, one in parameters(ToolMaterial).items()
             }
             tool = self._build("tool", ToolMaterial, {"name": name, **numbers})
         return MaterialFile(name, description, tuple(self._properties), sets, tool)
 
     def _workpieces(self, name: str, data: Mapping[str, Any]) -> dict[str, WorkpieceMaterial]:
-        constant_or_table = {
-            key: self._constant_or_table(key, data[key], quantity)
-            for key, quantity in _CONSTANT_OR_TABLE.items()
+        declared = parameters(WorkpieceMaterial)
+        either = {
+            key: self._constant_or_table(key, data[key], declared[key])
+            for key in _CONSTANT_OR_TABLE
         }
-        share = self._share("taylor_quinney", data["taylor_quinney"])
-        tables = {key: self._table(key, data[key], quantity) for key, quantity in _TABLES.items()}
+        heat_fraction = self._heat_fraction(data["taylor_quinney"], declared["taylor_quinney"])
+        tables = {key: self._table(key, data[key], declared[key]) for key in _TABLES}
         damage = self._damage(data["damage"])
         fitted = self._fitted(data["fitted_damage"]) if "fitted_damage" in data else None
         laws = data["flow_stress"]
@@ -289,8 +236,8 @@ class _Reader:
                 "flow_stress": flow_stress,
                 "damage": damage if fails else None,
                 "fitted_damage": fitted if fails else None,
-                "taylor_quinney": share,
-                **constant_or_table,
+                "taylor_quinney": heat_fraction,
+                **either,
                 **tables,
             }
             sets[str(chosen)] = self._build("workpiece", WorkpieceMaterial, values)
@@ -300,7 +247,7 @@ class _Reader:
         if data == "none":
             return None
         damage: JohnsonCookDamage = self._build(
-            "damage", JohnsonCookDamage, self._group("damage", data, _DAMAGE)
+            "damage", JohnsonCookDamage, self._group("damage", data, parameters(JohnsonCookDamage))
         )
         return damage
 
@@ -329,17 +276,13 @@ class _Reader:
         law, damage = "johnson-cook", None
         if isinstance(rest, dict):
             law, damage = rest.pop("law", law), rest.pop("damage", None)
-        if not isinstance(law, str) or law not in LAWS:
-            raise self._wrong(f"{place}.law", law, f"one of {', '.join(sorted(LAWS))}")
+        kind = FLOW_LAWS.find(law)
+        if kind is None:
+            raise self._wrong(f"{place}.law", law, f"one of {', '.join(sorted(FLOW_LAWS.kinds))}")
         if damage not in (None, "none"):
             raise self._wrong(f"{place}.damage", damage, "none, or to be left out")
-        kind = LAWS[law]
-        known = comes_with_chipglow(kind)
-        quantities = {
-            f.name: _LAW_FIELDS.get(f.name, _NUMBER) if known else _ANY
-            for f in fields(kind)  # type: ignore[arg-type]
-        }
-        return damage is None, self._build(place, kind, self._group(place, rest, quantities))
+        values = self._group(place, rest, parameters(kind))
+        return damage is None, self._build(place, kind, values)
 
     def _build(self, place: str, kind: Any, values: Mapping[str, Any]) -> Any:
         try:
@@ -348,44 +291,45 @@ class _Reader:
             raise MaterialError(f"{self._file}: {place}: {error}") from None
 
     def _group(
-        self, place: str, data: object, quantities: Mapping[str, _Quantity]
+        self, place: str, data: object, declared: Mapping[str, Parameter]
     ) -> dict[str, float]:
         """Numbers that share one source."""
-        data = self._mapping(place, data, (*quantities, "source"))
+        data = self._mapping(place, data, (*declared, "source"))
         source = self._text(f"{place}.source", data)
         return {
-            key: self._number(f"{place}.{key}", data[key], quantity, source)
-            for key, quantity in quantities.items()
+            key: self._number(f"{place}.{key}", data[key], one, source)
+            for key, one in declared.items()
         }
 
-    def _sourced(self, place: str, data: object, quantity: _Quantity) -> float:
+    def _sourced(self, place: str, data: object, parameter: Parameter) -> float:
         data = self._mapping(place, data, ("value", "source"))
         source = self._text(f"{place}.source", data)
-        return self._number(place, data["value"], quantity, source)
+        return self._number(place, data["value"], parameter, source)
 
-    def _share(self, place: str, data: object) -> float | RateTable:
-        """A constant share, or rows of [strain rate, share]."""
+    def _heat_fraction(self, data: object, parameter: Parameter) -> float | RateTable:
+        """A constant fraction, or rows of [strain rate, fraction]."""
+        place = "taylor_quinney"
         if not _has_rows(data):
-            return self._sourced(place, data, _NUMBER)
-        rates, values = self._rows(place, data, ("strain rate", _RATE), _NUMBER)
+            return self._sourced(place, data, parameter)
+        rates, values = self._rows(place, data, ("strain rate", _RATE), parameter)
         table: RateTable = self._build(place, RateTable, {"rates": rates, "values": values})
         return table
 
     def _constant_or_table(
-        self, place: str, data: object, quantity: _Quantity
+        self, place: str, data: object, parameter: Parameter
     ) -> float | TemperatureTable:
         if _has_rows(data):
-            return self._table(place, data, quantity)
-        return self._sourced(place, data, quantity)
+            return self._table(place, data, parameter)
+        return self._sourced(place, data, parameter)
 
-    def _table(self, place: str, data: object, quantity: _Quantity) -> TemperatureTable:
-        temperatures, values = self._rows(place, data, ("temperature", _TEMPERATURE), quantity)
+    def _table(self, place: str, data: object, parameter: Parameter) -> TemperatureTable:
+        temperatures, values = self._rows(place, data, ("temperature", _TEMPERATURE), parameter)
         columns = {"temperatures": temperatures, "values": values}
         table: TemperatureTable = self._build(place, TemperatureTable, columns)
         return table
 
     def _rows(
-        self, place: str, data: object, over: tuple[str, _Quantity], quantity: _Quantity
+        self, place: str, data: object, over: tuple[str, Parameter], parameter: Parameter
     ) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Columns of a table whose rows are [what it is over, value]."""
         data = self._mapping(place, data, ("value", "source"))
@@ -396,23 +340,21 @@ class _Reader:
         for row in rows:
             if not isinstance(row, list) or len(row) != 2:
                 raise self._wrong(place, row, f"[{over[0]}, value]")
-            pairs.append((self._si(place, row[0], over[1]), self._si(place, row[1], quantity)))
+            pairs.append((self._si(place, row[0], over[1]), self._si(place, row[1], parameter)))
             self._properties.append(Property(place, f"{row[1]} at {row[0]}", source))
         first, second = zip(*pairs, strict=True)
         return first, second
 
-    def _number(self, place: str, value: object, quantity: _Quantity, source: str) -> float:
-        number = self._si(place, value, quantity)
+    def _number(self, place: str, value: object, parameter: Parameter, source: str) -> float:
+        number = self._si(place, value, parameter)
         self._properties.append(Property(place, str(value), source))
         return number
 
-    def _si(self, place: str, value: object, quantity: _Quantity) -> float:
-        """Value in SI units, rounded once: 553.1 MPa is 553.1e6 to the last bit."""
-        match = _VALUE.fullmatch(str(value).strip())
-        if not match or (match[2] or "") not in quantity.units:
-            raise self._wrong(place, value, quantity.expectation)
-        factor, offset = quantity.units[match[2] or ""]
-        return float(Decimal(match[1]) * Decimal(factor) + Decimal(offset))
+    def _si(self, place: str, value: object, parameter: Parameter) -> float:
+        try:
+            return parameter.number(value)
+        except ValueError as error:
+            raise MaterialError(f"{self._file}: {place}: {error}") from None
 
     def _mapping(self, place: str, data: object, keys: tuple[str, ...]) -> Mapping[str, Any]:
         if not isinstance(data, Mapping):

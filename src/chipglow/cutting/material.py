@@ -1,14 +1,16 @@
 """Materials of the cut: mechanics and heat."""
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.cutting.damage import FittedDamage, JohnsonCookDamage
 from chipglow.cutting.flow_stress import FlowStress
-from chipglow.cutting.laws import check_positive
+from chipglow.quantities import Parameter, Part
+from chipglow.quantities.part import parameters
+from chipglow.quantities.units import CONDUCTIVITY, DENSITY, HEAT_CAPACITY, STRESS
 
 TABLE_COLDEST: Final = 200.0
 TABLE_HOTTEST: Final = 3000.0
@@ -24,7 +26,7 @@ class TemperatureTable:
     temperatures : tuple of float
         In K, ascending.
     values : tuple of float
-        The property in SI units, over 0.
+        The property in SI units, whose limits its field declares.
     """
 
     temperatures: tuple[float, ...]
@@ -35,8 +37,6 @@ class TemperatureTable:
             raise ValueError("temperature table: expected as many values as temperatures")
         if any(np.diff(self.temperatures) <= 0):
             raise ValueError("temperature table: temperatures must ascend")
-        for value in self.values:
-            check_positive("temperature table: value", value)
 
     def at(self, temperature: ArrayLike) -> NDArray[np.float64]:
         """Values at temperatures in K, of the same shape."""
@@ -53,10 +53,6 @@ class TemperatureTable:
 _KELVINS: Final = np.arange(TABLE_COLDEST, TABLE_HOTTEST + 1.0)
 
 
-def _values(quantity: float | TemperatureTable) -> tuple[float, ...]:
-    return quantity.values if isinstance(quantity, TemperatureTable) else (quantity,)
-
-
 def _at(quantity: float | TemperatureTable, temperature: ArrayLike) -> NDArray[np.float64]:
     if isinstance(quantity, TemperatureTable):
         return quantity.at(temperature)
@@ -65,7 +61,7 @@ def _at(quantity: float | TemperatureTable, temperature: ArrayLike) -> NDArray[n
 
 @dataclass(frozen=True)
 class RateTable:
-    """A share that depends on the plastic strain rate.
+    """A number that depends on the plastic strain rate.
 
     Linear over the logarithm of the rate between the points, constant beyond.
 
@@ -74,7 +70,7 @@ class RateTable:
     rates : tuple of float
         Plastic strain rates in 1/s, ascending, over 0.
     values : tuple of float
-        The share at these rates, 0 to 1.
+        The number at these rates.
     """
 
     rates: tuple[float, ...]
@@ -83,29 +79,23 @@ class RateTable:
     def __post_init__(self) -> None:
         if len(self.rates) != len(self.values) or not self.values:
             raise ValueError("rate table: expected as many values as rates")
-        for rate in self.rates:
-            check_positive("rate table: rate", rate)
-        if any(np.diff(self.rates) <= 0):
-            raise ValueError("rate table: rates must ascend")
-        for value in self.values:
-            if not 0 <= value <= 1:
-                raise ValueError(f"rate table: value: expected 0 to 1, got {value!r}")
+        if any(np.diff(self.rates, prepend=0.0) <= 0):
+            raise ValueError("rate table: rates must ascend from over 0")
 
 
 @dataclass(frozen=True)
-class WorkpieceMaterial:
+class WorkpieceMaterial(Part):
     """What is cut.
+
+    A table over the temperature holds for density (which is thermal expansion), moduli,
+    conductivity and heat capacity.
 
     Parameters
     ----------
     name : str
         Name with the source of the numbers.
-    density : float or TemperatureTable
-        In kg/m³: constant, or over the temperature, which is thermal expansion.
-    young_modulus : float or TemperatureTable
-        In Pa: constant, or over the temperature.
-    poisson_ratio : float or TemperatureTable
-        0 to 0.49: constant, or over the temperature.
+    density, young_modulus, poisson_ratio : float or TemperatureTable
+        In kg/m³, in Pa, and a number: constant, or over the temperature.
     flow_stress : FlowStress
         Law of the flow stress.
     damage : JohnsonCookDamage or None
@@ -113,33 +103,39 @@ class WorkpieceMaterial:
     conductivity, heat_capacity : TemperatureTable
         In W/(m K) and J/(kg K).
     taylor_quinney : float or RateTable
-        Share of the plastic work that becomes heat: constant, or over the plastic strain rate.
+        Fraction of the plastic work that becomes heat: constant, or over the plastic strain rate.
     fitted_damage : FittedDamage, optional
         How well the damage is known, where measured cuts determined it.
+
+    Raises
+    ------
+    ValueError
+        If a value, or one in a table, is outside the limits of its parameter.
     """
 
     name: str
-    density: float | TemperatureTable
-    young_modulus: float | TemperatureTable
-    poisson_ratio: float | TemperatureTable
+    density: Annotated[float | TemperatureTable, Parameter("Density.", DENSITY, over=0.0)]
+    young_modulus: Annotated[
+        float | TemperatureTable, Parameter("Young's modulus.", STRESS, over=0.0)
+    ]
+    poisson_ratio: Annotated[
+        float | TemperatureTable, Parameter("Poisson's ratio.", least=0.0, most=0.49)
+    ]
     flow_stress: FlowStress
     damage: JohnsonCookDamage | None
-    conductivity: TemperatureTable
-    heat_capacity: TemperatureTable
-    taylor_quinney: float | RateTable = 0.9
+    conductivity: Annotated[TemperatureTable, Parameter("Conductivity.", CONDUCTIVITY, over=0.0)]
+    heat_capacity: Annotated[TemperatureTable, Parameter("Heat.", HEAT_CAPACITY, over=0.0)]
+    taylor_quinney: Annotated[
+        float | RateTable, Parameter("Fraction of work that is heat.", least=0.0, most=1.0)
+    ] = 0.9
     fitted_damage: FittedDamage | None = None
 
     def __post_init__(self) -> None:
-        for value in _values(self.density):
-            check_positive("workpiece density", value)
-        for value in _values(self.young_modulus):
-            check_positive("workpiece young_modulus", value)
-        for value in _values(self.poisson_ratio):
-            if not 0 <= value <= 0.49:
-                raise ValueError(f"poisson_ratio: expected 0 to 0.49, got {value!r}")
-        share = self.taylor_quinney
-        if not isinstance(share, RateTable) and not 0 <= share <= 1:
-            raise ValueError(f"taylor_quinney: expected 0 to 1, got {share!r}")
+        super().__post_init__()
+        for name, parameter in parameters(type(self)).items():
+            for value in getattr(getattr(self, name), "values", ()):
+                if not parameter.holds(value):
+                    raise parameter.refusal(f"{type(self).__name__}.{name}", value)
 
     def density_at(self, temperature: ArrayLike) -> NDArray[np.float64]:
         """Densities without stress in kg/m³ at temperatures in K, of the same shape."""
@@ -161,7 +157,7 @@ class WorkpieceMaterial:
         Returns
         -------
         ndarray
-            Shear modulus, bulk modulus and volume without stress as shares of their values at
+            Shear modulus, bulk modulus and volume without stress as fractions of their values at
             `ROOM_TEMPERATURE`, and the rise of the last to the next row, at every kelvin as
             `TemperatureTable.sampled` has it, shape (n, 4); one row if all are constant.
         """
@@ -206,7 +202,7 @@ class WorkpieceMaterial:
 
 
 @dataclass(frozen=True)
-class ToolMaterial:
+class ToolMaterial(Part):
     """What cuts: rigid, but it conducts heat.
 
     Parameters
@@ -218,13 +214,9 @@ class ToolMaterial:
     """
 
     name: str
-    density: float
-    conductivity: float
-    heat_capacity: float
-
-    def __post_init__(self) -> None:
-        for name in ("density", "conductivity", "heat_capacity"):
-            check_positive(f"tool {name}", getattr(self, name))
+    density: Annotated[float, Parameter("Density.", DENSITY, over=0.0)]
+    conductivity: Annotated[float, Parameter("Conductivity.", CONDUCTIVITY, over=0.0)]
+    heat_capacity: Annotated[float, Parameter("Heat capacity.", HEAT_CAPACITY, over=0.0)]
 
     @property
     def effusivity(self) -> float:

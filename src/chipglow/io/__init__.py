@@ -1,7 +1,14 @@
 """Readers and writers: scenes, measurements, and output that is whole or not there."""
 
 from chipglow.io.atomic import atomic_folder, atomic_path
-from chipglow.io.import_description import ImportDescription, import_text, load_import
+from chipglow.io.import_description import (
+    IMPORT_SOURCES,
+    ImportDescription,
+    SourceSection,
+    import_description,
+    import_text,
+    load_import,
+)
 from chipglow.io.importing import Import, View, import_scene, prospect, read_scene
 from chipglow.io.measurement_file import (
     is_measurement,
@@ -23,10 +30,12 @@ from chipglow.io.tool_section import ToolSection, read_tool_outline
 from chipglow.io.unfinished import UnfinishedScene, unfinished_scenes
 
 __all__ = [
+    "IMPORT_SOURCES",
     "SCENE_FORMAT",
     "Import",
     "ImportDescription",
     "SceneWriter",
+    "SourceSection",
     "StoredScene",
     "ToolSection",
     "UnfinishedScene",
@@ -35,6 +44,7 @@ __all__ = [
     "atomic_path",
     "check_movie_path",
     "check_table_path",
+    "import_description",
     "import_scene",
     "import_text",
     "is_measurement",

@@ -2,12 +2,12 @@
 
 import re
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from pydantic import Strict, model_validator
+from pydantic import Strict, create_model, model_validator
 
 from chipglow.io.importing import Import, View
 from chipglow.io.sandbox import Isolated
@@ -19,18 +19,13 @@ from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.mesh import MESH_READERS, MeshSource
 from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap, metre_per_pixel
 from chipglow.io.tool_section import ToolSection
-from chipglow.quantities import OR_NONE, Declared, FileBeside, Section, Settings, described
+from chipglow.quantities import OR_NONE, Declared, Family, FileBeside, Section, Settings, described
 from chipglow.quantities.units import Length, Position, Time, Unit, parse_unit
 from chipglow.scene.completion import Completion
 from chipglow.text import commented_yaml, described_by
 
-KINDS: Final[Mapping[str, tuple[str, ...]]] = {
-    "movie": (".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif"),
-    "mesh": (*MESH_READERS, "d3plot"),
-    "points": lammps_dump.ENDINGS,
-    "grid": tuple(ARRAY_READERS),
-}
-"""Kinds of sources by how the file's name ends; most sources of points have to be called so."""
+IMPORT_SOURCES: Final = Family("import_source")
+"""Kinds of sources; those of other packages are sections with their kind and endings, too."""
 
 Pixels = Annotated[tuple[float, float], Strict(False)]
 ColourSection = Annotated[tuple[int, int, int], Strict(False)]
@@ -90,7 +85,21 @@ class PlacementSection(Settings[Placement]):
 
 
 class SourceSection(Section):
-    """What is said of one kind of source."""
+    """What is said of one kind of source.
+
+    Attributes
+    ----------
+    kind : str
+        Name of the kind, and of its section.
+    title : str
+        What such sources are, for the comment on the section.
+    endings : tuple of str
+        Endings of such files' names, in small letters.
+    """
+
+    kind: ClassVar[str]
+    title: ClassVar[str]
+    endings: ClassVar[tuple[str, ...]]
 
     @abstractmethod
     def source(self, whole: "ImportDescription") -> Source:
@@ -120,8 +129,15 @@ class FieldMovieSection(Section):
     )
 
 
+@IMPORT_SOURCES.part
 class MovieSection(SourceSection):
     """Movies of fields with a colour scale, a movie a field."""
+
+    kind: ClassVar[str] = "movie"
+    title: ClassVar[str] = "a movie"
+    endings: ClassVar[tuple[str, ...]] = (
+        ".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif",
+    )  # fmt: skip
 
     temperature: FieldMovieSection = described({}, "The movie of the temperature.")
     plastic_strain: Annotated[FieldMovieSection | None, OR_NONE] = described(
@@ -239,8 +255,13 @@ _EXAMPLES: Final = {
 }
 
 
+@IMPORT_SOURCES.part
 class MeshSection(SourceSection):
     """Finite-element results."""
+
+    kind: ClassVar[str] = "mesh"
+    title: ClassVar[str] = "a mesh"
+    endings: ClassVar[tuple[str, ...]] = (*MESH_READERS, "d3plot")
 
     section: Annotated[Position | Literal["facing"] | None, OR_NONE] = described(
         "none",
@@ -273,8 +294,14 @@ class MeshSection(SourceSection):
         )
 
 
+@IMPORT_SOURCES.part
 class PointsSection(SourceSection):
     """Points, as of smoothed particles or material points."""
+
+    kind: ClassVar[str] = "points"
+    title: ClassVar[str] = "points"
+    # Most files of points have another ending: they are called by their kind.
+    endings: ClassVar[tuple[str, ...]] = lammps_dump.ENDINGS
 
     spacing: Annotated[Length | None, OR_NONE] = described(
         "none", "Distance of neighbours before the cut; none: from volumes or the first frame."
@@ -302,8 +329,13 @@ class PointsSection(SourceSection):
         )
 
 
+@IMPORT_SOURCES.part
 class GridSection(SourceSection):
     """Arrays on a regular grid."""
+
+    kind: ClassVar[str] = "grid"
+    title: ClassVar[str] = "a grid"
+    endings: ClassVar[tuple[str, ...]] = tuple(ARRAY_READERS)
 
     files: Annotated[dict[str, FileBeside] | None, OR_NONE] = described(
         "none",
@@ -351,7 +383,7 @@ class ImportDescription(Section):
         "none", "The file, or a pattern for several: chip_*.vtu."
     )
     kind: Annotated[Literal["movie", "mesh", "points", "grid"] | None, OR_NONE] = described(
-        "none", "What the source is; none: told by the file's name.", "movie, mesh, points, grid"
+        "none", "What the source is; none: the file's name says it.", "movie, mesh, points, grid"
     )
     fields: dict[str, str] = described(
         {},
@@ -393,24 +425,18 @@ class ImportDescription(Section):
         name = Path(self.file).name.lower()
         if name.endswith((".csv", ".tsv")) and _has_header(Path(self.file)):
             return "points"
-        for kind, suffixes in KINDS.items():
-            if name.endswith(suffixes):
+        for kind, section in IMPORT_SOURCES.parts.items():
+            if name.endswith(section.endings):
                 return kind
-        raise ValueError(f"kind: {name!r} says none, expected movie, mesh, points or grid")
+        raise ValueError(f"kind: {name!r} says none, expected {', '.join(IMPORT_SOURCES.kinds)}")
 
     def build(self) -> Import:
         """The import that is described."""
-        sections: Mapping[str, SourceSection] = {
-            "mesh": self.mesh,
-            "movie": self.movie,
-            "points": self.points,
-            "grid": self.grid,
-        }
-        source = sections[self.kind_of_source()].source(self)
+        section: SourceSection = getattr(self, self.kind_of_source())
         completion = self.completion.build()
         tool = self.tool.build() if self.tool else None
         return Import(
-            Isolated(source, Path(self.source or "movie").name),
+            Isolated(section.source(self), Path(self.source or "movie").name),
             self.field_of_view.build(),
             replace(completion, tool=tool),
             self.model_dump(mode="json"),
@@ -434,6 +460,21 @@ class ImportDescription(Section):
         return notes
 
 
+def import_description() -> type[ImportDescription]:
+    """What describes an import, with the sections of the kinds that other packages add."""
+    parts = IMPORT_SOURCES.parts
+    added = {
+        kind: part for kind, part in parts.items() if kind not in ImportDescription.model_fields
+    }
+    if not added:
+        return ImportDescription
+    kinds = Annotated[Literal[*parts] | None, OR_NONE]  # type: ignore[valid-type]
+    sections = {k: (part, described({}, f"More of {part.title}.")) for k, part in added.items()}
+    said = described("none", "What the source is; none: the file's name says it.", ", ".join(parts))
+    fields: Any = {"kind": (kinds, said), **sections}
+    return create_model("ImportDescription", __base__=ImportDescription, **fields)
+
+
 def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescription:
     """Read the description of an import from a YAML file, or make one of a source.
 
@@ -451,7 +492,7 @@ def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescr
     OSError
         If the file cannot be read.
     """
-    return described_by(ImportDescription, Path(source), "source", settings)
+    return described_by(import_description(), Path(source), "source", settings)
 
 
 def import_text(description: ImportDescription) -> str:
@@ -462,5 +503,5 @@ def import_text(description: ImportDescription) -> str:
 _IMPORT_HEADER: Final = """\
 # An import of chipglow. Run it with: chipglow import FILE --out scene.nc
 # Quantities carry their unit, in any unit of their kind: 10 us, 0.3 mm, 250 m/min, 391 degC.
-# Of movie, mesh, points and grid only the one of the source's kind counts.
+# Of the sections that are called by a kind, such as mesh, only that of the source's kind counts.
 """

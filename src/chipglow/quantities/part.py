@@ -32,10 +32,10 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 from chipglow.quantities.section import OR_NONE, Section, described, or_the_word, or_word
-from chipglow.quantities.units import Quantity
+from chipglow.quantities.units import Quantity, is_bare_number
 
 Built = TypeVar("Built")
-PartType = TypeVar("PartType", bound="type[Part]")
+PartType = TypeVar("PartType", bound="type[Part | Section]")
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,26 @@ class Parameter:
         if not isinstance(value, Real) or isinstance(value, bool):
             return repr(value)
         return f"{float(value):g} {self.quantity.base if self.quantity else ''}".strip()
+
+    def number(self, value: object) -> float:
+        """SI number of a value as descriptions write it, with its unit if it has one.
+
+        Raises
+        ------
+        ValueError
+            If it is no such number, or outside the limits.
+        """
+        if self.quantity is not None:
+            number = self.quantity.parse(value)
+        elif is_bare_number(value):
+            number = float(str(value).replace("−", "-"))
+        else:
+            raise ValueError(f"{value!r}, expected a number without a unit")
+        return float(self._within(number))
+
+    def refusal(self, name: str, value: object) -> ValueError:
+        """The error for a value that it may not have, in SI units."""
+        return ValueError(f"{name}: {self.si_text(value)}, expected {self.si_limits}")
 
     def _limits(self, text: Callable[[float], str]) -> str:
         if self.least is not None and self.most is not None:
@@ -176,10 +196,7 @@ class Part:
         for name, (parameter, annotation) in _declared(part).items():
             value = getattr(self, name)
             if not (_is_of(value, annotation) and parameter.holds(value)):
-                raise ValueError(
-                    f"{type(self).__name__}.{name}: {parameter.si_text(value)}, "
-                    f"expected {parameter.si_limits}"
-                )
+                raise parameter.refusal(f"{type(self).__name__}.{name}", value)
 
 
 def parameters(part: Any) -> dict[str, Parameter]:
@@ -246,29 +263,38 @@ class Family:
 
     def __init__(self, name: str) -> None:
         self.name: Final = name
-        self._own: dict[str, type[Part | Section]] = {}
+        self._own: dict[str, Any] = {}
 
     def part(self, part: PartType) -> PartType:
-        """Add a part; a decorator."""
-        self.add(part.kind, part)
+        """Add a part, or a section that is written by hand, by its `kind`; a decorator."""
+        self.add(part.kind, part)  # type: ignore[union-attr]
         return part
 
     def add(self, kind: str, part: "type[Part | Section]") -> None:
         """Add a part, or a section of descriptions that is written by hand.
 
+        A class that is defined anew, as by a notebook's cell, takes the place of the one before.
+
         Raises
         ------
         ValueError
-            If the kind is empty or there already.
+            If the kind is empty or that of another class.
         """
-        if not kind or kind in self._own:
+        taken = self._own.get(kind, part)
+        if not kind or _place(taken) != _place(part):
             raise ValueError(f"{self.name}: {kind!r} is no new kind")
         self._own[kind] = part
 
     @property
-    def parts(self) -> "dict[str, type[Part | Section]]":
+    def parts(self) -> dict[str, Any]:
         """All parts by their kind: those of other packages, then the library's own."""
         return {**of_other_packages(f"chipglow.{self.name}"), **self._own}
+
+    def find(self, kind: object) -> "type[Part | Section] | None":
+        """The part of a kind, if there is one; other packages are not loaded for the own ones."""
+        if not isinstance(kind, str):
+            return None
+        return self._own.get(kind) or self.parts.get(kind)
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -306,10 +332,11 @@ class Family:
         if isinstance(value, Section):
             return value
         kind = value.get("kind") if isinstance(value, Mapping) else None
-        if not isinstance(kind, str) or kind not in self.parts:
+        part = self.find(kind)
+        if part is None:
             shown = reprlib.repr(value if kind is None else kind)
             raise ValueError(f"kind: {shown}, expected one of {', '.join(self.kinds)}")
-        return _section_of(self.parts[kind]).model_validate(value, context=info.context)
+        return _section_of(part).model_validate(value, context=info.context)
 
 
 @cache
@@ -328,6 +355,10 @@ def of_other_packages(group: str) -> dict[str, Any]:
         except Exception as error:  # whatever another package does wrong
             warn(f"{entry.value}: cannot be loaded ({error}).", RuntimeWarning, stacklevel=2)
     return found
+
+
+def _place(part: type) -> tuple[str, str]:
+    return part.__module__, part.__qualname__
 
 
 def _section_of(part: Any) -> type[Section]:
@@ -407,7 +438,8 @@ def _first_sentence(part: type[Part]) -> str:
 def _documented(cls: type[Part]) -> Iterator[str]:
     """Parameters for the documentation, of a class that is being made."""
     rows = []
-    for name, annotation in inspect.get_annotations(cls, eval_str=False).items():
+    annotations = [inspect.get_annotations(one) for one in reversed(cls.__mro__)]
+    for name, annotation in [pair for one in annotations for pair in one.items()]:
         for metadata in getattr(annotation, "__metadata__", ()):
             if isinstance(metadata, Parameter):
                 rows += [f"{name} : {_type_text(annotation, metadata)}", f"    {metadata.meaning}"]

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 _NUMBER: Final = r"\d{1,40}(?:\.\d{0,40})?(?:[eE][+-]?\d{1,3})?|\.\d{1,40}(?:[eE][+-]?\d{1,3})?"
 _FRACTION: Final = r"\d{1,3}/\d{1,3}"
-_UNIT: Final = r"[A-Za-z°µμ][A-Za-z0-9°µμ/*^ .-]{0,60}"
+# 1/s only after a space: 101/s is not 10 1/s.
+_UNIT: Final = r"(?:(?<=\s)1/)?[A-Za-z°µμ][A-Za-z0-9°µμ/*^ ().-]{0,60}"
 _QUANTITY: Final = re.compile(rf"\s*([-+−]?(?:{_FRACTION}|{_NUMBER}))\s*({_UNIT})\s*")
 _RANGE: Final = re.compile(rf"\s*({_NUMBER})\s*[-–]\s*({_NUMBER})\s*({_UNIT})?\s*")
 _BARE: Final = re.compile(rf"\s*[-+−]?(?:{_NUMBER})\s*")
@@ -49,6 +50,7 @@ _NO_UNIT: Final = ("", "1", "-", "none", "dimensionless", "m/m", "mm/mm", "m m-1
 # One digit of exponent: pint would compute any power that a file asks for.
 _TERM: Final = r"(?:1|[A-Za-z°µμ%_]{1,24}(?:(?:\^|\*\*)?[-+]?[1-9])?)"
 _TERMS: Final = re.compile(rf"{_TERM}(?:\s*[*/.·]\s*{_TERM}|\s+{_TERM}){{0,5}}")
+_BELOW: Final = re.compile(r"/\s*\(([^()]*)\)")
 _EXPONENT: Final = re.compile(r"([A-Za-z°µμ%_])(?:\^|\*\*)?([-+]?[1-9])")
 
 
@@ -281,6 +283,14 @@ HEAT_TRANSFER: Final = Quantity(
 )
 TEMPERATURE: Final = Quantity("a temperature", "K", "degC", "300 degC")
 Temperature = Annotated[float, TEMPERATURE]
+KELVINS: Final = Quantity("a temperature", "K", "K", "1733 K")
+STRESS: Final = Quantity("a stress", "Pa", "MPa", "553.1 MPa", positive=False)
+STRAIN_RATE: Final = Quantity("a strain rate", "1/s", "1/s", "1 1/s", positive=False)
+PER_KELVIN: Final = Quantity("a softening", "1/K", "1/K", "7e-4 1/K", positive=False)
+FRACTURE_ENERGY: Final = Quantity("a fracture energy", "J/m^2", "kJ/m^2", "15 kJ/m2")
+DENSITY: Final = Quantity("a density", "kg/m^3", "kg/m^3", "7850 kg/m3")
+CONDUCTIVITY: Final = Quantity("a conductivity", "W/m/K", "W/m/K", "45 W/(m K)")
+HEAT_CAPACITY: Final = Quantity("a heat capacity", "J/kg/K", "J/kg/K", "480 J/(kg K)")
 TEMPERATURE_DIFFERENCE: Final = Difference(
     "a difference of temperatures", "K", "K", "2 K", positive=False
 )
@@ -310,6 +320,7 @@ def _in_base(number: Decimal, unit: str, base: str) -> Decimal:
 def _unit(text: str) -> Any:
     clean = text.strip()
     spelled = _SPELLINGS.get(clean.lower().replace(" ", "_"), clean)
+    spelled = _BELOW.sub(lambda below: "/" + "/".join(below[1].split()), spelled)
     if not _TERMS.fullmatch(spelled):
         raise ValueError(f"{text!r} is no unit")
     written = re.sub(r"(?<=[\w°%])[\s.·]+(?=[A-Za-z°µμ])", "*", spelled)

@@ -1,0 +1,85 @@
+"""An import source: a text with a header of four numbers, then temperatures row by row.
+
+An entry point makes `chipglow import` read it; in the pyproject.toml of the package::
+
+    [project.entry-points."chipglow.import_source"]
+    thermal-log = "thermal_log:ThermalLogSection"
+
+The source is read in a subprocess, which imports the module: a class of a notebook does not do.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.io import ImportDescription, SourceSection
+from chipglow.io.sources import Source, SourceError, Survey
+from chipglow.quantities import described
+from chipglow.scene import Material, Raster, SampledFrame
+
+
+class ThermalLogSection(SourceSection):
+    """What an import says of a log."""
+
+    kind: ClassVar[str] = "thermal-log"
+    title: ClassVar[str] = "a thermal log"
+    endings: ClassVar[tuple[str, ...]] = (".tlog",)
+    offset: float = described(0.0, "Added to the temperatures, in K.")
+
+    def source(self, whole: ImportDescription) -> Source:
+        """The source that the whole describes."""
+        return ThermalLog(Path(whole.file), self.offset)
+
+
+@dataclass(frozen=True)
+class ThermalLog(Source):
+    """Temperatures in degC on a grid whose upper left corner is at 0, 0."""
+
+    path: Path
+    offset: float = 0.0
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The file."""
+        return (str(self.path),)
+
+    def survey(self) -> Survey:
+        """Look at what is there."""
+        values, spacing, interval = self._read()
+        count, rows, columns = values.shape
+        return Survey(
+            kind="thermal log",
+            times=interval * np.arange(count),
+            extent=(0.0, columns * spacing, -rows * spacing, 0.0),
+            found={"temperature": "the numbers"},
+            spacing=spacing,
+        )
+
+    def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
+        """The nearest of the log's samples for each of the scene's."""
+        values, spacing, interval = self._read()
+        down, across = np.floor(-raster.y / spacing), np.floor(raster.x / spacing)
+        rows, columns = down.astype(int), across.astype(int)
+        there = np.outer((rows >= 0) & (rows < values.shape[1]), columns >= 0)
+        there &= columns < values.shape[2]
+        inside = np.ix_(rows.clip(0, values.shape[1] - 1), columns.clip(0, values.shape[2] - 1))
+        material = np.where(there, np.uint8(Material.WORKPIECE), np.uint8(Material.VOID))
+        for number, frame in enumerate(values[start:], start):
+            temperature = np.where(there, frame[inside] + 273.15 + self.offset, np.nan)
+            fields = {"temperature": temperature.astype(np.float32)}
+            yield SampledFrame(number * interval, fields, material)
+
+    def _read(self) -> tuple[NDArray[np.float64], float, float]:
+        """Temperatures of shape (time, y, x), spacing in m, interval in s."""
+        numbers = np.fromstring(self.path.read_text(encoding="utf-8"), sep=" ")
+        if len(numbers) < 4 or not (numbers[:4] > 0).all():
+            raise SourceError(f"{self.path}: no header, expected rows, columns, um and us")
+        rows, columns = numbers[:2].astype(int)
+        frames, over = divmod(len(numbers) - 4, rows * columns)
+        if over or not frames:
+            raise SourceError(f"{self.path}: expected whole frames of {rows} x {columns} numbers")
+        return numbers[4:].reshape(frames, rows, columns), numbers[2] * 1e-6, numbers[3] * 1e-6
