@@ -137,7 +137,9 @@ def test_what_is_left_to_the_paper_is_said():
 
 @pytest.fixture(scope="module")
 def own_result():
-    plan = Plan(exposures=2, phases=1, textures=1, psf_widths=(8e-6, 12e-6), beside_paper=False)
+    plan = Plan(
+        exposures=2, phases=1, textures=1, psf_widths=(8e-6, 12e-6), study=Study(**TITANIUM)
+    )
     scene = AnalyticChip().scene()
     camera = Camera(integration_time=5e-6)
     return analyse(scene, {"chip 1": CHIP_1, "chip 2": CHIP_2}, camera, plan)
@@ -152,8 +154,12 @@ def test_the_paper_stands_beside_its_own_study_only(own_result, tmp_path):
     assert "paper" not in told.lower().replace("data:image/png;base64", "")
     assert "Figure 5" not in told
     assert (tmp_path / "figures" / "scene.png").exists()
-    beside = replace(own_result, plan=replace(own_result.plan, beside_paper=True))
+    beside = replace(own_result, plan=replace(own_result.plan, study=Study.quick()))
     assert any(row.paper is not None for row in comparison_rows(beside))
+    # Nor beside what somebody analyses without a study, nor if one thing of it is another.
+    for study in (None, Study(camera={"integration_time": "20 us"})):
+        other = replace(own_result, plan=replace(own_result.plan, study=study))
+        assert all(row.paper is None for row in comparison_rows(other))
 
 
 def test_the_cost_of_the_papers_study_is_about_what_it_was():

@@ -50,7 +50,7 @@ def result():
         AnalyticChip(frames=60).scene(),
         {"chip 1": CHIP_1, "chip 2": CHIP_2},
         Camera(psf_order="detector"),
-        Plan(exposures=3, phases=2, textures=2, psf_widths=(4e-6, 12e-6, 20e-6)),
+        Plan(exposures=3, phases=2, textures=2, psf_widths=(4e-6, 12e-6, 20e-6), study=Study()),
     )
 
 

@@ -24,6 +24,7 @@ from .camera import (
 )
 from .cutting import (
     AISI_1045 as AISI_1045,
+    FLOW_LAWS as FLOW_LAWS,
     CuttingSimulation as CuttingSimulation,
     FlowStress as FlowStress,
 )
@@ -76,6 +77,10 @@ from .laboratory.registration import (
     fit_points as fit_points,
     load_registration as load_registration,
     simultaneous_frames as simultaneous_frames,
+)
+from .quantities import (
+    Parameter as Parameter,
+    Quantity as Quantity,
 )
 from .radiometry import (
     Band as Band,

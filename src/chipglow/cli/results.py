@@ -16,6 +16,7 @@ from chipglow.cutting import SOLVER_VERSION
 from chipglow.errors import SceneErrors, StudyResult
 from chipglow.io import atomic_folder
 from chipglow.report import comparison_rows, place_rows, table_2, write_report, write_scene_report
+from chipglow.report.paper import stands_beside
 from chipglow.study import Study, errors, run, study_text
 
 
@@ -124,7 +125,7 @@ def _provenance(study: Study) -> dict[str, str]:
 def _print_table(result: StudyResult | SceneErrors) -> None:
     """The paper's figures beside ours; of any scene the error at each place."""
     if isinstance(result, StudyResult):
-        beside = result.plan.beside_paper
+        beside = stands_beside(result)
         heads = ("the paper", "here", "range of draws", "differs")
         table = Table("quantity", *(heads if beside else heads[1:3]))
         for row in comparison_rows(result):

@@ -69,8 +69,8 @@ class Plan:
         Full widths at half maximum of the point spread functions that are compared, in m.
     reference : ReferenceKind
         What the measured temperatures are compared with.
-    beside_paper : bool
-        Whether the paper's figures are the ones to compare with: its cut, surfaces and camera.
+    study : object, optional
+        What it is the plan of, such as a `chipglow.study.Study`: for who reports the result.
     line_reach, line_step : float
         Reach of the analysis lines to either side and distance between their points in m.
     touching : float
@@ -92,7 +92,7 @@ class Plan:
         default_factory=lambda: tuple(width * 1e-6 for width in range(4, 21))
     )
     reference: ReferenceKind = "maximum"
-    beside_paper: bool = True
+    study: object = None
     line_reach: float = 60e-6
     line_step: float = 1e-6
     touching: float = 3e-6

@@ -12,6 +12,7 @@ from chipglow.quantities.section import (
     beside_the_study,
     described,
 )
+from chipglow.quantities.units import Quantity
 
 __all__ = [
     "OR_NONE",
@@ -22,6 +23,7 @@ __all__ = [
     "OrWord",
     "Parameter",
     "Part",
+    "Quantity",
     "Section",
     "Settings",
     "allowed",

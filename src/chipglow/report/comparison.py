@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chipglow.errors import Distribution, LocalError, StudyResult
 from chipglow.quantities.format import quantity_text
 from chipglow.report import evidence
-from chipglow.report.paper import PAPER, PaperValue
+from chipglow.report.paper import PAPER, PaperValue, stands_beside
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def comparison_rows(result: StudyResult) -> list[Row]:
         The paper's quantities first.
     """
     rows = [*_error_rows(result), *_period_rows(result), *_further_rows(result)]
-    if result.plan.beside_paper:
+    if stands_beside(result):
         return rows
     return [replace(row, paper=None, where="") for row in rows]
 
@@ -419,7 +419,7 @@ def _headline(
 ) -> Iterator[Row]:
     """The rows of an error and of the point spread function's part of it."""
     headline = result.draws.headlines.get(name)
-    paper = paper if result.plan.beside_paper else (None, None)
+    paper = paper if stands_beside(result) else (None, None)
     error = headline.error if headline else None
     share = headline.psf_fraction if headline else None
     yield _drawn(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from chipglow.errors import Distribution, ReferenceKind, Sensitivity, StudyResult
 from chipglow.errors.distribution import COVERAGE
 from chipglow.laboratory.chip import Segmentation
-from chipglow.report.paper import PAPER
+from chipglow.report.paper import PAPER, stands_beside
 
 ORDER_TEXT: Final = {
     "detector": "from pixel to pixel",
@@ -91,7 +91,7 @@ def _spread(draws: Distribution, scale: float) -> str:
 
 def _against(result: StudyResult, name: str, paper: float) -> str:
     headline = result.draws.headlines.get(name)
-    if headline is None or headline.error.draws < 2 or not result.plan.beside_paper:
+    if headline is None or headline.error.draws < 2 or not stands_beside(result):
         return ""
     if headline.error.differs_from(paper):
         return f"The paper's {-paper:.0f} °C lies outside this scatter."
@@ -310,7 +310,7 @@ def _reach(
         f"Gaussian PSFs of {widths[0] * 1e6:.0f} to {_micrometres(widths[-1])} give "
         f"{text(series[0])} to {text(series[-1])}"
     )
-    if not result.plan.beside_paper:
+    if not stands_beside(result):
         return f"{span}."
     width = crossing(widths, series, target)
     if width is None:
@@ -335,7 +335,7 @@ def crossing(
 
 def beside(result: StudyResult, text: str, of_paper: str) -> str:
     """A text, and what is said of the paper where the study is beside it."""
-    return f"{text} {of_paper}" if result.plan.beside_paper else text
+    return f"{text} {of_paper}" if stands_beside(result) else text
 
 
 def joined(*sentences: str) -> str:

@@ -32,7 +32,7 @@ from chipglow.report.laboratory_figures import (
     heated_tool,
     rake_profiles,
 )
-from chipglow.report.paper import PAPER
+from chipglow.report.paper import PAPER, stands_beside
 from chipglow.scene import Material
 
 _ORDER_STYLE: Final = {
@@ -52,7 +52,7 @@ def draw_figures(result: StudyResult, folder: Path) -> Iterator[FigureFile]:
         An existing folder; ``<name>.png`` and ``<name>.svg`` are written.
     """
     for one in _DRAWINGS:
-        if not result.plan.beside_paper:
+        if not stands_beside(result):
             name = one.name.removeprefix(f"{one.paper.lower().replace(' ', '-')}-")
             one = replace(one, name=name, paper="")
         if (figure := one.write(result, folder)) is not None:
@@ -167,7 +167,7 @@ def error_lines(result: StudyResult) -> Figure:
     left.set_title(f"a) across the rake face, {result.plan.rake_surface}")
     left.set_xlabel("distance from the rake face / µm\n← tool      chip →")
     _draw_error_line(right, result.draws.band_line, band.case_1, band.psf_portion)
-    if result.plan.beside_paper:
+    if stands_beside(result):
         _draw_papers_points(left, right)
     right.set_title(f"b) across the shear band, {result.plan.band_surface}")
     right.set_xlabel("distance from the ridge / µm\n← workpiece      chip →")
@@ -309,7 +309,7 @@ def psf_sensitivity(result: StudyResult) -> Figure:
                 markersize=3.0,
                 label=label,
             )
-        if result.plan.beside_paper:
+        if stands_beside(result):
             level, style = panel.scale * panel.paper, "--"
             axes.axhline(level, color="black", linestyle=style, linewidth=1.0, label="paper")
         if result.camera.psf is not None and panel.own is not None:

@@ -34,6 +34,13 @@ class PaperValues:
 
 PAPER: Final = PaperValues()
 
+
+def stands_beside(result: StudyResult) -> bool:
+    """Whether the paper's figures may stand beside a result: its study cuts and looks as it did."""
+    study = result.plan.study
+    return isinstance(study, Study) and study.is_papers
+
+
 TABLE_1: Final = {
     "chip 1 chip body": Emissivity(0.42, 0.07),
     "chip 1 shear band": Emissivity(0.53, 0.05),

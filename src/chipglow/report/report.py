@@ -21,7 +21,7 @@ from chipglow.report.page import (
     table_part,
     write_files,
 )
-from chipglow.report.paper import EmissivityTexts, table_1
+from chipglow.report.paper import EmissivityTexts, stands_beside, table_1
 from chipglow.report.results import results_dataset, summary
 
 _PAPER: Final = (
@@ -83,7 +83,7 @@ def write_report(
     """
     pictures = folder / "figures"
     pictures.mkdir()
-    beside = result.plan.beside_paper
+    beside = stands_beside(result)
     rows, causes, chip = comparison_rows(result), cause_rows(result), chip_rows(result.chip)
     figures, emissivities = list(draw_figures(result, pictures)), table_1(result)
     bodies = {
@@ -113,7 +113,7 @@ def write_report(
 
 
 def _comparison(result: StudyResult, rows: Sequence[Row]) -> str:
-    beside = result.plan.beside_paper
+    beside = stands_beside(result)
     text = (
         f"{error_definition(result)} PSF: point spread function. Here: mean ± standard deviation "
         "over the draws of segment, texture and pixel phase, or ± standard uncertainty where there "

@@ -56,7 +56,7 @@ class Study(Section):
     @property
     def plan(self) -> Plan:
         """What to analyse of a cut; a surface that is the only one is seen everywhere."""
-        plan = replace(self.analysis.build(), beside_paper=self.is_papers)
+        plan = replace(self.analysis.build(), study=self)
         if isinstance(self.surface, FeaturesSection):
             return plan
         (name,) = surface_names(self.surface)
