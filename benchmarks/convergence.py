@@ -1,25 +1,37 @@
 """How the cut depends on the cell: forces, segments, temperatures, width of the shear band.
 
-    python benchmarks/convergence.py [20 14 10 7 5]
+    python benchmarks/convergence.py [20 14 10 7 5] [--local]
 
 Cells in um; the finer, the longer: the time grows with the cube of their number. The paper's cut
-otherwise, frames every 1 us in the paper's window. Prints a Markdown table.
+otherwise, over 2 mm: means are of what follows 0.7 mm, frames every 1 us. With --local the steel
+has no `NonlocalViscosity`: what fails is then as thin as two cells. Prints a Markdown table.
 """
 
-import sys
-from dataclasses import dataclass, field
+import argparse
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from time import perf_counter
 
 import numpy as np
 
-from chipglow.cutting import CuttingSimulation, Numerics, OutputWindow
+from chipglow.cutting import AISI_1045, CuttingConditions, CuttingSimulation, Numerics, OutputWindow
 from chipglow.laboratory.chip import NoShearBandError, find_shear_band, segmentation
-from chipglow.scene import Material, Raster, ToolGeometry
+from chipglow.scene import Material, Raster, ToolGeometry, sample
 
 CELLS = (20.0, 14.0, 10.0, 7.0, 5.0)
-WINDOW = OutputWindow(interval=1e-6, later_bands=0)
+CUT = CuttingConditions(cutting_length=2e-3)
+WINDOW = OutputWindow(0.7e-3, CUT.cutting_length, interval=1e-6, later_bands=0)
 RASTER = Raster(-560e-6, 460e-6, 2e-6, 270, 300)
+
+ACROSS = np.arange(-120e-6, 121e-6, 2e-6)
+SIDES = 20e-6
+"""Length at either end of a profile whose mean is the temperature beside the band."""
+
+COLUMNS = (
+    "cell / µm", "cutting force / (N/mm)", "swing / (N/mm)", "thrust / (N/mm)", "period / µs",
+    "hottest chip / °C", "band / µm", "band's rate / (10³ 1/s)", "width of its temperature / µm",
+    "its temperature / °C", "unaccounted work / %", "time / s",
+)  # fmt: skip
 
 
 @dataclass
@@ -28,8 +40,7 @@ class Fields:
 
     tool: ToolGeometry
     hottest: list[float] = field(default_factory=list)
-    widths: list[float] = field(default_factory=list)
-    rates: list[float] = field(default_factory=list)
+    bands: list[tuple[float, float, float, float]] = field(default_factory=list)
 
     def add(self, frame):
         """Take one frame: the hottest thousandth of the chip, and the band's middle if any."""
@@ -39,20 +50,46 @@ class Fields:
             band = find_shear_band(RASTER, frame.plastic_strain_rate, chip, self.tool)
         except NoShearBandError:
             return
-        self.rates.append(float(band.middle_rate))
-        self.widths.append(float(band.width))
+        profile = mean_profile(band, np.where(chip, frame.temperature, np.nan))
+        self.bands.append((band.middle_rate, band.width, *rise_width(profile)))
+
+    def active(self):
+        """Medians over the tenth of the frames in which the band is at work most."""
+        bands = np.array(self.bands)
+        return np.nanmedian(bands[bands[:, 0] >= np.quantile(bands[:, 0], 0.9)], axis=0)
 
 
-def row(cell):
+def mean_profile(band, temperature):
+    """Temperature in K across a band, mean over the middle half of its length."""
+    points, normals = band.ridge.points[band.middle_half], band.normals[band.middle_half]
+    lines = points[:, None] + ACROSS[None, :, None] * normals[:, None]
+    return np.nanmean(sample(temperature, RASTER, lines), axis=0)
+
+
+def rise_width(profile):
+    """Full width at half maximum (m) of the rise over a line between both sides; the top in K."""
+    count = round(SIDES / (ACROSS[1] - ACROSS[0]))
+    ends = np.nanmean(profile[:count]), np.nanmean(profile[-count:])
+    rise = profile - np.interp(ACROSS, (ACROSS[count // 2], ACROSS[-1 - count // 2]), ends)
+    top = int(np.argmax(np.where(np.abs(ACROSS) < 50e-6, rise, -np.inf)))
+    below = np.flatnonzero(rise <= rise[top] / 2)
+    left, right = below[below < top], below[below > top]
+    if not (left.size and right.size):
+        return float("nan"), float(profile[top])
+    return float(ACROSS[right[0]] - ACROSS[left[-1]]), float(profile[top])
+
+
+def row(cell, workpiece):
     """Run one cut and return its row of the table."""
-    simulation = CuttingSimulation(numerics=Numerics(cell=cell * 1e-6))
+    numerics = Numerics(cell=cell * 1e-6)
+    simulation = CuttingSimulation(CUT, workpiece=workpiece, numerics=numerics)
     fields = Fields(simulation.tool)
     start = perf_counter()
     history = simulation.run(WINDOW, RASTER, fields.add)
     seconds = perf_counter() - start
-    segments = segmentation(history.time, history.cutting, history.thrust)
-    # The band is judged where it is at work: the frames with the highest tenth of its rate.
-    active = np.array(fields.rates) >= np.quantile(fields.rates, 0.9)
+    later = history.time * CUT.speed > WINDOW.start
+    segments = segmentation(history.time[later], history.cutting[later], history.thrust[later])
+    rate, width, temperature_width, temperature = fields.active()
     return [
         f"{cell:g}",
         f"{segments.cutting_mean / 1e3:.0f}",
@@ -60,8 +97,10 @@ def row(cell):
         f"{segments.thrust_mean / 1e3:.0f}",
         f"{segments.period * 1e6:.0f}{deviation(segments.period_uncertainty)}",
         f"{max(fields.hottest) - 273.15:.0f}",
-        f"{np.median(np.array(fields.widths)[active]) * 1e6:.0f}",
-        f"{np.median(np.array(fields.rates)[active]) / 1e3:.0f}",
+        f"{width * 1e6:.0f}",
+        f"{rate / 1e3:.0f}",
+        f"{temperature_width * 1e6:.0f}",
+        f"{temperature - 273.15:.0f}",
         f"{history.energy.closing_error[-1] * 100:.1f}",
         f"{seconds:.0f}",
     ]
@@ -73,15 +112,15 @@ def deviation(seconds: float) -> str:
 
 
 def main():
-    cells = [float(text) for text in sys.argv[1:]] or CELLS
-    print(
-        "| cell / um | cutting force / (N/mm) | swing / (N/mm) | thrust / (N/mm) | period / us "
-        "| hottest chip / °C | band / um | band's rate / (10³ 1/s) | unaccounted work / % "
-        "| time / s |"
-    )
-    print("|---" * 10 + "|")
-    for cell in cells:
-        print("| " + " | ".join(row(cell)) + " |", flush=True)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("cells", nargs="*", type=float, help="cells in um")
+    parser.add_argument("--local", action="store_true", help="without the nonlocal viscosity")
+    given = parser.parse_args()
+    workpiece = replace(AISI_1045, nonlocal_viscosity=None) if given.local else AISI_1045
+    print("| " + " | ".join(COLUMNS) + " |")
+    print("|---" * len(COLUMNS) + "|")
+    for cell in given.cells or CELLS:
+        print("| " + " | ".join(row(cell, workpiece)) + " |", flush=True)
 
 
 if __name__ == "__main__":

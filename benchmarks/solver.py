@@ -63,7 +63,7 @@ class Block:
             speed=0.0,
         )._replace(**changes)
         self.law = material.flow_stress.numbers()
-        self.damage = Damage.of(material.damage, cell)
+        self.damage = Damage.of(material.damage, material.failing_layer(cell))
         self.elastic = material.elastic_ratios()
         self.capacity = material.heat_capacity.sampled()
         self.heat_shares = heat_shares(material.taylor_quinney)

@@ -61,9 +61,10 @@ def test_default_material_is_unchanged() -> None:
             "reference_rate": 1.0,
         },
         "damage": asdict(
-            JohnsonCookDamage(0.006, 0.331, -1.96, 0.0018, 0.58, 5e3, 0.25, 1733.0, 293.0, 1.0)
+            JohnsonCookDamage(0.006, 0.331, -1.96, 0.0018, 0.58, 8e3, 0.4, 1733.0, 293.0, 1.0)
         ),
         "fitted_damage": asdict(AISI_1045.fitted_damage),
+        "nonlocal_viscosity": {"viscosity": 3e3, "length": 20e-6},
         "conductivity": asdict(TemperatureTable((273.15, 1173.15), (52.61, 27.32))),
         "heat_capacity": asdict(TemperatureTable((273.15, 1173.15), (420.0, 873.6))),
         "taylor_quinney": 0.9,

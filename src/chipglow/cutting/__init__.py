@@ -24,6 +24,7 @@ from chipglow.cutting.library import (
     workpiece,
 )
 from chipglow.cutting.material import RateTable, TemperatureTable, ToolMaterial, WorkpieceMaterial
+from chipglow.cutting.nonlocal_viscosity import NonlocalViscosity
 from chipglow.cutting.preview import Preview
 from chipglow.cutting.resolution import unresolved
 from chipglow.cutting.simulation import SOLVER_VERSION, CuttingSimulation, ForceHistory, SolverError
@@ -48,6 +49,7 @@ __all__ = [
     "MarusichOrtiz",
     "MaterialError",
     "MaterialFile",
+    "NonlocalViscosity",
     "Numerics",
     "OutputWindow",
     "Preview",

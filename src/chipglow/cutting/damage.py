@@ -18,6 +18,9 @@ BAND_CELLS: Final = 2.0
 """Width in cells of the layer over which the solver spreads a failure: quadratic B-splines cannot
 resolve a narrower one. What this layer takes is the energy of the failed surface."""
 
+BAND_LENGTHS: Final = 2.0
+"""Width of that layer in lengths of a `NonlocalViscosity`."""
+
 
 _LARGEST_LOSS: Final = 0.99
 
@@ -31,8 +34,9 @@ class JohnsonCookDamage(Part):
     σ* = mean stress / equivalent stress and θ as in `JohnsonCook`. When it is 1, the flow stress
     begins to fall: by the factor 1 − loss · w, where w rises from 0 to 1 with the work of the
     failing layer, dw = σ L dε / (2 G), σ being the undamaged flow stress and L the layer's
-    thickness in the solver. The energy thus does not depend on the cell: the layer takes up
-    (2 − loss) G, of which loss · G is above the strength that remains.
+    thickness: twice the length of a `NonlocalViscosity`, or else two cells. The energy thus does
+    not depend on the cell: the layer takes up (2 − loss) G, of which loss · G is above the
+    strength that remains.
     """
 
     d1: Annotated[float, Parameter("D₁.")]
@@ -136,12 +140,12 @@ class Damage(NamedTuple):
     reference_rate: float
 
     @classmethod
-    def of(cls, law: JohnsonCookDamage | None, cell: float) -> "Damage":
-        """Numbers of a law (None: nothing fails) on a grid with a cell in m."""
+    def of(cls, law: JohnsonCookDamage | None, layer: float) -> "Damage":
+        """Numbers of a law (None: nothing fails) that softens a layer of a thickness in m."""
         if law is None:
             return cls(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1e3, 0.0, 1.0)
         same = {name: getattr(law, name) for name in cls._fields if name != "per_work"}
-        return cls(per_work=BAND_CELLS * cell / (2 * law.fracture_energy), **same)
+        return cls(per_work=layer / (2 * law.fracture_energy), **same)
 
 
 @njit(**INLINE)

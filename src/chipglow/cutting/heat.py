@@ -71,7 +71,7 @@ def _place(p, grid):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _nodes_around(p, grid):  # type: ignore[no-untyped-def]
+def nodes_around(p, grid):  # type: ignore[no-untyped-def]
     """First of the nodes around a point, column and row, and the weights of both directions."""
     i, j, ax, ay = _place(p, grid)
     return i, j, spline_weights(ax), spline_weights(ay)
@@ -195,7 +195,7 @@ def heat_contact(  # type: ignore[no-untyped-def]
 @njit
 def _touch(p, touched, grid):  # type: ignore[no-untyped-def]
     """A point's time in contact, weighted, to its nodes."""
-    i, j, wx, wy = _nodes_around(p, grid)
+    i, j, wx, wy = nodes_around(p, grid)
     for a in range(3):
         for b in range(3):
             touched[i + a, j + b] += wx[a] * wy[b] * p.contact_time
@@ -204,7 +204,7 @@ def _touch(p, touched, grid):  # type: ignore[no-untyped-def]
 @njit
 def _friction_work(p, friction, touched, grid):  # type: ignore[no-untyped-def]
     """A point's part of its nodes' friction work in J/m, by weight and time in contact."""
-    i, j, wx, wy = _nodes_around(p, grid)
+    i, j, wx, wy = nodes_around(p, grid)
     work = 0.0
     for a in range(3):
         for b in range(3):
@@ -311,7 +311,7 @@ def return_heat(points, count, increment, grid):  # type: ignore[no-untyped-def]
     """Give the rise of temperature on the grid to the points: increments, so nothing diffuses."""
     for k in range(count):
         p = points[k]
-        i, j, wx, wy = _nodes_around(p, grid)
+        i, j, wx, wy = nodes_around(p, grid)
         rise = 0.0
         for a in range(3):
             for b in range(3):

@@ -11,6 +11,7 @@ from chipglow.cutting import laws as _laws  # noqa: F401  (registers the laws)
 from chipglow.cutting.damage import FittedDamage, JohnsonCookDamage
 from chipglow.cutting.flow_stress import FLOW_LAWS
 from chipglow.cutting.material import RateTable, TemperatureTable, ToolMaterial, WorkpieceMaterial
+from chipglow.cutting.nonlocal_viscosity import NonlocalViscosity
 from chipglow.quantities import Parameter, of_other_packages
 from chipglow.quantities.part import parameters
 from chipglow.quantities.units import KELVINS, STRAIN_RATE
@@ -65,6 +66,7 @@ _TABLES: Final = ("conductivity", "heat_capacity")
 _GROUP: Final = "chipglow.material"
 _HEADER: Final = ("kind", "name", "description")
 _WORKPIECE_PARTS: Final = (*_CONSTANT_OR_TABLE, "taylor_quinney", *_TABLES, "flow_stress", "damage")
+_OPTIONAL: Final = ("fitted_damage", "nonlocal_viscosity")
 _OWN_FILE: Final = re.compile(r"(.+\.ya?ml)(?:/([^/]+))?")
 
 
@@ -198,8 +200,8 @@ class _Reader:
         if kind not in ("workpiece", "tool"):
             raise self._wrong("kind", kind, "workpiece or tool")
         parts = tuple(parameters(ToolMaterial)) if kind == "tool" else _WORKPIECE_PARTS
-        if isinstance(data, Mapping) and kind == "workpiece" and "fitted_damage" in data:
-            parts = (*parts, "fitted_damage")
+        if isinstance(data, Mapping) and kind == "workpiece":
+            parts = (*parts, *(one for one in _OPTIONAL if one in data))
         data = self._mapping("", data, (*_HEADER, *parts))
         name, description = self._text("name", data), self._text("description", data)
         sets: dict[str, WorkpieceMaterial] = {}
@@ -224,6 +226,7 @@ class _Reader:
         tables = {key: self._table(key, data[key], declared[key]) for key in _TABLES}
         damage = self._damage(data["damage"])
         fitted = self._fitted(data["fitted_damage"]) if "fitted_damage" in data else None
+        resists = self._nonlocal_viscosity(data.get("nonlocal_viscosity"))
         laws = data["flow_stress"]
         if not isinstance(laws, Mapping) or not laws:
             raise self._wrong("flow_stress", laws, "one set or more by name")
@@ -236,6 +239,7 @@ class _Reader:
                 "flow_stress": flow_stress,
                 "damage": damage if fails else None,
                 "fitted_damage": fitted if fails else None,
+                "nonlocal_viscosity": resists,
                 "taylor_quinney": heat_fraction,
                 **either,
                 **tables,
@@ -250,6 +254,14 @@ class _Reader:
             "damage", JohnsonCookDamage, self._group("damage", data, parameters(JohnsonCookDamage))
         )
         return damage
+
+    def _nonlocal_viscosity(self, data: object) -> NonlocalViscosity | None:
+        if data is None:
+            return None
+        place = "nonlocal_viscosity"
+        values = self._group(place, data, parameters(NonlocalViscosity))
+        made: NonlocalViscosity = self._build(place, NonlocalViscosity, values)
+        return made
 
     def _fitted(self, data: object) -> FittedDamage:
         """How well the damage is known; a number that is no number is the class's to refuse."""

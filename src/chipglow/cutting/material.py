@@ -6,8 +6,9 @@ from typing import Annotated, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chipglow.cutting.damage import FittedDamage, JohnsonCookDamage
+from chipglow.cutting.damage import BAND_CELLS, BAND_LENGTHS, FittedDamage, JohnsonCookDamage
 from chipglow.cutting.flow_stress import FlowStress
+from chipglow.cutting.nonlocal_viscosity import NonlocalViscosity
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.part import parameters
 from chipglow.quantities.units import CONDUCTIVITY, DENSITY, HEAT_CAPACITY, STRESS
@@ -106,6 +107,8 @@ class WorkpieceMaterial(Part):
         Fraction of the plastic work that becomes heat: constant, or over the plastic strain rate.
     fitted_damage : FittedDamage, optional
         How well the damage is known, where measured cuts determined it.
+    nonlocal_viscosity : NonlocalViscosity, optional
+        What gives shear bands a width of their own; without it they are as narrow as the cell.
 
     Raises
     ------
@@ -129,6 +132,7 @@ class WorkpieceMaterial(Part):
         float | RateTable, Parameter("Fraction of work that is heat.", least=0.0, most=1.0)
     ] = 0.9
     fitted_damage: FittedDamage | None = None
+    nonlocal_viscosity: NonlocalViscosity | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -186,6 +190,12 @@ class WorkpieceMaterial(Part):
         if self.damage is None or self.fitted_damage is None:
             raise ValueError(f"{self.name}: its damage was not fitted, nothing to draw from")
         return replace(self, damage=self.fitted_damage.draw(self.damage, generator))
+
+    def failing_layer(self, cell: float) -> float:
+        """Thickness in m of the layer that a failure softens, on a grid with a cell in m."""
+        if self.nonlocal_viscosity is None:
+            return BAND_CELLS * cell
+        return BAND_LENGTHS * self.nonlocal_viscosity.length
 
     def sound_speed(self) -> float:
         """Speed of longitudinal waves in m/s at the temperature where it is highest."""

@@ -70,7 +70,8 @@ class Step(NamedTuple):
     (Pa); contact: stiffness (Pa), damping (N s/m²), distance at which a point touches (m), area of
     a point (m²/m), friction; boundary: nodes under `floor`, and those left of `inflow` and under
     `ceiling` (m), move at `speed` (m/s). Friction falls with the temperature over
-    `friction_melting` (K): see `friction_coefficient`.
+    `friction_melting` (K): see `friction_coefficient`. `viscosity` (Pa s) is
+    that of `NonlocalViscosity`.
     """
 
     mass: float
@@ -92,6 +93,7 @@ class Step(NamedTuple):
     speed: float
     friction_exponent: float = 1.0
     friction_melting: float = inf
+    viscosity: float = 0.0
 
 
 @njit(**INLINE)

@@ -17,6 +17,7 @@ POINT: Final = np.dtype(
             "elastic_temperature",
             "volume", "free_volume", "rise_x", "rise_y",
             "material_x", "material_y", "contact_time",
+            "averaged_strain", "mean_rate",
         )
     ]
 )  # fmt: skip
@@ -25,7 +26,8 @@ deviator of the Cauchy stress that the elastic strain makes at room temperature;
 what the last step added to it and what it was at the last record; damage, temperature, that of the
 moduli in the last step, volume per width and what it would be without stress (at the temperature of
 the last step), rise of the temperature over a cell, position before the cut, time in contact since
-the last exchange of heat; SI units."""
+the last exchange of heat; plastic strain when its rates were last averaged, and the mean rate
+around the point then; SI units."""
 
 Points: TypeAlias = NDArray[np.void]
 

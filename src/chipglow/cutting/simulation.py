@@ -31,6 +31,7 @@ from chipglow.cutting.heat import (
 from chipglow.cutting.heat_loss import HeatLoss, lose_heat
 from chipglow.cutting.library import AISI_1045, CARBIDE
 from chipglow.cutting.material import ROOM_TEMPERATURE, ToolMaterial, WorkpieceMaterial
+from chipglow.cutting.mean_rate import average_rates
 from chipglow.cutting.momentum import (
     BOUNDARY_WORK,
     CONTACT_WORK,
@@ -60,7 +61,7 @@ from chipglow.cutting.watch import Trouble, fastest_point, find_lost, find_off_g
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
 from chipglow.scene.tool_surface import ToolSurface, surface_distance
 
-SOLVER_VERSION: Final = "10"
+SOLVER_VERSION: Final = "11"
 """Changes whenever the same input gives another result."""
 
 _MARGIN: Final = 4
@@ -370,6 +371,7 @@ class _State:
         self.simulation, self.interval = simulation, interval
         heat_mass = float(material.density_at(conditions.initial_temperature)) * spacing**2
         mass = heat_mass * simulation.mass_scaling
+        resists = material.nonlocal_viscosity
         self.step = Step(
             mass=mass,
             heat_mass=heat_mass,
@@ -388,11 +390,12 @@ class _State:
             inflow=-numerics.upstream,
             ceiling=conditions.feed + 2 * cell,
             speed=conditions.speed,
+            viscosity=resists.viscosity if resists is not None else 0.0,
             **_thermal_friction(simulation),
         )
         self.law = material.flow_stress.numbers()
         self.step_points = advance_with(self.law)
-        self.damage = Damage.of(material.damage, cell)
+        self.damage = Damage.of(material.damage, material.failing_layer(cell))
         self.elastic = material.elastic_ratios()
         self.capacity = material.heat_capacity.sampled()
         self.heat_shares = heat_shares(material.taylor_quinney)
@@ -406,6 +409,8 @@ class _State:
         self.velocity[..., VELOCITY_X] = conditions.speed
         self.nodes = np.zeros((*shape, NODE_VALUES))
         self.heat_nodes = np.zeros((*shape, 3))
+        self.rate_nodes = np.zeros((2, *shape))
+        self.rate_spare = np.zeros((2, *shape))
         self.increment = np.zeros(shape)
         self.touched = np.zeros(shape)
         self.entered = np.zeros((*shape, 2))
@@ -533,6 +538,7 @@ class _State:
             if not good:
                 self._stop_at(find_off_grid(self.points[: self.count], self.grid))
             self._conduct()
+            self._average_rates()
         self._stop_at(find_trouble(self.points[: self.count]))
         self.work += sums
         forces = -sums[[FORCE_X, FORCE_Y]] / (self.cycles * self.steps)
@@ -566,6 +572,19 @@ class _State:
         return np.array(
             held_energy(self.points, self.count, self.step, self.elastic, self.grid.cell)
         )
+
+    def _average_rates(self) -> None:
+        resists = self.simulation.workpiece.nonlocal_viscosity
+        if resists is not None:
+            average_rates(
+                self.points,
+                self.count,
+                self.rate_nodes,
+                self.rate_spare,
+                self.grid,
+                self.cycle,
+                resists.length,
+            )
 
     def _conduct(self) -> None:
         conduct(

@@ -26,28 +26,31 @@ _ROW = LANES + 8
 _ITERATIONS = 8
 _SMALL_CHANGE = 0.02
 _SMALL_STRAIN = 0.01
+_MOST_HELP = 0.95
+"""Share of a point's strength that the flow around it takes off at most: it stays a solid."""
 (
     DXX, DYY, DXY, STRAIN, DAMAGE, TEMPERATURE, INCREMENT, VOLUME,
-    CXX, CXY, CYX, CYY, TRIAL, WEAK, BOUND, WORK, SOFT, TENSION, FREE, EXPANSION, FALL,
-) = range(0, 21 * _ROW, _ROW)  # fmt: skip
-BUFFER = 21 * _ROW
+    CXX, CXY, CYX, CYY, TRIAL, WEAK, BOUND, WORK, SOFT, TENSION, FREE, EXPANSION, FALL, MEAN,
+) = range(0, 22 * _ROW, _ROW)  # fmt: skip
+BUFFER = 22 * _ROW
 STRESS = TRIAL
 """Rows of the buffer; in the end the trial stress has become the equivalent stress (Pa). `SOFT` is
 the shear modulus over that at room temperature; the deviator is that at room temperature. `FREE` is
 the volume without stress (m²), `EXPANSION` the elastic energy (J/m) that its change has given,
-`FALL` that which went as the moduli fell with the temperature."""
+`FALL` that which went as the moduli fell with the temperature. `MEAN` is the mean plastic strain
+rate around the point, then the stress (Pa) by which it lowers the flow stress."""
 
 SHEAR, BULK, VOLUME_FREE, VOLUME_RISE = range(4)
 """Columns of `WorkpieceMaterial.elastic_ratios`."""
 
 
 @njit(**FAST)
-def plastic_increments(b, count, shear_modulus, time_step, law, damage):  # type: ignore[no-untyped-def]
+def plastic_increments(b, count, shear_modulus, time_step, viscosity, law, damage):  # type: ignore[no-untyped-def]
     """Plastic strains of a step that take trial stresses back to the flow stress.
 
-    Solves trial − 3GΔ = weakening · σ(strain + Δ, Δ/dt, temperature) for Δ by Newton's method over
-    ln Δ; weakening and temperature are those of the step's beginning. It starts at the last step's
-    Δ or, without one, at the rate-independent Δ.
+    Solves trial − 3GΔ = weakening · σ(strain + Δ, Δ/dt, temperature) + 3η(Δ/dt − mean rate) for Δ
+    by Newton's method over ln Δ; weakening, temperature and mean rate are those of the step's
+    beginning. It starts at the last step's Δ or, without one, at the rate-independent Δ.
     """
     beyond = 0
     for k in range(count):
@@ -55,11 +58,14 @@ def plastic_increments(b, count, shear_modulus, time_step, law, damage):  # type
     for k in range(count):
         strain, trial = b[STRAIN + k], b[TRIAL + k]
         still, slope, _ = stress_and_slopes(strain, SLOWEST_RATE, b[TEMPERATURE + k], law)
-        excess = trial - b[WEAK + k] * still
+        strength = b[WEAK + k] * still
+        b[MEAN + k] = min(3.0 * viscosity * b[MEAN + k], _MOST_HELP * strength)
+        excess = trial - strength + b[MEAN + k]
         beyond += 1 if excess > 0.0 else 0
         # Hardening is infinitely steep at no strain: no slope to rely on.
         firm = max(slope * b[WEAK + k], 0.0) if strain > _SMALL_STRAIN else 0.0
-        bound = excess / (3.0 * shear_modulus * b[SOFT + k] + firm)
+        viscous = 3.0 * viscosity / time_step
+        bound = excess / (3.0 * shear_modulus * b[SOFT + k] + firm + viscous)
         guess = b[INCREMENT + k]
         begin = guess if guess > 2.0 * SLOWEST_RATE * time_step else bound
         b[INCREMENT + k] = max(min(begin, bound), 0.0)
@@ -67,13 +73,13 @@ def plastic_increments(b, count, shear_modulus, time_step, law, damage):  # type
     if beyond == 0:
         return False
     for _ in range(_ITERATIONS):
-        if _improve(b, count, shear_modulus, time_step, law, damage) == 0:
+        if _improve(b, count, shear_modulus, time_step, viscosity, law, damage) == 0:
             break
     return True
 
 
 @njit(**FAST)
-def _improve(b, count, shear_modulus, time_step, law, damage):  # type: ignore[no-untyped-def]
+def _improve(b, count, shear_modulus, time_step, viscosity, law, damage):  # type: ignore[no-untyped-def]
     """One step of Newton over the logarithm of the increment; how many change much."""
     slowest = SLOWEST_RATE * time_step
     per_step = 1.0 / time_step
@@ -86,8 +92,10 @@ def _improve(b, count, shear_modulus, time_step, law, damage):  # type: ignore[n
         flowing, by_strain, by_rate = stress_and_slopes(
             b[STRAIN + k] + tried, tried * per_step, b[TEMPERATURE + k], law
         )
-        excess = b[TRIAL + k] - stiffness * tried - weak * flowing
-        fall = stiffness * tried + weak * (by_strain * tried + by_rate)
+        viscous = 3.0 * viscosity * per_step * tried
+        strength = weak * flowing + viscous - b[MEAN + k]
+        excess = b[TRIAL + k] - stiffness * tried - strength
+        fall = stiffness * tried + weak * (by_strain * tried + by_rate) + viscous
         change = excess / max(fall, 0.5 * stiffness * tried)
         plastic = bound > 0.0
         far += 1 if moving and plastic and abs(change) > _SMALL_CHANGE else 0
@@ -196,7 +204,7 @@ def update_stresses(  # type: ignore[no-untyped-def]
         b[CXX + k], b[CXY + k], b[CYX + k], b[CYY + k] = p.cxx, p.cxy, p.cyx, p.cyy
         b[DXX + k], b[DYY + k], b[DXY + k] = p.dxx, p.dyy, p.dxy
         b[STRAIN + k], b[DAMAGE + k], b[TEMPERATURE + k] = p.strain, p.damage, p.temperature
-        b[INCREMENT + k], b[VOLUME + k] = p.increment, p.volume
+        b[INCREMENT + k], b[VOLUME + k], b[MEAN + k] = p.increment, p.volume, p.mean_rate
         warm = kelvin_index(p.temperature, elastic.shape[0])
         b[SOFT + k], b[TENSION + k] = elastic[warm, SHEAR], elastic[warm, BULK]
         b[FALL + k] = _moduli_loss(p, warm, elastic, step)
@@ -207,7 +215,9 @@ def update_stresses(  # type: ignore[no-untyped-def]
         b[EXPANSION + k], b[FREE + k] = p.free_volume, step.volume * free
         p.free_volume = b[FREE + k]
     _try(b, count, step)
-    plastic = plastic_increments(b, count, step.shear_modulus, step.time_step, law, damage)
+    plastic = plastic_increments(
+        b, count, step.shear_modulus, step.time_step, step.viscosity, law, damage
+    )
     if plastic:
         _return(b, count, step, law, damage)
     for k in range(count):
