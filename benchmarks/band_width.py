@@ -17,10 +17,10 @@ CELLS = (28.0, 20.0, 14.0, 10.0, 7.0)
 SHOWN = {
     "band_width_um": "band",
     "band_error_degC": "error at the band's centre",
-    "band_psf_fraction_percent": "PSF's share",
+    "band_psf_fraction_percent": "PSF's fraction",
     "band_worst_error_degC": "largest beside the band",
     "rake_error_degC": "error at the rake face",
-    "rake_psf_fraction_percent": "PSF's share",
+    "rake_psf_fraction_percent": "PSF's fraction",
 }
 
 

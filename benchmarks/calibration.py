@@ -112,9 +112,9 @@ def main():
             held += error < fit.coverage_factor() * uncertainty
             uncertainties += uncertainty / BAND.slope(BETWEEN)
             said += bool(fit.calibration.warnings)
-        shares = " | ".join(f"{100 * value / repeats:.0f} %" for value in held)
+        fractions = " | ".join(f"{100 * value / repeats:.0f} %" for value in held)
         mean = uncertainties[1] / repeats
-        print(f"| {name} | {shares} | {mean:.2g} | {100 * said / repeats:.0f} % |", flush=True)
+        print(f"| {name} | {fractions} | {mean:.2g} | {100 * said / repeats:.0f} % |", flush=True)
 
 
 if __name__ == "__main__":

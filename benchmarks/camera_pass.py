@@ -80,8 +80,8 @@ def quadrature_radiance():
     def radiance(temperature):
         total = np.zeros(temperature.shape)
         for index, wavelength in enumerate(wavelengths):
-            share = step / 2 if index in (0, 63) else step
-            total += share * spectral_radiance(wavelength, temperature)
+            fraction = step / 2 if index in (0, 63) else step
+            total += fraction * spectral_radiance(wavelength, temperature)
         return total
 
     return radiance

@@ -61,7 +61,7 @@ KINDS = ("measured", "correlation", "computed")
 
 STEP = 10e-6  # of cut between two records of the forces
 STEPS_A_FRAME = 2
-BUILD_UP = 0.4  # share of the cut before the frames
+BUILD_UP = 0.4  # fraction of the cut before the frames
 SAMPLE = 4e-6
 NOT_READ = "†"
 METRICS = (chip_metrics, contact_length, segmentation)

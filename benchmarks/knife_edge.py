@@ -38,7 +38,7 @@ UP_TO_NYQUIST = np.arange(2, 33, 6)
 
 
 def coverage(repeats, name, edge, fwhm, noise, saturation=None, gaussian=False):
-    """Print the share of intervals of the width, and of the MTF, that hold the truth."""
+    """Print the fraction of intervals of the width, and of the MTF, that hold the truth."""
     generator = np.random.default_rng(5)
     within, held, uncertainty = [], [], []
     for seed in range(repeats):

@@ -66,9 +66,9 @@ def known_field(number: int, shape: tuple[int, int] = (ROWS, COLUMNS)) -> np.nda
 
 def drawn(field: np.ndarray, colours: NamedMap) -> np.ndarray:
     """Picture of a field on white, as a plotting program draws it: (y, x, 3), uint8."""
-    share = np.clip((field - COLDEST) / (HOTTEST - COLDEST), 0, 1)
+    fraction = np.clip((field - COLDEST) / (HOTTEST - COLDEST), 0, 1)
     count = colours.bands or 256
-    index = np.minimum(np.nan_to_num(share) * count, count - 1).astype(int)
+    index = np.minimum(np.nan_to_num(fraction) * count, count - 1).astype(int)
     if colours.name == "rainbow":
         hues = np.linspace(2 / 3, 0, count)
         table = hsv_to_rgb(np.stack([hues, np.ones(count), np.ones(count)], axis=1))

@@ -53,7 +53,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a case: temperatures in K, shares of 1; or why it was refused."""
+    """What came of a case: temperatures in K, fractions of 1; or why it was refused."""
 
     stated: float = float("nan")
     rms: float = float("nan")

@@ -119,7 +119,7 @@ def distance(one: Matrix, other: Matrix, pair: Pair) -> float:
 
 
 def overlap(matrix: Matrix, pair: Pair) -> float:
-    """Share of the pixels that lie on the visible picture."""
+    """Fraction of the pixels that lie on the visible picture."""
     rows, columns = np.indices(pair.infrared.shape)[:, ::8, ::8]
     column, row = mapped(matrix, np.stack([columns, rows], axis=-1).reshape(-1, 2)).T
     height, width = pair.visible.shape

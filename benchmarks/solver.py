@@ -108,11 +108,11 @@ class Block:
         shape = (self.grid.columns, self.grid.rows)
         nodes, increment = np.zeros((*shape, 3)), np.zeros(shape)
         diffusivity = conductivity[0] / (self.step.heat_mass / self.step.volume * capacity[0])
-        share = min(diffusivity * duration / steps / self.cell**2, 1.0)
+        fraction = min(diffusivity * duration / steps / self.cell**2, 1.0)
         for _ in range(steps):
             conduct(
                 self.points, self.count, nodes, increment, conductivity, capacity,
-                self.step.heat_mass, self.grid, duration / steps, share,
+                self.step.heat_mass, self.grid, duration / steps, fraction,
             )  # fmt: skip
             return_heat(self.points, self.count, increment, self.grid)
 

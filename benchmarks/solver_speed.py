@@ -38,7 +38,7 @@ PEERS = {"Taichi": ("taichi", "peers.step_taichi"), "Warp": ("warp", "peers.step
 SINGLE_THREADED = {"Warp"}
 COMPARED = ("own_vx", "dxy", "volume", "strain", "damage", "temperature")
 TOLERANCE = 1e-4
-"""Largest root mean square difference from chipglow over the points, as a share of the field's own.
+"""Largest root mean square difference from chipglow over the points, over the field's own.
 Peers share density among the points that are in a cell now, chipglow among those that were in it
 at the last sorting. Here it is the same: points begin a quarter of a cell from its sides and drift
 less. The same arithmetic thus gives the same to rounding (3e-14 when Newton's method goes on to the
@@ -200,7 +200,7 @@ def sort_seconds(start):
 
 
 def differences(ours, theirs):
-    """Root mean square difference over the points, as a share of the field's own."""
+    """Root mean square difference over the points, over the field's own."""
     return {
         name: np.sqrt(np.mean((theirs[name] - ours[name]) ** 2) / np.mean(ours[name] ** 2))
         for name in COMPARED
@@ -225,9 +225,9 @@ def measure(side, threads, names, rounds, bandwidth):
     start = start_of(sheared_block(side))
     points, plastic = start.points.size, np.mean(start.points["increment"] > 0)
     failing = np.mean(start.points["damage"] >= 1)
-    share = sort_seconds(start) / STEPS / points
+    fraction = sort_seconds(start) / STEPS / points
     print(f"\n{points} points, {plastic:.0%} plastic, {failing:.0%} failing; ", end="")
-    print(f"sort {share * 1e9:.1f} ns a point-step")
+    print(f"sort {fraction * 1e9:.1f} ns a point-step")
     workers = [
         Worker(name, start, count)
         for count in threads

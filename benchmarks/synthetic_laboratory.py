@@ -90,19 +90,19 @@ DRIFT = 0.3  # counts from one recording to the next
 REGIONS = """regions:
   body left: {rectangle: [[1, 4], [9, 44]], feature: body}
   body right: {rectangle: [[55, 4], [63, 44]], feature: body}
-  fissure: {rectangle: [[28, 16], [36, 32]]}
+  shear band: {rectangle: [[28, 16], [36, 32]]}
 """
-FISSURE = slice(18, 46)  # columns
+BANDS = slice(18, 46)  # columns
 PLATEAU = 105e-6  # radius in m of the even middle of the hot chip
 FREQUENCY = 12 / 64 / PITCH  # of the MTF in 1/m
 
 QUANTITIES = {
     "blackbody": "K",
     "emissivity of the body": "",
-    "emissivity of the fissure": "",
+    "emissivity of the shear band": "",
     "PSF, full width": "um",
     "MTF at 31 /mm": "",
-    "temperature of the fissure": "K",
+    "temperature of the shear band": "K",
 }
 """What is recovered, and the unit in which it is told."""
 
@@ -142,13 +142,13 @@ def gaussian_optics(fwhm: float) -> Optics:
     )
 
 
-def tailed_optics(core: float, share: float, length: float) -> Optics:
+def tailed_optics(core: float, fraction: float, length: float) -> Optics:
     """A Gaussian with a tail exp(-r/L)/(2 pi L^2), whose line spread is a Bessel function."""
     sigma = core / FWHM_PER_SIGMA
 
     def density(r: Any) -> Any:
         gauss = np.exp(-(r**2) / (2 * sigma**2)) / (2 * pi * sigma**2)
-        return (1 - share) * gauss + share * np.exp(-r / length) / (2 * pi * length**2)
+        return (1 - fraction) * gauss + fraction * np.exp(-r / length) / (2 * pi * length**2)
 
     x = np.concatenate([np.linspace(0, 2, 2001), np.linspace(2, 60, 4000)[1:]])
     line = np.where(x == 0, 1.0, x * k1(np.where(x == 0, 1.0, x))) / pi
@@ -156,11 +156,11 @@ def tailed_optics(core: float, share: float, length: float) -> Optics:
 
     def edge(u: NDArray[np.float64]) -> NDArray[np.float64]:
         tail = 0.5 + np.sign(u) * half(np.minimum(np.abs(u), 60 * length))
-        return np.asarray((1 - share) * ndtr(u / sigma) + share * tail)
+        return np.asarray((1 - fraction) * ndtr(u / sigma) + fraction * tail)
 
     def transfer(f: float) -> float:
         tail = (1 + (2 * pi * length * f) ** 2) ** -1.5
-        return float((1 - share) * np.exp(-2 * (pi * sigma * f) ** 2) + share * tail)
+        return float((1 - fraction) * np.exp(-2 * (pi * sigma * f) ** 2) + fraction * tail)
 
     spacing, reach = 1e-6, 8 * length
     line_of = spacing * np.arange(-round(reach / spacing), round(reach / spacing) + 1)
@@ -205,8 +205,8 @@ def hidden_optics(generator: np.random.Generator) -> Optics:
         return gaussian_optics(generator.uniform(7e-6, 14e-6))
     if kind == "tail":
         core = generator.uniform(7e-6, 11e-6)
-        share, ratio = generator.uniform(0.1, 0.25), generator.uniform(1.8, 3.0)
-        return tailed_optics(core, share, ratio * core)
+        fraction, ratio = generator.uniform(0.1, 0.25), generator.uniform(1.8, 3.0)
+        return tailed_optics(core, fraction, ratio * core)
     return mirror_optics(generator.uniform(0.2, 0.32), generator.uniform(0.2, 0.45))
 
 
@@ -241,12 +241,12 @@ class Laboratory:
         tilts = generator.uniform(2.0, 9.0, 2) * generator.choice([-1, 1], 2)
         self.normals = tilts + [0.0, 90.0] + 180.0 * generator.integers(0, 2, 2)
 
-    def _surface(self, body: float, fissure: float) -> NDArray[np.float64]:
+    def _surface(self, body: float, shear_band: float) -> NDArray[np.float64]:
         """Emissivity of every sample, which varies from place to place."""
         shape = tuple(SAMPLES * count for count in SHAPE)
         texture = gaussian_filter(self._generator.standard_normal(shape), 4.0, mode="reflect")
         emissivity = np.full(shape, body)
-        emissivity[:, SAMPLES * FISSURE.start : SAMPLES * FISSURE.stop] = fissure
+        emissivity[:, SAMPLES * BANDS.start : SAMPLES * BANDS.stop] = shear_band
         return np.asarray(emissivity + 0.015 * texture / texture.std())
 
     def reference(self) -> dict[str, float]:
@@ -257,10 +257,10 @@ class Laboratory:
         return {
             "blackbody": self.unknown,
             "emissivity of the body": float(body.mean()),
-            "emissivity of the fissure": float(pixels[16:32, 28:36].mean()),
+            "emissivity of the shear band": float(pixels[16:32, 28:36].mean()),
             "PSF, full width": self.optics.fwhm,
             "MTF at 31 /mm": self._transfer(),
-            "temperature of the fissure": self.hot,
+            "temperature of the shear band": self.hot,
         }
 
     def _transfer(self) -> float:
@@ -340,11 +340,11 @@ class Laboratory:
         y = (PITCH * ((rows - 1) / 2 - np.arange(rows))[:, None] + inside).ravel()
         angle = radians(normal)
         distance = x * cos(angle) + y[:, None] * sin(angle) - self._generator.uniform(-6e-6, 6e-6)
-        shares = self.optics.edge(distance).reshape(rows, 6, columns, 6)
-        share = np.einsum("iajb,a,b->ij", shares, weight / 2, weight / 2)
+        fractions = self.optics.edge(distance).reshape(rows, 6, columns, 6)
+        fraction = np.einsum("iajb,a,b->ij", fractions, weight / 2, weight / 2)
         blade, plate = self._generator.uniform(230.0, 280.0), self._generator.uniform(520.0, 600.0)
         dark, bright = BAND.radiance(np.array([blade, plate]) + CELSIUS)
-        return np.asarray(dark + (bright - dark) * share)
+        return np.asarray(dark + (bright - dark) * fraction)
 
 
 def _even(kelvins: float) -> NDArray[np.float64]:
@@ -408,20 +408,20 @@ class Evaluation:
         regions = load_regions(self.folder / "regions.yaml")
         found = {area.name: area for area in areas(regions, heated[0].raster)}
         emissivity = determine_emissivity(heated, heating)
-        body, fissure = emissivity.of(found["body"]), emissivity.of(found["fissure"])
-        hot = true_temperature(chip, found["fissure"], fissure, calibration=calibration)
+        body, shear_band = emissivity.of(found["body"]), emissivity.of(found["shear band"])
+        hot = true_temperature(chip, found["shear band"], shear_band, calibration=calibration)
         unknown = true_temperature(
             self.images("unknown-*.hcc"),
-            found["fissure"],
+            found["shear band"],
             KnownEmissivity(1.0),
             ReflectedTemperature(293.0, ROOM),
         )
         return {
             "blackbody": Found.of(unknown.estimate),
             "emissivity of the body": Found.of(body.estimate),
-            "emissivity of the fissure": Found.of(fissure.estimate),
+            "emissivity of the shear band": Found.of(shear_band.estimate),
             **self._spread(),
-            "temperature of the fissure": Found.of(hot.estimate),
+            "temperature of the shear band": Found.of(hot.estimate),
         }
 
     def _spread(self) -> dict[str, Found]:

@@ -53,11 +53,11 @@ def kolsky_bar(folder: Path) -> None:
     """
     time = np.arange(0.0, 40e-6, 1e-6)
     y = 1e-6 * np.arange(-150.0, 150.0, 2.0)
-    share = time / time[-1]
-    width = (200.0 - 170.0 * share) * 1e-6
-    rise = 60.0 + 500.0 * share**3
+    fraction = time / time[-1]
+    width = (200.0 - 170.0 * fraction) * 1e-6
+    rise = 60.0 + 500.0 * fraction**3
     across = np.exp(-4 * np.log(2) * (y / width[:, None]) ** 2)
-    temperature = AMBIENT + 60.0 * share[:, None] + (rise[:, None] - 60.0) * across
+    temperature = AMBIENT + 60.0 * fraction[:, None] + (rise[:, None] - 60.0) * across
     field = np.repeat(temperature[:, :, None], 100, axis=2).astype(np.float32)
     np.savez_compressed(folder / "bar.npz", temperature=field)
 
@@ -89,11 +89,11 @@ def _disc_picture(number: int) -> NDArray[np.uint8]:
     spots = np.maximum(np.cos(3 * (angle - 0.15 * number)), 0.0) ** 4
     ring = np.exp(-(((radius - 110.0) / 22.0) ** 2))
     celsius = 120.0 + ring * (180.0 + 260.0 * spots)
-    share = (celsius - DISC[0]) / (DISC[1] - DISC[0])
+    fraction = (celsius - DISC[0]) / (DISC[1] - DISC[0])
     jet = matplotlib.colormaps["jet"]
     picture = np.full((320, 400, 3), 255, np.uint8)
     disc = (radius > 70) & (radius < 150)
-    picture[disc] = jet(share, bytes=True)[disc][:, :3]
+    picture[disc] = jet(fraction, bytes=True)[disc][:, :3]
     legend = jet(np.linspace(1, 0, 240), bytes=True)[:, None, :3]
     picture[39:281, 349:371] = 0
     picture[40:280, 350:370] = legend

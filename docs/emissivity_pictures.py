@@ -22,13 +22,13 @@ HERE = Path(__file__).parent
 BAND = Band(3.8e-6, 5.1e-6)
 RASTER = Raster(left=0.0, top=0.0, spacing=2e-6, rows=240, columns=390)
 PITCH, LABORATORY = 6e-6, 293.0
-FISSURES, LEAN = (232e-6, 502e-6), 8 / 60
+BANDS, LEAN = (232e-6, 502e-6), 8 / 60
 FRAMES, NOISE, DRIFT = 10, 3.0, 1.0
 REGIONS = (
     Region("body left", Polygon(((6, 12), (26, 12), (34, 72), (14, 72))), "chip body"),
     Region("body right", Polygon(((50, 12), (72, 12), (80, 72), (58, 72))), "chip body"),
-    Region("fissure 1", Polygon(((38, 12), (42, 12), (50, 72), (46, 72))), "fissure"),
-    Region("fissure 2", Polygon(((83, 12), (87, 12), (95, 72), (91, 72))), "fissure"),
+    Region("shear band 1", Polygon(((38, 12), (42, 12), (50, 72), (46, 72))), "shear band"),
+    Region("shear band 2", Polygon(((83, 12), (87, 12), (95, 72), (91, 72))), "shear band"),
 )
 
 
@@ -44,25 +44,25 @@ def main() -> None:
 
 
 def chip_emissivity() -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Emissivity of chip 1 of the paper's Table 1 with leaning fissures, and where nothing is."""
+    """Emissivity of chip 1 of Table 1 with leaning shear bands, and where nothing is."""
     x, y = np.meshgrid(RASTER.x, -RASTER.y)
     body = Texture.random(
-        Emissivity(0.42, 0.07), 20e-6, np.random.default_rng(1), restore_deviation=True
+        Emissivity(0.42, 0.07), 20e-6, np.random.default_rng(1), restore_standard_deviation=True
     )
     band = Texture.random(
-        Emissivity(0.53, 0.05), 20e-6, np.random.default_rng(2), restore_deviation=True
+        Emissivity(0.53, 0.05), 20e-6, np.random.default_rng(2), restore_standard_deviation=True
     )
     leaning = x - LEAN * y
-    values = np.where(in_fissure(48e-6), band.at(x, y), body.at(x, y))
-    teeth = 40e-6 * np.abs(np.cos(np.pi * (leaning - FISSURES[0]) / (FISSURES[1] - FISSURES[0])))
+    values = np.where(in_shear_band(48e-6), band.at(x, y), body.at(x, y))
+    teeth = 40e-6 * np.abs(np.cos(np.pi * (leaning - BANDS[0]) / (BANDS[1] - BANDS[0])))
     return values.astype(np.float64), y < 20e-6 + teeth
 
 
-def in_fissure(width: float) -> NDArray[np.bool_]:
-    """Which samples are in one of the leaning fissures."""
+def in_shear_band(width: float) -> NDArray[np.bool_]:
+    """Which samples are in one of the leaning shear bands."""
     x, y = np.meshgrid(RASTER.x, -RASTER.y)
     leaning = x - LEAN * y
-    return np.any([np.abs(leaning - middle) < width / 2 for middle in FISSURES], axis=0)
+    return np.any([np.abs(leaning - middle) < width / 2 for middle in BANDS], axis=0)
 
 
 def heated(
@@ -100,7 +100,7 @@ def table(found: EmissivityMap, chip: NDArray[np.float64]) -> None:
         parts = row.estimate.budget().standard_uncertainty.to_series()
         budget = ", ".join(f"{cause} {part:.2g}" for cause, part in parts.items())
         print(
-            f"{row.name}: n {row.pixels}, mean {row.mean:.4f}, sd {row.deviation:.4f}, "
+            f"{row.name}: n {row.pixels}, mean {row.mean:.4f}, sd {row.standard_deviation:.4f}, "
             f"u {row.estimate.standard_uncertainty:.2g}, "
             f"U {row.estimate.expanded_uncertainty():.2g}; {budget}"
         )
@@ -138,26 +138,26 @@ def over_temperature(chip: NDArray[np.float64], background: NDArray[np.bool_]) -
 
 
 def widths() -> None:
-    """Print what the blur of the optics makes of fissures of several widths."""
+    """Print what the blur of the optics makes of shear bands of several widths."""
     heating = Heating(391.0 + 273.15)
     background = chip_emissivity()[1]
     for width in (12e-6, 24e-6, 36e-6, 48e-6, 72e-6, 96e-6):
-        flat = np.where(in_fissure(width), 0.53, 0.42)
+        flat = np.where(in_shear_band(width), 0.53, 0.42)
         found = determine_emissivity([heated(flat, background, heating.reference)], heating)
         means = [
-            found.of(areas((fissure(width / 2 - inset),), found.raster)[0]).mean
+            found.of(areas((shear_band(width / 2 - inset),), found.raster)[0]).mean
             for inset in (0.0, PITCH, 2 * PITCH)
             if width / 2 - inset > 5e-6
         ]
         print(f"{width * 1e6:.0f} um:", ", ".join(f"{mean:.3f}" for mean in means))
 
 
-def fissure(half_width: float) -> Region:
-    """Region of the first fissure, so far to either side of its middle."""
+def shear_band(half_width: float) -> Region:
+    """Region of the first shear band, so far to either side of its middle."""
     places = [(side * half_width, -height) for side, height in ((-1, 72e-6), (1, 72e-6))]
     places += [(side * half_width, -height) for side, height in ((1, 432e-6), (-1, 432e-6))]
-    corners = tuple((FISSURES[0] + x - LEAN * y, y) for x, y in places)
-    return Region("fissure", Polygon(corners), unit="m")
+    corners = tuple((BANDS[0] + x - LEAN * y, y) for x, y in places)
+    return Region("shear band", Polygon(corners), unit="m")
 
 
 if __name__ == "__main__":

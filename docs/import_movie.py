@@ -17,7 +17,7 @@ FOLDER = Path(__file__).parent
 MOVIE = FOLDER / "hot-spot.avi"
 COLDEST, HOTTEST = 293.15, 1400.15
 
-# A hot spot and a band that move to the right, as a share of the scale; X, Y: pixel, N: picture.
+# A hot spot and a band that move to the right, as a fraction of the scale; X, Y: pixel, N: picture.
 FIELD = (
     "0.06+0.15*X/250+0.5*exp(-pow((X-120-2*N)/40,2)-pow((Y-120)/35,2))"
     "+0.25*exp(-pow((Y-200+0.6*(X-2*N))/10,2))"
@@ -29,9 +29,9 @@ BLACK = "between(X,271,288)*between(Y,19,220)+between(X,289,292)*eq(mod(Y-20,40)
 MESH = "eq(mod(X,16),0)+eq(mod(Y,16),0)"
 
 
-def jet(share: str, middle: int) -> str:
+def jet(fraction: str, middle: int) -> str:
     """One of red, green and blue of the jet map, as an expression of FFmpeg."""
-    return f"255*clip(1.5-abs(4*({share})-{middle}),0,1)"
+    return f"255*clip(1.5-abs(4*({fraction})-{middle}),0,1)"
 
 
 def draw() -> None:
@@ -73,12 +73,12 @@ def source() -> MovieSource:
 def truth(number: int) -> np.ndarray:
     """Temperature that FFmpeg drew in K; NaN where it drew none."""
     y, x = np.mgrid[:240, :250].astype(float)
-    share = 0.06 + 0.15 * x / 250
-    share += 0.5 * np.exp(-(((x - 120 - 2 * number) / 40) ** 2) - ((y - 120) / 35) ** 2)
-    share += 0.25 * np.exp(-(((y - 200 + 0.6 * (x - 2 * number)) / 10) ** 2))
+    fraction = 0.06 + 0.15 * x / 250
+    fraction += 0.5 * np.exp(-(((x - 120 - 2 * number) / 40) ** 2) - ((y - 120) / 35) ** 2)
+    fraction += 0.25 * np.exp(-(((y - 200 + 0.6 * (x - 2 * number)) / 10) ** 2))
     void = y < 40 + 9 * np.sin((x - 2 * number) / 16)
     tool = (y > 150) & (x > 185 + 0.12 * (y - 150))
-    return np.where(void | tool, np.nan, COLDEST + (HOTTEST - COLDEST) * share)
+    return np.where(void | tool, np.nan, COLDEST + (HOTTEST - COLDEST) * fraction)
 
 
 def main() -> None:

@@ -53,12 +53,12 @@ def aperture(diameter: float, psf: PointSpreadFunction) -> NDArray[np.float64]:
     return seen(inside, psf)
 
 
-def measured(share: NDArray[np.float64], cold: float, hot: float, seed: int) -> Measurement:
-    """A frame between two temperatures in K, with noise of a share of the step."""
+def measured(fraction: NDArray[np.float64], cold: float, hot: float, seed: int) -> Measurement:
+    """A frame between two temperatures in K, with noise of a fraction of the step."""
     low, high = BAND.radiance(np.array([cold, hot]))
-    noise = np.random.default_rng(seed).normal(0.0, NOISE, share.shape)
-    raster = Raster(0.0, 0.0, PITCH, *share.shape)
-    frame = (low + (high - low) * (share + noise))[None]
+    noise = np.random.default_rng(seed).normal(0.0, NOISE, fraction.shape)
+    raster = Raster(0.0, 0.0, PITCH, *fraction.shape)
+    frame = (low + (high - low) * (fraction + noise))[None]
     return Measurement.from_radiance(frame, BAND, np.zeros(1), raster)
 
 

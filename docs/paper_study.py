@@ -33,14 +33,14 @@ def _errors(summary: dict[str, dict[str, dict[str, float]]]) -> str:
     lines = ["| error | paper / °C | here / °C | range / °C | PSF, paper / % | PSF, here / % |"]
     lines.append("|---|---|---|---|---|---|")
     for key, name in NAMES.items():
-        share = key.replace("_error_degC", "_psf_fraction_percent")
-        error, portion = summary["draws"][key], summary["draws"][share]
+        fraction = key.replace("_error_degC", "_psf_fraction_percent")
+        error, portion = summary["draws"][key], summary["draws"][fraction]
         texts = (
             name,
             _paper(summary, key),
             _spread(error),
             f"{_number(error['lowest'])} to {_number(error['highest'])}",
-            _paper(summary, share),
+            _paper(summary, fraction),
             _spread(portion),
         )
         lines.append("| " + " | ".join(texts) + " |")

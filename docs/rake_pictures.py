@@ -26,7 +26,7 @@ def main() -> None:
         measurement = camera.measure(scene, surface, scene.times[0] + INSTANTS)
         say_found(name, measurement)
     grid = rake_grid(measurement, measurement.tool)
-    print(np.round(grid.frame_mean[0] - 273.15, 1), np.round(grid.frame_deviation[0], 1))
+    print(np.round(grid.frame_mean[0] - 273.15, 1), np.round(grid.frame_standard_deviation[0], 1))
     figure = draw_rake_grid(measurement, grid)
     figure.savefig(HERE / "rake-face.png", dpi=150)
 

@@ -62,7 +62,7 @@ def main() -> None:
 
 
 def draw(rows: list[Any]) -> Figure:
-    """Errors of all repeats as shares of their own intervals."""
+    """Errors of all repeats as fractions of their own intervals."""
     kinds = np.array([Laboratory(seed).optics.kind for seed in range(REPEATS)])
     with style():
         figure = new_figure(3.4)
@@ -73,9 +73,9 @@ def draw(rows: list[Any]) -> Figure:
             place = line + np.linspace(-0.32, 0.32, REPEATS)
             for kind, colour in (("gaussian", BLUE), ("tail", GREEN), ("mirror", VERMILLION)):
                 mine = kinds == kind
-                share = (value - reference) / expanded
+                fraction = (value - reference) / expanded
                 axes.plot(
-                    share[mine], place[mine], "o", color=colour, markersize=2.6,
+                    fraction[mine], place[mine], "o", color=colour, markersize=2.6,
                     label=f"{kind}: {mine.sum()}" if line == 0 else "",
                 )  # fmt: skip
         axes.set_yticks(range(len(QUANTITIES)), list(QUANTITIES))

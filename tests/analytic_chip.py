@@ -66,7 +66,7 @@ class AnalyticChip:
         return (self.feed - float(self.edge[1])) / sin(self.angle(time))
 
     def growth(self, time: float) -> float:
-        """Share of the band's full strength: 1 when fully grown."""
+        """Fraction of the band's full strength: 1 when fully grown."""
         return float(np.exp(-(((time - self.grown_at) / 18e-6) ** 2)))
 
     def scene(self) -> Scene:

@@ -13,15 +13,15 @@ REGIONS = """
 regions:
   body left: {rectangle: [[0, 0], [16, 30]], feature: chip body}
   body right: {rectangle: [[24, 0], [40, 30]], feature: chip body}
-  fissure: {polygon: [[17, 0], [23, 0], [23, 30], [17, 30]]}
+  shear band: {polygon: [[17, 0], [23, 0], [23, 30], [17, 30]]}
 """
 
 
-def table_1(body=(0.42, 0.07), fissure=(0.53, 0.05), seed=1, raster=RASTER):
-    """Emissivity of a chip whose columns 17 to 22 are a fissure."""
+def table_1(body=(0.42, 0.07), band=(0.53, 0.05), seed=1, raster=RASTER):
+    """Emissivity of a chip whose columns 17 to 22 are a shear band."""
     generator = np.random.default_rng(seed)
     values = generator.normal(*body, raster.shape)
-    values[:, 17:23] = generator.normal(*fissure, (raster.rows, 6))
+    values[:, 17:23] = generator.normal(*band, (raster.rows, 6))
     return values
 
 

@@ -79,8 +79,8 @@ class SerratedChip:
         length = self.chip_speed * self.period
         travel = length / (2 * np.pi) * (turn + self.unsteadiness * np.sin(turn))
         phase = (along - travel) / length % 1.0
-        share = np.where(phase < self.rise, phase / self.rise, (1 - phase) / (1 - self.rise))
-        back = self.valley + (self.peak - self.valley) * share
+        fraction = np.where(phase < self.rise, phase / self.rise, (1 - phase) / (1 - self.rise))
+        back = self.valley + (self.peak - self.valley) * fraction
         free = along > self.contact
         gap = np.where(free, 8e-6 + tan(self.lift) * (along - self.contact), 0.0)
         back = back + np.where(free, gap - 8e-6, 0.0)

@@ -28,7 +28,7 @@ def gaussian_edge(fwhm):
     return lambda u: ndtr(u * FWHM_PER_SIGMA / fwhm)
 
 
-def tailed_edge(fwhm, share, length):
+def tailed_edge(fwhm, fraction, length):
     """Of a Gaussian with a tail exp(−r/L)/(2πL²), whose line-spread function is a Bessel's K1."""
     x = np.concatenate([np.linspace(0, 2, 2001), np.linspace(2, 60, 4000)[1:]])
     line = np.where(x == 0, 1.0, x * k1(np.where(x == 0, 1.0, x))) / pi
@@ -36,7 +36,7 @@ def tailed_edge(fwhm, share, length):
 
     def edge(u):
         tail = 0.5 + np.sign(u) * half(np.minimum(np.abs(u), 60 * length))
-        return (1 - share) * ndtr(u * FWHM_PER_SIGMA / fwhm) + share * tail
+        return (1 - fraction) * ndtr(u * FWHM_PER_SIGMA / fwhm) + fraction * tail
 
     return edge
 
@@ -76,8 +76,8 @@ def disc_edge(radius):
 
 def ring_edge(inner, outer):
     """Of an even ring, as a mirror objective out of focus makes it."""
-    large, small, share = disc_edge(outer), disc_edge(inner), (inner / outer) ** 2
-    return lambda u: (large(u) - share * small(u)) / (1 - share)
+    large, small, fraction = disc_edge(outer), disc_edge(inner), (inner / outer) ** 2
+    return lambda u: (large(u) - fraction * small(u)) / (1 - fraction)
 
 
 def moffat_edge(fwhm, exponent):
@@ -105,8 +105,8 @@ def edge_radiance(edge, normal, side=40, position=1e-6, background=2.0, step=5.0
     y = (PITCH * ((rows - 1) / 2 - np.arange(rows))[:, None] + inside).ravel()
     angle = radians(normal)
     value = edge(x * cos(angle) + y[:, None] * sin(angle) - position)
-    shares = value.reshape(rows, 6, columns, 6)
-    return background + step * np.einsum("iajb,a,b->ij", shares, weight / 2, weight / 2)
+    fractions = value.reshape(rows, 6, columns, 6)
+    return background + step * np.einsum("iajb,a,b->ij", fractions, weight / 2, weight / 2)
 
 
 def image_of(radiance, noise=0.0, seed=0, saturation=None, name="edge", wavelength=WAVELENGTH):
@@ -135,7 +135,7 @@ def measurement_of(radiance, flags=None):
     return Measurement.from_radiance(radiance[None], BAND, np.zeros(1), raster, flags=flags)
 
 
-def gaussian_aperture(fwhm, diameter, share=0.0, length=1.0, side=61, noise=0.0, seed=0):
+def gaussian_aperture(fwhm, diameter, fraction=0.0, length=1.0, side=61, noise=0.0, seed=0):
     """Image of a disc before a source of 5 over a background of 1 W/(m² sr), without footprint.
 
     The signal in the middle is that of the closed form of the encircled light; elsewhere a disc
@@ -146,7 +146,7 @@ def gaussian_aperture(fwhm, diameter, share=0.0, length=1.0, side=61, noise=0.0,
     tail = 1 - (1 + radius / length) * np.exp(-radius / length)
     x = PITCH * (np.arange(side) - side // 2)
     inside = np.hypot(x, x[:, None]) < radius
-    middle = (1 - share) * gauss + share * tail
+    middle = (1 - fraction) * gauss + fraction * tail
     image = 1.0 + 5.0 * np.where(inside, middle, 0.0)
     image += np.random.default_rng(seed).normal(0.0, 1.0, image.shape) * noise
     return ApertureImage(diameter, image, x, x[::-1], f"{diameter * 1e6:.0f} um")

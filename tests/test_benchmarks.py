@@ -56,7 +56,7 @@ PROGRAMS = {
     "solver_speed.py": ("--rounds 1 --sides 40 --threads 1", {"chipglow ": 6}),
     "synthetic_laboratory.py": (
         "--repeats 1",
-        {"blackbody": 4, "emissivity of the fissure": 4, "PSF, full width": 4, "MTF": 5},
+        {"blackbody": 4, "emissivity of the shear band": 4, "PSF, full width": 4, "MTF": 5},
     ),
     "titanium.py": (
         f"--cell {COARSEST} 88.9-0.1",

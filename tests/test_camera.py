@@ -325,9 +325,9 @@ def test_motion_blur_of_a_moving_step_is_a_ramp():
     camera = Camera(pitch=SPACING, psf=None, integration_time=frames * STEP)
     measured = camera.measure(make_scene(temperature), BLACK, 0.0).radiance[0, 0]
     hot, cold = camera.band.radiance(1200.0), camera.band.radiance(700.0)
-    share = np.clip((18 + speed * frames - speed - column) / (speed * frames), 0, 1)
-    share = np.ceil(share * frames - 1e-9) / frames
-    np.testing.assert_allclose(measured, cold + share * (hot - cold), rtol=1e-6)
+    fraction = np.clip((18 + speed * frames - speed - column) / (speed * frames), 0, 1)
+    fraction = np.ceil(fraction * frames - 1e-9) / frames
+    np.testing.assert_allclose(measured, cold + fraction * (hot - cold), rtol=1e-6)
 
 
 def edge_response(order, fwhm, pitch, spacing=0.5e-6, columns=480):
@@ -407,11 +407,11 @@ def test_it_is_said_where_the_border_of_the_scene_matters(order):
     found = re.search(
         r"The border of the scene: .* ([\d.]+) % .*up to ([\d.]+) µm .* 1 K, by ([\d.]+) K", said
     )
-    share, reach, most = (float(number) for number in found.groups())
+    fraction, reach, most = (float(number) for number in found.groups())
     # Two pixels of 6 um and a part of a third are within the Gaussian's 12 um of it.
     columns = np.flatnonzero((np.abs(wrong) > 1.0).any(axis=0)).max() + 1
     assert reach == pytest.approx(6 * columns - 3, abs=6)
-    assert share == pytest.approx(100 * columns / wrong.shape[1], rel=0.7)
+    assert fraction == pytest.approx(100 * columns / wrong.shape[1], rel=0.7)
     assert 0.3 * wrong.max() < most < 3 * wrong.max()
 
 

@@ -20,7 +20,7 @@ from chipglow.io import sandbox
 from chipglow.io.cameras import camera_formats, read_recording, recordings, write_hcc
 from chipglow.io.cameras.cine import _CURVE
 from chipglow.io.cameras.formats import find_format, read_here
-from chipglow.io.cameras.stacks import Told
+from chipglow.io.cameras.stacks import Stated
 from chipglow.io.sources import SourceError
 from chipglow.radiometry import ObjectParameters
 
@@ -98,7 +98,7 @@ def test_big_endian_counts_and_zeros_between_frames(tmp_path):
 def test_png_is_read_whatever_the_order_of_its_bytes(tmp_path, swapped):
     content = files.flir_jpeg(PICTURES[0], pack=partial(files.png, swapped=swapped))
     path = make(tmp_path, "a.jpg", content)
-    recording = read_here(path, "flir", None, Told())
+    recording = read_here(path, "flir", None, Stated())
     assert np.array_equal(recording.signal, PICTURES[:1])
 
 
@@ -388,7 +388,7 @@ STACKS = [stack_npy, stack_npz, stack_tiff, stack_tiffs, stack_mat, stack_hdf5, 
 @pytest.mark.parametrize("write", [*STACKS, stack_zarr])
 def test_arrays(tmp_path, write, frames):
     path, told = write(tmp_path)
-    told = Told(quantity="counts", interval=1e-3, **told)
+    told = Stated(quantity="counts", interval=1e-3, **told)
     recording = read_here(path, find_format(path), frames, told)
     chosen = frames or slice(None)
     assert np.array_equal(recording.signal, PICTURES[chosen])
@@ -398,7 +398,7 @@ def test_arrays(tmp_path, write, frames):
 def test_tables_of_temperature_in_degrees_celsius(tmp_path):
     for number in range(3):
         np.savetxt(tmp_path / f"T_{number}.csv", PICTURES[number] / 40, fmt="%.3f", delimiter=";")
-    told = Told(unit="degC", interval=0.1)
+    told = Stated(unit="degC", interval=0.1)
     recording = read_here(tmp_path / "T_*.csv", "csv", None, told)
     assert recording.quantity == "temperature"
     # Three digits in the file, and 32 bits of a value near 600.
@@ -410,7 +410,7 @@ def test_lines_of_text_before_an_exported_table_are_left_out(tmp_path, mark, dec
     rows = [mark.join(f"{v:.2f}".replace(".", decimal) for v in row) for row in PICTURES[0] / 40]
     text = f"File:{mark}IR_0001.jpg\n\nEmissivity:{mark}0{decimal}95\n" + "\n".join(rows)
     path = make(tmp_path, "a.csv", text.encode())
-    recording = read_here(path, "csv", None, Told(unit="K"))
+    recording = read_here(path, "csv", None, Stated(unit="K"))
     assert np.abs(recording.signal[0] - PICTURES[0] / 40).max() < 0.006
     assert recording.notes[-1] == "Left out: 3 lines of text before the numbers."
 
@@ -424,7 +424,7 @@ def test_a_file_that_says_units_times_and_packing_needs_no_more(tmp_path):
     scale = {"scale_factor": 0.01, "add_offset": 100.0}
     packing = {"T": {"dtype": "i2", "_FillValue": -32768, **scale}}
     data.to_netcdf(tmp_path / "a.nc", engine="h5netcdf", encoding=packing)
-    recording = read_here(tmp_path / "a.nc", "netcdf", slice(1, None), Told())
+    recording = read_here(tmp_path / "a.nc", "netcdf", slice(1, None), Stated())
     assert recording.quantity == "temperature"
     assert np.abs(recording.signal - temperature[1:] - 273.15).max() < 0.006
     assert recording.times == pytest.approx(np.arange(1, 5) * 0.25e-3)
@@ -498,7 +498,7 @@ def test_of_a_file_cut_anywhere_the_whole_frames_are_read_or_it_is_one_error(tmp
     for length in np.linspace(1, len(content) - 1, 60).astype(int):
         path = make(tmp_path, "a.bin", content[:length])
         try:
-            recording = read_here(path, kind, None, Told())
+            recording = read_here(path, kind, None, Stated())
         except SourceError as error:
             assert "a.bin" in str(error)
             assert "\n" not in str(error)
@@ -528,7 +528,7 @@ def test_any_change_of_a_file_is_one_error_or_a_recording(tmp_path, kind):
             changed[place] = random.choice([0, 1, 127, 128, 255, random.integers(256)])
         path = make(tmp_path, "a.bin", bytes(changed))
         try:
-            recording = read_here(path, kind, None, Told())
+            recording = read_here(path, kind, None, Stated())
         except SourceError as error:
             refused += 1
             assert "\n" not in str(error)
@@ -544,7 +544,7 @@ def test_any_change_of_a_file_is_one_error_or_a_recording(tmp_path, kind):
 def test_a_file_of_another_kind_is_one_error(tmp_path, name, content):
     path = make(tmp_path, name, content)
     with pytest.raises(SourceError, match=name.replace(".", "[.]")):
-        read_here(path, find_format(path), None, Told("counts", interval=1.0))
+        read_here(path, find_format(path), None, Stated("counts", interval=1.0))
 
 
 def test_absurd_dimensions_are_refused_before_memory_is_taken(tmp_path):
@@ -552,7 +552,7 @@ def test_absurd_dimensions_are_refused_before_memory_is_taken(tmp_path):
     one = bytearray(files.fff(wide, pack=partial(files.png, swapped=False)))
     struct.pack_into("<HH", one, 128 + 2, 60_000, 60_000)
     with pytest.raises(SourceError, match="60000 columns and 60000 rows"):
-        read_here(make(tmp_path, "a.fff", bytes(one)), "flir", None, Told())
+        read_here(make(tmp_path, "a.fff", bytes(one)), "flir", None, Stated())
     cine = bytearray(files.cine(PICTURES))
     struct.pack_into("<ii", cine, 48, 65_000, -65_000)
     with pytest.raises(SourceError, match="expected 8450000000"):

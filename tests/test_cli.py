@@ -297,10 +297,10 @@ def test_run_looks_at_an_imported_scene_in_the_place_of_the_cut(folder, runs, ch
     result = chipglow("run", "study.yaml", "--out", "results")
     assert result.exit_code == 0, result.output
     assert runs == []
-    assert "Assumed: The scene does not tell its tool" in result.stderr
+    assert "Assumed: The scene has no tool" in result.stderr
     assert "Assumed: The scene does not say where each point was" in result.stderr
     report = (folder / "results" / "report.html").read_text()
-    assert "The scene does not tell its tool" in report
+    assert "The scene has no tool" in report
     assert str(folder / "scene.nc") in report
     foreign = loads((folder / "results" / "summary.json").read_text())["results"]
 
@@ -337,9 +337,9 @@ def test_measure_writes_frames_at_the_camera_rate(folder, scene):
 
 def test_measure_lays_a_measured_emissivity_map_on_the_scene(folder, scene, chip_scene):
     band, raster = Band(3.8e-6, 5.1e-6), Raster(RASTER.left, RASTER.top, 6e-6, 56, 70)
-    share = np.where(raster.x < -100e-6, 0.3, 0.8) * np.ones((56, 1))
+    fraction = np.where(raster.x < -100e-6, 0.3, 0.8) * np.ones((56, 1))
     image = Measurement.from_radiance(
-        (share * band.radiance(800.0))[None], band, np.zeros(1), raster
+        (fraction * band.radiance(800.0))[None], band, np.zeros(1), raster
     )
     found = determine_emissivity([image], Heating(800.0, reflected=200.0))
     everywhere = Area("all", "chip", np.ones(raster.shape, bool), whole=True)

@@ -78,7 +78,7 @@ def test_e_n_holds_as_often_as_it_says():
     assert result.grid is not None
     e_n = normalised_error(result.grid.measured, result.grid.simulated[0])
     known = e_n[np.isfinite(e_n)]
-    # The standard deviation of the share of 80 squares is 3 %.
+    # The standard deviation of the fraction of 80 squares is 3 %.
     assert known.size > 70
     assert (known <= 1).mean() == pytest.approx(0.93, abs=0.08)
 
@@ -445,7 +445,7 @@ def test_noise_that_is_alike_makes_no_set_of_two_the_best(known):
 
 def of_mean(scatter):
     """Standard uncertainty of the mean over all places."""
-    none = np.zeros(scatter.deviation.shape)
+    none = np.zeros(scatter.standard_deviation.shape)
     return Estimate(none, (scatter.component(),)).mean().standard_uncertainty
 
 
@@ -453,11 +453,11 @@ def test_the_uncertainty_of_a_mean_over_frames_that_are_alike_is_theirs():
     generator = np.random.default_rng(5)
     shown = [alike(generator, 60) for _ in range(40)]
     true = np.std([one.mean(axis=0) for one in shown])
-    stated = np.mean([FrameScatter.of(one).deviation for one in shown])
+    stated = np.mean([FrameScatter.of(one).standard_deviation for one in shown])
     assert stated == pytest.approx(true, rel=0.15)
     together = np.std([one.mean() for one in shown])
     assert np.mean([of_mean(FrameScatter.of(one)) for one in shown]) == pytest.approx(
         together, rel=0.25
     )
     even = generator.standard_normal((30, 200))
-    assert FrameScatter.of(even).deviation.mean() == pytest.approx(1 / sqrt(30), rel=0.05)
+    assert FrameScatter.of(even).standard_deviation.mean() == pytest.approx(1 / sqrt(30), rel=0.05)

@@ -34,11 +34,11 @@ def test_conduction_keeps_heat_whatever_the_shape():
     assert block.points["temperature"].std() < 0.9 * spread
 
 
-def evened(block, share):
+def evened(block, fraction):
     shape = (block.grid.columns, block.grid.rows)
     nodes, increment = np.zeros((*shape, 3)), np.zeros(shape)
     conductivity, capacity = constant_properties()
-    for part in (0.0, share):  # the slopes first
+    for part in (0.0, fraction):  # the slopes first
         conduct(
             block.points, block.count, nodes, increment, conductivity, capacity,
             block.step.heat_mass, block.grid, 0.0, part,
@@ -68,7 +68,7 @@ def test_evening_out_takes_the_noise_and_leaves_a_smooth_field():
     # No rounding is left of a quadratic, nor is anything taken: the residue is a fourth derivative.
     assert np.abs(evened(block, 0.25) - smooth)[inside].max() < 1e-9
     block.points["temperature"] = smooth + noise
-    # The grid sees nothing of what alternates from point to point: all of the share is taken, but
+    # The grid sees nothing of what alternates from point to point: all of that is taken, but
     # for the slopes that it makes at the border, which fade inward.
     left = (evened(block, 0.25) - smooth)[inside]
     assert left == pytest.approx(0.75 * noise[inside], abs=0.01)
@@ -154,7 +154,7 @@ def test_contact_shares_friction_heat_and_loses_none():
     assert heat_of_all() - before == pytest.approx(work, rel=1e-9)
     assert not friction.any()
     assert not block.points["contact_time"].any()
-    # The chip was hotter: beside its share of the friction heat the tool took some through contact.
+    # The chip was hotter: beside its part of the friction heat the tool took some by contact.
     assert (store * (temperature - 293.0)).sum() > 0.4 * work
 
 
@@ -169,9 +169,9 @@ def test_friction_heats_chip_and_tool_as_half_spaces_in_contact():
     fraction, temperature = tool_fraction(block.grid, tool), np.full(shape, 293.0)
     nodes, increment, friction = np.zeros((*shape, 3)), np.zeros(shape), np.zeros(shape)
     effusivity = sqrt(CONDUCTIVITY * DENSITY * CAPACITY)
-    share = CARBIDE.effusivity / (CARBIDE.effusivity + effusivity)
+    fraction = CARBIDE.effusivity / (CARBIDE.effusivity + effusivity)
     store = CARBIDE.density * CARBIDE.heat_capacity
-    heat = ToolHeat(store, CARBIDE.conductivity, share, 1e7, block.spacing)
+    heat = ToolHeat(store, CARBIDE.conductivity, fraction, 1e7, block.spacing)
     conductivity, capacity = constant_properties()
     touching = block.points["x"] > 3e-6 - 0.6 * block.spacing
     steps = 200
@@ -193,14 +193,14 @@ def test_friction_heats_chip_and_tool_as_half_spaces_in_contact():
         )  # fmt: skip
         return_heat(block.points, block.count, increment, block.grid)
     # Both surfaces rise alike; away from it by the conduction of each side (Carslaw, Jaeger 2.9).
-    rise = 2 * flux * (1 - share) * sqrt(duration / pi) / effusivity
+    rise = 2 * flux * (1 - fraction) * sqrt(duration / pi) / effusivity
     middle = touching & (np.abs(block.points["y"] - 160e-6) < 30e-6)
     depth = block.spacing / 2
-    at_points = rise - flux * (1 - share) * depth / CONDUCTIVITY
-    # The chip's side is second order; the tool's share of a node is first: 2 % at this cell.
+    at_points = rise - flux * (1 - fraction) * depth / CONDUCTIVITY
+    # The chip's side is second order; the tool's fraction of a node is first: 2 % at this cell.
     assert block.points["temperature"][middle].mean() - 293 == pytest.approx(at_points, rel=0.03)
     node = round((3e-6 - block.grid.left) / cell) + 1
     inside = block.grid.left + node * cell - 3e-6
-    of_tool = rise - flux * share * inside / CARBIDE.conductivity
+    of_tool = rise - flux * fraction * inside / CARBIDE.conductivity
     row = round((160e-6 - block.grid.bottom) / cell)
     assert temperature[node, row] - 293 == pytest.approx(of_tool, rel=0.03)

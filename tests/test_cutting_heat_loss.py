@@ -101,7 +101,7 @@ def test_uneven_filling_is_no_surface():
     scatter = np.random.default_rng(1).uniform(-2e-6, 2e-6, (2, warm.block.count))
     warm.block.points["x"] += scatter[0]
     warm.block.points["y"] += scatter[1]
-    # Points that are scattered by 0.4 of their spacing make a filled share of 1 ± 0.06 inside.
+    # Points that are scattered by 0.4 of their spacing make a filled fraction of 1 ± 0.06 inside.
     assert warm.surface() == pytest.approx(1e-3, rel=0.02)
 
 

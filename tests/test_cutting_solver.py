@@ -94,14 +94,14 @@ def test_plastic_increment_solves_its_equation(
 
 
 @pytest.mark.parametrize(
-    ("share", "of_it"),
+    ("fraction", "of_it"),
     # The rate is 1e5/√3 = 57 735 1/s: 0.3 + 0.6 (4.76144 − 2)/(5 − 2) of the work, by hand.
     [(0.9, 0.9), (RateTable((1.0, 1e2, 1e5), (0.1, 0.3, 0.9)), 0.852288)],
 )
-def test_adiabatic_shear_follows_the_flow_stress(share, of_it):
+def test_adiabatic_shear_follows_the_flow_stress(fraction, of_it):
     """Uniform simple shear at 1e5 /s against the ordinary differential equations."""
     rate = 1e5
-    material = replace(AISI_1045, density=DENSITY, taylor_quinney=share)
+    material = replace(AISI_1045, density=DENSITY, taylor_quinney=fraction)
     # So heavy that nothing slows it: the shear stays as it was set.
     block = Block((60e-6, 60e-6), material=material, mass=1e9, time_step=1e-3 / rate)
     block.set_velocity(lambda x, y: rate * y + 0 * x, lambda x, y: 0 * x * y)
@@ -144,17 +144,17 @@ def pressed_on_a_face(**friction):
 
 
 @pytest.mark.parametrize(
-    ("rate", "share"),
+    ("rate", "fraction"),
     [(1e-3, 0.4), (1.0, 0.4), (10.0, 0.5), (100.0, 0.6), (1e4, 0.75), (1e6, 0.9), (1e9, 0.9)],
 )
-def test_heat_share_is_linear_over_the_logarithm_of_the_rate_and_held_beyond(rate, share):
+def test_heat_share_is_linear_over_the_logarithm_of_the_rate_and_held_beyond(rate, fraction):
     table = heat_shares(RateTable((1.0, 100.0, 1e6), (0.4, 0.6, 0.9)))
-    assert heat_share(rate, table) == pytest.approx(share, rel=1e-14)
+    assert heat_share(rate, table) == pytest.approx(fraction, rel=1e-14)
 
 
-@given(share=st.floats(0.0, 1.0), rate=st.floats(0.0, 1e12))
-def test_a_constant_heat_share_is_itself(share, rate):
-    assert heat_share(rate, heat_shares(share)) == share
+@given(fraction=st.floats(0.0, 1.0), rate=st.floats(0.0, 1e12))
+def test_a_constant_heat_share_is_itself(fraction, rate):
+    assert heat_share(rate, heat_shares(fraction)) == fraction
 
 
 @pytest.mark.parametrize("coefficient", [0.0, 0.3])

@@ -51,9 +51,9 @@ class Tool:
         return store * (inside.sum() + filled @ self.far @ GROWTH ** np.arange(CELLS))
 
 
-@pytest.mark.parametrize("share", [0.5, 1.0, 2.0, 5.0])
-def test_a_heated_face_follows_erfc_up_to_the_border_and_as_if_it_were_not_there(share):
-    """The border is 200 um from the face, `share` tells how many of them heat has diffused."""
+@pytest.mark.parametrize("fraction", [0.5, 1.0, 2.0, 5.0])
+def test_a_heated_face_follows_erfc_up_to_the_border_and_as_if_it_were_not_there(fraction):
+    """The border is 200 um from the face, `fraction` tells how many of them heat has diffused."""
     length, cell = 200e-6, 10e-6
     tool = Tool(round(length / cell) + 1, 5, cell)
     tool.fraction[:, 1:4] = 1.0  # a rod
@@ -62,7 +62,7 @@ def test_a_heated_face_follows_erfc_up_to_the_border_and_as_if_it_were_not_there
     def hot(temperature, _):
         temperature[0, 1:4] = 1.0
 
-    duration = (share * length) ** 2 / DIFFUSIVITY
+    duration = (fraction * length) ** 2 / DIFFUSIVITY
     found = tool.heat(duration, hot)[:, 2]
     x = cell * np.arange(found.size)
     exact = erfc(x / sqrt(4 * DIFFUSIVITY * duration))

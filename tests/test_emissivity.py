@@ -37,7 +37,7 @@ WHOLE = Area("all", "all", np.ones(RASTER.shape, bool), True)
 REGION_LIST = (
     Region("body left", Polygon.rectangle((0, 0), (16, 30)), "chip body"),
     Region("body right", Polygon.rectangle((24, 0), (40, 30)), "chip body"),
-    Region("fissure", Polygon.rectangle((17, 0), (23, 30))),
+    Region("shear band", Polygon.rectangle((17, 0), (23, 30))),
 )
 
 
@@ -64,11 +64,11 @@ def test_equation_2_is_undone(emissivity, reference, reflected):
 
 
 @pytest.mark.parametrize(
-    ("body", "fissure", "celsius"),
+    ("body", "band", "celsius"),
     [((0.42, 0.07), (0.53, 0.05), 391.0), ((0.77, 0.03), (0.85, 0.02), 570.0)],
 )
-def test_table_1_of_the_paper_comes_back_through_camera_and_scene(body, fissure, celsius):
-    put_in = table_1(body, fissure)
+def test_table_1_of_the_paper_comes_back_through_camera_and_scene(body, band, celsius):
+    put_in = table_1(body, band)
     fields = {name: np.zeros((11, *RASTER.shape)) for name in FIELD_UNITS}
     fields["temperature"] += celsius + CELSIUS
     fields["material"] += 1
@@ -77,15 +77,16 @@ def test_table_1_of_the_paper_comes_back_through_camera_and_scene(body, fissure,
     image = camera.measure(scene, MapSurface(put_in, RASTER), 0.0)
     rows = rows_of(determine_emissivity([image], Heating(celsius + CELSIUS)))
     # A camera without blur whose pixels are the samples; emissivities are float32 on their way.
-    parts = {"chip body": put_in[:, np.r_[:16, 24:40]], "fissure": put_in[:, 17:23]}
-    for name, (mean, deviation) in (("chip body", body), ("fissure", fissure)):
+    parts = {"chip body": put_in[:, np.r_[:16, 24:40]], "shear band": put_in[:, 17:23]}
+    for name, (mean, standard_deviation) in (("chip body", body), ("shear band", band)):
         row = rows[name]
         assert row.pixels == parts[name].size
         assert row.mean == pytest.approx(parts[name].mean(), abs=1e-6)
-        assert row.deviation == pytest.approx(parts[name].std(ddof=1), abs=1e-6)
+        assert row.standard_deviation == pytest.approx(parts[name].std(ddof=1), abs=1e-6)
         # And so the table's, but for drawing 960 and 180 pixels: four standard deviations of both.
-        assert row.mean == pytest.approx(mean, abs=4 * deviation / row.pixels**0.5)
-        assert row.deviation == pytest.approx(deviation, rel=4 / (2 * row.pixels) ** 0.5)
+        assert row.mean == pytest.approx(mean, abs=4 * standard_deviation / row.pixels**0.5)
+        error = 4 / (2 * row.pixels) ** 0.5
+        assert row.standard_deviation == pytest.approx(standard_deviation, rel=error)
 
 
 def test_the_spread_over_pixels_is_no_uncertainty_of_the_mean():
@@ -95,7 +96,7 @@ def test_the_spread_over_pixels_is_no_uncertainty_of_the_mean():
         rows_of(determine_emissivity([measured(one, frames=20, noise=0.1)], heating))["chip body"]
         for one in (smooth, rough)
     ]
-    assert rows[1].deviation > 50 * rows[0].deviation
+    assert rows[1].standard_deviation > 50 * rows[0].standard_deviation
     # The mean itself differs by 0.07 / sqrt(960) = 0.5 % and so does what is proportional to it.
     assert rows[1].estimate.standard_uncertainty == pytest.approx(
         rows[0].estimate.standard_uncertainty, rel=0.02
@@ -239,12 +240,12 @@ def test_the_difference_of_two_regions_is_known_better_than_either():
         radiance = BAND.radiance(BAND.temperature(image.radiance) + wrong)
         image.data["radiance"].values[:] = radiance
         rows = rows_of(determine_emissivity([image], heating))
-        differences.append(rows["fissure"].mean - rows["chip body"].mean)
-    (a, b), (_, d) = emissivity_covariance([rows["fissure"], rows["chip body"]])
+        differences.append(rows["shear band"].mean - rows["chip body"].mean)
+    (a, b), (_, d) = emissivity_covariance([rows["shear band"], rows["chip body"]])
     stated = np.sqrt(a - 2 * b + d)
     # 400 differences: the standard deviation is known to 3.5 %; three of them.
     assert np.std(differences) == pytest.approx(stated, rel=0.11)
-    assert stated < 0.25 * rows["fissure"].estimate.standard_uncertainty
+    assert stated < 0.25 * rows["shear band"].estimate.standard_uncertainty
 
 
 def test_the_uncertainty_of_a_pixel_has_its_noise():
@@ -459,8 +460,9 @@ def test_a_study_takes_the_regions():
     study = Study(**yaml.safe_load(surface_text(rows.values())))
     (surface,) = study.surface.build(1).values()
     assert surface.chip.mean == pytest.approx(rows["chip body"].mean, abs=6e-5)
-    assert surface.chip.deviation == pytest.approx(rows["chip body"].deviation, abs=6e-5)
-    assert surface.shear_band.mean == pytest.approx(rows["fissure"].mean, abs=6e-5)
+    found = rows["chip body"].standard_deviation
+    assert surface.chip.standard_deviation == pytest.approx(found, abs=6e-5)
+    assert surface.shear_band.mean == pytest.approx(rows["shear band"].mean, abs=6e-5)
     assert surface_text([rows["body left"]]) == ""
 
 
@@ -601,7 +603,7 @@ def test_what_is_assumed_and_doubtful_is_said(folder):
         "Assumed: nothing changes from frame to frame",
     ):
         assert sentence in result.stderr
-    assert "Warning: fissure: 18 of 180 pixels are left out (18 dead)." in result.stdout
+    assert "Warning: shear band: 18 of 180 pixels are left out (18 dead)." in result.stdout
 
 
 def test_a_region_outside_the_image_is_one_line(folder):

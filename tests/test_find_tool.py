@@ -151,7 +151,7 @@ def test_the_command_writes_what_the_function_gives(folder, seen):
         assert data["mean"].attrs["units"] == "K" and data.attrs["size"] == grid.size
         assert data.attrs["tool_rake_angle"] == radians(-7.0)
     assert (folder / "grid.png").read_bytes().startswith(b"\x89PNG")
-    value, spread = grid.frame_mean[0, 4] - 273.15, grid.frame_deviation[0, 4]
+    value, spread = grid.frame_mean[0, 4] - 273.15, grid.frame_standard_deviation[0, 4]
     assert f"{value:.1f} ± {spread:.1f}" in text
     assert "squares are left out" in text
 
@@ -170,7 +170,7 @@ def test_the_table_has_units_and_gaps(folder, seen):
     cells = lines[1].split(",")
     first = [float(cell) for cell in cells[:6]]
     assert cells[6:] == [""] * 5
-    expected = [10.0, 9.0, 9.0, grid.mean[0, 0, 0] - 273.15, grid.deviation[0, 0, 0]]
+    expected = [10.0, 9.0, 9.0, grid.mean[0, 0, 0] - 273.15, grid.standard_deviation[0, 0, 0]]
     # Four digits after the point are written.
     np.testing.assert_allclose(first[:-1], expected, atol=6e-5)
     without = [line.split(",")[3] == "" for line in lines]

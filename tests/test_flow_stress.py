@@ -182,7 +182,7 @@ def test_limits_of_tanh(rate, temperature, sharpness):
     cold = replace(law, melting_temperature=2900.0)
     expected = replace(johnson_cook, melting_temperature=2900.0).at(1e-5, rate, 298.0)
     assert cold.at(1e-5, rate, 298.0) == pytest.approx(expected, rel=1e-5)
-    # At great strain hardening is gone and the share D = 1 - T/T_melt of the yield stress is left.
+    # At great strain hardening is gone and D = 1 - T/T_melt of the yield stress is left.
     residual = replace(johnson_cook, hardening=0.0).at(1.0, rate, temperature)
     residual *= 1.0 - temperature / law.melting_temperature
     assert law.at(1e4, rate, temperature) == pytest.approx(residual, rel=1e-9)

@@ -81,7 +81,7 @@ def test_the_surface_is_within_half_a_spacing(jitter, angle):
 
 
 def test_surface_of_a_lattice_converges_to_the_truth():
-    """On a straight side the half of the filled share is the surface itself."""
+    """On a straight side the half of the filled fraction is the surface itself."""
     raster = Raster(10e-6, 45e-6, 0.1e-6, 500, 3)
     _, material = sample_cloud(a_cloud(lattice()), raster)
     top = raster.y[np.flatnonzero(material[:, 1])[0]] + raster.spacing / 2
@@ -399,13 +399,13 @@ def test_mislabelled_and_empty_files(tmp_path, suffix, content):
     refused(CloudSource(str(path)), f"p.{suffix}")
 
 
-@pytest.mark.parametrize("share", [0.05, 0.5])
+@pytest.mark.parametrize("fraction", [0.05, 0.5])
 @pytest.mark.parametrize("write", [npz, npy_structured, hdf5, vtk, vtu, vtk_legacy])
-def test_truncated_files(tmp_path, write, share):
+def test_truncated_files(tmp_path, write, fraction):
     path, options = write(tmp_path)
     for file in tmp_path.iterdir():
         content = file.read_bytes()
-        file.write_bytes(content[: int(share * len(content))])
+        file.write_bytes(content[: int(fraction * len(content))])
     refused(CloudSource(str(path), **options))
 
 
@@ -521,21 +521,21 @@ def write_dump(path, frames, units=None, columns="id type x y z vx vy vz v_temp"
     return path
 
 
-def dump_rows(time, places=None, share=False):
+def dump_rows(time, places=None, fraction=False):
     places = lattice() / 1e-6 if places is None else places
     heat = np.round(linear(*places.T * 1e-6, time), 2)
-    shown = places / (60.0, 40.0) if share else places
+    shown = places / (60.0, 40.0) if fraction else places
     return [
-        (number, 1 + (x > 50), *at, 0.5 if share else 0.0, 3.0, 1.0, 0.0, one)
+        (number, 1 + (x > 50), *at, 0.5 if fraction else 0.0, 3.0, 1.0, 0.0, one)
         for number, (x, at, one) in enumerate(zip(places[:, 0], shown, heat, strict=True), 1)
     ]
 
 
 @pytest.mark.parametrize("name", ["cut.dump", "cut.lammpstrj", "dump.txt"])
-@pytest.mark.parametrize("share", [False, True])
-def test_a_dump_of_lammps_over_time(tmp_path, name, share):
-    columns = "id type xs ys zs vx vy vz v_temp" if share else "id type x y z vx vy vz v_temp"
-    frames = [(time * 1e6, dump_rows(time, share=share)) for time in TIMES]
+@pytest.mark.parametrize("fraction", [False, True])
+def test_a_dump_of_lammps_over_time(tmp_path, name, fraction):
+    columns = "id type xs ys zs vx vy vz v_temp" if fraction else "id type x y z vx vy vz v_temp"
+    frames = [(time * 1e6, dump_rows(time, fraction=fraction)) for time in TIMES]
     path = write_dump(tmp_path / name, frames, "micro", columns)
     source = CloudSource(str(path), names={"temperature": "v_temp"}, tool_parts=(2,))
     survey = source.survey()

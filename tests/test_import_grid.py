@@ -449,12 +449,12 @@ def test_mislabelled_and_empty_files(tmp_path, suffix, content):
 
 
 @pytest.mark.parametrize("write", FORMATS, ids=lambda write: write.__name__)
-@pytest.mark.parametrize("share", [0.02, 0.3, 0.9])
-def test_truncated_files(tmp_path, write, share):
+@pytest.mark.parametrize("fraction", [0.02, 0.3, 0.9])
+def test_truncated_files(tmp_path, write, fraction):
     path, options = write(tmp_path, a_stack())
     for file in [file for file in tmp_path.rglob("*") if file.is_file()]:
         content = file.read_bytes()
-        file.write_bytes(content[: int(share * len(content))])
+        file.write_bytes(content[: int(fraction * len(content))])
     refused(a_source(str(path), **options))
 
 

@@ -895,8 +895,8 @@ def two_materials(path, other="temperature_steel", divided=False, whole_name=Non
     fields = {}
     for name, elements in blocks.items():
         of_block = np.isin(np.arange(len(points)), elements)
-        share = np.where(points[:, 0] == 1.0, 0.5 if divided else 1.0, 1.0)
-        fields[f"temperature_{name}"] = np.where(of_block, heat * share, 0.0)
+        fraction = np.where(points[:, 0] == 1.0, 0.5 if divided else 1.0, 1.0)
+        fields[f"temperature_{name}"] = np.where(of_block, heat * fraction, 0.0)
     if whole_name:
         fields = {whole_name: fields["temperature_graphite"]}
     return write_exodus(path, Exodus(points, blocks, "HEX8", [0.0, 1.0], fields))

@@ -152,8 +152,8 @@ def with_legend(picture, colours=RAINBOW, box=(100, 10, 108, 80), outline=True):
     left, top, right, bottom = box
     picture = picture.copy()
     picture[:, left - 12 :] = 255
-    share = 1 - (np.arange(bottom - top) + 0.5) / (bottom - top)
-    bar = drawn(ENDS[0] + share * (ENDS[1] - ENDS[0]), colours)
+    fraction = 1 - (np.arange(bottom - top) + 0.5) / (bottom - top)
+    bar = drawn(ENDS[0] + fraction * (ENDS[1] - ENDS[0]), colours)
     if outline:
         picture[top - 1 : bottom + 1, left - 1 : right + 1] = 0
     picture[top:bottom, left:right] = bar[:, None]
@@ -471,8 +471,8 @@ def test_a_coloured_tool_keeps_its_values(tmp_path):
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.6))
-def test_the_nearest_known_pixel_is_found(seed, share):
-    known = np.random.default_rng(seed).random((23, 31)) < share
+def test_the_nearest_known_pixel_is_found(seed, fraction):
+    known = np.random.default_rng(seed).random((23, 31)) < fraction
     known[3, 4] = True
     rows, columns = nearest(known, ~known)
     assert known[rows, columns].all()
@@ -532,11 +532,11 @@ def fails(path):
     [RAW, CODECS[1], CODECS[2], H264, Codec("GIF", ".gif", "gif", "rgb8")],
     ids=lambda codec: codec.name,
 )
-@pytest.mark.parametrize("share", [0.02, 0.5, 0.9])
-def test_a_truncated_movie_is_refused(tmp_path, codec, share):
+@pytest.mark.parametrize("fraction", [0.02, 0.5, 0.9])
+def test_a_truncated_movie_is_refused(tmp_path, codec, fraction):
     path = a_movie(tmp_path / f"a{codec.suffix}", count=8, codec=codec)
     data = path.read_bytes()
-    path.write_bytes(data[: int(share * len(data))])
+    path.write_bytes(data[: int(fraction * len(data))])
     fails(path)
 
 

@@ -281,8 +281,8 @@ def test_an_import_that_was_ended_goes_on_to_the_same_file(tmp_path, monkeypatch
     monkeypatch.setattr("chipglow.io.importing._CHECKPOINT_INTERVAL", 0.0)
     wanted = Import(MovingBlock(), description={"source": "block"})
 
-    def stop(share):
-        if share > 0.6:
+    def stop(fraction):
+        if fraction > 0.6:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt) as ended:
@@ -293,9 +293,9 @@ def test_an_import_that_was_ended_goes_on_to_the_same_file(tmp_path, monkeypatch
     assert str(ended.value) == f"{kept} frames are kept"
     left = kept_import(wanted, prospect(wanted), tmp_path / "scene.nc")
     assert left.progress == kept / 8
-    shares = []
-    import_scene(wanted, tmp_path / "scene.nc", shares.append, resume=left)
-    assert len(shares) == 8 - kept
+    fractions = []
+    import_scene(wanted, tmp_path / "scene.nc", fractions.append, resume=left)
+    assert len(fractions) == 8 - kept
     import_scene(wanted, tmp_path / "whole.nc")
     assert [path.name for path in sorted(tmp_path.iterdir())] == ["scene.nc", "whole.nc"]
     one, other = open_scene(tmp_path / "scene.nc"), open_scene(tmp_path / "whole.nc")
@@ -307,8 +307,8 @@ def test_an_import_that_was_ended_goes_on_to_the_same_file(tmp_path, monkeypatch
 def test_another_import_does_not_go_on_with_what_is_left(tmp_path, monkeypatch):
     monkeypatch.setattr("chipglow.io.importing._CHECKPOINT_INTERVAL", 0.0)
 
-    def stop(share):
-        if share > 0.6:
+    def stop(fraction):
+        if fraction > 0.6:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

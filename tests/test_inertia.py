@@ -120,15 +120,15 @@ def test_momentum_flow_of_the_papers_cut():
     ],
 )
 def test_a_warning_over_one_per_cent(kinetic, force, words, capsys):
-    share = Inertia(kinetic, force, 100.0)
-    assert bool(share.warning) == bool(words)
-    say_of_cut(share, ["The feed is 2 cells [small]."])
+    fraction = Inertia(kinetic, force, 100.0)
+    assert bool(fraction.warning) == bool(words)
+    say_of_cut(fraction, ["The feed is 2 cells [small]."])
     said = capsys.readouterr().err
     assert f"kinetic energy at most {kinetic:.2%} of the work" in said
     assert f"momentum flux {force:.2%} of the mean cutting force" in said
     assert "Warning: The feed is 2 cells [small]." in said
     assert said.count("Warning") == 1 + bool(words)
-    assert all(word in share.warning and word in said for word in words)
+    assert all(word in fraction.warning and word in said for word in words)
 
 
 def test_the_analysis_and_the_solver_close_the_account_alike():

@@ -310,13 +310,13 @@ def test_apertures_tell_of_tails_that_an_edge_does_not():
         for k, size in enumerate((40e-6, 80e-6, 160e-6, 320e-6, 800e-6))
     ]
     alone, together = knife_edge(images), knife_edge(images, holes)
-    share = together.fit("gaussian with tail")
-    assert together.best is share
+    fraction = together.fit("gaussian with tail")
+    assert together.best is fraction
     # The images of apertures have no footprint, which adds under 1 % at the smallest.
-    assert share.values[1] == pytest.approx(0.1, abs=0.01)
-    assert share.values[2] * share.values[0] == pytest.approx(60e-6, rel=0.1)
+    assert fraction.values[1] == pytest.approx(0.1, abs=0.01)
+    assert fraction.values[2] * fraction.values[0] == pytest.approx(60e-6, rel=0.1)
     unsure = alone.fit("gaussian with tail").uncertainties[1]
-    assert share.uncertainties[1] < 0.3 * unsure
+    assert fraction.uncertainties[1] < 0.3 * unsure
 
 
 def test_apertures_that_contradict_the_edge_are_doubtful():
@@ -425,8 +425,8 @@ def test_without_noise_the_truth_is_returned_and_nothing_is_doubtful():
 def test_noise_that_grows_with_the_light_is_weighed():
     """Of a dark side with a tenth of the noise, the width is known better than from the other."""
     radiance = edge_radiance(GAUSSIAN, 5.0)
-    share = (radiance - 2.0) / 5.0
-    found = knife_edge([image_of(radiance, 0.02 + 0.18 * share, 3)])
+    fraction = (radiance - 2.0) / 5.0
+    found = knife_edge([image_of(radiance, 0.02 + 0.18 * fraction, 3)])
     assert found.edges[0].noise < 0.06
     assert abs(found.fwhm - FWHM) < 3 * found.fwhm_uncertainty
     even = knife_edge([image_of(radiance, 0.2, 3)])

@@ -259,7 +259,7 @@ def test_a_material_that_does_not_fail(tmp_path: Path) -> None:
 def test_material_of_the_documentation(tmp_path: Path) -> None:
     page = (Path(__file__).parents[1] / "docs" / "materials.md").read_text(encoding="utf-8")
     blocks = [text.partition("```")[0] for text in page.split("```yaml\n")[1:]]
-    whole, law, shares = (
+    whole, law, fractions = (
         next(text for text in blocks if text.startswith(key))
         for key in ("kind: workpiece", "flow_stress:", "taylor_quinney:")
     )
@@ -267,7 +267,7 @@ def test_material_of_the_documentation(tmp_path: Path) -> None:
     path.write_text(whole, encoding="utf-8")
     (mine,) = read_material(path).workpieces.values()
     assert mine.damage is not None and mine.damage.fracture_energy == 15e3
-    data = yaml.safe_load(whole) | yaml.safe_load(shares)
+    data = yaml.safe_load(whole) | yaml.safe_load(fractions)
     data["flow_stress"]["softening"] = yaml.safe_load(law)["flow_stress"]["softening"]
     path.write_text(yaml.safe_dump(data), encoding="utf-8")
     soft = read_material(path).workpieces["softening"]

@@ -572,9 +572,9 @@ def test_counts_of_a_black_body_are_those_of_corrected_sensors(laboratory):
         assert uniform_counts(name, CAMERA) == pytest.approx(mean.mean(), rel=1e-12)
     # Straight between both: counts are linear in light.
     radiance = BAND.radiance(np.array([623.15, 873.15, 1123.15]))
-    share = (radiance[1] - radiance[0]) / (radiance[2] - radiance[0])
+    fraction = (radiance[1] - radiance[0]) / (radiance[2] - radiance[0])
     body = uniform_counts("body 600.npy", CORRECTED)
-    assert body == pytest.approx(expected[0] + share * (expected[1] - expected[0]), abs=0.5)
+    assert body == pytest.approx(expected[0] + fraction * (expected[1] - expected[0]), abs=0.5)
 
 
 def test_calibrate_takes_recordings_in_the_place_of_counts(laboratory):

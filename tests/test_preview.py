@@ -135,8 +135,8 @@ def panel_colour(picture, drawn, panel):
     return drawn[drawn.shape[0] - 1 - round(y), round(x)]
 
 
-def colour(name, share):
-    return np.round(np.array(colormaps[name](share))[:3] * 255)
+def colour(name, fraction):
+    return np.round(np.array(colormaps[name](fraction))[:3] * 255)
 
 
 @pytest.fixture(scope="module")
@@ -148,10 +148,14 @@ def test_a_picture_shows_the_fields_in_the_colours_of_its_scales(picture):
     drawn = picture.draw(frame_of())
     scales = MovieScales.of(SIMULATION)
     (low, high), (_, most) = scales.temperature, scales.strain
-    shares = ((800 - low) / (high - low), 1 / most, 1 / 3)
-    for panel, (name, share) in enumerate(zip((HEAT, "cividis", "viridis"), shares, strict=True)):
+    fractions = ((800 - low) / (high - low), 1 / most, 1 / 3)
+    for panel, (name, fraction) in enumerate(
+        zip((HEAT, "cividis", "viridis"), fractions, strict=True)
+    ):
         # One step of 256 of the colour map is up to 4 of 255.
-        np.testing.assert_allclose(panel_colour(picture, drawn, panel), colour(name, share), atol=4)
+        np.testing.assert_allclose(
+            panel_colour(picture, drawn, panel), colour(name, fraction), atol=4
+        )
 
 
 def test_a_picture_shows_nothing_where_nothing_is_and_the_end_of_a_scale_beyond_it(picture):
@@ -159,8 +163,10 @@ def test_a_picture_shows_nothing_where_nothing_is_and_the_end_of_a_scale_beyond_
     drawn = picture.draw(frame_of(material=Material.VOID))
     assert all((panel_colour(picture, drawn, panel) == void).all() for panel in range(3))
     drawn = picture.draw(frame_of(temperature=2000.0, strain=50.0, rate=0.0))
-    for panel, name, share in ((0, HEAT, 1.0), (1, "cividis", 1.0), (2, "viridis", 0.0)):
-        np.testing.assert_allclose(panel_colour(picture, drawn, panel), colour(name, share), atol=1)
+    for panel, name, fraction in ((0, HEAT, 1.0), (1, "cividis", 1.0), (2, "viridis", 0.0)):
+        np.testing.assert_allclose(
+            panel_colour(picture, drawn, panel), colour(name, fraction), atol=1
+        )
 
 
 def test_a_picture_keeps_nothing_of_the_one_before(picture):

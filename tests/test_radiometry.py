@@ -67,7 +67,7 @@ def test_what_has_no_answer_is_nan():
 
 def test_response_is_applied():
     whole = Band(3e-6, 5e-6, response=lambda w: np.where(w > 4e-6, 1.0, 0.0))
-    # A step inside one of 64 panels: an error of less than a panel's share of the radiance.
+    # A step inside one of 64 panels: an error of less than a panel's fraction of the radiance.
     assert whole.radiance(900.0) == pytest.approx(Band(4e-6, 5e-6).radiance(900.0), rel=0.01)
     half = Band(3e-6, 5e-6, response=lambda w: np.full_like(w, 0.5))
     assert half.radiance(900.0) == pytest.approx(0.5 * Band(3e-6, 5e-6).radiance(900.0), rel=1e-12)

@@ -73,7 +73,7 @@ def test_squares_on_the_pixels_are_plain_means_of_nine():
         square = image[row - 3 * n - 3 : row - 3 * n, column - 3 * m - 3 : column - 3 * m]
         assert grid.count[0, m, n] == 9
         assert abs(grid.mean[0, m, n] - square.mean()) < EXACT
-        assert abs(grid.deviation[0, m, n] - square.std(ddof=1)) < EXACT
+        assert abs(grid.standard_deviation[0, m, n] - square.std(ddof=1)) < EXACT
     np.testing.assert_allclose(grid.along[:2], [9e-6, 27e-6])
     np.testing.assert_allclose(grid.depth, 18e-6 * (np.arange(5) + 0.5))
 
@@ -124,11 +124,12 @@ def test_frames_have_a_mean_and_a_deviation_between_them():
     np.testing.assert_allclose(
         (grid.frame_mean - grid.mean[1])[grid.usable[1]], shifts.mean(), atol=EXACT
     )
-    np.testing.assert_allclose(grid.frame_deviation[grid.usable[1]], shifts.std(ddof=1), atol=EXACT)
+    found = grid.frame_standard_deviation[grid.usable[1]]
+    np.testing.assert_allclose(found, shifts.std(ddof=1), atol=EXACT)
     chosen = rake_grid(frames, ToolGeometry(), frames=[2])
     np.testing.assert_array_equal(chosen.mean[0], grid.mean[2])
     assert chosen.times[0] == frames.times[2]
-    assert np.isnan(chosen.frame_deviation).all()
+    assert np.isnan(chosen.frame_standard_deviation).all()
 
 
 def test_a_square_is_averaged_over_the_frames_that_show_it():
@@ -145,8 +146,8 @@ def test_noise_averages_as_the_number_of_pixels_says():
     noise = np.random.default_rng(5).normal(0.0, 5.0, (60, *RASTER.shape))
     grid = rake_grid(measured(*(linear_image() + noise)), ToolGeometry())
     seen = grid.usable.all(axis=0)
-    scaled = (grid.frame_deviation * np.sqrt(grid.count[0]) / 5.0)[seen]
-    # 60 frames give each deviation to 9 %, about 60 squares their mean to 1.2 %.
+    scaled = (grid.frame_standard_deviation * np.sqrt(grid.count[0]) / 5.0)[seen]
+    # 60 frames give each standard deviation to 9 %, about 60 squares their mean to 1.2 %.
     assert 0.97 < scaled.mean() < 1.10
 
 

@@ -46,13 +46,13 @@ def test_regions_of_a_feature_are_taken_together_and_a_pixel_counts_once():
     regions = (
         Region("a", Polygon.rectangle((0, 0), (10, 10)), "chip body"),
         Region("b", Polygon.rectangle((5, 0), (15, 10)), "chip body"),
-        Region("fissure", Polygon.rectangle((14, 0), (20, 10))),
+        Region("band", Polygon.rectangle((14, 0), (20, 10))),
     )
     found = {area.name: area for area in areas(regions, RASTER)}
-    assert list(found) == ["a", "b", "fissure", "chip body"]
+    assert list(found) == ["a", "b", "band", "chip body"]
     assert found["chip body"].mask.sum() == 150
     assert [area.whole for area in found.values()] == [False, False, True, True]
-    assert shared_pixels(regions, RASTER) == {("b", "fissure"): 10}
+    assert shared_pixels(regions, RASTER) == {("b", "band"): 10}
 
 
 @pytest.mark.parametrize(
@@ -87,14 +87,14 @@ def test_a_file_of_regions(tmp_path):
     text = """
 regions:
   body: {rectangle: [[1, 2], [5, 6]]}
-  fissure: {polygon: [[0 um, 0 um], [0.03 mm, 0 um], [0 um, 30 um]], feature: shear band}
+  band: {polygon: [[0 um, 0 um], [0.03 mm, 0 um], [0 um, 30 um]], feature: shear band}
   spot: {circle: {centre: [10.5, 4], radius: 3}}
 """
-    body, fissure, spot = load_regions(written(tmp_path, text))
+    body, band, spot = load_regions(written(tmp_path, text))
     assert body == Region("body", Polygon.rectangle((1.0, 2.0), (5.0, 6.0)))
-    assert fissure.unit == "m"
-    assert fissure.feature == "shear band"
-    assert fissure.shape.corners == ((0.0, 0.0), (3e-5, 0.0), (0.0, 3e-5))
+    assert band.unit == "m"
+    assert band.feature == "shear band"
+    assert band.shape.corners == ((0.0, 0.0), (3e-5, 0.0), (0.0, 3e-5))
     assert spot.shape == Circle((10.5, 4.0), 3.0)
 
 

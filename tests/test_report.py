@@ -164,8 +164,8 @@ def test_the_answer_states_scatter_and_whether_the_paper_differs(result):
 
 
 def test_inertia_that_is_too_much_is_said(result):
-    def rows(share):
-        inert = Inertia(kinetic_fraction=share, force_fraction=0.004, mass_scaling=300.0)
+    def rows(fraction):
+        inert = Inertia(kinetic_fraction=fraction, force_fraction=0.004, mass_scaling=300.0)
         found = comparison_rows(replace(result, forces=replace(result.forces, inertia=inert)))
         return {row.key: row for row in found}
 
@@ -198,7 +198,7 @@ def test_the_summary_is_strict_json(folder, result):
     assert summary["differs"]["rake_error_degC"] is not (low <= -42.0 <= high)
     assert set(summary["explanation"]) == set(summary["results"])
     assert summary["chip"]["feed_um"] == pytest.approx(result.chip.feed * 1e6)
-    assert set(summary["chip_spread"]) <= set(summary["chip"])
+    assert set(summary["chip_uncertainty"]) <= set(summary["chip"])
 
 
 def test_the_arrays_come_back_with_units(folder, result):
@@ -324,11 +324,11 @@ def test_the_papers_emissivities_come_back_from_heated_objects(result):
         assert row.true == paper
         # Few grains of 20 um in a region: the mean of the textures scatters by the deviation over
         # the root of some ten grains. Narrow bands are drawn toward the bodies by up to 0.06.
-        spread = 3 * paper.deviation / np.sqrt(10 * row.means.size)
+        spread = 3 * paper.standard_deviation / np.sqrt(10 * row.means.size)
         drawn = 0.06 if "shear band" in feature else 0.02
         assert row.means.mean() == pytest.approx(paper.mean, abs=spread + drawn)
         if "shear band" not in feature:  # whose region holds the slope to the bodies too
-            assert (row.deviations < paper.deviation).all()
+            assert (row.deviations < paper.standard_deviation).all()
     for chip in ("chip 1", "chip 2"):
         body, band = found[f"{chip} chip body"].found, found[f"{chip} shear band"].found
         assert band.mean > body.mean + 2 * band.estimate.standard_uncertainty

@@ -88,9 +88,9 @@ def test_at_an_edge_the_blurred_radiance_is_the_mean_of_both_sides():
     result = found(places=(point,), phases=1)
     deviation = 8e-6 / np.sqrt(8 * np.log(2))
     bright, _ = quad(lambda x: 0.5 * (1 + erf(x / (np.sqrt(2) * deviation))), -4e-6, 0.0)
-    share = bright / 4e-6
+    fraction = bright / 4e-6
     radiance = [0.6 * float(BAND.radiance(np.array(T))) for T in (COLD, HOT)]
-    measured = float(BAND.temperature((1 - share) * radiance[0] + share * radiance[1]))
+    measured = float(BAND.temperature((1 - fraction) * radiance[0] + fraction * radiance[1]))
     reference = float(BAND.temperature(radiance[0]))
     one = reading(result, "cold side", "pixel")
     # The kernel is summed over samples of 1 um: 0.03 of the 8 um of its width.

@@ -335,7 +335,7 @@ def load(text, folder):
             "surface.chips.a",
             "'chip-3' is unknown, expected one of chip-1, chip-2",
         ),
-        ("surface: {tool: {mean: 1.2, deviation: 0}}", "surface.tool.mean", "1.2, expected 0 to 1"),
+        ("surface: {tool: {mean: 1.2}}", "surface.tool.mean", "1.2, expected 0 to 1"),
         (
             "surface: {chips: {a: chip-1}}",
             "analysis.rake_chip",
@@ -655,7 +655,7 @@ def test_a_scene_without_tool_and_coordinates_is_fitted_and_says_so():
     assert bare.tool is None
     assert [surface.follow for surface in fitted.surfaces.values()] == ["mean", "mean"]
     assert [sentence[:23] for sentence in fitted.assumed] == [
-        "The scene does not tell",
+        "The scene has no tool: ",
         "The scene shows no tool",
         "The scene does not say ",
     ]
@@ -670,12 +670,12 @@ def test_what_an_emissivity_map_leaves_of_the_scene_is_said():
         name: MapSurface(np.full(of.shape, 0.5), of)
         for name, of in (("whole", raster), ("half", half), ("away", away))
     }
-    assert maps["whole"].known_share(raster) == 1.0
+    assert maps["whole"].known_fraction(raster) == 1.0
     # Beside its last pixel a map is interpolated, at most one sample far.
-    assert maps["half"].known_share(raster) == pytest.approx(0.5, abs=1.5 / raster.columns)
+    assert maps["half"].known_fraction(raster) == pytest.approx(0.5, abs=1.5 / raster.columns)
     assert list(uncovered({"whole": maps["whole"]}, raster)) == []
     (sentence,) = uncovered({"half": maps["half"]}, raster)
-    assert sentence.startswith("The emissivity map 'half' tells 50")
+    assert sentence.startswith("The emissivity map 'half' covers 50")
     assert "elsewhere its emissivity is 0" in sentence
     with pytest.raises(ValueError, match=r"the map 'away' lies at x .* expected the scene's"):
         list(uncovered({"away": maps["away"]}, raster))

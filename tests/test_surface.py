@@ -15,8 +15,8 @@ from chipglow.surface import (
     FeatureSurface,
     Texture,
     UniformSurface,
-    chip_share,
-    shear_band_share,
+    chip_fraction,
+    shear_band_fraction,
 )
 from chipglow.surface.cubic import cubic_convolution
 from chipglow.surface.emissivity import REACH
@@ -32,10 +32,10 @@ FLAT = FeatureSurface(
 )
 
 
-def texture(mean=0.5, deviation=0.05, grain=20e-6, seed=1, restore=True):
+def texture(mean=0.5, standard_deviation=0.05, grain=20e-6, seed=1, restore=True):
     generator = np.random.default_rng(seed)
-    emissivity = Emissivity(mean, deviation)
-    return Texture.random(emissivity, grain, generator, restore_deviation=restore)
+    emissivity = Emissivity(mean, standard_deviation)
+    return Texture.random(emissivity, grain, generator, restore_standard_deviation=restore)
 
 
 def a_scene(times=(0.0,), coordinates=None, raster=RASTER, **changed):
@@ -105,19 +105,19 @@ def test_deviation_that_is_told_is_that_of_the_map(restore):
     # trapezoidal rule over a period, is good to 1e-4 of itself.
     position = np.arange(10 * MAP_SIZE) * map_.grain / 10
     values = map_.at(position[None, :], position[:, None]).astype(np.float64)
-    assert values.std() == pytest.approx(map_.deviation, rel=1e-3)
+    assert values.std() == pytest.approx(map_.standard_deviation, rel=1e-3)
     assert values.mean() == pytest.approx(map_.mean, abs=1e-6)
 
 
 def test_restoring_gives_the_deviation_asked_for():
-    # The sampled deviation is good to 1e-4 of itself.
-    assert texture(0.42, 0.07).deviation == pytest.approx(0.07, rel=1e-4)
+    # The sampled standard deviation is good to 1e-4 of itself.
+    assert texture(0.42, 0.07).standard_deviation == pytest.approx(0.07, rel=1e-4)
 
 
 def test_without_restoring_enlarging_takes_a_fifth():
     # Over many maps the variance falls by the square of ∫k², which for the cubics is 57/70.
     # 16384 deviates: 0.55 % standard deviation of a standard deviation; four of it.
-    found = texture(0.5, 0.05, restore=False).deviation
+    found = texture(0.5, 0.05, restore=False).standard_deviation
     assert found == pytest.approx(0.05 * 57 / 70, rel=0.022)
 
 
@@ -130,22 +130,23 @@ def test_mean_is_that_asked_for(restore, seed):
 
 
 @pytest.mark.parametrize(
-    ("mean", "deviation"), [(0.05, 0.04), (0.03, 0.03), (0.95, 0.06), (0.5, 0.3), (0.42, 0.09)]
+    ("mean", "standard_deviation"),
+    [(0.05, 0.04), (0.03, 0.03), (0.95, 0.06), (0.5, 0.3), (0.42, 0.09)],
 )
-def test_low_and_high_emissivities_keep_mean_and_deviation_within_0_to_1(mean, deviation):
-    """Cut off at 0, mean and deviation of the first would be 0.057 and 0.033."""
-    maps = [texture(mean, deviation, seed=seed) for seed in range(12)]
+def test_low_and_high_emissivities_keep_mean_and_deviation_within_0_to_1(mean, standard_deviation):
+    """Cut off at 0, mean and standard deviation of the first would be 0.057 and 0.033."""
+    maps = [texture(mean, standard_deviation, seed=seed) for seed in range(12)]
     values = np.concatenate([map_._samples.ravel() for map_ in maps])
-    assert not Emissivity(mean, deviation).is_normal
+    assert not Emissivity(mean, standard_deviation).is_normal
     assert values.min() >= 0.0
     assert values.max() <= 1.0
     # What would be cut off is 11 % of the first; of a beta distribution float32 rounds a few.
     assert ((values == 0.0) | (values == 1.0)).mean() < 1e-3
     # 12 x 16384 deviates: four standard errors of the mean, and as much of a deviation whose
     # fourth moment is under eight times that of a normal distribution.
-    error = 1.25 * deviation / (MAP_SIZE * np.sqrt(12))
+    error = 1.25 * standard_deviation / (MAP_SIZE * np.sqrt(12))
     assert values.mean() == pytest.approx(mean, abs=4 * error)
-    assert values.std() == pytest.approx(deviation, abs=4 * error * 2)
+    assert values.std() == pytest.approx(standard_deviation, abs=4 * error * 2)
 
 
 @given(st.floats(-5.0, 5.0))
@@ -156,7 +157,8 @@ def test_the_papers_emissivities_are_normal(deviate):
             assert feature.is_normal
             found = np.interp(deviate, np.linspace(-REACH, REACH, table.size), table)
             # float32 of a number below 1.
-            assert found == pytest.approx(feature.mean + feature.deviation * deviate, abs=1e-6)
+            expected = feature.mean + feature.standard_deviation * deviate
+            assert found == pytest.approx(expected, abs=1e-6)
 
 
 def test_surfaces_beside_each_other_are_those_alone():
@@ -206,16 +208,16 @@ def test_presets_are_table_1():
         (CHIP_1, (0.42, 0.07), (0.53, 0.05)),
         (CHIP_2, (0.77, 0.03), (0.85, 0.02)),
     ):
-        assert (surface.chip.mean, surface.chip.deviation) == chip
-        assert (surface.shear_band.mean, surface.shear_band.deviation) == band
+        assert (surface.chip.mean, surface.chip.standard_deviation) == chip
+        assert (surface.shear_band.mean, surface.shear_band.standard_deviation) == band
         assert surface.workpiece == Emissivity(0.40, 0.03)
         assert surface.tool == Emissivity(0.58, 0.06)
 
 
 def test_shares_of_the_blends():
-    np.testing.assert_allclose(chip_share([0, 0.3, 0.35, 0.4, 0.5, 7]), [0, 0, 0.25, 0.5, 1, 1])
+    np.testing.assert_allclose(chip_fraction([0, 0.3, 0.35, 0.4, 0.5, 7]), [0, 0, 0.25, 0.5, 1, 1])
     np.testing.assert_allclose(
-        shear_band_share([0, 6e3, 12e3, 18e3, 30e3, 1e6]), [0, 0, 0.25, 0.5, 1, 1], atol=1e-12
+        shear_band_fraction([0, 6e3, 12e3, 18e3, 30e3, 1e6]), [0, 0, 0.25, 0.5, 1, 1], atol=1e-12
     )
 
 
@@ -235,7 +237,7 @@ def test_blend_against_plain_numpy(seed):
         name: CHIP_1.textures[name].at(frame.material_x, frame.material_y)
         for name in ("workpiece", "chip", "shear_band")
     }
-    chip, band = chip_share(frame.plastic_strain), shear_band_share(frame.plastic_strain_rate)
+    chip, band = chip_fraction(frame.plastic_strain), shear_band_fraction(frame.plastic_strain_rate)
     expected = (1 - chip) * maps["workpiece"] + chip * maps["chip"]
     expected = (1 - band) * expected + band * maps["shear_band"]
     tool = CHIP_1.textures["tool"].at(RASTER.x[None, :], RASTER.y[:, None])
@@ -251,9 +253,9 @@ def test_blend_is_linear_between_its_ends():
     rate = np.linspace(0.0, 4e4, RASTER.rows)[:, None]
     scene = a_scene(coordinates=at_rest(), plastic_strain=strain, plastic_strain_rate=rate)
     chip = np.interp(strain, [0.3, 0.5], [0.40, 0.77])
-    share = np.interp(rate, [6e3, 30e3], [0.0, 1.0])
+    fraction = np.interp(rate, [6e3, 30e3], [0.0, 1.0])
     found = FLAT.on(scene).emissivity(scene.frame(0))
-    np.testing.assert_allclose(found, chip + share * (0.85 - chip), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(found, chip + fraction * (0.85 - chip), rtol=0, atol=1e-6)
 
 
 def test_void_is_0_and_the_tool_does_not_move():

@@ -58,12 +58,12 @@ def test_the_intervals_are_narrow(rows):
     the radiance at 500 degC are 2.7 K. For 95 % these are doubled; the rest adds little.
     """
     for row in rows:
-        for name in ("emissivity of the body", "emissivity of the fissure"):
+        for name in ("emissivity of the body", "emissivity of the shear band"):
             reference, _, expanded = row[name]
             assert expanded < 0.05 * reference
         assert row["PSF, full width"][2] < 0.01 * row["PSF, full width"][0]
         assert row["blackbody"][2] < 2.0
-        assert row["temperature of the fissure"][2] < 12.0
+        assert row["temperature of the shear band"][2] < 12.0
 
 
 def test_a_thermocouple_far_off_is_found_out(experiment, tmp_path):
@@ -72,9 +72,9 @@ def test_a_thermocouple_far_off_is_found_out(experiment, tmp_path):
     notes["thermocouple_degC"] += 10 * synthetic_laboratory.THERMOCOUPLE
     (tmp_path / "notes.yaml").write_text(yaml.safe_dump(notes))
     found, reference = Evaluation(tmp_path).results(), experiment.reference()
-    for name in ("emissivity of the body", "emissivity of the fissure"):
+    for name in ("emissivity of the body", "emissivity of the shear band"):
         assert found[name].value + found[name].expanded < reference[name]
-    name = "temperature of the fissure"
+    name = "temperature of the shear band"
     assert found[name].value - found[name].expanded > reference[name]
     # What has nothing to do with the thermocouple is as right as ever.
     assert abs(found["blackbody"].value - reference["blackbody"]) < found["blackbody"].expanded
@@ -121,13 +121,13 @@ def test_the_commands_find_the_same_as_the_functions(experiment, tmp_path):
     found = Evaluation(tmp_path).results()
     emissivity = {row["region"]: row for row in read("emissivity.csv")}
     temperature = {row["region"]: row for row in read("temperature.csv")}
-    for name, region in (("body", "body"), ("fissure", "fissure")):
+    for name, region in (("body", "body"), ("shear band", "shear band")):
         expected = found[f"emissivity of the {name}"]
         assert float(emissivity[region]["mean"]) == pytest.approx(expected.value, rel=1e-6)
         stated = float(emissivity[region]["expanded_uncertainty"])
         assert stated == pytest.approx(expected.expanded, rel=1e-4)
-    hot = temperature["fissure"]
-    expected = found["temperature of the fissure"]
+    hot = temperature["shear band"]
+    expected = found["temperature of the shear band"]
     assert float(hot["true_temperature"]) == pytest.approx(expected.value, abs=1e-3)
     # The file keeps degrees of freedom of both chances together, not of each.
     assert float(hot["expanded_uncertainty"]) == pytest.approx(expected.expanded, rel=0.01)

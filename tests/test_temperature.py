@@ -366,7 +366,7 @@ def test_an_emissivity_of_another_temperature_is_doubtful(folder):
     for reference, doubtful in ((HEATING.reference, True), (HOT - 20.0, False)):
         heating = replace(HEATING, reference=reference)
         found = determine_emissivity([image(kelvins=reference)], heating)
-        names = ("body left", "body right", "fissure 1", "fissure 2")
+        names = ("body left", "body right", "shear band 1", "shear band 2")
         rows = [replace(found.of(WHOLE), name=name) for name in names]
         write_emissivity(RegionEmissivities((found,), (tuple(rows),)), folder / "e.nc")
         code, output = run("hot.nc", "--regions", "regions.yaml", "--emissivity", "e.nc")

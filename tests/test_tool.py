@@ -221,8 +221,8 @@ def test_width_and_angle_of_the_chamfer_are_those_of_the_sharp_outline(tool):
         corners.append(along)
     assert corners[0] - corners[1] == pytest.approx(tool.chamfer.width, rel=1e-9)
     # The flat between its rounded corners is on the surface, with the land's normal.
-    for share in (0.01, 0.5, 0.99):
-        place = lower + share * (upper - lower) + (tool.edge_radius + 1e-6) * normal
+    for fraction in (0.01, 0.5, 0.99):
+        place = lower + fraction * (upper - lower) + (tool.edge_radius + 1e-6) * normal
         assert surface_distance(*place, tool.surface) == pytest.approx((1e-6, *normal), abs=1e-9)
 
 

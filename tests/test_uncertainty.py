@@ -208,11 +208,11 @@ def test_gtc_gives_the_same():
 # Errors that are the same, and errors that are not
 
 ESTIMATES = st.builds(
-    lambda values, spreads, shares: (
+    lambda values, spreads, fractions: (
         Estimate(values)
         .with_component("calibration", spreads)
-        .with_component("noise", shares, independent="per element")
-        .with_component("place", shares[0], independent="common")
+        .with_component("noise", fractions, independent="per element")
+        .with_component("place", fractions[0], independent="common")
     ),
     *(
         st.lists(st.floats(low, 100.0), min_size=4, max_size=4).map(np.array)

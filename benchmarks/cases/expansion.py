@@ -139,7 +139,7 @@ def bent(cells=(10e-6, 5e-6)):
             unit="1/m",
         ),
         Check(
-            "stress in the plane, cell 10 µm, share of that across",
+            "stress in the plane, cell 10 µm, fraction of that across",
             "none",
             0.0,
             stress_in_plane(blocks[0]) / ACROSS,

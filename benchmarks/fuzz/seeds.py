@@ -164,8 +164,8 @@ def _movie_seed(folder: Path, codec: str, pixels: str, name: str) -> Seed:
     import av
     from matplotlib import colormaps
 
-    share = np.linspace(0.0, 1.0, 64)[None, :] * np.ones((64, 1))
-    picture = (colormaps["jet"](share)[..., :3] * 255).round().astype(np.uint8)
+    fraction = np.linspace(0.0, 1.0, 64)[None, :] * np.ones((64, 1))
+    picture = (colormaps["jet"](fraction)[..., :3] * 255).round().astype(np.uint8)
     with av.open(str(folder / name), "w") as container:
         stream = container.add_stream(codec, rate=10)
         stream.width = stream.height = 64

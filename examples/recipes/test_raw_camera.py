@@ -38,4 +38,4 @@ def test_an_entry_point_finds_the_format():
     entry = EntryPoint("raw", "raw_camera:RAW", "chipglow.camera_file")
     assert entry.load() is RAW
     assert isinstance(RAW, CameraFormat)
-    assert RAW.tells_quantity
+    assert RAW.states_quantity

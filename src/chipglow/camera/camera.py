@@ -50,14 +50,14 @@ class Camera:
     offset : tuple of float
         Corner of the first pixel in m, right of and down from the scene's upper left corner.
     fill_factor : float
-        Share of a pixel's square that is sensitive: a square in its middle.
+        Fraction of a pixel's square that is sensitive: a square in its middle.
     psf : PointSpreadFunction, optional
         How the camera spreads a point; None for an ideal camera (the paper's case 2).
     psf_order : {"optics", "detector"}
         ``optics`` blurs the scene's samples and lets the pixels integrate the blurred image, as
         light does it: the point spread function is that of the optics alone. ``detector`` is the
         paper's: the pixels integrate the scene, and the blur is applied from pixel to pixel.
-        The kernel is then the share of a point's light that each pixel receives, which holds
+        The kernel is then the fraction of a point's light that each pixel receives, which holds
         the pixel's footprint a second time: the variance of the blur is larger by pitch² / 12.
     integration_time : float
         In s.
@@ -382,7 +382,7 @@ class Camera:
         )
 
     def _attributes(self) -> dict[str, float | str]:
-        """What a measurement does not tell of the camera by itself; SI, without what is None."""
+        """What a measurement does not state of the camera by itself; SI, without what is None."""
         attributes: dict[str, float | str | None] = {
             "offset_right": self.offset[0],
             "offset_down": self.offset[1],

@@ -171,7 +171,7 @@ def expose_all(
 def frame_weights(
     times: NDArray[np.float64], frame_spacing: float, start: float, duration: float
 ) -> tuple[range, NDArray[np.float64]]:
-    """Share of an integration time that each sub-frame stands for.
+    """Fraction of an integration time that each sub-frame stands for.
 
     A sub-frame stands for the time from its own to the next one's, the last one and those before
     a gap for `frame_spacing`: 10 µs that begin with a sub-frame hold fifty of 0.2 µs, all of one

@@ -139,7 +139,7 @@ def _print_tables(console: "Console", found: "RegionEmissivities") -> None:
         "region": "{region}",
         "pixels": "{pixels}",
         "mean": "{mean:.4f}",
-        "sd of pixels": "{deviation:u}",
+        "sd of pixels": "{standard_deviation:u}",
         "u": "{standard_uncertainty:u}",
         "U 95 %": "{expanded_uncertainty:u}",
         "k": "{coverage_factor:.2f}",

@@ -28,8 +28,8 @@ def say_of_cut(inertia: Inertia | None, warnings: Iterable[str] = ()) -> None:
 
 
 def _known(inertia: Inertia) -> list[str]:
-    shares = (
+    known = (
         (inertia.kinetic_fraction, "kinetic energy at most {} of the work"),
         (inertia.force_fraction, "momentum flux {} of the mean cutting force"),
     )
-    return [text.format(f"{share:.2%}") for share, text in shares if isfinite(share)]
+    return [text.format(f"{fraction:.2%}") for fraction, text in known if isfinite(fraction)]

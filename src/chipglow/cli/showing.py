@@ -138,7 +138,8 @@ def _tool_text(tool: Tool) -> str:
 
 def _state(summary: SceneSummary) -> _Rows:
     fractions = (
-        f"{kind.name.lower()} {100 * share:.3g} %" for kind, share in summary.fractions.items()
+        f"{kind.name.lower()} {100 * fraction:.3g} %"
+        for kind, fraction in summary.fractions.items()
     )
     yield "samples that show", ", ".join(fractions)
     quality = summary.quality

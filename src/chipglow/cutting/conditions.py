@@ -57,7 +57,7 @@ class Friction(Part):
     friction_factor: Annotated[
         float,
         Parameter(
-            "Limit of the friction stress, as a share of the chip's shear flow stress.",
+            "Limit of the friction stress, as a fraction of the chip's shear flow stress.",
             least=0.0,
             most=1.0,
         ),

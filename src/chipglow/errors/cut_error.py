@@ -516,7 +516,7 @@ def _forces(scene: Scene) -> CuttingForces | None:
 
 
 def _unaccounted(scene: Scene) -> float:
-    """Share of the drive's work that the energy balance does not find again, at the end."""
+    """Fraction of the drive's work that the energy balance does not find again, at the end."""
     if "drive_work" not in scene.data:
         return nan
     account = {name: np.asarray(scene.data[name].values, dtype=np.float64) for name in ENERGY_UNITS}

@@ -210,7 +210,7 @@ def import_scene(
     path : path-like
         The file to write; it appears when it is whole.
     progress : callable, optional
-        Told the share that is done, 0 to 1.
+        Told the fraction that is done, 0 to 1.
     looked : Prospect, optional
         What `prospect` said, if it was asked before.
     resume : UnfinishedScene, optional
@@ -245,11 +245,11 @@ def import_scene(
         try:
             for number, frame in enumerate(_frames(wanted, raster, done), start=done + 1):
                 writer.append(frame)
-                share = number / len(survey.times)
+                fraction = number / len(survey.times)
                 if progress:
-                    progress(min(share, 1.0))
+                    progress(min(fraction, 1.0))
                 if monotonic() > due:
-                    writer.checkpoint({_KEY: np.frombuffer(key.encode(), np.uint8)}, share)
+                    writer.checkpoint({_KEY: np.frombuffer(key.encode(), np.uint8)}, fraction)
                     kept = f"{number} frames are kept"
                     due = monotonic() + _CHECKPOINT_INTERVAL
         except KeyboardInterrupt:

@@ -196,7 +196,7 @@ class SceneWriter:
         state : mapping
             Arrays by name.
         progress : float
-            Share of the work that is done, 0 to 1.
+            Fraction of the work that is done, 0 to 1.
 
         Returns
         -------

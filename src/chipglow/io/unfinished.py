@@ -29,7 +29,7 @@ class UnfinishedScene:
     part : Path
         File under a temporary name in which the writer wrote.
     progress : float
-        Share of the work that was done at the last checkpoint; 0 if there is none.
+        Fraction of the work that was done at the last checkpoint; 0 if there is none.
     """
 
     part: Path
@@ -91,7 +91,7 @@ def write_checkpoint(
     state : mapping
         Arrays by name.
     progress : float
-        Share of the work that is done.
+        Fraction of the work that is done.
     times : sequence of float
         Times of the frames in s.
     chunks : sequence

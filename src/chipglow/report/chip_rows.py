@@ -25,14 +25,14 @@ def _segment_rows(chip: ChipMetrics) -> list[Row]:
             "kHz",
             chip.frequency * 1e-3,
             1,
-            "1 over the period of the forces; the spread is its standard uncertainty.",
+            "1 over the period of the forces; ± is its standard uncertainty.",
             chip.frequency * chip.period_uncertainty / chip.period * 1e-3,
         ),
         _micrometres(
             "segment_spacing_um",
             "Uncut length of a segment",
             chip.spacing,
-            "Period times cutting speed; the spread is its standard uncertainty.",
+            "Period times cutting speed; ± is its standard uncertainty.",
             chip.spacing_uncertainty,
         ),
         _micrometres(
@@ -99,7 +99,7 @@ def _contact_rows(chip: ChipMetrics) -> list[Row]:
             "m/s",
             chip.chip_speed,
             2,
-            "Up the rake face where the thickness is read; the spread is over time.",
+            "Up the rake face where the thickness is read; ± is the standard deviation over time.",
             chip.chip_speed_standard_deviation,
         ),
         _micrometres(
@@ -162,10 +162,15 @@ def _scan_text(chip: ChipMetrics) -> str:
 
 def _segments_text(chip: ChipMetrics) -> str:
     count = f"{chip.segments} segment{'' if chip.segments == 1 else 's'}"
-    return f"Of {count} that passed whole on that normal; one segment has no spread."
+    return f"Of {count} that passed whole on that normal; one segment has no standard deviation."
 
 
 def _micrometres(
-    key: str, quantity: str, value: float, explanation: str, spread: float = nan, decimals: int = 0
+    key: str,
+    quantity: str,
+    value: float,
+    explanation: str,
+    uncertainty: float = nan,
+    decimals: int = 0,
 ) -> Row:
-    return own_row(key, quantity, "µm", value * 1e6, decimals, explanation, spread * 1e6)
+    return own_row(key, quantity, "µm", value * 1e6, decimals, explanation, uncertainty * 1e6)

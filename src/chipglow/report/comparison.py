@@ -421,7 +421,7 @@ def _headline(
     headline = result.draws.headlines.get(name)
     paper = paper if stands_beside(result) else (None, None)
     error = headline.error if headline else None
-    share = headline.psf_fraction if headline else None
+    fraction = headline.psf_fraction if headline else None
     yield _drawn(
         f"{name}_error_degC", quantity, "°C", paper[0], error, one_draw.error, explanations[0]
     )
@@ -430,7 +430,7 @@ def _headline(
         "PSF's portion of it",
         "%",
         paper[1],
-        share,
+        fraction,
         one_draw.psf_fraction,
         explanations[1],
         scale=100.0,

@@ -68,20 +68,20 @@ def _answer_text(result: StudyResult, name: str, begin: str, end: str) -> str:
     if headline is None:
         return ""
     low, high = headline.error.range
-    share = headline.psf_fraction
+    fraction = headline.psf_fraction
     psf = ""
-    if share is not None and share.mean > 0:  # beside the band the blur may bring light
-        psf = f", of which the point spread function makes {_spread(share, 100)} %"
+    if fraction is not None and fraction.mean > 0:  # beside the band the blur may bring light
+        psf = f", of which the point spread function makes {_mean_text(fraction, 100)} %"
     unknown = " Its sign is not known." if low <= 0 <= high and headline.error.draws > 1 else ""
     least, most = (f"{-end:.0f}".replace("-", "−") for end in (high, low))
     return (
-        f"{begin} {_spread(headline.error, -1)} °C too little radiance temperature ({least} to "
+        f"{begin} {_mean_text(headline.error, -1)} °C too little radiance temperature ({least} to "
         f"{most} °C in {headline.error.draws} draws of segment, texture and pixel phase)"
         f"{psf}.{unknown} {end}"
     ).strip()
 
 
-def _spread(draws: Distribution, scale: float) -> str:
+def _mean_text(draws: Distribution, scale: float) -> str:
     """Mean and standard deviation; the mean alone of a single draw."""
     mean = f"{scale * draws.mean:.0f}".replace("-", "−")
     if draws.draws < 2:
@@ -277,14 +277,14 @@ def _psf_text(result: StudyResult) -> str:
 def _wings_text(result: StudyResult, name: str) -> str:
     """What a Gaussian as wide at half maximum as the camera's PSF would make: the rest is wings."""
     psf, found, headline = result.camera.psf, _same_order(result), result.draws.headlines.get(name)
-    share = headline.psf_fraction if headline else None
-    if psf is None or share is None or not found.widths[0] <= psf.fwhm <= found.widths[-1]:
+    fraction = headline.psf_fraction if headline else None
+    if psf is None or fraction is None or not found.widths[0] <= psf.fwhm <= found.widths[-1]:
         return ""
     gaussian = float(np.interp(psf.fwhm, found.widths, found.psf_fraction(name)))
     if not isfinite(gaussian):
         return ""
     return (
-        f"It makes {_percent(share.mean)} of the error, a Gaussian of the same width "
+        f"It makes {_percent(fraction.mean)} of the error, a Gaussian of the same width "
         f"{_percent(gaussian)}: what it does beyond its half maximum counts too."
     )
 

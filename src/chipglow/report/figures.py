@@ -183,12 +183,12 @@ def error_lines(result: StudyResult) -> Figure:
 
 def _draw_papers_points(left: Axes, right: Axes) -> None:
     """The figures that the paper states, on the lines of its Figure 11."""
-    for axes, error, share in (
+    for axes, error, fraction in (
         (left, PAPER.rake_error.value, PAPER.rake_psf_fraction.value),
         (right, PAPER.band_error.value, PAPER.band_psf_fraction.value),
     ):
         _draw_point(axes, 0.0, error, BLUE, "the paper's error")
-        _draw_point(axes, 0.0, error * share, VERMILLION, "the paper's PSF portion")
+        _draw_point(axes, 0.0, error * fraction, VERMILLION, "the paper's PSF portion")
     worst = PAPER.band_worst.value
     right.axhline(worst, color=BLUE, linestyle="--", linewidth=1.0, label="the paper, beside")
     # The line is no axis: it needs room below.
@@ -295,7 +295,7 @@ def chip(result: StudyResult) -> Figure | None:
 
 
 def psf_sensitivity(result: StudyResult) -> Figure:
-    """Headline errors and the PSF's shares against its width, for both orders."""
+    """Headline errors and the PSF's fractions against its width, for both orders."""
     figure = drawing.new_figure(5.2)
     grid = figure.subplots(2, 2, sharex=True)
     for axes, panel in zip(grid.flat, _sensitivity_panels(result), strict=True):
@@ -339,8 +339,8 @@ def _sensitivity_panels(result: StudyResult) -> tuple[_SensitivityPanel, ...]:
     own = {}
     for name in ("rake", "band"):
         headline = result.draws.headlines.get(name)
-        share = headline.psf_fraction if headline else None
-        own[name] = (headline.error.mean if headline else None, share.mean if share else None)
+        fraction = headline.psf_fraction if headline else None
+        own[name] = (headline.error.mean if headline else None, fraction.mean if fraction else None)
     return (
         _SensitivityPanel(
             "a) error at the rake face",
@@ -468,10 +468,10 @@ def _fields_caption(result: StudyResult) -> str:
 def _measurement_caption(result: StudyResult) -> str:
     lower_limit = ""
     if result.camera.lower_limit is not None:
-        share = float(np.mean(_surface(result).errors.flagged))
+        fraction = float(np.mean(_surface(result).errors.flagged))
         lower_limit = (
             " Grey on the right: under the lower limit of the camera's range, "
-            f"{result.camera.lower_limit - KELVIN:.0f} °C, {100 * share:.0f} % of the pixels."
+            f"{result.camera.lower_limit - KELVIN:.0f} °C, {100 * fraction:.0f} % of the pixels."
         )
     return beside(
         result,

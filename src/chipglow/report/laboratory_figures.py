@@ -99,7 +99,7 @@ def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
         axes.errorbar(
             grid.along * 1e6,
             grid.frame_mean[row] - KELVIN,
-            yerr=grid.frame_deviation[row],
+            yerr=grid.frame_standard_deviation[row],
             color=colour,
             linewidth=1.4,
             elinewidth=0.8,

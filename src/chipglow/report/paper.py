@@ -11,7 +11,7 @@ from chipglow.surface import Emissivity
 
 @dataclass(frozen=True)
 class PaperValue:
-    """A figure of the paper: value in SI units (shares of 1), and where it stands."""
+    """A figure of the paper: value in SI units (fractions of 1), and where it stands."""
 
     value: float
     where: str
@@ -21,7 +21,7 @@ class PaperValue:
 class PaperValues:
     """The figures of Heigel and Whitenton (2010) that a study can be set beside.
 
-    Errors in K of radiance temperature, shares of 1, the period in s.
+    Errors in K of radiance temperature, fractions of 1, the period in s.
     """
 
     rake_error: PaperValue = PaperValue(-42.0, "abstract; Figure 11a shows about -40")
@@ -69,7 +69,7 @@ class EmissivityTexts:
         The feature.
     paper, true : str
         Mean ± standard deviation in the paper, and as put into the study.
-    mean, deviation : str
+    mean, standard_deviation : str
         What comes back from the image of a heated object: mean with its standard uncertainty, and
         the standard deviation over its pixels.
     textures : str
@@ -80,7 +80,7 @@ class EmissivityTexts:
     paper: str
     true: str
     mean: str
-    deviation: str
+    standard_deviation: str
     textures: str
 
 
@@ -99,10 +99,10 @@ def table_1(result: StudyResult) -> list[EmissivityTexts]:
         rows.append(
             EmissivityTexts(
                 feature=row.feature,
-                paper=_both(paper.mean, paper.deviation) if paper else "–",
-                true=_both(row.true.mean, row.true.deviation),
+                paper=_both(paper.mean, paper.standard_deviation) if paper else "–",
+                true=_both(row.true.mean, row.true.standard_deviation),
                 mean=f"{row.found.mean:.3f} ± {row.found.estimate.standard_uncertainty:.3f}",
-                deviation=f"{row.found.deviation:.3f}",
+                standard_deviation=f"{row.found.standard_deviation:.3f}",
                 textures=(
                     f"{row.means.mean():.3f} ± {row.means.std(ddof=1):.3f}" if several else "–"
                 ),
@@ -155,5 +155,5 @@ def table_2(study: Study) -> list[tuple[str, str, str]]:
     ]
 
 
-def _both(mean: float, deviation: float) -> str:
-    return f"{mean:.2f} ± {deviation:.2f}"
+def _both(mean: float, standard_deviation: float) -> str:
+    return f"{mean:.2f} ± {standard_deviation:.2f}"

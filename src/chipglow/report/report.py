@@ -179,7 +179,10 @@ def _emissivities(rows: Sequence[EmissivityTexts]) -> str:
         f"{_FOUND} The camera's blur takes from the standard deviation, and draws narrow shear "
         "bands toward the bodies beside them."
     )
-    lines = (Line((row.feature, row.true, row.mean, row.deviation, row.textures)) for row in rows)
+    lines = (
+        Line((row.feature, row.true, row.mean, row.standard_deviation, row.textures))
+        for row in rows
+    )
     return table_part(text, heads, lines) if rows else ""
 
 
@@ -201,7 +204,7 @@ def _table_1(rows: Sequence[EmissivityTexts]) -> str:
         "shear bands toward the bodies beside them."
     )
     lines = (
-        Line((row.feature, row.paper, row.true, row.mean, row.deviation, row.textures))
+        Line((row.feature, row.paper, row.true, row.mean, row.standard_deviation, row.textures))
         for row in rows
     )
     table = table_part(text, heads, lines)

@@ -89,7 +89,9 @@ def summary(
         "causes": {row.key: _causes(row) for row in causes},
         "one_draw": {row.key: row.one_draw for row in rows if row.one_draw is not None},
         "chip": {row.key: row.here for row in chip},
-        "chip_spread": {row.key: row.uncertainty for row in chip if row.uncertainty is not None},
+        "chip_uncertainty": {
+            row.key: row.uncertainty for row in chip if row.uncertainty is not None
+        },
         "paper": {row.key: row.paper for row in rows if row.paper is not None},
         "differs": {row.key: row.differs for row in rows if row.paper is not None},
         "explanation": {row.key: row.explanation for row in rows},

@@ -54,10 +54,10 @@ def place_rows(result: SceneErrors) -> list[PlaceRow]:
             rows.append(
                 PlaceRow(
                     f"{where} ({name})" if len(result.surfaces) > 1 else where,
-                    f"{_spread(one.reference, -KELVIN)} °C",
-                    f"{_spread(one.error)} °C",
+                    f"{_mean_text(one.reference, -KELVIN)} °C",
+                    f"{_mean_text(one.error)} °C",
                     f"{_rounded(low)} to {_rounded(high)}" if one.error.draws > 1 else "–",
-                    f"{_spread(one.psf_portion)} °C",
+                    f"{_mean_text(one.psf_portion)} °C",
                 )
             )
     return rows
@@ -137,14 +137,14 @@ def _sentence(one: PlaceErrors) -> str:
     way = "little" if mean < 0 else "much"
     scale = -1.0 if mean < 0 else 1.0
     scaled = Distribution(scale * one.error.values, one.error.causes)
-    text = f"the camera reads {_spread(scaled)} °C too {way} radiance temperature"
+    text = f"the camera reads {_mean_text(scaled)} °C too {way} radiance temperature"
     if one.error.draws > 1:
         low, high = one.error.range
         text += (
             f" (error of {_rounded(low)} to {_rounded(high)} °C in {one.error.draws} draws of "
             "exposure, texture and pixel phase)"
         )
-    return f"{text}; the point spread function makes {_spread(one.psf_portion)} °C of the error."
+    return f"{text}; the point spread function makes {_mean_text(one.psf_portion)} °C of the error."
 
 
 def _places(result: SceneErrors) -> str:
@@ -182,7 +182,7 @@ def _cause_text(part: Any) -> str:
     return f"{part.standard_deviation:.1f} °C ({100 * part.fraction:.0f} %)"
 
 
-def _spread(draws: Distribution, offset: float = 0.0) -> str:
+def _mean_text(draws: Distribution, offset: float = 0.0) -> str:
     """Mean and standard deviation, of as many decimals; the mean alone of a single draw."""
     mean = draws.mean + offset
     if draws.draws < 2:

@@ -33,7 +33,7 @@ def visible_picture(frame: Frame, raster: Raster) -> NDArray[np.float64]:
     if x is None or y is None:
         x, y = (grid.astype(np.float32) for grid in np.meshgrid(raster.x, raster.y))
     generator = np.random.default_rng(_SEED)
-    steel = Texture.random(_STEEL, _GRAIN, generator, restore_deviation=True).at(x, y)
+    steel = Texture.random(_STEEL, _GRAIN, generator, restore_standard_deviation=True).at(x, y)
     low, high = _SHEARED
     sheared = np.clip((frame.needed("plastic_strain") - low) / (high - low), 0.0, 1.0)
     grey = steel * (1.0 - _DARKEST * sheared)

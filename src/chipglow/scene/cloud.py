@@ -7,9 +7,9 @@ free surface too, where points lie to one side only.
 Notes
 -----
 Weights are quadratic B-splines. Values reach 1.1 spacings from a point and gradients 2: what lies
-beyond a gap wider than a spacing has no part in them. The filled share of the area, whose half is
-the surface, is smoothed twice as wide: on a straight surface half a spacing outside of the last row
-it is one half. Where points lie at random, not as on a lattice that was deformed, all widths
+beyond a gap wider than a spacing has no part in them. The filled fraction of the area, whose half
+is the surface, is smoothed twice as wide: on a straight surface half a spacing outside of the last
+row it is one half. Where points lie at random, not as on a lattice that was deformed, all widths
 are twice as large, or the area would have holes between them.
 """
 
@@ -134,10 +134,10 @@ def sample_cloud(cloud: Cloud, raster: Raster) -> tuple[NDArray[np.float32], NDA
         own = _near(cloud, raster) & (cloud.material == kind)
         if not own.any():
             continue
-        share, found = _scatter_kind(cloud, own, raster)
-        filled += share
-        more = share > most
-        most[more] = share[more]
+        fraction, found = _scatter_kind(cloud, own, raster)
+        filled += fraction
+        more = fraction > most
+        most[more] = fraction[more]
         material[more] = kind
         values[:, more] = found[:, more]
     void = filled <= _FILLED
@@ -169,17 +169,17 @@ def _scatter_kind(
     rows = (raster.top - places[:, 1]) / raster.spacing - 0.5
     gradients *= raster.spacing
     totals = np.zeros((*raster.shape, values.shape[1]))
-    share, weight = np.zeros(raster.shape), np.zeros(raster.shape)
+    fraction, weight = np.zeros(raster.shape), np.zeros(raster.shape)
     width = spacing / raster.spacing
     if layers == 1 and neighbours.shape[1] > 0:
         width *= _coarseness(neighbours, nearest)
     _scatter(
-        columns, rows, width, area / raster.spacing**2, values, gradients, totals, weight, share
+        columns, rows, width, area / raster.spacing**2, values, gradients, totals, weight, fraction
     )
     limits = values.min(axis=0)[:, None, None], values.max(axis=0)[:, None, None]
     with np.errstate(invalid="ignore"):
         means = (totals / weight[..., None]).transpose(2, 0, 1)
-    return share, np.clip(means, *limits).astype(np.float32)
+    return fraction, np.clip(means, *limits).astype(np.float32)
 
 
 def _neighbours(
@@ -259,23 +259,23 @@ def _bell(distance):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _scatter(columns, rows, width, area, values, gradients, totals, weight, share):  # type: ignore[no-untyped-def]
+def _scatter(columns, rows, width, area, values, gradients, totals, weight, fraction):  # type: ignore[no-untyped-def]
     """Add what every point says to the samples around it; lengths in samples, rows downward."""
     fields = values.shape[1]
     for p in range(columns.size):
         narrow, wide = max(_SHARPNESS * width[p], 1.0), max(_SMOOTHING * width[p], 1.0)
         reach = 1.5 * wide
         first_row = max(int(np.ceil(rows[p] - reach)), 0)
-        last_row = min(int(np.floor(rows[p] + reach)), share.shape[0] - 1)
+        last_row = min(int(np.floor(rows[p] + reach)), fraction.shape[0] - 1)
         first_column = max(int(np.ceil(columns[p] - reach)), 0)
-        last_column = min(int(np.floor(columns[p] + reach)), share.shape[1] - 1)
+        last_column = min(int(np.floor(columns[p] + reach)), fraction.shape[1] - 1)
         for row in range(first_row, last_row + 1):
             down = row - rows[p]
             wide_y, narrow_y = _bell(down / wide), _bell(down / narrow)
             for column in range(first_column, last_column + 1):
                 right = column - columns[p]
                 smooth = wide_y * _bell(right / wide)
-                share[row, column] += area[p] / (wide * wide) * smooth
+                fraction[row, column] += area[p] / (wide * wide) * smooth
                 # Where no point is near but the area is filled, those farther off say the value.
                 w = area[p] * (narrow_y * _bell(right / narrow) + _FAINT * smooth)
                 weight[row, column] += w

@@ -84,17 +84,17 @@ def _regrid(values, material, first_x, weights_x, first_y, weights_y):  # type: 
     shape = (first_y.size, first_x.size)
     result = np.full((fields, *shape), np.nan, np.float32)
     kinds = np.zeros(shape, np.uint8)
-    share = np.empty(_KINDS)
+    fraction = np.empty(_KINDS)
     total, known = np.empty(fields), np.empty(fields)
     for row in range(shape[0]):
         for column in range(shape[1]):
-            share[:] = 0.0
+            fraction[:] = 0.0
             for a in range(weights_y.shape[1]):
                 for b in range(weights_x.shape[1]):
                     weight = weights_y[row, a] * weights_x[column, b]
                     if weight > 0.0:
-                        share[material[first_y[row] + a, first_x[column] + b]] += weight
-            kind = np.argmax(share)
+                        fraction[material[first_y[row] + a, first_x[column] + b]] += weight
+            kind = np.argmax(fraction)
             kinds[row, column] = kind
             if kind == 0:
                 continue

@@ -383,7 +383,7 @@ class Scene:
 
     @cached_property
     def _workpiece(self) -> NDArray[np.uint8]:
-        """The material of a scene that does not tell it."""
+        """The material of a scene that does not state it."""
         return np.full(self.raster.shape, Material.WORKPIECE, dtype=np.uint8)
 
 

@@ -58,7 +58,7 @@ class CameraSection(Settings[Camera]):
         "the scene.",
         "none, or such as [640, 512]",
     )
-    fill_factor: float = described(1.0, "Share of a pixel's square that takes light.")
+    fill_factor: float = described(1.0, "Fraction of a pixel's square that takes light.")
     offset_right: Position = described("0 um", "First pixel's corner from the scene's left edge.")
     offset_down: Position = described("0 um", "First pixel's corner from the scene's upper edge.")
     psf: Annotated[PSFSection | None, OR_NONE] = described(

@@ -20,7 +20,7 @@ class Fitted:
     Parameters
     ----------
     scene : Scene
-        The scene, with the study's tool if it tells none and the study does.
+        The scene, with the study's tool if it has none and the study does.
     surfaces : mapping
         The study's surfaces by name.
     assumed : tuple of str
@@ -54,9 +54,7 @@ def fit(study: Study, scene: Scene) -> Fitted:
     assumed = []
     if scene.tool is None and "tool" in study.cutting.model_fields_set:
         scene = scene.with_tool(study.cutting.tool.build())
-        assumed.append(
-            "The scene does not tell its tool: it is that of the study's section cutting.tool."
-        )
+        assumed.append("The scene has no tool: it is that of the study's section cutting.tool.")
     if scene.tool is not None and not (scene.frame(0).material == Material.TOOL).any():
         assumed.append(
             "The scene shows no tool: beyond the rake face nothing shines into the blur of the "
@@ -112,17 +110,17 @@ def uncovered(surfaces: Mapping[str, Surface], scene: Raster) -> Iterator[str]:
     for name, surface in surfaces.items():
         if not isinstance(surface, MapSurface):
             continue
-        share = surface.known_share(scene)
-        if share == 0.0:
+        fraction = surface.known_fraction(scene)
+        if fraction == 0.0:
             raise ValueError(
                 f"surface: the map {name!r} lies at {_place(surface.raster)}, expected the scene's "
                 f"place, {_place(scene)} (the tip of the emissivity's measurement puts it there)"
             )
-        if share < 1.0:
+        if fraction < 1.0:
             yield (
-                f"The emissivity map {name!r} tells {100 * share:.3g} % of the scene; elsewhere "
-                f"its emissivity is {surface.elsewhere:g}. It lies at {_place(surface.raster)}, "
-                f"the scene at {_place(scene)}."
+                f"The emissivity map {name!r} covers {100 * fraction:.3g} % of the scene; "
+                f"elsewhere its emissivity is {surface.elsewhere:g}. "
+                f"It lies at {_place(surface.raster)}, the scene at {_place(scene)}."
             )
 
 

@@ -85,7 +85,7 @@ def is_cut(study: Study) -> bool:
 
 
 def kept_progress(study: Study) -> float:
-    """Share of the study's cut that earlier runs left at a checkpoint, 0 to 1."""
+    """Fraction of the study's cut that earlier runs left at a checkpoint, 0 to 1."""
     return max((left.progress for left in unfinished_scenes(scene_path(_inputs(study)))), default=0)
 
 

@@ -25,14 +25,14 @@ CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2
 
 
 def _numbers(emissivity: Emissivity) -> dict[str, float]:
-    return {"mean": emissivity.mean, "deviation": emissivity.deviation}
+    return {"mean": emissivity.mean, "standard_deviation": emissivity.standard_deviation}
 
 
 class ChipSection(Section):
     """Emissivity of one chip."""
 
     body: Declared[Emissivity] = Field(description="Body of the segments.")
-    shear_band: Declared[Emissivity] = Field(description="Shear bands: the fissures of the chip.")
+    shear_band: Declared[Emissivity] = Field(description="Shear bands: the paper's fissures.")
 
     @classmethod
     def __get_pydantic_json_schema__(
@@ -79,8 +79,8 @@ class FeaturesSection(Section):
         "How textures move: material (each point keeps its own), mean (the paper's shift by the\n"
         "feature's mean velocity) or none.",
     )
-    restore_deviation: bool = described(
-        True, "Make up for the deviation that is lost when a texture is enlarged."
+    restore_standard_deviation: bool = described(
+        True, "Make up for the standard deviation that is lost when a texture is enlarged."
     )
 
     @field_validator("chips")
@@ -126,7 +126,7 @@ class FeaturesSection(Section):
                 grain=self.grain,
                 follow=self.follow,
                 seed=seed,
-                restore_deviation=self.restore_deviation,
+                restore_standard_deviation=self.restore_standard_deviation,
             )
             for name, chip in self.chips.items()
         }

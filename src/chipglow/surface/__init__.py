@@ -6,8 +6,8 @@ from chipglow.surface.feature import (
     CHIP_2,
     FeatureField,
     FeatureSurface,
-    chip_share,
-    shear_band_share,
+    chip_fraction,
+    shear_band_fraction,
 )
 from chipglow.surface.map import MapField, MapSurface
 from chipglow.surface.surface import (
@@ -41,6 +41,6 @@ __all__ = [
     "Texture",
     "UniformEmissivity",
     "UniformSurface",
-    "chip_share",
-    "shear_band_share",
+    "chip_fraction",
+    "shear_band_fraction",
 ]

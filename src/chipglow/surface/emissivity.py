@@ -33,21 +33,23 @@ class Emissivity(Part):
     """
 
     mean: Annotated[float, Parameter("Mean emissivity.", least=0.0, most=1.0)]
-    deviation: Annotated[float, Parameter("Standard deviation over the surface.", least=0.0)] = 0.0
+    standard_deviation: Annotated[
+        float, Parameter("Standard deviation over the surface.", least=0.0)
+    ] = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         most = 0.9 * sqrt(self.mean * (1.0 - self.mean))
-        if self.deviation > most:
+        if self.standard_deviation > most:
             raise ValueError(
-                f"deviation: {self.deviation:g}, expected up to {most:.3g} about a mean of "
-                f"{self.mean:g}"
+                f"standard_deviation: {self.standard_deviation:g}, expected up to {most:.3g} "
+                f"about a mean of {self.mean:g}"
             )
 
     @property
     def is_normal(self) -> bool:
         """Whether its values are distributed normally."""
-        reach = _NORMAL_REACH * self.deviation
+        reach = _NORMAL_REACH * self.standard_deviation
         return self.mean - reach >= 0.0 and self.mean + reach <= 1.0
 
     @cached_property
@@ -55,7 +57,7 @@ class Emissivity(Part):
         """Emissivity at normal deviates from −`REACH` to `REACH`, `STEPS` to a unit."""
         deviates = np.linspace(-REACH, REACH, round(2 * REACH * STEPS) + 1)
         if self.is_normal:
-            values = np.clip(self.mean + self.deviation * deviates, 0.0, 1.0)
+            values = np.clip(self.mean + self.standard_deviation * deviates, 0.0, 1.0)
         else:
             values = _beta_values(deviates, *self._beta_moments)
         return np.asarray(values, dtype=np.float32)
@@ -71,24 +73,24 @@ class Emissivity(Part):
 
         def excess(moments: NDArray[np.float64]) -> list[float]:
             mean = 1 / (1 + np.exp(-moments[0]))
-            deviation = sqrt(mean * (1 - mean)) / (1 + np.exp(-moments[1]))
-            values = _beta_values(deviates, mean, deviation)
+            standard_deviation = sqrt(mean * (1 - mean)) / (1 + np.exp(-moments[1]))
+            values = _beta_values(deviates, mean, standard_deviation)
             found = float(weights @ values)
             spread = sqrt(float(weights @ (values - found) ** 2))
-            return [found - self.mean, spread - self.deviation]
+            return [found - self.mean, spread - self.standard_deviation]
 
-        share = self.deviation / sqrt(self.mean * (1 - self.mean))
-        start = np.log([self.mean / (1 - self.mean), share / (1 - share)])
+        fraction = self.standard_deviation / sqrt(self.mean * (1 - self.mean))
+        start = np.log([self.mean / (1 - self.mean), fraction / (1 - fraction)])
         solution = root(excess, start, tol=1e-10).x
         mean = float(1 / (1 + np.exp(-solution[0])))
         return mean, float(sqrt(mean * (1 - mean)) / (1 + np.exp(-solution[1])))
 
 
 def _beta_values(
-    deviates: NDArray[np.float64], mean: float, deviation: float
+    deviates: NDArray[np.float64], mean: float, standard_deviation: float
 ) -> NDArray[np.float64]:
     """Values of a beta distribution where a normal one has these deviates."""
-    size = mean * (1 - mean) / deviation**2 - 1
+    size = mean * (1 - mean) / standard_deviation**2 - 1
     first, second = mean * size, (1 - mean) * size
     # The upper half by the survival function: 1 − p would be rounded away.
     lower = beta.ppf(norm.cdf(np.minimum(deviates, 0.0)), first, second)
@@ -101,8 +103,8 @@ def _enlarged_deviates() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     place, place_weight = np.polynomial.legendre.leggauss(4)
     lags = np.arange(-1, 3)[:, None]
     line = (cubic_convolution((place + 1) / 4 - lags) ** 2).sum(axis=0)
-    deviation = np.sqrt(np.outer(line, line) / ENLARGED_VARIANCE)
+    standard_deviation = np.sqrt(np.outer(line, line) / ENLARGED_VARIANCE)
     normal, normal_weight = np.polynomial.hermite_e.hermegauss(40)
     weights = np.multiply.outer(np.outer(place_weight, place_weight) / 4, normal_weight)
-    deviates = np.multiply.outer(deviation, normal)
+    deviates = np.multiply.outer(standard_deviation, normal)
     return deviates.ravel(), weights.ravel() / sqrt(2 * np.pi)

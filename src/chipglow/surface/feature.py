@@ -19,7 +19,7 @@ STRAIN_OF_WORKPIECE: Final = 0.3
 STRAIN_OF_CHIP: Final = 0.5
 """Plastic strain from which the chip's map holds alone."""
 RATE_OF_CHIP: Final = 6_000.0
-"""Plastic strain rate in 1/s up to which the shear band's map has no share."""
+"""Plastic strain rate in 1/s up to which the shear band's map has no fraction."""
 RATE_OF_SHEAR_BAND: Final = 30_000.0
 """Plastic strain rate in 1/s from which the shear band's map holds alone."""
 UNDEFORMED_STRAIN: Final = 0.01
@@ -46,8 +46,8 @@ class FeatureSurface(Surface):
     seed : int
         Seed of the textures; each feature has an independent stream of it. By default that of the
         paper's study.
-    restore_deviation : bool
-        Make up for the deviation that enlarging takes from a map of deviates.
+    restore_standard_deviation : bool
+        Make up for the standard deviation that enlarging takes from a map of deviates.
 
     Raises
     ------
@@ -57,7 +57,7 @@ class FeatureSurface(Surface):
     Notes
     -----
     "Create emissivity maps for each feature" and what follows in Heigel and Whitenton (2010). The
-    chip's share rises linearly from 0 at a plastic strain of 0.3 to 1 at 0.5; over that blend of
+    chip's fraction rises linearly from 0 at a plastic strain of 0.3 to 1 at 0.5; over that blend of
     chip and workpiece the shear band's rises from 0 at a plastic strain rate of 6 000 /s to 1 at
     30 000 /s; a scene without strain rate has no shear band. The tool's map is fixed. The void
     has emissivity 0.
@@ -70,7 +70,7 @@ class FeatureSurface(Surface):
     grain: float = 20e-6
     follow: Literal["material", "mean", "none"] = "material"
     seed: int = 2010
-    restore_deviation: bool = True
+    restore_standard_deviation: bool = True
 
     def __post_init__(self) -> None:
         if not 0 < self.grain < np.inf:
@@ -82,7 +82,7 @@ class FeatureSurface(Surface):
 
     @cached_property
     def textures(self) -> Mapping[str, Texture]:
-        """Textures by the names of `FEATURES`; their ``deviation`` is the realised one."""
+        """Textures by the names of `FEATURES`; their ``standard_deviation`` is the realised one."""
         streams = np.random.SeedSequence(self.seed).spawn(len(FEATURES))
         return {
             name: self._texture(getattr(self, name), np.random.default_rng(stream))
@@ -132,7 +132,7 @@ class FeatureSurface(Surface):
             emissivity,
             self.grain,
             generator,
-            restore_deviation=self.restore_deviation,
+            restore_standard_deviation=self.restore_standard_deviation,
         )
 
 
@@ -187,7 +187,7 @@ class FeatureField(EmissivityField):
         return super().beside(others)
 
     def _moves_like(self, other: "FeatureField") -> bool:
-        names = ("grain", "follow", "restore_deviation")
+        names = ("grain", "follow", "restore_standard_deviation")
         alike = all(getattr(self.surface, n) == getattr(other.surface, n) for n in names)
         return alike and self.raster == other.raster and np.array_equal(self.shifts, other.shifts)
 
@@ -296,15 +296,15 @@ class FeatureFields(EmissivityStack):
         return np.array([field.tool_map for field in self.fields])
 
 
-def chip_share(plastic_strain: ArrayLike) -> NDArray[np.float64]:
-    """Share of the chip's map over the workpiece's, 0 to 1, by plastic strain."""
+def chip_fraction(plastic_strain: ArrayLike) -> NDArray[np.float64]:
+    """Fraction of the chip's map over the workpiece's, 0 to 1, by plastic strain."""
     strain = np.asarray(plastic_strain, dtype=np.float64)
-    share = (strain - STRAIN_OF_WORKPIECE) / (STRAIN_OF_CHIP - STRAIN_OF_WORKPIECE)
-    return np.asarray(np.clip(share, 0.0, 1.0))
+    fraction = (strain - STRAIN_OF_WORKPIECE) / (STRAIN_OF_CHIP - STRAIN_OF_WORKPIECE)
+    return np.asarray(np.clip(fraction, 0.0, 1.0))
 
 
-def shear_band_share(plastic_strain_rate: ArrayLike) -> NDArray[np.float64]:
-    """Share of the shear band's map over the others, 0 to 1, by plastic strain rate in 1/s."""
+def shear_band_fraction(plastic_strain_rate: ArrayLike) -> NDArray[np.float64]:
+    """Fraction of the shear band's map over the others, 0 to 1, by plastic strain rate in 1/s."""
     rate = np.asarray(plastic_strain_rate, dtype=np.float64)
     return np.asarray(np.clip((rate - RATE_OF_CHIP) / (RATE_OF_SHEAR_BAND - RATE_OF_CHIP), 0, 1))
 
@@ -344,8 +344,8 @@ def _mean_velocities(frame: Frame, height: NDArray[np.float64]) -> NDArray[np.fl
 
 @njit(error_model="numpy", fastmath={"contract"}, forceinline=True)
 def _share(value, none, full):  # type: ignore[no-untyped-def]
-    share = (value - np.float32(none)) * np.float32(1.0 / (full - none))
-    return min(max(share, np.float32(0.0)), np.float32(1.0))
+    fraction = (value - np.float32(none)) * np.float32(1.0 / (full - none))
+    return min(max(fraction, np.float32(0.0)), np.float32(1.0))
 
 
 @njit(cache=True, parallel=True)
@@ -364,7 +364,7 @@ def _blend(  # type: ignore[no-untyped-def]
     tool_maps,
     result,
 ):
-    """Emissivity of every surface: shares of the features times their textures."""
+    """Emissivity of every surface: fractions of the features times their textures."""
     surfaces, rows, columns = result.shape
     seeds = nodes.shape[3]
     scale = np.float32(scale)
@@ -379,8 +379,8 @@ def _blend(  # type: ignore[no-untyped-def]
             chip = _share(strain[r, c], STRAIN_OF_WORKPIECE, STRAIN_OF_CHIP)
             band = _share(rate[r, c], RATE_OF_CHIP, RATE_OF_SHEAR_BAND)
             rest = np.float32(1.0) - band
-            for k, share in ((0, rest - rest * chip), (1, rest * chip), (2, band)):
-                if share > 0:
+            for k, fraction in ((0, rest - rest * chip), (1, rest * chip), (2, band)):
+                if fraction > 0:
                     across = cubic_taps((x[r, c] - np.float32(shift[k, 0])) * scale)
                     down = cubic_taps((y[r, c] - np.float32(shift[k, 1])) * scale)
                     if seeds == 1:
@@ -389,7 +389,7 @@ def _blend(  # type: ignore[no-untyped-def]
                         enlarge_all(nodes[k], down, across, deviates)
                     for n in range(surfaces):
                         deviate = deviates[seed_numbers[n]]
-                        result[n, r, c] += share * emissivity_at(deviate, tables[n, k])
+                        result[n, r, c] += fraction * emissivity_at(deviate, tables[n, k])
 
 
 @njit(cache=True, parallel=True)

@@ -68,8 +68,8 @@ class MapSurface(Surface):
         """Resample the image to a scene's samples."""
         return MapField(self.at(scene.raster))
 
-    def known_share(self, raster: Raster) -> float:
-        """Share of other samples, 0 to 1, at which the image tells the emissivity."""
+    def known_fraction(self, raster: Raster) -> float:
+        """Fraction of other samples, 0 to 1, at which the image tells the emissivity."""
         return float(np.mean(self._on(raster)[1] > _KNOWN))
 
     def at(self, raster: Raster) -> NDArray[np.float32]:

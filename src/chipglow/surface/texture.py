@@ -65,7 +65,7 @@ class Texture:
         grain: float,
         generator: np.random.Generator,
         *,
-        restore_deviation: bool,
+        restore_standard_deviation: bool,
     ) -> "Texture":
         """Texture of normal deviates.
 
@@ -77,13 +77,13 @@ class Texture:
             Size of one deviate in m.
         generator : numpy.random.Generator
             Where the deviates come from.
-        restore_deviation : bool
-            Widen the deviates so that the enlarged map has the deviation asked for; without it
-            the small map has it, and the enlarged one about a fifth less.
+        restore_standard_deviation : bool
+            Widen the deviates so that the enlarged map has the standard deviation asked for;
+            without it the small map has it, and the enlarged one about a fifth less.
         """
         deviates = generator.standard_normal((MAP_SIZE, MAP_SIZE))
-        if restore_deviation:
-            deviates /= _enlarged_deviation(deviates)
+        if restore_standard_deviation:
+            deviates /= _enlarged_standard_deviation(deviates)
         return cls(deviates.astype(np.float32), grain, emissivity)
 
     @property
@@ -97,13 +97,13 @@ class Texture:
         return float(self._samples.mean())
 
     @cached_property
-    def deviation(self) -> float:
+    def standard_deviation(self) -> float:
         """Standard deviation over the enlarged map."""
         return float(self._samples.std())
 
     @cached_property
     def _samples(self) -> NDArray[np.float64]:
-        """Values at even steps over one period: sums of cubics, good to 1e-4 of the deviation."""
+        """Values at even steps over one period: sums of cubics, good to 1e-4 of their scatter."""
         along = np.arange(_PER_NODE * MAP_SIZE) * self.grain / _PER_NODE
         return self.at(along[None, :], along[:, None]).astype(np.float64)
 
@@ -128,7 +128,7 @@ class Texture:
         return result.reshape(x.shape)
 
 
-def _enlarged_deviation(nodes: NDArray[np.float64]) -> float:
+def _enlarged_standard_deviation(nodes: NDArray[np.float64]) -> float:
     """Deviation over the enlarged map: its mean square is a quadratic form of the nodes.
 
     ∫∫ (Σ d_ij k(u−i) k(v−j))² du dv = Σ d_ij d_lm r(i−l) r(j−m) with r the autocorrelation of k.

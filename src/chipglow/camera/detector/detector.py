@@ -37,7 +37,7 @@ class Detector(Part):
         shape: tuple[int, int],
         gain_spread: float,
         offset_spread: float,
-        dead_share: float,
+        dead_fraction: float,
         generator: np.random.Generator,
     ) -> "Detector":
         """The same detector with detector elements that differ.
@@ -47,11 +47,11 @@ class Detector(Part):
         shape : tuple of int
             Rows and columns.
         gain_spread : float
-            Standard deviation of the elements' gains, as a share of the mean gain.
+            Standard deviation of the elements' gains, as a fraction of the mean gain.
         offset_spread : float
             Standard deviation of their offsets in counts.
-        dead_share : float
-            Share of dead elements, 0 to 1.
+        dead_fraction : float
+            Fraction of dead elements, 0 to 1.
         generator : numpy.random.Generator
             Where the random numbers come from.
         """
@@ -59,7 +59,7 @@ class Detector(Part):
             1.0 + gain_spread * generator.standard_normal(shape),
             offset_spread * generator.standard_normal(shape),
         )
-        dead = DeadElements(generator.random(shape) < dead_share)
+        dead = DeadElements(generator.random(shape) < dead_fraction)
         return replace(self, terms=(*self.terms, pattern, dead))
 
     def counts(

@@ -82,7 +82,7 @@ class PointSpreadFunction(PSFChoice):
 
     @abstractmethod
     def kernel(self, spacing: float) -> NDArray[np.float64]:
-        """Shares of a point's light on a grid of squares.
+        """Fractions of a point's light on a grid of squares.
 
         Parameters
         ----------
@@ -152,7 +152,7 @@ class AnnularAperturePSF(PointSpreadFunction):
         float, Parameter("Numerical aperture of the objective.", over=0.0, most=1.0)
     ] = 0.28
     obscuration: Annotated[
-        float, Parameter("Diameter of the central obstruction, as a share.", least=0.0, most=0.9)
+        float, Parameter("Diameter of the central obstruction, as a fraction.", least=0.0, most=0.9)
     ] = 0.35
     fwhm: float = field(init=False, repr=False, compare=False)
 
@@ -205,7 +205,7 @@ class AnnularAperturePSF(PointSpreadFunction):
     @property
     def _reach(self) -> float:
         """Radius, as v, that encircles `ANNULAR_ENERGY`."""
-        # Beyond the rings' first few, the share outside is 2 / (π v (1 − o)).
+        # Beyond the rings' first few, the fraction outside is 2 / (π v (1 − o)).
         far = 4 / (pi * (1 - self.obscuration) * (1 - ANNULAR_ENERGY))
         v = np.linspace(0.0, far, ceil(20 * far))
         clear = 1 - self.obscuration**2
@@ -250,7 +250,7 @@ class MeasuredPSF(PointSpreadFunction):
     Parameters
     ----------
     weights : array_like
-        Share of a point's light on each square of a grid, in any unit; a square array of odd
+        Fraction of a point's light on each square of a grid, in any unit; a square array of odd
         side, first row on top, the point in the middle of the middle square.
     spacing : float
         Side of those squares in m, on the scene.
@@ -345,8 +345,10 @@ class MeasuredPSF(PointSpreadFunction):
         width = samples * self.spacing
         half = _half_size(width / 2, spacing)
         left = width / 2 + spacing * (np.arange(-half, half + 1) - 0.5)
-        share = overlap_lengths(left, spacing, samples, self.spacing) / self.spacing
-        return normalised(np.einsum("ij,jk,lk->il", share, self.weights, share, optimize=True))
+        fraction = overlap_lengths(left, spacing, samples, self.spacing) / self.spacing
+        return normalised(
+            np.einsum("ij,jk,lk->il", fraction, self.weights, fraction, optimize=True)
+        )
 
 
 @final

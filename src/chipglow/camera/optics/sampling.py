@@ -10,7 +10,7 @@ from scipy import sparse
 from chipglow.scene import Raster
 
 _ROUNDING: Final = 1e-6
-"""Share of a pixel or a sample that is taken for rounding of lengths."""
+"""Fraction of a pixel or a sample that is taken for rounding of lengths."""
 
 
 def overlap_lengths(
@@ -107,7 +107,7 @@ def integrate(
     scene, pixels : Raster
         Where the samples and the pixels are.
     fill_factor : float
-        Share of a pixel's square that is sensitive: a square in its middle.
+        Fraction of a pixel's square that is sensitive: a square in its middle.
 
     Returns
     -------

@@ -175,9 +175,9 @@ def _curve() -> NDArray[np.uint16]:
     fitted to it: within two counts of the table, and clipped where it is.
     """
     codes = np.arange(1024)
-    share = (codes - 63.5573) / (1041.4199 - 63.5573)
-    power = (np.maximum(share + 0.0962, 0) / 1.0962) ** (1 / 0.4502)
-    light = np.where(share < 0.081, share / 4.6157, power)
+    fraction = (codes - 63.5573) / (1041.4199 - 63.5573)
+    power = (np.maximum(fraction + 0.0962, 0) / 1.0962) ** (1 / 0.4502)
+    light = np.where(fraction < 0.081, fraction / 4.6157, power)
     counts = np.clip(np.round(64.0143 + 4237.8147 * light), 0, 4095)
     return np.where(codes < 1015, counts, 4095).astype(np.uint16)
 

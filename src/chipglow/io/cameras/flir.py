@@ -400,12 +400,12 @@ def _object(fields: _Fields, remarks: FileRemarks) -> ObjectParameters:
     atmosphere, window = _finite(fields, 0x2C), _finite(fields, 0x34)
     transmittance = window if window is not None and window > 0 else 1.0
     if distance is not None and humidity is not None and atmosphere is not None:
-        share = humidity / 100 if humidity > 2 else humidity
+        fraction = humidity / 100 if humidity > 2 else humidity
         remarks.notes.append(
             f"The camera was told of an object at {distance:g} m and a humidity of "
-            f"{share * 100:g} %."
+            f"{fraction * 100:g} %."
         )
-        transmittance *= _through_air(fields, distance, share, atmosphere)
+        transmittance *= _through_air(fields, distance, fraction, atmosphere)
     if window is not None and window != 1:
         remarks.notes.append(
             f"The camera was told of a window that lets {window * 100:g} % pass, at "
@@ -426,9 +426,9 @@ def _through_air(fields: _Fields, distance: float, humidity: float, temperature:
     Minkina and Dudzik, Infrared Thermography: Errors and Uncertainties (2009), Section 2.3.
     """
     alpha, beta = ((fields.number(a, "f"), fields.number(a + 4, "f")) for a in (0x70, 0x78))
-    share = fields.number(0x80, "f")
+    fraction = fields.number(0x80, "f")
     celsius = temperature - _ZERO
-    known = isfinite(sum(alpha) + sum(beta) + share) and -100 < celsius < 100
+    known = isfinite(sum(alpha) + sum(beta) + fraction) and -100 < celsius < 100
     if not known or not (0 <= distance < 1e6 and 0 <= humidity <= 1):
         return 1.0
     water = humidity * exp(
@@ -438,7 +438,7 @@ def _through_air(fields: _Fields, distance: float, humidity: float, temperature:
         exp(min(_LARGE, -sqrt(distance) * (a + b * sqrt(water))))
         for a, b in zip(alpha, beta, strict=True)
     )
-    return share * first + (1 - share) * second
+    return fraction * first + (1 - fraction) * second
 
 
 def _finite(fields: _Fields, place: int) -> float | None:

@@ -1,4 +1,4 @@
-"""Formats of cameras' files: which they are, how they are told, and who reads them."""
+"""Formats of cameras' files: which they are, how they are recognised, and who reads them."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,13 +11,13 @@ from chipglow.io.cameras.cine import is_cine, read_cine
 from chipglow.io.cameras.flir import is_flir, packed_counts, read_flir
 from chipglow.io.cameras.hcc import is_hcc, read_hcc
 from chipglow.io.cameras.ptw import is_ptw, read_ptw
-from chipglow.io.cameras.stacks import Told, read_stack
+from chipglow.io.cameras.stacks import Stated, read_stack
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.file_order import files_of
 from chipglow.quantities import of_other_packages
 
 _HEAD: Final = 520
-"""Bytes from which a kind of file is told: those of HDF5 may follow 512 of the user's."""
+"""Bytes by which a kind of file is recognised: those of HDF5 may follow 512 of the user's."""
 
 
 Begins = Callable[[bytes], bool]
@@ -59,7 +59,7 @@ class CameraFormat:
     inside_hdf5: bool = False
 
     @property
-    def tells_quantity(self) -> bool:
+    def states_quantity(self) -> bool:
         """Whether such a file says what was measured, so that the user need not."""
         return self.read is not None
 
@@ -145,9 +145,9 @@ def _by_content(head: bytes) -> str | None:
     return None
 
 
-def read_here(path: Path, kind: str, frames: slice | None, told: Told) -> Recording:
+def read_here(path: Path, kind: str, frames: slice | None, stated: Stated) -> Recording:
     """Read frames of one of `camera_formats` in this process; see `read_recording`."""
     one = camera_formats()[kind]
     if one.read is not None:
-        return one.read(path, frames, told.interval)
-    return read_stack(path, one.suffixes[0], frames, told)
+        return one.read(path, frames, stated.interval)
+    return read_stack(path, one.suffixes[0], frames, stated)

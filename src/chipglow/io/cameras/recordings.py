@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from chipglow.camera import PlanckConversion, Recording
 from chipglow.io.cameras.formats import camera_formats, find_format, read_here
-from chipglow.io.cameras.stacks import Told
+from chipglow.io.cameras.stacks import Stated
 from chipglow.io.sandbox import Message, Sandbox, patience_for
 from chipglow.io.sources import SourceError
 from chipglow.radiometry import ObjectParameters
@@ -62,27 +62,27 @@ def read_recording(
     OSError
         If it is missing or not accessible.
     """
-    told = Told(quantity, unit, interval, dataset, axes)
+    stated = Stated(quantity, unit, interval, dataset, axes)
     path = Path(path)
     if format is not None and format not in camera_formats():
         raise ValueError(f"format: is {format!r}, expected one of {', '.join(camera_formats())}")
     kind = format or find_format(path)
     one = camera_formats()[kind]
-    if one.tells_quantity and told != Told(interval=interval):
+    if one.states_quantity and stated != Stated(interval=interval):
         raise ValueError(
             f"{path}: is {one.description}, which says itself what was measured: "
             "expected no quantity, unit, dataset or axes"
         )
     if one.in_subprocess(path):
         sandbox = Sandbox(str(path), patience_for((str(path),)))
-        with sandbox.answers(partial(_read, path, kind, frames, told)) as answers:
+        with sandbox.answers(partial(_read, path, kind, frames, stated)) as answers:
             return _recording(next(answers))
-    return read_here(path, kind, frames, told)
+    return read_here(path, kind, frames, stated)
 
 
-def _read(path: Path, kind: str, frames: slice | None, told: Told) -> Iterator[Message]:
+def _read(path: Path, kind: str, frames: slice | None, stated: Stated) -> Iterator[Message]:
     try:
-        recording = read_here(path, kind, frames, told)
+        recording = read_here(path, kind, frames, stated)
     except FileNotFoundError:
         raise
     except (ValueError, OSError) as error:

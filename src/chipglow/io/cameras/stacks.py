@@ -65,7 +65,7 @@ class MissingError(SourceError):
 
 
 @dataclass(frozen=True)
-class Told:
+class Stated:
     """What the user says of a file that does not say it itself; see `read_recording`."""
 
     quantity: str | None = None
@@ -91,7 +91,7 @@ class Told:
             raise ValueError(f"axes: are {', '.join(self.axes)}, expected {', '.join(AXES)}")
 
 
-def read_stack(path: Path, kind: str, frames: slice | None, told: Told) -> Recording:
+def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> Recording:
     """Read frames of an array in a file.
 
     Parameters
@@ -102,7 +102,7 @@ def read_stack(path: Path, kind: str, frames: slice | None, told: Told) -> Recor
         Ending of the names of such files; the file's own may be another.
     frames : slice, optional
         Which frames to read.
-    told : Told
+    stated : Stated
         What the user says of it.
 
     Raises
@@ -115,13 +115,13 @@ def read_stack(path: Path, kind: str, frames: slice | None, told: Told) -> Recor
     with ExitStack() as stack:
         reader = exported_table if kind == ".csv" else ARRAY_READERS[kind]
         arrays = open_arrays(str(path), stack, reader)
-        one = _dataset(path, arrays, told.dataset)
+        one = _dataset(path, arrays, stated.dataset)
         remarks = SourceRemarks()
-        axes = axes_of(one, told.axes, remarks)
+        axes = axes_of(one, stated.axes, remarks)
         lengths = dict(zip(axes, one.array.shape, strict=True))
         check_picture(path, lengths["y"], lengths["x"], MOST_ON_A_SIDE)
         chosen = chosen_frames(path, frames, lengths.get("time", 1), lengths["y"] * lengths["x"])
-        unit, times = _unit(one, told), _times(one, arrays, axes, chosen, told, remarks)
+        unit, times = _unit(one, stated), _times(one, arrays, axes, chosen, stated, remarks)
         if unit is None or times is None:
             raise MissingError(f"{one}: {_missing(one, unit, times)}")
         signal = _signal(one, axes, chosen)
@@ -181,18 +181,18 @@ def _missing(one: Chosen, unit: str | None, times: NDArray[np.float64] | None) -
     return "; ".join(parts)
 
 
-def _unit(one: Chosen, told: Told) -> str | None:
+def _unit(one: Chosen, stated: Stated) -> str | None:
     """Unit of the samples, as the user or the file says; None if neither does."""
-    if told.unit is not None:
-        return told.unit
+    if stated.unit is not None:
+        return stated.unit
     said = one.unit if isinstance(one.unit, str) else ""
     unit = said if said in RECORDING_UNITS else _SPELLINGS.get(said.strip().lower())
-    if unit is None and told.quantity in ("counts", "radiance"):
-        unit = "counts" if told.quantity == "counts" else "W/m2/sr"
+    if unit is None and stated.quantity in ("counts", "radiance"):
+        unit = "counts" if stated.quantity == "counts" else "W/m2/sr"
     if unit is None:
         return None
-    if told.quantity is not None and RECORDING_UNITS[unit][0] != told.quantity:
-        raise SourceError(f"{one}: is in {said}, which is no unit of {told.quantity}")
+    if stated.quantity is not None and RECORDING_UNITS[unit][0] != stated.quantity:
+        raise SourceError(f"{one}: is in {said}, which is no unit of {stated.quantity}")
     return unit
 
 
@@ -201,12 +201,12 @@ def _times(
     arrays: Mapping[str, StoredArray],
     axes: tuple[str, ...],
     chosen: range,
-    told: Told,
+    stated: Stated,
     remarks: SourceRemarks,
 ) -> NDArray[np.float64] | None:
     """Times of the chosen frames in s; None if neither the user nor the file says them."""
-    if told.interval is not None:
-        return np.asarray(chosen, np.float64) * told.interval
+    if stated.interval is not None:
+        return np.asarray(chosen, np.float64) * stated.interval
     count = one.array.shape[axes.index("time")] if "time" in axes else 1
     if count == 1:
         return np.zeros(1)

@@ -22,7 +22,7 @@ Picture: TypeAlias = NDArray[np.uint8]
 _LEVELS: Final = 256
 _SAME: Final = 7.0  # a difference in Lab that a codec makes between two pixels of one colour
 _APART: Final = 15.0
-_CHORD: Final = 0.01  # half of the share of the scale over which its slope is taken
+_CHORD: Final = 0.01  # half of the fraction of the scale over which its slope is taken
 _BAND_JUMP: Final = 3.0
 _FEWEST_BANDS, _MOST_BANDS = 4, 40
 _NARROWEST_BAND: Final = 6
@@ -445,21 +445,21 @@ def _nearest(place, labs, scale, banded):  # type: ignore[no-untyped-def]
         u0 = place[0] - labs[index, 0]
         u1 = place[1] - labs[index, 1]
         u2 = place[2] - labs[index, 2]
-        share = 0.0
+        fraction = 0.0
         if not banded:
             v0 = labs[index + 1, 0] - labs[index, 0]
             v1 = labs[index + 1, 1] - labs[index, 1]
             v2 = labs[index + 1, 2] - labs[index, 2]
             square = v0 * v0 + v1 * v1 + v2 * v2
             if square > 0:
-                share = min(max((u0 * v0 + u1 * v1 + u2 * v2) / square, 0.0), 1.0)
-            u0 -= share * v0
-            u1 -= share * v1
-            u2 -= share * v2
+                fraction = min(max((u0 * v0 + u1 * v1 + u2 * v2) / square, 0.0), 1.0)
+            u0 -= fraction * v0
+            u1 -= fraction * v1
+            u2 -= fraction * v2
         apart = u0 * u0 + u1 * u1 + u2 * u2
         if apart < best:
             best = apart
             value = scale[index]
-            if share > 0:
-                value += share * (scale[index + 1] - scale[index])
+            if fraction > 0:
+                value += fraction * (scale[index + 1] - scale[index])
     return value, np.sqrt(best)

@@ -106,7 +106,7 @@ class LammpsDump:
         return self._placed(one, {label: of for label, of in columns.items() if of is not None})
 
     def _placed(self, one: Snapshot, columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-        """With places, which may be unwrapped or shares of the box."""
+        """With places, which may be unwrapped or fractions of the box."""
         for (low, high), axis in zip(one.box, "xyz", strict=True):
             names = [
                 name for name in (axis, f"{axis}u", f"{axis}s", f"{axis}su") if name in columns

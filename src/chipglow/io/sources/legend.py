@@ -29,7 +29,7 @@ _AROUND: Final = 6
 _MOST_PIXELS: Final = 3000
 
 LEAST_EXPLAINED: Final = 0.7
-"""Share of a picture that must have the colours of its legend."""
+"""Fraction of a picture that must have the colours of its legend."""
 
 
 def find_legend(picture: Picture) -> Box | None:
@@ -107,7 +107,7 @@ def _extended(picture: Picture, box: Box) -> Box:
 
 
 def explained(picture: Picture, box: Box, scale: ColourScale) -> float:
-    """Share of what a picture shows, beside legend, background and lines, in colours of a scale."""
+    """Fraction of a picture, beside legend, background and lines, in colours of a scale."""
     left, top, right, bottom = box
     shown = ~dark_lines(picture)
     shown[max(top - _AROUND, 0) : bottom + _AROUND, max(left - _AROUND, 0) : right + _AROUND] = (

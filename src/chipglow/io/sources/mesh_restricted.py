@@ -19,7 +19,7 @@ NODE_NUMBER: Final = "GlobalNodeId"
 
 _BETWEEN: Final = ", "
 _BLANK: Final = 0.5
-"""Share of a block's elements from which on blank ones mean that it does not have the field."""
+"""Fraction of a block's elements from which on blank ones mean that it does not have the field."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def _has(frames: Sequence[Sequence[Block]], block: Block, name: str) -> bool:
 
 
 def _blank(grid: Any, name: str) -> Iterator[float]:
-    """Share of the elements that have a value of 0 or none: of their own, of their nodes."""
+    """Fraction of the elements that have a value of 0 or none: of their own, of their nodes."""
     if not grid.n_cells:
         return
     if name in grid.cell_data:

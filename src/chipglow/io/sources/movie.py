@@ -394,8 +394,8 @@ class MovieSource(Source):
         filled = self._turned(quality == FILLED)
         distance = sampling.mean(self._turned(quality.astype(np.float32)), shown & ~filled)
         result = np.round(np.nan_to_num(distance)).astype(np.uint8)
-        shares = sampling.share(filled & shown), sampling.share(shown)
-        result[(shares[0] > _HALF * shares[1])] = FILLED
+        fractions = sampling.fraction(filled & shown), sampling.fraction(shown)
+        result[(fractions[0] > _HALF * fractions[1])] = FILLED
         return result
 
     def _turned(self, values: NDArray[Any]) -> NDArray[Any]:
@@ -487,10 +487,10 @@ def _scale(
 
 
 def _check_legend(picture: Picture, box: Box, scale: ColourScale) -> None:
-    share = explained(picture, box, scale)
-    if share < LEAST_EXPLAINED:
+    fraction = explained(picture, box, scale)
+    if fraction < LEAST_EXPLAINED:
         raise SourceError(
-            f"legend: the picture has the colours of {box} in {share:.0%} of what it shows, "
+            f"legend: the picture has the colours of {box} in {fraction:.0%} of what it shows, "
             f"expected {LEAST_EXPLAINED:.0%} or more; give the box of the legend, or a named map"
         )
 

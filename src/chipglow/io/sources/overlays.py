@@ -147,8 +147,8 @@ class FieldReader:
             fill(values, read.seen & shown & ~tried, tried)
             errors.append(values[tried] - read.values[tried])
         error = np.concatenate(errors)
-        share = filled.sum() / shown.sum()
-        return float(np.sqrt(share * np.nanmean(error**2))) if error.size else 0.0
+        fraction = filled.sum() / shown.sum()
+        return float(np.sqrt(fraction * np.nanmean(error**2))) if error.size else 0.0
 
     @property
     def _tools(self) -> tuple[Colour, ...]:

@@ -45,13 +45,13 @@ class PictureSampling:
 
     def mean(self, values: NDArray[np.float32], valid: NDArray[np.bool_]) -> NDArray[np.float32]:
         """Mean of the valid pixels of each sample, float32; NaN where there is none."""
-        share = self._sum(valid)
+        fraction = self._sum(valid)
         total = self._sum(np.where(valid, values, 0.0))
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.where(share > 0, total / share, np.nan).astype(np.float32)
+            return np.where(fraction > 0, total / fraction, np.nan).astype(np.float32)
 
-    def share(self, chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Share of each sample that chosen pixels cover."""
+    def fraction(self, chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Fraction of each sample that chosen pixels cover."""
         return self._sum(chosen)
 
     def _sum(self, pixels: NDArray[np.generic]) -> NDArray[np.float64]:

@@ -198,10 +198,10 @@ def _response(image: ThermalImage, tool: Tool) -> NDArray[np.float64]:
         least = mean - np.hypot(half, both)
         turn = 0.5 * np.arctan2(-both, half) + np.pi / 2
         off_face = np.degrees(np.arcsin(np.clip(abs(np.cos(turn) * x + np.sin(turn) * y), 0, 1)))
-        share = np.clip(
+        fraction = np.clip(
             (off_face - _ALONG_THE_FACE[0]) / (_ALONG_THE_FACE[1] - _ALONG_THE_FACE[0]), 0, 1
         )
-        best = np.maximum(best, share * width**2 * np.maximum(-least, 0.0))
+        best = np.maximum(best, fraction * width**2 * np.maximum(-least, 0.0))
     return best
 
 

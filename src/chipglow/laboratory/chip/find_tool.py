@@ -178,7 +178,7 @@ def _gain(
     blur: float,
     image: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Root mean square that a break explains beyond a smooth course, as a share of the level."""
+    """Root mean square that a break explains beyond a smooth course, as a fraction of the level."""
     steps = np.arange(-_REACH, _REACH + 1.0)
     basis = _parabolas(steps - place[..., None] if np.any(place) else steps, blur)
     smooth = np.stack([steps**power for power in range(5)], axis=-1)
@@ -256,7 +256,7 @@ class _Strip:
         return np.asarray(line[0] + line[1] * self.up - self.middle, dtype=np.float64)
 
     def residuals(self, line: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What the model leaves of each row, as a share of its level, shape (rows, pixels)."""
+        """What the model leaves of each row, as a fraction of its level, shape (rows, pixels)."""
         steps = np.arange(-_REACH, _REACH + 1.0) - self.place(line)[:, None]
         left = _remainder(self.windows, _decays(steps, float(line[2])))
         return np.asarray(left / self.level[:, None])

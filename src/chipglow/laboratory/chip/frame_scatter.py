@@ -54,7 +54,7 @@ class FrameScatter:
         return cls(away * np.sqrt(longer / pairs), freedom if len(frames) > 1 else inf)
 
     @property
-    def deviation(self) -> NDArray[np.float64]:
+    def standard_deviation(self) -> NDArray[np.float64]:
         """Standard uncertainty of the mean, shape (...)."""
         return np.asarray(np.sqrt(np.sum(self.patterns**2, axis=0)))
 
@@ -72,10 +72,10 @@ def _longer(away: NDArray[np.float64]) -> float:
         return 1.0
     total, weight = 0.0, 0.0
     for lag in range(1, count // 2 + 1):
-        share = float(np.sum(frames[lag:] * frames[:-lag])) / square * count / (count - lag)
+        fraction = float(np.sum(frames[lag:] * frames[:-lag])) / square * count / (count - lag)
         # That the mean is taken off makes all correlations smaller by about 1 / count.
-        if share + 1 / count <= 0:
+        if fraction + 1 / count <= 0:
             break
-        total += (1 - lag / count) * share
+        total += (1 - lag / count) * fraction
         weight += (1 - lag / count) / count
     return float(np.clip((1 + 2 * total) / max(1 - 2 * weight, 1 / count), 1.0, count))

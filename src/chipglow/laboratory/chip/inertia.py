@@ -11,7 +11,7 @@ from chipglow.laboratory.chip.segmentation import end_of_build_up
 from chipglow.scene import Scene
 
 LARGEST_FRACTION: Final = 0.01
-"""Share of work or force from which inertia counts as too much."""
+"""Fraction of work or force from which inertia counts as too much."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Inertia:
     force_fraction : float
         Momentum that the scaled mass brings to the tool per time, ρV² times uncut chip thickness,
         over the mean cutting force; NaN where the scene does not state it. By the balance of
-        momentum a chip that leaves at v makes a share abs(V − v)/V of it a force.
+        momentum a chip that leaves at v makes a fraction abs(V − v)/V of it a force.
     mass_scaling : float
         Factor on the density: the true mass has this much less of both.
     """
@@ -38,11 +38,11 @@ class Inertia:
     @property
     def warning(self) -> str:
         """What is too much, and what to do; empty if nothing is."""
-        shares = (
+        fractions = (
             (self.kinetic_fraction, "kinetic energy reaches {} of the work"),
             (self.force_fraction, "momentum is worth {} of the cutting force"),
         )
-        over = [text.format(f"{s:.1%}") for s, text in shares if s > LARGEST_FRACTION]
+        over = [text.format(f"{s:.1%}") for s, text in fractions if s > LARGEST_FRACTION]
         if not over:
             return ""
         return (

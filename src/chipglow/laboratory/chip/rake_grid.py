@@ -60,7 +60,7 @@ class RakeGrid:
         the square is left out. Its components are ``calibration``, which is the same in all that
         was measured by it, and ``tool``, the same in all that is read by this tool, of which
         `TOOL_BUDGET` are parts.
-    deviation : ndarray
+    standard_deviation : ndarray
         Standard deviation over the square's pixels in K, of the same shape; NaN also for a single
         pixel.
     count : ndarray
@@ -81,7 +81,7 @@ class RakeGrid:
     along: NDArray[np.float64]
     depth: NDArray[np.float64]
     estimate: Estimate
-    deviation: NDArray[np.float64]
+    standard_deviation: NDArray[np.float64]
     count: NDArray[np.int64]
     size: float
     tool: Tool
@@ -89,7 +89,7 @@ class RakeGrid:
 
     def __post_init__(self) -> None:
         shape = (self.times.size, self.depth.size, self.along.size)
-        for name in ("estimate", "deviation", "count"):
+        for name in ("estimate", "standard_deviation", "count"):
             found = getattr(self, name).shape
             if found != shape:
                 raise ValueError(f"rake grid: {name} has shape {found}, expected {shape}")
@@ -135,7 +135,7 @@ class RakeGrid:
         return self.frame_estimate.values
 
     @property
-    def frame_deviation(self) -> NDArray[np.float64]:
+    def frame_standard_deviation(self) -> NDArray[np.float64]:
         """Standard deviation of `mean` between those frames in K, shape (m, n); NaN for one."""
         away = np.where(self.usable, self.mean - self.frame_mean, 0.0)
         return np.sqrt(_ratio((away**2).sum(axis=0), self.frame_count - 1))
@@ -158,7 +158,7 @@ class RakeGrid:
                 "depth_um": depth,
                 "along_um": along,
                 "mean_degC": celsius(self.mean.ravel()),
-                "deviation_K": self.deviation.ravel(),
+                "standard_deviation_K": self.standard_deviation.ravel(),
                 "usable_pixels": self.count.ravel(),
                 **budget_columns(self.estimate, RAKE_BUDGET),
             }
@@ -171,7 +171,8 @@ class RakeGrid:
         -------
         xarray.Dataset
             Of the dimensions (time, depth, along): ``mean`` with its components as
-            `chipglow.uncertainty.from_xarray` reads them, ``standard_uncertainty``, ``deviation``
+            `chipglow.uncertainty.from_xarray` reads them, ``standard_uncertainty``,
+            ``standard_deviation``
             and ``count``; and the tool as a scene has it.
         """
         dimensions = ("time", "depth", "along")
@@ -180,7 +181,7 @@ class RakeGrid:
         return (
             data.assign(
                 standard_uncertainty=(dimensions, known_uncertainty(self.estimate), {"units": "K"}),
-                deviation=(dimensions, self.deviation, {"units": "K"}),
+                standard_deviation=(dimensions, self.standard_deviation, {"units": "K"}),
                 count=(dimensions, self.count, {"units": "1"}),
             )
             .assign_coords(
@@ -201,13 +202,16 @@ class RakeGrid:
             (of one frame over the square's pixels), and ``frames`` in which it is usable.
         """
         depth, along = np.meshgrid(1e6 * self.depth, 1e6 * self.along, indexing="ij")
-        deviation = self.frame_deviation if self.times.size > 1 else self.deviation[0]
+        several = self.times.size > 1
+        standard_deviation = (
+            self.frame_standard_deviation if several else self.standard_deviation[0]
+        )
         return pd.DataFrame(
             {
                 "depth_um": depth.ravel(),
                 "along_um": along.ravel(),
                 "mean_degC": celsius(self.frame_mean.ravel()),
-                "deviation_K": deviation.ravel(),
+                "standard_deviation_K": standard_deviation.ravel(),
                 "frames": self.frame_count.ravel(),
             }
         )
@@ -249,7 +253,7 @@ class RakeGrid:
             self,
             along=self.along[:columns],
             estimate=self.estimate[:, :, :columns],
-            deviation=self.deviation[:, :, :columns],
+            standard_deviation=self.standard_deviation[:, :, :columns],
             count=self.count[:, :, :columns],
         )
 
@@ -314,7 +318,7 @@ def rake_grid(
     squares, has in the middle of the square. Where the pixels lie evenly it is the plain mean. A
     field that is linear in x and y comes out exactly, wherever the pixels lie; the noise of a mean
     of 9 pixels rises by 6 % on average at a rake angle of -7 degrees, by 18 % at most.
-    `RakeGrid.deviation` is the plain standard deviation.
+    `RakeGrid.standard_deviation` is the plain standard deviation.
 
     What the calibration's errors change in a square is the weighted mean of what they change in its
     pixels. Each uncertainty of the tool's place displaces the squares to either side by one
@@ -328,7 +332,7 @@ def rake_grid(
     columns = _columns(raster, tool, size, rows)
     squares = _Squares.of(raster, tool, size, rows, columns)
     shape = (numbers.size, rows, columns)
-    mean, deviation = np.empty(shape), np.empty(shape)
+    mean, standard_deviation = np.empty(shape), np.empty(shape)
     count = np.empty(shape, np.int64)
     effects = []
     temperatures = measurement.data["radiance_temperature"]
@@ -336,7 +340,7 @@ def rake_grid(
     for index, number in enumerate(numbers):
         usable = flags[number].values & UNUSABLE == 0
         values = np.asarray(temperatures[number].values, dtype=np.float64)
-        mean[index], deviation[index], count[index] = squares.statistics(values, usable)
+        mean[index], standard_deviation[index], count[index] = squares.statistics(values, usable)
         effects.append([squares.mean(e) for e in measurement.calibration_effects(int(number))])
     if not np.isfinite(mean[:, 0]).any():
         raise ValueError(
@@ -347,7 +351,7 @@ def rake_grid(
         along=size * (np.arange(columns, dtype=np.float64) + 0.5),
         depth=size * (np.arange(rows, dtype=np.float64) + 0.5),
         estimate=measurement.estimate(mean, effects),
-        deviation=deviation,
+        standard_deviation=standard_deviation,
         count=count,
         size=size,
         tool=tool,
@@ -447,10 +451,10 @@ class _Squares:
         mean = np.where(left_out, np.nan, weighted)
         plain = _ratio(self._sum(value), number)
         away = value - plain[self.square]
-        deviation = np.sqrt(_ratio(self._sum(away**2), number - 1))
-        deviation = np.where(left_out, np.nan, deviation)
+        standard_deviation = np.sqrt(_ratio(self._sum(away**2), number - 1))
+        standard_deviation = np.where(left_out, np.nan, standard_deviation)
         number_kept = kept.astype(np.int64).reshape(self.shape)
-        return mean.reshape(self.shape), deviation.reshape(self.shape), number_kept
+        return mean.reshape(self.shape), standard_deviation.reshape(self.shape), number_kept
 
     def mean(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Mean of values of all pixels, NaN counting as 0, of `shape`."""

@@ -70,7 +70,7 @@ def _mean_image(measurement: Measurement, grid: RakeGrid) -> NDArray[np.float64]
 def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
     several = grid.times.size > 1
     mean = grid.frame_mean - KELVIN
-    bars = grid.frame_deviation if several else grid.deviation[0]
+    bars = grid.frame_standard_deviation if several else grid.standard_deviation[0]
     uncertainty = grid.frame_estimate.standard_uncertainty
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, grid.depth.size))
     for m, depth in enumerate(grid.depth):
@@ -100,4 +100,4 @@ def _draw_profiles(axes: Axes, grid: RakeGrid) -> None:
     axes.set_ylabel("radiance temperature / °C")
     over = f"between {grid.times.size} frames" if several else "in a square"
     bands = "\nbands: ± 1 standard uncertainty" * bool(grid.estimate.components)
-    axes.set_title(f"b) profiles\nbars: deviation {over}{bands}")
+    axes.set_title(f"b) profiles\nbars: standard deviation {over}{bands}")

@@ -118,7 +118,7 @@ class PolarGrid:
         ends : ndarray of bool
             Where it may end.
         toll : float
-            What every step costs, as a share of the median score on the best path without.
+            What every step costs, as a fraction of the median score on the best path without.
         anywhere : bool
             Whether the path may begin at any radius, not only at the first.
 

@@ -18,7 +18,7 @@ _STANDING_OUT: Final = 0.35
 """Least prominence of the peaks of unequal segments over the range of the force."""
 
 _LEAST_SMOOTH: Final = 0.7
-"""Least share of its range that a force with unequal segments keeps when it is smoothed over a
+"""Least fraction of its range that a force with unequal segments keeps when it is smoothed over a
 quarter of the time in which it forgets itself: noise keeps less."""
 
 _LEAST_SWING: Final = 0.1

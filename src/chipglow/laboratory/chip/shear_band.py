@@ -88,8 +88,8 @@ class ShearBand:
     @property
     def middle_half(self) -> NDArray[np.bool_]:
         """Which points are on the middle half of the curve, shape (n,)."""
-        share = (self.ridge.distance - self.start) / self.length
-        return np.asarray((share >= 0.25) & (share <= 0.75))
+        fraction = (self.ridge.distance - self.start) / self.length
+        return np.asarray((fraction >= 0.25) & (fraction <= 0.75))
 
     def across(self, half_length: float, step: float) -> Line:
         """Line across the band's middle; the distance grows from the workpiece to the chip.
@@ -255,7 +255,7 @@ def _half_crossing(
     index = np.arange(first.size)
     upper, lower = values[index, first - 1], values[index, first]
     drop = upper - lower
-    share = np.divide(upper - half[:, 0], drop, out=np.zeros_like(drop), where=drop > 0)
-    crossing = offsets[first - 1] + share * (offsets[first] - offsets[first - 1])
+    fraction = np.divide(upper - half[:, 0], drop, out=np.zeros_like(drop), where=drop > 0)
+    crossing = offsets[first - 1] + fraction * (offsets[first] - offsets[first - 1])
     found = below.any(axis=1) & (values[:, 0] > 0)
     return np.where(found, crossing, np.nan)

@@ -616,7 +616,8 @@ def _scatter(frames: NDArray[np.float64], known: NDArray[np.bool_]) -> FrameScat
     several = count > 1
     if several.any() and (count == 1).any():
         patterns = scatter.patterns.copy()
-        patterns[0, count == 1] = sqrt(float((count * scatter.deviation**2)[several].mean()))
+        squares = count * scatter.standard_deviation**2
+        patterns[0, count == 1] = sqrt(float(squares[several].mean()))
         scatter = replace(scatter, patterns=patterns)
     return scatter
 

@@ -238,7 +238,7 @@ class EmissivityMap:
             left_out=int(area.mask.sum()) - count,
             flagged=flagged,
             hidden=self.hidden,
-            deviation=float(pixels.std(ddof=1)),
+            standard_deviation=float(pixels.std(ddof=1)),
             outside=(int((pixels < 0).sum()), int((pixels > 1).sum())),
             observed=values.mean(axis=1),
             estimate=estimate + (random - mean),
@@ -298,7 +298,7 @@ class RegionEmissivity:
         How many have each `Flag`.
     hidden : float
         Lowest emissivity that the camera's range measures; 0 without a lower limit.
-    deviation : float
+    standard_deviation : float
         Standard deviation over the pixels: how much the surface varies from place to place, with
         the pixels' noise. It is no uncertainty of the mean.
     outside : tuple of int
@@ -319,7 +319,7 @@ class RegionEmissivity:
     left_out: int
     flagged: dict[Flag, int]
     hidden: float
-    deviation: float
+    standard_deviation: float
     outside: tuple[int, int]
     observed: NDArray[np.float64]
     estimate: Estimate

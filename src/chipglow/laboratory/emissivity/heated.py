@@ -233,5 +233,5 @@ def _row(feature: str, true: Emissivity, found: list[EmissivityMap], area: Area)
         true=true,
         found=rows[0],
         means=np.array([row.mean for row in rows]),
-        deviations=np.array([row.deviation for row in rows]),
+        deviations=np.array([row.standard_deviation for row in rows]),
     )

@@ -50,7 +50,7 @@ class RegionEmissivities:
         -------
         pandas.DataFrame
             Columns ``region``, ``feature``, ``reference_K``, ``reflected_K``, ``pixels``, how many
-            of them are flagged, under 0 and over 1, ``mean``, ``deviation`` over the pixels,
+            of them are flagged, under 0 and over 1, ``mean``, ``standard_deviation`` over pixels,
             ``standard_uncertainty``, ``degrees_of_freedom``, ``coverage_factor``,
             ``expanded_uncertainty``, and the parts ``…_uncertainty`` of the standard uncertainty;
             NaN where nothing is known.
@@ -126,7 +126,7 @@ def _row(row: RegionEmissivity) -> Mapping[str, float | str]:
         "under_0": row.outside[0],
         "over_1": row.outside[1],
         "mean": row.mean,
-        "deviation": row.deviation,
+        "standard_deviation": row.standard_deviation,
         **uncertainty_columns(row.estimate, BUDGET),
     }
 

@@ -11,7 +11,6 @@ _FIELDS: Final[Mapping[str, str]] = {
     "chip": "body",
     "chip body": "body",
     "body": "body",
-    "fissure": "shear_band",
     "shear band": "shear_band",
     "shear_band": "shear_band",
     "workpiece": "workpiece",
@@ -29,18 +28,19 @@ def surface_text(rows: Iterable[RegionEmissivity]) -> str:
     ----------
     rows : iterable of RegionEmissivity
         Determined emissivities. What they are of is known by the name of their feature: chip body,
-        fissure or shear band, workpiece, tool.
+        shear band, workpiece, tool.
 
     Returns
     -------
     str
         The sections ``surface`` and, with a chip, ``analysis``; empty if no feature is known or a
-        chip's body comes without its fissures. A mean or deviation that no study takes is left out.
+        chip's body comes without its shear bands. A mean or standard deviation that no study takes
+        is left out.
     """
     found = {
         _FIELDS[row.feature.lower()]: {
             "mean": round(row.mean, _DIGITS),
-            "deviation": round(row.deviation, _DIGITS),
+            "standard_deviation": round(row.standard_deviation, _DIGITS),
         }
         for row in rows
         if row.whole and row.feature.lower() in _FIELDS and _possible(row)
@@ -57,4 +57,4 @@ def surface_text(rows: Iterable[RegionEmissivity]) -> str:
 
 
 def _possible(row: RegionEmissivity) -> bool:
-    return 0 <= row.mean <= 1 and row.deviation <= _GREATEST_DEVIATION
+    return 0 <= row.mean <= 1 and row.standard_deviation <= _GREATEST_DEVIATION

@@ -141,7 +141,7 @@ class TrueTemperature:
         How many have each `Flag`.
     radiance_temperature : float
         That of the area's mean radiance in K.
-    deviation : float
+    standard_deviation : float
         Standard deviation over the pixels of the temperatures in K that each would have by
         itself: how uneven the area is in temperature and emissivity, with the pixels' noise.
     mean_of_pixels : float
@@ -163,7 +163,7 @@ class TrueTemperature:
     left_out: int
     flagged: dict[Flag, int]
     radiance_temperature: float
-    deviation: float
+    standard_deviation: float
     mean_of_pixels: float
     emissivity: float
     estimate: Estimate
@@ -255,7 +255,7 @@ def true_temperature(
         left_out=count_out,
         flagged=flagged,
         radiance_temperature=float(band.temperature(np.array(mean))),
-        deviation=float(pixels.std(ddof=1)),
+        standard_deviation=float(pixels.std(ddof=1)),
         mean_of_pixels=mean_of_pixels,
         emissivity=float(emissivity.estimate.values),
         estimate=replace(found, warnings=tuple(warnings)),
@@ -286,7 +286,7 @@ class RegionTemperatures:
         -------
         pandas.DataFrame
             In K: columns ``region``, ``pixels``, ``left_out``, ``emissivity``,
-            ``radiance_temperature``, ``true_temperature``, ``deviation`` over the pixels,
+            ``radiance_temperature``, ``true_temperature``, ``standard_deviation`` over the pixels,
             ``standard_uncertainty``, ``degrees_of_freedom``, ``coverage_factor``,
             ``expanded_uncertainty``, and the parts ``…_uncertainty`` of the standard uncertainty;
             NaN where nothing is known.
@@ -299,7 +299,7 @@ class RegionTemperatures:
                 "emissivity": row.emissivity,
                 "radiance_temperature": row.radiance_temperature,
                 "true_temperature": float(row.estimate.values),
-                "deviation": row.deviation,
+                "standard_deviation": row.standard_deviation,
                 **uncertainty_columns(row.estimate, TEMPERATURE_BUDGET),
             }
             for row in self.rows

@@ -182,9 +182,9 @@ def uniform_counts(
         if not good.any():
             raise ValueError("all pixels are bad, expected some that are not")
         if recording.saturation is not None:
-            share = float(np.mean(recording.signal[:, good] > recording.saturation))
-            if share > 0:
-                raise ValueError(f"{share:.2%} of it is saturated, expected a darker object")
+            fraction = float(np.mean(recording.signal[:, good] > recording.saturation))
+            if fraction > 0:
+                raise ValueError(f"{fraction:.2%} of it is saturated, expected a darker object")
     except ValueError as error:
         raise DescriptionError(f"{source}: {error}") from error
     return float(signal[:, good].mean())
@@ -292,7 +292,7 @@ def _read_uniform(description: MeasurementDescription) -> _FlatFields:
 
 
 def _uniform(description: MeasurementDescription, file: str) -> Recording:
-    if camera_formats()[find_format(Path(file))].tells_quantity:
+    if camera_formats()[find_format(Path(file))].states_quantity:
         # What the description says of the recording's file, this file says itself.
         return read_recording(file)
     return _read(description, file, every=True)
@@ -309,7 +309,7 @@ def _unsuitable(uniform: Recording, recording: Recording) -> str | None:
             "expected the same"
         )
     if recording.saturation is not None:
-        share = float(np.mean(uniform.signal > recording.saturation))
-        if share > _MOST_SATURATED:
-            return f"{share:.0%} of it is saturated, expected a darker flat-field source"
+        fraction = float(np.mean(uniform.signal > recording.saturation))
+        if fraction > _MOST_SATURATED:
+            return f"{fraction:.0%} of it is saturated, expected a darker flat-field source"
     return None

@@ -330,20 +330,20 @@ def _first_clipped(
     first = float(distance.min())
     index = ((distance - first) / (pitch / 2)).astype(np.int64).ravel()
     count = np.bincount(index)
-    share = np.bincount(index, clipped.ravel()) / np.maximum(count, 1)
-    found = np.flatnonzero((share > _MANY_CLIPPED) & (share * count >= 2))
+    fraction = np.bincount(index, clipped.ravel()) / np.maximum(count, 1)
+    found = np.flatnonzero((fraction > _MANY_CLIPPED) & (fraction * count >= 2))
     return first + float(found[0]) * pitch / 2 if found.size else np.inf
 
 
 def _clipped_text(clipped: NDArray[np.bool_], how: str, side: str, limit: float) -> str:
-    share = 100 * np.count_nonzero(clipped) / clipped.size
+    fraction = 100 * np.count_nonzero(clipped) / clipped.size
     beyond = (
         f"; nothing is used beyond {limit * 1e6:.3g} um on the {side} side, so that the step and "
         "the tails are known less well"
         if np.isfinite(limit)
         else " and left out"
     )
-    return f"{share:.2g} % of the pixels are {how}{beyond}."
+    return f"{fraction:.2g} % of the pixels are {how}{beyond}."
 
 
 def _within_limits(pixels: EdgePixels, line: EdgeLine, limits: tuple[float, float]) -> EdgePixels:
@@ -386,15 +386,15 @@ def _check_single(pixels: EdgePixels, quick: ModelFit) -> None:
     total[row, column], count[row, column] = left, 1.0
     weight = uniform_filter(count, _BLOCK, mode="constant")
     mean = uniform_filter(total, _BLOCK, mode="constant") / np.maximum(weight, 1e-9)
-    share = np.abs(np.where(weight > 0.5, mean, 0.0)) / quick.edges[0].step
+    fraction = np.abs(np.where(weight > 0.5, mean, 0.0)) / quick.edges[0].step
     change = np.diff(total, axis=1)[(count[:, 1:] * count[:, :-1]) > 0]
     noise = float(np.median(np.abs(change))) / (_BLOCK * quick.edges[0].step)
-    if share.max() > max(_SECOND_EDGE, 7 * noise):
-        where = np.unravel_index(int(np.argmax(share)), share.shape)
+    if fraction.max() > max(_SECOND_EDGE, 7 * noise):
+        where = np.unravel_index(int(np.argmax(fraction)), fraction.shape)
         raise NoEdgeError(
             f"more than one straight edge: near row {where[0]}, column {where[1]} the image is "
-            f"{100 * share.max():.0f} % of the step away from a single edge's, expected a region "
-            "with one edge and even sides"
+            f"{100 * fraction.max():.0f} % of the step away from a single edge's, expected a "
+            "region with one edge and even sides"
         )
 
 

@@ -128,12 +128,12 @@ def _draw_transfer(axes: Axes, edge: EdgeResult) -> None:
 def _draw_apertures(axes: Axes, found: KnifeEdge) -> None:
     signals, best = found.apertures, found.best
     assert signals is not None
-    share = (signals.radiance - best.aperture_background) / best.source
+    fraction = (signals.radiance - best.aperture_background) / best.source
     model = signals.weights @ best.model.mean_transfer(best.values, signals.frequency)
     order = np.argsort(signals.diameters)
     diameters = signals.diameters[order] * 1e6
     axes.errorbar(
-        diameters, 100 * share[order], 200 * signals.sigma[order] / best.source, fmt=".",
+        diameters, 100 * fraction[order], 200 * signals.sigma[order] / best.source, fmt=".",
         color=GREY, label="measured, 2 u",
     )  # fmt: skip
     axes.plot(diameters, 100 * model[order], color=VERMILLION, label="fit")

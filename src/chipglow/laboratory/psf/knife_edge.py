@@ -438,8 +438,8 @@ def _fit_warnings(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
 
 def _aperture_warnings(best: ModelFit, signals: ApertureSignals) -> list[str]:
     """Whether apertures say something else than the edges."""
-    shares = signals.weights @ best.model.mean_transfer(best.values, signals.frequency)
-    left = (signals.radiance - best.aperture_background) / best.source - shares
+    fractions = signals.weights @ best.model.mean_transfer(best.values, signals.frequency)
+    left = (signals.radiance - best.aperture_background) / best.source - fractions
     square = float(np.sum((left * best.source / signals.sigma) ** 2))
     greatest = int(np.argmax(np.abs(left)))
     if square < _APERTURES_APART * left.size or abs(left[greatest]) < _NOTHING:
@@ -452,7 +452,7 @@ def _aperture_warnings(best: ModelFit, signals: ApertureSignals) -> list[str]:
 
 
 def _left(edge: EdgeResult) -> float:
-    """Root of the mean square of what the model leaves near the edge, as a share of the step."""
+    """Root of the mean square of what the model leaves near the edge, as a fraction of the step."""
     near = np.abs(edge.spread.distance) < 2 * edge.line_fwhm
     return float(np.sqrt(np.mean(edge.spread.residual[near] ** 2)))
 

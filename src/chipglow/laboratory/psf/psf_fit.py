@@ -304,9 +304,9 @@ class _Problem:
             parts.append((edge.radiance - modelled) / edge.sigma)
         if self.apertures is not None:
             background, source = vector[-_SOURCE_PARAMETERS:]
-            shares = self._shares(values)
+            fractions = self._fractions(values)
             parts.append(
-                (self.apertures.radiance - background - source * shares) / self.apertures.sigma
+                (self.apertures.radiance - background - source * fractions) / self.apertures.sigma
             )
         return np.concatenate(parts)
 
@@ -327,7 +327,9 @@ class _Problem:
             row, column = row + edge.x.size, column + _EDGE_PARAMETERS
         if self.apertures is not None:
             result[row:, column] = -1 / self.apertures.sigma
-            result[row:, column + 1] = -self._shares(vector[: self.shapes]) / self.apertures.sigma
+            result[row:, column + 1] = (
+                -self._fractions(vector[: self.shapes]) / self.apertures.sigma
+            )
         here, high = self.residual(vector), self.bounds()[1]
         for k in range(self.shapes):
             shift = _DIFFERENCE * self.scales[k] * (1 if vector[k] < high[k] / 2 else -1)
@@ -416,8 +418,8 @@ class _Problem:
             bins += int(there.sum())
         return total / max(bins - vector.size, 1)
 
-    def _shares(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Signals of the apertures as shares of an endless source's."""
+    def _fractions(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Signals of the apertures as fractions of an endless source's."""
         assert self.apertures is not None
         transfer = self.model.mean_transfer(values, self.apertures.frequency)
         return np.asarray(self.apertures.weights @ transfer)
@@ -435,12 +437,12 @@ class _Problem:
         parts = [values]
         for edge in self.edges:
             response = _response(self.model, values, edge.line, edge)
-            shares = response(edge.line.distance(edge.x, edge.y))
-            background, step = _straight_line(shares, edge.radiance, edge.sigma)
+            fractions = response(edge.line.distance(edge.x, edge.y))
+            background, step = _straight_line(fractions, edge.radiance, edge.sigma)
             parts.append(np.array([background, step, edge.line.position, edge.line.normal]))
         if self.apertures is not None:
             signals = self.apertures
-            line = _straight_line(self._shares(values), signals.radiance, signals.sigma)
+            line = _straight_line(self._fractions(values), signals.radiance, signals.sigma)
             low, high = (limit[-_SOURCE_PARAMETERS:] for limit in self.bounds())
             parts.append(np.clip(line, low, high))
         return np.concatenate(parts)
@@ -472,18 +474,18 @@ def with_noise(edge: EdgePixels, predicted: NDArray[np.float64]) -> EdgePixels:
     of the light does.
     """
     low, high = float(predicted.min()), float(predicted.max())
-    share = (predicted - low) / max(high - low, 1e-300)
+    fraction = (predicted - low) / max(high - low, 1e-300)
     square = (edge.radiance - predicted) ** 2
-    sides = [share < 0.5, share >= 0.5]
+    sides = [fraction < 0.5, fraction >= 0.5]
     # The means of both sides, taken at the sides' own mean brightness.
     means = [
-        (float(share[side].mean()), float(square[side].mean())) for side in sides if side.any()
+        (float(fraction[side].mean()), float(square[side].mean())) for side in sides if side.any()
     ]
     slope = 0.0
     if len(means) == 2:
         slope = (means[1][1] - means[0][1]) / max(means[1][0] - means[0][0], 1e-3)
     overall = float(square.mean())
-    variance = means[0][1] + slope * (share - means[0][0])
+    variance = means[0][1] + slope * (fraction - means[0][0])
     least = max(0.02 * overall, (1e-7 * (high - low)) ** 2, 1e-300)
     return replace(edge, sigma=np.sqrt(np.maximum(variance, least)))
 

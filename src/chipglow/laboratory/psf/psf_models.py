@@ -128,7 +128,7 @@ class GaussianModel(PSFModel):
 
 @dataclass(frozen=True)
 class GaussianTailModel(PSFModel):
-    """A round Gaussian and, for a share of the light, a tail exp(−r / length) / (2π length²).
+    """A round Gaussian and, for a fraction of the light, a tail exp(−r / length) / (2π length²).
 
     The tail is that of stray light and of the size-of-source effect. Its transfer function is
     (1 + (2π length f)²)^(−3/2). Its parameter ``tail_ratio`` is the length over the core's width;
@@ -140,7 +140,7 @@ class GaussianTailModel(PSFModel):
 
     def starts(self, fwhm: float) -> list[list[float]]:
         """See `PSFModel.starts`."""
-        return [[0.9 * fwhm, share, ratio] for share, ratio in ((0.1, 4.0), (0.25, 1.5))]
+        return [[0.9 * fwhm, fraction, ratio] for fraction, ratio in ((0.1, 4.0), (0.25, 1.5))]
 
     def bounds(self, pitch: float, extent: float) -> tuple[list[float], list[float]]:
         """See `PSFModel.bounds`."""
@@ -150,9 +150,9 @@ class GaussianTailModel(PSFModel):
         self, values: NDArray[np.float64], frequency: NDArray[np.float64], angle: float
     ) -> NDArray[np.float64]:
         """Sum of the core's and the tail's."""
-        core, share, length = self._numbers(values)
+        core, fraction, length = self._numbers(values)
         tail = (1 + (2 * pi * length * frequency) ** 2) ** -1.5
-        return np.asarray((1 - share) * _gaussian_transfer(core, frequency) + share * tail)
+        return np.asarray((1 - fraction) * _gaussian_transfer(core, frequency) + fraction * tail)
 
     def fwhm(self, values: NDArray[np.float64]) -> float:
         """See `PSFModel.fwhm`."""
@@ -163,26 +163,26 @@ class GaussianTailModel(PSFModel):
 
     def psf(self, values: NDArray[np.float64]) -> PointSpreadFunction:
         """See `PSFModel.psf`."""
-        core, share, length = self._numbers(values)
+        core, fraction, length = self._numbers(values)
         reach = 2.0 * core
         # Of the tail, (1 + r / length) exp(−r / length) is beyond r.
-        while share * (1 + reach / length) * exp(-reach / length) > 1 - _TAIL_ENERGY:
+        while fraction * (1 + reach / length) * exp(-reach / length) > 1 - _TAIL_ENERGY:
             reach += 0.5 * length
         return sampled_psf(lambda x, y: self._density(values, np.hypot(x, y)), reach, core / 8)
 
     def _numbers(self, values: NDArray[np.float64]) -> tuple[float, float, float]:
-        """Width of the core in m, share of the tail, length of the tail in m."""
-        core, share, ratio = values
-        return float(core), float(share), float(ratio * core)
+        """Width of the core in m, fraction of the tail, length of the tail in m."""
+        core, fraction, ratio = values
+        return float(core), float(fraction), float(ratio * core)
 
     def _density(
         self, values: NDArray[np.float64], radius: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        core, share, length = self._numbers(values)
+        core, fraction, length = self._numbers(values)
         sigma = core / _FWHM_PER_SIGMA
         gauss = np.exp(-(radius**2) / (2 * sigma**2)) / sigma**2
         tail = np.exp(-radius / length) / length**2
-        return np.asarray(((1 - share) * gauss + share * tail) / (2 * pi))
+        return np.asarray(((1 - fraction) * gauss + fraction * tail) / (2 * pi))
 
 
 @dataclass(frozen=True)
@@ -523,7 +523,7 @@ def disc_response(
     -------
     ndarray
         Shape (n,): the product with the optics' transfer function, averaged over directions, is
-        the signal as a share of that of an endless source: R ∫ H(f) J0(2πfρ) J1(2πfR) 2π df.
+        the signal as a fraction of that of an endless source: R ∫ H(f) J0(2πfρ) J1(2πfR) 2π df.
     """
     radius = diameter / 2
     angles = ((np.arange(12) + 0.5) * pi / 24).tolist()

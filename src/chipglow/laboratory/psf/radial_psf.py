@@ -1,8 +1,8 @@
 """A round point spread function from edges, which departs from a model as far as data ask.
 
 The light is shared among rings about the point. Each ring has a known edge-spread function, so
-that the shares follow from the measured one by least squares: the inversion of Abel's integral.
-Alone that would blow up the noise. No share is negative, and the difference to the best model
+that the fractions follow from the measured one by least squares: the inversion of Abel's integral.
+Alone that would blow up the noise. No fraction is negative, and the difference to the best model
 changes as smoothly from ring to ring as the data let it: what the data do not show, as the finest
 of the core and the farthest of the tails, is the model's.
 """
@@ -30,7 +30,7 @@ FIT: Final = "psf fit"
 """Name of the component of uncertainty that the noise of the images makes."""
 
 _KEPT: Final = 0.9999
-"""Fraction of the variance of the shares that the kernel's fewer errors hold."""
+"""Fraction of the variance of the fractions that the kernel's fewer errors hold."""
 
 _RINGS: Final = 32
 _SMOOTHNESS: Final[list[float]] = np.geomspace(1e2, 1e-4, 13).tolist()
@@ -52,10 +52,11 @@ class RadialPSF:
     edges : ndarray
         Radii in m that limit the rings, from 0, shape (n + 1,).
     estimate : Estimate
-        Share of the light in each ring, shape (n,); what is missing to 1 lies beyond. Its component
-        `FIT` is by the noise, and by how much the shares change when they are let be rougher.
+        Fraction of the light in each ring, shape (n,); what is missing to 1 lies beyond. Its
+        component `FIT` is by the noise, and by how much the fractions change when they are let be
+        rougher.
     model : ndarray
-        Share of the light of the best model in each ring, shape (n,).
+        Fraction of the light of the best model in each ring, shape (n,).
     smoothness : float
         Weight of the smoothness.
     """
@@ -90,7 +91,7 @@ class RadialPSF:
 
     @property
     def encircled(self) -> Estimate:
-        """Share of the light within each of the radii `edges`."""
+        """Fraction of the light within each of the radii `edges`."""
         return self.estimate.linear(np.tri(self.edges.size, self.fractions.size, -1))
 
     def psf(self) -> MeasuredPSF:
@@ -108,9 +109,9 @@ class RadialPSF:
         """The same kernel of the best model: with what the rings are too coarse for."""
         return MeasuredPSF(*self._kernel(self.model))
 
-    def _kernel(self, shares: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+    def _kernel(self, fractions: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         """Kernel of light that is shared among the rings so, and its spacing in m."""
-        radius, density = self.radius, shares / np.diff(self.edges**2)
+        radius, density = self.radius, fractions / np.diff(self.edges**2)
 
         def at(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
             return np.interp(np.hypot(x, y), radius, density, right=0.0)
@@ -143,14 +144,14 @@ def radial_psf(
     Notes
     -----
     The weight of the smoothness is the one with the least sum of squared residuals and twice the
-    number of free shares that it leaves (Mallows, 1973). What it hides is
+    number of free fractions that it leaves (Mallows, 1973). What it hides is
     estimated by the change with a hundredth of that weight. The repeats draw the model too.
     """
     radii = _radii(fit, edges)
     design, left = _rows(fit, edges, spreads, apertures, radii)
     penalty = _penalty(radii, _core(fit, edges))
-    shares_by = _shares_by(fit, radii)
-    model = shares_by(fit.values)
+    fractions_by = _shares_by(fit, radii)
+    model = fractions_by(fit.values)
     # Light of the model beyond the last ring stays in it.
     data, beyond = left + design @ model, 1.0 - float(model.sum())
     solutions = [_solved(design, data, weight * penalty, model) for weight in _SMOOTHNESS]
@@ -162,25 +163,27 @@ def radial_psf(
     weight = _SMOOTHNESS[chosen]
     repeats = []
     for values in _drawn(fit, edges, generator):
-        shares = shares_by(values)
-        noisy = left + generator.standard_normal(left.size) + design @ shares
-        repeats.append(_solved(design, noisy, weight * penalty, shares))
+        fractions = fractions_by(values)
+        noisy = left + generator.standard_normal(left.size) + design @ fractions
+        repeats.append(_solved(design, noisy, weight * penalty, fractions))
     rougher = solutions[min(chosen + _ROUGHER, len(solutions) - 1)]
-    all_shares = np.array([solutions[chosen], rougher, *repeats])
-    all_shares /= all_shares.sum(axis=1, keepdims=True) + beyond
-    component = Component(psf_cause(FIT, all_shares, len(all_shares) - 1), _effects(all_shares))
-    return RadialPSF(radii, Estimate(all_shares[0], (component,)), model, weight)
+    all_fractions = np.array([solutions[chosen], rougher, *repeats])
+    all_fractions /= all_fractions.sum(axis=1, keepdims=True) + beyond
+    component = Component(
+        psf_cause(FIT, all_fractions, len(all_fractions) - 1), _effects(all_fractions)
+    )
+    return RadialPSF(radii, Estimate(all_fractions[0], (component,)), model, weight)
 
 
-def _ring_width(edges: Values, shares: Values) -> float:
+def _ring_width(edges: Values, fractions: Values) -> float:
     """Twice the greatest radius in m with half of the greatest density, by straight lines."""
-    radius, density = (edges[1:] + edges[:-1]) / 2, shares / np.diff(edges**2)
+    radius, density = (edges[1:] + edges[:-1]) / 2, fractions / np.diff(edges**2)
     half = density.max() / 2
     last = int(np.flatnonzero(density >= half)[-1])
     if last + 1 == radius.size:
         return 2 * float(radius[-1])
-    share = (density[last] - half) / (density[last] - density[last + 1])
-    return 2 * float(radius[last] + share * (radius[last + 1] - radius[last]))
+    fraction = (density[last] - half) / (density[last] - density[last + 1])
+    return 2 * float(radius[last] + fraction * (radius[last + 1] - radius[last]))
 
 
 def _drawn(
@@ -237,8 +240,8 @@ def _rows(
         transfers = [_ring_transfer(radii, k, apertures.frequency) for k in range(radii.size - 1)]
         sigma = apertures.sigma / fit.source
         rows.append((apertures.weights @ np.array(transfers).T) / sigma[:, None])
-        shares = apertures.weights @ fit.model.mean_transfer(fit.values, apertures.frequency)
-        left = (apertures.radiance - fit.aperture_background) / fit.source - shares
+        fractions = apertures.weights @ fit.model.mean_transfer(fit.values, apertures.frequency)
+        left = (apertures.radiance - fit.aperture_background) / fit.source - fractions
         data.append(left / sigma)
     return np.concatenate(rows), np.concatenate(data)
 
@@ -272,7 +275,7 @@ def _penalty(radii: NDArray[np.float64], width: float) -> NDArray[np.float64]:
 
 
 def _shares_by(fit: ModelFit, radii: NDArray[np.float64]) -> Callable[[Values], Values]:
-    """What gives the share of a model's light in each ring by the model's parameters."""
+    """What gives the fraction of a model's light in each ring by the model's parameters."""
     frequency = np.arange(0.0, 6 / fit.fwhm, 1 / (32 * float(radii[-1])))
     middle = np.zeros(1)
     encircled = np.array(
@@ -301,11 +304,11 @@ def _criterion(
     design: NDArray[np.float64],
     data: NDArray[np.float64],
     penalty: NDArray[np.float64],
-    shares: NDArray[np.float64],
+    fractions: NDArray[np.float64],
 ) -> float:
     """Squared residuals, and twice the trace of what makes fitted data of data."""
-    left = data - design @ shares
-    free = shares > 0
+    left = data - design @ fractions
+    free = fractions > 0
     normal = design[:, free].T @ design[:, free]
     smooth = penalty[:, free].T @ penalty[:, free]
     return float(left @ left + 2 * np.trace(np.linalg.solve(normal + smooth, normal)))

@@ -265,8 +265,8 @@ def _noise(image: NDArray[np.float64]) -> float:
 def _binned(image: NDArray[np.float64]) -> NDArray[np.int64]:
     """Bins of equal width from nearly the least to nearly the greatest value."""
     low, high = np.percentile(image, _ENDS)
-    share = (image - low) / max(high - low, np.finfo(float).tiny)
-    return np.asarray(np.clip(share * _BINS, 0, _BINS - 1), np.int64)
+    fraction = (image - low) / max(high - low, np.finfo(float).tiny)
+    return np.asarray(np.clip(fraction * _BINS, 0, _BINS - 1), np.int64)
 
 
 def _frame(raster: Raster, shape: tuple[int, ...]) -> NormalisedFrame:
