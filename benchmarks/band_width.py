@@ -1,11 +1,10 @@
-"""How the camera's errors depend on the width of the shear band.
+"""How the width of the shear band and the camera's errors depend on the cell.
 
     python benchmarks/band_width.py [28 20 14 10 7]
 
-The solver's shear band is about two cells wide, so its width is chosen by the cell (in um). For
-each the paper's cut is made, and looked at as the paper's study does, with frames and samples as
-coarse as those of the quick study: mean and standard deviation over its segments, textures and
-pixel phases. Scenes are kept in chipglow's cache. Prints a Markdown table.
+For each cell (in um) the paper's cut is made, and looked at as the paper's study does, with frames
+and samples as coarse as those of the quick study: mean and standard deviation over its segments,
+textures and pixel phases. Scenes are kept in chipglow's cache. Prints a Markdown table.
 """
 
 import sys
