@@ -43,10 +43,10 @@ AXIAL = 0.7
 """Distance of the design's outer points from its middle, of the half range."""
 
 
-FRONT = (1.0, 5e3, 100e-6)
+FRONT = (1.0, 8e3, 100e-6)
 """Onset, fracture energy and edge radius of the points whose loss alone is varied, in SI."""
 
-FRONT_LOSSES = (0.2, 0.25, 0.3, 0.35)
+FRONT_LOSSES = (0.3, 0.35, 0.4, 0.45)
 
 
 @dataclass(frozen=True)

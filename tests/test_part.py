@@ -175,3 +175,11 @@ def test_the_command_writes_the_schema(tmp_path, monkeypatch):
         main()
     assert ended.value.code in (0, None)
     assert json.loads((tmp_path / "s.json").read_text())["title"] == "Study"
+
+
+def test_a_copy_of_a_section_builds_what_it_says():
+    """Not the part of the section that it was copied from."""
+    numerics = Study.quick().cutting.numerics
+    assert numerics.build().cell == 20e-6
+    assert numerics.model_copy(update={"cell": 10e-6}).build().cell == 10e-6
+    assert numerics.build().cell == 20e-6

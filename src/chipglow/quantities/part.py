@@ -242,6 +242,12 @@ class Declared(Settings[Built]):
         """The part; a file that it names is read once."""
         return self._built
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with other values; its part is built from them."""
+        copied = super().model_copy(update=update, deep=deep)
+        copied.__dict__.pop("_built", None)
+        return copied
+
     @cached_property
     def _built(self) -> Built:
         names = parameters(self.part)
