@@ -8,8 +8,8 @@ edge radius of the four is not told: it is fitted with them, and stands for roun
 
 Quadratic surfaces through the logarithms of the forces stand for the solver between the points. The
 forces alone would have next to no softening, and a chip without segments: so along the front
-between the two, where only the loss differs, the least loss is chosen that segments the chip with
-the paper's period. Printed are all points, what is found, its uncertainty, and the valley of
+between the two, where only the loss differs, the loss is chosen that segments the chip and comes
+closest to the paper's period. Printed are all points, what is found, its uncertainty, and the valley of
 numbers that are as good.
 """
 
@@ -299,15 +299,14 @@ def main() -> None:
     forces = observed[:-1]
     surfaces = [Surface.through(np.array(places), column(runs, one)) for one in forces]
     free = best_place(surfaces, forces)
-    chosen = next(
-        place for place, run in zip(places[-len(FRONT_LOSSES) :], runs[-len(FRONT_LOSSES) :],
-                                    strict=True) if segments(run)
-    )  # fmt: skip
+    along = zip(places[-len(FRONT_LOSSES) :], runs[-len(FRONT_LOSSES) :], strict=True)
+    segmented = [(place, run) for place, run in along if segments(run)]
+    chosen, _ = min(segmented, key=lambda point: abs(point[1]["paper"].period - PERIOD))
     covariance = covariance_at(np.array(chosen), surfaces, forces)
     table = markdown if given.markdown else aligned
     print(f"Cell {CELL * 1e6:g} um, solver {SOLVER_VERSION}, {len(places)} points.\n")
     print(f"{table(run_table(places, runs, observed))}\n")
-    print("By the forces alone, and the least loss that segments the paper's cut in time:\n")
+    print("By the forces alone, and of the front the point that segments the paper's cut best in time:\n")
     print(f"{table(number_table(free, np.array(chosen), covariance))}\n")
     print(table(valley_table(covariance)))
 
