@@ -9,8 +9,8 @@ edge radius of the four is not told: it is fitted with them, and stands for roun
 Quadratic surfaces through the logarithms of the forces stand for the solver between the points. The
 forces alone would have next to no softening, and a chip without segments: so along the front
 between the two, where only the loss differs, the loss is chosen that segments the chip and comes
-closest to the paper's period. Printed are all points, what is found, its uncertainty, and the valley of
-numbers that are as good.
+closest to the paper's period. Printed are all points, what is found, its uncertainty, and the
+valley of numbers that are as good.
 """
 
 import argparse
@@ -306,7 +306,7 @@ def main() -> None:
     table = markdown if given.markdown else aligned
     print(f"Cell {CELL * 1e6:g} um, solver {SOLVER_VERSION}, {len(places)} points.\n")
     print(f"{table(run_table(places, runs, observed))}\n")
-    print("By the forces alone, and of the front the point that segments the paper's cut best in time:\n")
+    print("By the forces alone, and the front's point that segments the paper's cut in time:\n")
     print(f"{table(number_table(free, np.array(chosen), covariance))}\n")
     print(table(valley_table(covariance)))
 
