@@ -274,8 +274,8 @@ def test_softening_takes_the_fracture_energy_whatever_the_cell(cell, loss):
     """A layer of two cells at a constant undamaged stress, from failure to full softening."""
     energy, undamaged = 15e3, 1e9
     assert AISI_1045.damage is not None
-    law = Damage.of(replace(AISI_1045.damage, fracture_energy=energy, loss=loss), cell)
     layer = BAND_CELLS * cell
+    law = Damage.of(replace(AISI_1045.damage, fracture_energy=energy, loss=loss), layer)
     slip = 2 * energy / undamaged
     increment = slip / layer / 4000
     damage, taken, steps = 1.0, 0.0, 0
