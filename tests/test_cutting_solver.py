@@ -107,10 +107,8 @@ def test_adiabatic_shear_follows_the_flow_stress(fraction, of_it):
     block.set_velocity(lambda x, y: rate * y + 0 * x, lambda x, y: 0 * x * y)
     block.advance(1000)
     equivalent_rate = rate / sqrt(3)
-    law, harm = (
-        AISI_1045.flow_stress.numbers(),
-        Damage.of(AISI_1045.damage, AISI_1045.failing_layer(block.cell)),
-    )
+    law = AISI_1045.flow_stress.numbers()
+    harm = Damage.of(AISI_1045.damage, AISI_1045.failing_layer(block.cell))
 
     def change(strain, state):
         temperature, damage = state
