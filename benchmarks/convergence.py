@@ -93,9 +93,9 @@ def row(cell, workpiece):
     return [
         f"{cell:g}",
         f"{segments.cutting_mean / 1e3:.0f}",
-        f"{segments.cutting_swing / 1e3:.0f}",
+        number(segments.cutting_swing / 1e3),
         f"{segments.thrust_mean / 1e3:.0f}",
-        f"{segments.period * 1e6:.0f}{deviation(segments.period_uncertainty)}",
+        f"{number(segments.period * 1e6)}{deviation(segments.period_uncertainty)}",
         f"{max(fields.hottest) - 273.15:.0f}",
         f"{width * 1e6:.0f}",
         f"{rate / 1e3:.0f}",
@@ -104,6 +104,11 @@ def row(cell, workpiece):
         f"{history.energy.closing_error[-1] * 100:.1f}",
         f"{seconds:.0f}",
     ]
+
+
+def number(value: float) -> str:
+    """A rounded number; a dash where a chip has none, as it has no segments."""
+    return f"{value:.0f}" if isfinite(value) else "–"
 
 
 def deviation(seconds: float) -> str:

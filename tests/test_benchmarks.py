@@ -26,7 +26,7 @@ PROGRAMS = {
     "band_width.py": (COARSEST, {f"| {COARSEST} |": 7}),
     "calibration.py": ("--repeats 2", {"| none |": 5, "| 15 counts": 6, "| 3 points": 6}),
     "camera_pass.py": ("--rounds 1", {"chipglow  ": 3, "NumPy, Figure 6, table": 4}),
-    "convergence.py": (COARSEST, {f"| {COARSEST} |": 12}),
+    "convergence.py": (COARSEST, {f"| {COARSEST} |": 10}),
     "dot_target.py": ("300 1", {" 300 ": 6}),
     "dual_spectrum.py": ("9000 1", {"9000 ": 8}),
     "experiments.py": (

@@ -169,9 +169,9 @@ def test_friction_heats_chip_and_tool_as_half_spaces_in_contact():
     fraction, temperature = tool_fraction(block.grid, tool), np.full(shape, 293.0)
     nodes, increment, friction = np.zeros((*shape, 3)), np.zeros(shape), np.zeros(shape)
     effusivity = sqrt(CONDUCTIVITY * DENSITY * CAPACITY)
-    fraction = CARBIDE.effusivity / (CARBIDE.effusivity + effusivity)
+    to_tool = CARBIDE.effusivity / (CARBIDE.effusivity + effusivity)
     store = CARBIDE.density * CARBIDE.heat_capacity
-    heat = ToolHeat(store, CARBIDE.conductivity, fraction, 1e7, block.spacing)
+    heat = ToolHeat(store, CARBIDE.conductivity, to_tool, 1e7, block.spacing)
     conductivity, capacity = constant_properties()
     touching = block.points["x"] > 3e-6 - 0.6 * block.spacing
     steps = 200
@@ -193,14 +193,14 @@ def test_friction_heats_chip_and_tool_as_half_spaces_in_contact():
         )  # fmt: skip
         return_heat(block.points, block.count, increment, block.grid)
     # Both surfaces rise alike; away from it by the conduction of each side (Carslaw, Jaeger 2.9).
-    rise = 2 * flux * (1 - fraction) * sqrt(duration / pi) / effusivity
+    rise = 2 * flux * (1 - to_tool) * sqrt(duration / pi) / effusivity
     middle = touching & (np.abs(block.points["y"] - 160e-6) < 30e-6)
     depth = block.spacing / 2
-    at_points = rise - flux * (1 - fraction) * depth / CONDUCTIVITY
+    at_points = rise - flux * (1 - to_tool) * depth / CONDUCTIVITY
     # The chip's side is second order; the tool's fraction of a node is first: 2 % at this cell.
     assert block.points["temperature"][middle].mean() - 293 == pytest.approx(at_points, rel=0.03)
     node = round((3e-6 - block.grid.left) / cell) + 1
     inside = block.grid.left + node * cell - 3e-6
-    of_tool = rise - flux * fraction * inside / CARBIDE.conductivity
+    of_tool = rise - flux * to_tool * inside / CARBIDE.conductivity
     row = round((160e-6 - block.grid.bottom) / cell)
     assert temperature[node, row] - 293 == pytest.approx(of_tool, rel=0.03)

@@ -160,7 +160,7 @@ def test_the_table_has_units_and_gaps(folder, seen):
     assert command("told.nc", "--frame", "1", "--out", "grid.csv")[0] == 0
     lines = (folder / "grid.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == (
-        "time_us,depth_um,along_um,mean_degC,deviation_K,usable_pixels,standard_uncertainty_K,"
+        "time_us,depth_um,along_um,mean_degC,standard_deviation_K,usable_pixels,standard_uncertainty_K,"
         "calibration_uncertainty_K,tool_along_uncertainty_K,tool_across_uncertainty_K,"
         "tool_angle_uncertainty_K"
     )

@@ -111,7 +111,7 @@ def _table(grid: "RakeGrid") -> "Table":
     depths = wide["mean_degC"].columns
     wide.columns = [f"{name}_{depths.get_loc(depth)}" for name, depth in wide.columns]
     cells = {
-        f"{depth:.4g} µm deep": f"{{mean_degC_{n}:.1f}} ± {{deviation_K_{n}:.1f}}"
+        f"{depth:.4g} µm deep": f"{{mean_degC_{n}:.1f}} ± {{standard_deviation_K_{n}:.1f}}"
         for n, depth in enumerate(depths)
     }
     cells = {"along / µm": "{along_um:.4g}", **cells}

@@ -146,8 +146,8 @@ class RakeGrid:
         Returns
         -------
         pandas.DataFrame
-            Columns ``time_us``, ``depth_um``, ``along_um``, ``mean_degC``, ``deviation_K`` over the
-            square's pixels, ``usable_pixels``, and the standard uncertainty with its parts; NaN
+            Columns ``time_us``, ``depth_um``, ``along_um``, ``mean_degC``,
+            ``standard_deviation_K`` over the square's pixels, ``usable_pixels``, and the standard uncertainty with its parts; NaN
             where a square is left out, or nothing is known.
         """
         places = np.meshgrid(self.times, self.depth, self.along, indexing="ij")
@@ -198,8 +198,8 @@ class RakeGrid:
         Returns
         -------
         pandas.DataFrame
-            Columns ``depth_um``, ``along_um``, ``mean_degC``, ``deviation_K`` between the frames
-            (of one frame over the square's pixels), and ``frames`` in which it is usable.
+            Columns ``depth_um``, ``along_um``, ``mean_degC``, ``standard_deviation_K`` between the
+            frames (of one frame over the square's pixels), and ``frames`` in which it is usable.
         """
         depth, along = np.meshgrid(1e6 * self.depth, 1e6 * self.along, indexing="ij")
         several = self.times.size > 1
