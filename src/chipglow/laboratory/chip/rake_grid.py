@@ -147,8 +147,8 @@ class RakeGrid:
         -------
         pandas.DataFrame
             Columns ``time_us``, ``depth_um``, ``along_um``, ``mean_degC``,
-            ``standard_deviation_K`` over the square's pixels, ``usable_pixels``, and the standard uncertainty with its parts; NaN
-            where a square is left out, or nothing is known.
+            ``standard_deviation_K`` over the square's pixels, ``usable_pixels``, and the standard
+            uncertainty with its parts; NaN where a square is left out, or nothing is known.
         """
         places = np.meshgrid(self.times, self.depth, self.along, indexing="ij")
         time, depth, along = (1e6 * place.ravel() for place in places)
