@@ -51,14 +51,13 @@ def _blur(nodes, spare, variance):  # type: ignore[no-untyped-def]
     side = 0.5 * variance / passes
     middle = 1.0 - 2.0 * side
     _, columns, rows = nodes.shape
+    spare[:] = 0.0  # its border stays so: no pass writes there
     for _ in range(passes):
-        spare[:] = 0.0
         for c in range(2):
             for i in range(1, columns - 1):
                 for j in range(rows):
                     beside = nodes[c, i - 1, j] + nodes[c, i + 1, j]
                     spare[c, i, j] = middle * nodes[c, i, j] + side * beside
-        nodes[:] = 0.0
         for c in range(2):
             for i in range(columns):
                 for j in range(1, rows - 1):
