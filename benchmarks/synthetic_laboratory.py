@@ -45,7 +45,6 @@ from chipglow.camera import (
     ShotNoise,
     fit_linear,
 )
-from chipglow.camera.exposure import Exposure
 from chipglow.io.cameras import write_hcc
 from chipglow.io.column_file import read_calibration_points
 from chipglow.laboratory.emissivity import (
@@ -326,10 +325,7 @@ class Laboratory:
         own = BAND.radiance(np.broadcast_to(kelvins, self.emissivity.shape))
         radiance = self.emissivity * own + (1 - self.emissivity) * reflected
         raster = Raster(0.0, 0.0, PITCH / SAMPLES, *radiance.shape)
-        single = radiance.astype(np.float32)
-        exposure = Exposure(0.0, INTEGRATION_TIME, raster, radiance, single, single, radiance)
-        camera = Camera(BAND, PITCH, psf=self.optics.psf, lower_limit=None)
-        return camera.form_measurement(exposure).radiance[0]
+        return Camera(BAND, PITCH, psf=self.optics.psf).form_image(radiance, raster)
 
     def _edge(self, normal: float) -> NDArray[np.float64]:
         """Radiance of a hot plate half behind a warm blade, at every pixel's square."""

@@ -36,6 +36,15 @@ from chipglow.camera.detector.terms import (
 )
 from chipglow.camera.exposure import Exposure, expose, expose_all, frame_weights
 from chipglow.camera.measurement import UNUSABLE, Flag, Measurement
+from chipglow.camera.optics.blurs import (
+    BLURS,
+    BlurredPSF,
+    BlurTerm,
+    ChargeDiffusion,
+    Jitter,
+    LinearMotion,
+    Vibration,
+)
 from chipglow.camera.optics.convolution import blur
 from chipglow.camera.optics.psf import (
     PSFS,
@@ -47,45 +56,69 @@ from chipglow.camera.optics.psf import (
     PointSpreadFunction,
     PSFChoice,
 )
+from chipglow.camera.optics.pupil import Pupil, PupilPSF
+from chipglow.camera.optics.terms import (
+    OPTICS_TERMS,
+    Distortion,
+    Narcissus,
+    OpticalElement,
+    OpticsTerm,
+    Veil,
+)
 from chipglow.camera.recording import PlanckConversion, Recording
 from chipglow.camera.warning import ChipglowWarning
 
 __all__ = [
+    "BLURS",
     "DETECTOR_TERMS",
     "LEAST_FRAMES",
     "MODELS",
+    "OPTICS_TERMS",
     "PSFS",
     "UNUSABLE",
     "AiryAperture",
     "AnnularAperturePSF",
     "BadPixels",
     "Blackbody",
+    "BlurTerm",
+    "BlurredPSF",
     "Calibration",
     "CalibrationErrors",
     "CalibrationFit",
     "Camera",
+    "ChargeDiffusion",
     "ChipglowWarning",
     "DeadElements",
     "Detector",
     "DetectorTerm",
+    "Distortion",
     "Exposure",
     "FactoryCalibration",
     "FittedCalibration",
     "FixedPattern",
     "Flag",
     "GaussianPSF",
+    "Jitter",
     "LinearCalibration",
+    "LinearMotion",
     "MeasuredPSF",
     "MeasuredPSFFile",
     "Measurement",
+    "Narcissus",
     "NonUniformity",
+    "OpticalElement",
+    "OpticsTerm",
     "PSFChoice",
     "PlanckConversion",
     "PointSpreadFunction",
+    "Pupil",
+    "PupilPSF",
     "ReadNoise",
     "Recording",
     "SakumaHattori",
     "ShotNoise",
+    "Veil",
+    "Vibration",
     "blur",
     "expose",
     "expose_all",

@@ -1,11 +1,11 @@
 """The virtual infrared camera."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from numbers import Integral, Real
 from sys import float_info
-from typing import Final, Literal, TypeAlias
+from typing import Final, Literal
 from warnings import warn
 
 import numpy as np
@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from chipglow.camera.exposure import Exposure, expose
 from chipglow.camera.measurement import Measurement
-from chipglow.camera.optics import AnnularAperturePSF, PointSpreadFunction, blur
+from chipglow.camera.optics import AnnularAperturePSF, OpticsTerm, PointSpreadFunction, blur
 from chipglow.camera.optics.convolution import blur_of_like, light_from_beyond
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
+from chipglow.camera.optics.terms import Blur
 from chipglow.camera.warning import ChipglowWarning
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
@@ -29,8 +30,6 @@ BORDER_TOLERANCE: Final = 1.0
 
 _COLD_FLOOR: Final = 373.15
 """Floor in K up to which a round number is probably one of degrees Celsius."""
-
-_Blur: TypeAlias = Callable[[NDArray[np.float64], PointSpreadFunction, float], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,9 @@ class Camera:
     fill_factor : float
         Fraction of a pixel's square that is sensitive: a square in its middle.
     psf : PointSpreadFunction, optional
-        How the camera spreads a point; None for an ideal camera (the paper's case 2).
+        How the camera spreads a point; None for an ideal camera (the paper's case 2). One that
+        includes the ``footprint`` is of optics and pixel together: then a pixel reads the blurred
+        image in its middle, and does not integrate once more.
     psf_order : {"optics", "detector"}
         ``optics`` blurs the scene's samples and lets the pixels integrate the blurred image, as
         light does it: the point spread function is that of the optics alone. ``detector`` is the
@@ -69,6 +70,8 @@ class Camera:
     reflected : float, optional
         Temperature in K of surroundings that the surface reflects (Equation 2); by default
         reflections are left out, as in the paper's simulation (Equation 3).
+    optics : tuple of OpticsTerm
+        What the optics do besides, in the order of the light; nothing by default.
 
     Raises
     ------
@@ -92,6 +95,7 @@ class Camera:
     frame_rate: float = 600.0
     lower_limit: float | None = 573.15
     reflected: float | None = None
+    optics: tuple[OpticsTerm, ...] = ()
 
     def __post_init__(self) -> None:
         _expect(
@@ -118,6 +122,18 @@ class Camera:
             "a PointSpreadFunction such as GaussianPSF(12e-6), or None",
         )
         _expect(self.psf_order in PSF_ORDERS, "psf_order", self.psf_order, " or ".join(PSF_ORDERS))
+        _expect(
+            self.psf_order == "optics" or not self._blur_has_footprint,
+            "psf_order",
+            self.psf_order,
+            "optics: the point spread function includes the pixel's footprint",
+        )
+        _expect(
+            isinstance(self.optics, tuple) and all(isinstance(t, OpticsTerm) for t in self.optics),
+            "optics",
+            self.optics,
+            "a tuple of terms such as Veil(0.02, 300e-6)",
+        )
         _expect_number("frame_rate", self.frame_rate, 0.0, float_info.max, "over 0 a second")
         _expect_number(
             "integration_time",
@@ -254,9 +270,10 @@ class Camera:
                 raise ValueError(f"camera: exposures of different grids, {sensors} and {found}")
             sensors = found
             starts.append(exposure.start)
-            frames.append(self._read_out(exposure, sensors, blur))
-            if self.psf is not None:
-                alike.append(self._read_out(exposure, sensors, blur_of_like))
+            seen = exposure.mean_radiance, exposure.raster, sensors
+            frames.append(self._read_out(*seen, blur))
+            if self.psf is not None or self.optics:
+                alike.append(self._read_out(*seen, blur_of_like))
         if sensors is None:
             raise ValueError("camera: no exposure to develop, expected 1 or more")
         measured = self._measurement(np.stack(frames), np.array(starts), sensors)
@@ -321,42 +338,71 @@ class Camera:
             return np.zeros(sensors.shape)
         if self.psf_order == "optics":
             fraction = light_from_beyond(self.psf, scene.spacing, scene.shape)
-            return integrate(fraction, scene, sensors, self.fill_factor)
+            return integrate(fraction, scene, sensors, self._sensitive(scene))
         whole, own = whole_raster(scene, sensors)
         return light_from_beyond(self.psf, self.pitch, whole.shape)[own].copy()
 
-    def form_image(self, exposure: Exposure) -> NDArray[np.float64]:
-        """Image of an exposure on the pixels: point spread function and detector footprint.
+    def form_image(self, radiance: NDArray[np.float64], scene: Raster) -> NDArray[np.float64]:
+        """Image of a map of radiance on the pixels: optics, point spread function and footprint.
 
         Parameters
         ----------
-        exposure : Exposure
-            What the scene sent.
+        radiance : ndarray
+            Radiance of the scene's samples in W/(m² sr), shape `scene.shape`: the mean over the
+            integration time, such as `Exposure.mean_radiance`.
+        scene : Raster
+            The samples.
 
         Returns
         -------
         ndarray
-            Radiance of every pixel in W/(m² sr), shape `pixels(exposure.raster).shape`.
+            Radiance of every pixel in W/(m² sr), shape `pixels(scene).shape`.
 
         Raises
         ------
         ValueError
-            If the pixels do not fit the scene.
+            If the map is not of the raster's shape, holds what is no radiance, or the pixels do
+            not fit the scene.
         """
-        return self._read_out(exposure, self.pixels(exposure.raster), blur)
+        image = np.asarray(radiance, np.float64)
+        if image.shape != scene.shape:
+            raise ValueError(f"camera: radiance of shape {image.shape}, expected {scene.shape}")
+        if not (np.isfinite(image).all() and (image >= 0).all()):
+            raise ValueError("camera: radiance must be finite and 0 W/(m² sr) or more")
+        return self._read_out(image, scene, self.pixels(scene), blur)
 
-    def _read_out(self, exposure: Exposure, sensors: Raster, blurred: _Blur) -> NDArray[np.float64]:
+    def _read_out(
+        self, image: NDArray[np.float64], scene: Raster, sensors: Raster, blurred: Blur
+    ) -> NDArray[np.float64]:
         """Radiance of every pixel, shape `sensors.shape`."""
-        image, raster = exposure.mean_radiance, exposure.raster
-        if self.psf is None:
-            return integrate(image, raster, sensors, self.fill_factor)
-        if self.psf_order == "optics":
-            image = blurred(image, self.psf, raster.spacing)
-            return integrate(image, raster, sensors, self.fill_factor)
+        if self.psf is not None and self.psf_order == "optics":
+            image = blurred(image, self.psf, scene.spacing)
+        for term in self.optics:
+            image = term.on_samples(image, scene, sensors, blurred)
+        image = self._on_pixels(image, scene, sensors, blurred)
+        for term in self.optics:
+            image = term.on_pixels(image, sensors, self.band)
+        return image
+
+    def _on_pixels(
+        self, image: NDArray[np.float64], scene: Raster, sensors: Raster, blurred: Blur
+    ) -> NDArray[np.float64]:
+        """What pixels integrate, in the detector's order with the point spread function."""
+        if self.psf is None or self.psf_order == "optics":
+            return integrate(image, scene, sensors, self._sensitive(scene))
         # Pixels that are not read out tell what is beyond those that are.
-        whole, own = whole_raster(raster, sensors)
-        image = integrate(image, raster, whole, self.fill_factor)
-        return blurred(image, self.psf, self.pitch)[own]
+        whole, own = whole_raster(scene, sensors)
+        return blurred(integrate(image, scene, whole, self.fill_factor), self.psf, self.pitch)[own]
+
+    def _sensitive(self, scene: Raster) -> float:
+        """Share of a pixel's square that it integrates: a sample, if the blur did the rest."""
+        if not self._blur_has_footprint:
+            return self.fill_factor
+        return min((scene.spacing / self.pitch) ** 2, 1.0)
+
+    @property
+    def _blur_has_footprint(self) -> bool:
+        return self.psf is not None and "footprint" in self.psf.includes
 
     def measurement(
         self, images: NDArray[np.float64], starts: NDArray[np.float64], scene: Raster
@@ -392,6 +438,7 @@ class Camera:
             "integration_time": self.integration_time,
             "frame_rate": self.frame_rate,
             "reflected": self.reflected,
+            "optics": repr(self.optics) if self.optics else None,
         }
         return {name: value for name, value in attributes.items() if value is not None}
 

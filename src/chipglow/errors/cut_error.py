@@ -405,7 +405,7 @@ def _measure(
         tell("camera", i / len(instants))
         exposures = _expose(scene, fields, camera, instant.start)
         for image, exposure in zip(images, exposures, strict=True):
-            image.append(camera.form_image(exposure))
+            image.append(camera.form_image(exposure.mean_radiance, exposure.raster))
         if i == developed:
             frames.append(list(exposures))
     tell("camera", 1.0)

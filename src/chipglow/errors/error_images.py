@@ -80,7 +80,9 @@ def error_images(
     reference : ReferenceKind
         What to compare with; the paper's is the maximum.
     """
-    return Unblurred.of(camera, exposure, reference).errors(camera.form_image(exposure))
+    return Unblurred.of(camera, exposure, reference).errors(
+        camera.form_image(exposure.mean_radiance, exposure.raster)
+    )
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ class Unblurred:
             camera,
             camera.pixels(exposure.raster),
             reference_temperature(camera, exposure, reference),
-            replace(camera, psf=None).form_image(exposure),
+            replace(camera, psf=None).form_image(exposure.mean_radiance, exposure.raster),
         )
 
     def errors(self, radiance: NDArray[np.float64]) -> ErrorImages:

@@ -384,7 +384,7 @@ def _collect(
         )
         for one, textures in zip(collected, fields, strict=True):
             of_surface = [next(exposures) for _ in textures]
-            one.images.append(camera.form_image(of_surface[0]))
+            one.images.append(camera.form_image(of_surface[0].mean_radiance, scene.raster))
             if i == shown:
                 one.shown.append(of_surface[0])
                 one.errors.append(error_images(camera, of_surface[0], plan.reference))

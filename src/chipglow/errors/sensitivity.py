@@ -7,9 +7,9 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera import Camera, Exposure, GaussianPSF, blur
+from chipglow.camera import Camera, GaussianPSF, blur
 from chipglow.errors.draws import BAND_READINGS, RAKE_READINGS, Site, pixel_phases
-from chipglow.errors.error_images import ErrorImages, Unblurred
+from chipglow.errors.error_images import Unblurred
 from chipglow.errors.local_error import LocalError
 
 PsfOrder: TypeAlias = Literal["detector", "optics"]
@@ -74,8 +74,11 @@ def sensitivity(
         places = [_Place.of(one, site) for one in pixel_phases(camera, phases)]
         for psf in (GaussianPSF(width) for width in widths):
             found["detector"].append([place.blurred_on_pixels(psf) for place in places])
-            rake, band = _spread(site.rake_exposure, psf), _spread(site.band_exposure, psf)
-            found["optics"].append([place.of_exposures(rake, band) for place in places])
+            blurred = [
+                blur(one.mean_radiance, psf, one.raster.spacing)
+                for one in (site.rake_exposure, site.band_exposure)
+            ]
+            found["optics"].append([place.ideal(*blurred) for place in places])
         progress((i + 1) / len(sites))
     return tuple(_gathered(order, widths, found[order], len(sites)) for order in PSF_ORDERS)
 
@@ -100,30 +103,26 @@ class _Place:
     def blurred_on_pixels(self, psf: GaussianPSF) -> dict[str, LocalError]:
         """Readings of a camera whose point spread function acts from pixel to pixel."""
         camera = replace(self.rake.camera, psf=psf, psf_order="detector")
-        return self._readings(
-            self.rake.errors(camera.form_image(self.site.rake_exposure)),
-            self.band.errors(camera.form_image(self.site.band_exposure)),
-        )
+        exposures = self.site.rake_exposure, self.site.band_exposure
+        return self._readings(camera, *(one.mean_radiance for one in exposures))
 
-    def of_exposures(self, rake: Exposure, band: Exposure) -> dict[str, LocalError]:
-        """Readings on exposures that are blurred already."""
-        return self._readings(
-            self.rake.errors(self.rake.camera.form_image(rake)),
-            self.band.errors(self.band.camera.form_image(band)),
-        )
+    def ideal(self, rake: NDArray[np.float64], band: NDArray[np.float64]) -> dict[str, LocalError]:
+        """Readings of a camera without point spread function, on blurred radiance."""
+        return self._readings(self.rake.camera, rake, band)
 
-    def _readings(self, rake: ErrorImages, band: ErrorImages) -> dict[str, LocalError]:
-        rake_errors, band_errors = self.site.rake_errors(rake), self.site.band_errors(band)
+    def _readings(
+        self, camera: Camera, rake: NDArray[np.float64], band: NDArray[np.float64]
+    ) -> dict[str, LocalError]:
+        """Readings on radiance of the scene's samples at the rake face and in the band."""
+        site = self.site
+        rake_image = camera.form_image(rake, site.rake_exposure.raster)
+        band_image = camera.form_image(band, site.band_exposure.raster)
+        rake_errors = site.rake_errors(self.rake.errors(rake_image))
+        band_errors = site.band_errors(self.band.errors(band_image))
         return {
             **{name: read(rake_errors) for name, read in RAKE_READINGS.items()},
             **{name: read(band_errors) for name, read in BAND_READINGS.items()},
         }
-
-
-def _spread(exposure: Exposure, psf: GaussianPSF) -> Exposure:
-    """The exposure behind optics with a point spread function."""
-    radiance = blur(exposure.mean_radiance, psf, exposure.raster.spacing)
-    return replace(exposure, mean_radiance=radiance)
 
 
 def _gathered(

@@ -10,6 +10,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import eigh_tridiagonal
 
 from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT, spectral_radiance
 
@@ -132,6 +133,57 @@ class Band:
         position = (values - TABLE_COLDEST) / _TEMPERATURE_STEP
         slopes = self.radiance_table[:, 1]
         return np.interp(position, np.arange(slopes.size), slopes, left=np.nan, right=np.nan)
+
+    def spectrum(
+        self, temperature: float, count: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Wavelengths that stand for the in-band radiance of a blackbody.
+
+        Parameters
+        ----------
+        temperature : float
+            Temperature of the blackbody in K.
+        count : int
+            Number of wavelengths, 1 to 15.
+
+        Returns
+        -------
+        wavelengths : ndarray
+            In m, ascending, shape (count,).
+        weights : ndarray
+            Their fractions of the radiance, of sum 1.
+
+        Raises
+        ------
+        ValueError
+            If the number is another.
+
+        Notes
+        -----
+        The Gauss quadrature of the weight R(λ) L(λ, T), exact for polynomials in λ up to degree
+        2 `count` − 1, from the eigenvalues of its Jacobi matrix (Golub and Welsch, Math. Comp. 23
+        (1969) 221), which Lanczos' recurrence finds of the nodes of the band's own integral.
+        """
+        if not 1 <= count < _NODES_PER_PANEL:
+            raise ValueError(f"band: count is {count}, expected 1 to {_NODES_PER_PANEL - 1}")
+        nodes, weights = self._quadrature
+        weights = weights * spectral_radiance(nodes, np.array(temperature))
+        middle, half = (self.lower + self.upper) / 2, (self.upper - self.lower) / 2
+        place = (nodes - middle) / half
+        basis = np.zeros((count, nodes.size))
+        diagonal, beside = np.zeros(count), np.zeros(count)
+        vector = np.sqrt(weights / weights.sum())
+        for n in range(count):
+            basis[n] = vector
+            vector = place * vector
+            diagonal[n] = vector @ basis[n]
+            # Once is not enough: rounding would bring the first vectors back.
+            for _ in range(2):
+                vector = vector - basis[: n + 1].T @ (basis[: n + 1] @ vector)
+            beside[n] = np.linalg.norm(vector)
+            vector = vector / beside[n]
+        found, vectors = eigh_tridiagonal(diagonal, beside[:-1])
+        return middle + half * found, vectors[0] ** 2
 
     @cached_property
     def wavelengths(self) -> NDArray[np.float64]:

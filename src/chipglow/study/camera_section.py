@@ -6,7 +6,17 @@ from typing import Annotated, Literal
 
 from pydantic import Strict, model_validator
 
-from chipglow.camera import PSFS, Camera, PointSpreadFunction, PSFChoice
+from chipglow.camera import (
+    BLURS,
+    OPTICS_TERMS,
+    PSFS,
+    BlurredPSF,
+    BlurTerm,
+    Camera,
+    OpticsTerm,
+    PointSpreadFunction,
+    PSFChoice,
+)
 from chipglow.io.column_file import read_response
 from chipglow.quantities import OR_NONE, Declared, FileBeside, Settings, described
 from chipglow.quantities.units import (
@@ -23,6 +33,8 @@ from chipglow.study.camera_presets import CAMERAS, with_preset
 from chipglow.study.scaling import with_pitch
 
 PSFSection = Annotated[Declared[PSFChoice], PSFS]
+BlurSection = Annotated[Declared[BlurTerm], BLURS]
+OpticsTermSection = Annotated[Declared[OpticsTerm], OPTICS_TERMS]
 
 
 class CameraSection(Settings[Camera]):
@@ -65,6 +77,16 @@ class CameraSection(Settings[Camera]):
         {"kind": "annular-aperture"},
         f"Point spread function of the optics, or none. Kinds:\n{PSFS.examples}",
     )
+    blur: Annotated[tuple[BlurSection, ...], Strict(False)] = described(
+        [],
+        "What spreads light besides, a list: it is part of the point spread function. Kinds:\n"
+        f"{BLURS.examples}",
+    )
+    optics: Annotated[tuple[OpticsTermSection, ...], Strict(False)] = described(
+        [],
+        "What the optics do besides, a list in the order of the light. Kinds:\n"
+        f"{OPTICS_TERMS.examples}",
+    )
     psf_order: Literal["optics", "detector"] = described(
         "detector",
         "detector (the paper's: on the pixels' values) or optics (on the samples, before the\n"
@@ -86,18 +108,19 @@ class CameraSection(Settings[Camera]):
 
     def build(self) -> Camera:
         """The camera, with as many pixels as see the scene."""
-        response = None if self.response is None else read_response(self.response)
+        band = self._band()
         return Camera(
-            band=Band(*self.band, response),
+            band=band,
             pitch=self.pitch,
             offset=(self.offset_right, self.offset_down),
             fill_factor=self.fill_factor,
-            psf=self._psf(),
+            psf=self._psf(band),
             psf_order=self.psf_order,
             integration_time=self.integration_time,
             frame_rate=self.frame_rate,
             lower_limit=self.lower_limit,
             reflected=self.reflected,
+            optics=tuple(term.build() for term in self.optics),
         )
 
     def on(self, scene: Raster) -> Camera:
@@ -115,7 +138,17 @@ class CameraSection(Settings[Camera]):
         columns, rows = self.array
         return replace(camera, shape=(min(rows, seen.rows), min(columns, seen.columns)))
 
-    def _psf(self) -> PointSpreadFunction | None:
+    def _band(self) -> Band:
+        response = None if self.response is None else read_response(self.response)
+        return Band(*self.band, response)
+
+    def _psf(self, band: Band) -> PointSpreadFunction | None:
         if self.psf is None:
+            if self.blur:
+                raise ValueError(
+                    "blur: stands beside psf: none, expected a point spread function that it is "
+                    "part of"
+                )
             return None
-        return self.psf.build().of_camera(sum(self.band) / 2, self.magnification)
+        psf = self.psf.build().of_camera(band, self.magnification)
+        return BlurredPSF(psf, tuple(one.build() for one in self.blur)) if self.blur else psf

@@ -1,5 +1,14 @@
 """What the optics and the detector elements do to a radiance image."""
 
+from chipglow.camera.optics.blurs import (
+    BLURS,
+    BlurredPSF,
+    BlurTerm,
+    ChargeDiffusion,
+    Jitter,
+    LinearMotion,
+    Vibration,
+)
 from chipglow.camera.optics.convolution import blur
 from chipglow.camera.optics.psf import (
     PSFS,
@@ -11,15 +20,39 @@ from chipglow.camera.optics.psf import (
     PointSpreadFunction,
     PSFChoice,
 )
+from chipglow.camera.optics.pupil import Pupil, PupilPSF
+from chipglow.camera.optics.terms import (
+    OPTICS_TERMS,
+    Distortion,
+    Narcissus,
+    OpticalElement,
+    OpticsTerm,
+    Veil,
+)
 
 __all__ = [
+    "BLURS",
+    "OPTICS_TERMS",
     "PSFS",
     "AiryAperture",
     "AnnularAperturePSF",
+    "BlurTerm",
+    "BlurredPSF",
+    "ChargeDiffusion",
+    "Distortion",
     "GaussianPSF",
+    "Jitter",
+    "LinearMotion",
     "MeasuredPSF",
     "MeasuredPSFFile",
+    "Narcissus",
+    "OpticalElement",
+    "OpticsTerm",
     "PSFChoice",
     "PointSpreadFunction",
+    "Pupil",
+    "PupilPSF",
+    "Veil",
+    "Vibration",
     "blur",
 ]

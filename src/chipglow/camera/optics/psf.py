@@ -4,20 +4,29 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from errno import ENOENT
 from math import ceil, inf, log, pi, sqrt
-from numbers import Real
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, final
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Strict
 from scipy.integrate import cumulative_simpson
 from scipy.optimize import brentq
 from scipy.special import erf, erfinv, j1
 
+from chipglow.camera.optics.kernel import (
+    check_length,
+    folded,
+    half_maximum_width,
+    half_size,
+    normalised,
+    peak,
+)
 from chipglow.camera.optics.sampling import overlap_lengths
 from chipglow.quantities import Family, FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, WAVELENGTH
+from chipglow.radiometry import Band
 from chipglow.uncertainty import Component, Estimate, from_xarray
 
 GAUSSIAN_ENERGY: Final = 1.0 - 1e-12
@@ -33,9 +42,7 @@ ANNULAR_ENERGY: Final = 0.99
 The camera's blur has no use for it: `PointSpreadFunction.view_kernel` leaves out nothing.
 """
 
-_LARGEST_KERNEL: Final = 4097
 _FWHM_PER_SIGMA: Final = 2 * sqrt(2 * log(2))
-_EQUAL: Final = 1e-9
 _FAR: Final = 30.0
 """Radius, as v, from which on the mean of diffraction's rings falls as 1/r³: within 2 %."""
 
@@ -48,13 +55,13 @@ class PSFChoice(Part, ABC):
     """What a description of a camera says of its point spread function."""
 
     @abstractmethod
-    def of_camera(self, wavelength: float, magnification: float | None) -> "PointSpreadFunction":
+    def of_camera(self, band: Band, magnification: float | None) -> "PointSpreadFunction":
         """The point spread function on the scene.
 
         Parameters
         ----------
-        wavelength : float
-            Middle of the camera's band in m.
+        band : Band
+            The camera's band.
         magnification : float or None
             Of its lens, if it is known.
 
@@ -72,11 +79,15 @@ class PointSpreadFunction(PSFChoice):
     ----------
     fwhm : float
         Full width at half maximum in m.
+    includes : tuple of str
+        What is in it besides the optics: ``footprint`` for the pixel's sensitive square, or kinds
+        of `chipglow.camera.BLURS`. A camera adds none of them again.
     """
 
     fwhm: float
+    includes: tuple[str, ...] = ()
 
-    def of_camera(self, wavelength: float, magnification: float | None) -> "PointSpreadFunction":
+    def of_camera(self, band: Band, magnification: float | None) -> "PointSpreadFunction":
         """Return itself: it is given on the scene."""
         return self
 
@@ -124,7 +135,7 @@ class PointSpreadFunction(PSFChoice):
         ValueError
             As `kernel`.
         """
-        return _folded(normalised(self.kernel(spacing)), rows, columns)
+        return folded(normalised(self.kernel(spacing)), rows, columns)
 
 
 @final
@@ -170,15 +181,15 @@ class AnnularAperturePSF(PointSpreadFunction):
 
     def kernel(self, spacing: float) -> NDArray[np.float64]:
         """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
-        half = _half_size(self._reach * self._unit, spacing)
+        half = half_size(self._reach * self._unit, spacing)
         return self._fractions(spacing, half, half)
 
     def view_kernel(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
         """Integrate over all squares of the view; see `PointSpreadFunction.view_kernel`."""
-        _check_length("spacing", spacing)
+        check_length("spacing", spacing)
         far = ceil(_FAR * self._unit / spacing)
         kernel = self._fractions(spacing, max(rows, far), max(columns, far))
-        return _folded(_with_the_rest(kernel, spacing), rows, columns)
+        return folded(_with_the_rest(kernel, spacing), rows, columns)
 
     def _fractions(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
         """Fractions of the light on squares, so many up and down and to either side."""
@@ -236,7 +247,7 @@ class GaussianPSF(PointSpreadFunction):
         """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
         deviation = self.fwhm / _FWHM_PER_SIGMA
         reach = sqrt(2) * deviation * float(erfinv(sqrt(GAUSSIAN_ENERGY)))
-        half = _half_size(reach, spacing)
+        half = half_size(reach, spacing)
         edges = spacing * (np.arange(-half, half + 2) - 0.5)
         line = np.diff(erf(edges / (sqrt(2) * deviation))) / 2
         return np.outer(line, line)
@@ -257,6 +268,9 @@ class MeasuredPSF(PointSpreadFunction):
     components : tuple of Component
         What independent errors change in the weights, in their unit; those of ``chipglow psf`` are
         in its files. None by default: then nothing is known of them.
+    includes : tuple of str
+        What it holds besides the optics, because it was measured through it: ``footprint`` for the
+        pixel's sensitive square, and kinds of `chipglow.camera.BLURS`.
 
     Attributes
     ----------
@@ -280,6 +294,7 @@ class MeasuredPSF(PointSpreadFunction):
     weights: NDArray[np.float64] = field(repr=False)
     spacing: float
     components: tuple[Component, ...] = field(default=(), repr=False)
+    includes: tuple[str, ...] = ()
     fwhm: float = field(init=False)
 
     def __str__(self) -> str:
@@ -287,14 +302,14 @@ class MeasuredPSF(PointSpreadFunction):
         return f"measured, {rows} x {columns} values {self.spacing * 1e6:.3g} µm apart"
 
     def __post_init__(self) -> None:
-        _check_length("spacing", self.spacing)
+        check_length("spacing", self.spacing)
         given = Estimate(_checked_weights(self.weights), self.components)
         estimate = given / given.sum()
         object.__setattr__(self, "weights", estimate.values)
         object.__setattr__(self, "components", estimate.components)
-        row, column = _peak(estimate.values)
+        row, column = peak(estimate.values)
         lines = estimate.values[row], estimate.values[:, column]
-        widths = [_half_maximum_width(line) for line in lines]
+        widths = [half_maximum_width(line) for line in lines]
         object.__setattr__(self, "fwhm", float(np.mean(widths)) * self.spacing)
 
     @property
@@ -303,7 +318,12 @@ class MeasuredPSF(PointSpreadFunction):
         return Estimate(self.weights, self.components)
 
     @classmethod
-    def from_file(cls, path: str | Path, spacing: float | None = None) -> "MeasuredPSF":
+    def from_file(
+        cls,
+        path: str | Path,
+        spacing: float | None = None,
+        includes: tuple[str, ...] | None = None,
+    ) -> "MeasuredPSF":
         """Read a kernel.
 
         Parameters
@@ -313,6 +333,8 @@ class MeasuredPSF(PointSpreadFunction):
             ``chipglow psf`` writes (``.nc``).
         spacing : float, optional
             Side of the kernel's squares in m, on the scene; None for a ``.nc``, which tells it.
+        includes : tuple of str, optional
+            What it holds besides the optics; by default what a ``.nc`` says, and nothing.
 
         Raises
         ------
@@ -333,9 +355,10 @@ class MeasuredPSF(PointSpreadFunction):
             )
         try:
             if spacing is None:
-                estimate, spacing = _read_netcdf(path)
-                return cls(estimate.values, spacing, estimate.components)
-            return cls(readers[kind](path), spacing)
+                estimate, spacing, stated = _read_netcdf(path)
+                held = stated if includes is None else includes
+                return cls(estimate.values, spacing, estimate.components, held)
+            return cls(readers[kind](path), spacing, includes=includes or ())
         except (ValueError, EOFError, MemoryError, KeyError, RuntimeError) as error:
             raise ValueError(f"psf: {path} is not a kernel: {error}") from error
 
@@ -343,12 +366,64 @@ class MeasuredPSF(PointSpreadFunction):
         """Share the measured light among squares of side `spacing`."""
         samples = self.weights.shape[0]
         width = samples * self.spacing
-        half = _half_size(width / 2, spacing)
+        half = half_size(width / 2, spacing)
         left = width / 2 + spacing * (np.arange(-half, half + 1) - 0.5)
         fraction = overlap_lengths(left, spacing, samples, self.spacing) / self.spacing
         return normalised(
             np.einsum("ij,jk,lk->il", fraction, self.weights, fraction, optimize=True)
         )
+
+
+NumericalAperture = Annotated[
+    float | None, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
+]
+FNumber = Annotated[
+    float | None,
+    Parameter(
+        "F-number of the lens, focused at infinity; with the camera's magnification m the\n"
+        "numerical aperture is m / (2 f_number (1 + m)).",
+        over=0.0,
+    ),
+]
+
+
+def check_aperture(numerical_aperture: float | None, f_number: float | None) -> None:
+    """Refuse both, or none, of the ways to say how wide a lens is open.
+
+    Raises
+    ------
+    ValueError
+        If it is so.
+    """
+    if (numerical_aperture is None) == (f_number is None):
+        raise ValueError("expected one of numerical_aperture and f_number")
+
+
+def object_aperture(
+    numerical_aperture: float | None, f_number: float | None, magnification: float | None
+) -> float:
+    """Numerical aperture on the scene's side.
+
+    Parameters
+    ----------
+    numerical_aperture : float or None
+        It, if it is given.
+    f_number : float or None
+        Of the lens, focused at infinity, in its place.
+    magnification : float or None
+        Of the lens, which an f-number needs.
+
+    Raises
+    ------
+    ValueError
+        If the magnification is missing.
+    """
+    if numerical_aperture is not None:
+        return numerical_aperture
+    assert f_number is not None
+    if magnification is None:
+        raise ValueError("magnification: is missing, expected it with psf.f_number")
+    return magnification / (2 * f_number * (1 + magnification))
 
 
 @final
@@ -368,32 +443,18 @@ class AiryAperture(PSFChoice):
             most=0.1,
         ),
     ] = None
-    numerical_aperture: Annotated[
-        float | None, Parameter("Numerical aperture on the scene's side.", over=0.0, most=1.0)
-    ] = None
-    f_number: Annotated[
-        float | None,
-        Parameter(
-            "F-number of the lens, focused at infinity; with the camera's magnification m the\n"
-            "numerical aperture is m / (2 f_number (1 + m)).",
-            over=0.0,
-        ),
-    ] = None
+    numerical_aperture: NumericalAperture = None
+    f_number: FNumber = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if (self.numerical_aperture is None) == (self.f_number is None):
-            raise ValueError("expected one of numerical_aperture and f_number")
+        check_aperture(self.numerical_aperture, self.f_number)
 
-    def of_camera(self, wavelength: float, magnification: float | None) -> PointSpreadFunction:
+    def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
         """Diffraction by the numerical aperture; see `PSFChoice.of_camera`."""
-        aperture = self.numerical_aperture
-        if aperture is None:
-            assert self.f_number is not None
-            if magnification is None:
-                raise ValueError("magnification: is missing, expected it with psf.f_number")
-            aperture = magnification / (2 * self.f_number * (1 + magnification))
-        return AnnularAperturePSF(self.wavelength or wavelength, aperture, 0.0)
+        aperture = object_aperture(self.numerical_aperture, self.f_number, magnification)
+        wavelength = self.wavelength or (band.lower + band.upper) / 2
+        return AnnularAperturePSF(wavelength, aperture, 0.0)
 
 
 @final
@@ -417,13 +478,23 @@ class MeasuredPSFFile(PSFChoice):
         ),
     ] = None
 
+    includes: Annotated[
+        tuple[str, ...] | None,
+        Strict(False),
+        Parameter(
+            "What it holds besides the optics, because it was measured through it: footprint for\n"
+            "the pixel's sensitive square, and kinds of blur; none: what a .nc says, or nothing."
+        ),
+    ] = None
+
     psf: MeasuredPSF = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "psf", MeasuredPSF.from_file(self.file, self.spacing))
+        psf = MeasuredPSF.from_file(self.file, self.spacing, self.includes)
+        object.__setattr__(self, "psf", psf)
 
-    def of_camera(self, wavelength: float, magnification: float | None) -> PointSpreadFunction:
+    def of_camera(self, band: Band, magnification: float | None) -> PointSpreadFunction:
         """The kernel; see `PSFChoice.of_camera`."""
         return self.psf
 
@@ -432,11 +503,6 @@ def _jinc(v: NDArray[np.float64]) -> NDArray[np.float64]:
     """2 J1(v) / v."""
     safe = np.where(v == 0.0, 1.0, v)
     return np.where(v == 0.0, 1.0, 2 * j1(safe) / safe)
-
-
-def normalised(kernel: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A kernel of sum 1."""
-    return np.asarray(kernel / kernel.sum())
 
 
 def _with_the_rest(kernel: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
@@ -453,57 +519,6 @@ def _with_the_rest(kernel: NDArray[np.float64], spacing: float) -> NDArray[np.fl
     ring[[0, -1], 1:-1] = np.diff((np.hypot(y[-1], x) - y[-1]) / (y[-1] * x))
     ring[np.ix_([0, -1], [0, -1])] = (x[-1] + y[-1] - corner) / (x[-1] * y[-1])
     return np.asarray(np.pad(kernel, 1) + ring * (1 - kernel.sum()) / ring.sum())
-
-
-def _folded(kernel: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.float64]:
-    """A kernel no larger than this on each side; its outermost squares hold what was beyond."""
-    for axis, reach in enumerate((rows, columns)):
-        line = np.moveaxis(kernel, axis, 0)
-        beyond = line.shape[0] // 2 - reach
-        if beyond > 0:
-            kept = line[beyond:-beyond].copy()
-            kept[0] += line[:beyond].sum(axis=0)
-            kept[-1] += line[-beyond:].sum(axis=0)
-            kernel = np.moveaxis(kept, 0, axis)
-    return kernel
-
-
-def _half_size(reach: float, spacing: float) -> int:
-    """Number of squares on each side of the middle one that hold what is within `reach`."""
-    _check_length("spacing", spacing)
-    # A kernel that ends on a square's edge but for rounding needs no square more.
-    half = max(0, ceil(reach / spacing - 0.5 - 1e-9))
-    if 2 * half + 1 > _LARGEST_KERNEL:
-        raise ValueError(
-            f"psf: spacing is {spacing:g} m, expected {2 * reach / _LARGEST_KERNEL:.3g} m or more "
-            f"for a kernel of {2 * reach:.3g} m"
-        )
-    return half
-
-
-def _peak(weights: NDArray[np.float64]) -> tuple[int, int]:
-    """Row and column of the greatest value; of equal ones, of that nearest to their middle."""
-    # What differs by rounding alone is equal: the top of a disc is flat.
-    places = np.argwhere(weights >= weights.max() * (1 - _EQUAL))
-    from_middle = np.hypot(*(places - places.mean(axis=0)).T)
-    row, column = places[int(np.argmin(from_middle))].tolist()
-    return row, column
-
-
-def _half_maximum_width(line: NDArray[np.float64]) -> float:
-    """Full width at half maximum of a line of samples, in samples."""
-    padded = np.pad(line, 1)
-    level = padded.max() / 2
-    above = np.flatnonzero(padded >= level)
-    first, last = int(above[0]), int(above[-1])
-    rise = (padded[first] - level) / (padded[first] - padded[first - 1])
-    fall = (padded[last] - level) / (padded[last] - padded[last + 1])
-    return float(last - first + rise + fall)
-
-
-def _check_length(name: str, value: float) -> None:
-    if not (isinstance(value, Real) and 0.0 < value <= 0.1):
-        raise ValueError(f"psf: {name} is {value!r}, expected over 0 to 0.1 m; 8 um is 8e-6")
 
 
 def _checked_weights(weights: ArrayLike) -> NDArray[np.float64]:
@@ -526,12 +541,14 @@ def _read_csv(path: Path) -> NDArray[np.float64]:
     return np.array(rows, dtype=np.float64)
 
 
-def _read_netcdf(path: Path) -> tuple[Estimate, float]:
-    """Kernel, with the components of its uncertainty if it has any, and its spacing."""
+def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:
+    """Kernel, with the components of its uncertainty if it has any, spacing and what it holds."""
     if not path.is_file():
         raise FileNotFoundError(ENOENT, "there is no such file", str(path))
     try:
         with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as data:
-            return from_xarray(data, "kernel"), float(data["kernel"].attrs["spacing"])
+            kernel = data["kernel"].attrs
+            stated = tuple(str(kernel.get("includes", "")).split())
+            return from_xarray(data, "kernel"), float(kernel["spacing"]), stated
     except OSError as error:
         raise ValueError(f"cut short, or no NetCDF-4 file: {error}") from error

@@ -36,7 +36,7 @@ def write_psf(
     """
     psf = psf_kernel(knife) if psf is None else psf
     data = to_xarray(psf.estimate, "kernel", ("y", "x"))
-    data["kernel"].attrs["spacing"] = psf.spacing
+    data["kernel"].attrs |= {"spacing": psf.spacing, "includes": " ".join(psf.includes)}
     data = data.assign_attrs(
         fwhm=knife.fwhm,
         fwhm_uncertainty=knife.fwhm_uncertainty,

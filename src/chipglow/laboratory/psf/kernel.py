@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera import MeasuredPSF, PointSpreadFunction
-from chipglow.camera.optics.psf import normalised
+from chipglow.camera.optics.kernel import normalised
 from chipglow.laboratory.psf.knife_edge import RADIAL, KnifeEdge
 from chipglow.laboratory.psf.psf_fit import ModelFit
 from chipglow.laboratory.psf.radial_psf import FIT, psf_cause

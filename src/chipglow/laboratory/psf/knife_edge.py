@@ -462,4 +462,5 @@ def _with_pixel(optics: PointSpreadFunction, footprint: float) -> MeasuredPSF:
     spacing = footprint / _SUBSAMPLES
     kernel = np.pad(optics.kernel(spacing), _SUBSAMPLES // 2)
     # A mean over squares of sum 1 leaves rounding below 0 where there is no light.
-    return MeasuredPSF(np.maximum(uniform_filter(kernel, _SUBSAMPLES, mode="constant"), 0), spacing)
+    weights = np.maximum(uniform_filter(kernel, _SUBSAMPLES, mode="constant"), 0)
+    return MeasuredPSF(weights, spacing, includes=("footprint",))

@@ -1,0 +1,275 @@
+"""What spreads light besides the optics: charge that diffuses, and a camera that moves."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from math import ceil, cos, pi, sin
+from typing import Annotated, ClassVar, Final, final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+from scipy.special import j0
+
+from chipglow.camera.optics.kernel import (
+    check_length,
+    folded,
+    half_maximum_width,
+    half_size,
+    normalised,
+    peak,
+    resized,
+)
+from chipglow.camera.optics.psf import PointSpreadFunction
+from chipglow.quantities import Family, Parameter, Part
+from chipglow.quantities.units import ANGLE, LENGTH
+
+BLURS: Final = Family("blur")
+"""Blurs by their kind; other packages add theirs in the group ``chipglow.blur``."""
+
+_SQUARES_PER_WIDTH: Final = 4
+"""Squares to a point spread function's width, so that hardly any of its detail is finer."""
+
+_NEAR: Final = 32
+"""Widths of a point spread function within which a blur changes it."""
+
+_WIDTH_SQUARES: Final = 24
+
+
+class BlurTerm(Part, ABC):
+    """An effect that moves the light of a point about, the same wherever it is.
+
+    Lengths are on the scene, as those of a point spread function.
+
+    Attributes
+    ----------
+    reach : float
+        How far it carries light in m.
+    """
+
+    @property
+    @abstractmethod
+    def reach(self) -> float:
+        """How far it carries light in m."""
+
+    @abstractmethod
+    def transfer(self, across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Transfer function.
+
+        Parameters
+        ----------
+        across, up : ndarray
+            Spatial frequencies to the right and upwards in 1/m, broadcast against each other.
+
+        Returns
+        -------
+        ndarray
+            1 at no frequency.
+        """
+
+
+Deviation = Annotated[
+    float, Parameter("Standard deviation along each axis, on the scene.", LENGTH, over=0.0)
+]
+Direction = Annotated[
+    float, Parameter("Direction, counter-clockwise from the right.", ANGLE, least=-pi, most=pi)
+]
+
+
+@dataclass(frozen=True)
+class _RandomBlur(BlurTerm):
+    """Normally distributed displacements: the transfer function is exp(−2π² σ² f²)."""
+
+    standard_deviation: Deviation
+
+    @property
+    def reach(self) -> float:
+        """Eight standard deviations: beyond them there is 1e-15 of the light."""
+        return 8 * self.standard_deviation
+
+    def transfer(self, across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
+        """exp(−2π² σ² f²)."""
+        return np.asarray(np.exp(-2 * (pi * self.standard_deviation) ** 2 * (across**2 + up**2)))
+
+
+@final
+@BLURS.part
+@dataclass(frozen=True)
+class ChargeDiffusion(_RandomBlur):
+    """Charge that diffuses into neighbouring detector elements before it is collected."""
+
+    kind: ClassVar[str] = "charge-diffusion"
+    example: ClassVar[str] = "{kind: charge-diffusion, standard_deviation: 1.5 um}"
+    standard_deviation: Deviation
+
+
+@final
+@BLURS.part
+@dataclass(frozen=True)
+class Jitter(_RandomBlur):
+    """Vibration at random with many periods in an integration time."""
+
+    kind: ClassVar[str] = "jitter"
+    example: ClassVar[str] = "{kind: jitter, standard_deviation: 1 um}"
+    standard_deviation: Deviation
+
+
+@dataclass(frozen=True)
+class _DirectedBlur(BlurTerm):
+    """Displacements along one line."""
+
+    def _along(
+        self, across: NDArray[np.float64], up: NDArray[np.float64], direction: float
+    ) -> NDArray[np.float64]:
+        """Frequency along a direction in 1/m."""
+        return across * cos(direction) + up * sin(direction)
+
+
+@final
+@BLURS.part
+@dataclass(frozen=True)
+class LinearMotion(_DirectedBlur):
+    """Camera and scene that move against each other, evenly, while the camera integrates."""
+
+    kind: ClassVar[str] = "linear-motion"
+    example: ClassVar[str] = "{kind: linear-motion, distance: 4 um, direction: 0 deg}"
+    distance: Annotated[
+        float, Parameter("Way within an integration time, on the scene.", LENGTH, over=0.0)
+    ]
+    direction: Direction = 0.0
+
+    @property
+    def reach(self) -> float:
+        """Half the way."""
+        return self.distance / 2
+
+    def transfer(self, across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
+        """sin(π d f) / (π d f), f along the direction."""
+        return np.asarray(np.sinc(self.distance * self._along(across, up, self.direction)))
+
+
+@final
+@BLURS.part
+@dataclass(frozen=True)
+class Vibration(_DirectedBlur):
+    """Sinusoidal vibration along a line with many periods in an integration time."""
+
+    kind: ClassVar[str] = "vibration"
+    example: ClassVar[str] = "{kind: vibration, amplitude: 2 um, direction: 90 deg}"
+    amplitude: Annotated[
+        float, Parameter("Greatest displacement from the middle, on the scene.", LENGTH, over=0.0)
+    ]
+    direction: Direction = 0.0
+
+    @property
+    def reach(self) -> float:
+        """The amplitude."""
+        return self.amplitude
+
+    def transfer(self, across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
+        """J0(2π A f), f along the direction."""
+        along = self._along(across, up, self.direction)
+        return np.asarray(j0(2 * pi * self.amplitude * along))
+
+
+@final
+@dataclass(frozen=True)
+class BlurredPSF(PointSpreadFunction):
+    """A point spread function with further blurs: the transfer functions are multiplied.
+
+    Parameters
+    ----------
+    psf : PointSpreadFunction
+        That of the optics, or a measured one.
+    blurs : tuple of BlurTerm
+        What spreads the light besides.
+
+    Attributes
+    ----------
+    fwhm : float
+        Full width at half maximum in m: the mean of the widths along the row and the column through
+        the peak.
+
+    Raises
+    ------
+    ValueError
+        If a blur is in the point spread function already.
+
+    Notes
+    -----
+    What the blurs change is computed within 32 widths of the middle and their reach, on squares of
+    at most a quarter of the width, and summed on the squares that are asked for: the squares
+    themselves count once. Farther away a blur of standard deviation σ changes the light at a radius
+    r by a fraction of some (σ / r)², which is left out. No light is lost.
+    """
+
+    psf: PointSpreadFunction
+    blurs: tuple[BlurTerm, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for one in self.blurs:
+            if one.kind and one.kind in self.psf.includes:
+                raise ValueError(
+                    f"blur: {one.kind} is in the point spread function already (includes), "
+                    "expected it once"
+                )
+
+    def __str__(self) -> str:
+        return " and ".join([str(self.psf), *(one.kind for one in self.blurs)])
+
+    @property
+    def includes(self) -> tuple[str, ...]:  # type: ignore[override]
+        """What is in it besides the optics."""
+        return (*self.psf.includes, *(one.kind for one in self.blurs))
+
+    @cached_property
+    def fwhm(self) -> float:  # type: ignore[override]
+        """Full width at half maximum in m."""
+        spacing = self.psf.fwhm / _WIDTH_SQUARES
+        half = ceil((self.psf.fwhm + self._reach) / spacing)
+        kernel = self.view_kernel(spacing, half, half)
+        kernel = kernel[1:-1, 1:-1]  # the outermost squares hold what goes farther
+        row, column = peak(kernel)
+        widths = [half_maximum_width(line) for line in (kernel[row], kernel[:, column])]
+        return float(np.mean(widths)) * spacing
+
+    def kernel(self, spacing: float) -> NDArray[np.float64]:
+        """Blur the kernel; see `PointSpreadFunction.kernel`."""
+        check_length("spacing", spacing)
+        kernel, change = self.psf.kernel(spacing), self._change(spacing)
+        half = max(kernel.shape[0], change.shape[0]) // 2
+        return np.maximum(resized(kernel, half, half) + resized(change, half, half), 0.0)
+
+    def view_kernel(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
+        """Blur all the light of the view; see `PointSpreadFunction.view_kernel`."""
+        check_length("spacing", spacing)
+        kernel, change = self.psf.view_kernel(spacing, rows, columns), self._change(spacing)
+        change = folded(change, rows, columns)
+        rows, columns = (max(pair) // 2 for pair in zip(kernel.shape, change.shape, strict=True))
+        sum_of_both = resized(kernel, rows, columns) + resized(change, rows, columns)
+        return normalised(np.maximum(sum_of_both, 0.0))
+
+    def _change(self, spacing: float) -> NDArray[np.float64]:
+        """What the blurs change in the fractions on squares, of sum 0."""
+        half = half_size(_NEAR * self.psf.fwhm + self._reach, spacing)
+        parts = 1 + 2 * ceil(max(_SQUARES_PER_WIDTH * spacing / self.psf.fwhm - 1, 0) / 2)
+        fine = spacing / parts
+        reach = half * parts + parts // 2
+        half_size(reach * fine, fine)
+        kernel = self.psf.view_kernel(fine, reach, reach)
+        kernel = resized(kernel, reach, reach)
+        frequency = fft.fftfreq(kernel.shape[0], fine)
+        # Rows go down, frequencies go up.
+        change = self.transfer(frequency[: kernel.shape[0] // 2 + 1], -frequency[:, None]) - 1.0
+        blurred = fft.irfft2(fft.rfft2(kernel) * change, s=kernel.shape)
+        count = 2 * half + 1
+        return np.asarray(blurred.reshape(count, parts, count, parts).sum(axis=(1, 3)))
+
+    def transfer(self, across: NDArray[np.float64], up: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Transfer function of the blurs without the point spread function's; see `BlurTerm`."""
+        return reduce(np.multiply, (one.transfer(across, up) for one in self.blurs))
+
+    @property
+    def _reach(self) -> float:
+        return sum(one.reach for one in self.blurs)

@@ -1,0 +1,107 @@
+"""Kernels on squares: their sum, their reach, what is beyond a view, and how wide they are."""
+
+from math import ceil, pi
+from numbers import Real
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+LARGEST_KERNEL: Final = 4097
+"""Squares along a side that a kernel has at most."""
+
+_EQUAL: Final = 1e-9
+_INFINITE: Final = 1e9
+
+
+def normalised(kernel: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A kernel of sum 1."""
+    return np.asarray(kernel / kernel.sum())
+
+
+def folded(kernel: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.float64]:
+    """A kernel no larger than this on each side; its outermost squares hold what was beyond."""
+    for axis, reach in enumerate((rows, columns)):
+        line = np.moveaxis(kernel, axis, 0)
+        beyond = line.shape[0] // 2 - reach
+        if beyond > 0:
+            kept = line[beyond:-beyond].copy()
+            kept[0] += line[:beyond].sum(axis=0)
+            kept[-1] += line[-beyond:].sum(axis=0)
+            kernel = np.moveaxis(kept, 0, axis)
+    return kernel
+
+
+def resized(kernel: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.float64]:
+    """The middle of a kernel, so large on each side, or the kernel with nothing about it."""
+    for axis, reach in enumerate((rows, columns)):
+        more = reach - kernel.shape[axis] // 2
+        line = np.moveaxis(kernel, axis, 0)
+        line = line[-more:more] if more < 0 else np.pad(line, ((more, more), (0, 0)))
+        kernel = np.moveaxis(line, 0, axis)
+    return kernel
+
+
+def half_size(reach: float, spacing: float) -> int:
+    """Number of squares on each side of the middle one that hold what is within `reach`."""
+    check_length("spacing", spacing)
+    # A kernel that ends on a square's edge but for rounding needs no square more.
+    half = max(0, ceil(reach / spacing - 0.5 - 1e-9))
+    if 2 * half + 1 > LARGEST_KERNEL:
+        raise ValueError(
+            f"psf: spacing is {spacing:g} m, expected {2 * reach / LARGEST_KERNEL:.3g} m or more "
+            f"for a kernel of {2 * reach:.3g} m"
+        )
+    return half
+
+
+def poisson_squares(
+    spacing: float, rows: int, columns: int, tail: float, width: float, beyond: bool
+) -> NDArray[np.float64]:
+    """Fractions on squares of light with the transfer function (1 + 2π (b − a) f) exp(−2π b f).
+
+    Far away it falls as a / (2π r³); a is `tail` and b `width`. That of exp(−2π b f) alone within
+    0 to x and 0 to y is atan(x y / (b R)) / 2π with R² = x² + y² + b², and f times it is its
+    derivative by b.
+    """
+    x, y = (spacing * (np.arange(-n, n + 2) - 0.5) for n in (columns, rows))
+    if beyond:
+        x[[0, -1]], y[[0, -1]] = ([-_INFINITE * width, _INFINITE * width],) * 2
+    y = y[:, None]
+    distance = np.sqrt(x**2 + y**2 + width**2)
+    plain = np.arctan(x * y / (width * distance))
+    change = x * y * (distance**2 + width**2) / (distance * (x**2 + width**2) * (y**2 + width**2))
+    corner = plain + (width - tail) * change
+    return np.asarray(np.diff(np.diff(corner, axis=0), axis=1) / (2 * pi))
+
+
+def peak(weights: NDArray[np.float64]) -> tuple[int, int]:
+    """Row and column of the greatest value; of equal ones, of that nearest to their middle."""
+    # What differs by rounding alone is equal: the top of a disc is flat.
+    places = np.argwhere(weights >= weights.max() * (1 - _EQUAL))
+    from_middle = np.hypot(*(places - places.mean(axis=0)).T)
+    row, column = places[int(np.argmin(from_middle))].tolist()
+    return row, column
+
+
+def half_maximum_width(line: NDArray[np.float64]) -> float:
+    """Full width at half maximum of a line of samples, in samples."""
+    padded = np.pad(line, 1)
+    level = padded.max() / 2
+    above = np.flatnonzero(padded >= level)
+    first, last = int(above[0]), int(above[-1])
+    rise = (padded[first] - level) / (padded[first] - padded[first - 1])
+    fall = (padded[last] - level) / (padded[last] - padded[last + 1])
+    return float(last - first + rise + fall)
+
+
+def check_length(name: str, value: float) -> None:
+    """Refuse what is no length of a kernel.
+
+    Raises
+    ------
+    ValueError
+        If it is not over 0 to 0.1 m.
+    """
+    if not (isinstance(value, Real) and 0.0 < value <= 0.1):
+        raise ValueError(f"psf: {name} is {value!r}, expected over 0 to 0.1 m; 8 um is 8e-6")

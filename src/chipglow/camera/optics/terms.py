@@ -1,0 +1,250 @@
+"""What optics do besides spreading a point: each effect a small term, chosen by its kind."""
+
+from abc import ABC
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import log, sqrt
+from typing import Annotated, ClassVar, Final, TypeAlias, final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from chipglow.camera.optics.kernel import half_size, poisson_squares
+from chipglow.camera.optics.psf import PointSpreadFunction
+from chipglow.quantities import Family, Parameter, Part
+from chipglow.quantities.units import LENGTH, TEMPERATURE
+from chipglow.radiometry import Band
+from chipglow.scene import Raster
+
+Blur: TypeAlias = Callable[[NDArray[np.float64], PointSpreadFunction, float], NDArray[np.float64]]
+"""A convolution with a point spread function: `chipglow.camera.blur`, or `blur_of_like`."""
+
+OPTICS_TERMS: Final = Family("optics_term")
+"""Terms by their kind; other packages add theirs in the group ``chipglow.optics_term``."""
+
+
+class OpticsTerm(Part, ABC):
+    """An effect of the optics; a term overrides what it changes.
+
+    Radiance is in W/(m² sr), of shape (y, x).
+    """
+
+    def on_samples(
+        self, radiance: NDArray[np.float64], scene: Raster, pixels: Raster, blurred: Blur
+    ) -> NDArray[np.float64]:
+        """Image on the scene's samples, before the pixels integrate it.
+
+        Parameters
+        ----------
+        radiance : ndarray
+            Of the samples.
+        scene, pixels : Raster
+            The samples, and the pixels.
+        blurred : Blur
+            How to convolve, and what is taken to be beyond the scene.
+        """
+        return radiance
+
+    def on_pixels(
+        self, radiance: NDArray[np.float64], pixels: Raster, band: Band
+    ) -> NDArray[np.float64]:
+        """Radiance that the camera shows for what its pixels received.
+
+        Parameters
+        ----------
+        radiance : ndarray
+            Of the pixels.
+        pixels : Raster
+            The pixels.
+        band : Band
+            The camera's band.
+        """
+        return radiance
+
+
+@final
+@OPTICS_TERMS.part
+@dataclass(frozen=True)
+class OpticalElement(OpticsTerm):
+    """A lens, filter or window that does not pass all light, and sends its own.
+
+    Of the radiance L it passes τ L, and sends (1 − τ) L(T) by its temperature T: what it does not
+    pass it absorbs, or it reflects what is as warm as itself. A calibration that saw it at T' takes
+    τ L + (1 − τ) L(T') for L: then L + (L(T) − L(T')) (1 − τ) / τ is shown.
+    """
+
+    kind: ClassVar[str] = "element"
+    example: ClassVar[str] = (
+        "{kind: element, transmittance: 0.9, temperature: 40 degC, calibrated_at: 25 degC}"
+    )
+    transmittance: Annotated[
+        float, Parameter("Fraction of the light in the band that it passes.", over=0.0, most=1.0)
+    ]
+    temperature: Annotated[float, Parameter("Of the element.", TEMPERATURE)] = 293.15
+    calibrated_at: Annotated[
+        float | None,
+        Parameter(
+            "Temperature that it had when the camera was calibrated; none: the calibration was\n"
+            "without it.",
+            TEMPERATURE,
+        ),
+    ] = None
+
+    def on_pixels(
+        self, radiance: NDArray[np.float64], pixels: Raster, band: Band
+    ) -> NDArray[np.float64]:
+        """Transmitted and own light; see `OpticsTerm.on_pixels`."""
+        own = float(band.radiance(self.temperature))
+        lost = 1 - self.transmittance
+        if self.calibrated_at is None:
+            return self.transmittance * radiance + lost * own
+        seen = float(band.radiance(self.calibrated_at))
+        return radiance + (own - seen) * lost / self.transmittance
+
+
+@final
+@OPTICS_TERMS.part
+@dataclass(frozen=True)
+class Narcissus(OpticsTerm):
+    """The cooled detector's reflection in the lenses, round the optical axis.
+
+    Where the detector sees itself by a reflectance R, the warm housing's light L(T) is missing:
+    R (L(T) − L(T')) exp(−ln 2 r² / h²) is taken from the radiance, T' the detector's temperature
+    (Howard and Abel, Appl. Opt. 21 (1982) 3393). A correction of non-uniformity takes it away as it
+    was then: T' is then the temperature that the housing had. The axis is the pixels' middle; that
+    it is a Gaussian is an assumption.
+    """
+
+    kind: ClassVar[str] = "narcissus"
+    example: ClassVar[str] = (
+        "{kind: narcissus, reflectance: 0.01, radius: 150 um, housing: 45 degC,\n"
+        "    corrected_at: 25 degC}"
+    )
+    reflectance: Annotated[
+        float,
+        Parameter("Of all surfaces, as a fraction of what the detector sees.", least=0.0, most=1.0),
+    ]
+    radius: Annotated[float, Parameter("Where half of it is left, on the scene.", LENGTH, over=0.0)]
+    housing: Annotated[float, Parameter("Temperature of the housing.", TEMPERATURE)] = 293.15
+    detector: Annotated[float, Parameter("Temperature of the detector.", TEMPERATURE)] = 77.0
+    corrected_at: Annotated[
+        float | None,
+        Parameter(
+            "Temperature of the housing when non-uniformity was corrected; none: it was not.",
+            TEMPERATURE,
+        ),
+    ] = None
+
+    def on_pixels(
+        self, radiance: NDArray[np.float64], pixels: Raster, band: Band
+    ) -> NDArray[np.float64]:
+        """Radiance without what is missing; see `OpticsTerm.on_pixels`."""
+        cold = self.detector if self.corrected_at is None else self.corrected_at
+        missing = float(band.radiance(self.housing)) - float(band.radiance(cold))
+        x, y = _from_axis(pixels, pixels)
+        profile = np.exp(-log(2) * (x**2 + y**2) / self.radius**2)
+        return np.asarray(radiance - self.reflectance * missing * profile)
+
+
+@final
+@dataclass(frozen=True)
+class VeilPSF(PointSpreadFunction):
+    """Where light goes that is scattered: h / (2π √3 (r² + h² / 3)^(3/2)) per area.
+
+    Parameters
+    ----------
+    radius : float
+        Radius h in m within which half of it falls.
+    """
+
+    radius: float
+
+    @property
+    def fwhm(self) -> float:  # type: ignore[override]
+        """Full width at half maximum in m."""
+        return 2 * self._width * sqrt(2 ** (2 / 3) - 1)
+
+    def kernel(self, spacing: float) -> NDArray[np.float64]:
+        """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
+        half = half_size(100 * self._width, spacing)
+        return poisson_squares(spacing, half, half, self._width, self._width, beyond=False)
+
+    def view_kernel(self, spacing: float, rows: int, columns: int) -> NDArray[np.float64]:
+        """Integrate over all squares of the view; see `PointSpreadFunction.view_kernel`."""
+        return poisson_squares(spacing, rows, columns, self._width, self._width, beyond=True)
+
+    @property
+    def _width(self) -> float:
+        return self.radius / sqrt(3)
+
+
+@final
+@OPTICS_TERMS.part
+@dataclass(frozen=True)
+class Veil(OpticsTerm):
+    """Light that surfaces scatter far away: the size-of-source effect.
+
+    (1 − s) L + s (L convolved with `VeilPSF`): of a uniform disc of radius ρ a pixel in its middle
+    sees the fraction 1 − s / √(1 + 3 ρ² / h²). The size-of-source effect is defined in IEC TS
+    62492-1; the kernel, which falls as 1/r³ as diffraction does, is an assumption.
+    """
+
+    kind: ClassVar[str] = "veil"
+    example: ClassVar[str] = "{kind: veil, fraction: 0.03, radius: 300 um}"
+    fraction: Annotated[
+        float, Parameter("Fraction of the light that is scattered.", least=0.0, under=1.0)
+    ]
+    radius: Annotated[
+        float, Parameter("Within which half of it falls, on the scene.", LENGTH, over=0.0)
+    ]
+
+    def on_samples(
+        self, radiance: NDArray[np.float64], scene: Raster, pixels: Raster, blurred: Blur
+    ) -> NDArray[np.float64]:
+        """Image with the veil; see `OpticsTerm.on_samples`."""
+        veil = blurred(radiance, VeilPSF(self.radius), scene.spacing)
+        return (1 - self.fraction) * radiance + self.fraction * veil
+
+
+@final
+@OPTICS_TERMS.part
+@dataclass(frozen=True)
+class Distortion(OpticsTerm):
+    """Pixels that see another place than where they are taken to be.
+
+    A pixel at the distance r from the optical axis, the pixels' middle, sees what is at
+    r (1 + d r² / R²) (Brown, Photogramm. Eng. 37 (1971) 855, first term): a lens's distortion with
+    the other sign. Beyond the scene it sees the nearest edge.
+    """
+
+    kind: ClassVar[str] = "distortion"
+    example: ClassVar[str] = "{kind: distortion, fraction: 0.01, radius: 400 um}"
+    fraction: Annotated[
+        float,
+        Parameter(
+            "How much farther out pixels at the radius see, as a fraction of it: over 0 for a\n"
+            "barrel.",
+            least=-0.3,
+            most=0.3,
+        ),
+    ]
+    radius: Annotated[float, Parameter("That radius, on the scene.", LENGTH, over=0.0)]
+
+    def on_samples(
+        self, radiance: NDArray[np.float64], scene: Raster, pixels: Raster, blurred: Blur
+    ) -> NDArray[np.float64]:
+        """Image that undistorted pixels would see; see `OpticsTerm.on_samples`."""
+        x, y = _from_axis(scene, pixels)
+        farther = self.fraction * (x**2 + y**2) / self.radius**2
+        rows, columns = (np.arange(count, dtype=np.float64) for count in scene.shape)
+        places = np.stack(
+            [rows[:, None] - farther * y / scene.spacing, columns + farther * x / scene.spacing]
+        )
+        return np.asarray(map_coordinates(radiance, places, order=1, mode="nearest"))
+
+
+def _from_axis(raster: Raster, pixels: Raster) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places of a raster's values right of and above the pixels' middle in m."""
+    left, right, bottom, top = pixels.extent
+    return raster.x - (left + right) / 2, (raster.y - (bottom + top) / 2)[:, None]

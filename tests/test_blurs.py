@@ -1,0 +1,139 @@
+"""Blurs besides the optics: each counts once, by variances, closed forms and what they say."""
+
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+from scipy.special import erf
+
+from chipglow.camera import (
+    AnnularAperturePSF,
+    BlurredPSF,
+    Camera,
+    ChargeDiffusion,
+    GaussianPSF,
+    Jitter,
+    LinearMotion,
+    MeasuredPSF,
+    Vibration,
+)
+from chipglow.scene import Raster
+
+OPTICS = GaussianPSF(8e-6)
+SIGMA = 8e-6 / 2.354820045
+BLURS = [
+    (Jitter(2e-6), 4e-12, 4e-12),
+    (ChargeDiffusion(1.5e-6), 2.25e-12, 2.25e-12),
+    (LinearMotion(6e-6), 36e-12 / 12, 0.0),
+    (LinearMotion(6e-6, pi / 2), 0.0, 36e-12 / 12),
+    (Vibration(3e-6, pi / 4), 9e-12 / 4, 9e-12 / 4),
+]
+
+
+def variances(kernel, spacing):
+    place = spacing * (np.arange(kernel.shape[0]) - kernel.shape[0] // 2)
+    return (kernel.sum(axis=0) @ place**2, kernel.sum(axis=1) @ place**2)
+
+
+@pytest.mark.parametrize(("blur", "across", "up"), BLURS, ids=lambda value: repr(value)[:24])
+@pytest.mark.parametrize("spacing", [2e-6 / 3, 5e-6])
+def test_variances_add_and_the_squares_count_once(blur, across, up, spacing):
+    psf = BlurredPSF(OPTICS, (blur,))
+    kernel = psf.kernel(spacing)
+    own = SIGMA**2 + spacing**2 / 12
+    found = variances(kernel, spacing)
+    # Sheppard's correction of squares that are wider than the Gaussian holds within 1e-3.
+    np.testing.assert_allclose(found, [own + across, own + up], rtol=2e-3)
+    view = psf.view_kernel(spacing, 40, 50)
+    assert view.sum() == pytest.approx(1.0, abs=1e-12)
+    assert (view >= 0).all()
+
+
+def test_a_gaussian_with_jitter_is_a_wider_gaussian():
+    wide = GaussianPSF(2.354820045 * sqrt(SIGMA**2 + 4e-12))
+    blurred = BlurredPSF(OPTICS, (Jitter(2e-6),))
+    assert blurred.fwhm == pytest.approx(wide.fwhm, rel=2e-3)
+    for spacing, half in ((2e-6 / 3, 60), (5e-6, 10)):
+        found, expected = (one.view_kernel(spacing, half, half) for one in (blurred, wide))
+        half = min(len(found), len(expected)) // 2
+        middle = [k[len(k) // 2 - half + 1 :][: 2 * half - 1] for k in (found, expected)]
+        middle = [k[:, len(k[0]) // 2 - half + 1 :][:, : 2 * half - 1] for k in middle]
+        # What a quarter of the width leaves of the finest detail.
+        assert np.abs(middle[0] - middle[1]).sum() < 1e-5
+
+
+def test_vibration_is_the_mean_of_displaced_kernels():
+    spacing, amplitude = 1e-6, 5e-6
+    found = BlurredPSF(OPTICS, (Vibration(amplitude),)).view_kernel(spacing, 30, 30)
+    edges = spacing * (np.arange(-30, 32) - 0.5)
+    # Equal times of a sine: Chebyshev's nodes.
+    places = amplitude * np.cos(pi * (np.arange(64) + 0.5) / 64)
+    lines = [np.diff(erf((edges - p) / (sqrt(2) * SIGMA))) / 2 for p in (0.0, *places)]
+    expected = np.outer(lines[0], np.mean(lines[1:], axis=0))
+    assert np.abs(found - expected)[1:-1, 1:-1].sum() < 1e-5
+
+
+def test_blurs_multiply_and_keep_far_light():
+    psf = BlurredPSF(AnnularAperturePSF(), (ChargeDiffusion(1.5e-6), LinearMotion(4e-6)))
+    kernel = psf.view_kernel(2e-6, 120, 120)
+    plain = AnnularAperturePSF().view_kernel(2e-6, 120, 120)
+    # Far away diffraction is as it was; near by the middle is lower.
+    assert kernel[1:21].sum() == pytest.approx(plain[1:21].sum(), rel=5e-3)
+    assert kernel.max() < 0.9 * plain.max()
+    frequency = 0.5 / 8e-6
+    place = 2e-6 * np.arange(-120, 121)
+    ratio = (kernel.sum(0) - plain.sum(0)) @ np.cos(2 * pi * frequency * place)
+    ratio = 1 + ratio / (plain.sum(0) @ np.cos(2 * pi * frequency * place))
+    expected = np.exp(-2 * (pi * 1.5e-6 * frequency) ** 2) * np.sinc(4e-6 * frequency)
+    assert ratio == pytest.approx(expected, abs=1e-4)
+
+
+def edge_scene():
+    scene = Raster(0.0, 0.0, 1e-6, 90, 120)
+    return scene, np.where(scene.x > 60e-6, 50.0, 1.0) * np.ones((90, 1))
+
+
+def test_a_point_spread_function_with_the_footprint_counts_it_once():
+    scene, radiance = edge_scene()
+    optics = GaussianPSF(8e-6)
+    box = np.ones((5, 5))
+    spacing = 6e-6 / 5
+    fine = optics.kernel(spacing)
+    # Optics and a pixel of 6 um: five squares of the kernel, each side.
+    count = fine.shape[0] + 4
+    system = np.fft.irfft2(
+        np.fft.rfft2(fine, (count, count)) * np.fft.rfft2(box, (count, count)), (count, count)
+    )
+    whole = MeasuredPSF(np.maximum(system, 0), spacing, includes=("footprint",))
+    camera = Camera(psf=whole, lower_limit=None)
+    expected = Camera(psf=optics, lower_limit=None).form_image(radiance, scene)
+    # The kernel's squares and the sample in a pixel's middle: 1.2²/12 and 1/12 um² of 14.5.
+    np.testing.assert_allclose(camera.form_image(radiance, scene), expected, atol=0.5)
+    twice = Camera(psf=MeasuredPSF(whole.weights, spacing), lower_limit=None)
+    assert np.abs(twice.form_image(radiance, scene) - expected).max() > 1.0
+    with pytest.raises(ValueError, match="psf_order is 'detector', expected optics: the point"):
+        Camera(psf=whole, psf_order="detector")
+
+
+def test_what_is_in_a_measured_kernel_is_not_added_again():
+    measured = MeasuredPSF(np.ones((3, 3)), 2e-6, includes=("footprint", "charge-diffusion"))
+    blurred = BlurredPSF(measured, (Jitter(1e-6),))
+    assert blurred.includes == ("footprint", "charge-diffusion", "jitter")
+    with pytest.raises(ValueError, match="charge-diffusion is in the point spread function alre"):
+        BlurredPSF(measured, (ChargeDiffusion(1e-6),))
+    with pytest.raises(ValueError, match="jitter is in the point spread function already"):
+        BlurredPSF(blurred, (Jitter(1e-6),))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Jitter(0.0),
+        lambda: ChargeDiffusion(-1e-6),
+        lambda: LinearMotion(1e-6, 7.0),
+        lambda: Vibration(float("nan")),
+    ],
+)
+def test_impossible_blurs_are_refused(make):
+    with pytest.raises(ValueError, match="expected"):
+        make()
