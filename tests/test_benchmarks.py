@@ -43,6 +43,10 @@ PROGRAMS = {
         "--pictures 1 --maps jet --bands 0 12 --codecs GIF",
         {"| jet | none | no": 3, "| jet | none | yes": 3, "| jet | 12 | yes": 4, "0 cases": 1},
     ),
+    "optics.py": (
+        "--samples 128",
+        {"| OTF, defocus 2.0 mm |": 1, "| OTF, vibration |": 1, "| PSF, defocus 30 um |": 2},
+    ),
     "rasterise.py": (
         "--file",
         {"| rasterise, 5 fields": 5, "| VTK's probe": 5, "| SciPy": 5, "read ": 4},
@@ -70,6 +74,10 @@ NEEDED = {
     "fuzz/fuzz.py": ("hypothesis", "lasso", "pyvista", "tifffile", "zarr"),
     "movie_codecs.py": ("av",),
     "movie_matrix.py": ("av",),
+    "optics.py": (
+        "--samples 128",
+        {"| OTF, defocus 2.0 mm |": 1, "| OTF, vibration |": 1, "| PSF, defocus 30 um |": 2},
+    ),
     "rasterise.py": ("pyvista",),
     "registration_libraries.py": ("skimage",),
     "synthetic_laboratory.py": ("tifffile",),

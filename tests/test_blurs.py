@@ -15,8 +15,10 @@ from chipglow.camera import (
     Jitter,
     LinearMotion,
     MeasuredPSF,
+    MeasuredPSFFile,
     Vibration,
 )
+from chipglow.camera.optics.pupil import annular_transfer
 from chipglow.scene import Raster
 
 OPTICS = GaussianPSF(8e-6)
@@ -82,10 +84,10 @@ def test_blurs_multiply_and_keep_far_light():
     assert kernel.max() < 0.9 * plain.max()
     frequency = 0.5 / 8e-6
     place = 2e-6 * np.arange(-120, 121)
-    ratio = (kernel.sum(0) - plain.sum(0)) @ np.cos(2 * pi * frequency * place)
-    ratio = 1 + ratio / (plain.sum(0) @ np.cos(2 * pi * frequency * place))
-    expected = np.exp(-2 * (pi * 1.5e-6 * frequency) ** 2) * np.sinc(4e-6 * frequency)
-    assert ratio == pytest.approx(expected, abs=1e-4)
+    change = (kernel.sum(0) - plain.sum(0)) @ np.cos(2 * pi * frequency * place)
+    own = annular_transfer(np.array(frequency * 4.5e-6 / 0.56), 0.35) * np.sinc(2e-6 * frequency)
+    blurs = np.exp(-2 * (pi * 1.5e-6 * frequency) ** 2) * np.sinc(4e-6 * frequency)
+    assert change == pytest.approx(float(own) * (blurs - 1), abs=2e-5)
 
 
 def edge_scene():
@@ -123,6 +125,18 @@ def test_what_is_in_a_measured_kernel_is_not_added_again():
         BlurredPSF(measured, (ChargeDiffusion(1e-6),))
     with pytest.raises(ValueError, match="jitter is in the point spread function already"):
         BlurredPSF(blurred, (Jitter(1e-6),))
+
+
+def test_a_file_says_what_it_includes(tmp_path):
+    path = tmp_path / "psf.csv"
+    np.savetxt(path, np.ones((3, 3)), delimiter=",")
+    part = MeasuredPSFFile(str(path), 2e-6, ("footprint",))
+    assert part.of_camera(Camera().band, None).includes == ("footprint",)
+    assert MeasuredPSF.from_file(path, 2e-6).includes == ()
+    with pytest.raises(
+        ValueError, match=r"psf.includes is \('pixel',\), expected any of footprint"
+    ):
+        Camera(psf=MeasuredPSF.from_file(path, 2e-6, ("pixel",)))
 
 
 @pytest.mark.parametrize(

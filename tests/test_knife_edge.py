@@ -331,6 +331,8 @@ def test_apertures_that_contradict_the_edge_are_doubtful():
 
 def test_the_system_holds_the_sensor_once(clean):
     system, optics = clean.psf("system").kernel(1e-6), clean.psf().kernel(1e-6)
+    assert clean.psf("system").includes == ("footprint",)
+    assert clean.psf().includes == ()
 
     def variance(kernel):
         x = np.arange(len(kernel)) - len(kernel) // 2

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 
 from chipglow.camera.exposure import Exposure, expose
 from chipglow.camera.measurement import Measurement
-from chipglow.camera.optics import AnnularAperturePSF, OpticsTerm, PointSpreadFunction, blur
+from chipglow.camera.optics import (
+    BLURS,
+    AnnularAperturePSF,
+    OpticsTerm,
+    PointSpreadFunction,
+    blur,
+)
 from chipglow.camera.optics.convolution import blur_of_like, light_from_beyond
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
 from chipglow.camera.optics.terms import Blur
@@ -122,6 +128,13 @@ class Camera:
             "a PointSpreadFunction such as GaussianPSF(12e-6), or None",
         )
         _expect(self.psf_order in PSF_ORDERS, "psf_order", self.psf_order, " or ".join(PSF_ORDERS))
+        held = ("footprint", *BLURS.kinds)
+        _expect(
+            self.psf is None or set(self.psf.includes) <= set(held),
+            "psf.includes",
+            self.psf and self.psf.includes,
+            f"any of {', '.join(held)}",
+        )
         _expect(
             self.psf_order == "optics" or not self._blur_has_footprint,
             "psf_order",

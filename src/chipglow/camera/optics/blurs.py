@@ -209,7 +209,7 @@ class BlurredPSF(PointSpreadFunction):
     def __post_init__(self) -> None:
         super().__post_init__()
         for one in self.blurs:
-            if one.kind and one.kind in self.psf.includes:
+            if one.kind in self.psf.includes:
                 raise ValueError(
                     f"blur: {one.kind} is in the point spread function already (includes), "
                     "expected it once"
