@@ -81,6 +81,13 @@ def test_blurs_multiply_and_keep_far_light():
     plain = AnnularAperturePSF().view_kernel(2e-6, 120, 120)
     # Far away diffraction is as it was; near by the middle is lower.
     assert kernel[1:21].sum() == pytest.approx(plain[1:21].sum(), rel=5e-3)
+    wide, beyond = (one.view_kernel(4e-6, 100, 100)[:30] for one in (psf, AnnularAperturePSF()))
+    # Farther than 32 widths it is left as it is, and nothing is moved to where that ends.
+    np.testing.assert_allclose(wide, beyond, rtol=1e-4)
+    assert kernel.sum() == pytest.approx(1.0, abs=1e-12)
+    change = psf.view_kernel(4e-6, 100, 100) - AnnularAperturePSF().view_kernel(4e-6, 100, 100)
+    place = 4e-6 * np.arange(-100, 101)
+    assert np.abs(change[np.hypot(place, place[:, None]) > 150e-6]).sum() < 2e-3
     assert kernel.max() < 0.9 * plain.max()
     frequency = 0.5 / 8e-6
     place = 2e-6 * np.arange(-120, 121)

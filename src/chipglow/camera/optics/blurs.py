@@ -257,8 +257,8 @@ class BlurredPSF(PointSpreadFunction):
         fine = spacing / parts
         reach = half * parts + parts // 2
         half_size(reach * fine, fine)
-        kernel = self.psf.view_kernel(fine, reach, reach)
-        kernel = resized(kernel, reach, reach)
+        # The outermost squares of a view hold all that goes farther: those are left out.
+        kernel = resized(self.psf.view_kernel(fine, reach + 1, reach + 1), reach, reach)
         frequency = fft.fftfreq(kernel.shape[0], fine)
         # Rows go down, frequencies go up.
         change = self.transfer(frequency[: kernel.shape[0] // 2 + 1], -frequency[:, None]) - 1.0
