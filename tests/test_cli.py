@@ -82,6 +82,7 @@ def runs(monkeypatch, chip_scene):
         return AnalyticChip().cut_history()
 
     monkeypatch.setattr(CuttingSimulation, "run", cut_chip)
+    monkeypatch.setattr(CuttingSimulation, "lattice", lambda *_: None)  # it has samples only
     return calls
 
 

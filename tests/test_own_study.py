@@ -163,14 +163,14 @@ def test_the_paper_stands_beside_its_own_study_only(own_result, tmp_path):
 
 
 def test_the_cost_of_the_papers_study_is_about_what_it_was():
-    """Measured: 1.56 GB, 1.1 GB of memory, and 4 to 5 min with two threads, of which 2 the cut."""
+    """Measured: 25 MB, 1.1 GB of memory, and 4 to 5 min with two threads, of which 2 the cut."""
     cost = expected_cost(Study())
-    assert cost.disk == pytest.approx(1.56e9, rel=0.1)
+    assert 20e6 < cost.disk < 60e6
     assert cost.memory == pytest.approx(1.1e9, rel=0.2)
     assert 60 < cost.seconds < 1200
     finer = expected_cost(Study(cutting={"numerics": {"cell": "5 um"}}))
     assert finer.seconds > 3 * cost.seconds
-    assert finer.disk == cost.disk
+    assert 3 * cost.disk < finer.disk < 4 * cost.disk
 
 
 @pytest.mark.parametrize(("agreed", "asked"), [(False, 1), (True, 0)])

@@ -140,7 +140,7 @@ def expose_all(
     peak = np.zeros(mean.shape, dtype=np.float32)
     hottest = np.zeros(shape, dtype=np.float32)
     for index, weight in zip(indices, weights, strict=True):
-        frame = scene.frame(index, velocity=False)
+        frame = scene.frame(index)
         sub_frame = (np.ascontiguousarray(frame.temperature), np.ascontiguousarray(frame.material))
         surfaces = stack.emissivities(frame)
         _accumulate(*sub_frame, surfaces, weight, table, environment, mean, peak, hottest)

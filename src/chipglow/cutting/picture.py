@@ -3,27 +3,24 @@
 Each field is the quadratic B-spline on the grid that fits the points: a weighted mean to start
 with, then corrections by the residual at the points. A sample shows the workpiece where the
 smoothed share of the area that chip and tool fill is over one half: on a straight surface that is
-the surface.
+the surface. The samples are those of a `SplineFrame`, which the frame keeps.
 """
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from chipglow.cutting.momentum import spline, spline_weights
 from chipglow.cutting.points import Grid, Points
-from chipglow.scene import Frame, Material, Raster, Tool
+from chipglow.scene import Frame, Raster, Tool
+from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, Lattice, SplineFrame
 from chipglow.scene.tool_surface import surface_distance
 
-_FIELDS: Final = (
-    "temperature", "plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y",
-    "material_x", "material_y",
-)  # fmt: skip
+_FIELDS: Final = SPLINE_FIELDS[:FILLED_SPLINE]
 _CORRECTIONS: Final = 2
-_VOID, _WORKPIECE, _TOOL = int(Material.VOID), int(Material.WORKPIECE), int(Material.TOOL)
 _FILL_PASSES: Final = 3
 
 
@@ -52,11 +49,16 @@ class Picture:
         filled_by_tool: NDArray[np.float64],
         ambient: float,
     ) -> None:
-        self._grid, self._raster, self._ambient = grid, raster, ambient
+        self._grid = grid
         self._filled_by_tool = filled_by_tool
-        self._across = _placement((raster.x - grid.left) / grid.cell)
-        self._down = _placement((raster.y - grid.bottom) / grid.cell)
-        self._in_tool = _inside(raster.x, raster.y, tool.surface)
+        self._lattice = lattice_of(grid, raster, tool, ambient)
+        lattice = self._lattice
+        across = round((lattice.left - grid.left) / grid.cell)
+        highest = round((lattice.top - grid.bottom) / grid.cell)
+        self._seen_nodes = (
+            slice(across, across + lattice.columns),
+            slice(highest - lattice.rows + 1, highest + 1),
+        )
         margin = 3 * grid.cell
         left, right, bottom, top = raster.extent
         self._view = (left - margin, right + margin, bottom - margin, top + margin)
@@ -96,21 +98,32 @@ class Picture:
         tool = tool_temperature[..., None].copy()
         _fill(tool, self._filled_by_tool > 0.0, _FILL_PASSES)
         nodes = np.concatenate([coefficients, filled[..., None], tool], axis=2)
-        limits = np.stack([at_points.min(axis=0), at_points.max(axis=0)])
-        samples = np.empty((len(_FIELDS), *self._raster.shape), np.float32)
-        material = np.empty(self._raster.shape, np.uint8)
-        empty = np.zeros(len(_FIELDS))
-        empty[0] = self._ambient
-        _sample(nodes, self._across, self._down, self._in_tool, limits, empty, samples, material)
-        fields: dict[str, Any] = dict(zip(_FIELDS, samples, strict=True))
-        return Frame(time=time, material=material, **fields)
+        limits = np.stack([at_points.min(axis=0), at_points.max(axis=0)], axis=1)
+        from_the_top = nodes[self._seen_nodes][:, ::-1].transpose(2, 1, 0)
+        return SplineFrame(
+            self._lattice,
+            time,
+            np.ascontiguousarray(from_the_top, np.float32),
+            limits.astype(np.float32),
+        ).frame()
 
 
-def _placement(position: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """First node and the three weights of positions in cells."""
-    first = np.floor(position - 0.5).astype(np.int64)
-    offset = position - first
-    return first, np.stack(spline_weights.py_func(offset), axis=1)
+def lattice_of(grid: Grid, raster: Raster, tool: Tool, ambient: float) -> Lattice:
+    """The nodes of the solver's grid that a raster's frames need.
+
+    Parameters
+    ----------
+    grid : Grid
+        The solver's grid; it must cover the samples.
+    raster : Raster
+        Samples of the frames.
+    tool : Tool
+        Outline of the tool.
+    ambient : float
+        Temperature in K of samples that show nothing.
+    """
+    in_tool = _inside(raster.x, raster.y, tool.surface)
+    return Lattice.within(raster, (grid.left, grid.bottom), grid.cell, in_tool, ambient)
 
 
 @njit(cache=True)
@@ -182,43 +195,3 @@ def _fill(values, known, passes):  # type: ignore[no-untyped-def]
                                 total += values[i + a, j + b, f]
                     values[i, j, f] = total / near
                 known[i, j] = True
-
-
-@njit(cache=True, parallel=True)
-def _sample(nodes, across, down, in_tool, limits, empty, samples, material):  # type: ignore[no-untyped-def]
-    """Evaluate the splines on the raster: down each column of nodes first, then across."""
-    fields = limits.shape[1]
-    first_x, weights_x = across
-    first_y, weights_y = down
-    low, high = first_x[0], first_x[-1] + 3
-    for row in prange(samples.shape[1]):
-        line = np.empty((high - low, fields + 2))
-        j = first_y[row]
-        for i in range(low, high):
-            for f in range(fields + 2):
-                line[i - low, f] = (
-                    weights_y[row, 0] * nodes[i, j, f]
-                    + weights_y[row, 1] * nodes[i, j + 1, f]
-                    + weights_y[row, 2] * nodes[i, j + 2, f]
-                )
-        for column in range(samples.shape[2]):
-            i = first_x[column] - low
-            w0, w1, w2 = weights_x[column, 0], weights_x[column, 1], weights_x[column, 2]
-            filled = w0 * line[i, fields] + w1 * line[i + 1, fields] + w2 * line[i + 2, fields]
-            if in_tool[row, column]:
-                material[row, column] = _TOOL
-                for f in range(1, fields):
-                    samples[f, row, column] = 0.0
-                f = fields + 1
-                samples[0, row, column] = (
-                    w0 * line[i, f] + w1 * line[i + 1, f] + w2 * line[i + 2, f]
-                )
-            elif filled > 0.5:
-                material[row, column] = _WORKPIECE
-                for f in range(fields):
-                    value = w0 * line[i, f] + w1 * line[i + 1, f] + w2 * line[i + 2, f]
-                    samples[f, row, column] = min(max(value, limits[0, f]), limits[1, f])
-            else:
-                material[row, column] = _VOID
-                for f in range(fields):
-                    samples[f, row, column] = empty[f]

@@ -49,7 +49,7 @@ from chipglow.cutting.momentum import (
     Step,
     advance_with,
 )
-from chipglow.cutting.picture import Picture
+from chipglow.cutting.picture import Picture, lattice_of
 from chipglow.cutting.plastic_heat import heat_shares
 from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
 from chipglow.cutting.preview import Preview
@@ -59,6 +59,7 @@ from chipglow.cutting.steady_tool import SteadyTool, ToolBody, beyond, steady_te
 from chipglow.cutting.tool_border import CELLS, border_nodes, conduct_beyond
 from chipglow.cutting.watch import Trouble, fastest_point, find_lost, find_off_grid, find_trouble
 from chipglow.scene import Frame, Raster, Tool, ToolGeometry
+from chipglow.scene.splines import Lattice
 from chipglow.scene.tool_surface import ToolSurface, surface_distance
 
 SOLVER_VERSION: Final = "11"
@@ -331,6 +332,23 @@ class CuttingSimulation:
                 f"window: no frame between {window.start * 1e3:g} mm and {window.end * 1e3:g} mm "
                 f"with an interval of {window.interval * 1e6:g} us"
             )
+
+    def lattice(self, raster: Raster) -> Lattice:
+        """Where the nodes are whose splines its frames are.
+
+        Parameters
+        ----------
+        raster : Raster
+            Samples of the frames.
+
+        Raises
+        ------
+        ValueError
+            If the raster reaches beyond what is simulated.
+        """
+        grid = _grid(self.numerics)
+        self._check_raster(raster, grid)
+        return lattice_of(grid, raster, self.tool, self.conditions.initial_temperature)
 
     def _picture(self, raster: Raster, state: "_State") -> Picture:
         self._check_raster(raster, state.grid)

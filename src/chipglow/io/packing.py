@@ -114,19 +114,6 @@ PACKING: Final[Mapping[str, Packing]] = {
 }
 """Resolution of each field of a scene."""
 
-# What the blend of emissivities and the metrics of a chip can tell, for fewer bytes: half a step of
-# the rate, which counts from 6000 to 30 000 1/s, changes the emissivity by under 2e-4 for the
-# largest difference of Table 1, 0.45 of 0.85, and half a step of the strain, which counts from 0.3
-# to 0.5, by under 1e-4. A chip moves at metres a second.
-CUT: Final[Mapping[str, Packing]] = {
-    **PACKING,
-    "plastic_strain": Steps(np.int32, 1e-4),
-    "plastic_strain_rate": Steps(np.int32, 20.0),
-    "velocity_x": Steps(np.int32, 5e-3),
-    "velocity_y": Steps(np.int32, 5e-3),
-}
-"""Resolution of each field of a scene that the cutting simulation makes."""
-
 HOTTEST_PACKED: Final = 1838.375
 """Greatest temperature in K that 16 bits of its steps reach."""
 

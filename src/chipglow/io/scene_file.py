@@ -1,8 +1,8 @@
 """Scenes in NetCDF-4 files: written frame by frame, read lazily."""
 
 import os
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
@@ -15,10 +15,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from chipglow.io import spline_file
 from chipglow.io.atomic import KeptErrorFile, atomic_path
+from chipglow.io.decoded import CACHED_BYTES, Decoded
 from chipglow.io.interrupts import uninterrupted
 from chipglow.io.measurement_file import holds
-from chipglow.io.packing import CUT, HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
+from chipglow.io.packing import HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
 from chipglow.io.unfinished import (
     UnfinishedScene,
     checkpoint_path,
@@ -37,10 +39,16 @@ from chipglow.scene import (
     SceneError,
     Tool,
 )
-from chipglow.scene.scene import FORCE_UNITS, HOTTEST_PLAUSIBLE, check_frame, raster_coordinates
+from chipglow.scene.scene import (
+    FORCE_UNITS,
+    HOTTEST_PLAUSIBLE,
+    check_frame,
+    raster_coordinates,
+)
+from chipglow.scene.splines import Lattice, SplineFrame
 from chipglow.scene.tool_attributes import tool_attributes
 
-SCENE_FORMAT: Final = 3
+SCENE_FORMAT: Final = 4
 """Changes when the same scene is written to a file in another way."""
 
 _LONG_NAMES: Final[Mapping[str, str]] = {
@@ -106,6 +114,8 @@ class SceneWriter:
     portable : bool
         Compress with zlib, which every reader of NetCDF-4 knows; by default with Blosc2, several
         times faster, which needs the HDF5 filter of ``hdf5plugin``.
+    lattice : Lattice, optional
+        Keep the splines of the frames instead of their samples; for frames that have them.
     resume : UnfinishedScene, optional
         Begin with the frames that an earlier writer of the same scene had at its last checkpoint.
 
@@ -113,7 +123,7 @@ class SceneWriter:
     -----
     One NetCDF-4 file, a chunk per field and frame. Temperature has steps of 25 mK from 200 K up,
     material coordinates steps of 20 nm; plastic strain, plastic strain rate and velocities are
-    within 2⁻¹⁴, 2⁻¹² and 2⁻¹¹ of their value, those of `packing.CUT` have steps too.
+    within 2⁻¹⁴, 2⁻¹² and 2⁻¹¹ of their value. Splines have the steps of `spline_file.STEPS`.
     """
 
     def __init__(
@@ -127,6 +137,7 @@ class SceneWriter:
         hottest: float = HOTTEST_PACKED,
         packing: Mapping[str, Packing] = PACKING,
         portable: bool = False,
+        lattice: Lattice | None = None,
         resume: UnfinishedScene | None = None,
     ) -> None:
         self.path = Path(path)
@@ -134,6 +145,8 @@ class SceneWriter:
         self._attributes = {**(attributes or {}), **(tool_attributes(tool) if tool else {})}
         units = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS, QUALITY: "1"}
         self._units = {name: units[name] for name in fields}
+        self._lattice = lattice
+        self._chunked = spline_file.CHUNKED if lattice else tuple(self._units)
         self._packing = packing_for(hottest, packing)
         self._compression = _PORTABLE if portable else _FAST
         self._stack = ExitStack()
@@ -178,7 +191,7 @@ class SceneWriter:
                 f"scene: frame at {frame.time:.9g} s, expected later than {self._times[-1]:.9g} s"
             )
         check_frame(frame)
-        packed = {name: self._packed(name, frame) for name in self._units}
+        packed = self._kept(frame)
         count = len(self._times)
         self._file.resize_dimension("time", count + 1)
         self._file.variables["time"][count] = frame.time
@@ -211,9 +224,10 @@ class SceneWriter:
         self._hdf.flush()
         self._sink.check(self.path)
         os.fsync(self._sink.fileno())
-        for frame in range(len(self._chunks) // len(self._units), len(self._times)):
-            for name in self._units:
-                at = self._dataset(name).get_chunk_info_by_coord((frame, 0, 0))
+        for frame in range(len(self._chunks) // len(self._chunked), len(self._times)):
+            for name in self._chunked:
+                dataset = self._dataset(name)
+                at = dataset.get_chunk_info_by_coord((frame, *(0,) * (dataset.rank - 1)))
                 self._chunks.append((at.byte_offset, at.size, at.filter_mask))
         write_checkpoint(self._part, state, progress, self._times, self._chunks)
         return checkpoint_path(self._part)
@@ -286,10 +300,11 @@ class SceneWriter:
         self._file.resize_dimension("time", len(times))
         with unfinished.part.open("rb") as source:
             for index, (offset, size, filters) in enumerate(chunks.tolist()):
-                frame, field = divmod(index, len(self._units))
+                frame, field = divmod(index, len(self._chunked))
                 source.seek(offset)
-                dataset = self._dataset(list(self._units)[field])
-                dataset.write_direct_chunk((frame, 0, 0), source.read(size), filters)
+                dataset = self._dataset(self._chunked[field])
+                corner = (frame, *(0,) * (dataset.rank - 1))
+                dataset.write_direct_chunk(corner, source.read(size), filters)
                 self._sink.check(self.path)
         self._file.variables["time"][...] = times
         self._times = times.tolist()
@@ -315,6 +330,9 @@ class SceneWriter:
             if values.size:
                 variable[...] = values
             variable.attrs.update(attributes)
+        if self._lattice is not None:
+            spline_file.create(self._file, self._lattice, self._compression)
+            return
         for name in self._units:
             self._create_field(name)
 
@@ -330,6 +348,17 @@ class SceneWriter:
         variable.attrs.update(
             units=self._units[name], long_name=_LONG_NAMES[name], **packing.attributes
         )
+
+    def _kept(self, frame: Frame) -> dict[str, NDArray[Any]]:
+        """What the file keeps of a frame, by variable."""
+        if self._lattice is None:
+            return {name: self._packed(name, frame) for name in self._units}
+        if frame.splines is None or frame.splines.nodes.shape != self._lattice.shape:
+            raise SceneError(
+                f"scene: the frame at {frame.time:.9g} s has no splines of shape "
+                f"{self._lattice.shape}, expected those of the lattice"
+            )
+        return dict(spline_file.rounded(frame.splines))
 
     def _packed(self, name: str, frame: Frame) -> NDArray[Any]:
         values = getattr(frame, name)
@@ -348,7 +377,8 @@ class StoredScene(Scene):
     """A scene in a file, read frame by frame; opened by `open_scene`.
 
     Fields that are packed as `SceneWriter` packs them are read without the way through xarray,
-    in half the time.
+    in half the time; what was read last stays in memory, up to `CACHED_BYTES`. `lattice` says
+    where the nodes are if the file holds splines, None if it holds samples.
     """
 
     def __init__(self, path: Path) -> None:
@@ -357,12 +387,16 @@ class StoredScene(Scene):
         self._datasets = {name: self._file[name] for name in PACKING if name in self._file}
         self._direct = {
             name: packing
-            for name, packing in (*PACKING.items(), *CUT.items(), ("temperature", HOT))
+            for name, packing in (*PACKING.items(), ("temperature", HOT))
             if self._is_packed(name, packing)
         }
-        super().__init__(
-            xr.open_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
-        )
+        data = xr.open_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
+        self.lattice = spline_file.stored_lattice(self._file, data)
+        if self.lattice is not None:
+            data = spline_file.with_samples(data, self._read, _LONG_NAMES)
+        self._near_splines: Decoded[SplineFrame] = Decoded(CACHED_BYTES)
+        self._near: Decoded[NDArray[Any]] = Decoded(CACHED_BYTES)
+        super().__init__(data)
 
     @property
     def hottest(self) -> float:
@@ -377,8 +411,9 @@ class StoredScene(Scene):
 
     @property
     def compression(self) -> str:
-        """Names of the HDF5 filters of the temperature, as ``shuffle, deflate``; ``none``."""
-        settings = self._file["temperature"].id.get_create_plist()
+        """HDF5 filters of temperature or splines: ``shuffle, deflate``; ``none``."""
+        kept = "temperature" if self.lattice is None else spline_file.SPLINES
+        settings = self._file[kept].id.get_create_plist()
         filters = [settings.get_filter(i) for i in range(settings.get_nfilters())]
         return ", ".join(name.decode() or str(code) for code, _, _, name in filters) or "none"
 
@@ -391,11 +426,46 @@ class StoredScene(Scene):
             packing.attributes
         )
 
+    def _unchecked(self, index: int, names: Collection[str] | None) -> Frame:
+        splines = self.splines(index)
+        return splines.frame(names) if splines else super()._unchecked(index, names)
+
+    def splines(self, index: int) -> SplineFrame | None:
+        """The splines of one frame; None if the file has samples."""
+        if self.lattice is None:
+            return None
+        index = range(len(self.times))[index]
+        found = self._near_splines.get(index)
+        if found is None:
+            with self._telling(spline_file.SPLINES, index):
+                nodes, limits = (self._file[name][index] for name in spline_file.CHUNKED)
+            found = SplineFrame(self.lattice, float(self.times[index]), nodes, limits)
+            spline_file.check(found)
+            self._near_splines.keep(index, found, nodes.nbytes)
+        return found
+
     def _read(self, name: str, index: int) -> NDArray[Any]:
+        splines = self.splines(index)
+        if splines is not None:
+            material = splines.material()
+            return material if name == "material" else splines.values(name, material)
+        if name not in self._direct:
+            with self._telling(name, index):
+                return super()._read(name, index)
+        index = range(len(self.times))[index]
+        packed = self._near.get((name, index))
+        if packed is None:
+            with self._telling(name, index):
+                packed = self._datasets[name][index]
+            self._near.keep((name, index), packed, packed.nbytes)
+        values = self._direct[name].unpack(packed)
+        return values.copy() if values is packed else values
+
+    @contextmanager
+    def _telling(self, name: str, index: int) -> Iterator[None]:
+        """Say of what cannot be read where it is."""
         try:
-            if name in self._direct:
-                return self._direct[name].unpack(self._datasets[name][index])
-            return super()._read(name, index)
+            yield
         except OSError as error:
             raise SceneError(
                 f"{self.path}: {name!r} of frame {index} cannot be read: {_first_line(error)}"
@@ -433,7 +503,7 @@ def open_scene(path: str | os.PathLike[str]) -> StoredScene:
 
 def is_scene(path: str | os.PathLike[str]) -> bool:
     """Whether a file is one that `SceneWriter` or `write_scene` wrote, or like it."""
-    return holds(path, ("temperature",))
+    return holds(path, ("temperature",)) or holds(path, (spline_file.SPLINES,))
 
 
 def write_scene(scene: Scene, path: str | os.PathLike[str], *, portable: bool = False) -> None:
@@ -446,16 +516,18 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, portable: bool = 
     path : path-like
         The file to write; one that is there is replaced at the end.
     portable : bool
-        As for `SceneWriter`.
+        As for `SceneWriter`; of a cut's scene, the samples instead of its splines.
     """
+    stored = scene if isinstance(scene, StoredScene) else None
     with SceneWriter(
         path,
         scene.raster,
         attributes=scene.data.attrs,
         fields=scene.fields,
-        hottest=scene.hottest if isinstance(scene, StoredScene) else HOTTEST_PLAUSIBLE,
-        packing=scene.packing if isinstance(scene, StoredScene) else PACKING,
+        hottest=stored.hottest if stored is not None else HOTTEST_PLAUSIBLE,
+        packing=stored.packing if stored is not None else PACKING,
         portable=portable,
+        lattice=stored.lattice if stored is not None and not portable else None,
     ) as writer:
         for frame in scene.frames():
             writer.append(frame)

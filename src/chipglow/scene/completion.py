@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Final, Literal, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -268,7 +268,7 @@ def _finished(
         fields |= zip(("velocity_x", "velocity_y"), velocity, strict=True)
         if "plastic_strain_rate" in names and "plastic_strain_rate" not in fields:
             fields["plastic_strain_rate"] = _rate(now, others, velocity, raster, completion)
-    whole = {name: _elsewhere(values) for name, values in fields.items()}
+    whole: dict[str, Any] = {name: _elsewhere(values) for name, values in fields.items()}
     for name in ("plastic_strain", "plastic_strain_rate"):
         if name in whole:
             whole[name] = np.maximum(whole[name], 0.0)

@@ -1,8 +1,8 @@
 """The scene: what is truly there, as fields on a regular grid over time."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field as declared
 from enum import IntEnum
 from functools import cached_property
 from itertools import pairwise
@@ -21,6 +21,8 @@ from chipglow.scene.tool_attributes import stored_tool, tool_attributes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from chipglow.scene.splines import SplineFrame
 
 FIELD_UNITS: Final[Mapping[str, str]] = {
     "temperature": "K",
@@ -97,8 +99,8 @@ class Material(IntEnum):
 class Frame:
     """The fields of a scene at one time, each of shape (y, x); see `FIELD_UNITS`.
 
-    What a scene does not have, and a velocity that was not asked for, is None. A scene without
-    material is workpiece everywhere.
+    What a scene does not have, or was not asked for, is None. A scene without material is
+    workpiece everywhere. `splines` is what the fields were sampled from, where they were.
     """
 
     time: float
@@ -111,6 +113,7 @@ class Frame:
     material_x: NDArray[np.float32] | None = None
     material_y: NDArray[np.float32] | None = None
     quality: NDArray[np.uint8] | None = None
+    splines: "SplineFrame | None" = declared(default=None, repr=False)
 
     def needed(self, name: str) -> NDArray[np.float32]:
         """A field that what follows cannot do without.
@@ -160,9 +163,11 @@ class Scene:
         _check_structure(data)
         self.data = data
         last = len(self.times) - 1
-        lazy = any(not isinstance(data[name].variable._data, np.ndarray) for name in self.fields)
-        for index in {0, last} if lazy else range(last + 1):
-            self.frame(index)
+        arrays = {name: data[name].variable._data for name in self.fields}
+        self._arrays = {name: a for name, a in arrays.items() if isinstance(a, np.ndarray)}
+        self._whole = len(self._arrays) == len(arrays)
+        for index in range(last + 1) if self._whole else {0, last}:
+            check_frame(self._unchecked(index, None))
 
     @classmethod
     def from_fields(
@@ -290,15 +295,7 @@ class Scene:
     @cached_property
     def raster(self) -> Raster:
         """The grid of the samples."""
-        x, y = self.data["x"].values, self.data["y"].values
-        spacing = float((x[-1] - x[0]) / (len(x) - 1))
-        return Raster(
-            left=float(x[0]) - spacing / 2,
-            top=float(y[0]) + spacing / 2,
-            spacing=spacing,
-            rows=len(y),
-            columns=len(x),
-        )
+        return raster_of(self.data)
 
     @property
     def tool(self) -> Tool | None:
@@ -322,32 +319,49 @@ class Scene:
         """Whether the scene says where each point was before the cut."""
         return "material_x" in self.data
 
-    def frame(self, index: int, velocity: bool = True) -> Frame:
+    def frame(self, index: int, names: Collection[str] | None = None) -> Frame:
         """Read and check one frame.
 
         Parameters
         ----------
         index : int
             Number of the frame.
-        velocity : bool
-            Whether to read the velocity too, which a camera does not need.
+        names : collection of str, optional
+            The fields to read beside temperature and material; all by default.
 
         Raises
         ------
         SceneError
             If a value of the frame breaks the contract.
         """
-        names = [name for name in self.fields if velocity or name not in _VELOCITY]
-        fields: dict[str, Any] = {name: self.field(name, index) for name in names}
-        fields.setdefault("material", self._workpiece)
-        frame = Frame(time=float(self.times[index]), **fields)
-        check_frame(frame)
+        frame = self._unchecked(index, names)
+        if not self._whole:
+            check_frame(frame)
         return frame
 
-    def frames(self, indices: range | None = None) -> Iterator[Frame]:
-        """Read frames one after the other."""
+    def _unchecked(self, index: int, names: Collection[str] | None) -> Frame:
+        wanted = set(self.fields if names is None else (*names, *_ALWAYS))
+        read = (name for name in self.fields if name in wanted)
+        fields: dict[str, Any] = {name: self.field(name, index) for name in read}
+        fields.setdefault("material", self._workpiece)
+        return Frame(time=float(self.times[index]), **fields)
+
+    def frames(
+        self, indices: range | None = None, names: Collection[str] | None = None
+    ) -> Iterator[Frame]:
+        """Read frames one after the other; `names` as for `frame`."""
         for index in range(len(self.times)) if indices is None else indices:
-            yield self.frame(index)
+            yield self.frame(index, names)
+
+    def splines(self, index: int) -> "SplineFrame | None":
+        """What a frame's fields are sampled from; None for a scene of samples.
+
+        Parameters
+        ----------
+        index : int
+            Number of the frame.
+        """
+        return None
 
     def field(self, name: str, index: int) -> NDArray[Any]:
         """One field of one frame, unchecked: float32, or uint8 of the material and the quality.
@@ -373,6 +387,9 @@ class Scene:
 
     def _read(self, name: str, index: int) -> NDArray[Any]:
         """One field of one frame; a scene in a file has a faster way."""
+        if name in self._arrays:
+            values: NDArray[Any] = self._arrays[name][index]
+            return values
         return np.asarray(self.data[name][index].values)
 
     @cached_property
@@ -387,6 +404,7 @@ class Scene:
         return np.full(self.raster.shape, Material.WORKPIECE, dtype=np.uint8)
 
 
+_ALWAYS: Final = ("temperature", "material")
 _BYTES: Final = ("material", QUALITY)
 _VELOCITY: Final = ("velocity_x", "velocity_y")
 _MATERIALS: Final = ", ".join(f"{m.value} ({m.name.lower()})" for m in Material)
@@ -430,6 +448,19 @@ def check_frame(frame: Frame) -> None:
         raise SceneError(
             f"scene: quality has type {frame.quality.dtype} at {frame.time:.9g} s, expected uint8"
         )
+
+
+def raster_of(data: xr.Dataset) -> Raster:
+    """The grid of the samples of a scene's dataset."""
+    x, y = data["x"].values, data["y"].values
+    spacing = float((x[-1] - x[0]) / (len(x) - 1))
+    return Raster(
+        left=float(x[0]) - spacing / 2,
+        top=float(y[0]) + spacing / 2,
+        spacing=spacing,
+        rows=len(y),
+        columns=len(x),
+    )
 
 
 def raster_coordinates(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:

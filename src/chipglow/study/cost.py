@@ -14,8 +14,11 @@ _POINT_STEPS: Final = 13e6
 _SECONDS_A_SAMPLE: Final = 150e-9
 """Sampling, packing and writing a frame of the scene, for each of its samples."""
 
-_BYTES_A_SAMPLE: Final = 3.9
-"""Of a scene's file: 1.56 GB of the default's 555 frames of 810 x 900."""
+_BYTES_A_NODE: Final = 18.0
+"""Of a scene's file: nine splines, of which each coefficient takes 1.3 to 2 bytes."""
+
+_NODES_BEYOND: Final = 6
+"""Nodes beside those that lie among the samples, in either direction."""
 
 _ANALYSIS_SECONDS: Final = 210e-9
 """Analysis, for each sample of each frame of each exposure that it reads."""
@@ -57,6 +60,9 @@ def expected_cost(study: Study) -> Cost:
     cutting, camera = study.cutting, study.camera
     view, window = cutting.field_of_view, cutting.window
     samples = view.rows * view.columns
+    cell = cutting.numerics.build().cell
+    down, across = (n * view.spacing / cell + _NODES_BEYOND for n in (view.rows, view.columns))
+    nodes = down * across
     kept = window.later_bands * ceil(window.band_duration / window.interval)
     frames = ceil(cutting.duration / window.interval) + kept
     solver = cutting.simulation().point_steps / (_POINT_STEPS * get_num_threads())
@@ -67,6 +73,6 @@ def expected_cost(study: Study) -> Cost:
         + solver
         + _SECONDS_A_SAMPLE * frames * samples
         + _ANALYSIS_SECONDS * exposures * exposed * samples,
-        disk=_BYTES_A_SAMPLE * frames * samples,
+        disk=_BYTES_A_NODE * frames * nodes,
         memory=_MEMORY + _MEMORY_A_SAMPLE * samples,
     )

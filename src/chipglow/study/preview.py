@@ -3,7 +3,9 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import ceil
-from typing import Final
+from typing import Any, Final
+
+import numpy as np
 
 from chipglow.cutting import Preview
 from chipglow.scene import Frame, Raster, Scene
@@ -51,9 +53,9 @@ def _step(raster: Raster) -> int:
 
 def _thinned(frame: Frame, step: int, rows: int, columns: int) -> Frame:
     middles = slice(step // 2, None, step)
-    fields = {
+    fields: dict[str, Any] = {
         name: values[middles, middles][:rows, :columns]
         for name, values in vars(frame).items()
-        if name != "time" and values is not None
+        if isinstance(values, np.ndarray)
     }
     return Frame(time=frame.time, **fields)

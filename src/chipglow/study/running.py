@@ -18,7 +18,6 @@ from chipglow.cutting import (
 from chipglow.errors import SceneErrors, StudyResult, analyse, scene_errors
 from chipglow.io import SCENE_FORMAT, SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.interrupts import uninterrupted
-from chipglow.io.packing import CUT
 from chipglow.laboratory.chip import NoContactError, NoShearBandError
 from chipglow.scene import Frame, Scene, SceneError, ToolOutline
 from chipglow.study.assumed import left_to_the_paper
@@ -271,7 +270,8 @@ def _compute(
     start = left[0] if left and left[0].progress > 0 else None
     state = Checkpoint(start.state(), start.progress) if start else None
     tool = cutting.tool.build()
-    with SceneWriter(path, raster, tool, attributes, packing=CUT, resume=start) as writer:
+    lattice = simulation.lattice(raster)
+    with SceneWriter(path, raster, tool, attributes, lattice=lattice, resume=start) as writer:
         keeper = _Keeper(writer)
         if start and state:
             keeper.note_kept(state, start.checkpoint)

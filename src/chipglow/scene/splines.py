@@ -1,0 +1,256 @@
+"""Frames as quadratic B-splines on a grid that is coarser than the samples.
+
+A cut's picture is such splines on the grid of its simulation: their coefficients hold all of it, in
+a small part of the numbers that its samples are.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from chipglow.scene.raster import Raster
+from chipglow.scene.scene import Frame, Material
+
+SPLINE_FIELDS: Final = (
+    "temperature",
+    "plastic_strain",
+    "plastic_strain_rate",
+    "velocity_x",
+    "velocity_y",
+    "material_x",
+    "material_y",
+    "filled",
+    "tool_temperature",
+)
+"""What the coefficients are of: the workpiece's fields, the share of the area that chip and tool
+fill, and the tool's temperature."""
+
+FILLED_SPLINE: Final = SPLINE_FIELDS.index("filled")
+TOOL_SPLINE: Final = SPLINE_FIELDS.index("tool_temperature")
+_SAMPLED: Final = SPLINE_FIELDS[:FILLED_SPLINE]
+_VOID, _WORKPIECE, _TOOL = int(Material.VOID), int(Material.WORKPIECE), int(Material.TOOL)
+_FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """Where the nodes of the splines are, and which samples they give.
+
+    Parameters
+    ----------
+    raster : Raster
+        The samples.
+    left, top : float
+        Place of the first node in m.
+    cell : float
+        Distance between nodes in m.
+    rows, columns : int
+        Number of nodes down and across; row 0 is at the top.
+    in_tool : ndarray
+        Which samples show the tool, bool of shape `raster.shape`.
+    ambient : float
+        Temperature in K of samples that show nothing.
+
+    Raises
+    ------
+    ValueError
+        If the nodes do not reach three beyond every sample, or `in_tool` has another shape.
+    """
+
+    raster: Raster
+    left: float
+    top: float
+    cell: float
+    rows: int
+    columns: int
+    in_tool: NDArray[np.bool_]
+    ambient: float
+
+    def __post_init__(self) -> None:
+        if self.in_tool.shape != self.raster.shape:
+            raise ValueError(
+                f"lattice: in_tool has shape {self.in_tool.shape}, expected {self.raster.shape}"
+            )
+        for name, (first, _), nodes in (
+            ("rows", self.down, self.rows),
+            ("columns", self.across, self.columns),
+        ):
+            if first.min() < 0 or first.max() + 3 > nodes:
+                raise ValueError(
+                    f"lattice: {nodes} {name} of nodes, expected them to reach beyond the samples"
+                )
+
+    @classmethod
+    def within(
+        cls,
+        raster: Raster,
+        corner: tuple[float, float],
+        cell: float,
+        in_tool: NDArray[np.bool_],
+        ambient: float,
+    ) -> "Lattice":
+        """The part of a larger grid that a raster needs.
+
+        Parameters
+        ----------
+        raster : Raster
+            The samples.
+        corner : tuple of float
+            x and y of the grid's lower left node in m.
+        cell, in_tool, ambient
+            As for the class.
+        """
+        left, bottom = corner
+        # A node more on each side, so that rounding takes none away.
+        beyond = np.array((-1.0, 3.0))
+        first, last = np.floor((raster.x[[0, -1]] - left) / cell - 0.5) + beyond
+        lowest, highest = np.floor((raster.y[[-1, 0]] - bottom) / cell - 0.5) + beyond
+        return cls(
+            raster,
+            float(left + cell * first),
+            float(bottom + cell * highest),
+            cell,
+            int(highest - lowest) + 1,
+            int(last - first) + 1,
+            in_tool,
+            ambient,
+        )
+
+    @cached_property
+    def across(self) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """First node of each column of samples, and the weights of three nodes, (3, columns)."""
+        return _placement((self.raster.x - self.left) / self.cell)
+
+    @cached_property
+    def down(self) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """The same for the rows of samples, (3, rows)."""
+        return _placement((self.top - self.raster.y) / self.cell)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Of the coefficients of a frame: fields, rows and columns."""
+        return len(SPLINE_FIELDS), self.rows, self.columns
+
+
+@dataclass(frozen=True, eq=False)
+class SplineFrame:
+    """The splines of one frame.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Where their nodes are.
+    time : float
+        In s.
+    nodes : ndarray
+        Coefficients of `SPLINE_FIELDS`, float32 of shape `lattice.shape`.
+    limits : ndarray
+        Least and greatest value that the workpiece's fields may have, which splines can overshoot:
+        float32 of shape (fields, 2), of the fields before ``filled``.
+
+    Notes
+    -----
+    A sample has the value Σ w_a(y) w_b(x) c_ab of the three by three nodes about it, with w the
+    quadratic B-spline: (3/2 − d)²/2, 3/4 − d², (3/2 − d)²/2 at the distances d in cells. It shows
+    the workpiece where ``filled`` is over one half and the tool is not there; there the value is
+    kept within the limits. The tool has its own temperature and nothing else, the void the
+    lattice's.
+    """
+
+    lattice: Lattice
+    time: float
+    nodes: NDArray[np.float32]
+    limits: NDArray[np.float32]
+
+    def frame(self, names: Collection[str] | None = None) -> Frame:
+        """The samples.
+
+        Parameters
+        ----------
+        names : collection of str, optional
+            Which fields beside the material; all by default.
+        """
+        material = self.material()
+        fields: dict[str, Any] = {
+            name: self.values(name, material)
+            for name in _SAMPLED
+            if names is None or name in names or name == "temperature"
+        }
+        return Frame(time=self.time, material=material, splines=self, **fields)
+
+    def material(self) -> NDArray[np.uint8]:
+        """What each sample shows, shape (y, x)."""
+        filled = np.empty(self.lattice.raster.shape, np.float32)
+        self._evaluate(FILLED_SPLINE, filled)
+        seen = np.where(filled > 0.5, np.uint8(_WORKPIECE), np.uint8(_VOID))
+        seen[self.lattice.in_tool] = _TOOL
+        return seen
+
+    def values(self, name: str, material: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """One field, shape (y, x).
+
+        Parameters
+        ----------
+        name : str
+            One of `SPLINE_FIELDS` before ``filled``.
+        material : ndarray
+            What each sample shows, as of `material`.
+        """
+        number = _SAMPLED.index(name)
+        result = np.empty(self.lattice.raster.shape, np.float32)
+        self._evaluate(number, result)
+        elsewhere = np.float32(self.lattice.ambient if name == "temperature" else 0.0)
+        _within(result, material, *self.limits[number], elsewhere)
+        if name == "temperature":
+            tool = np.empty_like(result)
+            self._evaluate(TOOL_SPLINE, tool)
+            np.copyto(result, tool, where=self.lattice.in_tool)
+        return result
+
+    def _evaluate(self, number: int, result: NDArray[np.float32]) -> None:
+        _evaluate(self.nodes[number], *self.lattice.down, *self.lattice.across, result)
+
+
+def _placement(position: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    first = np.floor(position - 0.5)
+    s = position - first - 0.5
+    weights = np.stack([(1.0 - s) ** 2 / 2, 0.5 + s * (1.0 - s), s**2 / 2])
+    return first.astype(np.int64), weights.astype(np.float32)
+
+
+@njit(**_FAST)
+def spread(nodes, first, weights, begin, end, result):  # type: ignore[no-untyped-def]
+    """A row of nodes on the columns of samples from `begin` to `end`."""
+    for c in range(begin, end):
+        i = first[c]
+        result[c - begin] = (
+            weights[0, c] * nodes[i] + weights[1, c] * nodes[i + 1] + weights[2, c] * nodes[i + 2]
+        )
+
+
+@njit(cache=True, **_FAST)
+def _evaluate(nodes, first_down, down, first_across, across, result):  # type: ignore[no-untyped-def]
+    rows, columns = result.shape
+    wide = np.empty((nodes.shape[0], columns), np.float32)
+    for j in range(nodes.shape[0]):
+        spread(nodes[j], first_across, across, 0, columns, wide[j])
+    for r in range(rows):
+        j = first_down[r]
+        upper, middle, lower = wide[j], wide[j + 1], wide[j + 2]
+        u, v, w = down[0, r], down[1, r], down[2, r]
+        for c in range(columns):
+            result[r, c] = u * upper[c] + v * middle[c] + w * lower[c]
+
+
+@njit(cache=True, **_FAST)
+def _within(values, material, least, greatest, elsewhere):  # type: ignore[no-untyped-def]
+    rows, columns = values.shape
+    for r in range(rows):
+        for c in range(columns):
+            value = min(max(values[r, c], least), greatest)
+            values[r, c] = value if material[r, c] == _WORKPIECE else elsewhere
