@@ -1,22 +1,22 @@
 """The exposure: a scene's radiance, summed over the integration time in one pass."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
+from chipglow.camera.sweep import BATCH, STEPS_PER_KELVIN, Sums
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
-from chipglow.scene import Material, Raster, Scene, is_gap
-from chipglow.surface import EmissivityField
+from chipglow.scene import Frame, Raster, Scene, is_gap
+from chipglow.scene.splines import SplineFrame
+from chipglow.surface import EmissivityField, EmissivityStack, FeatureFields
 
-_STEPS_PER_KELVIN: Final = 32.0
 _ROUNDING: Final = 1e-6
-_VOID: Final = int(Material.VOID)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ def expose(
     duration: float,
     reflected: float | None = None,
 ) -> Exposure:
-    """Sum a scene's apparent radiance over an integration time; one sub-frame in memory at once.
+    """Sum a scene's apparent radiance over an integration time.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def expose(
     -----
     Apparent radiance is ε L(T) (Equation 3 of the paper), or ε L(T) + (1 − ε) L(T_reflected)
     (Equation 2). The void, "undefined" in the paper, has no radiance at all. L is looked up
-    between values 1/32 K apart, within 4e-7 of it from 250 K on.
+    between values 1/32 K apart, within 6e-7 of it from 250 K on.
     """
     return expose_all(scene, (emissivity,), band, start, duration, reflected)[0]
 
@@ -134,19 +134,10 @@ def expose_all(
     indices, weights = frame_weights(scene.times, scene.frame_spacing, start, duration)
     middle = _frame_at(scene, start + duration / 2, indices)
     environment = 0.0 if reflected is None else float(band.radiance(reflected))
-    table, shape = _fine_table(band), scene.raster.shape
     stack = emissivities[0].beside(emissivities[1:])
-    mean, centre = (np.zeros((len(emissivities), *shape)) for _ in range(2))
-    peak = np.zeros(mean.shape, dtype=np.float32)
-    hottest = np.zeros(shape, dtype=np.float32)
-    for index, weight in zip(indices, weights, strict=True):
-        frame = scene.frame(index)
-        sub_frame = (np.ascontiguousarray(frame.temperature), np.ascontiguousarray(frame.material))
-        surfaces = stack.emissivities(frame)
-        _accumulate(*sub_frame, surfaces, weight, table, environment, mean, peak, hottest)
-        if index == middle:
-            # Its peaks are in already: to take them again changes nothing.
-            _accumulate(*sub_frame, surfaces, 1.0, table, environment, centre, peak, hottest)
+    sums = Sums.zero(_fine_table(band), environment, len(emissivities), scene.raster.shape)
+    _sweep(scene, stack, indices, weights, indices.index(middle), sums)
+    mean, centre, peak, hottest = sums.mean, sums.centre, sums.peak, sums.hottest
     if not np.isfinite(mean).all():
         raise ValueError(
             f"exposure: from {start:g} s, temperature must be {TABLE_COLDEST:g} to "
@@ -229,42 +220,59 @@ def _frame_at(scene: Scene, time: float, indices: range) -> int:
     return min(max(index, indices[0]), indices[-1])
 
 
+def _sweep(
+    scene: Scene,
+    stack: EmissivityStack,
+    indices: range,
+    weights: NDArray[np.float64],
+    middle: int,
+    sums: Sums,
+) -> None:
+    """Add sub-frames to sums, in the quickest way that scene and surfaces allow."""
+    features = stack if isinstance(stack, FeatureFields) else None
+    if features is not None and (splines := _splines(scene, indices)):
+        shifts = np.stack([features.shifts(frame.time) for frame in splines])
+        textures, fixed = features.textures, features.fixed_positions
+        sums.add_splines(splines, fixed, shifts, textures, weights, middle)
+        return
+    for begin, frames in _batches(scene, indices, stack.needs):
+        part = weights[begin : begin + len(frames)]
+        inside = middle - begin if begin <= middle < begin + len(frames) else -1
+        if features is None:
+            sums.add_given(frames, [stack.emissivities(one) for one in frames], part, inside)
+        else:
+            positions = [features.positions(frame) for frame in frames]
+            shifts = np.stack([features.shifts(frame.time) for frame in frames])
+            sums.add_features(frames, positions, shifts, features.textures, part, inside)
+
+
+def _splines(scene: Scene, indices: range) -> list[SplineFrame]:
+    """The splines of these frames; none for a scene of samples."""
+    found = (scene.splines(index) for index in indices)
+    return [splines for splines in found if splines is not None]
+
+
+def _batches(
+    scene: Scene, indices: range, needs: Collection[str] | None
+) -> Iterator[tuple[int, list[Frame]]]:
+    """Frames, a few at a time, with the place of the first; the next are read meanwhile."""
+
+    def read(begin: int) -> list[Frame]:
+        return [scene.frame(index, needs) for index in indices[begin : begin + BATCH]]
+
+    begins = range(0, len(indices), BATCH)
+    with ThreadPoolExecutor(1) as reader:
+        coming = reader.submit(read, 0)
+        for begin in begins:
+            frames = coming.result()
+            if begin != begins[-1]:
+                coming = reader.submit(read, begin + BATCH)
+            yield begin, frames
+
+
 @lru_cache(maxsize=8)
-def _fine_table(band: Band) -> NDArray[np.float64]:
+def _fine_table(band: Band) -> NDArray[np.float32]:
     """Radiance at steps so fine that a straight line between them is exact enough, and fast."""
-    count = round((TABLE_HOTTEST - TABLE_COLDEST) * _STEPS_PER_KELVIN) + 1
-    return np.asarray(
-        band.radiance(TABLE_COLDEST + np.arange(count) / _STEPS_PER_KELVIN), dtype=np.float64
-    )
-
-
-@njit(cache=True, parallel=True, error_model="numpy")
-def _accumulate(  # type: ignore[no-untyped-def]
-    temperature, material, emissivity, weight, table, environment, total, peak, hottest
-):
-    """Add one sub-frame; the innermost loops have no branches, and become vector instructions."""
-    surfaces, rows, columns = emissivity.shape
-    last = table.size - 1
-    for y in prange(rows):
-        reflected = np.empty(columns)
-        gain = np.empty(columns)
-        for x in range(columns):
-            t = temperature[y, x]
-            there = material[y, x] != _VOID
-            position = (np.float64(t) - TABLE_COLDEST) * _STEPS_PER_KELVIN
-            inside = min(max(position, 0.0), np.float64(last))
-            i = min(np.int32(inside), last - 1)
-            black = table[i] + (inside - i) * (table[i + 1] - table[i])
-            if not 0.0 <= position <= last:
-                black = np.nan
-            reflected[x] = environment if there else 0.0
-            gain[x] = black - environment if there else 0.0
-            hottest[y, x] = max(hottest[y, x], t if there else np.float32(0.0))
-        for n in range(surfaces):
-            for x in range(columns):
-                e = np.float64(emissivity[n, y, x])
-                apparent = reflected[x] + e * gain[x]
-                if not 0.0 <= e <= 1.0:
-                    apparent = np.nan
-                total[n, y, x] += weight * apparent
-                peak[n, y, x] = max(peak[n, y, x], np.float32(apparent))
+    count = round((TABLE_HOTTEST - TABLE_COLDEST) * STEPS_PER_KELVIN) + 1
+    values = np.asarray(band.radiance(TABLE_COLDEST + np.arange(count) / STEPS_PER_KELVIN))
+    return np.stack([values, np.diff(values, append=values[-1])], axis=1).astype(np.float32)

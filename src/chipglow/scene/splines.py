@@ -27,7 +27,7 @@ SPLINE_FIELDS: Final = (
     "filled",
     "tool_temperature",
 )
-"""What the coefficients are of: the workpiece's fields, the share of the area that chip and tool
+"""What the coefficients are of: the workpiece's fields, the fraction of the area that chip and tool
 fill, and the tool's temperature."""
 
 FILLED_SPLINE: Final = SPLINE_FIELDS.index("filled")

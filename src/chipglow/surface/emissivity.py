@@ -63,6 +63,11 @@ class Emissivity(Part):
         return np.asarray(values, dtype=np.float32)
 
     @property
+    def line(self) -> tuple[float, float]:
+        """Emissivity at a deviate of 0 and its change with the deviate; NaN if it is no line."""
+        return self.mean, self.standard_deviation if self.is_normal else float("nan")
+
+    @property
     def _beta_moments(self) -> tuple[float, float]:
         """Moments of the beta distribution whose enlarged texture has those asked for.
 

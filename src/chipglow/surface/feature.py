@@ -10,18 +10,21 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.scene import Frame, Material, Raster, Scene
+from chipglow.surface.blend import (
+    RATE_OF_CHIP,
+    RATE_OF_SHEAR_BAND,
+    SCRATCH,
+    STRAIN_OF_CHIP,
+    STRAIN_OF_WORKPIECE,
+    Textures,
+    blend_row,
+    fraction_between,
+    padded,
+)
 from chipglow.surface.emissivity import Emissivity
 from chipglow.surface.surface import EmissivityField, EmissivityStack, Surface
-from chipglow.surface.texture import Texture, cubic_taps, emissivity_at, enlarge_all, enlarged
+from chipglow.surface.texture import Texture
 
-STRAIN_OF_WORKPIECE: Final = 0.3
-"""Plastic strain up to which the workpiece's map holds alone."""
-STRAIN_OF_CHIP: Final = 0.5
-"""Plastic strain from which the chip's map holds alone."""
-RATE_OF_CHIP: Final = 6_000.0
-"""Plastic strain rate in 1/s up to which the shear band's map has no fraction."""
-RATE_OF_SHEAR_BAND: Final = 30_000.0
-"""Plastic strain rate in 1/s from which the shear band's map holds alone."""
 UNDEFORMED_STRAIN: Final = 0.01
 """Plastic strain under which material is not affected by the cut."""
 
@@ -163,6 +166,12 @@ class FeatureField(EmissivityField):
     times: NDArray[np.float64]
     shifts: NDArray[np.float64]
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """See `EmissivityField.needs`."""
+        moves = ("material_x", "material_y") if self.surface.follow == "material" else ()
+        return ("plastic_strain", "plastic_strain_rate", *moves)
+
     def shift(self, time: float) -> NDArray[np.float64]:
         """Shift of the maps of workpiece, chip and shear band at a time in s, shape (3, 2) in m."""
         flat = self.shifts.reshape(len(self.times), 6)
@@ -199,8 +208,8 @@ class FeatureField(EmissivityField):
         ValueError
             If the textures follow the material, and the frame lacks the material coordinates.
         """
-        if self.surface.follow != "material":
-            return self._sample_positions
+        if self.fixed_positions is not None:
+            return self.fixed_positions
         if frame.material_x is None or frame.material_y is None:
             raise ValueError("frame: has no material coordinates, expected them for 'material'")
         return frame.material_x, frame.material_y
@@ -215,7 +224,10 @@ class FeatureField(EmissivityField):
         return FeatureFields((self,))
 
     @cached_property
-    def _sample_positions(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def fixed_positions(self) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
+        """Positions that are the same in every frame; None if textures follow the material."""
+        if self.surface.follow == "material":
+            return None
         x, y = np.meshgrid(self.raster.x, self.raster.y)
         return x.astype(np.float32), y.astype(np.float32)
 
@@ -254,46 +266,45 @@ class FeatureFields(EmissivityStack):
             frame.needed("plastic_strain"),
             np.zeros(first.raster.shape, np.float32) if rate is None else rate,
             *first.positions(frame),
-            first.shift(frame.time),
-            1.0 / first.surface.grain,
-            self._nodes,
-            self._first_nodes,
-            self._seed_numbers,
-            self._tables,
-            self._tool_maps,
+            self.shifts(frame.time),
+            self.textures,
             result,
         )
         return result
 
-    @cached_property
-    def _seeds(self) -> list[int]:
-        return sorted({field.surface.seed for field in self.fields})
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """See `EmissivityStack.needs`."""
+        return self.fields[0].needs
+
+    def positions(self, frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """See `FeatureField.positions`."""
+        return self.fields[0].positions(frame)
+
+    @property
+    def fixed_positions(self) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
+        """Positions that are the same in every frame; None if textures follow the material."""
+        return self.fields[0].fixed_positions
+
+    def shifts(self, time: float) -> NDArray[np.float32]:
+        """Shift of the maps of workpiece, chip and shear band at a time in s, shape (3, 2) in m."""
+        return self.fields[0].shift(time).astype(np.float32)
 
     @cached_property
-    def _seed_numbers(self) -> NDArray[np.int64]:
-        return np.array([self._seeds.index(field.surface.seed) for field in self.fields])
-
-    @cached_property
-    def _nodes(self) -> NDArray[np.float32]:
-        """Deviates of the three moving features, shape (feature, row, column, seed)."""
+    def textures(self) -> Textures:
+        """What a kernel needs of them; surfaces of one seed share its maps."""
+        seeds = sorted({field.surface.seed for field in self.fields})
         of_seed = {field.surface.seed: field.surface.textures for field in self.fields}
-        maps = [[of_seed[seed][name].nodes for seed in self._seeds] for name in FEATURES[:3]]
-        return np.ascontiguousarray(np.moveaxis(np.array(maps), 1, -1))
-
-    @cached_property
-    def _first_nodes(self) -> NDArray[np.float32]:
-        return np.ascontiguousarray(self._nodes[..., 0])
-
-    @cached_property
-    def _tables(self) -> NDArray[np.float32]:
-        """What a deviate stands for, shape (surface, feature, entry)."""
-        return np.array(
-            [[getattr(f.surface, name).table for name in FEATURES[:3]] for f in self.fields]
+        moving = FEATURES[:3]
+        chosen = [[getattr(f.surface, name) for name in moving] for f in self.fields]
+        return Textures(
+            np.float32(1.0 / self.fields[0].surface.grain),
+            np.array([[padded(of_seed[seed][name].nodes) for seed in seeds] for name in moving]),
+            np.array([seeds.index(field.surface.seed) for field in self.fields]),
+            np.array([[one.line for one in row] for row in chosen], np.float32),
+            np.array([[one.table for one in row] for row in chosen]),
+            np.array([field.tool_map for field in self.fields]),
         )
-
-    @cached_property
-    def _tool_maps(self) -> NDArray[np.float32]:
-        return np.array([field.tool_map for field in self.fields])
 
 
 def chip_fraction(plastic_strain: ArrayLike) -> NDArray[np.float64]:
@@ -312,7 +323,8 @@ def shear_band_fraction(plastic_strain_rate: ArrayLike) -> NDArray[np.float64]:
 def _mean_shifts(scene: Scene) -> NDArray[np.float64]:
     """Integral over time of the features' mean velocities, shape (time, 3, 2) in m."""
     height = scene.raster.y
-    velocity = np.array([_mean_velocities(frame, height) for frame in scene.frames()])
+    needed = ("plastic_strain", "plastic_strain_rate", "velocity_x", "velocity_y")
+    velocity = np.array([_mean_velocities(frame, height) for frame in scene.frames(names=needed)])
     velocity = velocity.reshape(len(scene.times), 6)
     for column in velocity.T:
         known = np.isfinite(column)
@@ -342,54 +354,18 @@ def _mean_velocities(frame: Frame, height: NDArray[np.float64]) -> NDArray[np.fl
     return np.asarray(velocity)
 
 
-@njit(error_model="numpy", fastmath={"contract"}, forceinline=True)
-def _share(value, none, full):  # type: ignore[no-untyped-def]
-    fraction = (value - np.float32(none)) * np.float32(1.0 / (full - none))
-    return min(max(fraction, np.float32(0.0)), np.float32(1.0))
-
-
 @njit(cache=True, parallel=True)
-def _blend(  # type: ignore[no-untyped-def]
-    material,
-    strain,
-    rate,
-    x,
-    y,
-    shift,
-    scale,
-    nodes,
-    first_nodes,
-    seed_numbers,
-    tables,
-    tool_maps,
-    result,
-):
-    """Emissivity of every surface: fractions of the features times their textures."""
-    surfaces, rows, columns = result.shape
-    seeds = nodes.shape[3]
-    scale = np.float32(scale)
+def _blend(material, strain, rate, x, y, shifts, textures, result):  # type: ignore[no-untyped-def]
+    """Emissivity of every surface."""
+    rows, columns = material.shape
+    seeds = textures[1].shape[1]
     for r in prange(rows):
-        deviates = np.empty(seeds, np.float32)
-        for c in range(columns):
-            kind = material[r, c]
-            for n in range(surfaces):
-                result[n, r, c] = tool_maps[n, r, c] if kind == _TOOL else np.float32(0.0)
-            if kind in (_VOID, _TOOL):
-                continue
-            chip = _share(strain[r, c], STRAIN_OF_WORKPIECE, STRAIN_OF_CHIP)
-            band = _share(rate[r, c], RATE_OF_CHIP, RATE_OF_SHEAR_BAND)
-            rest = np.float32(1.0) - band
-            for k, fraction in ((0, rest - rest * chip), (1, rest * chip), (2, band)):
-                if fraction > 0:
-                    across = cubic_taps((x[r, c] - np.float32(shift[k, 0])) * scale)
-                    down = cubic_taps((y[r, c] - np.float32(shift[k, 1])) * scale)
-                    if seeds == 1:
-                        deviates[0] = enlarged(first_nodes[k], down, across)
-                    else:
-                        enlarge_all(nodes[k], down, across, deviates)
-                    for n in range(surfaces):
-                        deviate = deviates[seed_numbers[n]]
-                        result[n, r, c] += fraction * emissivity_at(deviate, tables[n, k])
+        scratch = np.zeros((SCRATCH + seeds, columns), np.float32)
+        corner = np.empty(columns, np.int32)
+        blend_row(
+            material[r], strain[r], rate[r], x[r], y[r], shifts, textures, r, scratch, corner,
+            result[:, r],
+        )  # fmt: skip
 
 
 @njit(cache=True, parallel=True)
@@ -401,7 +377,7 @@ def _sum_velocities(material, strain, rate, vx, vy, height, sums):  # type: igno
         for c in range(columns):
             if material[r, c] == _VOID or material[r, c] == _TOOL:
                 continue
-            band = _share(rate[r, c], RATE_OF_CHIP, RATE_OF_SHEAR_BAND)
+            band = fraction_between(rate[r, c], RATE_OF_CHIP, RATE_OF_SHEAR_BAND)
             undeformed = strain[r, c] < UNDEFORMED_STRAIN
             formed = strain[r, c] >= STRAIN_OF_CHIP and band == 0 and height[r] > 0
             for k, weight in ((0, np.float32(undeformed)), (1, np.float32(formed)), (2, band)):

@@ -100,6 +100,11 @@ class MapField(EmissivityField):
 
     image: NDArray[np.float32]
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """See `EmissivityField.needs`."""
+        return ()
+
     def emissivity(self, frame: Frame) -> NDArray[np.float32]:
         """Emissivity of every sample of a frame, shape (y, x); 0 in the void.
 

@@ -1,7 +1,7 @@
 """What a surface owes the camera: an emissivity for every sample of every frame."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Final, Self
 
@@ -15,6 +15,11 @@ from chipglow.scene import Frame, Material, Scene
 class EmissivityStack(ABC):
     """Emissivities of one scene's samples for several surfaces, frame by frame."""
 
+    @property
+    def needs(self) -> Collection[str] | None:
+        """Fields of a frame that it reads beside temperature and material; None: all there are."""
+        return None
+
     @abstractmethod
     def emissivities(self, frame: Frame) -> NDArray[np.float32]:
         """Emissivity of every sample for every surface, shape (surface, y, x), from 0 to 1."""
@@ -22,6 +27,11 @@ class EmissivityStack(ABC):
 
 class EmissivityField(ABC):
     """Emissivity of one scene's samples, frame by frame."""
+
+    @property
+    def needs(self) -> Collection[str] | None:
+        """Fields of a frame that it reads beside temperature and material; None: all there are."""
+        return None
 
     @abstractmethod
     def emissivity(self, frame: Frame) -> NDArray[np.float32]:
@@ -43,6 +53,16 @@ class _OneByOne(EmissivityStack):
     """Fields that have nothing in common."""
 
     fields: tuple[EmissivityField, ...]
+
+    @property
+    def needs(self) -> Collection[str] | None:
+        """See `EmissivityStack.needs`."""
+        found: set[str] = set()
+        for field in self.fields:
+            if field.needs is None:
+                return None
+            found.update(field.needs)
+        return found
 
     def emissivities(self, frame: Frame) -> NDArray[np.float32]:
         """See `EmissivityStack.emissivities`."""
@@ -110,6 +130,11 @@ class UniformSurface(Surface, EmissivityField):
     def on(self, scene: Scene) -> EmissivityField:
         """Return itself: it is the same on every scene."""
         return self
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """See `EmissivityField.needs`."""
+        return ()
 
     def emissivity(self, frame: Frame) -> NDArray[np.float32]:
         """Emissivity of every sample of a frame, shape (y, x); 0 in the void."""

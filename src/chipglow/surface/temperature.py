@@ -60,6 +60,11 @@ class TemperatureSurface(Surface, EmissivityField):
         """Return itself: it is the same on every scene."""
         return self
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """See `EmissivityField.needs`."""
+        return ()
+
     def emissivity(self, frame: Frame) -> NDArray[np.float32]:
         """Emissivity of every sample of a frame, shape (y, x); 0 in the void."""
         values = np.interp(frame.temperature, self.temperatures, self.emissivities)

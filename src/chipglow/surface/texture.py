@@ -174,20 +174,6 @@ def enlarged(nodes, down, across):  # type: ignore[no-untyped-def]
 
 
 @njit(**_FAST)
-def enlarge_all(nodes, down, across, deviates):  # type: ignore[no-untyped-def]
-    """The same of several maps, the last axis of `nodes`: side by side they are vectors."""
-    i, e, f, g, h = down
-    j, a, b, c, d = across
-    wrap = MAP_SIZE - 1
-    j0, j1, j2, j3 = (j - 1) & wrap, j & wrap, (j + 1) & wrap, (j + 2) & wrap
-    deviates[:] = np.float32(0.0)
-    for lag, weight in ((-1, e), (0, f), (1, g), (2, h)):
-        n = nodes[(i + lag) & wrap]
-        for k in range(deviates.size):
-            deviates[k] += weight * (a * n[j0, k] + b * n[j1, k] + c * n[j2, k] + d * n[j3, k])
-
-
-@njit(**_FAST)
 def emissivity_at(deviate, table):  # type: ignore[no-untyped-def]
     """Emissivity at a normal deviate, by straight lines between the entries of its table."""
     position = (deviate + np.float32(REACH)) * np.float32(STEPS)

@@ -1,0 +1,408 @@
+"""Sums over the sub-frames of an exposure: the rows in blocks, with time inside.
+
+A block's sums stay in the processor's cache while its sub-frames go by, and a sub-frame's fields
+are made, blended and summed row by row. Blocks are shared among threads of this module, which sleep
+when there is nothing to do; none of the sums depends on their number.
+
+The kernels are functions of arrays alone and work on one block each: a graphics processor would
+take them block by block, with the loops over columns as its threads.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numba import get_num_threads, njit
+from numpy.typing import NDArray
+
+from chipglow.radiometry.band import TABLE_COLDEST
+from chipglow.scene import Frame, Material
+from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, TOOL_SPLINE, SplineFrame, spread
+from chipglow.surface.blend import SCRATCH, Textures, blend_row
+
+STEPS_PER_KELVIN: Final = 32.0
+"""Values of the table of radiance in a kelvin; a straight line between them is exact enough."""
+
+BATCH: Final = 8
+"""Frames that are summed together where their samples are in memory."""
+
+_ROWS: Final = 16
+_VOID, _WORKPIECE, _TOOL = int(Material.VOID), int(Material.WORKPIECE), int(Material.TOOL)
+_STRAIN, _RATE, _X, _Y = (
+    SPLINE_FIELDS.index(name)
+    for name in ("plastic_strain", "plastic_strain_rate", "material_x", "material_y")
+)
+_FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """What is summed over the sub-frames; see `Exposure`.
+
+    Parameters
+    ----------
+    table : ndarray
+        Radiance from 200 K on, `STEPS_PER_KELVIN` to a kelvin, and its change to the next value;
+        float32 of shape (n, 2).
+    environment : float
+        Radiance of the surroundings in W/(m² sr).
+    mean, centre : ndarray
+        Float64 of shape (surface, y, x), zero to start with.
+    peak : ndarray
+        Float32 of the same shape.
+    hottest : ndarray
+        Float32 of shape (y, x).
+    """
+
+    table: NDArray[np.float32]
+    environment: float
+    mean: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    peak: NDArray[np.float32]
+    hottest: NDArray[np.float32]
+
+    @classmethod
+    def zero(
+        cls, table: NDArray[np.float32], environment: float, surfaces: int, shape: tuple[int, int]
+    ) -> "Sums":
+        """Sums of nothing."""
+        mean, centre = (np.zeros((surfaces, *shape)) for _ in range(2))
+        peak, hottest = (np.zeros(of, np.float32) for of in (mean.shape, shape))
+        return cls(table, environment, mean, centre, peak, hottest)
+
+    def add_given(
+        self,
+        frames: Sequence[Frame],
+        emissivities: Sequence[NDArray[np.float32]],
+        weights: NDArray[np.float64],
+        middle: int,
+    ) -> None:
+        """Add frames with the emissivities of all surfaces, each of shape (surface, y, x).
+
+        Parameters
+        ----------
+        frames : sequence of Frame
+            Up to `BATCH` of them.
+        emissivities : sequence of ndarray
+            One of each frame.
+        weights : ndarray
+            Fraction of the exposure that each frame stands for.
+        middle : int
+            Which of them is in the middle of the exposure; -1 for none.
+        """
+        temperature, material = (_batch(frames, name) for name in ("temperature", "material"))
+        given = _filled([np.ascontiguousarray(e, np.float32) for e in emissivities])
+
+        def add(first: int, last: int) -> None:
+            _add_given(temperature, material, given, weights, middle, first, last, *self._own)
+
+        self._in_blocks(add)
+
+    def add_features(
+        self,
+        frames: Sequence[Frame],
+        positions: Sequence[tuple[NDArray[np.float32], NDArray[np.float32]]],
+        shifts: NDArray[np.float32],
+        textures: Textures,
+        weights: NDArray[np.float64],
+        middle: int,
+    ) -> None:
+        """Add frames with the emissivities that their features have.
+
+        Parameters
+        ----------
+        frames, weights, middle
+            As for `add_given`.
+        positions : sequence of tuple of ndarray
+            Where each frame's samples are looked up in the textures.
+        shifts : ndarray
+            Shifts of the textures, shape (frame, feature, 2).
+        textures : Textures
+            The surfaces.
+        """
+        temperature, material, strain, rate = (
+            _batch(frames, name)
+            for name in ("temperature", "material", "plastic_strain", "plastic_strain_rate")
+        )
+        x, y = (_filled([np.ascontiguousarray(p[k]) for p in positions]) for k in (0, 1))
+        fields = (temperature, material, strain, rate, x, y)
+
+        def add(first: int, last: int) -> None:
+            _add_features(fields, shifts, tuple(textures), weights, middle, first, last, *self._own)
+
+        self._in_blocks(add)
+
+    def add_splines(
+        self,
+        frames: Sequence[SplineFrame],
+        positions: tuple[NDArray[np.float32], NDArray[np.float32]] | None,
+        shifts: NDArray[np.float32],
+        textures: Textures,
+        weights: NDArray[np.float64],
+        middle: int,
+    ) -> None:
+        """Add frames of splines: their samples are never written anywhere.
+
+        Parameters
+        ----------
+        frames : sequence of SplineFrame
+            Any number, of one lattice.
+        positions : tuple of ndarray, optional
+            Where the samples are looked up in the textures; by their material coordinates if left
+            out.
+        shifts, textures, weights, middle
+            As for `add_features`.
+        """
+        lattice = frames[0].lattice
+        nodes = np.stack([frame.nodes for frame in frames])
+        limits = np.stack([frame.limits for frame in frames])
+        fixed = positions or (np.empty((0, 0), np.float32),) * 2
+        grid = (*lattice.down, *lattice.across, lattice.in_tool)
+
+        def add(first: int, last: int) -> None:
+            _add_splines(
+                nodes, limits, grid, fixed, shifts, tuple(textures), weights, middle, first, last,
+                *self._own,
+            )  # fmt: skip
+
+        self._in_blocks(add)
+
+    @property
+    def _own(self) -> tuple[Any, ...]:
+        environment = np.float32(self.environment)
+        return self.table, environment, self.mean, self.centre, self.peak, self.hottest
+
+    def _in_blocks(self, add: Callable[[int, int], None]) -> None:
+        rows = len(self.hottest)
+        firsts = range(0, rows, _ROWS)
+        with ThreadPoolExecutor(get_num_threads()) as pool:
+            list(pool.map(add, firsts, (min(first + _ROWS, rows) for first in firsts)))
+
+
+def _filled(arrays: list[NDArray[Any]]) -> tuple[NDArray[Any], ...]:
+    """As many arrays as a kernel was compiled for; those at the end count for nothing."""
+    return tuple((arrays + [arrays[-1]] * BATCH)[:BATCH])
+
+
+def _batch(frames: Sequence[Frame], name: str) -> tuple[NDArray[Any], ...]:
+    values = [getattr(frame, name) for frame in frames]
+    if values[0] is None:
+        values = [np.zeros(frames[0].material.shape, np.float32)] * len(frames)
+    return _filled([np.ascontiguousarray(one) for one in values])
+
+
+@njit(**_FAST)
+def _find(temperature, last, number, past):  # type: ignore[no-untyped-def]
+    """Entry of the table before a temperature, and how far past it that is; NaN off the table."""
+    for i in range(temperature.size):
+        position = (temperature[i] - np.float32(TABLE_COLDEST)) * np.float32(STEPS_PER_KELVIN)
+        inside = min(max(position, np.float32(0.0)), np.float32(last))
+        # What is not finite becomes the least integer, or any.
+        number[i] = min(max(np.int32(inside), np.int32(0)), np.int32(last - 1))
+        off = position - inside
+        past[i] = inside - np.float32(number[i]) if off == np.float32(0.0) else np.float32(np.nan)
+
+
+@njit(**_FAST)
+def _look_up(table, number, past, black):  # type: ignore[no-untyped-def]
+    for i in range(black.size):
+        k = np.uint32(number[i])
+        black[i] = table[k, 0] + past[i] * table[k, 1]
+
+
+@njit(**_FAST)
+def _heat(temperature, kind, hottest):  # type: ignore[no-untyped-def]
+    for i in range(hottest.size):
+        there = temperature[i] if kind[i] != _VOID else np.float32(0.0)
+        hottest[i] = max(hottest[i], there)
+
+
+@njit(**_FAST)
+def _apparent(emissivity, black, kind, environment, apparent):  # type: ignore[no-untyped-def]
+    for i in range(apparent.size):
+        e = emissivity[i]
+        radiance = environment + e * (black[i] - environment)
+        radiance = radiance if (e >= 0.0) & (e <= 1.0) else np.float32(np.nan)
+        apparent[i] = radiance if kind[i] != _VOID else np.float32(0.0)
+
+
+@njit(**_FAST)
+def _sum(apparent, weight, mean):  # type: ignore[no-untyped-def]
+    for i in range(mean.size):
+        mean[i] += weight * np.float64(apparent[i])
+
+
+@njit(**_FAST)
+def _raise(apparent, peak):  # type: ignore[no-untyped-def]
+    for i in range(peak.size):
+        peak[i] = max(peak[i], apparent[i])
+
+
+@njit(**_FAST)
+def _add_row(  # type: ignore[no-untyped-def]
+    temperature, kind, emissivity, weight, is_middle, row, work, number, table, environment,
+    mean, centre, peak, hottest,
+):  # fmt: skip
+    """Add a row of a sub-frame, with the emissivities (surface, x), to row `row` of the sums."""
+    past, black, apparent = work[0], work[1], work[2]
+    _find(temperature, table.shape[0] - 1, number, past)
+    _look_up(table, number, past, black)
+    _heat(temperature, kind, hottest[row])
+    for n in range(emissivity.shape[0]):
+        _apparent(emissivity[n], black, kind, environment, apparent)
+        _sum(apparent, weight, mean[n, row])
+        _raise(apparent, peak[n, row])
+        if is_middle:
+            centre[n, row, :] = apparent
+
+
+@njit(cache=True, **_FAST)
+def _add_given(  # type: ignore[no-untyped-def]
+    temperature,
+    material,
+    emissivities,
+    weights,
+    middle,
+    first,
+    last,
+    table,
+    environment,
+    mean,
+    centre,
+    peak,
+    hottest,
+):
+    work = np.empty((3, hottest.shape[1]), np.float32)
+    number = np.empty(hottest.shape[1], np.int32)
+    for row in range(first, last):
+        for k in range(weights.size):
+            _add_row(
+                temperature[k][row], material[k][row], emissivities[k][:, row], weights[k],
+                k == middle, row, work, number, table, environment, mean, centre, peak, hottest,
+            )  # fmt: skip
+
+
+@njit(cache=True, **_FAST)
+def _add_features(  # type: ignore[no-untyped-def]
+    fields,
+    shifts,
+    textures,
+    weights,
+    middle,
+    first,
+    last,
+    table,
+    environment,
+    mean,
+    centre,
+    peak,
+    hottest,
+):
+    temperature, material, strain, rate, x, y = fields
+    surfaces, columns = mean.shape[0], mean.shape[2]
+    scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
+    corner = np.empty(columns, np.int32)
+    emissivity = np.empty((surfaces, columns), np.float32)
+    work = np.empty((3, columns), np.float32)
+    number = np.empty(columns, np.int32)
+    for row in range(first, last):
+        for k in range(weights.size):
+            blend_row(
+                material[k][row], strain[k][row], rate[k][row], x[k][row], y[k][row], shifts[k],
+                textures, row, scratch, corner, emissivity,
+            )  # fmt: skip
+            _add_row(
+                temperature[k][row], material[k][row], emissivity, weights[k], k == middle, row,
+                work, number, table, environment, mean, centre, peak, hottest,
+            )  # fmt: skip
+
+
+@njit(**_FAST)
+def _weighted(upper, middle, lower, u, v, w, result):  # type: ignore[no-untyped-def]
+    for i in range(result.size):
+        result[i] = u * upper[i] + v * middle[i] + w * lower[i]
+
+
+@njit(**_FAST)
+def _combine(wide, base, u, v, w, result):  # type: ignore[no-untyped-def]
+    _weighted(wide[base], wide[base + 1], wide[base + 2], u, v, w, result)
+
+
+@njit(**_FAST)
+def _tell(filled, in_tool, kind):  # type: ignore[no-untyped-def]
+    for i in range(kind.size):
+        seen = np.uint8(_WORKPIECE) if filled[i] > np.float32(0.5) else np.uint8(_VOID)
+        kind[i] = np.uint8(_TOOL) if in_tool[i] else seen
+
+
+@njit(**_FAST)
+def _keep_within(values, least, most):  # type: ignore[no-untyped-def]
+    for i in range(values.size):
+        values[i] = min(max(values[i], least), most)
+
+
+@njit(**_FAST)
+def _take(tool, kind, temperature):  # type: ignore[no-untyped-def]
+    for i in range(kind.size):
+        temperature[i] = tool[i] if kind[i] == _TOOL else temperature[i]
+
+
+@njit(cache=True, **_FAST)
+def _add_splines(  # type: ignore[no-untyped-def]
+    nodes,
+    limits,
+    grid,
+    fixed,
+    shifts,
+    textures,
+    weights,
+    middle,
+    first,
+    last,
+    table,
+    environment,
+    mean,
+    centre,
+    peak,
+    hottest,
+):
+    first_down, down, first_across, across, in_tool = grid
+    surfaces, columns = mean.shape[0], mean.shape[2]
+    scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
+    corner = np.empty(columns, np.int32)
+    emissivity = np.empty((surfaces, columns), np.float32)
+    work = np.empty((3, columns), np.float32)
+    number = np.empty(columns, np.int32)
+    top = first_down[first]
+    count = first_down[last - 1] + 3 - top
+    wide = np.empty((nodes.shape[1], count, columns), np.float32)
+    values = np.zeros((nodes.shape[1], columns), np.float32)
+    kind = np.empty(columns, np.uint8)
+    for k in range(weights.size):
+        for f in (0, _STRAIN, _RATE, _X, _Y, FILLED_SPLINE, TOOL_SPLINE):
+            for j in range(count):
+                spread(nodes[k, f, top + j], first_across, across, 0, columns, wide[f, j])
+        for row in range(first, last):
+            base = first_down[row] - top
+            u, v, w = down[0, row], down[1, row], down[2, row]
+            _combine(wide[FILLED_SPLINE], base, u, v, w, values[FILLED_SPLINE])
+            _tell(values[FILLED_SPLINE], in_tool[row], kind)
+            for f in (0, _STRAIN, _RATE, _X, _Y):
+                _combine(wide[f], base, u, v, w, values[f])
+                _keep_within(values[f], limits[k, f, 0], limits[k, f, 1])
+            if in_tool[row].any():
+                _combine(wide[TOOL_SPLINE], base, u, v, w, values[TOOL_SPLINE])
+                _take(values[TOOL_SPLINE], kind, values[0])
+            if fixed[0].size > 0:
+                values[_X, :] = fixed[0][row]
+                values[_Y, :] = fixed[1][row]
+            blend_row(
+                kind, values[_STRAIN], values[_RATE], values[_X], values[_Y], shifts[k],
+                textures, row, scratch, corner, emissivity,
+            )  # fmt: skip
+            _add_row(
+                values[0], kind, emissivity, weights[k], k == middle, row, work, number,
+                table, environment, mean, centre, peak, hottest,
+            )  # fmt: skip

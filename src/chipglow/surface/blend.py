@@ -1,0 +1,210 @@
+"""Emissivity of a row of samples from the features that it shows; for kernels.
+
+Each step is a loop over the row without branches, which becomes vector instructions. Of the
+textures, whose nodes lie scattered, the four by four about a sample are vectors instead.
+"""
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from chipglow.scene import Material
+from chipglow.surface.texture import MAP_SIZE, emissivity_at
+
+STRAIN_OF_WORKPIECE: Final = 0.3
+"""Plastic strain up to which the workpiece's map holds alone."""
+STRAIN_OF_CHIP: Final = 0.5
+"""Plastic strain from which the chip's map holds alone."""
+RATE_OF_CHIP: Final = 6_000.0
+"""Plastic strain rate in 1/s up to which the shear band's map has no fraction."""
+RATE_OF_SHEAR_BAND: Final = 30_000.0
+"""Plastic strain rate in 1/s from which the shear band's map holds alone."""
+
+SCRATCH: Final = 5
+"""Rows of float32 that `blend_row` works on, before those of the seeds."""
+
+_WIDTH: Final = MAP_SIZE + 4
+_WRAP: Final = MAP_SIZE - 1
+# Cubic convolution (Keys, 1981; a = -1/2): weights of four nodes by powers of the way from the
+# second to the third, the cube first.
+_CUBIC: Final = (
+    (-0.5, 1.5, -1.5, 0.5),
+    (1.0, -2.5, 2.0, -0.5),
+    (-0.5, 0.0, 0.5, 0.0),
+    (0.0, 1.0, 0.0, 0.0),
+)
+_LANES: Final = tuple(ir.Constant(ir.IntType(32), lane) for lane in range(4))
+_WORKPIECE, _TOOL = int(Material.WORKPIECE), int(Material.TOOL)
+_FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
+
+
+class Textures(NamedTuple):
+    """What `blend_row` needs of several surfaces that move alike.
+
+    Parameters
+    ----------
+    scale : numpy.float32
+        Nodes in a m.
+    maps : ndarray
+        `padded` deviates of workpiece, chip and shear band, shape (feature, seed, nodes).
+    seed_numbers : ndarray
+        Which of the seeds each surface has.
+    linear : ndarray
+        Mean and standard deviation of a surface's feature, shape (surface, feature, 2); the
+        deviation is NaN where the table says what a deviate stands for.
+    tables : ndarray
+        What a deviate stands for, shape (surface, feature, entry).
+    tool_maps : ndarray
+        Emissivity of the tool, shape (surface, y, x).
+    """
+
+    scale: np.float32
+    maps: NDArray[np.float32]
+    seed_numbers: NDArray[np.int64]
+    linear: NDArray[np.float32]
+    tables: NDArray[np.float32]
+    tool_maps: NDArray[np.float32]
+
+
+def padded(nodes: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A periodic map with the nodes about its border, so that no index wraps: one row, flat."""
+    around = np.arange(-1, _WIDTH - 1) & _WRAP
+    return np.ascontiguousarray(nodes[around[:, None], around]).ravel()
+
+
+@njit(forceinline=True, **_FAST)
+def fraction_between(value, none, full):  # type: ignore[no-untyped-def]
+    """How far a value has come from `none` to `full`, 0 to 1."""
+    result = (value - np.float32(none)) * np.float32(1.0 / (full - none))
+    return min(max(result, np.float32(0.0)), np.float32(1.0))
+
+
+@intrinsic
+def _patch(typing, nodes, corner, across, down):  # type: ignore[no-untyped-def]
+    """Value of a texture between four by four nodes, `across` and `down` past the inner corner.
+
+    What `chipglow.surface.texture.enlarged` computes, in vectors of four: left to itself the
+    compiler takes the sixteen nodes one by one.
+    """
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        four, fast = ir.VectorType(ir.FloatType(), 4), {"flags": ("contract",)}
+        nothing = ir.Constant(four, ir.Undefined)
+
+        def splat(vector: Any, lane: int) -> Any:
+            mask = ir.Constant(ir.VectorType(ir.IntType(32), 4), [lane] * 4)
+            return builder.shuffle_vector(vector, nothing, mask)
+
+        def weights(past: Any) -> Any:
+            all_past = splat(builder.insert_element(nothing, past, _LANES[0]), 0)
+            result = ir.Constant(four, list(_CUBIC[0]))
+            for coefficients in _CUBIC[1:]:
+                product = builder.fmul(result, all_past, **fast)
+                result = builder.fadd(product, ir.Constant(four, list(coefficients)), **fast)
+            return result
+
+        array, corner, across, down = arguments
+        base = context.make_array(signature.args[0])(context, builder, array).data
+        rows, total = weights(down), None
+        for row in range(4):
+            start = builder.add(corner, ir.Constant(ir.IntType(64), row * _WIDTH))
+            place = builder.bitcast(builder.gep(base, [start]), four.as_pointer())
+            product = builder.fmul(builder.load(place, align=4), splat(rows, row), **fast)
+            total = product if total is None else builder.fadd(total, product, **fast)
+        total = builder.fmul(total, weights(across), **fast)
+        low, high, left, right = (builder.extract_element(total, lane) for lane in _LANES)
+        return builder.fadd(builder.fadd(low, left), builder.fadd(high, right))
+
+    return types.float32(nodes, types.int64, types.float32, types.float32), generate
+
+
+@njit(**_FAST)
+def _place(x, y, shift, scale, corner, across, down):  # type: ignore[no-untyped-def]
+    """Corner of the four by four nodes about each sample, and how far it is past the second."""
+    for i in range(corner.size):
+        u, v = (x[i] - shift[0]) * scale, (y[i] - shift[1]) * scale
+        before, above = np.floor(u), np.floor(v)
+        across[i], down[i] = u - before, v - above
+        corner[i] = (np.int32(above) & _WRAP) * np.int32(_WIDTH) + (np.int32(before) & _WRAP)
+
+
+@njit(**_FAST)
+def _deviates(nodes, corner, across, down, fractions, deviates):  # type: ignore[no-untyped-def]
+    """Deviate of the enlarged map wherever the feature has a fraction."""
+    for i in range(corner.size):
+        if fractions[i] > np.float32(0.0):
+            deviates[i] = _patch(nodes, np.int64(corner[i]), across[i], down[i])
+
+
+@njit(**_FAST)
+def _divide(kind, strain, rate, workpiece, chip, band):  # type: ignore[no-untyped-def]
+    for i in range(kind.size):
+        there = np.float32(1.0) if kind[i] == _WORKPIECE else np.float32(0.0)
+        formed = fraction_between(strain[i], STRAIN_OF_WORKPIECE, STRAIN_OF_CHIP)
+        sheared = fraction_between(rate[i], RATE_OF_CHIP, RATE_OF_SHEAR_BAND) * there
+        rest = there - sheared
+        workpiece[i], chip[i], band[i] = rest - rest * formed, rest * formed, sheared
+
+
+@njit(**_FAST)
+def _positive(values):  # type: ignore[no-untyped-def]
+    count = 0
+    for i in range(values.size):
+        count += values[i] > np.float32(0.0)
+    return count
+
+
+@njit(**_FAST)
+def _tool_emissivity(kind, tool_map, result):  # type: ignore[no-untyped-def]
+    for i in range(kind.size):
+        result[i] = tool_map[i] if kind[i] == _TOOL else np.float32(0.0)
+
+
+@njit(**_FAST)
+def _add_linear(fractions, deviates, mean, deviation, result):  # type: ignore[no-untyped-def]
+    for i in range(result.size):
+        value = min(max(mean + deviation * deviates[i], np.float32(0.0)), np.float32(1.0))
+        result[i] += fractions[i] * value
+
+
+@njit(**_FAST)
+def _add_tabled(fractions, deviates, table, result):  # type: ignore[no-untyped-def]
+    for i in range(result.size):
+        if fractions[i] > np.float32(0.0):
+            result[i] += fractions[i] * emissivity_at(deviates[i], table)
+
+
+@njit(**_FAST)
+def blend_row(  # type: ignore[no-untyped-def]
+    kind, strain, rate, x, y, shifts, textures, row, scratch, corner, result
+):
+    """Emissivity of one row for every surface: fractions of the features times their textures.
+
+    The fields are those of row `row` of the samples; `textures` are `Textures`, `shifts` of shape
+    (feature, 2), and `scratch` has `SCRATCH` rows and one for each seed, of finite numbers.
+    """
+    scale, maps, seed_numbers, linear, tables, tool_maps = textures
+    _divide(kind, strain, rate, scratch[0], scratch[1], scratch[2])
+    for n in range(result.shape[0]):
+        _tool_emissivity(kind, tool_maps[n, row], result[n])
+    across, down, found = scratch[3], scratch[4], -1
+    for k in range(3):
+        if _positive(scratch[k]) == 0:
+            continue
+        if found < 0 or shifts[k, 0] != shifts[found, 0] or shifts[k, 1] != shifts[found, 1]:
+            _place(x, y, shifts[k], scale, corner, across, down)
+            found = k
+        for seed in range(maps.shape[1]):
+            deviates = scratch[SCRATCH + seed]
+            _deviates(maps[k, seed], corner, across, down, scratch[k], deviates)
+        for n in range(result.shape[0]):
+            deviates = scratch[SCRATCH + seed_numbers[n]]
+            mean, deviation = linear[n, k, 0], linear[n, k, 1]
+            if deviation == deviation:
+                _add_linear(scratch[k], deviates, mean, deviation, result[n])
+            else:
+                _add_tabled(scratch[k], deviates, tables[n, k], result[n])
