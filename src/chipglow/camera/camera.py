@@ -220,6 +220,29 @@ class Camera:
         """
         return start + np.arange(count) / self.frame_rate
 
+    def lay(self, surface: Surface, scene: Scene) -> EmissivityField:
+        """Lay a surface on a scene as this camera sees it, in its band and its surroundings.
+
+        Parameters
+        ----------
+        surface : Surface
+            The surface.
+        scene : Scene
+            What it is laid on.
+
+        Raises
+        ------
+        ValueError
+            If the surface is none, or the scene lacks what it needs.
+        """
+        _expect(
+            isinstance(surface, Surface),
+            "surface",
+            surface,
+            "a Surface such as chipglow.CHIP_1 or UniformSurface(0.6)",
+        )
+        return surface.in_band(self.band, self.reflected).on(scene)
+
     def expose(self, scene: Scene, surface: Surface, start: float) -> Exposure:
         """Let a scene shine on the camera for one integration time.
 
@@ -240,7 +263,7 @@ class Camera:
         """
         self.pixels(scene.raster)
         return expose(
-            scene, _laid(surface, scene), self.band, start, self.integration_time, self.reflected
+            scene, self.lay(surface, scene), self.band, start, self.integration_time, self.reflected
         )
 
     def form_measurement(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
@@ -321,7 +344,7 @@ class Camera:
             If an integration reaches beyond the scene, or the pixels do not fit it.
         """
         self.pixels(scene.raster)
-        emissivity = _laid(surface, scene)
+        emissivity = self.lay(surface, scene)
         measured = self.form_measurement(
             expose(scene, emissivity, self.band, at, self.integration_time, self.reflected)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
@@ -454,17 +477,6 @@ class Camera:
             "optics": repr(self.optics) if self.optics else None,
         }
         return {name: value for name, value in attributes.items() if value is not None}
-
-
-def _laid(surface: Surface, scene: Scene) -> EmissivityField:
-    """A surface on a scene."""
-    _expect(
-        isinstance(surface, Surface),
-        "surface",
-        surface,
-        "a Surface such as chipglow.CHIP_1 or UniformSurface(0.6)",
-    )
-    return surface.on(scene)
 
 
 def _border_warning(

@@ -135,7 +135,8 @@ def expose_all(
     middle = _frame_at(scene, start + duration / 2, indices)
     environment = 0.0 if reflected is None else float(band.radiance(reflected))
     stack = emissivities[0].beside(emissivities[1:])
-    sums = Sums.zero(_fine_table(band), environment, len(emissivities), scene.raster.shape)
+    stacked = (stack.most, len(emissivities), scene.raster.shape)
+    sums = Sums.zero(_fine_table(band), environment, *stacked)
     _sweep(scene, stack, indices, weights, indices.index(middle), sums)
     mean, centre, peak, hottest = sums.mean, sums.centre, sums.peak, sums.hottest
     if not np.isfinite(mean).all():

@@ -48,6 +48,8 @@ class Sums:
         float32 of shape (n, 2).
     environment : float
         Radiance of the surroundings in W/(m² sr).
+    most : float
+        Largest emissivity that is possible.
     mean, centre : ndarray
         Float64 of shape (surface, y, x), zero to start with.
     peak : ndarray
@@ -58,6 +60,7 @@ class Sums:
 
     table: NDArray[np.float32]
     environment: float
+    most: float
     mean: NDArray[np.float64]
     centre: NDArray[np.float64]
     peak: NDArray[np.float32]
@@ -65,12 +68,17 @@ class Sums:
 
     @classmethod
     def zero(
-        cls, table: NDArray[np.float32], environment: float, surfaces: int, shape: tuple[int, int]
+        cls,
+        table: NDArray[np.float32],
+        environment: float,
+        most: float,
+        surfaces: int,
+        shape: tuple[int, int],
     ) -> "Sums":
         """Sums of nothing."""
         mean, centre = (np.zeros((surfaces, *shape)) for _ in range(2))
         peak, hottest = (np.zeros(of, np.float32) for of in (mean.shape, shape))
-        return cls(table, environment, mean, centre, peak, hottest)
+        return cls(table, environment, most, mean, centre, peak, hottest)
 
     def add_given(
         self,
@@ -171,8 +179,8 @@ class Sums:
 
     @property
     def _own(self) -> tuple[Any, ...]:
-        environment = np.float32(self.environment)
-        return self.table, environment, self.mean, self.centre, self.peak, self.hottest
+        environment, most = np.float32(self.environment), np.float32(self.most)
+        return self.table, environment, most, self.mean, self.centre, self.peak, self.hottest
 
     def _in_blocks(self, add: Callable[[int, int], None]) -> None:
         rows = len(self.hottest)
@@ -220,11 +228,11 @@ def _heat(temperature, kind, hottest):  # type: ignore[no-untyped-def]
 
 
 @njit(**_FAST)
-def _apparent(emissivity, black, kind, environment, apparent):  # type: ignore[no-untyped-def]
+def _apparent(emissivity, black, kind, environment, most, apparent):  # type: ignore[no-untyped-def]
     for i in range(apparent.size):
         e = emissivity[i]
         radiance = environment + e * (black[i] - environment)
-        radiance = radiance if (e >= 0.0) & (e <= 1.0) else np.float32(np.nan)
+        radiance = radiance if (e >= 0.0) & (e <= most) else np.float32(np.nan)
         apparent[i] = radiance if kind[i] != _VOID else np.float32(0.0)
 
 
@@ -243,7 +251,7 @@ def _raise(apparent, peak):  # type: ignore[no-untyped-def]
 @njit(**_FAST)
 def _add_row(  # type: ignore[no-untyped-def]
     temperature, kind, emissivity, weight, is_middle, row, work, number, table, environment,
-    mean, centre, peak, hottest,
+    most, mean, centre, peak, hottest,
 ):  # fmt: skip
     """Add a row of a sub-frame, with the emissivities (surface, x), to row `row` of the sums."""
     past, black, apparent = work[0], work[1], work[2]
@@ -251,7 +259,7 @@ def _add_row(  # type: ignore[no-untyped-def]
     _look_up(table, number, past, black)
     _heat(temperature, kind, hottest[row])
     for n in range(emissivity.shape[0]):
-        _apparent(emissivity[n], black, kind, environment, apparent)
+        _apparent(emissivity[n], black, kind, environment, most, apparent)
         _sum(apparent, weight, mean[n, row])
         _raise(apparent, peak[n, row])
         if is_middle:
@@ -269,6 +277,7 @@ def _add_given(  # type: ignore[no-untyped-def]
     last,
     table,
     environment,
+    most,
     mean,
     centre,
     peak,
@@ -280,7 +289,7 @@ def _add_given(  # type: ignore[no-untyped-def]
         for k in range(weights.size):
             _add_row(
                 temperature[k][row], material[k][row], emissivities[k][:, row], weights[k],
-                k == middle, row, work, number, table, environment, mean, centre, peak, hottest,
+                k == middle, row, work, number, table, environment, most, mean, centre, peak, hottest,
             )  # fmt: skip
 
 
@@ -295,6 +304,7 @@ def _add_features(  # type: ignore[no-untyped-def]
     last,
     table,
     environment,
+    most,
     mean,
     centre,
     peak,
@@ -315,7 +325,7 @@ def _add_features(  # type: ignore[no-untyped-def]
             )  # fmt: skip
             _add_row(
                 temperature[k][row], material[k][row], emissivity, weights[k], k == middle, row,
-                work, number, table, environment, mean, centre, peak, hottest,
+                work, number, table, environment, most, mean, centre, peak, hottest,
             )  # fmt: skip
 
 
@@ -363,6 +373,7 @@ def _add_splines(  # type: ignore[no-untyped-def]
     last,
     table,
     environment,
+    most,
     mean,
     centre,
     peak,
@@ -404,5 +415,5 @@ def _add_splines(  # type: ignore[no-untyped-def]
             )  # fmt: skip
             _add_row(
                 values[0], kind, emissivity, weights[k], k == middle, row, work, number,
-                table, environment, mean, centre, peak, hottest,
+                table, environment, most, mean, centre, peak, hottest,
             )  # fmt: skip

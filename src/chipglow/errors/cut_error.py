@@ -398,7 +398,7 @@ def _measure(
     tell: Progress,
 ) -> dict[str, SurfaceResult]:
     """What the camera makes of every instant, with every surface: the paper's procedure."""
-    fields = [surface.on(scene) for surface in surfaces.values()]
+    fields = [camera.lay(surface, scene) for surface in surfaces.values()]
     frames: list[list[Exposure]] = []
     images: list[list[NDArray[np.float64]]] = [[] for _ in fields]
     for i, instant in enumerate(instants):
@@ -448,7 +448,7 @@ def _sites(
     used = [surfaces[name] for name in (plan.rake_surface, plan.band_surface)]
     random = any(surface.redrawn(1) is not surface for surface in used)
     textures = plan.textures if random else 1
-    fields = [surface.redrawn(k).on(scene) for k in range(textures) for surface in used]
+    fields = [camera.lay(s.redrawn(k), scene) for k in range(textures) for s in used]
     sites = []
     for i, segment in enumerate(segments):
         tell("segments and textures", i / len(segments))

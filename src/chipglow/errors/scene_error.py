@@ -239,7 +239,7 @@ def scene_errors(
         cannot be laid on the scene.
     """
     tell = progress or (lambda label, part: None)
-    fields = [_textures(surface, scene, plan.textures) for surface in surfaces.values()]
+    fields = [_textures(surface, scene, camera, plan.textures) for surface in surfaces.values()]
     starts = spread_starts(scene, camera.integration_time, plan.exposures)
     frames = [_middle(scene, float(start), camera.integration_time) for start in starts]
     hottest = [float(scene.field("temperature", index).max()) for index in frames]
@@ -267,10 +267,10 @@ def scene_errors(
     )
 
 
-def _textures(surface: Surface, scene: Scene, count: int) -> list[EmissivityField]:
+def _textures(surface: Surface, scene: Scene, camera: Camera, count: int) -> list[EmissivityField]:
     """The surface on the scene, then its other textures if it has any."""
     draws = count if surface.redrawn(1) is not surface else 1
-    return [surface.redrawn(number).on(scene) for number in range(draws)]
+    return [camera.lay(surface.redrawn(number), scene) for number in range(draws)]
 
 
 def _unread(results: Mapping[str, SurfaceErrors], places: Sequence[Place]) -> Iterator[str]:

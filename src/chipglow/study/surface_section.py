@@ -8,14 +8,17 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from chipglow.laboratory.emissivity import read_emissivity_map
-from chipglow.quantities import Declared, FileBeside, Section, described
+from chipglow.quantities import OR_NONE, Declared, FileBeside, Section, described
 from chipglow.quantities.units import Length
 from chipglow.surface import (
     CHIP_1,
     CHIP_2,
+    REFLECTIONS,
     SURFACES,
     Emissivity,
     FeatureSurface,
+    ReflectingSurface,
+    SideShape,
     Surface,
     SurfaceChoice,
 )
@@ -26,6 +29,9 @@ CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2
 
 def _numbers(emissivity: Emissivity) -> dict[str, float]:
     return {"mean": emissivity.mean, "standard_deviation": emissivity.standard_deviation}
+
+
+ReflectionsSection = Annotated[Declared[SideShape], REFLECTIONS]
 
 
 class ChipSection(Section):
@@ -82,6 +88,11 @@ class FeaturesSection(Section):
     restore_standard_deviation: bool = described(
         True, "Make up for the standard deviation that is lost when a texture is enlarged."
     )
+    reflections: Annotated[ReflectionsSection | None, OR_NONE] = described(
+        "none",
+        "Reflections between the rake face and the chip's side, which flowed sideways, or none.\n"
+        f"Kinds:\n{REFLECTIONS.examples}",
+    )
 
     @field_validator("chips")
     @classmethod
@@ -130,7 +141,12 @@ class FeaturesSection(Section):
             )
             for name, chip in self.chips.items()
         }
-        return {**chips, **{name: read_emissivity_map(file) for name, file in self.maps.items()}}
+        maps = {name: read_emissivity_map(file) for name, file in self.maps.items()}
+        surfaces: dict[str, Surface] = {**chips, **maps}
+        if self.reflections is None:
+            return surfaces
+        shape = self.reflections.build()
+        return {name: ReflectingSurface(bare, shape) for name, bare in surfaces.items()}
 
 
 SURFACES.add("features", FeaturesSection)

@@ -1,6 +1,7 @@
 """Surfaces: emissivity maps that follow the material."""
 
 from chipglow.surface.emissivity import Emissivity
+from chipglow.surface.exchange import Exchange
 from chipglow.surface.feature import (
     CHIP_1,
     CHIP_2,
@@ -11,6 +12,8 @@ from chipglow.surface.feature import (
     shear_band_fraction,
 )
 from chipglow.surface.map import MapField, MapSurface
+from chipglow.surface.reflecting import ReflectingField, ReflectingSurface
+from chipglow.surface.side_flow import REFLECTIONS, SideElements, SideShape, Wedge
 from chipglow.surface.surface import (
     SURFACES,
     EmissivityField,
@@ -26,16 +29,22 @@ from chipglow.surface.texture import Texture
 __all__ = [
     "CHIP_1",
     "CHIP_2",
+    "REFLECTIONS",
     "SURFACES",
     "Emissivity",
     "EmissivityField",
     "EmissivityStack",
+    "Exchange",
     "FeatureField",
     "FeatureFields",
     "FeatureSurface",
     "MapField",
     "MapSurface",
     "PhaseEmissivity",
+    "ReflectingField",
+    "ReflectingSurface",
+    "SideElements",
+    "SideShape",
     "Surface",
     "SurfaceChoice",
     "TemperatureSurface",
@@ -43,6 +52,4 @@ __all__ = [
     "Texture",
     "UniformEmissivity",
     "UniformSurface",
-    "chip_fraction",
-    "shear_band_fraction",
-]
+    "Wedge",

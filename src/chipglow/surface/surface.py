@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.quantities import Family, Parameter, Part
+from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Scene
 
 
@@ -20,9 +21,14 @@ class EmissivityStack(ABC):
         """Fields of a frame that it reads beside temperature and material; None: all there are."""
         return None
 
+    @property
+    def most(self) -> float:
+        """Largest emissivity that is possible: 1, unless reflected light counts as emitted."""
+        return 1.0
+
     @abstractmethod
     def emissivities(self, frame: Frame) -> NDArray[np.float32]:
-        """Emissivity of every sample for every surface, shape (surface, y, x), from 0 to 1."""
+        """Emissivity of every sample for every surface, shape (surface, y, x), from 0 on."""
 
 
 class EmissivityField(ABC):
@@ -32,6 +38,11 @@ class EmissivityField(ABC):
     def needs(self) -> Collection[str] | None:
         """Fields of a frame that it reads beside temperature and material; None: all there are."""
         return None
+
+    @property
+    def most(self) -> float:
+        """Largest emissivity that is possible: 1, unless reflected light counts as emitted."""
+        return 1.0
 
     @abstractmethod
     def emissivity(self, frame: Frame) -> NDArray[np.float32]:
@@ -68,6 +79,11 @@ class _OneByOne(EmissivityStack):
         """See `EmissivityStack.emissivities`."""
         return np.stack([field.emissivity(frame) for field in self.fields])
 
+    @property
+    def most(self) -> float:
+        """See `EmissivityStack.most`."""
+        return max(field.most for field in self.fields)
+
 
 SURFACES: Final = Family("surface")
 """Emissivity models by their kind; other packages add theirs in the group ``chipglow.surface``."""
@@ -99,6 +115,18 @@ class Surface(SurfaceChoice):
     @abstractmethod
     def on(self, scene: Scene) -> EmissivityField:
         """Lay this surface on a scene; what depends on the whole scene is computed here."""
+
+    def in_band(self, band: Band, reflected: float | None) -> "Surface":
+        """The surface as a camera sees it; itself where the camera does not matter.
+
+        Parameters
+        ----------
+        band : Band
+            The camera's spectral band.
+        reflected : float, optional
+            Temperature of the surroundings that the surface reflects in K; None: they are dark.
+        """
+        return self
 
     def redrawn(self, number: int) -> Self:
         """The surface with another draw of what is random in it; itself where nothing is.

@@ -1,0 +1,287 @@
+"""Exchange of radiation between long surfaces: diffuse and mirror-like, with all bounces."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, TypeAlias
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+RAYS: Final = 2048
+"""Rays that leave each element."""
+BOUNCES: Final = 64
+"""Most reflections by mirrors along a ray; what is left then comes from the surroundings."""
+TOLERANCE: Final = 1e-9
+"""Change of the irradiation, of the largest radiance, at which the iteration ends."""
+
+_Paths: TypeAlias = tuple[NDArray[np.int16], NDArray[np.float64], NDArray[np.int64]]
+
+_GOLDEN: Final = (5.0**0.5 - 1.0) / 2.0
+_MOST_SWEEPS: Final = 10_000
+_OPEN: Final = -1
+_EDGE: Final = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Exchange:
+    """Surfaces that are long in one direction, in their cross-section, before surroundings.
+
+    Elements are straight and see what is on their left, looking from start to end. Every element
+    has one temperature and emissivity, reflects grey and partly like a mirror, the rest diffusely.
+
+    Parameters
+    ----------
+    starts, ends : ndarray
+        Ends of the elements in m, shape (element, 2).
+    rays : int
+        Rays that leave each element, evenly over its length and the sine of their angle.
+
+    Raises
+    ------
+    ValueError
+        If there is no element, one has no length, or there are no rays.
+
+    Notes
+    -----
+    In a cross-section a diffuse element sends (1/2) d(sin φ) of its radiation into the angle dφ
+    to its normal; a mirror keeps a ray's direction along the elements, so that it is a mirror in
+    the cross-section too (Howell, Mengüç, Daun and Siegel, Thermal Radiation Heat Transfer,
+    chapters 4 to 6). The irradiation H of element i, as a radiance, is the mean over its rays of
+    what they meet: B of the first element, m times B of the next, and so on, and what is left of
+    the surroundings. B = ε L + (1 − ε)(1 − s) H is the diffuse radiosity, m = (1 − ε) s with the
+    fraction s of the reflected light that mirrors make.
+    """
+
+    starts: NDArray[np.float64]
+    ends: NDArray[np.float64]
+    rays: int = RAYS
+
+    def __post_init__(self) -> None:
+        shape = self.starts.shape
+        if len(shape) != 2 or shape[1] != 2 or shape[0] < 1 or self.ends.shape != shape:
+            raise ValueError(
+                f"exchange: starts and ends have shapes {shape} and {self.ends.shape}, "
+                "expected (elements, 2) of both"
+            )
+        if not (self.lengths > 0).all():
+            raise ValueError("exchange: an element has no length, expected over 0 m")
+        if self.rays < 1:
+            raise ValueError(f"exchange: rays is {self.rays!r}, expected 1 or more")
+
+    @cached_property
+    def lengths(self) -> NDArray[np.float64]:
+        """Lengths of the elements in m."""
+        return np.asarray(np.hypot(*(self.ends - self.starts).T), np.float64)
+
+    @property
+    def middles(self) -> NDArray[np.float64]:
+        """Middles of the elements in m, shape (element, 2)."""
+        return (self.starts + self.ends) / 2
+
+    @property
+    def view_factors(self) -> NDArray[np.float64]:
+        """Fraction of each element's diffuse radiation that first meets each other one.
+
+        Shape (element, element + 1); the last column is what leaves to the surroundings, so that
+        every row has the sum 1.
+        """
+        paths, weights, first = self._first_hits
+        count = len(self.lengths)
+        factors = np.zeros((count, count + 1))
+        element = np.repeat(np.arange(count), np.diff(first))
+        np.add.at(factors, (element, paths[:, 0]), weights)  # −1, the open, is the last column
+        return factors
+
+    def irradiation(
+        self,
+        radiance: ArrayLike,
+        emissivity: ArrayLike,
+        surroundings: float = 0.0,
+        mirror: ArrayLike = 0.0,
+    ) -> NDArray[np.float64]:
+        """What falls on every element from all sides, as the radiance of a hemisphere.
+
+        Parameters
+        ----------
+        radiance : array_like
+            Radiance of a blackbody of the element's temperature, shape (..., element).
+        emissivity : array_like
+            Emissivity of the elements, broadcast against it.
+        surroundings : float
+            Radiance of the surroundings.
+        mirror : array_like
+            Fraction of the reflected light that is reflected as by a mirror, of the elements.
+
+        Returns
+        -------
+        ndarray
+            Irradiation over π, in the unit of the radiance, shape (..., element).
+        """
+        return self._incident(radiance, emissivity, surroundings, mirror, None)
+
+    def seen(
+        self,
+        direction: ArrayLike,
+        radiance: ArrayLike,
+        emissivity: ArrayLike,
+        surroundings: float = 0.0,
+        mirror: ArrayLike = 0.0,
+    ) -> NDArray[np.float64]:
+        """Incident radiance whose reflection an eye far off in one direction sees.
+
+        The eye sees ε L + (1 − ε) times it: the irradiation for the diffuse fraction of the
+        reflected light, the radiance in the mirrored direction for the rest.
+
+        Parameters
+        ----------
+        direction : array_like
+            From the elements to the eye in the cross-section, shape (2,).
+        radiance, emissivity, surroundings, mirror
+            As for `irradiation`.
+
+        Returns
+        -------
+        ndarray
+            In the unit of the radiance, shape (..., element).
+        """
+        toward = np.asarray(direction, np.float64)
+        return self._incident(radiance, emissivity, surroundings, mirror, toward)
+
+    def _incident(
+        self,
+        radiance: ArrayLike,
+        emissivity: ArrayLike,
+        surroundings: float,
+        mirror: ArrayLike,
+        eye: NDArray[np.float64] | None,
+    ) -> NDArray[np.float64]:
+        black = np.asarray(radiance, np.float64)
+        emissivities, mirrors = (
+            np.broadcast_to(np.asarray(values, np.float64), black.shape)
+            for values in (emissivity, mirror)
+        )
+        shape, count = black.shape, len(self.lengths)
+        own = (emissivities * black).reshape(-1, count)
+        reflectance = (1.0 - emissivities).reshape(-1, count)
+        mirror_part = np.ascontiguousarray(mirrors.reshape(-1, count))
+        looked = np.zeros((0, 0), np.int16) if eye is None else self._mirrored(eye)
+        result, paths = np.empty_like(own), self._all_hits if mirrors.any() else self._first_hits
+        scale = max(float(np.max(black, initial=0.0)), surroundings) * TOLERANCE
+        _solve(own, reflectance, mirror_part, *paths, looked, surroundings, scale, result)
+        return result.reshape(shape)
+
+    @cached_property
+    def _first_hits(self) -> _Paths:
+        return self._traced(1)
+
+    @cached_property
+    def _all_hits(self) -> _Paths:
+        return self._traced(BOUNCES)
+
+    def _traced(self, bounces: int) -> _Paths:
+        """Different paths of rays, their fractions, and where those of each element begin."""
+        number = np.arange(self.rays) + 0.5
+        place, sine = np.modf(_GOLDEN * number)[0], 2.0 * number / self.rays - 1.0
+        paths, weights, first = [], [], [0]
+        for element in range(len(self.lengths)):
+            hits = _trace(self.starts, self.ends, element, place, sine, bounces)
+            different, count = np.unique(hits, axis=0, return_counts=True)
+            paths.append(different)
+            weights.append(count / self.rays)
+            first.append(first[-1] + len(different))
+        return np.concatenate(paths), np.concatenate(weights), np.array(first)
+
+    def _mirrored(self, eye: NDArray[np.float64]) -> NDArray[np.int16]:
+        """Paths that an eye sees in the elements' middles, shape (element, bounce)."""
+        along = (self.ends - self.starts) / self.lengths[:, None]
+        sine = -(along @ (eye / np.hypot(*eye)))
+        return np.stack(
+            [_trace_one(self.starts, self.ends, i, 0.5, sine[i], BOUNCES) for i in range(len(sine))]
+        )
+
+
+@njit(cache=True)
+def _trace(starts, ends, element, places, sines, bounces):  # type: ignore[no-untyped-def]
+    """What the rays of an element meet in turn, shape (ray, bounce); −1: nothing."""
+    hits = np.empty((len(sines), bounces), np.int16)
+    for r in range(len(sines)):
+        hits[r] = _trace_one(starts, ends, element, places[r], sines[r], bounces)
+    return hits
+
+
+@njit(cache=True)
+def _trace_one(starts, ends, element, place, sine, bounces):  # type: ignore[no-untyped-def]
+    """What one ray meets in turn: from a place on an element, 0 to 1, at an angle's sine."""
+    path = np.full(bounces, _OPEN, np.int16)
+    cosine = np.sqrt(max(1.0 - sine * sine, 0.0))
+    along = ends[element] - starts[element]
+    along = along / np.sqrt(along[0] ** 2 + along[1] ** 2)
+    dx, dy = sine * along[0] - cosine * along[1], sine * along[1] + cosine * along[0]
+    x, y = starts[element] + place * (ends[element] - starts[element])
+    for bounce in range(bounces):
+        nearest, found = np.inf, _OPEN
+        for j in range(len(starts)):
+            if j == element:
+                continue
+            ux, uy = ends[j] - starts[j]
+            facing = dx * -uy + dy * ux
+            if facing >= 0.0:
+                continue
+            fx, fy = starts[j, 0] - x, starts[j, 1] - y
+            distance = (fx * -uy + fy * ux) / facing
+            part = (fy * dx - fx * dy) / facing
+            if -_EDGE <= part <= 1.0 + _EDGE and 0.0 <= distance < nearest:
+                nearest, found = distance, j
+        if found == _OPEN:
+            break
+        path[bounce] = found
+        element = found
+        x, y = x + nearest * dx, y + nearest * dy
+        ux, uy = ends[found] - starts[found]
+        twice = 2.0 * (dx * -uy + dy * ux) / (ux * ux + uy * uy)
+        dx, dy = dx + twice * uy, dy - twice * ux
+    return path
+
+
+@njit(cache=True)
+def _along(path, radiosity, reflectance, mirror, surroundings):  # type: ignore[no-untyped-def]
+    """Radiance that arrives along a path."""
+    total, left = 0.0, 1.0
+    for hit in path:
+        if hit == _OPEN or left == 0.0:
+            break
+        total += left * radiosity[hit]
+        left *= reflectance[hit] * mirror[hit]
+    return total + left * surroundings
+
+
+@njit(cache=True)
+def _solve(  # type: ignore[no-untyped-def]
+    own, reflectance, mirror, paths, weights, first, looked, surroundings, tolerance, result
+):
+    """Irradiation of every element, or what an eye sees reflected, case by case."""
+    cases, elements = own.shape
+    incident = np.empty(elements)
+    radiosity = np.empty(elements)
+    for c in range(cases):
+        incident[:] = surroundings
+        radiosity[:] = own[c] + reflectance[c] * (1.0 - mirror[c]) * surroundings
+        for _ in range(_MOST_SWEEPS):
+            change = 0.0
+            for i in range(elements):
+                total = 0.0
+                for p in range(first[i], first[i + 1]):
+                    total += weights[p] * _along(
+                        paths[p], radiosity, reflectance[c], mirror[c], surroundings
+                    )
+                change = max(change, abs(total - incident[i]))
+                incident[i] = total
+                radiosity[i] = own[c, i] + reflectance[c, i] * (1.0 - mirror[c, i]) * total
+            if change <= tolerance:
+                break
+        for i in range(elements):
+            result[c, i] = incident[i]
+            if len(looked) and mirror[c, i] > 0.0:
+                straight = _along(looked[i], radiosity, reflectance[c], mirror[c], surroundings)
+                result[c, i] += mirror[c, i] * (straight - incident[i])
