@@ -54,6 +54,10 @@ PROGRAMS = {
         "--file",
         {"| rasterise, 5 fields": 5, "| VTK's probe": 5, "| SciPy": 5, "read ": 4},
     ),
+    "reflections.py": (
+        "--draws 2 --study tiny.yaml",
+        {"45 ": 6, "as cut ": 8, "as warm as the chip": 8},
+    ),
     "registration_libraries.py": (
         "--pairs 1",
         {"| chipglow |": 6, "| scikit-image, correlation |": 5, "| scikit-image, flow |": 5},
@@ -82,6 +86,10 @@ NEEDED = {
         {"| OTF, defocus 2.0 mm |": 1, "| OTF, vibration |": 1, "| PSF, defocus 30 um |": 2},
     ),
     "rasterise.py": ("pyvista",),
+    "reflections.py": (
+        "--draws 2 --study tiny.yaml",
+        {"45 ": 6, "as cut ": 8, "as warm as the chip": 8},
+    ),
     "registration_libraries.py": ("skimage",),
     "synthetic_laboratory.py": ("tifffile",),
 }

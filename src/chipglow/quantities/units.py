@@ -268,6 +268,7 @@ Length = Annotated[float, LENGTH]
 CUT_LENGTH: Final = Quantity("a length", "m", "mm", "0.3 mm")
 CutLength = Annotated[float, CUT_LENGTH]
 WAVELENGTH: Final = Quantity("a wavelength", "m", "um", "4.5 um")
+Wavelength = Annotated[float, WAVELENGTH]
 WAVELENGTHS: Final = Quantity("a band of wavelengths", "m", "um", "3.8-5.1 um")
 WavelengthRange = Annotated[tuple[float, float], WAVELENGTHS]
 TIME: Final = Quantity("a time", "s", "us", "10 us")
@@ -280,6 +281,10 @@ ANGLE: Final = Quantity("an angle", "rad", "deg", "-7 deg", positive=False)
 Angle = Annotated[float, ANGLE]
 HEAT_TRANSFER: Final = Quantity(
     "a coefficient of heat transfer", "W/m^2/K", "W/m^2/K", "50 W/m^2/K", positive=False
+)
+RESISTIVITY: Final = Quantity("a resistivity", "ohm*m", "ohm*m", "1.6e-7 ohm*m")
+TEMPERATURE_COEFFICIENT: Final = Quantity(
+    "a temperature coefficient", "1/K", "K^-1", "0.005 K^-1", positive=False
 )
 TEMPERATURE: Final = Quantity("a temperature", "K", "degC", "300 degC")
 Temperature = Annotated[float, TEMPERATURE]

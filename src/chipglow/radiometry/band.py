@@ -190,6 +190,27 @@ class Band:
         """Wavelengths in m, ascending, at which the response counts: the nodes of the integral."""
         return np.sort(self._quadrature[0])
 
+    def weights(
+        self, temperature: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Parts of the in-band radiance by their wavelength.
+
+        Parameters
+        ----------
+        temperature : array_like
+            Temperature of a blackbody in K, shape (...).
+
+        Returns
+        -------
+        wavelengths : ndarray
+            Nodes of the integral in m, shape (wavelength,).
+        radiance : ndarray
+            In W/(m² sr), shape (..., wavelength); their sum is `radiance`.
+        """
+        wavelength, weights = self._quadrature
+        kelvins = np.asarray(temperature, np.float64)[..., None]
+        return wavelength, spectral_radiance(wavelength, kelvins) * weights
+
     @cached_property
     def radiance_table(self) -> NDArray[np.float64]:
         """Radiance and its derivative at every 0.25 K from 200 K to 6000 K, shape (n, 2)."""

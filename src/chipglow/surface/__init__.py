@@ -14,6 +14,7 @@ from chipglow.surface.feature import (
 from chipglow.surface.map import MapField, MapSurface
 from chipglow.surface.reflecting import ReflectingField, ReflectingSurface
 from chipglow.surface.side_flow import REFLECTIONS, SideElements, SideShape, Wedge
+from chipglow.surface.spectral import HagenRubens, SpectralSurface, SpectralTable
 from chipglow.surface.surface import (
     SURFACES,
     EmissivityField,
@@ -27,6 +28,9 @@ from chipglow.surface.temperature import PhaseEmissivity, TemperatureSurface, Te
 from chipglow.surface.texture import Texture
 
 __all__ = [
+    "SpectralTable",
+    "SpectralSurface",
+    "HagenRubens",
     "CHIP_1",
     "CHIP_2",
     "REFLECTIONS",

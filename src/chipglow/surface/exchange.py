@@ -27,8 +27,9 @@ _EDGE: Final = 1e-12
 class Exchange:
     """Surfaces that are long in one direction, in their cross-section, before surroundings.
 
-    Elements are straight and see what is on their left, looking from start to end. Every element
-    has one temperature and emissivity, reflects grey and partly like a mirror, the rest diffusely.
+    Elements are straight and see what is on their left, looking from start to end: they are the
+    borders of bodies, whose inside no ray reaches. Every element has one temperature and emissivity,
+    reflects grey and partly like a mirror, the rest diffusely.
 
     Parameters
     ----------
@@ -215,16 +216,16 @@ def _trace_one(starts, ends, element, place, sine, bounces):  # type: ignore[no-
     """What one ray meets in turn: from a place on an element, 0 to 1, at an angle's sine."""
     path = np.full(bounces, _OPEN, np.int16)
     cosine = np.sqrt(max(1.0 - sine * sine, 0.0))
-    along = ends[element] - starts[element]
-    along = along / np.sqrt(along[0] ** 2 + along[1] ** 2)
-    dx, dy = sine * along[0] - cosine * along[1], sine * along[1] + cosine * along[0]
-    x, y = starts[element] + place * (ends[element] - starts[element])
+    ux, uy = ends[element, 0] - starts[element, 0], ends[element, 1] - starts[element, 1]
+    x, y = starts[element, 0] + place * ux, starts[element, 1] + place * uy
+    length = np.sqrt(ux * ux + uy * uy)
+    dx, dy = (sine * ux - cosine * uy) / length, (sine * uy + cosine * ux) / length
     for bounce in range(bounces):
         nearest, found = np.inf, _OPEN
         for j in range(len(starts)):
             if j == element:
                 continue
-            ux, uy = ends[j] - starts[j]
+            ux, uy = ends[j, 0] - starts[j, 0], ends[j, 1] - starts[j, 1]
             facing = dx * -uy + dy * ux
             if facing >= 0.0:
                 continue
@@ -238,7 +239,7 @@ def _trace_one(starts, ends, element, place, sine, bounces):  # type: ignore[no-
         path[bounce] = found
         element = found
         x, y = x + nearest * dx, y + nearest * dy
-        ux, uy = ends[found] - starts[found]
+        ux, uy = ends[found, 0] - starts[found, 0], ends[found, 1] - starts[found, 1]
         twice = 2.0 * (dx * -uy + dy * ux) / (ux * ux + uy * uy)
         dx, dy = dx + twice * uy, dy - twice * ux
     return path

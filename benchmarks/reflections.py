@@ -1,0 +1,186 @@
+"""How much of the paper's missing 100 °C at the rake face reflections explain.
+
+    python benchmarks/reflections.py [--draws 40] [--study quick.yaml]
+
+Measures the hottest square of the row beside the rake face (its Figure 7) in one instant of the
+quick study, or of a study's cut, with the light that rake face and chip's side reflect on each
+other and without. The paper's simulated peak with chip 2 is about 100 °C under the measured one:
+what has to be explained is 100 °C with chip 2, and that and the difference of the chips with
+chip 1. Wedge angle, bulge radius, fraction of mirror-like reflection and the emissivities of chip
+and tool are drawn; the tool is as warm as it was cut, or as the chip that it touches. Minutes.
+"""
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from math import pi, radians
+from pathlib import Path
+
+import numpy as np
+from experiments import aligned
+
+from chipglow.camera import Camera
+from chipglow.io import open_scene
+from chipglow.laboratory.chip import rake_grid
+from chipglow.scene import Material, Scene
+from chipglow.scene.lines import nearest
+from chipglow.study import Study, cut, load_study
+from chipglow.surface import (
+    CHIP_1,
+    CHIP_2,
+    Emissivity,
+    FeatureSurface,
+    ReflectingSurface,
+    Surface,
+    Wedge,
+)
+
+MISSING = 100.0
+INSTANT = 0.5
+CHIPS = {"chip 1": CHIP_1, "chip 2": CHIP_2}
+ANGLES = (30.0, 75.0)
+RADII = (50e-6, 200e-6)
+SEED = 17
+
+
+@dataclass(frozen=True)
+class Face:
+    """One instant of a scene, and the camera that reads the row beside its rake face."""
+
+    scene: Scene
+    camera: Camera
+
+    @classmethod
+    def of(cls, scene: Scene, camera: Camera, hot_tool: bool) -> "Face":
+        """The scene at rest in the middle of its time; its tool as warm as the chip, if it shall."""
+        frame = scene.frame(int(INSTANT * len(scene.times)))
+        temperature = frame.temperature
+        if hot_tool:
+            temperature = with_hot_tool(scene, temperature, frame.material)
+        fields = {
+            "temperature": temperature,
+            "material": frame.material,
+            "plastic_strain": frame.needed("plastic_strain"),
+            "plastic_strain_rate": frame.needed("plastic_strain_rate"),
+        }
+        still = {name: values[None] for name, values in fields.items()}
+        return cls(Scene.from_fields(scene.raster, [0.0], still, scene.tool), camera)
+
+    def peak(self, surface: Surface) -> float:
+        """Hottest radiance temperature of the row of squares beside the face in K."""
+        measured = self.camera.measure(self.scene, surface, 0.0)
+        assert measured.tool is not None
+        return float(np.nanmax(rake_grid(measured, measured.tool).frame_mean[0]))
+
+
+def with_hot_tool(
+    scene: Scene, temperature: np.ndarray, material: np.ndarray
+) -> np.ndarray:
+    """Temperatures with a tool that is as warm as the chip on the other side of its rake face."""
+    tool, raster = scene.tool, scene.raster
+    assert tool is not None
+    x, y = np.meshgrid(raster.x, raster.y)
+    along = (np.stack([x, y], axis=-1) - tool.rake_foot) @ np.array(tool.rake_direction)
+    beside = tool.rake_point(along) + raster.spacing * np.array(tool.rake_normal)
+    touching = nearest(material, raster, beside) == Material.WORKPIECE
+    changed = (material == Material.TOOL) & (along > 0) & touching
+    return np.where(changed, nearest(temperature, raster, beside), temperature).astype(np.float32)
+
+
+def flat(chip: FeatureSurface, body: float, tool: float) -> FeatureSurface:
+    """A chip of even emissivities, which follows no texture."""
+    return replace(
+        chip,
+        chip=Emissivity(body),
+        shear_band=Emissivity(chip.shear_band.mean),
+        workpiece=Emissivity(chip.workpiece.mean),
+        tool=Emissivity(tool),
+        follow="none",
+    )
+
+
+def drawn(mean: float, deviation: float, generator: np.random.Generator) -> float:
+    """A number from a normal distribution, within 0.02 to 0.98."""
+    return float(np.clip(generator.normal(mean, deviation), 0.02, 0.98))
+
+
+def differences(face: Face, chip: FeatureSurface, draws: int) -> np.ndarray:
+    """Peaks without and with reflections for drawn shapes and emissivities, shape (draw, 2)."""
+    generator = np.random.default_rng(SEED)
+    found = []
+    for _ in range(draws):
+        wedge = Wedge(
+            angle=radians(generator.uniform(*ANGLES)),
+            bulge_radius=generator.uniform(*RADII),
+            mirror=generator.uniform(0.0, 1.0),
+        )
+        bare = flat(
+            chip,
+            drawn(chip.chip.mean, chip.chip.deviation, generator),
+            drawn(chip.tool.mean, chip.tool.deviation, generator),
+        )
+        found.append((face.peak(bare), face.peak(ReflectingSurface(bare, wedge))))
+    return np.array(found)
+
+
+def spread(values: np.ndarray) -> str:
+    return f"{values.mean():.0f} ± {values.std(ddof=1):.0f}"
+
+
+def explained(faces: dict[str, Face], draws: int) -> list[list[str]]:
+    """Table of what reflections add to the peak, and of what has to be explained."""
+    rows = [["tool", "chip", "without / °C", "with / °C", "added / K", "range / K", "missing / K"]]
+    bare = {name: faces["as cut"].peak(flat(c, c.chip.mean, 0.58)) for name, c in CHIPS.items()}
+    for tool, face in faces.items():
+        for name, chip in CHIPS.items():
+            without, reflecting = differences(face, chip, draws).T
+            added = reflecting - without
+            rows.append(
+                [
+                    tool,
+                    name,
+                    spread(without - 273.15),
+                    spread(reflecting - 273.15),
+                    spread(added),
+                    f"{added.min():.0f} to {added.max():.0f}",
+                    f"{MISSING + bare['chip 2'] - bare[name]:.0f}",
+                ]
+            )
+    return rows
+
+
+def by_shape(faces: dict[str, Face]) -> list[list[str]]:
+    """Table of what one wedge adds, by its angle and its kind of reflection."""
+    rows = [["angle / °", *(f"{tool}, {name} / K" for tool in faces for name in CHIPS), "mirror"]]
+    for mirror in (0.0, 1.0):
+        for angle in (30.0, 45.0, 60.0, 75.0):
+            wedge = Wedge(angle=radians(angle), mirror=mirror)
+            added = [_added(face, chip, wedge) for face in faces.values() for chip in CHIPS.values()]
+            rows.append([f"{angle:.0f}", *(f"{one:.0f}" for one in added), f"{mirror:.0f}"])
+    upright = Wedge(angle=pi / 2, overhang=30e-6)
+    added = [_added(face, chip, upright) for face in faces.values() for chip in CHIPS.values()]
+    rows.append(["90, 30 um behind", *(f"{one:.0f}" for one in added), "0"])
+    return rows
+
+
+def _added(face: Face, chip: FeatureSurface, wedge: Wedge) -> float:
+    bare = flat(chip, chip.chip.mean, chip.tool.mean)
+    return face.peak(ReflectingSurface(bare, wedge)) - face.peak(bare)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--draws", type=int, default=40, help="draws of each row, 2 or more")
+    parser.add_argument("--study", type=Path, help="a study whose cut is looked at")
+    given = parser.parse_args()
+    study = Study.quick() if given.study is None else load_study(given.study)
+    scene, camera = open_scene(cut(study)), study.camera.build()
+    make: Callable[[bool], Face] = partial(Face.of, scene, camera)
+    faces = {"as cut": make(False), "as warm as the chip": make(True)}
+    print(aligned(by_shape(faces)))
+    print(aligned(explained(faces, given.draws)))
+
+
+if __name__ == "__main__":
+    main()
