@@ -53,7 +53,7 @@ class Face:
 
     @classmethod
     def of(cls, scene: Scene, camera: Camera, hot_tool: bool) -> "Face":
-        """The scene at rest in the middle of its time; its tool as warm as the chip, if it shall."""
+        """The scene at rest in the middle of its time, with a tool as warm as the chip or not."""
         frame = scene.frame(int(INSTANT * len(scene.times)))
         temperature = frame.temperature
         if hot_tool:
@@ -74,9 +74,7 @@ class Face:
         return float(np.nanmax(rake_grid(measured, measured.tool).frame_mean[0]))
 
 
-def with_hot_tool(
-    scene: Scene, temperature: np.ndarray, material: np.ndarray
-) -> np.ndarray:
+def with_hot_tool(scene: Scene, temperature: np.ndarray, material: np.ndarray) -> np.ndarray:
     """Temperatures with a tool that is as warm as the chip on the other side of its rake face."""
     tool, raster = scene.tool, scene.raster
     assert tool is not None
@@ -156,7 +154,9 @@ def by_shape(faces: dict[str, Face]) -> list[list[str]]:
     for mirror in (0.0, 1.0):
         for angle in (30.0, 45.0, 60.0, 75.0):
             wedge = Wedge(angle=radians(angle), mirror=mirror)
-            added = [_added(face, chip, wedge) for face in faces.values() for chip in CHIPS.values()]
+            added = [
+                _added(face, chip, wedge) for face in faces.values() for chip in CHIPS.values()
+            ]
             rows.append([f"{angle:.0f}", *(f"{one:.0f}" for one in added), f"{mirror:.0f}"])
     upright = Wedge(angle=pi / 2, overhang=30e-6)
     added = [_added(face, chip, upright) for face in faces.values() for chip in CHIPS.values()]

@@ -190,9 +190,7 @@ class Band:
         """Wavelengths in m, ascending, at which the response counts: the nodes of the integral."""
         return np.sort(self._quadrature[0])
 
-    def weights(
-        self, temperature: ArrayLike
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def weights(self, temperature: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Parts of the in-band radiance by their wavelength.
 
         Parameters

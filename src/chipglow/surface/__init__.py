@@ -28,9 +28,6 @@ from chipglow.surface.temperature import PhaseEmissivity, TemperatureSurface, Te
 from chipglow.surface.texture import Texture
 
 __all__ = [
-    "SpectralTable",
-    "SpectralSurface",
-    "HagenRubens",
     "CHIP_1",
     "CHIP_2",
     "REFLECTIONS",
@@ -42,6 +39,7 @@ __all__ = [
     "FeatureField",
     "FeatureFields",
     "FeatureSurface",
+    "HagenRubens",
     "MapField",
     "MapSurface",
     "PhaseEmissivity",
@@ -49,6 +47,8 @@ __all__ = [
     "ReflectingSurface",
     "SideElements",
     "SideShape",
+    "SpectralSurface",
+    "SpectralTable",
     "Surface",
     "SurfaceChoice",
     "TemperatureSurface",

@@ -207,7 +207,7 @@ class _Sections:
         from_foot = np.stack([x, y], axis=-1) - tool.rake_foot
         along = from_foot @ np.array(tool.rake_direction)
         depth = from_foot @ np.array(tool.rake_normal)
-        count = max(int(along.max() / raster.spacing), 0)
+        count = max(int(along.max() / raster.spacing) + 1, 0)
         foot = tool.rake_point((np.arange(count) + 0.5) * raster.spacing)
         step = raster.spacing / 2
         heights = np.arange(raster.spacing / 4, TOUCHING + step, step)

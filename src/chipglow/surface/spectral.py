@@ -81,9 +81,7 @@ class SpectralTable(SpectralSurface):
     """A table over wavelength and true temperature, linear between, constant beyond its ends."""
 
     kind: ClassVar[str] = "spectral"
-    example: ClassVar[str] = (
-        "{kind: spectral, table: [[3 um, 20 degC, 0.3], [5 um, 20 degC, 0.2]]}"
-    )
+    example: ClassVar[str] = "{kind: spectral, table: [[3 um, 20 degC, 0.3], [5 um, 20 degC, 0.2]]}"
     table: Annotated[
         tuple[_Row, ...],
         Strict(False),
