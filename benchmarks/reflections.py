@@ -159,9 +159,13 @@ def by_shape(faces: dict[str, Face]) -> list[list[str]]:
             ]
             rows.append([f"{angle:.0f}", *(f"{one:.0f}" for one in added), f"{mirror:.0f}"])
     upright = Wedge(angle=pi / 2, overhang=30e-6)
-    added = [_added(face, chip, upright) for face in faces.values() for chip in CHIPS.values()]
+    added = _all_added(faces, upright)
     rows.append(["90, 30 um behind", *(f"{one:.0f}" for one in added), "0"])
     return rows
+
+
+def _all_added(faces: dict[str, Face], wedge: Wedge) -> list[float]:
+    return [_added(face, chip, wedge) for face in faces.values() for chip in CHIPS.values()]
 
 
 def _added(face: Face, chip: FeatureSurface, wedge: Wedge) -> float:

@@ -34,7 +34,7 @@ def lines(*polylines):
 
 
 def groove(angle, count, grading=2.0):
-    """A V-groove with walls of unit length; elements from the far end of one wall to the other's."""
+    """A V-groove with walls of unit length; elements from one far end to the other."""
     part = np.linspace(0, 1, count + 1) ** grading
     left = np.outer(part[::-1], [np.cos(angle), np.sin(angle)])
     return lines(left, np.outer(part, [1.0, 0.0]))

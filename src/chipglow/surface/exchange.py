@@ -28,8 +28,8 @@ class Exchange:
     """Surfaces that are long in one direction, in their cross-section, before surroundings.
 
     Elements are straight and see what is on their left, looking from start to end: they are the
-    borders of bodies, whose inside no ray reaches. Every element has one temperature and emissivity,
-    reflects grey and partly like a mirror, the rest diffusely.
+    borders of bodies, whose inside no ray reaches. Every element has one temperature and
+    emissivity, reflects grey and partly like a mirror, the rest diffusely.
 
     Parameters
     ----------
