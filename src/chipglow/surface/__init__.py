@@ -57,3 +57,6 @@ __all__ = [
     "UniformEmissivity",
     "UniformSurface",
     "Wedge",
+    "chip_fraction",
+    "shear_band_fraction",
+]
