@@ -289,7 +289,8 @@ def _add_given(  # type: ignore[no-untyped-def]
         for k in range(weights.size):
             _add_row(
                 temperature[k][row], material[k][row], emissivities[k][:, row], weights[k],
-                k == middle, row, work, number, table, environment, most, mean, centre, peak, hottest,
+                k == middle, row, work, number, table, environment, most, mean, centre, peak,
+                hottest,
             )  # fmt: skip
 
 
