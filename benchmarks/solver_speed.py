@@ -57,7 +57,7 @@ class Start(NamedTuple):
     damage: Damage
     elastic: np.ndarray
     capacity: np.ndarray
-    heat_shares: np.ndarray
+    heat_fractions: np.ndarray
 
 
 def sheared_block(side):
@@ -91,7 +91,7 @@ def start_of(block):
         block.damage,
         block.elastic,
         block.capacity,
-        block.heat_shares,
+        block.heat_fractions,
     )
 
 
@@ -125,7 +125,7 @@ class Chipglow:
         advance_with(start.law)(
             steps, self.points, self.starts, self.velocity, self.nodes, self.heat, self.tool,
             start.grid, start.step, start.law, start.damage, start.elastic, start.capacity,
-            start.heat_shares, self.sums, self.threads,
+            start.heat_fractions, self.sums, self.threads,
         )  # fmt: skip
         return perf_counter() - begin
 

@@ -25,7 +25,7 @@ from chipglow.cutting.flow_stress import flow_stress
 from chipglow.cutting.laws import HyperbolicTangent
 from chipglow.cutting.library import AISI_1045, workpiece
 from chipglow.cutting.material import ROOM_TEMPERATURE
-from chipglow.cutting.plastic_heat import heat_share, heat_shares
+from chipglow.cutting.plastic_heat import heat_fraction, heat_fractions
 from chipglow.cutting.simulation import _State
 from chipglow.scene import Raster, ToolGeometry
 
@@ -148,14 +148,14 @@ def pressed_on_a_face(**friction):
     ("rate", "fraction"),
     [(1e-3, 0.4), (1.0, 0.4), (10.0, 0.5), (100.0, 0.6), (1e4, 0.75), (1e6, 0.9), (1e9, 0.9)],
 )
-def test_heat_share_is_linear_over_the_logarithm_of_the_rate_and_held_beyond(rate, fraction):
-    table = heat_shares(RateTable((1.0, 100.0, 1e6), (0.4, 0.6, 0.9)))
-    assert heat_share(rate, table) == pytest.approx(fraction, rel=1e-14)
+def test_heat_fraction_is_linear_over_the_logarithm_of_the_rate_and_held_beyond(rate, fraction):
+    table = heat_fractions(RateTable((1.0, 100.0, 1e6), (0.4, 0.6, 0.9)))
+    assert heat_fraction(rate, table) == pytest.approx(fraction, rel=1e-14)
 
 
 @given(fraction=st.floats(0.0, 1.0), rate=st.floats(0.0, 1e12))
-def test_a_constant_heat_share_is_itself(fraction, rate):
-    assert heat_share(rate, heat_shares(fraction)) == fraction
+def test_a_constant_heat_fraction_is_itself(fraction, rate):
+    assert heat_fraction(rate, heat_fractions(fraction)) == fraction
 
 
 @pytest.mark.parametrize("coefficient", [0.0, 0.3])

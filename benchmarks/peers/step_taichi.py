@@ -34,7 +34,7 @@ class Stepper:
         )
         self.grid, self.step = start.grid, start.step
         self.law, self.damage = start.law, start.damage
-        self.heat_share = float(start.heat_shares[1, 0])
+        self.heat_fraction = float(start.heat_fractions[1, 0])
         self.start, count = start, start.points.size
         self.count = count
         point = ti.types.struct(
@@ -222,7 +222,7 @@ class Stepper:
                 self.points[k].damage = p.damage + growth
                 index = ti.cast(p.temperature - 200.0, ti.i32)
                 capacity = self.capacity[ti.math.clamp(index, 0, self.capacity.shape[0] - 1)]
-                heat = self.heat_share * stress * increment * volume
+                heat = self.heat_fraction * stress * increment * volume
                 self.points[k].temperature = p.temperature + heat / (step.heat_mass * capacity)
             self.points[k].increment = increment
             self.points[k].volume = volume

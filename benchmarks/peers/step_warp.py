@@ -54,7 +54,7 @@ class Step:
     kept: f64
     shear_modulus: f64
     bulk_modulus: f64
-    heat_share: f64
+    heat_fraction: f64
 
 
 @wp.struct
@@ -239,7 +239,7 @@ def stress_and_scatter(
             )
         points[k].damage = p.damage + growth
         capacity = capacities[wp.clamp(int(p.temperature - COLDEST), 0, capacities.shape[0] - 1)]
-        heat = step.heat_share * stress * increment * volume
+        heat = step.heat_fraction * stress * increment * volume
         points[k].temperature = p.temperature + heat / (step.heat_mass * capacity)
     points[k].increment = increment
     points[k].volume = volume
@@ -292,7 +292,7 @@ class Stepper:
         self.cells = wp.zeros(shape, dtype=wp.vec2d)
         self.velocity = wp.zeros(shape, dtype=wp.vec4d)
         capacity = wp.array(start.capacity, dtype=f64)
-        step = SimpleNamespace(**start.step._asdict(), heat_share=start.heat_shares[1, 0])
+        step = SimpleNamespace(**start.step._asdict(), heat_fraction=start.heat_fractions[1, 0])
         numbers = (start.grid, step, start.law, start.damage)
         grid, step, law, damage = map(filled, (Grid, Step, Law, Damage), numbers)
         launches = (

@@ -157,7 +157,7 @@ def _quality(fit: "CalibrationFit[FittedCalibration]") -> str:
         return f"{text}; as many points as parameters, which prove nothing."
     return (
         f"{text}, chi² {fit.chi_squared:.3g} with {fit.degrees_of_freedom} degrees of freedom "
-        f"(as large by chance in {100 * fit.probability:.3g} %)."
+        f"(probability of as much or more: {100 * fit.probability:.3g} %)."
     )
 
 

@@ -38,7 +38,7 @@ class Checkpoint:
         The state by name, in SI. ``time`` is how far the cut is, in s; ``records`` holds the
         forces and energies of the intervals that are done.
     progress : float
-        Share of the cut that is done, 0 to 1.
+        Fraction of the cut that is done, 0 to 1.
     """
 
     arrays: Mapping[str, NDArray[Any]]

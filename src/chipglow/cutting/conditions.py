@@ -198,7 +198,7 @@ class Numerics(Part):
     courant: Annotated[
         float,
         Parameter(
-            "Time step as a share of the time that sound takes for a cell.", over=0.0, most=0.6
+            "Time step as a fraction of the time that sound takes for a cell.", over=0.0, most=0.6
         ),
     ] = 0.5
     points_per_side: Annotated[

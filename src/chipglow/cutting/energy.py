@@ -24,7 +24,7 @@ class EnergyHistory:
         Change of the energies that the material holds, shape (n,). The kinetic energy is that of
         the scaled mass.
     plastic_work : ndarray
-        Plastic work, of which the Taylor-Quinney share is heat, shape (n,).
+        Plastic work, of which the Taylor-Quinney fraction is heat, shape (n,).
     friction_work : ndarray
         Friction work, all of it heat, shape (n,).
     sharing_loss : ndarray
@@ -53,7 +53,7 @@ class EnergyHistory:
 
     @property
     def closing_error(self) -> NDArray[np.float64]:
-        """Share of the work that the balance does not account for: what the grid dissipates."""
+        """Fraction of the work that the balance does not account for: what the grid dissipates."""
         held = self.kinetic_energy + self.elastic_energy
         used = self.plastic_work + self.friction_work + self.sharing_loss + self.moduli_loss
         done = self.drive_work + self.contact_work + self.expansion_work

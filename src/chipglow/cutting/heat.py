@@ -13,20 +13,20 @@ from chipglow.scene.tool_surface import surface_distance
 class ToolHeat(NamedTuple):
     """Heat of the tool and of its contact.
 
-    Capacity (J/(m³ K)), conductivity (W/(m K)), share of friction heat that enters the tool,
+    Capacity (J/(m³ K)), conductivity (W/(m K)), fraction of friction heat that enters the tool,
     conductance of the contact (W/(m² K)), contact area of a point (m²/m).
     """
 
     capacity: float
     conductivity: float
-    friction_share: float
+    friction_fraction: float
     conductance: float
     area: float
 
 
 @njit(cache=True)
 def tool_fraction(grid, tool):  # type: ignore[no-untyped-def]
-    """Share of each node's square that the tool fills, shape (columns, rows)."""
+    """Fraction of each node's square that the tool fills, shape (columns, rows)."""
     result = np.zeros((grid.columns, grid.rows))
     for i in range(grid.columns):
         for j in range(grid.rows):
@@ -39,23 +39,23 @@ def tool_fraction(grid, tool):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def conduct(  # type: ignore[no-untyped-def]
-    points, count, nodes, increment, conductivity, capacity, heat_mass, grid, duration, share
+    points, count, nodes, increment, conductivity, capacity, heat_mass, grid, duration, part
 ):
     """Gather heat and temperature of the points on the grid and conduct for `duration` (s).
 
-    `nodes` (columns, rows, 3) becomes heat capacity (J/(m K)), temperature (K) and filled share;
+    `nodes` (columns, rows, 3) becomes heat capacity (J/(m K)), temperature (K) and filled fraction;
     `increment` (columns, rows) the rise of temperature (K), for `return_heat`. The flux is that at
     the points and acts on the nodes by the slopes of their weights (weak form), so none crosses a
     free surface wherever the surface lies between the nodes.
 
     Increments leave differences between the points of a cell as they are, so a point much colder
-    than the others would be cooled with them. A `share` of what the grid does not see is taken
+    than the others would be cooled with them. A `part` of what the grid does not see is taken
     away: that is all of the noise, but of a smooth field only a fourth derivative.
     """
     _gather_heat(points, count, nodes, capacity, heat_mass, grid)
     increment[:] = 0.0
     for k in range(count):
-        _conduct_at(points[k], nodes, increment, conductivity, grid, duration, share)
+        _conduct_at(points[k], nodes, increment, conductivity, grid, duration, part)
     for i in range(grid.columns):
         for j in range(grid.rows):
             if nodes[i, j, 0] > 0.0:
@@ -85,7 +85,7 @@ def _slopes(offset):  # type: ignore[no-untyped-def]
 
 @njit
 def _gather_heat(points, count, nodes, capacity, heat_mass, grid):  # type: ignore[no-untyped-def]
-    """Heat capacity, temperature and filled share of the nodes.
+    """Heat capacity, temperature and filled fraction of the nodes.
 
     A point brings the temperature that its slopes make at the node (affine transfer, Jiang et al.
     2015): a linear field is exact up to a free surface, where the points lie on one side only.
@@ -96,14 +96,14 @@ def _gather_heat(points, count, nodes, capacity, heat_mass, grid):  # type: igno
         i, j, ax, ay = _place(p, grid)
         wx, wy = spline_weights(ax), spline_weights(ay)
         heat = heat_mass * property_at(capacity, p.temperature)
-        share = p.volume / (grid.cell * grid.cell)
+        filled = p.volume / (grid.cell * grid.cell)
         for a in range(3):
             for b in range(3):
                 w = wx[a] * wy[b]
                 there = p.temperature + p.rise_x * (a - ax) + p.rise_y * (b - ay)
                 nodes[i + a, j + b, 0] += w * heat
                 nodes[i + a, j + b, 1] += w * heat * there
-                nodes[i + a, j + b, 2] += w * share
+                nodes[i + a, j + b, 2] += w * filled
     for i in range(grid.columns):
         for j in range(grid.rows):
             if nodes[i, j, 0] > 0.0:
@@ -111,7 +111,7 @@ def _gather_heat(points, count, nodes, capacity, heat_mass, grid):  # type: igno
 
 
 @njit
-def _conduct_at(p, nodes, increment, conductivity, grid, duration, share):  # type: ignore[no-untyped-def]
+def _conduct_at(p, nodes, increment, conductivity, grid, duration, part):  # type: ignore[no-untyped-def]
     """Slopes of a point's temperature, its noise less, and the heat of its flux to its nodes."""
     i, j, ax, ay = _place(p, grid)
     wx, wy = spline_weights(ax), spline_weights(ay)
@@ -128,7 +128,7 @@ def _conduct_at(p, nodes, increment, conductivity, grid, duration, share):  # ty
             slope_y += wx[a] * sy[b] * temperature
     # Squares of the nodes' distances are a quarter of a cell's in the mean, wherever the point is.
     p.rise_x, p.rise_y = 4.0 * rise_x, 4.0 * rise_y
-    p.temperature += share * (seen - p.temperature)
+    p.temperature += part * (seen - p.temperature)
     flow = property_at(conductivity, seen) * p.volume / (grid.cell * grid.cell) * duration
     for a in range(3):
         for b in range(3):
@@ -145,8 +145,8 @@ def conduct_tool(temperature, fraction, tool_heat, grid, duration):  # type: ign
             if fraction[i, j] == 0.0:
                 continue
             for k, m in ((i + 1, j), (i, j + 1)):
-                share = min(fraction[i, j], fraction[k, m])
-                heat = rate * share * (temperature[k, m] - temperature[i, j])
+                common = min(fraction[i, j], fraction[k, m])
+                heat = rate * common * (temperature[k, m] - temperature[i, j])
                 flow[i, j] += heat
                 flow[k, m] -= heat
     for i in range(grid.columns):
@@ -227,7 +227,7 @@ def _heat_contact_of(  # type: ignore[no-untyped-def]
     """
     distance, nx, ny = surface_distance(p.x, p.y, tool)
     dx, dy = -distance * nx / grid.cell, -distance * ny / grid.cell
-    into_tool = tool_heat.friction_share * work
+    into_tool = tool_heat.friction_fraction * work
     surface = p.temperature + p.rise_x * dx + p.rise_y * dy
     contact = tool_heat.area * p.contact_time
     layer = 0.5 * grid.cell / tool_heat.conductivity

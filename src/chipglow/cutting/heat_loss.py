@@ -11,7 +11,7 @@ from chipglow.cutting.heat import SMALLEST_FRACTION
 
 _SIGMA = float(Stefan_Boltzmann)
 _OUTSIDE, _INSIDE = 0.1, 0.7
-"""Filled shares between which the surface lies: the share of a surface runs over three cells, that
+"""Filled fractions between which the surface lies: that of a surface runs over three cells, that
 of the inside is uneven. So the two sides of a contact together are inside."""
 
 
@@ -52,8 +52,8 @@ def heat_flux(temperature, loss):  # type: ignore[no-untyped-def]
 def free_surface(nodes, fraction, grid, i, j):  # type: ignore[no-untyped-def]
     """Free surface of chip and tool per width (m) between node (i, j) and the next three.
 
-    The gradient of the filled share, integrated over an area, is the length of the boundary in it
-    (coarea formula).
+    The gradient of the filled fraction, integrated over an area, is the length of the boundary in
+    it (coarea formula).
     """
     a, b = _filled(nodes, fraction, i, j), _filled(nodes, fraction, i + 1, j)
     c, d = _filled(nodes, fraction, i, j + 1), _filled(nodes, fraction, i + 1, j + 1)
@@ -63,8 +63,8 @@ def free_surface(nodes, fraction, grid, i, j):  # type: ignore[no-untyped-def]
 
 @njit
 def _filled(nodes, fraction, i, j):  # type: ignore[no-untyped-def]
-    share = (nodes[i, j, 2] + fraction[i, j] - _OUTSIDE) / (_INSIDE - _OUTSIDE)
-    return min(max(share, 0.0), 1.0)
+    inside = (nodes[i, j, 2] + fraction[i, j] - _OUTSIDE) / (_INSIDE - _OUTSIDE)
+    return min(max(inside, 0.0), 1.0)
 
 
 @njit(cache=True)

@@ -18,11 +18,11 @@ MELTING_LIMIT = 3000.0
 @njit(**INLINE)
 def homologous(temperature, law):  # type: ignore[no-untyped-def]
     """θ = (T − T₀) / (T_melt − T₀), from 0 to 0.99."""
-    share = (temperature - law.reference_temperature) / (
+    theta = (temperature - law.reference_temperature) / (
         law.melting_temperature - law.reference_temperature
     )
     # A liquid's strength is not zero: 1 % is left, so that points never lose all stiffness.
-    return min(max(share, 0.0), 0.99)
+    return min(max(theta, 0.0), 0.99)
 
 
 @njit(**INLINE)

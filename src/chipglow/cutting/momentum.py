@@ -66,7 +66,7 @@ class Step(NamedTuple):
 
     Point mass (kg/m, scaled), heat mass (kg/m, true), volume without stress at room temperature
     (m²), time step (s),
-    share of a point's own velocity that it keeps (AFLIP 1, APIC 0), moduli at room temperature
+    fraction of a point's own velocity that it keeps (AFLIP 1, APIC 0), moduli at room temperature
     (Pa); contact: stiffness (Pa), damping (N s/m²), distance at which a point touches (m), area of
     a point (m²/m), friction; boundary: nodes under `floor`, and those left of `inflow` and under
     `ceiling` (m), move at `speed` (m/s). Friction falls with the temperature over
@@ -221,7 +221,7 @@ def _gather_cells(points, starts, first, last, velocity, grid, step, elastic, su
 @njit(**FAST)
 def _work_block(  # type: ignore[no-untyped-def]
     points, starts, block, velocity, nodes, tool, grid, step, law, damage, elastic, capacity,
-    heat_shares, sums, buffer,
+    heat_fractions, sums, buffer,
 ):  # fmt: skip
     """One step of the points of a block; False if a point left the grid."""
     first = block * BLOCK_COLUMNS * grid.rows
@@ -235,7 +235,7 @@ def _work_block(  # type: ignore[no-untyped-def]
         for begin in range(starts[cell], starts[end_cell], LANES):
             end = min(begin + LANES, starts[end_cell])
             update_stresses(
-                points, begin, end, step, law, damage, elastic, capacity, heat_shares, buffer
+                points, begin, end, step, law, damage, elastic, capacity, heat_fractions, buffer
             )
             for k in range(begin, end):
                 p = points[k]
@@ -289,15 +289,15 @@ def _work_column(i, velocity, nodes, heat, tool, grid, step, sums):  # type: ign
 
 def _advance(  # type: ignore[no-untyped-def]
     steps, points, starts, velocity, nodes, heat, tool, grid, step, law, damage, elastic,
-    capacity, heat_shares, sums, threads,
+    capacity, heat_fractions, sums, threads,
 ):  # fmt: skip
     """Advance all points by some steps, shared out among some threads.
 
     `velocity` (columns, rows, 4) is the grid's velocity after the last step and its change in that
     step, kept for the next; `nodes` (columns, rows, 8) is zero before and after; `heat` (columns,
     rows) gathers friction work (J/m); `sums` gathers over the steps what `FORCE_X` and so on name.
-    `elastic` is `WorkpieceMaterial.elastic_ratios`, `heat_shares` that of `heat_share`. Returns
-    False if a point left the grid.
+    `elastic` is `WorkpieceMaterial.elastic_ratios`, `heat_fractions` that of `heat_fraction`.
+    Returns False if a point left the grid.
     """
     blocks = (grid.columns + BLOCK_COLUMNS - 1) // BLOCK_COLUMNS
     of_blocks = np.zeros((blocks, sums.size))
@@ -310,7 +310,7 @@ def _advance(  # type: ignore[no-untyped-def]
                 for block in range(colour + 2 * thread, blocks, 2 * threads):
                     good[block] &= _work_block(
                         points, starts, block, velocity, nodes, tool, grid, step, law, damage,
-                        elastic, capacity, heat_shares, of_blocks, buffers[thread],
+                        elastic, capacity, heat_fractions, of_blocks, buffers[thread],
                     )  # fmt: skip
         for thread in prange(threads):
             for i in range(thread, grid.columns, threads):

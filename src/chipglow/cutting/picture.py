@@ -2,8 +2,8 @@
 
 Each field is the quadratic B-spline on the grid that fits the points: a weighted mean to start
 with, then corrections by the residual at the points. A sample shows the workpiece where the
-smoothed share of the area that chip and tool fill is over one half: on a straight surface that is
-the surface. The samples are those of a `SplineFrame`, which the frame keeps.
+smoothed fraction of the area that chip and tool fill is over one half: on a straight surface
+that is the surface. The samples are those of a `SplineFrame`, which the frame keeps.
 """
 
 from collections.abc import Mapping
@@ -36,7 +36,7 @@ class Picture:
     tool : Tool
         Outline of the tool.
     filled_by_tool : ndarray
-        Share of each node's square that the tool fills, shape (columns, rows).
+        Fraction of each node's square that the tool fills, shape (columns, rows).
     ambient : float
         Temperature in K of samples that show nothing.
     """
@@ -137,7 +137,7 @@ def _inside(x, y, tool):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _fit(fx, fy, values, area, columns, rows, corrections):  # type: ignore[no-untyped-def]
-    """B-spline coefficients (columns, rows, fields), filled share and where points are near."""
+    """B-spline coefficients (columns, rows, fields), filled fraction and where points are near."""
     fields = values.shape[1]
     weight = np.zeros((columns, rows))
     result = np.zeros((columns, rows, fields))

@@ -50,7 +50,7 @@ from chipglow.cutting.momentum import (
     advance_with,
 )
 from chipglow.cutting.picture import Picture, lattice_of
-from chipglow.cutting.plastic_heat import heat_shares
+from chipglow.cutting.plastic_heat import heat_fractions
 from chipglow.cutting.points import POINT, Grid, Points, block_of_points, sort_by_cell
 from chipglow.cutting.preview import Preview
 from chipglow.cutting.recording import Recorder
@@ -72,7 +72,7 @@ _KEPT: Final = 1.0
 _LARGEST_DRIFT: Final = 0.1
 _FASTEST_DRIFT: Final = 0.4
 _HEAT_STABILITY: Final = 0.15
-_INERTIA_SHARE: Final = 0.0045
+_INERTIA_FRACTION: Final = 0.0045
 _LARGEST_SCALING: Final = 1000.0
 
 
@@ -172,7 +172,7 @@ class CuttingSimulation:
         on_frame : callable
             Called with every frame of the window and of the bands after it, in their order.
         on_progress : callable, optional
-            Called with the share of the cut that is done, 0 to 1.
+            Called with the fraction of the cut that is done, 0 to 1.
         resume : Checkpoint, optional
             Go on from here, after an earlier run of the same simulation with the same window: the
             results are those of an unbroken run to the last bit. Only the frames that are still
@@ -247,8 +247,8 @@ class CuttingSimulation:
         start = self.conditions.initial_temperature
         strength = float(self.workpiece.flow_stress.at(1.0, 1e4, start))
         dynamic = float(self.workpiece.density_at(start)) * self.conditions.speed**2
-        share = _INERTIA_SHARE * sqrt(3.0) * strength / dynamic
-        return min(max(share, 1.0), _LARGEST_SCALING)
+        scaling = _INERTIA_FRACTION * sqrt(3.0) * strength / dynamic
+        return min(max(scaling, 1.0), _LARGEST_SCALING)
 
     @property
     def resolution_warnings(self) -> tuple[str, ...]:
@@ -416,7 +416,7 @@ class _State:
         self.damage = Damage.of(material.damage, material.failing_layer(cell))
         self.elastic = material.elastic_ratios()
         self.capacity = material.heat_capacity.sampled()
-        self.heat_shares = heat_shares(material.taylor_quinney)
+        self.heat_fractions = heat_fractions(material.taylor_quinney)
         self.conductivity = material.conductivity.sampled()
         self.diffusivity, self.effusivity = _conduction(material, conditions.initial_temperature)
         self.tool_heat = _tool_heat(simulation, self.effusivity, spacing)
@@ -548,7 +548,7 @@ class _State:
                 self.damage,
                 self.elastic,
                 self.capacity,
-                self.heat_shares,
+                self.heat_fractions,
                 sums,
                 get_num_threads(),
             )
@@ -759,7 +759,7 @@ def _tool_heat(simulation: CuttingSimulation, chip: float, spacing: float) -> To
     return ToolHeat(
         capacity=tool.density * tool.heat_capacity,
         conductivity=tool.conductivity,
-        friction_share=float(tool.effusivity / (tool.effusivity + chip)),
+        friction_fraction=float(tool.effusivity / (tool.effusivity + chip)),
         conductance=simulation.friction.conductance,
         area=spacing,
     )

@@ -66,7 +66,7 @@ class SteadyTool:
     grid : Grid
         The nodes.
     fraction : ndarray
-        Share of each node's square that the tool fills, shape (columns, rows).
+        Fraction of each node's square that the tool fills, shape (columns, rows).
     temperature : ndarray
         In K, shape (columns, rows).
     rounds : tuple of float
@@ -107,7 +107,7 @@ def steady_temperature(
     grid : Grid
         The nodes.
     fraction : ndarray
-        Share of each node's square that the tool fills, shape (columns, rows).
+        Fraction of each node's square that the tool fills, shape (columns, rows).
     tool_heat : ToolHeat
         The tool's conductivity.
     body : ToolBody
@@ -184,5 +184,5 @@ def beyond(grid: Grid, border: NDArray[np.int64], temperature: Field, body: Tool
     out = np.cumsum(lengths) - 0.5 * lengths + 0.5 * grid.cell
     i, j = border[:, 0], border[:, 1]
     r = _distance(grid)[i, j][:, None]
-    share = body.fall(r + out) / body.fall(r)
-    return body.holder_temperature + share * (temperature[i, j][:, None] - body.holder_temperature)
+    left = body.fall(r + out) / body.fall(r)
+    return body.holder_temperature + left * (temperature[i, j][:, None] - body.holder_temperature)

@@ -14,7 +14,7 @@ from chipglow.cutting.damage import damage_growth, weakening
 from chipglow.cutting.flow_stress import stress_and_slopes
 from chipglow.cutting.lanes import FAST, INLINE, exponential
 from chipglow.cutting.material import TABLE_COLDEST
-from chipglow.cutting.plastic_heat import heat_share
+from chipglow.cutting.plastic_heat import heat_fraction
 
 LANES = 128
 """Points of a batch: their rows stay in the fastest cache."""
@@ -27,7 +27,7 @@ _ITERATIONS = 8
 _SMALL_CHANGE = 0.02
 _SMALL_STRAIN = 0.01
 _MOST_HELP = 0.95
-"""Share of a point's strength that the flow around it takes off at most: it stays a solid."""
+"""Fraction of a point's strength that the flow around it takes off at most: it stays a solid."""
 (
     DXX, DYY, DXY, STRAIN, DAMAGE, TEMPERATURE, INCREMENT, VOLUME,
     CXX, CXY, CYX, CYY, TRIAL, WEAK, BOUND, WORK, SOFT, TENSION, FREE, EXPANSION, FALL, MEAN,
@@ -123,7 +123,7 @@ def _try(b, count, step):  # type: ignore[no-untyped-def]
         b[DXX + k], b[DYY + k], b[DXY + k] = dxx, dyy, shear
         square = dxx * dxx + dyy * dyy + dxx * dyy + shear * shear
         b[TRIAL + k] = b[SOFT + k] * np.sqrt(3.0 * square)
-        # Till here the rows hold the share of the bulk modulus and the last step's free volume.
+        # Till here the rows hold the fraction of the bulk modulus and the last step's free volume.
         bulk = step.bulk_modulus * b[TENSION + k]
         volume, free, before = b[VOLUME + k], b[FREE + k], b[EXPANSION + k]
         dilated = volume / free
@@ -191,12 +191,12 @@ def _moduli_loss(p, warm, elastic, step):  # type: ignore[no-untyped-def]
 
 @njit(**FAST)
 def update_stresses(  # type: ignore[no-untyped-def]
-    points, begin, end, step, law, damage, elastic, capacity, heat_shares, b
+    points, begin, end, step, law, damage, elastic, capacity, heat_fractions, b
 ):
     """Stress of up to `LANES` points.
 
-    Leaves their equivalent and mean stress, the soft share of the shear modulus, plastic work and
-    that of expansion in `b`. `elastic` is `WorkpieceMaterial.elastic_ratios`.
+    Leaves their equivalent and mean stress, the soft fraction of the shear modulus, plastic work
+    and that of expansion in `b`. `elastic` is `WorkpieceMaterial.elastic_ratios`.
     """
     count = end - begin
     for k in range(count):
@@ -210,8 +210,8 @@ def update_stresses(  # type: ignore[no-untyped-def]
         b[FALL + k] = _moduli_loss(p, warm, elastic, step)
         p.elastic_temperature = p.temperature
         # A kelvin of expansion is some megapascals of pressure: rows alone would be too coarse.
-        share = min(max(0.0, p.temperature - TABLE_COLDEST - warm), 1.0)
-        free = elastic[warm, VOLUME_FREE] + share * elastic[warm, VOLUME_RISE]
+        past = min(max(0.0, p.temperature - TABLE_COLDEST - warm), 1.0)
+        free = elastic[warm, VOLUME_FREE] + past * elastic[warm, VOLUME_RISE]
         b[EXPANSION + k], b[FREE + k] = p.free_volume, step.volume * free
         p.free_volume = b[FREE + k]
     _try(b, count, step)
@@ -229,7 +229,7 @@ def update_stresses(  # type: ignore[no-untyped-def]
             p.strain, p.damage = b[STRAIN + k], b[DAMAGE + k]
             work = b[WORK + k]
             if work > 0.0:
-                heat = heat_share(p.increment / step.time_step, heat_shares) * work
+                heat = heat_fraction(p.increment / step.time_step, heat_fractions) * work
                 p.temperature += heat / (step.heat_mass * property_at(capacity, p.temperature))
 
 

@@ -23,7 +23,7 @@ def border_nodes(fraction: NDArray[np.float64]) -> NDArray[np.int64]:
     Parameters
     ----------
     fraction : ndarray
-        Share of each node's square that the tool fills, shape (columns, rows).
+        Fraction of each node's square that the tool fills, shape (columns, rows).
     """
     columns, rows = fraction.shape
     i, j = np.arange(columns), np.arange(rows)
@@ -42,10 +42,10 @@ def conduct_beyond(temperature, far, border, fraction, tool_heat, grid, duration
     rate = tool_heat.conductivity * duration / (tool_heat.capacity * grid.cell**2)
     for k in range(border.shape[0]):
         i, j = border[k, 0], border[k, 1]
-        share = fraction[i, j]
+        filled = fraction[i, j]
         # Heat over capacity times a node's square; lengths and distances in cells of the grid.
         flow = rate * (temperature[i, j] - far[k, 0])
-        temperature[i, j] -= share * flow / max(share, SMALLEST_FRACTION)
+        temperature[i, j] -= filled * flow / max(filled, SMALLEST_FRACTION)
         length = 1.0
         for m in range(CELLS):
             out = 0.0

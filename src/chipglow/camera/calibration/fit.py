@@ -41,10 +41,10 @@ class CalibrationFit(Generic[Kind]):
         The points: radiance temperature of the blackbody in K and counts, shape (n,).
     residuals : ndarray
         Counts minus those of the calibration, shape (n,).
-    deviations : ndarray
+    standard_uncertainties : ndarray
         Standard uncertainty of each residual in counts, the temperature's included, shape (n,).
     stated : bool
-        Whether the points' uncertainties were stated. If not, the deviations are the scatter of
+        Whether the points' uncertainties were stated. If not, these are the scatter of
         the residuals themselves, which then prove nothing of the form of the calibration.
     """
 
@@ -52,7 +52,7 @@ class CalibrationFit(Generic[Kind]):
     temperatures: NDArray[np.float64]
     counts: NDArray[np.float64]
     residuals: NDArray[np.float64]
-    deviations: NDArray[np.float64]
+    standard_uncertainties: NDArray[np.float64]
     stated: bool
 
     @property
@@ -68,11 +68,11 @@ class CalibrationFit(Generic[Kind]):
     @property
     def chi_squared(self) -> float:
         """Sum of the squares of the residuals over their uncertainties."""
-        return float(np.sum((self.residuals / self.deviations) ** 2))
+        return float(np.sum((self.residuals / self.standard_uncertainties) ** 2))
 
     @property
     def probability(self) -> float | None:
-        """How often residuals as large as these come by chance; None unless `stated`.
+        """Probability of a chi-squared as large as this or larger; None unless `stated`.
 
         Where it is small, the form of the calibration or the stated uncertainties are wrong.
         """

@@ -54,7 +54,7 @@ def _draw(
     upper.plot(kelvins - KELVIN, counts, color=colour, linewidth=1.0, label=name)
     uncertainty = calibration.uncertainty(counts) / calibration.band.slope(kelvins)
     lower.fill_between(kelvins - KELVIN, -uncertainty, uncertainty, color=colour, alpha=0.2)
-    bars = fit.deviations / calibration.slope(fit.temperatures)
+    bars = fit.standard_uncertainties / calibration.slope(fit.temperatures)
     lower.errorbar(
         fit.temperatures - KELVIN, fit.residuals_temperature, bars,
         fmt=mark, color=colour, markersize=4, linewidth=0.8, label=name,
