@@ -76,8 +76,8 @@ class Recording:
     conversion : PlanckConversion, optional
         The factory conversion of counts.
     object_parameters : ObjectParameters, optional
-        What the camera was told of the object. Temperatures were computed with them; counts do not
-        depend on them.
+        What was set in the camera of the object. Temperatures were computed with them; counts do
+        not depend on them.
     notes : tuple of str
         What else the file says, a sentence each.
     range_name : str, optional

@@ -60,7 +60,7 @@ def block_of_points(
 def sort_by_cell(points, count, grid, right, top, target, starts):  # type: ignore[no-untyped-def]
     """Copy the points within the region into `target`, cell by cell; return how many.
 
-    `starts` (columns·rows + 1) tells where each cell's points begin; a point whose position is not
+    `starts` (columns·rows + 1) says where each cell's points begin; a point whose position is not
     finite makes the result negative.
     """
     cells = np.empty(count, np.int64)

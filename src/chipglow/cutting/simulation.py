@@ -308,7 +308,7 @@ class CuttingSimulation:
         return SteadyTool(state.grid, state.tool_fraction, state.tool_temperature, tuple(rounds))
 
     def _long_cut(self) -> "CuttingSimulation":
-        """The cut that tells the heat of a steady tool, as long as it may become."""
+        """The cut that gives the heat of a steady tool, as long as it may become."""
         feed = self.conditions.feed
         return replace(
             self,

@@ -17,7 +17,7 @@ Made = TypeVar("Made")
 
 
 def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) -> None:
-    """Write a measurement to a file: variables, flags and what its attributes tell.
+    """Write a measurement to a file: variables, flags and what its attributes state.
 
     Parameters
     ----------

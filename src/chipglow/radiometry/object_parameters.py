@@ -1,4 +1,4 @@
-"""What a thermographic camera was told of the object, and how to take it back."""
+"""The object parameters set in a thermographic camera, and how to take it back."""
 
 from dataclasses import dataclass
 from math import isfinite

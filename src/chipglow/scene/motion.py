@@ -1,4 +1,4 @@
-"""Motion of the material in a scene: what can be told of it from fields alone."""
+"""Motion of the material in a scene: what can be found of it from fields alone."""
 
 from typing import Final
 

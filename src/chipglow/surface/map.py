@@ -69,7 +69,7 @@ class MapSurface(Surface):
         return MapField(self.at(scene.raster))
 
     def known_fraction(self, raster: Raster) -> float:
-        """Fraction of other samples, 0 to 1, at which the image tells the emissivity."""
+        """Fraction of other samples, 0 to 1, at which the image gives the emissivity."""
         return float(np.mean(self._on(raster)[1] > _KNOWN))
 
     def at(self, raster: Raster) -> NDArray[np.float32]:

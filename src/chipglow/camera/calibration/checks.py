@@ -34,7 +34,7 @@ def residual_warnings(
     kelvins : ndarray
         Radiance temperatures of the points in K, shape (n,).
     stated : bool
-        Whether the uncertainties were stated; if not, only the order of the residuals tells.
+        Whether the uncertainties were stated; if not, only the order of the residuals is judged.
     """
     free = residuals.size - design.shape[1]
     total = float(residuals @ residuals)

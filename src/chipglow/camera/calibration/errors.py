@@ -16,7 +16,7 @@ CALIBRATION: Final = "calibration"
 
 @dataclass(frozen=True, eq=False)
 class CalibrationErrors:
-    """Independent errors of a calibration, and their effects on the radiance that it tells.
+    """Independent errors of a calibration, and their effects on the radiance that it gives.
 
     They are the same in all pixels, frames and files that were measured by the calibration: none
     falls in a mean.

@@ -84,7 +84,7 @@ class CalibrationFit(Generic[Kind]):
     def information_criterion(self) -> float:
         """Akaike's, corrected for few points: the form with the least is to be preferred.
 
-        Infinite where there are too few points to tell. Only of use between fits to the same
+        Infinite where there are too few points to say. Only of use between fits to the same
         points, with the same `stated`.
         """
         points, parameters = self.counts.size, self.calibration.parameters.size
@@ -138,7 +138,7 @@ def fit_linear(
     count_uncertainty, temperature_uncertainty : array_like, optional
         Standard uncertainties in counts and in K of each point, independent of those of the other
         points; of shape (n,) or one for all. If neither is given, all points weigh the same, and
-        the scatter of the residuals tells the uncertainty.
+        the scatter of the residuals gives the uncertainty.
     common_uncertainty : float
         Standard uncertainty in K of the blackbody's temperature that all points have in common,
         as of its certificate.
@@ -187,7 +187,7 @@ def fit_sakuma_hattori(
 ) -> CalibrationFit[SakumaHattori]:
     """Fit counts = offset + C / (exp(c2/(A T + B)) − 1) to blackbodies.
 
-    Parameters, weights and errors are those of `fit_linear`. The band is needed to tell the
+    Parameters, weights and errors are those of `fit_linear`. The band is needed to compute the
     radiance of a temperature, and for a first guess of A and B.
 
     Notes

@@ -332,7 +332,7 @@ class MeasuredPSF(PointSpreadFunction):
             A NumPy array (``.npy``), a table of numbers, separated by commas (``.csv``), or what
             ``chipglow psf`` writes (``.nc``).
         spacing : float, optional
-            Side of the kernel's squares in m, on the scene; None for a ``.nc``, which tells it.
+            Side of the kernel's squares in m, on the scene; None for a ``.nc``, which states it.
         includes : tuple of str, optional
             What it holds besides the optics; by default what a ``.nc`` says, and nothing.
 
@@ -351,7 +351,7 @@ class MeasuredPSF(PointSpreadFunction):
         if (spacing is None) != (kind == ".nc"):
             raise ValueError(
                 f"psf: spacing is {spacing!r} for {path}, expected "
-                + ("none: the file tells it" if kind == ".nc" else "a length such as 1e-6 m")
+                + ("none: the file states it" if kind == ".nc" else "a length such as 1e-6 m")
             )
         try:
             if spacing is None:
@@ -471,7 +471,7 @@ class MeasuredPSFFile(PSFChoice):
     spacing: Annotated[
         float | None,
         Parameter(
-            "Side of the kernel's samples; none for a .nc, which tells it.",
+            "Side of the kernel's samples; none for a .nc, which states it.",
             LENGTH,
             over=0.0,
             most=0.1,

@@ -225,12 +225,12 @@ class Timing:
 
 
 def common_exposure(exposures: NDArray[np.float64], remarks: FileRemarks) -> float | None:
-    """The integration time in s that all frames have; None if they differ or it is not told.
+    """The integration time in s that all frames have; None if they differ or it is not stated.
 
     Parameters
     ----------
     exposures : ndarray
-        Integration time of each frame in s, shape (frames,); 0 where it is not told.
+        Integration time of each frame in s, shape (frames,); 0 where it is not stated.
     remarks : FileRemarks
         Takes between which times they are, if they differ.
     """
@@ -244,7 +244,7 @@ def common_exposure(exposures: NDArray[np.float64], remarks: FileRemarks) -> flo
 
 
 def object_parameters(remarks: FileRemarks, **given: float | None) -> ObjectParameters:
-    """What a camera was told of the object; impossible values are noted and left out.
+    """What was set in a camera of the object; impossible values are noted and left out.
 
     Parameters
     ----------

@@ -402,13 +402,13 @@ def _object(fields: _Fields, remarks: FileRemarks) -> ObjectParameters:
     if distance is not None and humidity is not None and atmosphere is not None:
         fraction = humidity / 100 if humidity > 2 else humidity
         remarks.notes.append(
-            f"The camera was told of an object at {distance:g} m and a humidity of "
+            f"Set in the camera: an object at {distance:g} m and a humidity of "
             f"{fraction * 100:g} %."
         )
         transmittance *= _through_air(fields, distance, fraction, atmosphere)
     if window is not None and window != 1:
         remarks.notes.append(
-            f"The camera was told of a window that lets {window * 100:g} % pass, at "
+            f"Set in the camera: a window that lets {window * 100:g} % pass, at "
             f"{fields.number(0x30, 'f') - _ZERO:g} degC; here it is as warm as the air."
         )
     return object_parameters(

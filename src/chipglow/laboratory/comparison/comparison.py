@@ -505,7 +505,7 @@ def _position(measured: Measurement, stated: StatedUncertainties) -> float:
 def _few_frames(name: str, count: int) -> str:
     frames = "frame" if count == 1 else "frames"
     return (
-        f"{name}: {count} {frames} only, which do not tell how the temperature varies between "
+        f"{name}: {count} {frames} only, which do not show how the temperature varies between "
         "frames."
     )
 
