@@ -14,10 +14,9 @@ import numpy as np
 from experiments import BUILD_UP, aligned, view
 
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow, ToolBody
-from chipglow.laboratory.chip.contact import contact_length
+from chipglow.laboratory.chip import contact_length, contact_temperatures
 from chipglow.scene import Frame, Material
 
-BESIDE = 15e-6
 TOUCHING = 5e-6
 INTERVAL = 5e-6
 
@@ -27,20 +26,14 @@ class RakeFace:
 
     def __init__(self, simulation: CuttingSimulation) -> None:
         self.raster, self.tool = view(simulation), simulation.tool
-        x, y = np.meshgrid(self.raster.x, self.raster.y)
-        self.distance = self.tool.signed_distance(x, y)
-        (left, up), foot = self.tool.rake_direction, self.tool.rake_foot
-        self.along = (x - foot[0]) * left + (y - foot[1]) * up
         self.means: list[tuple[float, float, float]] = []
 
     def add(self, frame: Frame) -> None:
-        """Mean temperature in K of chip and tool within `BESIDE`, and the contact's length in m."""
+        """Mean temperature in K of chip and tool beside the contact, and its length in m."""
         workpiece = frame.material == Material.WORKPIECE
         contact = contact_length(self.raster, workpiece, self.tool, TOUCHING)
-        beside = (np.abs(self.distance) < BESIDE) & (self.along > 0) & (self.along < contact)
-        chip, inside = beside & workpiece, beside & (self.distance < 0)
-        means = (frame.temperature[chip].mean(), frame.temperature[inside].mean())
-        self.means.append((*map(float, means), contact))
+        beside = contact_temperatures(frame, self.raster, self.tool, contact)
+        self.means.append((*beside, contact))
 
 
 def row(name: str, simulation: CuttingSimulation) -> list[str]:

@@ -187,15 +187,15 @@ def test_a_second_run_finds_the_scene_and_replaces_the_results(earlier_results, 
 def test_reproduce_runs_the_papers_study(folder, monkeypatch):
     seen = []
 
-    def note(study, out, resume, agreed, remarks=()):
-        seen.append((study, str(out), resume, agreed, list(remarks)))
+    def note(study, out, resume, agreed, remarks=(), steady_tool=False):
+        seen.append((study, str(out), resume, agreed, list(remarks), steady_tool))
 
     monkeypatch.setattr("chipglow.cli.results.write_results", note)
-    assert chipglow("reproduce").exit_code == 0
+    assert chipglow("reproduce", "--steady-tool").exit_code == 0
     assert chipglow("reproduce", "--quick", "--out", "quick", "--resume", "--yes").exit_code == 0
     assert seen == [
-        (Study(), "chipglow-paper", False, False, []),
-        (Study.quick(), "quick", True, True, [QUICK]),
+        (Study(), "chipglow-paper", False, False, [], True),
+        (Study.quick(), "quick", True, True, [QUICK], False),
     ]
 
 

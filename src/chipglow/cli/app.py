@@ -79,6 +79,13 @@ def reproduce(
     quick: Annotated[
         bool, typer.Option("--quick", help="On a coarse cell and coarse samples, in a minute.")
     ] = False,
+    steady_tool: Annotated[
+        bool,
+        typer.Option(
+            "--steady-tool",
+            help="Beside it the same with a tool that has been cutting for long; twice the time.",
+        ),
+    ] = False,
     out: ResultFolder = PAPER_FOLDER,
     resume: Resume = False,
     yes: Yes = False,
@@ -89,9 +96,9 @@ def reproduce(
     from chipglow.study import Study
 
     if quick:
-        write_results(Study.quick(), out, resume, yes, [QUICK])
+        write_results(Study.quick(), out, resume, yes, [QUICK], steady_tool)
     else:
-        write_results(Study(), out, resume, yes)
+        write_results(Study(), out, resume, yes, steady_tool=steady_tool)
 
 
 @app.command()

@@ -17,11 +17,16 @@ from chipglow.errors import SceneErrors, StudyResult
 from chipglow.io import atomic_folder
 from chipglow.report import comparison_rows, place_rows, table_2, write_report, write_scene_report
 from chipglow.report.paper import stands_beside
-from chipglow.study import Study, errors, run, study_text
+from chipglow.study import Progress, Study, errors, run, study_text
 
 
 def write_results(
-    study: Study, folder: Path, resume: bool, agreed: bool, remarks: Sequence[str] = ()
+    study: Study,
+    folder: Path,
+    resume: bool,
+    agreed: bool,
+    remarks: Sequence[str] = (),
+    steady_tool: bool = False,
 ) -> None:
     """Run a study, write its report and print the comparison with the paper.
 
@@ -38,8 +43,11 @@ def write_results(
         Whether the user agreed beforehand to what it costs.
     remarks : sequence of str
         What a reader must know before quoting a number: printed, and on the page.
+    steady_tool : bool
+        Whether the same study with a tool that has been cutting for long stands beside it.
     """
-    _write(study, folder, resume, agreed, remarks, run)
+    beside = study.with_steady_tool() if steady_tool else None
+    _write(study, folder, resume, agreed, remarks, run, beside)
 
 
 def write_errors(study: Study, folder: Path) -> None:
@@ -62,16 +70,20 @@ def _write(
     agreed: bool,
     remarks: Sequence[str],
     compute: Callable[..., StudyResult | SceneErrors],
+    beside: Study | None = None,
 ) -> None:
     with atomic_folder(folder) as temporary:
         if study.scene is None:
             say_where_it_starts(study, resume, agreed)
+        if beside is not None:
+            say_where_it_starts(beside, resume, agreed)
         assumed: list[str] = []
         with progress_bars() as progress:
             result = compute(study, progress, resume, assumed.append)
+            steady = _steady(beside, progress, resume)
             progress("report", 0.0)
             said = [*remarks, *(f"Assumed: {one}" for one in assumed), *_warnings(result)]
-            report = _report(result, temporary, study, said)
+            report = _report(result, temporary, study, said, steady)
             progress("report", 1.0)
     say_assumed(assumed)
     _print_table(result)
@@ -85,13 +97,29 @@ def _write(
     print(f"Report: {folder / report.relative_to(temporary)}")
 
 
+def _steady(beside: Study | None, progress: Progress, resume: bool) -> StudyResult | None:
+    """The study with a steady tool, each step named so."""
+    if beside is None:
+        return None
+    found = run(beside, lambda step, done: progress(f"{step}, steady tool", done), resume)
+    if isinstance(found, SceneErrors):
+        raise ValueError(f"steady tool: {' '.join(found.missing)}")
+    return found
+
+
 def _report(
-    result: StudyResult | SceneErrors, folder: Path, study: Study, remarks: Sequence[str]
+    result: StudyResult | SceneErrors,
+    folder: Path,
+    study: Study,
+    remarks: Sequence[str],
+    steady: StudyResult | None,
 ) -> Path:
     provenance = _provenance(study)
     if isinstance(result, StudyResult):
         text, settings = study_text(study), table_2(study) if study.scene is None else ()
-        return write_report(result, folder, study.title, text, provenance, remarks, settings)
+        return write_report(
+            result, folder, study.title, text, provenance, remarks, settings, steady
+        )
     if study.title == Study().title:
         of = Path(study.scene).name if study.scene is not None else "the cut"
         study = study.model_copy(update={"title": f"Measurement error of {of}"})

@@ -29,6 +29,7 @@ class PaperValues:
     band_error: PaperValue = PaperValue(-46.0, "abstract, Figure 11b")
     band_psf_fraction: PaperValue = PaperValue(0.15, "abstract; -7 of -46 in Figure 11b")
     band_worst: PaperValue = PaperValue(-120.0, "Simulation measurement error, Figure 11b")
+    rake_missing: PaperValue = PaperValue(100.0, "Chip Temperature Near the Tool Rake Face")
     segment_period: PaperValue = PaperValue(90e-6, "Finite element analysis simulation")
 
 

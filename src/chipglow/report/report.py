@@ -23,6 +23,7 @@ from chipglow.report.page import (
 )
 from chipglow.report.paper import EmissivityTexts, stands_beside, table_1
 from chipglow.report.results import results_dataset, summary
+from chipglow.report.steady_tool import steady_tool_part, steady_tool_summary
 
 _PAPER: Final = (
     "J. C. Heigel, E. P. Whitenton: The effects of emissivity and camera point spread function on "
@@ -35,6 +36,7 @@ _BESIDE_PAPER: Final = {
     "figures": "The paper's figures and tables",
     "beyond": "Beyond the paper",
 }
+_STEADY: Final = "A tool that has been cutting for long"
 _OWN: Final = {
     "comparison": "The errors, and more",
     "emissivity": "Emissivity",
@@ -50,6 +52,7 @@ def write_report(
     provenance: Mapping[str, str],
     remarks: Sequence[str] = (),
     settings: Sequence[tuple[str, str, str]] = (),
+    steady: StudyResult | None = None,
 ) -> Path:
     """Write everything that a study gives into a folder.
 
@@ -69,6 +72,8 @@ def write_report(
         What a reader must know before quoting a number: sentences under the answer.
     settings : sequence of tuple
         Settings of the cut beside the paper's, see `paper.table_2`; none for a scene from a file.
+    steady : StudyResult, optional
+        The same study with a tool that has been cutting for long, to stand beside it.
 
     Returns
     -------
@@ -99,6 +104,7 @@ def write_report(
         first,
         ("scatter", "What makes the scatter", _causes(causes)),
         *others,
+        *_beside_steady(result, steady),
         ("chip", "The chip", _chip_table(chip)),
         *closing_sections(study_text, provenance),
         ("cite", "How to cite", _citation()),
@@ -107,9 +113,20 @@ def write_report(
         folder,
         document(title, sections),
         results_dataset(result, provenance),
-        summary(rows, causes, chip, provenance),
+        {**summary(rows, causes, chip, provenance), **_steady_numbers(result, steady)},
         study_text,
     )
+
+
+def _beside_steady(
+    result: StudyResult, steady: StudyResult | None
+) -> Iterator[tuple[str, str, str]]:
+    if steady is not None:
+        yield "steady-tool", _STEADY, steady_tool_part(result, steady)
+
+
+def _steady_numbers(result: StudyResult, steady: StudyResult | None) -> dict[str, object]:
+    return {} if steady is None else {"steady_tool": steady_tool_summary(result, steady)}
 
 
 def _comparison(result: StudyResult, rows: Sequence[Row]) -> str:

@@ -35,7 +35,7 @@ _IN_REGION: Final = "the whole scene within the simulated region"
 class FieldOfViewSection(Settings[Raster]):
     """Where the scene is sampled. The tip of the tool is near the origin, y points up."""
 
-    left: Position = described("-560 um", "Left edge of the scene.", _IN_REGION)
+    left: Position = described("-620 um", "Left edge of the scene.", _IN_REGION)
     top: Position = described("460 um", "Upper edge of the scene.", _IN_REGION)
     spacing: Length = described(
         "2/3 um",
@@ -43,7 +43,7 @@ class FieldOfViewSection(Settings[Raster]):
         "over 0 um",
     )
     rows: int = described(810, "Samples from top to bottom.", "1 or more")
-    columns: int = described(900, "Samples from left to right.", "1 or more")
+    columns: int = described(990, "Samples from left to right.", "1 or more")
 
     def build(self) -> Raster:
         """The grid of samples."""

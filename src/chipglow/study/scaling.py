@@ -8,7 +8,7 @@ from chipglow.quantities.units import CUT_LENGTH, LENGTH, POSITION, SPEED, TIME,
 
 _PAPERS: Final = {"feed": 0.3e-3, "speed": 250 / 60, "pitch": 6e-6, "integration_time": 10e-6}
 _START, _END, _LENGTH = 1.579e-3, 1.958e-3, 2.6e-3
-_LEFT, _TOP, _WIDTH, _HEIGHT = -560e-6, 460e-6, 600e-6, 540e-6
+_LEFT, _TOP, _WIDTH, _HEIGHT = -620e-6, 460e-6, 660e-6, 540e-6
 _INTERVAL, _BAND = 0.2e-6, 10e-6
 _ACROSS: Final = 9
 """Samples along a pixel, as in the paper."""

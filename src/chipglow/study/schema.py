@@ -10,7 +10,7 @@ from chipglow.errors import Plan
 from chipglow.quantities import OR_NONE, FileBeside, Section, described
 from chipglow.study.analysis_section import AnalysisSection
 from chipglow.study.camera_section import CameraSection
-from chipglow.study.cutting_section import CuttingSection
+from chipglow.study.cutting_section import STEADY, CuttingSection
 from chipglow.study.scaling import scaled
 from chipglow.study.surface_section import FeaturesSection, SurfaceSection, surface_names
 
@@ -62,6 +62,11 @@ class Study(Section):
         (name,) = surface_names(self.surface)
         return replace(plan, rake_surface=name, band_surface=name)
 
+    def with_steady_tool(self) -> Self:
+        """The same study with a tool that has been cutting for long."""
+        tool = self.cutting.tool.model_copy(update={"temperature": STEADY})
+        return self.model_copy(update={"cutting": self.cutting.model_copy(update={"tool": tool})})
+
     @property
     def is_papers(self) -> bool:
         """Whether it cuts, looks and reads as the paper does: its figures may stand beside it.
@@ -86,7 +91,7 @@ class Study(Section):
                 "cutting": {
                     "numerics": {"cell": "20 um"},
                     "window": {"interval": "0.5 us", "later_bands": 1},
-                    "field_of_view": {"spacing": "1.5 um", "rows": 360, "columns": 400},
+                    "field_of_view": {"spacing": "1.5 um", "rows": 360, "columns": 440},
                 },
                 "analysis": {
                     "exposures": 5,

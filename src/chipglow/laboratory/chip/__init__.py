@@ -3,7 +3,7 @@
 from chipglow.laboratory.chip.band_profile import BandProfile, Stage, band_profile
 from chipglow.laboratory.chip.band_ridge import ThermalImage, find_band
 from chipglow.laboratory.chip.chosen_tool import ChosenTool, chosen_tool
-from chipglow.laboratory.chip.contact import NoContactError, contact_length
+from chipglow.laboratory.chip.contact import NoContactError, contact_length, contact_temperatures
 from chipglow.laboratory.chip.curve_file import read_curve
 from chipglow.laboratory.chip.find_tool import FoundTool, find_tool
 from chipglow.laboratory.chip.inertia import Inertia, inertia
@@ -38,6 +38,7 @@ __all__ = [
     "chip_metrics",
     "chosen_tool",
     "contact_length",
+    "contact_temperatures",
     "find_band",
     "find_shear_band",
     "find_tool",

@@ -1,14 +1,18 @@
 """The contact of chip and tool: how far up the rake face the chip touches it."""
 
+from math import nan
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.scene import Raster, Tool
+from chipglow.scene import Frame, Material, Raster, Tool
 from chipglow.scene.lines import nearest
 
 _LONGEST_GAP: Final = 12e-6
+
+BESIDE: Final = 15e-6
+"""Distance from the rake face in m within which `contact_temperatures` takes means."""
 
 
 class NoContactError(ValueError):
@@ -50,3 +54,36 @@ def contact_length(
     gaps = np.diff(contacts) > _LONGEST_GAP
     last = int(gaps.argmax()) if gaps.any() else contacts.size - 1
     return float(contacts[last])
+
+
+def contact_temperatures(
+    frame: Frame, raster: Raster, tool: Tool, length: float
+) -> tuple[float, float]:
+    """Mean temperatures within `BESIDE` of the rake face, along the contact.
+
+    Parameters
+    ----------
+    frame : Frame
+        The scene at one time.
+    raster : Raster
+        Where the samples are.
+    tool : Tool
+        The tool.
+    length : float
+        Length of the contact in m, as `contact_length` gives it.
+
+    Returns
+    -------
+    tuple of float
+        Of the chip and of the tool in K; NaN where there is none.
+    """
+    x, y = np.meshgrid(raster.x, raster.y)
+    distance = tool.signed_distance(x, y)
+    (left, up), foot = tool.rake_direction, tool.rake_foot
+    along = (x - foot[0]) * left + (y - foot[1]) * up
+    beside = (np.abs(distance) < BESIDE) & (along > 0) & (along < length)
+    chip, inside = (
+        frame.temperature[beside & where]
+        for where in (frame.material == Material.WORKPIECE, distance < 0)
+    )
+    return float(chip.mean()) if chip.size else nan, float(inside.mean()) if inside.size else nan
