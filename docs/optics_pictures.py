@@ -14,6 +14,7 @@ from chipglow.camera import (
     Camera,
     ChargeDiffusion,
     Distortion,
+    FieldBlur,
     Jitter,
     LinearMotion,
     Narcissus,
@@ -82,6 +83,7 @@ def images() -> None:
         "narcissus 5 %": term(Narcissus(0.05, 80e-6, housing=318.15)),
         "veil 3 %, half in 200 µm": term(Veil(0.03, 200e-6)),
         "distortion 2 % at 250 µm": term(Distortion(0.02, 250e-6)),
+        "field blur 8 µm at 250 µm": term(FieldBlur(8e-6, 250e-6)),
     }
     figure, axes = plt.subplots(2, 4, figsize=(10.4, 6.6), layout="constrained")
     extent = tuple(1e6 * side for side in CAMERA.pixels(SCENE).extent)
@@ -89,7 +91,7 @@ def images() -> None:
     picture = first.imshow(without - 273.15, extent=extent, cmap="inferno")
     first.set_title("without", fontsize=9)
     figure.colorbar(picture, ax=first, label="radiance temperature / °C", location="bottom")
-    for axis, (name, camera) in zip(others, shown.items(), strict=False):
+    for axis, (name, camera) in zip(others, shown.items(), strict=True):
         change = kelvins(camera, radiance) - without
         largest = np.quantile(np.abs(change), 0.995)
         picture = axis.imshow(change, extent=extent, cmap="RdBu_r", vmin=-largest, vmax=largest)
@@ -98,7 +100,8 @@ def images() -> None:
         hot = without > 900.0
         print(name.replace("\n", " "), f"{change[hot].mean():.2f} K where it is over 900 K,")
         print(f"    {np.abs(change).max():.1f} K at most")
-    others[-1].set_axis_off()
+    figure.supxlabel("x / µm")
+    figure.supylabel("y / µm")
     figure.savefig(HERE / "optics-images.png", dpi=130)
 
 

@@ -6,12 +6,14 @@ from math import exp, log, sqrt
 
 import numpy as np
 import pytest
+from scipy.special import ndtr
 
 from chipglow.camera import (
     AnnularAperturePSF,
     BlurredPSF,
     Camera,
     Distortion,
+    FieldBlur,
     GaussianPSF,
     Jitter,
     Narcissus,
@@ -115,6 +117,21 @@ def test_distortion_moves_where_pixels_see(camera):
     # The mean over a pixel is that of its middle but for 0.02 · x · 2 · 6² / 12 / R²: 0.03 at most.
     np.testing.assert_allclose(image[inside], expected[inside], atol=0.03)
     assert np.abs(image - seen(ramp, camera=camera))[inside].max() > 3.0
+
+
+def test_the_blur_of_an_edge_grows_with_the_square_of_the_distance_from_the_axis():
+    term, spacing = FieldBlur(20e-6, 250e-6), SCENE.spacing
+    border = SCENE.x[220] - spacing / 2
+    edge = np.where(SCENE.x > border, 400.0, 0.0) * np.ones(SCENE.shape)
+    camera = replace(IDEAL, pitch=spacing)
+    x, y = SCENE.x - SCENE.x.mean(), (SCENE.y - SCENE.y.mean())[:, None]
+    deviation = 20e-6 * (x**2 + y**2) / 250e-6**2
+    expected = 400 * ndtr((SCENE.x - border) / deviation)
+    image = seen(edge, term, camera=camera)
+    # Between variances that double: the mixture of two Gaussians is off by 0.8 % at most.
+    np.testing.assert_allclose(image, expected, atol=0.01 * 400)
+    np.testing.assert_allclose(seen(even(800.0), term), even(800.0)[0, 0], rtol=1e-12)
+    np.testing.assert_array_equal(seen(rough(), FieldBlur(0.0, 250e-6)), seen(rough()))
 
 
 def test_form_image_stands_alone():

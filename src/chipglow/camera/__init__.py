@@ -60,6 +60,7 @@ from chipglow.camera.optics.pupil import Pupil, PupilPSF
 from chipglow.camera.optics.terms import (
     OPTICS_TERMS,
     Distortion,
+    FieldBlur,
     Narcissus,
     OpticalElement,
     OpticsTerm,
@@ -94,6 +95,7 @@ __all__ = [
     "Distortion",
     "Exposure",
     "FactoryCalibration",
+    "FieldBlur",
     "FittedCalibration",
     "FixedPattern",
     "Flag",

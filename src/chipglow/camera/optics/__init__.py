@@ -24,6 +24,7 @@ from chipglow.camera.optics.pupil import Pupil, PupilPSF
 from chipglow.camera.optics.terms import (
     OPTICS_TERMS,
     Distortion,
+    FieldBlur,
     Narcissus,
     OpticalElement,
     OpticsTerm,
@@ -40,6 +41,7 @@ __all__ = [
     "BlurredPSF",
     "ChargeDiffusion",
     "Distortion",
+    "FieldBlur",
     "GaussianPSF",
     "Jitter",
     "LinearMotion",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from chipglow.camera.optics.kernel import half_size, poisson_squares
-from chipglow.camera.optics.psf import PointSpreadFunction
+from chipglow.camera.optics.psf import GaussianPSF, PointSpreadFunction
 from chipglow.quantities import Family, Parameter, Part
 from chipglow.quantities.units import LENGTH, TEMPERATURE
 from chipglow.radiometry import Band
@@ -19,6 +19,9 @@ from chipglow.scene import Raster
 
 Blur: TypeAlias = Callable[[NDArray[np.float64], PointSpreadFunction, float], NDArray[np.float64]]
 """A convolution with a point spread function: `chipglow.camera.blur`, or `blur_of_like`."""
+
+_FWHM: Final = sqrt(8 * log(2))
+"""Full width at half maximum of a Gaussian over its standard deviation."""
 
 OPTICS_TERMS: Final = Family("optics_term")
 """Terms by their kind; other packages add theirs in the group ``chipglow.optics_term``."""
@@ -242,6 +245,41 @@ class Distortion(OpticsTerm):
             [rows[:, None] - farther * y / scene.spacing, columns + farther * x / scene.spacing]
         )
         return np.asarray(map_coordinates(radiance, places, order=1, mode="nearest"))
+
+
+@final
+@OPTICS_TERMS.part
+@dataclass(frozen=True)
+class FieldBlur(OpticsTerm):
+    """A blur that grows from the optical axis to the field's border.
+
+    At the distance r from the axis, the pixels' middle, light is spread by a Gaussian of the
+    standard deviation s r² / R²: where the image is a curved surface and the detector a plane,
+    defocus grows with r² (Petzval's curvature). Between images of variances that double, a value is
+    interpolated linearly in the variance.
+    """
+
+    kind: ClassVar[str] = "field-blur"
+    example: ClassVar[str] = "{kind: field-blur, standard_deviation: 6 um, radius: 400 um}"
+    standard_deviation: Annotated[
+        float, Parameter("Of the blur at the radius, on the scene.", LENGTH, least=0.0)
+    ]
+    radius: Annotated[float, Parameter("That radius, on the scene.", LENGTH, over=0.0)]
+
+    def on_samples(
+        self, radiance: NDArray[np.float64], scene: Raster, pixels: Raster, blurred: Blur
+    ) -> NDArray[np.float64]:
+        """Image with the blur; see `OpticsTerm.on_samples`."""
+        x, y = _from_axis(scene, pixels)
+        variance = (self.standard_deviation * (x**2 + y**2) / self.radius**2) ** 2
+        result, sharper, low, high = radiance.copy(), radiance, 0.0, (scene.spacing / 2) ** 2
+        while low < variance.max():
+            softer = blurred(radiance, GaussianPSF(_FWHM * sqrt(high)), scene.spacing)
+            here = (variance > low) & (variance <= high)
+            part = (variance[here] - low) / (high - low)
+            result[here] = sharper[here] + part * (softer[here] - sharper[here])
+            sharper, low, high = softer, high, 2 * high
+        return result
 
 
 def _from_axis(raster: Raster, pixels: Raster) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
