@@ -19,7 +19,9 @@ _FRAMES_A_BAND: Final = 2
 _TOUCHING: Final = 3e-6
 _CHIP_OVER_FEED: Final = 1.2
 _UNDEFORMED: Final = 0.01
-_WHOLE: Final = 0.95
+_WHOLE: Final = 0.9
+"""Fraction of a period from which on it counts as whole."""
+
 _DEVELOPED: Final = 0.5
 
 
@@ -160,7 +162,8 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     and over 1.2 times the feed all the time. There it is formed and still lies on the face: on a
     higher line, which a taller view would have, it has lifted off and curls, so that the line
     crosses the gap and the chip oblique. The means are over whole periods, each moment
-    weighted by the chip's speed, which makes them means over the chip's length. At most 64
+    weighted by the chip's speed, which makes them means over the chip's length; nine tenths of a period
+    count as a whole one. At most 64
     frames, evenly spread, are looked at; of a scene with gaps those of its longest part without.
     """
     tool = scene.tool
