@@ -16,7 +16,7 @@ STUDY = f"""
 cutting:
   numerics: {{cell: {COARSEST} um}}
   window: {{interval: 0.5 us}}
-  field_of_view: {{spacing: 1.5 um, rows: 360, columns: 400}}
+  field_of_view: {{spacing: 1.5 um, rows: 360, columns: 440}}
 analysis: {{exposures: 3, psf_widths: [8 um, 12 um]}}
 """
 NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|\bnan\b|\binf\b")

@@ -162,9 +162,9 @@ def chip_metrics(scene: Scene, feed: float | None = None) -> ChipMetrics:
     and over 1.2 times the feed all the time. There it is formed and still lies on the face: on a
     higher line, which a taller view would have, it has lifted off and curls, so that the line
     crosses the gap and the chip oblique. The means are over whole periods, each moment
-    weighted by the chip's speed, which makes them means over the chip's length; nine tenths of a period
-    count as a whole one. At most 64
-    frames, evenly spread, are looked at; of a scene with gaps those of its longest part without.
+    weighted by the chip's speed, which makes them means over the chip's length; nine tenths of a
+    period count as a whole one. At most 64 frames, evenly spread, are looked at; of a scene with
+    gaps those of its longest part without.
     """
     tool = scene.tool
     if tool is None:
