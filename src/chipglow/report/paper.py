@@ -55,7 +55,7 @@ QUICK: Final = (
     "For a first look only: --quick cuts with a cell of 20 µm in place of 10 µm, on samples of "
     "1.5 µm in place of 2/3 µm, and makes 16 draws in place of 135. Its errors are somewhat too "
     "small: −61 °C in place of −69 °C at the rake face, −36 °C in place of −37 °C at the centre of "
-    "the shear band, −66 °C in place of −73 °C beside it. To quote figures, run without --quick."
+    "the shear band, −66 °C in place of −72 °C beside it. To quote figures, run without --quick."
 )
 """What to know before quoting the quick study; means over the draws of both studies."""
 
