@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 
-from chipglow.radiometry import Band, ObjectParameters
+from chipglow.radiometry import Band, ObjectParameters, TabulatedResponse
 from chipglow.radiometry.planck import FIRST_RADIATION_CONSTANT, SECOND_RADIATION_CONSTANT
 
 REFERENCE = Path(__file__).parent / "reference" / "inband_radiance.csv"
@@ -32,6 +32,7 @@ def test_radiance_against_30_digits(limits, values):
     np.testing.assert_allclose(band.temperature(radiance), temperature, atol=1e-3, rtol=0)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.floats(250.0, 6000.0))
 def test_round_trip(temperature):
     # design: under 1 mK to 3000 K; a scene may have 6000 K
@@ -42,6 +43,47 @@ def test_table_is_as_good_as_the_integral_between_its_nodes():
     temperature = np.random.default_rng(1).uniform(250, 6000, 5000)
     exact = MID_WAVE._integrate(temperature)
     np.testing.assert_allclose(MID_WAVE.radiance(temperature), exact, rtol=1e-9)
+
+
+NOTCHED = TabulatedResponse(
+    (2.9e-6, 3.2e-6, 4.1e-6, 4.26e-6, 4.3e-6, 4.9e-6, 5.3e-6), (0.0, 0.8, 1.0, 0.2, 0.95, 1.0, 0.0)
+)
+
+
+@pytest.mark.parametrize(
+    "band",
+    [MID_WAVE, Band(0.9e-6, 1.7e-6), Band(7.5e-6, 14e-6), Band(2.9e-6, 5.3e-6, NOTCHED)],
+    ids=["mid", "short", "long", "response"],
+)
+def test_the_table_of_the_inverse_is_as_good_as_newtons_method(band):
+    coldest, hottest = band._integrate(np.array([200.0, 6000.0]))
+    radiance = np.geomspace(coldest * (1 + 1e-12), hottest, 5003)
+    exact = band._invert(radiance)
+    # The stated bound of its cubics; Newton's method and rounding leave under 1e-12.
+    np.testing.assert_allclose(band.temperature(radiance), exact, rtol=1.6e-10)
+    # In float32 the result is rounded.
+    single = radiance[radiance > 1e-35].astype(np.float32)
+    again = band._invert(single.astype(np.float64))
+    np.testing.assert_allclose(band.temperature(single), again, rtol=2.0**-24 + 2e-10)
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_an_array_may_hold_what_is_in_the_table_beyond_it_and_nothing(kind):
+    temperature = np.array([[900.0, 150.0, 400.0], [8000.0, 6000.5, 199.5]])
+    radiance = np.array(MID_WAVE._integrate(temperature.ravel()), kind).reshape(2, 3)
+    given = np.vstack([radiance, np.array([[0.0, np.nan, -1e-3]], kind)])
+    found = MID_WAVE.temperature(given[:, ::-1])[:, ::-1]
+    assert found.dtype == kind
+    np.testing.assert_allclose(found[:2], temperature, rtol=1e-6 if kind is np.float32 else 2e-10)
+    assert np.isnan(found[2]).all()
+
+
+def test_a_band_that_hardly_sees_the_cold_is_inverted_too():
+    ultraviolet = Band(0.2e-6, 0.25e-6)
+    temperature = np.array([300.0, 700.0, 2500.0, 5999.0])
+    # That of 300 K is 8e-76 W/(m² sr), far under what the table holds.
+    found = ultraviolet.temperature(ultraviolet._integrate(temperature))
+    np.testing.assert_allclose(found, temperature, rtol=2e-10)
 
 
 @pytest.mark.parametrize("temperature", [60.0, 150.0, 7000.0, 20000.0])

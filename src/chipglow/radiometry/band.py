@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil, inf, log
+from math import ceil, inf
 from numbers import Real
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eigh_tridiagonal
 
@@ -21,8 +21,14 @@ TABLE_COLDEST: Final = 200.0
 TABLE_HOTTEST: Final = 6000.0
 _NODES_PER_PANEL: Final = 16
 _TEMPERATURE_STEP: Final = 0.25
-_INVERSE_NODES: Final = 4096
-_CHUNK: Final = 65536
+_SHIFT: Final = 46
+"""Low bits of a radiance that lie between two nodes of the inverse: 64 nodes to a power of two."""
+
+_POWERS: Final = 128
+"""Powers of two below the greatest radiance that the inverse's table reaches at most."""
+
+_BLOCK: Final = 1024
+_KERNEL: Final[Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 @dataclass(frozen=True)
@@ -85,9 +91,8 @@ class Band:
         """
         values = _as_floats(temperature)
         result = np.empty_like(values)
-        _look_up_radiance(values.ravel(), self.radiance_table, result.ravel())
-        outside = (values > 0) & ~((values >= TABLE_COLDEST) & (values <= TABLE_HOTTEST))
-        if outside.any():
+        if _look_up_radiance(values.ravel(), self.radiance_table, result.ravel()):
+            outside = (values > 0) & ~((values >= TABLE_COLDEST) & (values <= TABLE_HOTTEST))
             result[outside] = self._integrate(values[outside].astype(np.float64))
         return result
 
@@ -104,14 +109,20 @@ class Band:
         ndarray
             Radiance temperature in K, of the same shape, float32 for float32 and else float64;
             NaN where the radiance is not positive and finite.
+
+        Notes
+        -----
+        From 200 K to 6000 K by a table at even steps of the radiance within each power of two: the
+        bits of the number itself tell the place. Between its nodes, at most h = 1/64 of the
+        radiance L apart, there are cubics with the slopes of the exact inverse at both ends. Their
+        error is (h L)⁴ T⁗(L) / 384 at most, and L⁴ T⁗ is T at most where T goes like a power of L
+        from 0 to 1: 1.6e-10 T, which is 1 µK at 6000 K. Beyond, and more than 128 powers of two
+        under the radiance of 6000 K, the integral itself is inverted.
         """
         values = _as_floats(radiance)
         result = np.empty_like(values)
-        first, step, nodes, slopes = self._inverse_table
-        _look_up_temperature(values.ravel(), first, step, nodes, slopes, result.ravel())
-        # What the table did not answer, so that rounding at its ends leaves no gap.
-        outside = np.isnan(result) & (values > 0) & np.isfinite(values)
-        if outside.any():
+        if _look_up_temperature(values.ravel(), *self._inverse_table, result.ravel()):
+            outside = np.isnan(result) & (values > 0) & np.isfinite(values)
             result[outside] = self._invert(values[outside].astype(np.float64))
         return result
 
@@ -234,22 +245,23 @@ class Band:
         return wavelength, weights
 
     @cached_property
-    def _inverse_table(self) -> tuple[float, float, NDArray[np.float64], NDArray[np.float64]]:
-        """1/T and its slope at even steps of ln L: nearly a straight line, so cubics are exact."""
+    def _inverse_table(self) -> tuple[int, NDArray[np.float64]]:
+        """Place of the first node, as the high bits of its radiance, and cubics, shape (n, 4)."""
         ends = self._integrate(np.array([TABLE_COLDEST, TABLE_HOTTEST]))
-        first, last = log(ends[0]), log(ends[1])
-        logarithm = np.linspace(first, last, _INVERSE_NODES)
-        step = (last - first) / (_INVERSE_NODES - 1)
-        temperature = self._invert(np.exp(logarithm))
-        relative_slope = self._derivative(temperature) / self._integrate(temperature)
-        slopes = -step / (temperature**2 * relative_slope)
-        return first, step, 1.0 / temperature, slopes
+        first, last = np.maximum(ends, ends[1] * 0.5**_POWERS).view(np.int64) >> _SHIFT
+        radiance = (np.arange(first, last + 2) << _SHIFT).view(np.float64)
+        temperature = self._invert(radiance)
+        begin, rise, step = temperature[:-1], np.diff(temperature), np.diff(radiance)
+        slope = 1.0 / self._derivative(temperature)
+        left, right = step * slope[:-1], step * slope[1:]
+        cubics = [begin, left, 3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise]
+        return int(first), np.stack(cubics, axis=1)
 
     def _integrate(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
         wavelength, weights = self._quadrature
         result = np.empty_like(temperature)
-        for at in range(0, temperature.size, _CHUNK // 64):
-            part = slice(at, at + _CHUNK // 64)
+        for at in range(0, temperature.size, _BLOCK):
+            part = slice(at, at + _BLOCK)
             result[part] = spectral_radiance(wavelength, temperature[part, None]) @ weights
         return result
 
@@ -298,25 +310,35 @@ def table_radiance(temperature, table):  # type: ignore[no-untyped-def]
     return value + _TEMPERATURE_STEP * s * r * bend
 
 
-@njit(cache=True, parallel=True)
+# These run on the caller's thread: threads that wait for work by spinning would take the processor
+# from others, for what lasts a few microseconds a frame.
+@njit(**_KERNEL)
 def _look_up_radiance(temperature, table, radiance):  # type: ignore[no-untyped-def]
-    for chunk in prange((temperature.size + _CHUNK - 1) // _CHUNK):
-        for i in range(chunk * _CHUNK, min((chunk + 1) * _CHUNK, temperature.size)):
-            radiance[i] = table_radiance(temperature[i], table)
+    """Fill in radiances, NaN where the table has none; how many are NaN."""
+    missing = 0
+    for i in range(temperature.size):
+        value = table_radiance(temperature[i], table)
+        radiance[i] = value
+        missing += np.isnan(value)
+    return missing
 
 
-@njit(cache=True, parallel=True)
-def _look_up_temperature(radiance, first, step, nodes, slopes, temperature):  # type: ignore[no-untyped-def]
-    for chunk in prange((radiance.size + _CHUNK - 1) // _CHUNK):
-        for i in range(chunk * _CHUNK, min((chunk + 1) * _CHUNK, radiance.size)):
-            temperature[i] = np.nan
-            if not 0.0 < radiance[i] < np.inf:
+@njit(**_KERNEL)
+def _look_up_temperature(radiance, first, cubics, temperature):  # type: ignore[no-untyped-def]
+    """Fill in temperatures, NaN where the table has none; how many are NaN."""
+    block = np.empty(_BLOCK)
+    missing = 0
+    for begin in range(0, radiance.size, _BLOCK):
+        count = min(_BLOCK, radiance.size - begin)
+        block[:count] = radiance[begin : begin + count]
+        # The bits of a positive number are in the order of the numbers.
+        for i, bits in enumerate(block[:count].view(np.int64)):
+            k = np.uint64((bits >> _SHIFT) - first)
+            if k >= np.uint64(cubics.shape[0]):
+                temperature[begin + i] = np.nan
+                missing += 1
                 continue
-            position = (np.log(radiance[i]) - first) / step
-            if not (0.0 <= position <= nodes.size - 1):
-                continue
-            k = min(int(position), nodes.size - 2)
-            s = position - k
-            r = 1.0 - s
-            value = r * r * (1.0 + 2.0 * s) * nodes[k] + s * s * (3.0 - 2.0 * s) * nodes[k + 1]
-            temperature[i] = 1.0 / (value + s * r * (r * slopes[k] - s * slopes[k + 1]))
+            s = np.float64(bits & ((1 << _SHIFT) - 1)) * (1.0 / (1 << _SHIFT))
+            bend = cubics[k, 2] + s * cubics[k, 3]
+            temperature[begin + i] = cubics[k, 0] + s * (cubics[k, 1] + s * bend)
+    return missing
