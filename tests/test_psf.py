@@ -9,7 +9,7 @@ from scipy.ndimage import convolve
 from scipy.special import erf, j0, j1
 
 from chipglow.camera import AnnularAperturePSF, GaussianPSF, MeasuredPSF
-from chipglow.camera.optics.convolution import blur, blur_of_like, light_from_beyond
+from chipglow.camera.optics.convolution import blur, blur_of_like, both_borders, light_from_beyond
 from chipglow.camera.optics.psf import ANNULAR_ENERGY, GAUSSIAN_ENERGY
 
 FWHM_PER_SIGMA = 2 * sqrt(2 * log(2))
@@ -359,6 +359,17 @@ def test_the_light_from_beyond_is_what_the_view_does_not_send(psf):
     radiance = np.random.default_rng(4).uniform(1, 100, shape)
     inside = convolve(radiance, psf.view_kernel(spacing, 40, 40), mode="constant")
     np.testing.assert_allclose(blur_of_like(radiance, psf, spacing), inside / within, rtol=1e-11)
+
+
+@pytest.mark.parametrize("psf", KINDS, ids=repr)
+def test_both_borders_are_the_images_by_either_rule(psf):
+    radiance = np.random.default_rng(5).uniform(1, 100, (40, 23))
+    kept = radiance.copy()
+    edge, like = both_borders(radiance, psf, 2e-6)
+    np.testing.assert_array_equal(radiance, kept)
+    # The same operations.
+    np.testing.assert_array_equal(edge, blur(radiance, psf, 2e-6))
+    np.testing.assert_array_equal(like, blur_of_like(radiance, psf, 2e-6))
 
 
 def test_half_the_light_at_a_border_is_from_beyond_it():

@@ -20,7 +20,7 @@ from chipglow.camera.optics import (
     PointSpreadFunction,
     blur,
 )
-from chipglow.camera.optics.convolution import blur_of_like, light_from_beyond
+from chipglow.camera.optics.convolution import blur_of_like, both_borders, light_from_beyond
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
 from chipglow.camera.optics.terms import Blur
 from chipglow.camera.warning import ChipglowWarning
@@ -306,10 +306,13 @@ class Camera:
                 raise ValueError(f"camera: exposures of different grids, {sensors} and {found}")
             sensors = found
             starts.append(exposure.start)
-            seen = exposure.mean_radiance, exposure.raster, sensors
-            frames.append(self._read_out(*seen, blur))
+            image, scene = exposure.mean_radiance, exposure.raster
+            like = image
+            if self.psf is not None and self.psf_order == "optics":
+                image, like = both_borders(image, self.psf, scene.spacing)
+            frames.append(self._read_out(image, scene, sensors, blur))
             if self.psf is not None or self.optics:
-                alike.append(self._read_out(*seen, blur_of_like))
+                alike.append(self._read_out(like, scene, sensors, blur_of_like))
         if sensors is None:
             raise ValueError("camera: no exposure to develop, expected 1 or more")
         measured = self._measurement(np.stack(frames), np.array(starts), sensors)
@@ -405,14 +408,15 @@ class Camera:
             raise ValueError(f"camera: radiance of shape {image.shape}, expected {scene.shape}")
         if not (np.isfinite(image).all() and (image >= 0).all()):
             raise ValueError("camera: radiance must be finite and 0 W/(m² sr) or more")
-        return self._read_out(image, scene, self.pixels(scene), blur)
+        sensors = self.pixels(scene)
+        if self.psf is not None and self.psf_order == "optics":
+            image = blur(image, self.psf, scene.spacing)
+        return self._read_out(image, scene, sensors, blur)
 
     def _read_out(
         self, image: NDArray[np.float64], scene: Raster, sensors: Raster, blurred: Blur
     ) -> NDArray[np.float64]:
-        """Radiance of every pixel, shape `sensors.shape`."""
-        if self.psf is not None and self.psf_order == "optics":
-            image = blurred(image, self.psf, scene.spacing)
+        """Radiance of every pixel, `sensors.shape`, from an image behind the optics' own PSF."""
         for term in self.optics:
             image = term.on_samples(image, scene, sensors, blurred)
         image = self._on_pixels(image, scene, sensors, blurred)
