@@ -91,7 +91,11 @@ def test_a_run_goes_on_from_any_checkpoint_with_the_same_bits():
         assert len(rest) == sum(frame.time > checkpoint.time for frame in frames)
         for frame, expected in zip(rest, frames[len(frames) - len(rest) :], strict=True):
             for name, values in vars(expected).items():
-                np.testing.assert_array_equal(getattr(frame, name), values, strict=True)
+                if name != "splines":
+                    np.testing.assert_array_equal(getattr(frame, name), values, strict=True)
+            for name in ("nodes", "limits"):
+                here, there = (getattr(one.splines, name) for one in (frame, expected))
+                np.testing.assert_array_equal(here, there, strict=True)
         for name in ("time", "cutting", "thrust"):
             np.testing.assert_array_equal(getattr(again, name), getattr(history, name))
         for name, values in vars(history.energy).items():

@@ -13,14 +13,18 @@ from . import (
 )
 from .camera import (
     AnnularAperturePSF as AnnularAperturePSF,
+    BlurredPSF as BlurredPSF,
     Camera as Camera,
     ChipglowWarning as ChipglowWarning,
     Detector as Detector,
     GaussianPSF as GaussianPSF,
+    Jitter as Jitter,
     MeasuredPSF as MeasuredPSF,
     Measurement as Measurement,
+    PupilPSF as PupilPSF,
     ReadNoise as ReadNoise,
     ShotNoise as ShotNoise,
+    Veil as Veil,
 )
 from .cutting import (
     AISI_1045 as AISI_1045,

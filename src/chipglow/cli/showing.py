@@ -14,7 +14,7 @@ from rich.table import Table
 from chipglow.cli.pictures import write_picture
 from chipglow.cli.times import parse_instant
 from chipglow.drawing.frames import shown_frame
-from chipglow.io import StoredScene, open_scene
+from chipglow.io import StoredScene, is_scene, open_scene
 from chipglow.io.measurement_file import holds
 from chipglow.quantities.format import rounded_text
 from chipglow.report import SceneSummary, draw_scene, scene_summary
@@ -69,7 +69,7 @@ def check_shown(path: Path) -> None:
             f"{path}: is no NetCDF-4 file, or cut short, expected a scene or a measurement "
             "(chipglow convert looks into a camera's file)"
         )
-    if path.is_file() and not holds(path, ("temperature",)):
+    if path.is_file() and not is_scene(path):
         raise ValueError(
             f"{path}: has neither temperature nor radiance, expected a scene or a measurement"
         )

@@ -44,7 +44,7 @@ def _unset(
     """Fields that nobody set, with their values as a study writes them."""
     for name in type(section).model_fields:
         value = getattr(section, name)
-        if name in without or values[name] == "none":
+        if name in without or values[name] in ("none", []):
             continue
         if name not in section.model_fields_set:
             yield f"{prefix}{name} {_written(values[name])}"

@@ -165,7 +165,7 @@ class PupilPSF(PointSpreadFunction):
     -----
     With the pupil's coordinate ρ (the sine of the angle over the aperture, as an aplanatic lens
     has it), the path difference W and P = 1 within the pupil, light of the wavelength λ that leaves
-    a point falls on the scene's plane with the density |∫ P exp(2πi (W − NA ρ·x) / λ) d²ρ|²
+    a point falls on the scene's plane with the density ``|∫ P exp(2πi (W − NA ρ·x) / λ) d²ρ|²``
     (Born and Wolf, Principles of Optics, 9.1; scalar, as the paraxial theory has it). A
     ray lands at ∇W / NA. Defocus by z is W = z (√(1 − NA² ρ²) − 1) (Hanser et al., J. Microsc. 216
     (2004) 32), and Zernike polynomials are those of Noll, J. Opt. Soc. Am. 66 (1976) 207.
