@@ -34,11 +34,15 @@ from scipy.special import j1, k1, ndtr
 from chipglow.camera import (
     AnnularAperturePSF,
     Camera,
+    DeadElements,
     Detector,
+    EnergyResponse,
     FittedCalibration,
+    GainPattern,
     GaussianPSF,
     MeasuredPSF,
     Measurement,
+    OffsetPattern,
     PointSpreadFunction,
     ReadNoise,
     Recording,
@@ -84,6 +88,7 @@ BLACK_BODIES: Final = (200, 260, 320, 390, 460, 540, 620, 700)  # degC
 
 # What the people of the laboratory know of their instruments: standard uncertainties in K.
 THERMOCOUPLE, ROOM, CERTIFICATE, SETTING = 2.0, 2.0, 0.4, 0.3
+GAIN: Final = 4e-3  # counts of an electron
 DRIFT = 0.3  # counts from one recording to the next
 
 REGIONS = """regions:
@@ -223,13 +228,21 @@ class Laboratory:
         # TIFF is read in a subprocess, whose start takes longer than all the rest.
         self.edge_format = ".tif" if seed % 10 == 0 else ".npy"
         self.optics = hidden_optics(generator)
-        plain = Detector(
-            gain=generator.uniform(0.85, 1.0),
+        self.slope = generator.uniform(0.85, 1.0)  # counts of 1 W/(m² sr)
+        self.detector = Detector(
+            response=EnergyResponse(self.slope / GAIN),
+            gain=GAIN,
             offset=generator.uniform(200.0, 400.0),
             bits=12,
-            terms=(ShotNoise(4e-3), ReadNoise(generator.uniform(1.5, 2.5))),
+            terms=(
+                GainPattern(0.02),
+                DeadElements(0.003),
+                ShotNoise(),
+                OffsetPattern(12.0 / GAIN),
+                ReadNoise(generator.uniform(1.5, 2.5) / GAIN),
+            ),
+            seed=int(generator.integers(2**31)),
         )
-        self.detector = plain.with_pattern(SHAPE, 0.02, 12.0, 0.003, generator)
         self.room = 293.0 + ROOM * generator.standard_normal()
         self.certificate = CERTIFICATE * generator.standard_normal()
         self.oven = CELSIUS + generator.uniform(360.0, 420.0)  # of the heated chip
@@ -296,7 +309,7 @@ class Laboratory:
 
     def _record(self, path: Path, radiance: NDArray[np.float64], count: int) -> None:
         """Counts of an image of radiance, in the format that the name tells."""
-        drift = DRIFT / self.detector.gain * self._generator.standard_normal()
+        drift = DRIFT / self.slope * self._generator.standard_normal()
         frames = np.broadcast_to(radiance + drift, (count, *SHAPE))
         counts = self.detector.counts(frames, self._generator).astype(np.uint16)
         if path.suffix == ".npy":

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.camera import Detector, ReadNoise, Recording, ShotNoise
+from chipglow.camera import Detector, EnergyResponse, ReadNoise, Recording, ShotNoise
 from chipglow.drawing.drawing import HEAT, KELVIN, PLAIN, new_figure, style
 from chipglow.io.cameras import read_recording, write_hcc
 from chipglow.radiometry import Band
@@ -49,9 +49,10 @@ def chip() -> Recording:
         solid = (from_face > 0) & (from_face < 250e-6 + 40e-6 * along)
         hot = 560 + 330 * np.exp(-from_face / 120e-6) + 70 * along
         frames.append(np.where(solid, hot, 300.0))
-    counts = Detector(gain=0.7, offset=400.0, terms=(ShotNoise(0.02), ReadNoise())).counts(
-        0.4 * BAND.radiance(np.array(frames)), np.random.default_rng(1)
+    detector = Detector(
+        response=EnergyResponse(35.0), gain=0.02, terms=(ShotNoise(), ReadNoise(100.0))
     )
+    counts = detector.counts(0.4 * BAND.radiance(np.array(frames)), np.random.default_rng(1))
     return Recording(counts, "counts", np.arange(4) / 600, "simulated", 30e-6, 4094.0)
 
 

@@ -12,9 +12,13 @@ from numpy.typing import NDArray
 
 from chipglow.camera import (
     CalibrationFit,
+    DeadElements,
     Detector,
+    EnergyResponse,
+    GainPattern,
     Measurement,
     NonUniformity,
+    OffsetPattern,
     ReadNoise,
     Recording,
     find_bad_pixels,
@@ -59,8 +63,12 @@ def _fits() -> dict[str, CalibrationFit[Any]]:
 def _draw_sensors() -> Figure:
     """A chip as it is, as the counts show it, and as the measurement does."""
     rng = np.random.default_rng(1)
-    plain = Detector(gain=1.8, bits=14, terms=(ReadNoise(3.0),))
-    detector = plain.with_pattern(SHAPE, 0.05, 40, 0.004, rng)
+    detector = Detector(
+        response=EnergyResponse(1.8),
+        gain=1.0,
+        bits=14,
+        terms=(GainPattern(0.05), DeadElements(0.004), OffsetPattern(40), ReadNoise(3.0)),
+    )
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
     truth = 700.0 + 350.0 * np.exp(-((x - 50) ** 2 + (y - 25) ** 2) / 250.0)
     cold, hot, chip = (_seen(detector, kelvins, rng) for kelvins in (623.15, 1123.15, truth))
@@ -78,7 +86,8 @@ def _draw_sensors() -> Figure:
     for name, measured in (("as it is", plain), ("corrected", repaired)):
         error = measured.radiance_temperature()[0] - truth
         print(f"{name}: error {np.sqrt(np.nanmean(error**2)):.2f} K rms")
-    print(f"bad pixels: {found.mask.sum()} found, {detector.terms[-1].mask.sum()} made")
+    made = DeadElements(0.004).mask(SHAPE, detector.seed)
+    print(f"bad pixels: {found.mask.sum()} found, {made.sum()} made")
     return _side_by_side(plain, repaired)
 
 

@@ -36,7 +36,18 @@ from knife_edge_pictures import aperture, edge, measured  # noqa: E402
 from PIL import Image  # noqa: E402
 
 import chipglow  # noqa: E402
-from chipglow.camera import AnnularAperturePSF, Camera, Detector, Measurement, ReadNoise, Recording  # noqa: E402
+from chipglow.camera import (  # noqa: E402
+    AnnularAperturePSF,
+    Camera,
+    DeadElements,
+    Detector,
+    EnergyResponse,
+    GainPattern,
+    Measurement,
+    OffsetPattern,
+    ReadNoise,
+    Recording,
+)
 from chipglow.io import write_measurement, write_scene  # noqa: E402
 from chipglow.io.cameras import write_hcc  # noqa: E402
 from chipglow.radiometry import Band  # noqa: E402
@@ -102,8 +113,12 @@ def recordings(folder: Path) -> None:
 def a_camera(folder: Path) -> None:
     """Write counts of a camera whose elements differ: a chip, flat-field sources, blackbodies."""
     generator, shape = np.random.default_rng(1), (48, 64)
-    detector = Detector(gain=1.8, offset=400.0, bits=14, terms=(ReadNoise(3.0),))
-    detector = detector.with_pattern(shape, 0.03, 40, 0.004, generator)
+    detector = Detector(
+        response=EnergyResponse(1.8),
+        gain=1.0,
+        bits=14,
+        terms=(GainPattern(0.03), DeadElements(0.004), OffsetPattern(40), ReadNoise(3.0)),
+    )
 
     def record(name: str, kelvins: Any, frames: int) -> Recording:
         radiance = np.broadcast_to(BAND.radiance(kelvins), (frames, *shape))

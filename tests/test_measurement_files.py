@@ -12,7 +12,18 @@ from analytic_chip import AnalyticChip
 from PIL import Image
 from typer.testing import CliRunner
 
-from chipglow.camera import Detector, Flag, ReadNoise, Recording, fit_linear, fit_sakuma_hattori
+from chipglow.camera import (
+    DeadElements,
+    Detector,
+    EnergyResponse,
+    Flag,
+    GainPattern,
+    OffsetPattern,
+    ReadNoise,
+    Recording,
+    fit_linear,
+    fit_sakuma_hattori,
+)
 from chipglow.cli import app
 from chipglow.io import is_measurement, read_measurement, write_measurement, write_scene
 from chipglow.io.cameras import read_recording, write_hcc
@@ -37,8 +48,11 @@ BAND = Band(3.8e-6, 5.1e-6)
 SHAPE = (30, 40)
 CELSIUS = np.arange(300.0, 1001.0, 100.0)
 TEMPERATURE_UNCERTAINTY, COUNT_UNCERTAINTY = 0.3, 1.0
-DETECTOR = Detector(gain=1.8, offset=400.0, bits=14, terms=(ReadNoise(3.0),)).with_pattern(
-    SHAPE, 0.03, 20.0, 0.003, np.random.default_rng(5)
+DETECTOR = Detector(
+    response=EnergyResponse(1.8),
+    gain=1.0,
+    bits=14,
+    terms=(GainPattern(0.03), DeadElements(0.003), OffsetPattern(20.0), ReadNoise(3.0)),
 )
 Y, X = np.mgrid[: SHAPE[0], : SHAPE[1]]
 TRUTH = 700.0 + 450.0 * np.exp(-((X - 20) ** 2 + (Y - 15) ** 2) / 100.0)
@@ -243,7 +257,7 @@ def test_the_measurement_holds_the_truth_within_its_uncertainty(laboratory):
     measured = load_measurement("chip.yaml")
     assert measured.times == pytest.approx(2e-3 * np.arange(5))
     assert measured.raster.extent == pytest.approx((-120e-6, 120e-6, 0.0, 180e-6), abs=1e-12)
-    dead = DETECTOR.terms[-1].mask
+    dead = DETECTOR.terms[1].mask(SHAPE, DETECTOR.seed)
     assert dead.any()
     np.testing.assert_array_equal((measured.flags[0] & Flag.REPLACED) != 0, dead)
 

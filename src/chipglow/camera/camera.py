@@ -1,7 +1,7 @@
 """The virtual infrared camera."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from numbers import Integral, Real
 from sys import float_info
@@ -11,6 +11,14 @@ from warnings import warn
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.camera.detector import (
+    Detector,
+    FlatFieldCalibration,
+    Lag,
+    OperationPoint,
+    flat_field_calibration,
+)
+from chipglow.camera.detector.terms import follows
 from chipglow.camera.exposure import Exposure, expose
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics import (
@@ -78,6 +86,11 @@ class Camera:
         reflections are left out, as in the paper's simulation (Equation 3).
     optics : tuple of OpticsTerm
         What the optics do besides, in the order of the light; nothing by default.
+    detector : Detector, optional
+        Makes electrons and counts of what the pixels receive, which the camera's own calibration
+        makes radiance again; by default radiance is read as it is.
+    seed : int
+        Of the detector's noise, which each frame has its own of by when it begins.
 
     Raises
     ------
@@ -102,6 +115,8 @@ class Camera:
     lower_limit: float | None = 573.15
     reflected: float | None = None
     optics: tuple[OpticsTerm, ...] = ()
+    detector: Detector | None = None
+    seed: int = 2010
 
     def __post_init__(self) -> None:
         _expect(
@@ -147,6 +162,13 @@ class Camera:
             self.optics,
             "a tuple of terms such as Veil(0.02, 300e-6)",
         )
+        _expect(
+            self.detector is None or isinstance(self.detector, Detector),
+            "detector",
+            self.detector,
+            "a Detector such as Detector(response=EnergyResponse(1e4), full_well=1e7), or None",
+        )
+        _expect(isinstance(self.seed, Integral) and self.seed >= 0, "seed", self.seed, "0 or more")
         _expect_number("frame_rate", self.frame_rate, 0.0, float_info.max, "over 0 a second")
         _expect_number(
             "integration_time",
@@ -202,6 +224,23 @@ class Camera:
             If not one pixel fits, or `shape` reaches beyond the scene.
         """
         return sensor_raster(scene, self.pitch, self.offset, self.shape)
+
+    def redrawn(self, number: int) -> "Camera":
+        """The camera with other noise of its detector: the seed `number` further on."""
+        return replace(self, seed=self.seed + number) if number and self.detector else self
+
+    def calibration(self, shape: tuple[int, int]) -> FlatFieldCalibration | None:
+        """The calibration of the detector at this camera's exposure; None without a detector.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Rows and columns of the pixels.
+        """
+        if self.detector is None:
+            return None
+        point = OperationPoint(self.band, self.integration_time, self.frame_rate, self.fill_factor)
+        return flat_field_calibration(self.detector, point, shape)
 
     def frame_times(self, start: float, count: int) -> NDArray[np.float64]:
         """When the frames of a sequence begin.
@@ -315,10 +354,20 @@ class Camera:
                 alike.append(self._read_out(like, scene, sensors, blur_of_like))
         if sensors is None:
             raise ValueError("camera: no exposure to develop, expected 1 or more")
-        measured = self._measurement(np.stack(frames), np.array(starts), sensors)
+        images, times = np.stack(frames), np.array(starts)
+        measured = self._measurement(images, times, sensors)
+        said = list(self._warnings(times))
         if alike:
             other = np.asarray(self.band.temperature(np.stack(alike)), np.float64)
-            measured.data.attrs |= _border_warning(measured, other, exposure.raster)
+            # Noise is no matter of the border.
+            ideal = (
+                replace(self, detector=None)._measurement(images, times, sensors)
+                if self.detector
+                else measured
+            )
+            said += _border_warning(ideal, other, exposure.raster)
+        if said:
+            measured.data.attrs["warnings"] = "\n".join(said)
         return measured
 
     def measure(
@@ -460,14 +509,60 @@ class Camera:
         """
         return self._measurement(images, starts, self.pixels(scene))
 
+    def read(
+        self, images: NDArray[np.float64], starts: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.uint8] | None]:
+        """What the detector and its calibration make of images.
+
+        Parameters
+        ----------
+        images : ndarray
+            Radiance in W/(m² sr) as `form_image` gives it, shape (time, y, x).
+        starts : ndarray
+            When the integration of each began in s, shape (time,).
+
+        Returns
+        -------
+        radiance : ndarray
+            As the camera tells it; without a detector the images themselves.
+        flags : ndarray or None
+            Sums of `Flag`, uint8, of the same shape; None without a detector.
+        """
+        calibration = self.calibration(images.shape[1:])
+        if self.detector is None or calibration is None:
+            return images, None
+        generators = [self._generator(float(start)) for start in starts]
+        counts = self.detector.counts(images, generators, calibration.point, starts)
+        return calibration.radiance(counts)
+
+    def _generator(self, start: float) -> np.random.Generator:
+        """Noise of the frame that begins then, however many others are read with it."""
+        return np.random.default_rng([self.seed, int(np.float64(start + 0.0).view(np.uint64))])
+
     def _measurement(
-        self, radiance: NDArray[np.float64], starts: NDArray[np.float64], sensors: Raster
+        self, images: NDArray[np.float64], starts: NDArray[np.float64], sensors: Raster
     ) -> Measurement:
+        radiance, flags = self.read(images, starts)
         return Measurement.from_radiance(
-            radiance, self.band, starts, sensors, self.lower_limit, attributes=self._attributes()
+            radiance,
+            self.band,
+            starts,
+            sensors,
+            self.lower_limit,
+            flags,
+            attributes=self._attributes(sensors.shape),
         )
 
-    def _attributes(self) -> dict[str, float | str]:
+    def _warnings(self, starts: NDArray[np.float64]) -> Iterator[str]:
+        """What to know of frames by when they begin, a sentence each."""
+        lags = self.detector is not None and any(isinstance(t, Lag) for t in self.detector.terms)
+        if lags and not follows(starts, 1 / self.frame_rate).any():
+            yield (
+                "Lag: no frame comes one time between frames after another, so the frame before is "
+                "taken to be as the frame itself: there is no lag in them."
+            )
+
+    def _attributes(self, shape: tuple[int, int]) -> dict[str, float | str]:
         """What a measurement does not state of the camera by itself; SI, without what is None."""
         attributes: dict[str, float | str | None] = {
             "offset_right": self.offset[0],
@@ -480,30 +575,35 @@ class Camera:
             "reflected": self.reflected,
             "optics": repr(self.optics) if self.optics else None,
         }
+        if calibration := self.calibration(shape):
+            attributes |= {
+                "detector": repr(self.detector),
+                "noise_seed": self.seed,
+                "netd": calibration.half_netd,
+                "netd_temperature": calibration.half_temperature,
+            }
         return {name: value for name, value in attributes.items() if value is not None}
 
 
 def _border_warning(
     measured: Measurement, other: NDArray[np.float64], scene: Raster
-) -> dict[str, str]:
+) -> Iterator[str]:
     """What the border of the scene may change, beside temperatures under another assumption."""
     change = np.abs(measured.radiance_temperature() - other)
     changed = change > BORDER_TOLERANCE
     if not changed.any():
-        return {}
+        return
     (left, right, bottom, top), at = scene.extent, measured.raster
     across = np.minimum(at.x - left, right - at.x)
     down = np.minimum(top - at.y, at.y - bottom)
     reach = np.minimum(across, down[:, None])[changed.any(axis=0)].max()
-    return {
-        "warnings": (
-            "The border of the scene: beyond it the surface is taken to be as at the edge. With "
-            "the like of what each pixel sees within the scene there instead, "
-            f"{100 * changed.mean():.3g} % of the pixels (up to {1e6 * reach:.3g} µm from the "
-            f"border) would change by over {BORDER_TOLERANCE:g} K, by {np.nanmax(change):.3g} K at "
-            "most."
-        )
-    }
+    yield (
+        "The border of the scene: beyond it the surface is taken to be as at the edge. With "
+        "the like of what each pixel sees within the scene there instead, "
+        f"{100 * changed.mean():.3g} % of the pixels (up to {1e6 * reach:.3g} µm from the "
+        f"border) would change by over {BORDER_TOLERANCE:g} K, by {np.nanmax(change):.3g} K at "
+        "most."
+    )
 
 
 def _are_numbers(values: object, kind: type) -> bool:

@@ -37,7 +37,7 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
         If there is no such chip, or no exposure fits into the scene.
     """
     fitted = fit(study, open_scene(path))
-    camera = study.camera.on(fitted.scene.raster)
+    camera = study.camera.on(fitted.scene.raster, study.seed)
     scene, surfaces = fitted.scene, fitted.surfaces
     name = next(iter(surfaces)) if chip is None else chip
     if name not in surfaces:

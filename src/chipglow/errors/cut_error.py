@@ -411,9 +411,12 @@ def _measure(
     tell("camera", 1.0)
     starts = np.array([instant.start for instant in instants])
     results = {}
-    for name, on_scene, exposure, image in zip(surfaces, fields, frames[0], images, strict=True):
-        measurement = camera.measurement(np.stack(image), starts, scene.raster)
-        errors = error_images(camera, exposure, plan.reference)
+    for number, (name, on_scene, exposure, image) in enumerate(
+        zip(surfaces, fields, frames[0], images, strict=True)
+    ):
+        looking = camera.redrawn(number)
+        measurement = looking.measurement(np.stack(image), starts, scene.raster)
+        errors = error_images(looking, exposure, plan.reference)
         site = _site(plan, segment, exposure, exposure)
         results[name] = SurfaceResult(
             measurement=measurement,
@@ -423,7 +426,7 @@ def _measure(
             errors=errors,
             rake=site.rake_errors(errors),
             band=site.band_errors(errors),
-            warnings=tuple(camera.form_measurement(exposure).warnings),
+            warnings=tuple(looking.form_measurement(exposure).warnings),
             curves=_curves(camera.band, measurement, instants),
         )
     return results

@@ -1,12 +1,13 @@
 """The headline errors drawn anew: over segments, textures and positions of the pixels.
 
 Where the pixels lie on the features, how the emissivity happens to vary there and which segment is
-looked at are chance in every experiment: one frame is one draw.
+looked at are chance in every experiment: one frame is one draw. A detector's noise is another in
+each of them, and counts to what the pixel phases make.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import chain, count
 from typing import Final, TypeVar
 
 import numpy as np
@@ -209,11 +210,17 @@ def draw_errors(
     cameras = pixel_phases(camera, phases)
     rake: list[RakeErrors] = []
     band: list[BandErrors] = []
+    number = count()
     for i, segment in enumerate(sites):
         for site in segment:
             for one in cameras:
-                rake.append(site.rake_errors(error_images(one, site.rake_exposure, site.reference)))
-                band.append(site.band_errors(error_images(one, site.band_exposure, site.reference)))
+                of_rake, of_band = (one.redrawn(next(number)) for _ in range(2))
+                rake.append(
+                    site.rake_errors(error_images(of_rake, site.rake_exposure, site.reference))
+                )
+                band.append(
+                    site.band_errors(error_images(of_band, site.band_exposure, site.reference))
+                )
         progress((i + 1) / len(sites))
     shape = (len(sites), len(sites[0]), len(cameras))
     exposed = [[site.rake_exposure for site in segment] for segment in sites]

@@ -7,7 +7,7 @@ from typing import Final, Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera import Camera, Exposure
+from chipglow.camera import UNUSABLE, Camera, Exposure
 from chipglow.camera.optics.sampling import integrate, overlap_lengths
 from chipglow.scene import Raster
 from chipglow.scene.lines import nearest
@@ -41,9 +41,10 @@ class ErrorImages:
         What the measured temperature is compared with in K, shape (y, x); NaN where nothing
         radiates.
     case_1 : ndarray
-        Error with everything: emissivity, exposure, size of source, point spread function.
+        Error with everything: emissivity, exposure, size of source, point spread function,
+        detector.
     case_2 : ndarray
-        Error with all but the point spread function.
+        Error with all but the point spread function; the detector's noise is the same.
     flagged : ndarray of bool
         Pixels whose measurement (case 1) the camera marks as unusable, such as under its
         range. Their errors are given nevertheless: they follow from the radiance.
@@ -99,12 +100,15 @@ class Unblurred:
         As in `ErrorImages`.
     ideal : ndarray
         Radiance of the pixels without point spread function in W/(m² sr), shape (y, x).
+    start : float
+        When the exposure began in s: each frame has its own noise.
     """
 
     camera: Camera
     raster: Raster
     reference: NDArray[np.float64]
     ideal: NDArray[np.float64]
+    start: float
 
     @classmethod
     def of(cls, camera: Camera, exposure: Exposure, reference: ReferenceKind) -> "Unblurred":
@@ -114,6 +118,7 @@ class Unblurred:
             camera.pixels(exposure.raster),
             reference_temperature(camera, exposure, reference),
             replace(camera, psf=None).form_image(exposure.mean_radiance, exposure.raster),
+            exposure.start,
         )
 
     def errors(self, radiance: NDArray[np.float64]) -> ErrorImages:
@@ -124,16 +129,24 @@ class Unblurred:
         radiance : ndarray
             Radiance of its pixels, as `Camera.form_image` gives it.
         """
-        band, lower_limit = self.camera.band, self.camera.lower_limit
-        measured = np.asarray(band.temperature(radiance), dtype=np.float64)
-        ideal = np.asarray(band.temperature(self.ideal), dtype=np.float64)
+        lower_limit = self.camera.lower_limit
+        measured, unusable = self._read(radiance)
+        ideal, _ = self._read(self.ideal)
         return ErrorImages(
             raster=self.raster,
             reference=self.reference,
             case_1=measured - self.reference,
             case_2=ideal - self.reference,
-            flagged=~(measured >= (lower_limit or 0.0)),
+            flagged=~(measured >= (lower_limit or 0.0)) | unusable,
         )
+
+    def _read(
+        self, radiance: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_] | bool]:
+        """Temperatures that the camera reads, and which of them its detector marks as unusable."""
+        read, flags = self.camera.read(radiance[None], np.array([self.start]))
+        kelvins = np.asarray(self.camera.band.temperature(read[0]), dtype=np.float64)
+        return kelvins, False if flags is None else flags[0] & UNUSABLE != 0
 
 
 def reference_temperature(

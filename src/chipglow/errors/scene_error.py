@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 
 import numpy as np
 import pandas as pd
@@ -250,8 +251,10 @@ def scene_errors(
         place.check_within(camera.pixels(scene.raster))
     collected = _collect(scene, fields, camera, plan, starts, shown, places, tell)
     results = {
-        name: one.finish(textures[0], scene, frame, camera, starts, places)
-        for name, textures, one in zip(surfaces, fields, collected, strict=True)
+        name: one.finish(textures[0], scene, frame, camera.redrawn(number), starts, places)
+        for number, (name, textures, one) in enumerate(
+            zip(surfaces, fields, collected, strict=True)
+        )
     }
     return SceneErrors(
         plan=plan,
@@ -382,15 +385,17 @@ def _collect(
                 scene, flat, camera.band, float(start), camera.integration_time, camera.reflected
             )
         )
-        for one, textures in zip(collected, fields, strict=True):
+        number = count()
+        for surface, (one, textures) in enumerate(zip(collected, fields, strict=True)):
             of_surface = [next(exposures) for _ in textures]
             one.images.append(camera.form_image(of_surface[0].mean_radiance, scene.raster))
             if i == shown:
+                looking = camera.redrawn(surface)
                 one.shown.append(of_surface[0])
-                one.errors.append(error_images(camera, of_surface[0], plan.reference))
+                one.errors.append(error_images(looking, of_surface[0], plan.reference))
             for exposure in of_surface:
                 for phase in cameras:
-                    errors = error_images(phase, exposure, plan.reference)
+                    errors = error_images(phase.redrawn(next(number)), exposure, plan.reference)
                     _read(one, errors, places, i == shown)
     tell("camera", 1.0)
     return collected

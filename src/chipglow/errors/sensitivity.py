@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
@@ -70,8 +71,12 @@ def sensitivity(
         Called with how much is done, 0 to 1.
     """
     found: dict[PsfOrder, list[list[dict[str, LocalError]]]] = {order: [] for order in PSF_ORDERS}
+    number = count()
     for i, site in enumerate(sites):
-        places = [_Place.of(one, site) for one in pixel_phases(camera, phases)]
+        places = [
+            _Place.of(one.redrawn(next(number)), one.redrawn(next(number)), site)
+            for one in pixel_phases(camera, phases)
+        ]
         for psf in (GaussianPSF(width) for width in widths):
             found["detector"].append([place.blurred_on_pixels(psf) for place in places])
             blurred = [
@@ -92,11 +97,13 @@ class _Place:
     band: Unblurred
 
     @classmethod
-    def of(cls, camera: Camera, site: Site) -> "_Place":
-        ideal = replace(camera, psf=None)
+    def of(cls, rake_camera: Camera, band_camera: Camera, site: Site) -> "_Place":
         rake, band = (
-            Unblurred.of(ideal, exposure, site.reference)
-            for exposure in (site.rake_exposure, site.band_exposure)
+            Unblurred.of(replace(camera, psf=None), exposure, site.reference)
+            for camera, exposure in (
+                (rake_camera, site.rake_exposure),
+                (band_camera, site.band_exposure),
+            )
         )
         return cls(site, rake, band)
 

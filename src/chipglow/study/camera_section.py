@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import Strict, model_validator
 
@@ -13,12 +13,16 @@ from chipglow.camera import (
     BlurredPSF,
     BlurTerm,
     Camera,
+    Detector,
+    OperationPoint,
     OpticsTerm,
     PointSpreadFunction,
     PSFChoice,
+    lower_range_limit,
 )
 from chipglow.io.column_file import read_response
 from chipglow.quantities import OR_NONE, Declared, FileBeside, Settings, described
+from chipglow.quantities.section import OrWord
 from chipglow.quantities.units import (
     Frequency,
     Length,
@@ -30,7 +34,11 @@ from chipglow.quantities.units import (
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 from chipglow.study.camera_presets import CAMERAS, with_preset
+from chipglow.study.detector_section import DetectorSection
 from chipglow.study.scaling import with_pitch
+
+OR_DETECTOR: Final = OrWord("detector", "detector")
+"""Annotation of a lower range limit that follows from the detector."""
 
 PSFSection = Annotated[Declared[PSFChoice], PSFS]
 BlurSection = Annotated[Declared[BlurTerm], BLURS]
@@ -94,21 +102,45 @@ class CameraSection(Settings[Camera]):
     )
     integration_time: Time = described("10 us", "Exposure.")
     frame_rate: Frequency = described("600 Hz", "Frames a second.")
-    lower_limit: Annotated[Temperature | None, OR_NONE] = described(
-        "300 degC", "Radiance temperatures under this are flagged, not returned; or none."
+    lower_limit: Annotated[Temperature | None, OR_NONE, OR_DETECTOR] = described(
+        "300 degC",
+        "Radiance temperatures under this are flagged, not returned; or none. With a detector it\n"
+        "is the detector's, unless it is said.",
+        "a temperature, detector or none",
     )
     reflected: Annotated[Temperature | None, OR_NONE] = described(
         "none", "Temperature of the surroundings that the surface reflects, or none."
     )
 
+    detector: Annotated[DetectorSection | None, OR_NONE] = described(
+        "none",
+        "Electrons, noise and counts of the detector, and the camera's own calibration; none: the\n"
+        "radiance is read as it is.",
+        "none, or such as\n"
+        "{response: {kind: photon, quantum_efficiency: 0.8, element: 15 um, f_number: 2.5},\n"
+        "full_well: 7e6, bits: 14, terms: [{kind: shot-noise}]}",
+    )
+
     @model_validator(mode="before")
     @classmethod
     def _pitch_on_the_scene(cls, data: object) -> object:
-        return with_pitch(with_preset(data)) if isinstance(data, Mapping) else data
+        if not isinstance(data, Mapping):
+            return data
+        camera = with_pitch(with_preset(data))
+        if camera.get("detector") not in (None, "none"):
+            return {"lower_limit": "detector", **camera}
+        return camera
 
-    def build(self) -> Camera:
-        """The camera, with as many pixels as see the scene."""
+    def build(self, seed: int = 2010) -> Camera:
+        """The camera, with as many pixels as see the scene.
+
+        Parameters
+        ----------
+        seed : int
+            The study's: of the detector's noise.
+        """
         band = self._band()
+        detector = None if self.detector is None else self.detector.build()
         return Camera(
             band=band,
             pitch=self.pitch,
@@ -118,25 +150,38 @@ class CameraSection(Settings[Camera]):
             psf_order=self.psf_order,
             integration_time=self.integration_time,
             frame_rate=self.frame_rate,
-            lower_limit=self.lower_limit,
+            lower_limit=self._lower_limit(band, detector),
             reflected=self.reflected,
             optics=tuple(term.build() for term in self.optics),
+            detector=detector,
+            seed=seed,
         )
 
-    def on(self, scene: Raster) -> Camera:
+    def on(self, scene: Raster, seed: int = 2010) -> Camera:
         """The camera on a scene, with no more pixels than its detector has.
 
         Parameters
         ----------
         scene : Raster
             The scene's samples.
+        seed : int
+            The study's: of the detector's noise.
         """
-        camera = self.build()
+        camera = self.build(seed)
         if self.array is None:
             return camera
         seen = camera.pixels(scene)
         columns, rows = self.array
         return replace(camera, shape=(min(rows, seen.rows), min(columns, seen.columns)))
+
+    def _lower_limit(self, band: Band, detector: Detector | None) -> float | None:
+        limit: object = self.lower_limit
+        if limit != OR_DETECTOR.value:
+            return self.lower_limit
+        if detector is None:
+            raise ValueError("lower_limit: detector, expected a detector beside it")
+        point = OperationPoint(band, self.integration_time, self.frame_rate, self.fill_factor)
+        return lower_range_limit(detector, point)
 
     def _band(self) -> Band:
         response = None if self.response is None else read_response(self.response)

@@ -151,7 +151,11 @@ def errors(
         fitted = _fitted(study, path, assume)
         plan = study.analysis.scene_plan()
         return scene_errors(
-            fitted.scene, fitted.surfaces, study.camera.on(fitted.scene.raster), plan, progress
+            fitted.scene,
+            fitted.surfaces,
+            study.camera.on(fitted.scene.raster, study.seed),
+            plan,
+            progress,
         )
 
 
@@ -172,7 +176,7 @@ def _look(
     study: Study, path: Path, progress: Progress | None, assume: Callable[[str], None] | None
 ) -> StudyResult | SceneErrors:
     fitted = _fitted(study, path, assume)
-    camera = study.camera.on(fitted.scene.raster)
+    camera = study.camera.on(fitted.scene.raster, study.seed)
     missing = [] if study.analysis.places else list(_lacking(fitted.scene))
     if not missing and not study.analysis.places:
         try:

@@ -1,4 +1,4 @@
-"""What the detector adds: noise, conversion to counts, non-uniformity, bad pixels."""
+"""What the detector adds: electrons, noise, counts, non-uniformity, bad pixels, and its range."""
 
 from chipglow.camera.detector.bad_pixels import (
     LEAST_FRAMES,
@@ -7,27 +7,67 @@ from chipglow.camera.detector.bad_pixels import (
     replace_bad_pixels,
 )
 from chipglow.camera.detector.detector import Detector
+from chipglow.camera.detector.flat_field import (
+    FlatFieldCalibration,
+    flat_field_calibration,
+    lower_range_limit,
+)
 from chipglow.camera.detector.nonuniformity import NonUniformity
+from chipglow.camera.detector.response import (
+    RESPONSES,
+    DetectorResponse,
+    EnergyResponse,
+    OperationPoint,
+    PhotonResponse,
+    RangeResponse,
+)
 from chipglow.camera.detector.terms import (
     DETECTOR_TERMS,
+    ColumnNoise,
+    DarkCurrent,
     DeadElements,
     DetectorTerm,
-    FixedPattern,
+    EquivalentNoise,
+    FlickerNoise,
+    GainPattern,
+    Lag,
+    NonLinearity,
+    OffsetPattern,
     ReadNoise,
+    Readout,
     ShotNoise,
+    Stage,
 )
 
 __all__ = [
     "DETECTOR_TERMS",
     "LEAST_FRAMES",
+    "RESPONSES",
     "BadPixels",
+    "ColumnNoise",
+    "DarkCurrent",
     "DeadElements",
     "Detector",
+    "DetectorResponse",
     "DetectorTerm",
-    "FixedPattern",
+    "EnergyResponse",
+    "EquivalentNoise",
+    "FlatFieldCalibration",
+    "FlickerNoise",
+    "GainPattern",
+    "Lag",
+    "NonLinearity",
     "NonUniformity",
+    "OffsetPattern",
+    "OperationPoint",
+    "PhotonResponse",
+    "RangeResponse",
     "ReadNoise",
+    "Readout",
     "ShotNoise",
+    "Stage",
     "find_bad_pixels",
+    "flat_field_calibration",
+    "lower_range_limit",
     "replace_bad_pixels",
 ]

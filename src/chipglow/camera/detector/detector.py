@@ -1,69 +1,149 @@
-"""The detector: from in-band radiance to counts, with noise, fixed pattern and a limited range."""
+"""The detector: from in-band radiance to electrons and counts, with noise and a limited range."""
 
-from dataclasses import dataclass, replace
-from typing import Annotated
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.detector.terms import DeadElements, DetectorTerm, FixedPattern, ReadNoise
+from chipglow.camera.detector.response import DetectorResponse, OperationPoint
+from chipglow.camera.detector.terms import DetectorTerm, Readout, Stage
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.recording import Recording
 from chipglow.quantities import Parameter, Part
+from chipglow.quantities.units import TEMPERATURE
+from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
+
+Correction: TypeAlias = Literal["two-point", "one-point", "none"]
+"""How the pixels are made alike: by frames of two flat-field sources, of one, or not at all."""
+
+DARKER_SOURCE: Final = 0.1
+BRIGHTER_SOURCE: Final = 0.9
+"""Parts of the capacity that the sources of the correction fill, if none are named."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Detector(Part):
-    """A photon detector and its digitiser.
+    """A detector, its digitiser, and how its pixels were made alike.
 
-    An element's mean signal is gain times radiance plus offset, in counts (DN). The terms
-    change it and add their noise, which is normal, in one draw. The sum is rounded to whole counts
-    and ends at the digitiser's limits. `terms` are the effects of the detector; by default a read
-    noise of two counts.
+    Light makes electrons by the `response`. The `terms` change them in the order of their `Stage`:
+    light, dark, charge; then the full well limits them; transfer, read-out; then they are
+    counts, offset + gain × electrons, rounded to whole ones between 0 and 2^bits − 1.
     """
 
-    gain: Annotated[float, Parameter("Counts per W/(m² sr).", over=0.0)]
-    offset: Annotated[float, Parameter("Counts without light.")] = 400.0
+    response: DetectorResponse
+    full_well: Annotated[
+        float | None,
+        Parameter("Electrons that an element holds; none: as many as the digitiser.", over=0.0),
+    ] = None
+    gain: Annotated[
+        float | None,
+        Parameter(
+            "Counts of one electron (DN/e-); none: the full well fills the digitiser.", over=0.0
+        ),
+    ] = None
+    offset: Annotated[float, Parameter("Counts without electrons.", least=0.0)] = 400.0
     bits: Annotated[int, Parameter("Bits of the digitiser.", least=1, most=32)] = 12
-    terms: tuple[DetectorTerm, ...] = (ReadNoise(),)
+    terms: tuple[DetectorTerm, ...] = ()
+    correction: Annotated[
+        Correction,
+        Parameter("How pixels are made alike: two-point, one-point or none."),
+    ] = "two-point"
+    frames: Annotated[int, Parameter("Frames of each source for that.", least=2, most=10_000)] = 32
+    cold: Annotated[
+        float | None,
+        Parameter(
+            "The darker source, a blackbody; none: what fills a tenth.",
+            TEMPERATURE,
+            least=TABLE_COLDEST,
+            most=TABLE_HOTTEST,
+        ),
+    ] = None
+    hot: Annotated[
+        float | None,
+        Parameter(
+            "The brighter source; none: what fills nine tenths.",
+            TEMPERATURE,
+            least=TABLE_COLDEST,
+            most=TABLE_HOTTEST,
+        ),
+    ] = None
+    least_signal: Annotated[
+        float,
+        Parameter(
+            "Signal at the lower range limit, in standard deviations of its noise, if the limit\n"
+            "is the detector's.",
+            over=0.0,
+        ),
+    ] = 10.0
+    seed: Annotated[
+        int, Parameter("Seed of the patterns and of the frames of the correction.", least=0)
+    ] = 1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.response, DetectorResponse):
+            raise ValueError(
+                f"Detector.response: {self.response!r}, expected one such as EnergyResponse(1e4)"
+            )
+        if self.correction not in get_args(Correction):
+            raise ValueError(
+                f"Detector.correction: {self.correction!r}, expected one of "
+                f"{', '.join(get_args(Correction))}"
+            )
+        if not (
+            isinstance(self.terms, tuple) and all(isinstance(t, DetectorTerm) for t in self.terms)
+        ):
+            raise ValueError(
+                f"Detector.terms: {self.terms!r}, expected a tuple of terms such as ShotNoise()"
+            )
+        kinds = [term.kind for term in self.terms]
+        for kind in kinds:
+            if kinds.count(kind) > 1:
+                raise ValueError(f"Detector.terms: two are of kind {kind!r}, expected one of each")
+        if self.offset >= self._top:
+            raise ValueError(
+                f"Detector.offset: {self.offset:g}, expected under the {self._top} of "
+                f"{self.bits} bits"
+            )
+        if self.gain is None and self.full_well is None:
+            raise ValueError("Detector.gain: none, expected it or full_well")
+        if self.cold is not None and self.hot is not None and not self.cold < self.hot:
+            raise ValueError(
+                f"Detector.hot: {self.hot:g} K, expected over the {self.cold:g} K of cold"
+            )
+
+    @property
+    def conversion_gain(self) -> float:
+        """Counts of one electron (DN/e-)."""
+        if self.gain is not None:
+            return self.gain
+        assert self.full_well is not None
+        return (self._top - self.offset) / self.full_well
+
+    @property
+    def capacity(self) -> float:
+        """Electrons that fill the well or, if they come before, the digitiser."""
+        digitised = (self._top - self.offset) / self.conversion_gain
+        return digitised if self.full_well is None else min(self.full_well, digitised)
 
     @property
     def saturation(self) -> int:
-        """The greatest count that is not saturated: one under the digitiser's limit."""
-        return (1 << self.bits) - 2
+        """The greatest count that is not saturated, as far as elements do not differ."""
+        full = self.offset + self.conversion_gain * self.capacity
+        return min(self._top, round(full)) - 1
 
-    def with_pattern(
-        self,
-        shape: tuple[int, int],
-        gain_spread: float,
-        offset_spread: float,
-        dead_fraction: float,
-        generator: np.random.Generator,
-    ) -> "Detector":
-        """The same detector with detector elements that differ.
-
-        Parameters
-        ----------
-        shape : tuple of int
-            Rows and columns.
-        gain_spread : float
-            Standard deviation of the elements' gains, as a fraction of the mean gain.
-        offset_spread : float
-            Standard deviation of their offsets in counts.
-        dead_fraction : float
-            Fraction of dead elements, 0 to 1.
-        generator : numpy.random.Generator
-            Where the random numbers come from.
-        """
-        pattern = FixedPattern(
-            1.0 + gain_spread * generator.standard_normal(shape),
-            offset_spread * generator.standard_normal(shape),
-        )
-        dead = DeadElements(generator.random(shape) < dead_fraction)
-        return replace(self, terms=(*self.terms, pattern, dead))
+    def per_radiance(self, point: OperationPoint) -> float:
+        """Electrons that 1 W/(m² sr) makes in an element in one frame."""
+        return self.response.electrons(point, self.capacity)
 
     def counts(
-        self, radiance: NDArray[np.floating], generator: np.random.Generator
+        self,
+        radiance: NDArray[np.floating],
+        generator: np.random.Generator | Sequence[np.random.Generator],
+        point: OperationPoint | None = None,
+        times: NDArray[np.float64] | None = None,
     ) -> NDArray[np.uint32]:
         """Counts of frames.
 
@@ -71,27 +151,36 @@ class Detector(Part):
         ----------
         radiance : ndarray
             In-band radiance in W/(m² sr), shape (time, y, x).
-        generator : numpy.random.Generator
-            Where the noise comes from: the same state gives the same counts.
+        generator : numpy.random.Generator or sequence of it
+            Where the noise comes from, of all frames or one for each: the same state gives the same
+            counts.
+        point : OperationPoint, optional
+            How the camera uses the detector; the paper's by default.
+        times : ndarray, optional
+            When the integration of each frame began in s; at the frame rate by default.
 
         Returns
         -------
         ndarray
             Counts, of the same shape.
-
-        Raises
-        ------
-        ValueError
-            If a pattern has another shape than the frames.
         """
-        light = self.gain * np.asarray(radiance, np.float64)
-        for term in self.terms:
-            light = term.light(light)
-        variance = sum((term.variance(light) for term in self.terms), start=np.zeros(1))
-        signal = self.offset + light + np.sqrt(variance) * generator.standard_normal(radiance.shape)
-        for term in self.terms:
-            signal = signal + term.offset(signal.shape)
-        return np.clip(np.rint(signal), 0, (1 << self.bits) - 1).astype(np.uint32)
+        point, count = point or OperationPoint(), len(radiance)
+        if isinstance(generator, np.random.Generator):
+            generator = [generator] * count
+        if times is None:
+            times = np.arange(count, dtype=np.float64) * point.frame_time
+        readout = Readout(
+            times, point, self.per_radiance(point), self.capacity, generator, self.seed
+        )
+        electrons = readout.per_radiance * np.asarray(radiance, np.float64)
+        for stage in Stage:
+            if stage == Stage.TRANSFER and self.full_well is not None:
+                electrons = np.minimum(electrons, self.full_well)
+            for term in self.terms:
+                if term.stage == stage:
+                    electrons = term.apply(electrons, readout)
+        signal = self.offset + self.conversion_gain * electrons
+        return np.clip(np.rint(signal), 0, self._top).astype(np.uint32)
 
     def record(self, measurement: Measurement, generator: np.random.Generator) -> Recording:
         """What a camera with this detector writes of what an ideal detector measured.
@@ -107,15 +196,32 @@ class Detector(Part):
         -------
         Recording
             Counts, with the camera's band, pitch and integration time.
+
+        Raises
+        ------
+        ValueError
+            If the measurement is that of a detector already.
         """
-        time = measurement.data.attrs.get("integration_time")
+        attributes = measurement.data.attrs
+        if "detector" in attributes:
+            raise ValueError("detector: the measurement has one already, expected one without")
+        known = {
+            name: float(attributes[name])
+            for name in ("integration_time", "frame_rate", "fill_factor")
+            if name in attributes
+        }
+        point = OperationPoint(band=measurement.band, **known)
         return Recording(
-            signal=self.counts(measurement.radiance, generator),
+            signal=self.counts(measurement.radiance, generator, point, measurement.times),
             quantity="counts",
             times=measurement.times,
             camera="chipglow",
-            integration_time=None if time is None else float(time),
+            integration_time=known.get("integration_time"),
             saturation=float(self.saturation),
             band=measurement.band,
             pitch=measurement.raster.spacing,
         )
+
+    @property
+    def _top(self) -> int:
+        return (1 << self.bits) - 1

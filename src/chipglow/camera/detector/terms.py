@@ -1,115 +1,367 @@
 """What happens between light and counts: each effect a small term, chosen by its kind."""
 
-from abc import ABC
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Final, TypeVar, final
+from enum import IntEnum
+from math import ceil, log10, pi
+from typing import Annotated, ClassVar, Final, final
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.camera.detector.response import OperationPoint
 from chipglow.quantities import Family, Parameter, Part
-
-_Kind = TypeVar("_Kind", bound=np.generic)
+from chipglow.quantities.units import TEMPERATURE, TEMPERATURE_DIFFERENCE, TIME, Quantity
 
 DETECTOR_TERMS: Final = Family("detector_term")
 """Terms by their kind; other packages add theirs in the group ``chipglow.detector_term``."""
 
+ELECTRON_RATE: Final = Quantity("a current of electrons", "Hz", "Hz", "50 kHz", positive=False)
 
-class DetectorTerm(Part, ABC):
-    """An effect of the detector; a term overrides what it changes.
+_PER_DECADE: Final = 2
+"""Processes of one time constant by which noise of 1/f is made: 1/f within 0.1 %."""
 
-    Signals are in counts (DN), of shape (time, y, x).
+_SAME_INTERVAL: Final = 0.01
+"""Part of the time between frames by which the frame before may be off."""
+
+
+class Stage(IntEnum):
+    """Where between light and counts a term acts; terms of one stage in the order they stand in."""
+
+    LIGHT = 0
+    """On the electrons that light makes."""
+    DARK = 1
+    """Electrons that come without light."""
+    CHARGE = 2
+    """On all electrons of an element; then the full well limits them."""
+    TRANSFER = 3
+    """On the signal that is made of them."""
+    READOUT = 4
+    """What reading adds; then come gain, offset and the digitiser."""
+
+
+@dataclass(frozen=True, eq=False)
+class Readout:
+    """Frames that are read from a detector, as terms see them.
+
+    Parameters
+    ----------
+    times : ndarray
+        When the integration of each began in s, shape (time,).
+    point : OperationPoint
+        How the camera uses the detector.
+    per_radiance : float
+        Electrons that 1 W/(m² sr) makes in a frame.
+    capacity : float
+        Electrons that fill the detector or its digitiser.
+    generators : sequence of numpy.random.Generator
+        Where the noise of each frame comes from.
+    seed : int
+        Of what is fixed in the detector.
     """
 
-    def light(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Mean counts that light makes, as this effect leaves them."""
-        return light
+    times: NDArray[np.float64]
+    point: OperationPoint
+    per_radiance: float
+    capacity: float
+    generators: Sequence[np.random.Generator]
+    seed: int
 
-    def offset(self, shape: tuple[int, ...]) -> NDArray[np.float64] | float:
-        """Counts that come without light."""
-        return 0.0
+    def normal(self, rows: int, columns: int) -> NDArray[np.float64]:
+        """Standard normal deviates of all frames, shape (time, rows, columns)."""
+        return np.stack([one.standard_normal((rows, columns)) for one in self.generators])
 
-    def variance(self, light: NDArray[np.float64]) -> NDArray[np.float64] | float:
-        """Variance of the noise at these mean counts of light."""
-        return 0.0
+
+def fixed_generator(seed: int, kind: str) -> np.random.Generator:
+    """Where a pattern comes from: the same for the same detector and the kind of the term."""
+    return np.random.default_rng([seed, crc32(kind.encode())])
+
+
+class DetectorTerm(Part, ABC):
+    """An effect of the detector.
+
+    Attributes
+    ----------
+    stage : Stage
+        Where it acts.
+    """
+
+    stage: ClassVar[Stage]
+
+    @abstractmethod
+    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
+        """What it makes of the electrons.
+
+        Parameters
+        ----------
+        electrons : ndarray
+            Of every element and frame, as the stages before left them, shape (time, y, x).
+        readout : Readout
+            The frames.
+
+        Returns
+        -------
+        ndarray
+            Of the same shape. Of the generators it takes deviates whose number does not depend on
+            the electrons.
+        """
 
 
 @final
 @DETECTOR_TERMS.part
 @dataclass(frozen=True)
-class ReadNoise(DetectorTerm):
-    """Noise of reading, which does not depend on the light (EMVA 1288)."""
+class GainPattern(DetectorTerm):
+    """Elements that answer differently to the same light (EMVA 1288: PRNU).
 
-    kind: ClassVar[str] = "read-noise"
-    example: ClassVar[str] = "{kind: read-noise, standard_deviation: 2}"
-    standard_deviation: Annotated[float, Parameter("Of the noise, in counts.", least=0.0)] = 2.0
+    n becomes n (1 + s z) with one normal deviate z for each element.
+    """
 
-    def variance(self, light: NDArray[np.float64]) -> float:
-        """Square of the standard deviation."""
-        return self.standard_deviation**2
+    kind: ClassVar[str] = "gain-pattern"
+    example: ClassVar[str] = "{kind: gain-pattern, standard_deviation: 0.02}"
+    stage: ClassVar[Stage] = Stage.LIGHT
+    standard_deviation: Annotated[
+        float, Parameter("Of the elements' gains, as a fraction of their mean.", least=0.0)
+    ]
+
+    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
+        """Electrons times each element's own gain; see `DetectorTerm.apply`."""
+        deviates = fixed_generator(readout.seed, self.kind).standard_normal(electrons.shape[1:])
+        return np.asarray(electrons * (1 + self.standard_deviation * deviates))
+
+
+@final
+@DETECTOR_TERMS.part
+@dataclass(frozen=True)
+class DeadElements(DetectorTerm):
+    """Elements that do not answer to light, at random places."""
+
+    kind: ClassVar[str] = "dead-elements"
+    example: ClassVar[str] = "{kind: dead-elements, fraction: 0.002}"
+    stage: ClassVar[Stage] = Stage.LIGHT
+    fraction: Annotated[float, Parameter("Of all elements.", least=0.0, under=1.0)]
+
+    def mask(self, shape: tuple[int, ...], seed: int) -> NDArray[np.bool_]:
+        """Which elements they are, of a detector with this seed and shape (y, x)."""
+        return np.asarray(fixed_generator(seed, self.kind).random(shape) < self.fraction)
+
+    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
+        """No electrons where an element is dead; see `DetectorTerm.apply`."""
+        return np.where(self.mask(electrons.shape[1:], readout.seed), 0.0, electrons)
+
+
+@final
+@DETECTOR_TERMS.part
+@dataclass(frozen=True)
+class Lag(DetectorTerm):
+    """A part of the frame before that is still there.
+
+    m(i) = (1 − a) n(i) + a m(i − 1): charge that is left, or, with a = exp(−T / τ) and the time T
+    between frames, the thermal time constant τ of a microbolometer. The frame before is the one
+    that began one time between frames earlier; where it is not among the frames, the scene is taken
+    to have been as it is.
+    """
+
+    kind: ClassVar[str] = "lag"
+    example: ClassVar[str] = "{kind: lag, fraction: 0.02}"
+    stage: ClassVar[Stage] = Stage.LIGHT
+    fraction: Annotated[float, Parameter("Of the frame before.", least=0.0, under=1.0)]
+
+    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
+        """Electrons with those of the frames before; see `DetectorTerm.apply`."""
+        result = electrons.copy()
+        for i in np.flatnonzero(follows(readout.times, readout.point.frame_time)):
+            result[i] += self.fraction * (result[i - 1] - electrons[i])
+        return result
+
+
+def follows(times: NDArray[np.float64], frame_time: float) -> NDArray[np.bool_]:
+    """Which frames come one time between frames after the one before them, shape (time,)."""
+    off = np.abs(np.diff(times, prepend=np.nan) - frame_time)
+    return np.asarray(off <= _SAME_INTERVAL * frame_time)
+
+
+@final
+@DETECTOR_TERMS.part
+@dataclass(frozen=True)
+class DarkCurrent(DetectorTerm):
+    """Electrons that come without light: current times integration time (EMVA 1288, 2.3)."""
+
+    kind: ClassVar[str] = "dark-current"
+    example: ClassVar[str] = "{kind: dark-current, current: 50 kHz}  electrons a second"
+    stage: ClassVar[Stage] = Stage.DARK
+    current: Annotated[
+        float, Parameter("Electrons a second and element.", ELECTRON_RATE, least=0.0)
+    ]
+
+    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
+        """Electrons and those of the dark; see `DetectorTerm.apply`."""
+        return electrons + self.current * readout.point.integration_time
 
 
 @final
 @DETECTOR_TERMS.part
 @dataclass(frozen=True)
 class ShotNoise(DetectorTerm):
-    """Photons arrive at random: the variance of n electrons is n (EMVA 1288)."""
+    """Electrons come at random: the variance of n electrons is n (EMVA 1288, 2.2).
+
+    They are taken as normal, which a Poisson process is from some 100 electrons on.
+    """
 
     kind: ClassVar[str] = "shot-noise"
-    example: ClassVar[str] = "{kind: shot-noise, conversion_gain: 0.02}"
-    conversion_gain: Annotated[
-        float, Parameter("Counts that one electron makes (DN/e-).", over=0.0)
+    example: ClassVar[str] = "{kind: shot-noise}"
+    stage: ClassVar[Stage] = Stage.CHARGE
+
+    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
+        """Electrons with their noise; see `DetectorTerm.apply`."""
+        noise = readout.normal(*electrons.shape[1:])
+        return np.asarray(electrons + np.sqrt(np.maximum(electrons, 0.0)) * noise)
+
+
+@final
+@DETECTOR_TERMS.part
+@dataclass(frozen=True)
+class NonLinearity(DetectorTerm):
+    """A signal that falls short of a straight line: n becomes n (1 − f n / N), N the capacity.
+
+    Beyond the capacity it goes on as n (1 − f).
+    """
+
+    kind: ClassVar[str] = "non-linearity"
+    example: ClassVar[str] = "{kind: non-linearity, fraction: 0.01}"
+    stage: ClassVar[Stage] = Stage.TRANSFER
+    fraction: Annotated[
+        float,
+        Parameter(
+            "By which the greatest signal falls short; under 0: beyond.", least=-0.4, most=0.4
+        ),
     ]
 
-    def variance(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Conversion gain times the mean counts."""
-        return np.asarray(self.conversion_gain * np.maximum(light, 0.0))
+    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
+        """Signal in electrons; see `DetectorTerm.apply`."""
+        filled = np.minimum(electrons / readout.capacity, 1.0)
+        return np.asarray(electrons * (1 - self.fraction * filled))
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class FixedPattern(DetectorTerm):
-    """Detector elements that differ.
+@DETECTOR_TERMS.part
+@dataclass(frozen=True)
+class OffsetPattern(DetectorTerm):
+    """Elements that differ in the dark (EMVA 1288: DSNU)."""
 
-    Parameters
-    ----------
-    gain : ndarray
-        What each element's gain is multiplied with, shape (y, x).
-    dark : ndarray
-        What is added to each element's offset in counts, shape (y, x).
-    """
+    kind: ClassVar[str] = "offset-pattern"
+    example: ClassVar[str] = "{kind: offset-pattern, standard_deviation: 2000}"
+    stage: ClassVar[Stage] = Stage.READOUT
+    standard_deviation: Annotated[
+        float, Parameter("Of the elements' offsets, in electrons.", least=0.0)
+    ]
 
-    gain: NDArray[np.float64]
-    dark: NDArray[np.float64]
-
-    def light(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Light times each element's own gain."""
-        return light * _fitting("gain", self.gain, light.shape)
-
-    def offset(self, shape: tuple[int, ...]) -> NDArray[np.float64]:
-        """Each element's own offset."""
-        return _fitting("dark", self.dark, shape)
+    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
+        """Signal and each element's own offset; see `DetectorTerm.apply`."""
+        deviates = fixed_generator(readout.seed, self.kind).standard_normal(electrons.shape[1:])
+        return np.asarray(electrons + self.standard_deviation * deviates)
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class DeadElements(DetectorTerm):
-    """Detector elements whose counts stay at the offset.
+@DETECTOR_TERMS.part
+@dataclass(frozen=True)
+class ReadNoise(DetectorTerm):
+    """Noise of reading, which does not depend on the light (EMVA 1288, 2.2)."""
 
-    Parameters
-    ----------
-    mask : ndarray of bool
-        Where they are, shape (y, x).
+    kind: ClassVar[str] = "read-noise"
+    example: ClassVar[str] = "{kind: read-noise, standard_deviation: 300}"
+    stage: ClassVar[Stage] = Stage.READOUT
+    standard_deviation: Annotated[float, Parameter("In electrons.", least=0.0)]
+
+    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
+        """Signal and noise; see `DetectorTerm.apply`."""
+        return electrons + self.standard_deviation * readout.normal(*electrons.shape[1:])
+
+
+@final
+@DETECTOR_TERMS.part
+@dataclass(frozen=True)
+class ColumnNoise(DetectorTerm):
+    """Noise of the columns' amplifiers: in every frame the same in all elements of a column."""
+
+    kind: ClassVar[str] = "column-noise"
+    example: ClassVar[str] = "{kind: column-noise, standard_deviation: 100}"
+    stage: ClassVar[Stage] = Stage.READOUT
+    standard_deviation: Annotated[float, Parameter("In electrons.", least=0.0)]
+
+    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
+        """Signal and noise; see `DetectorTerm.apply`."""
+        return electrons + self.standard_deviation * readout.normal(1, electrons.shape[2])
+
+
+@final
+@DETECTOR_TERMS.part
+@dataclass(frozen=True)
+class FlickerNoise(DetectorTerm):
+    """Noise of 1/f: each element's signal drifts from frame to frame.
+
+    Its power spectral density is s² / (ln 10 f), so that each decade of frequencies has the
+    variance s². It is the sum of processes of one time constant each, whose variances are equal and
+    whose time constants are a geometric row (Bernamont, Ann. Phys. 11 (1937) 71), exact at any
+    times of the frames. Frequencies go from once in the time since the correction to half the
+    frame rate; the frames of the correction have it too.
     """
 
-    mask: NDArray[np.bool_]
+    kind: ClassVar[str] = "flicker-noise"
+    example: ClassVar[str] = (
+        "{kind: flicker-noise, standard_deviation: 50, since_correction: 100 s}  1/f"
+    )
+    stage: ClassVar[Stage] = Stage.READOUT
+    standard_deviation: Annotated[
+        float, Parameter("In electrons, of each decade of frequencies.", least=0.0)
+    ]
+    since_correction: Annotated[
+        float, Parameter("Time since pixels were corrected.", TIME, over=0.0)
+    ] = 100.0
 
-    def light(self, light: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Light, but none where an element is dead."""
-        return np.where(_fitting("mask", self.mask, light.shape), 0.0, light)
+    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
+        """Signal and noise; see `DetectorTerm.apply`."""
+        constants = self.time_constants(readout.point.frame_time)
+        intervals = np.abs(np.diff(readout.times, prepend=-np.inf))
+        state = np.zeros((constants.size, *electrons.shape[1:]))
+        result = np.empty_like(electrons)
+        for i, generator in enumerate(readout.generators):
+            left = np.exp(-intervals[i] / constants)[:, None, None]
+            fresh = generator.standard_normal(state.shape)
+            state = left * state + np.sqrt(1 - left**2) * fresh
+            result[i] = state.sum(axis=0)
+        return np.asarray(electrons + self.standard_deviation / np.sqrt(_PER_DECADE) * result)
+
+    def time_constants(self, frame_time: float) -> NDArray[np.float64]:
+        """Time constants of the processes in s."""
+        decades = max(log10(self.since_correction / (2 * frame_time)), 0.0)
+        count = ceil(_PER_DECADE * decades) + 1
+        return self.since_correction / (2 * pi) * 10 ** (-np.arange(count) / _PER_DECADE)
 
 
-def _fitting(name: str, pattern: NDArray[_Kind], shape: tuple[int, ...]) -> NDArray[_Kind]:
-    if pattern.shape != shape[1:]:
-        raise ValueError(f"detector: {name} is of shape {pattern.shape}, expected {shape[1:]}")
-    return pattern
+@final
+@DETECTOR_TERMS.part
+@dataclass(frozen=True)
+class EquivalentNoise(DetectorTerm):
+    """Noise as data sheets state it: as a difference of a blackbody's temperature (NETD).
+
+    The standard deviation of the radiance is NETD times dL/dT at the stated temperature, at any
+    light. It holds all noise: no other term of noise should stand beside it.
+    """
+
+    kind: ClassVar[str] = "netd"
+    example: ClassVar[str] = "{kind: netd, netd: 50 mK, temperature: 30 degC}"
+    stage: ClassVar[Stage] = Stage.READOUT
+    netd: Annotated[
+        float, Parameter("Difference as large as the noise.", TEMPERATURE_DIFFERENCE, least=0.0)
+    ]
+    temperature: Annotated[
+        float, Parameter("Of the blackbody.", TEMPERATURE, least=200.0, most=6000.0)
+    ] = 303.15
+
+    def apply(self, electrons: NDArray[np.float64], readout: Readout) -> NDArray[np.float64]:
+        """Signal and noise; see `DetectorTerm.apply`."""
+        radiance = self.netd * float(readout.point.band.slope(self.temperature))
+        noise = readout.per_radiance * radiance * readout.normal(*electrons.shape[1:])
+        return np.asarray(electrons + noise)

@@ -1,0 +1,265 @@
+"""The camera's own calibration, from frames of blackbodies that its detector sees."""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from math import exp, log
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import bisect
+
+from chipglow.camera.detector.bad_pixels import find_bad_pixels, replace_bad_pixels
+from chipglow.camera.detector.detector import BRIGHTER_SOURCE, DARKER_SOURCE, Detector
+from chipglow.camera.detector.nonuniformity import NonUniformity, mean_frame
+from chipglow.camera.detector.response import OperationPoint
+from chipglow.camera.measurement import Flag
+
+HALF: Final = 0.5
+"""Part of the capacity that is filled where the NETD is told."""
+
+_BEYOND: Final = 10.0
+"""Capacities' light by which saturated frames are made."""
+
+_MARGIN: Final = 5.0
+"""Standard deviations under the mean of saturated frames from which on a count is saturated."""
+
+_SATURATED_FRAMES: Final = 8
+_SMALL: Final = (32, 32)
+"""Elements by which the lower range limit is found."""
+
+_QUANTISATION: Final = 12**-0.5
+"""Standard deviation of rounding to whole counts."""
+
+_FAINTEST: Final = 1e-9
+_STREAMS: Final = {"cold": 1, "hot": 2, "saturated": 3, "netd": 4}
+
+
+@dataclass(frozen=True, eq=False)
+class FlatFieldCalibration:
+    """From a detector's counts to radiance: what a camera does with its own counts.
+
+    Pixels are made alike by the detector's `correction`. Two sources, blackbodies of known
+    radiance, give the straight line from the median pixel's counts to radiance. So what remains in
+    the radiance is noise, rounding, what the pixels differ in besides, the frames of the sources
+    being few, and non-linearity.
+
+    Parameters
+    ----------
+    detector : Detector
+        The detector.
+    point : OperationPoint
+        How the camera uses it.
+    uniformity : NonUniformity
+        What makes the pixels alike.
+    bad : ndarray of bool
+        Pixels that do not answer to light as others do, shape (y, x).
+    saturated : ndarray
+        Counts from which on each pixel is saturated, shape (y, x).
+    sources : tuple of float
+        Radiance of the darker and of the brighter source in W/(m² sr).
+    levels : tuple of float
+        The median pixel's counts of them.
+    """
+
+    detector: Detector
+    point: OperationPoint
+    uniformity: NonUniformity
+    bad: NDArray[np.bool_]
+    saturated: NDArray[np.float64]
+    sources: tuple[float, float]
+    levels: tuple[float, float]
+
+    @classmethod
+    def of(
+        cls, detector: Detector, point: OperationPoint, shape: tuple[int, int]
+    ) -> "FlatFieldCalibration":
+        """Let the detector see its sources.
+
+        Parameters
+        ----------
+        detector, point
+            As above.
+        shape : tuple of int
+            Rows and columns.
+
+        Raises
+        ------
+        ValueError
+            If the second source is not the brighter, or saturates the detector.
+        """
+        dark, bright = sources = _sources(detector, point)
+        cold = _frames(detector, point, shape, dark, detector.frames, "cold")
+        hot = _frames(detector, point, shape, bright, detector.frames, "hot")
+        uniformity = _uniformity(detector, cold, hot)
+        bad = find_bad_pixels(cold, hot).unresponsive
+        low, high = (
+            float(np.median(mean_frame(uniformity.apply(frames))[~bad])) for frames in (cold, hot)
+        )
+        light = _BEYOND * full_light(detector, point)
+        full = _frames(detector, point, shape, light, _SATURATED_FRAMES, "saturated")
+        margin = _MARGIN * float(np.sqrt(full.var(axis=0).mean()))
+        saturated = full.mean(axis=0) - margin
+        return cls(detector, point, uniformity, bad, saturated, sources, (low, high))
+
+    def radiance(self, counts: NDArray[np.uint32]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+        """Radiance and flags of frames.
+
+        Parameters
+        ----------
+        counts : ndarray
+            Shape (time, y, x).
+
+        Returns
+        -------
+        radiance : ndarray
+            In W/(m² sr); NaN where a pixel is dead and not replaced by its neighbours.
+        flags : ndarray
+            Sums of `Flag`, uint8, of the same shape.
+        """
+        signal, replaced = replace_bad_pixels(self.uniformity.apply(counts), self.bad)
+        dead = np.where(replaced, Flag.REPLACED, np.where(self.bad, Flag.DEAD, 0))
+        flags = np.array(np.broadcast_to(dead, counts.shape), np.uint8)
+        flags[(counts >= self.saturated) & ~self.bad] |= np.uint8(Flag.SATURATED)
+        flags[(counts == 0) & ~self.bad] |= np.uint8(Flag.UNDER_RANGE)
+        (low, high), (dark, bright) = self.levels, self.sources
+        return dark + (signal - low) * (bright - dark) / (high - low), flags
+
+    def netd(self, temperature: float) -> float:
+        """Noise-equivalent temperature difference in K, of a blackbody of this temperature in K.
+
+        The standard deviation over time of the calibrated radiance, root mean square over the
+        pixels, over dL/dT: noise of frames that the detector makes, as a laboratory measures it.
+        """
+        seen = float(self.point.band.radiance(temperature))
+        frames = _frames(
+            self.detector, self.point, self.bad.shape, seen, self.detector.frames, "netd"
+        )
+        variance = self.radiance(frames)[0].var(axis=0, ddof=1)
+        noise = np.sqrt(variance[~self.bad].mean())
+        return float(noise / self.point.band.slope(temperature))
+
+    @cached_property
+    def half_temperature(self) -> float:
+        """Temperature in K of a blackbody whose light fills half of the detector."""
+        light = HALF * full_light(self.detector, self.point)
+        return float(self.point.band.temperature(light))
+
+    @cached_property
+    def half_netd(self) -> float:
+        """NETD in K there."""
+        return self.netd(self.half_temperature)
+
+
+def _sources(detector: Detector, point: OperationPoint) -> tuple[float, float]:
+    """Radiance of the darker and of the brighter source."""
+    band, full = point.band, full_light(detector, point)
+    dark, bright = (
+        part * full if kelvins is None else float(band.radiance(kelvins))
+        for kelvins, part in ((detector.cold, DARKER_SOURCE), (detector.hot, BRIGHTER_SOURCE))
+    )
+    cold, hot = (float(band.temperature(one)) - 273.15 for one in (dark, bright))
+    if not dark < bright:
+        raise ValueError(
+            f"detector: the sources of the correction are of {cold:.4g} °C and {hot:.4g} °C, "
+            "expected the second brighter (cold, hot)"
+        )
+    if not bright < full:
+        raise ValueError(
+            f"Detector.hot: {hot:.4g} °C fills the detector at its exposure, expected under "
+            f"{float(band.temperature(full)) - 273.15:.4g} °C"
+        )
+    return dark, bright
+
+
+def _uniformity(
+    detector: Detector, cold: NDArray[np.uint32], hot: NDArray[np.uint32]
+) -> NonUniformity:
+    if detector.correction == "two-point":
+        return NonUniformity.two_point(cold, hot)
+    if detector.correction == "one-point":
+        return NonUniformity.one_point(cold)
+    return NonUniformity(np.ones(cold.shape[1:]), np.zeros(cold.shape[1:]))
+
+
+def _frames(
+    detector: Detector,
+    point: OperationPoint,
+    shape: tuple[int, ...],
+    radiance: float,
+    count: int,
+    stream: str,
+) -> NDArray[np.uint32]:
+    """Frames of a flat-field source."""
+    generator = np.random.default_rng([detector.seed, _STREAMS[stream]])
+    return detector.counts(np.full((count, *shape), radiance), generator, point)
+
+
+@lru_cache(maxsize=32)
+def flat_field_calibration(
+    detector: Detector, point: OperationPoint, shape: tuple[int, int]
+) -> FlatFieldCalibration:
+    """The calibration of a detector in a camera, see `FlatFieldCalibration.of`: made once."""
+    return FlatFieldCalibration.of(detector, point, shape)
+
+
+@lru_cache(maxsize=32)
+def full_light(detector: Detector, point: OperationPoint) -> float:
+    """Radiance in W/(m² sr) that fills a detector, beside what is in it in the dark.
+
+    Raises
+    ------
+    ValueError
+        If the dark fills it.
+    """
+    dark = _seen(detector, point, 0.0)[0] - detector.offset
+    electrons = detector.capacity - max(dark, 0.0) / detector.conversion_gain
+    if not electrons > 0:
+        raise ValueError("detector: it is full in the dark, expected a smaller current")
+    return electrons / detector.per_radiance(point)
+
+
+@lru_cache(maxsize=32)
+def lower_range_limit(detector: Detector, point: OperationPoint) -> float:
+    """Lowest radiance temperature that a detector tells at its exposure.
+
+    Parameters
+    ----------
+    detector : Detector
+        The detector.
+    point : OperationPoint
+        How the camera uses it.
+
+    Returns
+    -------
+    float
+        Temperature in K of the blackbody whose mean signal over the dark is `least_signal` times
+        its noise: the standard deviation over time, or that of rounding where it is larger.
+
+    Raises
+    ------
+    ValueError
+        If no blackbody that does not saturate it is so bright.
+    """
+
+    def excess(logarithm: float) -> float:
+        mean, noise = _seen(detector, point, exp(logarithm))
+        return mean - dark - detector.least_signal * noise
+
+    dark, _ = _seen(detector, point, 0.0)
+    full = full_light(detector, point)
+    ends = log(_FAINTEST * full), log(full)
+    if excess(ends[1]) < 0:
+        raise ValueError(
+            "lower_limit: detector: its signal is never "
+            f"{detector.least_signal:g} times its noise, expected a smaller least_signal"
+        )
+    found = ends[0] if excess(ends[0]) > 0 else bisect(excess, *ends, xtol=1e-4)
+    return float(point.band.temperature(exp(found)))
+
+
+def _seen(detector: Detector, point: OperationPoint, radiance: float) -> tuple[float, float]:
+    """Mean count of a flat-field source and its standard deviation over time."""
+    counts = _frames(detector, point, _SMALL, radiance, detector.frames, "netd")
+    noise = float(np.sqrt(counts.var(axis=0, ddof=1).mean()))
+    return float(counts.mean()), max(noise, _QUANTISATION)

@@ -1,0 +1,158 @@
+"""How many electrons light makes in an element of the detector."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from math import isfinite, pi
+from typing import Annotated, ClassVar, Final, final
+
+import numpy as np
+from scipy.constants import c, h
+
+from chipglow.quantities import Family, Parameter, Part
+from chipglow.quantities.units import LENGTH, TEMPERATURE, WAVELENGTH
+from chipglow.radiometry import Band
+
+RESPONSES: Final = Family("detector_response")
+"""By their kind; other packages add theirs in the group ``chipglow.detector_response``."""
+
+
+@dataclass(frozen=True)
+class OperationPoint:
+    """How a camera uses its detector (EMVA 1288: the operation point).
+
+    Parameters
+    ----------
+    band : Band
+        Spectral band, with the relative spectral response.
+    integration_time : float
+        In s.
+    frame_rate : float
+        Frames a second.
+    fill_factor : float
+        Fraction of an element's square that takes light.
+
+    Raises
+    ------
+    ValueError
+        If a number is not positive and finite.
+    """
+
+    band: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
+    integration_time: float = 10e-6
+    frame_rate: float = 600.0
+    fill_factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("integration_time", "frame_rate", "fill_factor"):
+            value = getattr(self, name)
+            if not (isfinite(value) and value > 0):
+                raise ValueError(f"operation point: {name} is {value!r}, expected over 0")
+
+    @property
+    def frame_time(self) -> float:
+        """Time between frames in s."""
+        return 1 / self.frame_rate
+
+
+class DetectorResponse(Part, ABC):
+    """How many electrons light makes. They are proportional to the in-band radiance.
+
+    What counts at each wavelength is said once, by the band's relative spectral response.
+    """
+
+    @abstractmethod
+    def electrons(self, point: OperationPoint, capacity: float) -> float:
+        """Electrons that 1 W/(m² sr) makes in an element in one frame.
+
+        Parameters
+        ----------
+        point : OperationPoint
+            How the camera uses the detector.
+        capacity : float
+            Electrons that fill the detector or its digitiser.
+        """
+
+
+@final
+@RESPONSES.part
+@dataclass(frozen=True)
+class PhotonResponse(DetectorResponse):
+    """A photon detector behind a lens: every photon makes an electron with a probability.
+
+    n = η (λ₀ / h c) τ (π / 4 N²) A t ∫ R(λ) / R(λ₀) L(λ) dλ (EMVA 1288, 2.1; Born and Wolf,
+    4.8.3, for the irradiance by an aplanatic lens): the quantum efficiency η holds at the
+    wavelength λ₀, and elsewhere it is η R(λ) λ₀ / (R(λ₀) λ) by the band's response R relative to
+    energy. A is the part of the element's square that takes light.
+    """
+
+    kind: ClassVar[str] = "photon"
+    example: ClassVar[str] = (
+        "{kind: photon, quantum_efficiency: 0.8, element: 15 um, f_number: 2.5}"
+    )
+    quantum_efficiency: Annotated[
+        float, Parameter("Electrons for each photon.", over=0.0, most=1.0)
+    ]
+    element: Annotated[
+        float, Parameter("Side of an element's square, on the detector.", LENGTH, over=0.0)
+    ]
+    f_number: Annotated[
+        float,
+        Parameter("Of the cone of light at the detector, as of its cold stop.", least=0.5),
+    ]
+    transmittance: Annotated[
+        float, Parameter("Fraction of the light that optics and filter pass.", over=0.0, most=1.0)
+    ] = 1.0
+    wavelength: Annotated[
+        float | None,
+        Parameter(
+            "Wavelength of the quantum efficiency; none: the middle of the camera's band.",
+            WAVELENGTH,
+            over=0.0,
+        ),
+    ] = None
+
+    def electrons(self, point: OperationPoint, capacity: float) -> float:
+        """Electrons by photons; see `DetectorResponse.electrons`."""
+        band = point.band
+        wavelength = self.wavelength or (band.lower + band.upper) / 2
+        relative = 1.0 if band.response is None else float(band.response(np.array([wavelength]))[0])
+        if not relative > 0:
+            raise ValueError(
+                f"PhotonResponse.wavelength: {1e6 * wavelength:g} um, expected one at which the "
+                "band's response is over 0"
+            )
+        cone = self.transmittance * pi / (4 * self.f_number**2)
+        seen = cone * point.fill_factor * self.element**2 * point.integration_time
+        return float(self.quantum_efficiency * wavelength / (h * c) / relative * seen)
+
+
+@final
+@RESPONSES.part
+@dataclass(frozen=True)
+class EnergyResponse(DetectorResponse):
+    """A detector of which the response to radiance is known, as of a calibration."""
+
+    kind: ClassVar[str] = "energy"
+    example: ClassVar[str] = "{kind: energy, per_radiance: 1.2e4}"
+    per_radiance: Annotated[
+        float, Parameter("Electrons that 1 W/(m² sr) makes in a frame.", over=0.0)
+    ]
+
+    def electrons(self, point: OperationPoint, capacity: float) -> float:
+        """Electrons as they are given; see `DetectorResponse.electrons`."""
+        return self.per_radiance
+
+
+@final
+@RESPONSES.part
+@dataclass(frozen=True)
+class RangeResponse(DetectorResponse):
+    """A camera of which only the measuring range is known: a blackbody at its end fills it."""
+
+    kind: ClassVar[str] = "range"
+    example: ClassVar[str] = "{kind: range, hottest: 140 degC}"
+    hottest: Annotated[float, Parameter("Upper end of the range.", TEMPERATURE)]
+
+    def electrons(self, point: OperationPoint, capacity: float) -> float:
+        """Electrons by the range; see `DetectorResponse.electrons`."""
+        return capacity / float(point.band.radiance(self.hottest))
