@@ -1,57 +1,324 @@
-"""The detector: mean, noise, limits and pattern of its counts; recordings that it makes."""
+"""The detector: mean and noise of its counts by theory, its limits, patterns and recordings."""
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
+from scipy.constants import c, h
 
-from chipglow.camera import Camera, Detector, Measurement, ReadNoise, ShotNoise
-from chipglow.radiometry import Band
+from chipglow.camera import (
+    DETECTOR_TERMS,
+    RESPONSES,
+    Camera,
+    ColumnNoise,
+    DarkCurrent,
+    DeadElements,
+    Detector,
+    EnergyResponse,
+    EquivalentNoise,
+    FlickerNoise,
+    GainPattern,
+    Lag,
+    Measurement,
+    NonLinearity,
+    OffsetPattern,
+    OperationPoint,
+    PhotonResponse,
+    RangeResponse,
+    ReadNoise,
+    ShotNoise,
+)
+from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.scene import Raster
 
 BAND = Band(3.8e-6, 5.1e-6)
+FRAMES = 10_000
+PIXELS = (4, 4)
+MEAN_ERRORS = 5.0
+"""Standard errors by which a mean or variance may be off: beyond in one of two million cases."""
 
 
 def generator(seed=1):
     return np.random.default_rng(seed)
 
 
-def test_mean_and_variance_are_those_of_photons_and_reading():
-    detector = Detector(gain=10.0, offset=400.0, terms=(ShotNoise(0.05), ReadNoise(3.0)))
-    counts = detector.counts(np.full((1, 500, 500), 200.0), generator()).astype(float)
-    # Photons 0.05 x 2000, reading 9, rounding 1/12; both bounds are five standard errors.
-    variance = 0.05 * 2000.0 + 9.0 + 1 / 12
-    assert counts.mean() == pytest.approx(2400.0, abs=5 * np.sqrt(variance / counts.size))
-    assert counts.var() == pytest.approx(variance, rel=5 * np.sqrt(2 / counts.size))
+def detector(*terms, gain=1.0, **others):
+    settings = {"offset": 400.0, "bits": 20, **others}
+    return Detector(response=EnergyResponse(1.0), gain=gain, terms=terms, **settings)
 
 
-def test_counts_end_at_the_digitisers_limits():
-    detector = Detector(gain=10.0, offset=0.0, terms=(ReadNoise(0.0),))
-    counts = detector.counts(np.array([[[-5.0, 0.0, 204.7, 409.5, 500.0]]]), generator())
-    assert counts[0, 0].tolist() == [0, 0, 2047, 4095, 4095]
-    assert detector.saturation == 4094
+def frames(made, radiance, count=FRAMES, shape=PIXELS, seed=1):
+    return made.counts(np.full((count, *shape), radiance), generator(seed)).astype(float)
 
 
-def test_sensors_differ_by_their_pattern_and_dead_ones_see_nothing():
-    plain = Detector(gain=10.0, terms=(ReadNoise(0.0),))
-    detector = plain.with_pattern((200, 200), 0.02, 5.0, 0.01, generator(3))
-    dark, light = (
-        detector.counts(np.full((1, 200, 200), radiance), generator())[0].astype(float)
-        for radiance in (0.0, 100.0)
+def assert_variance(counts, expected, independent=None):
+    """Variance over time as expected, within standard errors of a normal variable's."""
+    count = independent or counts.size
+    found = counts.var(axis=0, ddof=1).mean()
+    assert found == pytest.approx(expected, rel=MEAN_ERRORS * np.sqrt(2 / count))
+
+
+def assert_mean(counts, expected, variance):
+    error = np.sqrt(variance / counts.size)
+    assert counts.mean() == pytest.approx(expected, abs=MEAN_ERRORS * error)
+
+
+def test_photons_make_electrons_by_the_closed_form():
+    point = OperationPoint(BAND, integration_time=20e-6, fill_factor=0.9)
+    found = PhotonResponse(0.8, 15e-6, 2.5, 0.7, 4.5e-6).electrons(point, 1.0)
+    # Energy on the element over that of a photon: π τ sin²θ A t / (h c / λ), sin θ = 1 / 2 N.
+    energy = np.pi * 0.7 / 5.0**2 * 0.9 * 225e-12 * 20e-6
+    assert found == pytest.approx(0.8 * energy * 4.5e-6 / (h * c), rel=1e-12)
+
+
+def test_a_flat_quantum_efficiency_counts_the_photons_of_the_band():
+    """By the response λ / λ₀ relative to energy; photons by their own integral of Planck's law."""
+    wavelengths = tuple(np.linspace(3.8e-6, 5.1e-6, 3))
+    flat = TabulatedResponse(wavelengths, tuple(w / 4e-6 for w in wavelengths))
+    point = OperationPoint(Band(3.8e-6, 5.1e-6, flat))
+    response = PhotonResponse(1.0, 10e-6, 2.0, wavelength=4.6e-6)
+    found = response.electrons(point, 1.0) * point.band.weights(900.0)[1].sum()
+    at = np.linspace(3.8e-6, 5.1e-6, 20_001)
+    photons = 2 * c / at**4 / np.expm1(h * c / (1.380649e-23 * 900.0 * at))
+    cone = np.pi / 16 * 100e-12 * 10e-6
+    assert found == pytest.approx(cone * np.trapezoid(photons, at), rel=1e-5)
+
+
+def test_other_responses():
+    point = OperationPoint()
+    assert EnergyResponse(3e4).electrons(point, 1e7) == 3e4
+    per_radiance = RangeResponse(413.15).electrons(point, 1e7)
+    assert per_radiance * float(BAND.radiance(413.15)) == pytest.approx(1e7, rel=1e-12)
+    assert set(RESPONSES.kinds) == {"photon", "energy", "range"}
+
+
+def test_a_wavelength_without_response_is_refused():
+    lone = TabulatedResponse((3.8e-6, 4.0e-6, 4.1e-6, 5.1e-6), (0.0, 1.0, 0.0, 0.0))
+    point = OperationPoint(Band(3.8e-6, 5.1e-6, lone))
+    with pytest.raises(ValueError, match=r"PhotonResponse.wavelength: 4.45 um, expected"):
+        PhotonResponse(0.8, 15e-6, 2.5).electrons(point, 1.0)
+
+
+def test_quantisation_has_a_variance_of_a_twelfth():
+    """Of a signal that is spread evenly over the counts."""
+    radiance = generator().uniform(100.0, 1100.0, (1, 400, 400))
+    counts = detector().counts(radiance, generator()).astype(float)
+    error = counts - 400.0 - radiance
+    # The fourth moment of an even distribution: its variance's error is √(4/5)/√N of it.
+    assert error.var() == pytest.approx(1 / 12, rel=5 * np.sqrt(0.8 / error.size))
+    assert np.abs(error).max() <= 0.5 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("terms", "mean", "variance"),
+    [
+        ((ShotNoise(),), 0.0, 5000.0),
+        ((ReadNoise(30.0),), 0.0, 900.0),
+        ((ColumnNoise(25.0),), 0.0, 625.0),
+        ((DarkCurrent(3e8), ShotNoise()), 3000.0, 8000.0),
+        ((ShotNoise(), DarkCurrent(3e8)), 3000.0, 8000.0),
+        ((EquivalentNoise(2.0, 500.0),), 0.0, (2.0 * float(BAND.slope(500.0))) ** 2),
+        ((ShotNoise(), ReadNoise(30.0), DarkCurrent(1e8)), 1000.0, 6900.0),
+    ],
+    ids=lambda value: ", ".join(t.kind for t in value) if isinstance(value, tuple) else "",
+)
+def test_mean_and_variance_over_10_000_frames_are_theorys(terms, mean, variance):
+    counts = frames(detector(*terms, gain=2.0), 5000.0)
+    expected = 4.0 * variance + 1 / 12
+    columns = counts[:, :1] if isinstance(terms[0], ColumnNoise) else counts
+    assert_mean(columns, 400.0 + 2.0 * (5000.0 + mean), expected)
+    assert_variance(columns, expected)
+
+
+def test_noise_of_columns_is_the_same_in_a_column_and_independent_between_them():
+    counts = frames(detector(ColumnNoise(200.0)), 1000.0, count=2000, shape=(5, 6))
+    np.testing.assert_array_equal(counts, np.broadcast_to(counts[:, :1], counts.shape))
+    together = np.corrcoef(counts[:, 0].T)
+    assert np.abs(together - np.eye(6)).max() < 5 / np.sqrt(2000)
+
+
+def test_flicker_noise_has_the_spectrum_of_1_over_f():
+    """Where the limits of frequency, 0.01 Hz and 50 Hz, are a decade away."""
+    term = FlickerNoise(100.0, since_correction=100.0)
+    point = OperationPoint(frame_rate=100.0)
+    made = detector(term, offset=1e5)
+    radiance = np.zeros((4096, 16, 16))
+    counts = made.counts(radiance, generator(), point).astype(float)
+    series = (counts - counts.mean(axis=0)).reshape(4096, -1) * np.hanning(4096)[:, None]
+    power = (np.abs(np.fft.rfft(series, axis=0)) ** 2).mean(axis=1)
+    density = 2 * power / (100.0 * (np.hanning(4096) ** 2).sum())
+    frequency = np.fft.rfftfreq(4096, 0.01)
+    expected = 100.0**2 / (np.log(10) * frequency[1:])
+    for low, high in ((0.1, 0.3), (0.3, 1.0), (1.0, 3.0)):
+        inside = (frequency[1:] >= low) & (frequency[1:] < high)
+        ratio = density[1:][inside] / expected[inside]
+        # 256 pixels, bins of the window two wide: 5 standard errors, and 5 % for what is missing
+        # beyond the limits and aliased from there.
+        tolerance = 5 * np.sqrt(2 / (256 * inside.sum())) + 0.05
+        assert ratio.mean() == pytest.approx(1.0, abs=tolerance)
+
+
+def test_flicker_noise_of_single_frames_has_the_variance_of_its_decades():
+    term = FlickerNoise(100.0, since_correction=100.0)
+    processes = term.time_constants(1 / 600.0).size
+    # From 0.01 Hz to 300 Hz: 4.5 decades, two processes in each, and both ends.
+    assert processes == 10
+    counts = detector(term, offset=1e5).counts(np.zeros((1, 300, 300)), generator())
+    expected = 100.0**2 / 2 * processes
+    assert counts.var() == pytest.approx(expected, rel=5 * np.sqrt(2 / counts.size))
+
+
+def test_lag_is_a_filter_of_first_order():
+    """A step's answer, and the transfer function (1 − a) / (1 − a exp(−iω)) of a sine."""
+    made = detector(Lag(0.2), gain=100.0, bits=32)
+    step = np.where(np.arange(12) >= 4, 5000.0, 1000.0)[:, None, None] * np.ones((1, 2, 2))
+    found = made.counts(step, generator())[:, 0, 0] - 400.0
+    after = np.maximum(np.arange(12) - 3, 0)
+    np.testing.assert_allclose(found, 100 * (5000.0 - 4000.0 * 0.2**after), atol=1)
+    number = np.arange(400)
+    for omega in (0.1, 1.0, 3.0):
+        sine = 5000.0 + 1000.0 * np.cos(omega * number)
+        seen = made.counts(sine[:, None, None], generator())[100:, 0, 0] / 100.0
+        design = np.stack([np.cos(omega * number), np.sin(omega * number), number**0])[:, 100:]
+        real, imaginary, _ = np.linalg.lstsq(design.T, seen, rcond=None)[0]
+        expected = 1000.0 * 0.8 / (1 - 0.2 * np.exp(-1j * omega))
+        assert real - 1j * imaginary == pytest.approx(expected, abs=0.01)
+
+
+def test_lag_is_only_of_a_frame_that_began_one_frame_time_before():
+    made = detector(Lag(0.5))
+    radiance = np.array([100.0, 300.0, 500.0])[:, None, None]
+    apart = made.counts(radiance, generator(), times=np.array([0.0, 1 / 600, 9.0]))
+    assert (apart[:, 0, 0] - 400).tolist() == [100, 200, 500]
+
+
+def test_elements_differ_by_their_patterns_and_dead_ones_see_nothing():
+    made = detector(
+        GainPattern(0.02), OffsetPattern(5.0), DeadElements(0.01), gain=10.0, offset=1e3
     )
-    dead = detector.terms[-1].mask
+    shape = (200, 200)
+    dark, light = (frames(made, r, 1, shape, seed)[0] for r, seed in ((0.0, 1), (100.0, 2)))
+    dead = made.terms[-1].mask(shape, made.seed)
     assert dead.mean() == pytest.approx(0.01, abs=5 * np.sqrt(0.01 / 40000))
     np.testing.assert_array_equal(light[dead], dark[dead])
     lit = (light - dark)[~dead]
-    # Two roundings of variance 1/12 each beside 2 % of 1000 counts.
+    # Two roundings of variance 1/12 each beside 2 % of 1000 counts, and 50 counts in the dark.
     assert lit.std() == pytest.approx(20.0, rel=5 / np.sqrt(2 * lit.size))
-    assert dark.std() == pytest.approx(np.sqrt(25 + 1 / 12), rel=5 / np.sqrt(2 * dark.size))
+    assert dark.std() == pytest.approx(50.0, rel=5 / np.sqrt(2 * dark.size))
+    other = frames(Detector(**{**vars(made), "seed": 2}), 100.0, 1, shape)[0]
+    assert (other != light).mean() > 0.9
+
+
+def test_a_signal_falls_short_by_the_non_linearity():
+    made = detector(NonLinearity(0.1), full_well=10_000.0)
+    found = [frames(made, r, 1)[0, 0, 0] - 400 for r in (0.0, 1000.0, 5000.0, 10_000.0)]
+    assert found == [0, 990, 4750, 9000]
+
+
+def test_full_well_and_digitiser_end_the_counts():
+    well = detector(ShotNoise(), ReadNoise(50.0), full_well=5000.0, gain=2.0)
+    over = frames(well, 6000.0)
+    # The charge is full, so its shot noise is gone: the read noise is what is left.
+    assert_mean(over, 400.0 + 2 * 5000.0, 4 * 2500.0 + 1 / 12)
+    assert_variance(over, 4 * 2500.0 + 1 / 12)
+    assert (well.capacity, well.saturation) == (5000.0, 10_399)
+    digitiser = detector(gain=10.0, offset=0.0, bits=12)
+    counts = digitiser.counts(np.array([[[-5.0, 0.0, 204.7, 409.5, 500.0]]]), generator())
+    assert counts[0, 0].tolist() == [0, 0, 2047, 4095, 4095]
+    assert (digitiser.capacity, digitiser.saturation) == (409.5, 4094)
+
+
+def test_the_gain_fills_the_digitiser_if_it_is_not_given():
+    made = detector(gain=None, full_well=1e6, bits=14)
+    assert frames(made, 1e6, 1).max() == (1 << 14) - 1
+    assert made.conversion_gain == pytest.approx((16383 - 400) / 1e6)
+
+
+def test_the_photon_transfer_curve_gives_gain_and_read_noise_back():
+    """EMVA 1288, 6.6: the slope of the variance over the mean is the gain, at no light the dark."""
+    gain, read = 0.02, 400.0
+    made = detector(ShotNoise(), ReadNoise(read), gain=gain, offset=100.0, bits=14)
+    means, variances = [], []
+    levels = np.linspace(0.0, 7e5, 15)
+    for i, electrons in enumerate(levels):
+        # Two frames each, as the standard measures: what is fixed falls out of the difference.
+        first, second = frames(made, electrons, 2, (300, 300), seed=i)
+        means.append((first.mean() + second.mean()) / 2)
+        variances.append(np.mean((first - second) ** 2) / 2)
+    dark_mean, dark_variance = means[0], variances[0]
+    slope, offset = np.polyfit(np.array(means) - dark_mean, variances, 1)
+    # Each variance is of 90 000 differences: √(2/90 000) = 0.5 %; of 15 levels the slope is
+    # within 0.3 %, and three times that is allowed.
+    assert slope == pytest.approx(gain, rel=0.01)
+    found = np.sqrt((dark_variance - 1 / 12) / slope**2)
+    assert found == pytest.approx(read, rel=0.02)
+    assert offset == pytest.approx(gain**2 * read**2 + 1 / 12, abs=0.05 * max(variances))
+
+
+def test_the_order_of_the_list_does_not_matter():
+    terms = (ReadNoise(5.0), ShotNoise(), DarkCurrent(1e6), GainPattern(0.1), NonLinearity(0.1))
+    counts = [frames(detector(*order), 2e5, 2) for order in (terms, terms[::-1])]
+    np.testing.assert_array_equal(*counts)
 
 
 def test_the_same_state_gives_the_same_counts_and_another_others():
-    detector, radiance = Detector(gain=10.0), np.full((2, 30, 40), 100.0)
-    first = detector.counts(radiance, generator(7))
-    np.testing.assert_array_equal(first, detector.counts(radiance, generator(7)))
-    assert (first != detector.counts(radiance, generator(8))).any()
+    made, radiance = detector(ReadNoise(9.0)), np.full((2, 30, 40), 100.0)
+    first = made.counts(radiance, generator(7))
+    np.testing.assert_array_equal(first, made.counts(radiance, generator(7)))
+    assert (first != made.counts(radiance, generator(8))).any()
     assert (first[0] != first[1]).any()
+
+
+every_term = st.sampled_from(
+    [
+        GainPattern(0.05),
+        OffsetPattern(30.0),
+        DeadElements(0.1),
+        Lag(0.3),
+        DarkCurrent(1e7),
+        ShotNoise(),
+        NonLinearity(0.2),
+        ReadNoise(20.0),
+        ColumnNoise(20.0),
+        FlickerNoise(10.0),
+        EquivalentNoise(1.0, 400.0),
+    ]
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    terms=st.lists(every_term, unique_by=lambda term: term.kind),
+    radiance=st.floats(0.0, 1e5),
+    bits=st.integers(8, 16),
+    seed=st.integers(0, 100),
+)
+def test_counts_are_within_the_digitiser_and_follow_from_their_seed(terms, radiance, bits, seed):
+    made = detector(*terms, gain=None, full_well=5e4, bits=bits, offset=20.0)
+    counts = made.counts(np.full((3, 5, 6), radiance), generator(seed))
+    assert counts.max() < 1 << bits
+    np.testing.assert_array_equal(
+        counts, made.counts(np.full((3, 5, 6), radiance), generator(seed))
+    )
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    terms=st.lists(every_term, unique_by=lambda term: term.kind),
+    less=st.floats(0.0, 2e4),
+    more=st.floats(0.0, 1e4),
+)
+def test_more_light_is_no_fewer_counts_by_the_same_noise(terms, less, more):
+    """Without the shot noise, which grows with the light and is not of one sign."""
+    terms = [term for term in terms if not isinstance(term, ShotNoise)]
+    made = detector(*terms, full_well=5e4)
+    dim, bright = (frames(made, light, 2, (5, 6)) for light in (less, less + more))
+    assert (bright >= dim).all()
+
+
+def test_every_term_has_an_example_and_a_place():
+    for kind, term in DETECTOR_TERMS.parts.items():
+        assert kind in term.example
+        assert term.stage is not None
 
 
 def test_a_recording_knows_the_camera():
@@ -60,37 +327,49 @@ def test_a_recording_knows_the_camera():
         radiance, BAND, np.array([0.0, 1e-3]), Raster(0, 0, 6e-6, 4, 5),
         attributes={"integration_time": 10e-6},
     )  # fmt: skip
-    detector = Detector(gain=1.0, offset=0.0, terms=(ReadNoise(0.0),))
-    recording = detector.record(measured, generator())
+    made = detector(offset=0.0, bits=12)
+    recording = made.record(measured, generator())
     np.testing.assert_array_equal(recording.signal, np.rint(radiance))
     assert recording.quantity == "counts"
     assert recording.times.tolist() == [0.0, 1e-3]
     assert (recording.integration_time, recording.pitch) == (10e-6, 6e-6)
     assert (recording.band, recording.saturation) == (Camera().band, 4094)
+    measured.data.attrs["detector"] = "another"
+    with pytest.raises(ValueError, match="the measurement has one already"):
+        made.record(measured, generator())
 
 
 @pytest.mark.parametrize(
-    ("field", "value"),
-    [("gain", 0.0), ("offset", np.nan), ("bits", 0)],
-)
-def test_impossible_detectors_are_refused(field, value):
-    with pytest.raises(ValueError, match=rf"Detector\.{field}: {value:g}, expected"):
-        Detector(**{"gain": 1.0, field: value})
-
-
-def test_a_pattern_of_another_shape_is_refused():
-    detector = Detector(gain=1.0).with_pattern((3, 4), 0.0, 0.0, 0.0, generator())
-    with pytest.raises(ValueError, match=r"gain is of shape \(3, 4\), expected \(4, 3\)"):
-        detector.counts(np.zeros((1, 4, 3)), generator())
-
-
-@pytest.mark.parametrize(
-    ("term", "message"),
+    ("fields", "message"),
     [
-        (lambda: ReadNoise(-1.0), "ReadNoise.standard_deviation: -1, expected 0 or more"),
-        (lambda: ShotNoise(0.0), "ShotNoise.conversion_gain: 0, expected over 0"),
+        ({"gain": 0.0}, "Detector.gain: 0, expected over 0"),
+        ({"gain": None}, "Detector.gain: none, expected it or full_well"),
+        ({"offset": np.nan}, "Detector.offset: nan, expected 0 or more"),
+        ({"offset": 5000.0}, "Detector.offset: 5000, expected under the 4095 of 12 bits"),
+        ({"bits": 0}, "Detector.bits: 0, expected 1 to 32"),
+        ({"full_well": -1.0}, "Detector.full_well: -1, expected over 0"),
+        ({"correction": "three-point"}, "Detector.correction: 'three-point', expected one of two-"),
+        ({"response": 3.0}, "Detector.response: 3.0, expected one such as EnergyResponse"),
+        ({"terms": [ShotNoise()]}, r"Detector.terms: \[ShotNoise\(\)\], expected a tuple"),
+        ({"terms": (ReadNoise(1.0),) * 2}, "two are of kind 'read-noise', expected one of each"),
+        ({"cold": 900.0, "hot": 800.0}, "Detector.hot: 800 K, expected over the 900 K of cold"),
+        ({"seed": -1}, "Detector.seed: -1, expected 0 or more"),
     ],
 )
-def test_impossible_terms_are_refused(term, message):
+def test_impossible_detectors_are_refused(fields, message):
     with pytest.raises(ValueError, match=message):
-        term()
+        Detector(**{"response": EnergyResponse(1.0), "gain": 1.0, **fields})
+
+
+@pytest.mark.parametrize(
+    ("part", "message"),
+    [
+        (lambda: ReadNoise(-1.0), "ReadNoise.standard_deviation: -1, expected 0 or more"),
+        (lambda: Lag(1.0), "Lag.fraction: 1, expected 0 or more, under 1"),
+        (lambda: PhotonResponse(1.5, 15e-6, 2.0), "quantum_efficiency: 1.5, expected over 0, up"),
+        (lambda: OperationPoint(frame_rate=0.0), "frame_rate is 0.0, expected over 0"),
+    ],
+)
+def test_impossible_parts_are_refused(part, message):
+    with pytest.raises(ValueError, match=message):
+        part()

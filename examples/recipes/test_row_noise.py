@@ -11,7 +11,7 @@ from chipglow.quantities import Declared
 def test_rows_differ_and_elements_of_a_row_do_not():
     detector = Detector(response=EnergyResponse(1.0), gain=0.05, terms=(RowNoise(200.0),))
     counts = detector.counts(np.zeros((20, 400, 30)), np.random.default_rng(1)).astype(float)
-    np.testing.assert_array_equal(counts, counts[:, :, :1])
+    np.testing.assert_array_equal(counts, np.broadcast_to(counts[:, :, :1], counts.shape))
     rows, variance = counts[:, :, 0], (0.05 * 200.0) ** 2 + 1 / 12  # rounding: 1/12
     # Five standard errors each.
     assert rows.mean() == pytest.approx(400.0, abs=5 * np.sqrt(variance / rows.size))

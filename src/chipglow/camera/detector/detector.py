@@ -19,7 +19,7 @@ Correction: TypeAlias = Literal["two-point", "one-point", "none"]
 """How the pixels are made alike: by frames of two flat-field sources, of one, or not at all."""
 
 DARKER_SOURCE: Final = 0.1
-BRIGHTER_SOURCE: Final = 0.9
+BRIGHTER_SOURCE: Final = 0.8
 """Parts of the capacity that the sources of the correction fill, if none are named."""
 
 
@@ -63,7 +63,7 @@ class Detector(Part):
     hot: Annotated[
         float | None,
         Parameter(
-            "The brighter source; none: what fills nine tenths.",
+            "The brighter source; none: what fills eight tenths.",
             TEMPERATURE,
             least=TABLE_COLDEST,
             most=TABLE_HOTTEST,

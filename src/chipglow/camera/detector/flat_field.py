@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from math import exp, log
+from math import exp, log, nan
 from typing import Final
 
 import numpy as np
@@ -53,7 +53,8 @@ class FlatFieldCalibration:
     uniformity : NonUniformity
         What makes the pixels alike.
     bad : ndarray of bool
-        Pixels that do not answer to light as others do, shape (y, x).
+        Pixels that do not answer to light as others do, or that the brighter source saturates,
+        shape (y, x).
     saturated : ndarray
         Counts from which on each pixel is saturated, shape (y, x).
     sources : tuple of float
@@ -92,14 +93,14 @@ class FlatFieldCalibration:
         cold = _frames(detector, point, shape, dark, detector.frames, "cold")
         hot = _frames(detector, point, shape, bright, detector.frames, "hot")
         uniformity = _uniformity(detector, cold, hot)
+        light = _BEYOND * full_light(detector, point)
+        full = _frames(detector, point, shape, light, _SATURATED_FRAMES, "saturated")
+        saturated = full.mean(axis=0) - _MARGIN * float(np.sqrt(full.var(axis=0).mean()))
         bad = find_bad_pixels(cold, hot).unresponsive
+        bad |= ~bad & (mean_frame(hot) >= saturated)
         low, high = (
             float(np.median(mean_frame(uniformity.apply(frames))[~bad])) for frames in (cold, hot)
         )
-        light = _BEYOND * full_light(detector, point)
-        full = _frames(detector, point, shape, light, _SATURATED_FRAMES, "saturated")
-        margin = _MARGIN * float(np.sqrt(full.var(axis=0).mean()))
-        saturated = full.mean(axis=0) - margin
         return cls(detector, point, uniformity, bad, saturated, sources, (low, high))
 
     def radiance(self, counts: NDArray[np.uint32]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
@@ -130,8 +131,11 @@ class FlatFieldCalibration:
 
         The standard deviation over time of the calibrated radiance, root mean square over the
         pixels, over dL/dT: noise of frames that the detector makes, as a laboratory measures it.
+        NaN for a blackbody that saturates it.
         """
         seen = float(self.point.band.radiance(temperature))
+        if seen >= full_light(self.detector, self.point):
+            return nan
         frames = _frames(
             self.detector, self.point, self.bad.shape, seen, self.detector.frames, "netd"
         )

@@ -1,0 +1,368 @@
+"""A camera with a detector: calibration, flags, NETD, range, seeds; the study that chooses it."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from hypothesis.extra.numpy import arrays
+
+from chipglow.camera import (
+    UNUSABLE,
+    AnnularAperturePSF,
+    Camera,
+    DarkCurrent,
+    DeadElements,
+    Detector,
+    EnergyResponse,
+    EquivalentNoise,
+    Exposure,
+    Flag,
+    FlickerNoise,
+    GainPattern,
+    Lag,
+    NonLinearity,
+    OffsetPattern,
+    OperationPoint,
+    PhotonResponse,
+    RangeResponse,
+    ReadNoise,
+    ShotNoise,
+    lower_range_limit,
+)
+from chipglow.errors.error_images import error_images
+from chipglow.io import read_measurement, write_measurement
+from chipglow.radiometry import Band
+from chipglow.scene import Raster
+from chipglow.study import Study, load_study, study_text
+
+SCENE = Raster(-120e-6, 90e-6, 2e-6, 90, 120)
+PLAIN = Camera(psf=None, lower_limit=None)
+BAND = PLAIN.band
+INSB = PhotonResponse(0.8, 15e-6, 2.5)
+
+
+def camera(*terms, lower_limit=None, psf=None, **fields):
+    made = {"response": INSB, "full_well": 7e6, "bits": 14, "terms": terms, **fields}
+    return Camera(psf=psf, lower_limit=lower_limit, detector=Detector(**made))
+
+
+def images(kelvins, count=1, shape=(30, 40)):
+    return np.full((count, *shape), float(BAND.radiance(kelvins)))
+
+
+def times(count):
+    return PLAIN.frame_times(0.0, count)
+
+
+def exposure(start=0.0):
+    x = SCENE.x[None, :] + 0 * SCENE.y[:, None]
+    radiance = np.asarray(BAND.radiance(np.where(x > 0, 650.0, 600.0)))
+    single = radiance.astype(np.float32)
+    kelvins = np.full(SCENE.shape, 650.0, np.float32)
+    return Exposure(start, 10e-6, SCENE, radiance, single, kelvins, radiance)
+
+
+@settings(max_examples=30, deadline=None)
+@given(radiance=arrays(np.float64, (90, 120), elements=st.floats(0.0, 900.0)))
+def test_without_a_detector_images_are_read_as_they_are(radiance):
+    for psf in (None, AnnularAperturePSF()):
+        image = replace(PLAIN, psf=psf).form_image(radiance, SCENE)[None]
+        read, flags = replace(PLAIN, psf=psf).read(image, times(1))
+        assert read is image
+        assert flags is None
+        measured = replace(PLAIN, psf=psf).measurement(image, times(1), SCENE)
+        np.testing.assert_array_equal(measured.radiance, image)
+
+
+def test_without_a_detector_nothing_of_one_is_told():
+    plain = PLAIN.form_measurement(exposure())
+    assert not {"detector", "netd", "noise_seed"} & set(plain.data.attrs)
+    assert Camera().detector is None
+    assert PLAIN.redrawn(3) is PLAIN
+    assert Study().camera.build() == Camera.paper()
+
+
+def test_an_ideal_detector_gives_the_radiance_back_within_its_counts():
+    """What remains is rounding: of a frame's counts, and of the two sources'."""
+    made = camera(bits=14)
+    calibration = made.calibration((30, 40))
+    full = calibration.sources[1] / 0.9
+    one = full / ((1 << 14) - 1 - 400)  # a count
+    radiance = np.linspace(0.01 * full, 0.99 * full, 1200).reshape(1, 30, 40)
+    read, flags = made.read(radiance, times(1))
+    assert np.abs(read - radiance).max() < 1.2 * one
+    assert np.std(read - radiance) == pytest.approx(one / np.sqrt(12), rel=0.1)
+    assert not flags.any()
+
+
+def test_two_points_leave_nothing_of_the_patterns_of_a_linear_detector():
+    """And one point leaves the gains, at radiances other than that of its source."""
+    patterns = GainPattern(0.05), OffsetPattern(20_000.0)
+    radiance = images(680.0)
+    left = {}
+    for correction in ("two-point", "one-point", "none"):
+        made = camera(*patterns, bits=24, correction=correction)
+        left[correction] = made.read(radiance, times(1))[0].std() / radiance.mean()
+    assert left["two-point"] < 1e-6  # counts of 24 bits
+    sources = made.calibration((30, 40)).sources
+    beyond = (radiance.mean() - sources[0]) / radiance.mean()
+    # 1200 elements: their standard deviation is within 5 / √2400 of the one drawn from.
+    assert left["one-point"] == pytest.approx(0.05 * beyond, rel=0.1)
+    electrons = made.detector.per_radiance(made.calibration((30, 40)).point) * radiance.mean()
+    assert left["none"] == pytest.approx(np.hypot(0.05, 2e4 / electrons), rel=0.1)
+
+
+def test_non_linearity_remains_between_the_points():
+    """n (1 − f n / N) by a line through 0.1 N and 0.9 N: at half, f (0.4)² / (1 − f) too much."""
+    made = camera(NonLinearity(0.05), bits=24)
+    full = made.calibration((4, 4)).sources[1] / 0.9
+    read, _ = made.read(np.full((1, 4, 4), 0.5 * full), times(1))
+    expected = 0.5 + 0.05 * (0.5 - 0.1) * (0.9 - 0.5) / (1 - 0.05)
+    np.testing.assert_allclose(read / full, expected, rtol=1e-5)
+
+
+def test_dark_electrons_leave_no_error_but_take_room():
+    radiance = images(560.0)
+    clear, dark = camera(bits=24), camera(DarkCurrent(1e11), bits=24)
+    np.testing.assert_allclose(dark.read(radiance, times(1))[0], radiance, rtol=1e-5)
+    hot = [one.calibration((30, 40)).sources[1] for one in (clear, dark)]
+    assert hot[1] / hot[0] == pytest.approx(1 - 1e6 / 7e6, rel=1e-4)
+    with pytest.raises(ValueError, match="full in the dark, expected a smaller current"):
+        camera(DarkCurrent(1e13)).calibration((30, 40))
+
+
+def test_flags_say_what_is_saturated_dead_and_under_range():
+    made = camera(DeadElements(0.02), ShotNoise(), ReadNoise(500.0), lower_limit=500.0)
+    radiance = images(700.0)
+    radiance[0, :10] = float(BAND.radiance(1200.0))
+    radiance[0, 20:] = float(BAND.radiance(450.0))
+    measured = made.measurement(radiance, times(1), Raster(0, 0, 6e-6, 30, 40))
+    flags, kelvins = measured.flags[0], measured.radiance_temperature()[0]
+    dead = made.detector.terms[0].mask((30, 40), made.detector.seed)
+    assert dead.any()
+    assert ((flags & (Flag.DEAD | Flag.REPLACED) != 0) == dead).all()
+    assert (flags[:10][~dead[:10]] & Flag.SATURATED != 0).all()
+    assert (flags[20:][~dead[20:]] & Flag.UNDER_RANGE != 0).all()
+    assert not (flags[10:20][~dead[10:20]] & UNUSABLE).any()
+    assert np.isnan(kelvins[flags & UNUSABLE != 0]).all()
+    middle = dead & (np.arange(30) > 10)[:, None] & (np.arange(30) < 19)[:, None]
+    np.testing.assert_allclose(kelvins[middle], 700.0, atol=1.0)  # its neighbours'
+
+
+@pytest.mark.parametrize("kelvins", [560.0, 650.0, 750.0])
+def test_the_netd_is_the_analytic_one(kelvins):
+    """σ / (dS/dT): shot noise of the light and the dark, reading, rounding."""
+    dark, read = 2e11, 900.0
+    made = camera(DarkCurrent(dark), ShotNoise(), ReadNoise(read), GainPattern(0.02), bits=12)
+    calibration = made.calibration((60, 80))
+    detector, point = made.detector, calibration.point
+    electrons = detector.per_radiance(point) * float(BAND.radiance(kelvins))
+    rounding = 1 / 12 / detector.conversion_gain**2
+    noise = np.sqrt(electrons + dark * point.integration_time + read**2 + rounding)
+    expected = noise / (detector.per_radiance(point) * float(BAND.slope(kelvins)))
+    # 4800 pixels of 31 degrees of freedom: 5 / √(2 · 148 800) = 1 %; pixels' own gains 0.1 %.
+    assert calibration.netd(kelvins) == pytest.approx(expected, rel=0.012)
+
+
+def test_a_data_sheets_netd_comes_back():
+    band = Band(8e-6, 14e-6)
+    detector = Detector(
+        response=RangeResponse(413.15), gain=1.0, bits=14, terms=(EquivalentNoise(0.05),)
+    )
+    made = Camera(band, lower_limit=None, psf=None, detector=detector)
+    assert made.calibration((60, 80)).netd(303.15) == pytest.approx(0.05, rel=0.015)
+
+
+@pytest.mark.parametrize(
+    ("limits", "kelvins"),
+    [((0.9e-6, 1.7e-6), 900.0), ((3e-6, 5e-6), 500.0), ((8e-6, 14e-6), 350.0)],
+)
+def test_bands_from_0_9_to_14_um_work(limits, kelvins):
+    band = Band(*limits)
+    radiance = float(band.radiance(kelvins))
+    detector = Detector(
+        response=EnergyResponse(3e6 / radiance),
+        full_well=6e6,
+        bits=16,
+        terms=(ShotNoise(), ReadNoise(300.0)),
+    )
+    made = Camera(band, psf=None, lower_limit=None, detector=detector)
+    read, flags = made.read(np.full((1, 50, 50), radiance), times(1))
+    assert not flags.any()
+    noise = np.sqrt(3e6 + 300.0**2) / 3e6
+    # Plus the sources' frames: a 32nd of the variance.
+    assert read.std() / radiance == pytest.approx(noise, rel=5 / np.sqrt(5000) + 0.03)
+    assert lower_range_limit(detector, made.calibration((50, 50)).point) < kelvins
+
+
+def test_the_lower_range_limit_is_where_the_signal_is_so_many_times_its_noise():
+    detector = camera(ShotNoise(), ReadNoise(800.0), least_signal=10.0).detector
+    point = OperationPoint(BAND)
+    limit = lower_range_limit(detector, point)
+    # n = k √(n + σ²): n = k² / 2 + √(k⁴ / 4 + k² σ²), with rounding in σ.
+    variance = 800.0**2 + 1 / 12 / detector.conversion_gain**2
+    electrons = 50 + np.sqrt(2500 + 100 * variance)
+    expected = float(BAND.temperature(electrons / detector.per_radiance(point)))
+    # The noise of 32 768 numbers is within 2 %; the radiance falls by 3.5 % a kelvin there.
+    assert limit == pytest.approx(expected, abs=1.0)
+
+
+def test_the_lower_range_limit_follows_exposure_and_bits():
+    made = camera(ShotNoise(), bits=14).detector
+    short, long = (
+        lower_range_limit(made, OperationPoint(BAND, integration_time=one)) for one in (2e-6, 50e-6)
+    )
+    coarse = lower_range_limit(replace(made, bits=10, offset=20.0), OperationPoint(BAND, 2e-6))
+    assert long < short < coarse
+    with pytest.raises(ValueError, match="never 1e\\+06 times its noise, expected a smaller"):
+        lower_range_limit(replace(made, least_signal=1e6), OperationPoint(BAND))
+
+
+def test_noise_follows_from_the_seed_and_when_a_frame_begins():
+    made = camera(ShotNoise(), GainPattern(0.02))
+    radiance = images(650.0, 3)
+    first, _ = made.read(radiance, times(3))
+    np.testing.assert_array_equal(first, made.read(radiance, times(3))[0])
+    np.testing.assert_array_equal(first[1:2], made.read(radiance[:1], times(3)[1:2])[0])
+    assert (first[0] != first[1]).mean() > 0.9
+    other, _ = made.redrawn(1).read(radiance, times(3))
+    assert (other != first).mean() > 0.9
+    # Another noise, by the same detector.
+    assert made.redrawn(1).calibration((30, 40)) is made.calibration((30, 40))
+    assert np.corrcoef((other - first)[0].ravel(), (first[1] - first[2]).ravel())[0, 1] < 0.2
+
+
+def test_a_measurement_tells_its_detector(tmp_path):
+    made = camera(ShotNoise(), ReadNoise(500.0), psf=AnnularAperturePSF())
+    measured = made.form_measurement(exposure())
+    write_measurement(measured, tmp_path / "m.nc")
+    attributes = read_measurement(tmp_path / "m.nc").data.attrs
+    calibration = made.calibration(measured.raster.shape)
+    assert "ReadNoise(standard_deviation=500.0)" in attributes["detector"]
+    assert attributes["netd"] == calibration.half_netd
+    assert attributes["netd_temperature"] == calibration.half_temperature
+    assert calibration.netd(calibration.half_temperature) == calibration.half_netd
+
+
+def test_the_borders_warning_is_not_of_the_noise():
+    quiet = replace(PLAIN, psf=AnnularAperturePSF())
+    noisy = replace(quiet, detector=camera(ShotNoise(), ReadNoise(9e4)).detector)
+    assert (
+        noisy.form_measurement(exposure()).warnings == quiet.form_measurement(exposure()).warnings
+    )
+
+
+def test_lag_without_a_frame_before_is_said():
+    made = camera(Lag(0.3))
+    at = PLAIN.frame_times(0.0, 2)
+    assert "Lag: no frame" in made.form_measurement(exposure()).warnings[0]
+    assert made.form_measurement([exposure(float(start)) for start in at]).warnings == ()
+
+
+def test_error_images_have_the_noise_in_both_cases_and_the_psf_does_not():
+    """The same deviates with and without the point spread function: it alone makes its portion."""
+    noisy = camera(ShotNoise(), ReadNoise(900.0), psf=AnnularAperturePSF())
+    seen, quiet = (
+        error_images(one, exposure(), "mean") for one in (noisy, replace(noisy, detector=None))
+    )
+    spread = float((seen.case_1 - quiet.case_1).std())
+    calibration = noisy.calibration(quiet.reference.shape)
+    expected = np.hypot(calibration.netd(600.0), calibration.netd(650.0)) / np.sqrt(2)
+    # 1000 pixels; the sources' 32 frames add 2 %.
+    assert spread == pytest.approx(expected, rel=5 / np.sqrt(2000) + 0.03)
+    apart = float((seen.psf_portion - quiet.psf_portion).std())
+    assert apart < 0.2 * spread
+    measured = noisy.form_measurement(exposure())
+    np.testing.assert_allclose(
+        seen.measured, measured.radiance_temperature(flagged=True)[0], rtol=1e-12
+    )
+
+
+def test_flicker_noise_is_in_the_sources_frames_too():
+    """Drift of an hour, of frames a hundredth of a second long: all of it stays in the pixels."""
+    made = camera(FlickerNoise(3000.0, since_correction=3600.0), bits=20)
+    read, _ = made.read(images(650.0), times(1))
+    assert read.std() / read.mean() > 1e-3
+
+
+STUDY = """
+camera:
+  integration_time: 20 us
+  detector:
+    response: {kind: photon, quantum_efficiency: 0.8, element: 15 um, f_number: 2.5}
+    full_well: 7e6
+    bits: 14
+    hot: 400 degC
+    terms:
+      - {kind: gain-pattern, standard_deviation: 0.02}
+      - {kind: dark-current, current: 50 kHz}
+      - {kind: shot-noise}
+      - {kind: read-noise, standard_deviation: 500}
+"""
+
+
+def test_a_study_chooses_it(tmp_path):
+    path = tmp_path / "study.yaml"
+    path.write_text(STUDY)
+    study = load_study(path)
+    detector = Detector(
+        response=INSB,
+        full_well=7e6,
+        bits=14,
+        hot=673.15,
+        terms=(GainPattern(0.02), DarkCurrent(5e4), ShotNoise(), ReadNoise(500.0)),
+    )
+    limit = lower_range_limit(detector, OperationPoint(BAND, 20e-6))
+    expected = replace(
+        Camera.paper(), integration_time=20e-6, detector=detector, seed=7, lower_limit=limit
+    )
+    assert study.camera.on(SCENE, 7) == expected
+    assert not study.is_papers
+    path.write_text(study_text(study))
+    assert load_study(path) == study
+
+
+def test_a_study_may_give_the_lower_limit_itself():
+    section = {"response": {"kind": "energy", "per_radiance": 1e4}, "full_well": 7e6}
+    told = Study(camera={"detector": section, "lower_limit": "320 degC"}).camera.build()
+    assert told.lower_limit == 593.15
+    assert Study(camera={"detector": "none"}).camera.build() == Camera.paper()
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("{detector: {full_well: 1e6}}", "detector.response: is missing"),
+        ("{lower_limit: detector}", "lower_limit: detector, expected a detector beside it"),
+        ("{detector: {response: {kind: x}}}", "kind: 'x', expected one of photon, energy, range"),
+        (
+            "{detector: {response: {kind: energy, per_radiance: 1}}}",
+            "Detector.gain: none, expected it or full_well",
+        ),
+        (
+            "{detector: {response: {kind: energy, per_radiance: 1}, gain: 1, terms: [{kind: y}]}}",
+            "terms.*kind: 'y', expected one of gain-pattern",
+        ),
+    ],
+)
+def test_a_study_with_an_impossible_detector_is_refused(tmp_path: Path, text, expected):
+    path = tmp_path / "study.yaml"
+    path.write_text(f"camera: {text}\n")
+    with pytest.raises(ValueError, match=re.compile(expected, re.DOTALL)):
+        load_study(path)
+
+
+def test_a_source_that_saturates_is_refused():
+    with pytest.raises(ValueError, match=r"Detector.hot: 1227 °C fills the detector .* under 4"):
+        camera(hot=1500.0).calibration((4, 4))
+    with pytest.raises(ValueError, match="sources .* expected the second brighter"):
+        camera(cold=690.0, hot=None).calibration((4, 4))
+
+
+@pytest.mark.parametrize(("field", "value"), [("detector", 3), ("seed", -1), ("seed", 1.5)])
+def test_a_camera_refuses_what_is_no_detector_or_seed(field, value):
+    with pytest.raises(ValueError, match=f"camera: {field} is {value}, expected"):
+        Camera(**{field: value})
