@@ -89,12 +89,14 @@ def test_an_ideal_detector_gives_the_radiance_back_within_its_counts():
     """What remains is rounding: of a frame's counts, and of the two sources'."""
     made = camera(bits=14)
     calibration = made.calibration((30, 40))
-    full = calibration.sources[1] / 0.9
+    full = calibration.sources[1] / 0.8
     one = full / ((1 << 14) - 1 - 400)  # a count
     radiance = np.linspace(0.01 * full, 0.99 * full, 1200).reshape(1, 30, 40)
     read, flags = made.read(radiance, times(1))
     assert np.abs(read - radiance).max() < 1.2 * one
-    assert np.std(read - radiance) == pytest.approx(one / np.sqrt(12), rel=0.1)
+    error = (read - radiance).ravel()
+    error -= np.polyval(np.polyfit(radiance.ravel(), error, 1), radiance.ravel())  # the sources'
+    assert np.std(error) == pytest.approx(one / np.sqrt(12), rel=5 * np.sqrt(0.2 / 1200))
     assert not flags.any()
 
 
@@ -116,11 +118,11 @@ def test_two_points_leave_nothing_of_the_patterns_of_a_linear_detector():
 
 
 def test_non_linearity_remains_between_the_points():
-    """n (1 − f n / N) by a line through 0.1 N and 0.9 N: at half, f (0.4)² / (1 − f) too much."""
+    """n (1 − f n / N) by a line through 0.1 N and 0.8 N, at half: f 0.4 · 0.3 / (1 − 0.9 f)."""
     made = camera(NonLinearity(0.05), bits=24)
-    full = made.calibration((4, 4)).sources[1] / 0.9
+    full = made.calibration((4, 4)).sources[1] / 0.8
     read, _ = made.read(np.full((1, 4, 4), 0.5 * full), times(1))
-    expected = 0.5 + 0.05 * (0.5 - 0.1) * (0.9 - 0.5) / (1 - 0.05)
+    expected = 0.5 + 0.05 * (0.5 - 0.1) * (0.8 - 0.5) / (1 - 0.9 * 0.05)
     np.testing.assert_allclose(read / full, expected, rtol=1e-5)
 
 
@@ -152,7 +154,7 @@ def test_flags_say_what_is_saturated_dead_and_under_range():
     np.testing.assert_allclose(kelvins[middle], 700.0, atol=1.0)  # its neighbours'
 
 
-@pytest.mark.parametrize("kelvins", [560.0, 650.0, 750.0])
+@pytest.mark.parametrize("kelvins", [560.0, 620.0, 680.0])
 def test_the_netd_is_the_analytic_one(kelvins):
     """σ / (dS/dT): shot noise of the light and the dark, reading, rounding."""
     dark, read = 2e11, 900.0
@@ -356,10 +358,10 @@ def test_a_study_with_an_impossible_detector_is_refused(tmp_path: Path, text, ex
 
 
 def test_a_source_that_saturates_is_refused():
-    with pytest.raises(ValueError, match=r"Detector.hot: 1227 °C fills the detector .* under 4"):
+    with pytest.raises(ValueError, match=r"Detector.hot: 1227 °C fills the detector .* under 50"):
         camera(hot=1500.0).calibration((4, 4))
-    with pytest.raises(ValueError, match="sources .* expected the second brighter"):
-        camera(cold=690.0, hot=None).calibration((4, 4))
+    with pytest.raises(ValueError, match=r"sources .* expected the second brighter"):
+        camera(cold=770.0).calibration((4, 4))
 
 
 @pytest.mark.parametrize(("field", "value"), [("detector", 3), ("seed", -1), ("seed", 1.5)])
