@@ -1,5 +1,6 @@
 """A camera with a detector: calibration, flags, NETD, range, seeds; the study that chooses it."""
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
+from typer.testing import CliRunner
 
 from chipglow.camera import (
     UNUSABLE,
@@ -32,11 +34,14 @@ from chipglow.camera import (
     ShotNoise,
     lower_range_limit,
 )
+from chipglow.cli.app import app
 from chipglow.errors.error_images import error_images
-from chipglow.io import read_measurement, write_measurement
+from chipglow.io import read_measurement, write_measurement, write_scene
 from chipglow.radiometry import Band
-from chipglow.scene import Raster
-from chipglow.study import Study, load_study, study_text
+from chipglow.report.camera_rows import camera_rows
+from chipglow.report.scene_report import write_scene_report
+from chipglow.scene import Raster, Scene
+from chipglow.study import Study, errors, load_study, study_text
 
 SCENE = Raster(-120e-6, 90e-6, 2e-6, 90, 120)
 PLAIN = Camera(psf=None, lower_limit=None)
@@ -368,3 +373,88 @@ def test_a_source_that_saturates_is_refused():
 def test_a_camera_refuses_what_is_no_detector_or_seed(field, value):
     with pytest.raises(ValueError, match=f"camera: {field} is {value}, expected"):
         Camera(**{field: value})
+
+
+def scene(folder):
+    """A warm plate with a hot spot, three frames."""
+    raster = Raster(-60e-6, 60e-6, 2e-6, 60, 60)
+    spot = np.exp(-(raster.x**2 + raster.y[:, None] ** 2) / (20e-6) ** 2)
+    path = folder / "scene.nc"
+    frames = np.stack([620.0 + 60.0 * spot] * 3)
+    write_scene(Scene.from_fields(raster, [0.0, 10e-6, 20e-6], {"temperature": frames}), path)
+    return path
+
+
+def looked_at(folder, **camera):
+    study = Study(
+        scene=str(scene(folder)),
+        surface={"kind": "uniform", "emissivity": 0.9},
+        camera={"psf": "none", **camera},
+        analysis={"exposures": 1, "phases": 2, "points": {"spot": ["0 um", "0 um"]}},
+    )
+    return errors(study)
+
+
+def test_the_errors_of_a_scene_have_the_noise_of_each_draw(tmp_path):
+    """Pixel phases differ by their noise too; the same study gives the same numbers again."""
+    section = {
+        "response": {
+            "kind": "photon",
+            "quantum_efficiency": 0.8,
+            "element": "15 um",
+            "f_number": 4.0,
+        },
+        "full_well": 7e6,
+        "bits": 14,
+        "terms": [{"kind": "shot-noise"}, {"kind": "read-noise", "standard_deviation": 6000.0}],
+    }
+    quiet, noisy, again = (
+        looked_at(tmp_path, detector=detector, lower_limit="none")
+        for detector in ("none", section, section)
+    )
+
+    def spot(result):
+        (surface,) = result.surfaces.values()
+        return next(one.error.values for one in surface.readings if one.place == "spot")
+
+    np.testing.assert_array_equal(spot(noisy), spot(again))
+    noise = (spot(noisy) - spot(quiet)).ravel()
+    assert np.unique(noise).size == 4
+    calibration = noisy.camera.calibration(noisy.camera.pixels(noisy.raster).shape)
+    assert np.abs(noise).max() < 5 * calibration.netd(600.0)
+    shown = next(iter(noisy.surfaces.values()))
+    assert "detector" in shown.measurement.data.attrs
+    np.testing.assert_allclose(
+        shown.errors.measured, shown.measurement.radiance_temperature()[0], rtol=1e-12
+    )
+    rows = {row.key: row.here for row in camera_rows(noisy.camera, noisy.raster)}
+    assert rows["netd_half_K"] == calibration.half_netd
+    assert camera_rows(quiet.camera, quiet.raster) == []
+    for result, told in ((noisy, True), (quiet, False)):
+        folder = tmp_path / str(told)
+        folder.mkdir()
+        page = write_scene_report(result, folder, "title", "", {}).read_text()
+        assert ("NETD, half of the range filled" in page) == told
+        assert ("camera" in json.loads((folder / "summary.json").read_text())) == told
+
+
+def test_show_tells_the_netd(tmp_path):
+    made = camera(ShotNoise(), ReadNoise(500.0))
+    write_measurement(made.form_measurement(exposure()), tmp_path / "m.nc")
+    result = CliRunner().invoke(app, ["show", str(tmp_path / "m.nc")], env={"COLUMNS": "120"})
+    calibration = made.calibration((30, 40))
+    celsius = calibration.half_temperature - 273.15
+    assert f"{1e3 * calibration.half_netd:.3g} mK at {celsius:.4g} °C" in result.output
+
+
+def test_the_microbolometers_data_sheet_comes_back():
+    section = Study(camera={"preset": "flir-lepton-3", "magnification": 1.0}).camera
+    made = section.build()
+    calibration = made.calibration((60, 80))
+    assert calibration.netd(303.15) == pytest.approx(0.05, rel=0.015)
+    assert calibration.full_temperature == pytest.approx(413.15, abs=1e-6)
+    assert made.lower_limit < 273.15
+    ideal = Study(
+        camera={"preset": "flir-lepton-3", "magnification": 1.0, "detector": "none"}
+    ).camera.build()
+    assert ideal.detector is None

@@ -26,7 +26,7 @@ _FLAG_NAMES: Final = {
     Flag.REPLACED: "replaced by neighbours",
 }
 _SAID_APART: Final = ("assumed", "warnings", "band_lower", "band_upper", "pitch", "tool_")
-_IN_FACTS: Final = ("integration_time", "lower_limit")
+_IN_FACTS: Final = ("integration_time", "lower_limit", "netd", "netd_temperature")
 
 
 def show_measurement(path: Path, at: str | None, plot: Path | None) -> None:
@@ -87,6 +87,9 @@ def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tu
         yield "integration time", microseconds(float(data.attrs["integration_time"]))
     if "lower_limit" in data.attrs:
         yield "lower range limit", f"{float(data.attrs['lower_limit']) - 273.15:.4g} °C"
+    if {"netd", "netd_temperature"} <= set(data.attrs):
+        netd, kelvins = (float(data.attrs[name]) for name in ("netd", "netd_temperature"))
+        yield "NETD", f"{1e3 * netd:.3g} mK at {kelvins - 273.15:.4g} °C, half of the range filled"
     if {"band_lower", "band_upper"} <= set(data.attrs):
         band = measurement.band
         shape = "" if band.response is None else ", with a response curve"

@@ -8,6 +8,7 @@ from typing import Final
 from chipglow import __version__
 from chipglow.drawing.drawing import FigureFile
 from chipglow.errors import StudyResult
+from chipglow.report.camera_rows import camera_rows, camera_table
 from chipglow.report.chip_rows import chip_rows
 from chipglow.report.comparison import CauseRow, Row, cause_rows, comparison_rows
 from chipglow.report.evidence import answer, error_definition
@@ -90,6 +91,7 @@ def write_report(
     pictures.mkdir()
     beside = stands_beside(result)
     rows, causes, chip = comparison_rows(result), cause_rows(result), chip_rows(result.chip)
+    camera = camera_rows(result.camera, result.raster)
     figures, emissivities = list(draw_figures(result, pictures)), table_1(result)
     bodies = {
         "comparison": _comparison(result, rows),
@@ -106,6 +108,7 @@ def write_report(
         *others,
         *_beside_steady(result, steady),
         ("chip", "The chip", _chip_table(chip)),
+        *([("camera", "The camera", camera_table(camera))] if camera else []),
         *closing_sections(study_text, provenance),
         ("cite", "How to cite", _citation()),
     ]
@@ -113,7 +116,10 @@ def write_report(
         folder,
         document(title, sections),
         results_dataset(result, provenance),
-        {**summary(rows, causes, chip, provenance), **_steady_numbers(result, steady)},
+        {
+            **summary(rows, causes, chip, provenance, camera),
+            **_steady_numbers(result, steady),
+        },
         study_text,
     )
 

@@ -68,6 +68,7 @@ def summary(
     causes: Sequence[CauseRow],
     chip: Sequence[Row],
     provenance: Mapping[str, str],
+    camera: Sequence[Row] = (),
 ) -> dict[str, Any]:
     """Numbers of the study for scripts; a name ends in its unit, what is unknown is None.
 
@@ -81,9 +82,12 @@ def summary(
         What describes the chip.
     provenance : mapping
         What, when, version, seed and the like.
+    camera : sequence of Row
+        What the camera's detector can tell, if it has one.
     """
     return {
         "provenance": dict(provenance),
+        **({"camera": {row.key: row.here for row in camera}} if camera else {}),
         "results": {row.key: row.here for row in rows},
         "draws": {row.key: scatter(row.draws) for row in rows if row.draws is not None},
         "causes": {row.key: _causes(row) for row in causes},

@@ -12,6 +12,8 @@ from chipglow.drawing.drawing import KELVIN
 from chipglow.errors import Distribution, SceneErrors
 from chipglow.errors.distribution import TOGETHER
 from chipglow.errors.scene_error import PlaceErrors
+from chipglow.report.camera_rows import camera_rows, camera_table
+from chipglow.report.comparison import Row
 from chipglow.report.evidence import definition_of
 from chipglow.report.page import (
     Line,
@@ -102,12 +104,14 @@ def write_scene_report(
     pictures = folder / "figures"
     pictures.mkdir()
     figures = [figure_part(figure) for figure in draw_scene_errors(result, pictures)]
+    camera = camera_rows(result.camera, result.raster)
     missing = "".join(f"<p>{escape(sentence)}</p>\n" for sentence in result.missing)
     sections = [
         ("answer", "The answer", answer_part(list(_answer(result)), remarks)),
         ("places", "The error at each place", _places(result)),
         ("scatter", "What makes the scatter", _causes(result)),
         ("figures", "Figures", "\n".join(figures)),
+        *([("camera", "The camera", camera_table(camera))] if camera else []),
         *([("missing", "What is not here", missing)] if missing else []),
         *closing_sections(study_text, provenance),
     ]
@@ -115,7 +119,7 @@ def write_scene_report(
         folder,
         document(title, sections),
         _dataset(result, provenance),
-        _summary(result, provenance),
+        _summary(result, provenance, camera),
         study_text,
     )
 
@@ -197,7 +201,9 @@ def _rounded(value: float, digits: int | None = None) -> str:
     return (text.removeprefix("-") if float(text) == 0 else text).replace("-", "−")
 
 
-def _summary(result: SceneErrors, provenance: Mapping[str, str]) -> dict[str, Any]:
+def _summary(
+    result: SceneErrors, provenance: Mapping[str, str], camera: Sequence[Row]
+) -> dict[str, Any]:
     surfaces: dict[str, Any] = {}
     for name, surface in result.surfaces.items():
         of_place = surfaces.setdefault(name, {})
@@ -209,6 +215,7 @@ def _summary(result: SceneErrors, provenance: Mapping[str, str]) -> dict[str, An
             }
     return {
         "provenance": dict(provenance),
+        **({"camera": {row.key: row.here for row in camera}} if camera else {}),
         "results": surfaces,
         "missing": list(result.missing),
     }

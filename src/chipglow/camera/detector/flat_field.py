@@ -149,6 +149,11 @@ class FlatFieldCalibration:
         light = HALF * full_light(self.detector, self.point)
         return float(self.point.band.temperature(light))
 
+    @property
+    def full_temperature(self) -> float:
+        """Temperature in K of a blackbody whose light fills the detector."""
+        return float(self.point.band.temperature(full_light(self.detector, self.point)))
+
     @cached_property
     def half_netd(self) -> float:
         """NETD in K there."""
