@@ -28,13 +28,14 @@ CAMERAS: Final[Mapping[str, CameraPreset]] = MappingProxyType(
         "flir-lepton-3": CameraPreset(
             "FLIR Lepton Engineering Datasheet, 500-0659-00-09 rev. 203: 160 x 120, 8 to 14 um, "
             "f/1.1, 14 bit, thermal sensitivity under 50 mK; M5Stack, unit FLIR (K021), Lepton "
-            "3.0: pixels of 12 um, 8.7 Hz, range of the high gain to 140 degC",
+            "3.0: pixels of 12 um, 8.7 Hz, range of the high gain -10 to 140 degC",
             {
                 "band": "8-14 um",
                 "detector_pitch": "12 um",
                 "array": [160, 120],
                 "psf": {"kind": "airy", "f_number": 1.1},
                 "frame_rate": "8.7 Hz",
+                "lower_limit": "-10 degC",
                 "detector": {
                     "response": {"kind": "range", "hottest": "140 degC"},
                     "gain": 1.0,

@@ -14,6 +14,7 @@ from chipglow.camera.detector.detector import BRIGHTER_SOURCE, DARKER_SOURCE, De
 from chipglow.camera.detector.nonuniformity import NonUniformity, mean_frame
 from chipglow.camera.detector.response import OperationPoint
 from chipglow.camera.measurement import Flag
+from chipglow.radiometry.band import TABLE_COLDEST
 
 HALF: Final = 0.5
 """Part of the capacity that is filled where the NETD is told."""
@@ -243,7 +244,8 @@ def lower_range_limit(detector: Detector, point: OperationPoint) -> float:
     -------
     float
         Temperature in K of the blackbody whose mean signal over the dark is `least_signal` times
-        its noise: the standard deviation over time, or that of rounding where it is larger.
+        its noise: the standard deviation over time, or that of rounding where it is larger. At
+        least the 200 K from which on a band's tables go.
 
     Raises
     ------
@@ -264,7 +266,7 @@ def lower_range_limit(detector: Detector, point: OperationPoint) -> float:
             f"{detector.least_signal:g} times its noise, expected a smaller least_signal"
         )
     found = ends[0] if excess(ends[0]) > 0 else bisect(excess, *ends, xtol=1e-4)
-    return float(point.band.temperature(exp(found)))
+    return max(float(point.band.temperature(exp(found))), TABLE_COLDEST)
 
 
 def _seen(detector: Detector, point: OperationPoint, radiance: float) -> tuple[float, float]:

@@ -1,0 +1,82 @@
+"""Draws the pictures of the detector: ``python docs/detector_pictures.py``.
+
+The scene is a made one: a hot chip with a colder band across it, in front of a cold background.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from chipglow.camera import (
+    Camera,
+    DeadElements,
+    Detector,
+    GainPattern,
+    OffsetPattern,
+    PhotonResponse,
+    ReadNoise,
+    ShotNoise,
+)
+from chipglow.scene import Raster
+
+HERE = Path(__file__).parent
+SCENE = Raster(-270e-6, 240e-6, 2e-6, 240, 270)
+NOISE = (ShotNoise(), ReadNoise(1500.0))
+PATTERN = (GainPattern(0.03), OffsetPattern(40_000.0), DeadElements(0.003))
+DETECTOR = Detector(response=PhotonResponse(0.8, 15e-6, 4.0), full_well=3e6, bits=14, terms=NOISE)
+CAMERA = Camera(lower_limit=None, detector=DETECTOR)
+
+
+def main() -> None:
+    """Draw the same frame without detector, with noise, with the pattern and its correction."""
+    image = replace(CAMERA, detector=None).form_image(chip(), SCENE)
+    shown = {
+        "no detector": None,
+        "shot and read noise": DETECTOR,
+        "patterns, not corrected": patterned("none"),
+        "patterns, one point": patterned("one-point"),
+        "patterns, two points": patterned("two-point"),
+    }
+    figure, axes = plt.subplots(2, 5, figsize=(11.5, 4.4), layout="constrained")
+    extent = tuple(1e6 * side for side in CAMERA.pixels(SCENE).extent)
+    true = np.asarray(CAMERA.band.temperature(image))
+    for (over, under), (name, detector) in zip(axes.T, shown.items(), strict=True):
+        read, _ = replace(CAMERA, detector=detector).read(image[None], np.zeros(1))
+        kelvins = np.asarray(CAMERA.band.temperature(read[0]))
+        picture = over.imshow(kelvins - 273.15, extent=extent, cmap="inferno", vmin=300, vmax=470)
+        over.set_title(name, fontsize=9)
+        change = kelvins - true
+        difference = under.imshow(change, extent=extent, cmap="RdBu_r", vmin=-1, vmax=1)
+        hot = true > 650.0
+        print(f"{name}: {np.nanstd(change[hot]):.3f} K where it is over 377 °C")
+    for axis in axes[-1]:
+        axis.set_xlabel("x / µm")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("y / µm")
+    figure.colorbar(picture, ax=axes[0], label="radiance temperature / °C")
+    figure.colorbar(difference, ax=axes[1], label="change / K", extend="both")
+    figure.savefig(HERE / "detector-frames.png", dpi=130)
+    calibration = CAMERA.calibration(image.shape)
+    assert calibration is not None
+    print(f"half of the range: {calibration.half_temperature - 273.15:.1f} °C")
+    print(f"NETD there: {1e3 * calibration.half_netd:.1f} mK")
+
+
+def patterned(correction: str) -> Detector:
+    """The detector with elements that differ."""
+    return replace(DETECTOR, terms=(*PATTERN, *NOISE), correction=correction)
+
+
+def chip() -> np.ndarray:
+    """Radiance of a chip at 720 K with a band of 650 K, before a background of 580 K."""
+    x, y = SCENE.x, SCENE.y[:, None]
+    inside = np.abs(y - 0.3 * x) < 120e-6
+    band = np.exp(-((x + 0.5 * y) ** 2) / (2 * 12e-6**2))
+    temperature = np.where(inside, 720.0 - 70.0 * band, 580.0)
+    return np.asarray(CAMERA.band.radiance(temperature))
+
+
+if __name__ == "__main__":
+    main()
