@@ -99,7 +99,7 @@ def heated_objects(
     ----------
     camera : Camera
         The camera; as for heated objects in the laboratory, without the lower limit of its range
-        at the exposure of the cut.
+        at the exposure of the cut, and without its detector, which may saturate then.
     surfaces : mapping
         Surfaces by name; those that are no `FeatureSurface` are left out.
     tool : Tool
@@ -119,7 +119,14 @@ def heated_objects(
     The chip is a strip with straight bands across it, of one temperature. It reflects the paper's
     laboratory of 293 K (Equation 2), which the procedure takes into account.
     """
-    oven = replace(camera, lower_limit=None, reflected=LABORATORY, shape=None, offset=(0.0, 0.0))
+    oven = replace(
+        camera,
+        lower_limit=None,
+        reflected=LABORATORY,
+        shape=None,
+        offset=(0.0, 0.0),
+        detector=None,
+    )
     known = {name: s for name, s in surfaces.items() if isinstance(s, FeatureSurface)}
     chips = [
         _heated_chip(oven, name, surface, max(band_width, camera.pitch), band_spacing, textures)
