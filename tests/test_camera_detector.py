@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from analytic_chip import AnalyticChip
 from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 from typer.testing import CliRunner
@@ -35,6 +36,7 @@ from chipglow.camera import (
     lower_range_limit,
 )
 from chipglow.cli.app import app
+from chipglow.errors import Plan, analyse
 from chipglow.errors.error_images import error_images
 from chipglow.io import read_measurement, write_measurement, write_scene
 from chipglow.radiometry import Band
@@ -42,6 +44,7 @@ from chipglow.report.camera_rows import camera_rows
 from chipglow.report.scene_report import write_scene_report
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, errors, load_study, study_text
+from chipglow.surface import CHIP_1, CHIP_2
 
 SCENE = Raster(-120e-6, 90e-6, 2e-6, 90, 120)
 PLAIN = Camera(psf=None, lower_limit=None)
@@ -436,6 +439,37 @@ def test_the_errors_of_a_scene_have_the_noise_of_each_draw(tmp_path):
         page = write_scene_report(result, folder, "title", "", {}).read_text()
         assert ("NETD, half of the range filled" in page) == told
         assert ("camera" in json.loads((folder / "summary.json").read_text())) == told
+
+
+def test_every_headline_draw_of_a_cut_has_noise_of_its_own():
+    """The noise is that of the detector, and another in each draw, chip and exposure."""
+    detector = Detector(
+        response=PhotonResponse(0.8, 15e-6, 5.0),
+        full_well=2e7,
+        bits=16,
+        terms=(ShotNoise(), ReadNoise(4000.0)),
+    )
+    plan = Plan(exposures=2, phases=2, textures=2, psf_widths=(12e-6,))
+    looking = Camera.paper()
+    quiet, noisy = (
+        analyse(AnalyticChip().scene(), {"chip 1": CHIP_1, "chip 2": CHIP_2}, one, plan)
+        for one in (looking, replace(looking, detector=detector))
+    )
+    netd = replace(looking, detector=detector).calibration((56, 70)).netd(800.0)
+    for name, found in noisy.draws.headlines.items():
+        without = quiet.draws.headlines[name]
+        noise = (found.error.values - without.error.values).ravel()
+        assert np.unique(noise).size == noise.size >= 8
+        assert 0 < np.abs(noise).max() < 30 * netd
+    for series, without in zip(noisy.sensitivity, quiet.sensitivity, strict=True):
+        assert (series.errors["band"] != without.errors["band"]).all()
+    for surface in noisy.surfaces.values():
+        frame = surface.measurement.radiance_temperature(flagged=True)[noisy.developed]
+        np.testing.assert_allclose(surface.errors.measured, frame, rtol=1e-9)
+    one, other = (noisy.surfaces[name].measurement.radiance[0] for name in ("chip 1", "chip 2"))
+    clean = [quiet.surfaces[name].measurement.radiance[0] for name in ("chip 1", "chip 2")]
+    # Two chips at the same time have other noise.
+    assert abs(np.corrcoef((one - clean[0]).ravel(), (other - clean[1]).ravel())[0, 1]) < 0.2
 
 
 def test_show_tells_the_netd(tmp_path):
