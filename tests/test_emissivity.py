@@ -22,6 +22,8 @@ from chipglow.laboratory.emissivity import (
     emissivity_line,
     load_regions,
     read_emissivity_map,
+    read_measured_areas,
+    read_region_emissivity,
     write_emissivity,
 )
 from chipglow.laboratory.emissivity.emissivity import COMMON
@@ -29,7 +31,8 @@ from chipglow.laboratory.emissivity.study_sections import surface_text
 from chipglow.quantities.units import TEMPERATURE_DIFFERENCE
 from chipglow.scene import FIELD_UNITS, Area, Polygon, Raster, Region, Scene, areas
 from chipglow.study import Study
-from chipglow.surface import MapSurface
+from chipglow.study.surface_section import surfaces_of
+from chipglow.surface import CHIP_1, FeatureTrends, MapSurface, TrendSurface
 
 TRUTH = 391.0 + CELSIUS
 HEATING = Heating(TRUTH)
@@ -541,6 +544,8 @@ def test_the_command_fits_over_the_temperature(folder):
     assert result.exit_code == 0, result.output
     assert "change in 100 K" in result.output
     assert (folder / "p.svg").is_file()
+    text = result.stdout.split("For a study:")[1].split("\ne.nc\n")[0]
+    assert surfaces_of(Study(**yaml.safe_load(text)).surface, 1).keys() >= {"measured chip"}
     hotter = read_emissivity_map("e.nc", reference=770.0)
     # The body's emissivity is 0.04 more; its mean over 960 pixels varies by 0.07 / 31.
     assert hotter.values[:, :16].mean() == pytest.approx(0.46, abs=0.01)
@@ -614,3 +619,114 @@ def test_a_region_outside_the_image_is_one_line(folder):
         "chipglow: region a: reaches over columns 0 to 400, expected within the image's 0 to 40\n"
     )
     assert not (folder / "e.nc").exists()
+
+
+# A study's surface of what was measured
+
+
+def two_temperatures(folder):
+    """The file of a chip at 391 °C and 500 °C, by the command."""
+    references = ["--reference", "391 degC", "--reference", "500 degC"]
+    more = ["--reference-uncertainty", "2 K", "--out", "e.nc"]
+    result = command("a.nc", "b.nc", *references, *more)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def even_scene(temperature, strain=1.0, rate=0.0, material=1):
+    values = np.ones((1, *RASTER.shape))
+    fields = {
+        "temperature": values * temperature,
+        "material": (values * material).astype(np.uint8),
+        "plastic_strain": values * strain,
+        "plastic_strain_rate": values * rate,
+    }
+    return Scene.from_fields(RASTER, [0.0], fields)
+
+
+def test_a_study_takes_the_line_of_a_region(folder):
+    two_temperatures(folder)
+    line = read_region_emissivity("e.nc")["chip body"]
+    area = read_measured_areas("e.nc")["chip body"]
+    np.testing.assert_allclose(area.trend.covariance, line.estimate.covariance(), rtol=1e-9)
+    assert area.trend.measured == line.temperatures
+    study = Study(surface={"kind": "measured", "file": "e.nc", "region": "chip body"})
+    (surface,) = surfaces_of(study.surface, 1).values()
+    for kelvins in (600.0, 700.0, 900.0):
+        scene = even_scene(kelvins)
+        found = surface.on(scene).emissivity(scene.frame(0))
+        np.testing.assert_allclose(found, line.at(kelvins).values, rtol=1e-6)
+    scene = even_scene(20_000.0)
+    assert surface.on(scene).emissivity(scene.frame(0)).max() == 1.0
+
+
+def test_draws_of_a_line_have_its_covariance(folder):
+    two_temperatures(folder)
+    areas_of = read_measured_areas("e.nc")
+    body, band = (areas_of[name].trend for name in ("chip body", "shear band"))
+    surface = TrendSurface(body)
+    assert surface.redrawn(0) is surface
+    assert surface.redrawn(3).redrawn(2) == surface.redrawn(5)
+    scene = even_scene(900.0)
+    drawn = [surface.redrawn(k).on(scene).emissivity(scene.frame(0))[0, 0] for k in range(1, 401)]
+    weights = np.array([1.0, 900.0 - body.middle])
+    # 400 draws: their standard deviation is known to 3.5 %; three of them.
+    assert np.std(drawn) == pytest.approx(np.sqrt(weights @ body.covariance @ weights), rel=0.11)
+    # Both regions were heated by one thermocouple, whose error is nearly all there is.
+    chip = FeatureTrends(replace(CHIP_1, follow="none"), {"chip": body, "shear_band": band})
+    fields = [chip.redrawn(k).on(scene) for k in range(1, 101)]
+    pairs = [[one.at(664.0) for one in field.trends.values()] for field in fields]
+    assert np.corrcoef(np.array(pairs).T)[0, 1] > 0.99
+
+
+@pytest.mark.parametrize(
+    ("strain", "rate", "parts"),
+    [(1.0, 0.0, {"chip body": 1.0}), (1.0, 18e3, {"chip body": 0.5, "shear band": 0.5})],
+)
+def test_a_measured_chip_is_its_features_by_their_lines(folder, strain, rate, parts):
+    two_temperatures(folder)
+    section = {"measured": {"heated": "e.nc"}, "follow": "none"}
+    study = Study(surface=section, analysis={"rake_chip": "heated", "band_chip": "heated"})
+    surface = surfaces_of(study.surface, 1)["heated"]
+    lines = read_region_emissivity("e.nc")
+    found = {}
+    for kelvins in (664.15, 850.0):
+        scene = even_scene(kelvins, strain, rate)
+        found[kelvins] = surface.on(scene).emissivity(scene.frame(0))
+    # The texture is the same; what is between two temperatures are the lines alone.
+    expected = sum(
+        part * (lines[name].at(850.0) - lines[name].at(664.15)).values
+        for name, part in parts.items()
+    )
+    np.testing.assert_allclose(found[850.0] - found[664.15], expected, atol=1e-6)
+    assert read_measured_areas("e.nc")["chip body"].standard_deviation == pytest.approx(
+        0.07, abs=0.01
+    )
+
+
+def test_a_map_of_several_temperatures_has_a_line_in_each_pixel(folder):
+    two_temperatures(folder)
+    cold, hot = (read_emissivity_map("e.nc", reference=one) for one in (660.0, 770.0))
+    surface = read_emissivity_map("e.nc")
+    for kelvins, one in ((TRUTH, cold), (500.0 + CELSIUS, hot)):
+        scene = even_scene(kelvins)
+        found = surface.on(scene).emissivity(scene.frame(0))
+        np.testing.assert_allclose(found, one.values, atol=1e-6)
+    # One error of all pixels: as much as each of them is uncertain.
+    drawn = np.array([surface.redrawn(k).at(RASTER)[5, 5] for k in range(1, 401)])
+    assert drawn.std() == pytest.approx(surface.uncertainty[5, 5], rel=0.11)
+    assert surface.redrawn(0) is surface
+
+
+def test_wrong_files_and_regions_are_one_error(folder):
+    two_temperatures(folder)
+    wrong = Study(surface={"kind": "measured", "file": "e.nc", "region": "nose"})
+    with pytest.raises(ValueError, match=r"region: 'nose' is not in .*e.nc, expected one of body"):
+        surfaces_of(wrong.surface, 1)
+    found = determine_emissivity([measured(table_1())], HEATING)
+    write_emissivity(RegionEmissivities((found,), ((found.of(WHOLE),),)), "all.nc")
+    study = Study(surface={"measured": {"heated": "all.nc"}})
+    with pytest.raises(ValueError, match=r"all.nc: is of the features all, expected chip body"):
+        surfaces_of(study.surface, 1)
+    with pytest.raises(ValueError, match="measured: 'chip 1' is the name of another chip"):
+        Study(surface={"measured": {"chip 1": "e.nc"}})

@@ -17,6 +17,7 @@ from chipglow.laboratory.emissivity import (
     ReflectedTemperature,
     RegionEmissivities,
     determine_emissivity,
+    emissivity_line,
     read_region_emissivity,
     true_temperature,
     write_emissivity,
@@ -230,12 +231,104 @@ def test_the_emissivity_of_a_file_is_the_one_that_was_written(tmp_path):
         assert second.estimate.contribution(cause) == pytest.approx(
             first.estimate.contribution(cause), nan_ok=True
         )
-    write_emissivity(RegionEmissivities((found, found), ((row,), (row,))), tmp_path / "two.nc")
-    with pytest.raises(ValueError, match=r"two.nc: has emissivities at 2 true temperatures"):
-        read_region_emissivity(tmp_path / "two.nc")
     (tmp_path / "none.nc").write_bytes(b"")
     with pytest.raises(ValueError, match=r"none.nc: not an emissivity map"):
         read_region_emissivity(tmp_path / "none.nc")
+
+
+# A line over the temperature
+
+SLOPE = 4e-4
+HEATED = (600.0, 700.0, 800.0)
+
+
+def on_the_line(kelvins, slope=SLOPE):
+    return 0.42 + slope * (kelvins - 700.0)
+
+
+def rows_of_line(slope=SLOPE, temperatures=HEATED, **errors):
+    """Areas of an object whose emissivity is on a line, at several temperatures."""
+    for kelvins in temperatures:
+        heated = image(on_the_line(kelvins, slope), kelvins)
+        found = determine_emissivity([heated], replace(HEATING, reference=kelvins, **errors))
+        yield found, found.of(WHOLE)
+
+
+def line_of(*arguments, **more):
+    return emissivity_line([row for _, row in rows_of_line(*arguments, **more)])
+
+
+@pytest.mark.parametrize("kelvins", [650.0, 823.0, 1000.0])
+@pytest.mark.parametrize("slope", [-4e-4, 0.0, 4e-4])
+def test_a_line_is_taken_at_the_temperature_that_is_found(slope, kelvins):
+    seen = image(on_the_line(kelvins, slope), kelvins)
+    found = true_temperature([seen], WHOLE, line_of(slope))
+    # Radiances in float32 are good to 6e-8 of 40 K a relative change of the radiance.
+    assert found.estimate.values == pytest.approx(kelvins, abs=1e-3)
+    assert found.emissivity == pytest.approx(on_the_line(kelvins, slope), abs=1e-6)
+
+
+@pytest.mark.parametrize("kelvins", [700.0, 900.0])
+def test_the_budget_by_a_line_is_that_of_small_changes(kelvins):
+    seen = image(on_the_line(kelvins), kelvins)
+    line = line_of(reference_uncertainty=2.0, reflected_uncertainty=0.0)
+    found = true_temperature([seen], WHOLE, line)
+    shifted = []
+    for sign in (-1.0, 1.0):
+        # The same images, by someone whose thermocouple is 2 K off.
+        rows = [
+            determine_emissivity(
+                [image(on_the_line(one), one)], replace(HEATING, reference=one + 2.0 * sign)
+            ).of(WHOLE)
+            for one in HEATED
+        ]
+        shifted.append(true_temperature([seen], WHOLE, emissivity_line(rows)).estimate.values)
+    # Terms of second order in 2 K of 700 K are some 1e-5 of the first.
+    assert found.estimate.effect("reference") == pytest.approx(
+        (shifted[1] - shifted[0]) / 2, rel=1e-3
+    )
+    # By a constant emissivity the same error would be read as more.
+    same = true_temperature([seen], WHOLE, line.area(kelvins))
+    assert same.estimate.values == pytest.approx(found.estimate.values, abs=1e-6)
+    assert 0 < found.estimate.effect("reference") / same.estimate.effect("reference") < 0.97
+
+
+def test_a_line_comes_back_from_its_file_with_its_covariance(tmp_path):
+    maps, rows = zip(*rows_of_line(drift=0.01, reference_uncertainty=2.0), strict=True)
+    line = emissivity_line(rows)
+    write_emissivity(RegionEmissivities(maps, tuple((r,) for r in rows)), tmp_path / "e.nc")
+    stored = read_region_emissivity(tmp_path / "e.nc")["chip"]
+    assert stored.heatings == tuple(replace(one, drift=None) for one in line.heatings)
+    np.testing.assert_allclose(stored.estimate.values, line.estimate.values, rtol=1e-12)
+    np.testing.assert_allclose(stored.estimate.covariance(), line.estimate.covariance(), rtol=1e-9)
+    assert (stored.estimate - line.estimate).standard_uncertainty == pytest.approx(0.0, abs=1e-12)
+    assert stored.estimate.warnings == line.estimate.warnings
+
+
+def test_the_error_of_a_calibration_cancels_by_a_line_too():
+    """A gain that is off is in the emissivity and in the image: nothing of it is left."""
+    calibration = fitted(common=0.5)
+    rows = [
+        determine_emissivity(
+            [developed(calibration, one, on_the_line(one))], replace(HEATING, reference=one)
+        ).of(WHOLE)
+        for one in HEATED
+    ]
+    line, seen = emissivity_line(rows), developed(calibration, 750.0, on_the_line(750.0))
+    one, other = (
+        true_temperature([seen], WHOLE, line, calibration=known) for known in (None, calibration)
+    )
+    assert other.correlation > 0.9
+    left, all_of_it = (float(o.estimate.contribution("calibration")) for o in (other, one))
+    assert left < 0.5 * all_of_it
+
+
+def test_an_emissivity_that_falls_too_steeply_is_refused():
+    line = line_of(-1.6e-3, (600.0, 800.0))
+    with pytest.raises(ValueError, match="expected an emissivity that falls less"):
+        true_temperature([image(0.9, 1000.0)], WHOLE, line)
+    with pytest.raises(ValueError, match="is darker than what it reflects"):
+        true_temperature([image(0.4, ROOM - 10.0)], WHOLE, line)
 
 
 def test_regions_in_a_file_correlate_as_obsarray_says(tmp_path):
@@ -374,6 +467,19 @@ def test_an_emissivity_of_another_temperature_is_doubtful(folder):
         assert "Assumed: the emissivity is the same at all temperatures" in output
         far = "°C at which its emissivity was determined"
         assert (f"K from the {reference - 273.15:.0f} {far}" in output) == doubtful, output
+
+
+def test_the_command_takes_the_line_of_several_temperatures(folder):
+    for temperatures, beyond in ((HEATED, False), ((560.0, 660.0), True)):
+        maps, rows = zip(*rows_of_line(0.0, temperatures), strict=True)
+        names = ("body left", "body right", "shear band 1", "shear band 2")
+        tables = tuple(tuple(replace(row, name=name) for name in names) for row in rows)
+        write_emissivity(RegionEmissivities(maps, tables), folder / "e.nc")
+        code, output = run("hot.nc", "--regions", "regions.yaml", "--emissivity", "e.nc")
+        assert code == 0, output
+        assert "Assumed: the emissivity is a straight line over the temperature" in output
+        assert "is the same at all temperatures" not in output
+        assert ("K beyond the 287 °C to 387 °C" in output) == beyond, output
 
 
 @pytest.mark.parametrize(

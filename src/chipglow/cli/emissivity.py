@@ -84,7 +84,7 @@ def emissivity(
     say_of_measurements(*measurements)
     say_assumed(found.assumptions)
     say_warnings(found.warnings)
-    _print_study(console, found)
+    _print_study(console, found, out)
     _write(found, out, table)
     if plot is not None:
         from chipglow.cli.pictures import write_picture
@@ -161,12 +161,14 @@ def _print_tables(console: "Console", found: "RegionEmissivities") -> None:
         console.print(screen_table(found.line_frame(), cells))
 
 
-def _print_study(console: "Console", found: "RegionEmissivities") -> None:
-    from chipglow.laboratory.emissivity import surface_text
+def _print_study(console: "Console", found: "RegionEmissivities", out: Path | None) -> None:
+    from chipglow.laboratory.emissivity import measured_text, surface_text
 
     text = surface_text(found.rows[0])
-    if text:
-        several, kelvins = len(found.maps) > 1, found.maps[0].heating.reference
+    several, kelvins = len(found.maps) > 1, found.maps[0].heating.reference
+    if text and several and out is not None and "chips" in text:
+        console.print(f"\nFor a study:\n\n{measured_text(out)}", soft_wrap=True)
+    elif text:
         at = f" at {kelvins - 273.15:.6g} °C" if several else ""
         console.print(f"\nFor a study{at}:\n\n{text}", soft_wrap=True)
 

@@ -11,10 +11,11 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from chipglow.laboratory.emissivity import (
+        AreaEmissivity,
+        EmissivityLine,
         KnownEmissivity,
         ReflectedTemperature,
         RegionTemperatures,
-        StoredEmissivity,
     )
 
 
@@ -30,8 +31,8 @@ def temperature(
         str,
         typer.Option(
             metavar="FILE|NUMBER",
-            help="What chipglow emissivity wrote of regions of the same names, NetCDF; or one "
-            "emissivity of all regions, such as 0.42.",
+            help="What chipglow emissivity wrote of regions of the same names, NetCDF, of several "
+            "true temperatures the line over them; or one emissivity of all, such as 0.42.",
         ),
     ],
     emissivity_uncertainty: Annotated[
@@ -95,7 +96,7 @@ def temperature(
 
 def _emissivities(
     text: str, uncertainty: float | None
-) -> "KnownEmissivity | dict[str, StoredEmissivity]":
+) -> "KnownEmissivity | dict[str, AreaEmissivity] | dict[str, EmissivityLine]":
     """One emissivity, or those of a file."""
     from chipglow.laboratory.emissivity import KnownEmissivity, read_region_emissivity
 

@@ -286,6 +286,8 @@ RESISTIVITY: Final = Quantity("a resistivity", "ohm*m", "ohm*m", "1.6e-7 ohm*m")
 TEMPERATURE_COEFFICIENT: Final = Quantity(
     "a temperature coefficient", "1/K", "K^-1", "0.005 K^-1", positive=False
 )
+OXIDATION_RATE: Final = Quantity("a rate of oxidation", "m^2/s", "m^2/s", "6.1e-4 m^2/s")
+ACTIVATION_ENERGY: Final = Quantity("an activation energy", "J/mol", "kJ/mol", "169.5 kJ/mol")
 TEMPERATURE: Final = Quantity("a temperature", "K", "degC", "300 degC")
 Temperature = Annotated[float, TEMPERATURE]
 KELVINS: Final = Quantity("a temperature", "K", "K", "1733 K")

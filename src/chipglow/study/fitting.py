@@ -7,7 +7,15 @@ from typing import Final, Literal
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study.schema import Study
 from chipglow.study.surface_section import surfaces_of
-from chipglow.surface import FeatureSurface, MapSurface, Surface
+from chipglow.surface import (
+    EmissivityTrend,
+    FeatureSurface,
+    FeatureTrends,
+    MapSurface,
+    Surface,
+    TrendSurface,
+    WrappedSurface,
+)
 
 _FEW_FRAMES: Final = 5
 _FEW_CELLS: Final = 10
@@ -60,14 +68,10 @@ def fit(study: Study, scene: Scene) -> Fitted:
             "The scene shows no tool: beyond the rake face nothing shines into the blur of the "
             "chip, and errors there are larger than with a warm tool."
         )
-    following = {
-        name: surface
-        for name, surface in surfaces.items()
-        if isinstance(surface, FeatureSurface) and surface.follow == "material"
-    }
-    if following and not scene.has_material_coordinates:
-        follow: Literal["mean", "none"] = "mean" if "velocity_x" in scene.fields else "none"
-        surfaces |= {name: replace(surface, follow=follow) for name, surface in following.items()}
+    follow: Literal["mean", "none"] = "mean" if "velocity_x" in scene.fields else "none"
+    changed = {name: _following(surface, follow) for name, surface in surfaces.items()}
+    if changed != surfaces and not scene.has_material_coordinates:
+        surfaces = changed
         moving = {
             "mean": "textures move with the mean velocity of their feature",
             "none": "textures stay where they are, as it has no velocity either",
@@ -76,9 +80,49 @@ def fit(study: Study, scene: Scene) -> Fitted:
             f"The scene does not say where each point was before the cut: {moving[follow]} "
             f"(surface.follow: {follow})."
         )
+    assumed.extend(_measured_at(surfaces))
     assumed.extend(uncovered(surfaces, scene.raster))
     assumed.extend(_too_coarse(study, scene))
     return Fitted(scene, surfaces, tuple(assumed))
+
+
+def _following(surface: Surface, follow: Literal["mean", "none"]) -> Surface:
+    """A surface whose textures do not follow the material."""
+    if isinstance(surface, FeatureSurface):
+        return replace(surface, follow=follow) if surface.follow == "material" else surface
+    if not isinstance(surface, WrappedSurface):
+        return surface
+    bare = _following(surface.bare, follow)
+    return surface if bare is surface.bare else replace(surface, bare=bare)
+
+
+def _layers(surface: Surface) -> Iterator[Surface]:
+    """A surface, and those under it."""
+    yield surface
+    if isinstance(surface, WrappedSurface):
+        yield from _layers(surface.bare)
+
+
+def _measured_at(surfaces: Mapping[str, Surface]) -> Iterator[str]:
+    """At which temperatures emissivities were measured, a sentence for each surface."""
+    for name, surface in surfaces.items():
+        trends: list[EmissivityTrend] = []
+        for layer in _layers(surface):
+            if isinstance(layer, TrendSurface):
+                trends.append(layer.trend)
+            elif isinstance(layer, FeatureTrends):
+                trends.extend(layer.trends.values())
+        for low, high in dict.fromkeys(trend.measured for trend in trends):
+            if low == high:
+                yield (
+                    f"The emissivity of {name!r} was measured at {low - 273.15:.0f} °C: it is "
+                    "taken to be the same at all temperatures."
+                )
+            else:
+                yield (
+                    f"The emissivity of {name!r} was measured at {low - 273.15:.0f} °C to "
+                    f"{high - 273.15:.0f} °C: its straight line is taken to go on beyond."
+                )
 
 
 def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
@@ -107,7 +151,8 @@ def uncovered(surfaces: Mapping[str, Surface], scene: Raster) -> Iterator[str]:
     ValueError
         If a map lies beside the scene.
     """
-    for name, surface in surfaces.items():
+    for name, outer in surfaces.items():
+        *_, surface = _layers(outer)
         if not isinstance(surface, MapSurface):
             continue
         fraction = surface.known_fraction(scene)

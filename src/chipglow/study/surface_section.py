@@ -1,22 +1,31 @@
 """The section of the surface: emissivities, the paper's Table 1 by default."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, GetJsonSchemaHandler, field_validator, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from chipglow.laboratory.emissivity import read_emissivity_map
+from chipglow.laboratory.emissivity import (
+    measured_features,
+    read_emissivity_map,
+    read_measured_areas,
+)
 from chipglow.quantities import OR_NONE, Declared, FileBeside, Section, described
 from chipglow.quantities.units import Length
 from chipglow.surface import (
     CHIP_1,
     CHIP_2,
+    OXIDES,
     REFLECTIONS,
     SURFACES,
     Emissivity,
     FeatureSurface,
+    FeatureTrends,
+    Oxide,
+    OxidisedSurface,
     ReflectingSurface,
     SideShape,
     Surface,
@@ -27,10 +36,15 @@ CHIPS: Final[Mapping[str, FeatureSurface]] = {"chip-1": CHIP_1, "chip-2": CHIP_2
 """Chips of the paper's Table 1 by the names of a study."""
 
 
+_FEATURE: Final = {"body": "chip"}
+"""Features whose name in a study is another than that of the surface."""
+
+
 def _numbers(emissivity: Emissivity) -> dict[str, float]:
     return {"mean": emissivity.mean, "standard_deviation": emissivity.standard_deviation}
 
 
+OxideSection = Annotated[Declared[Oxide], OXIDES]
 ReflectionsSection = Annotated[Declared[SideShape], REFLECTIONS]
 
 
@@ -72,8 +86,14 @@ class FeaturesSection(Section):
     maps: dict[str, FileBeside] = described(
         {},
         "Emissivity maps by name, files of chipglow emissivity: each is laid on the scene where\n"
-        "its pixels lie, as one more chip. Of several true temperatures the first counts.",
+        "its pixels lie, as one more chip. Of several true temperatures each pixel has its line.",
         "{} or names and files beside this one: {measured: emissivity.nc}",
+    )
+    measured: dict[str, FileBeside] = described(
+        {},
+        "Measured chips by name, files of chipglow emissivity: chip body and shear band (and\n"
+        "workpiece and tool, if they are there) by their regions, over the temperature.",
+        "{} or names and files beside this one: {heated chip: emissivity.nc}",
     )
     workpiece: Declared[Emissivity] = described(
         _numbers(CHIP_1.workpiece), "The uncut workpiece; the paper assumed these numbers."
@@ -87,6 +107,11 @@ class FeaturesSection(Section):
     )
     restore_standard_deviation: bool = described(
         True, "Make up for the standard deviation that is lost when a texture is enlarged."
+    )
+    oxide: Annotated[OxideSection | None, OR_NONE] = described(
+        "none",
+        "Oxide that grows on the material while it is in view, by its temperatures, or none.\n"
+        f"Kinds:\n{OXIDES.examples}",
     )
     reflections: Annotated[ReflectionsSection | None, OR_NONE] = described(
         "none",
@@ -106,12 +131,17 @@ class FeaturesSection(Section):
         for name in self.maps:
             if name in self.chips:
                 raise ValueError(f"maps: {name!r} is the name of a chip too, expected another")
+        for name in self.measured:
+            if name in self.chips or name in self.maps:
+                raise ValueError(
+                    f"measured: {name!r} is the name of another chip too, expected its own"
+                )
         return self
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the surfaces: the chips, then the maps."""
-        return (*self.chips, *self.maps)
+        """Names of the surfaces: the chips, the maps, then the measured chips."""
+        return (*self.chips, *self.maps, *self.measured)
 
     def build(self, seed: int) -> dict[str, Surface]:
         """The surfaces by name.
@@ -129,24 +159,50 @@ class FeaturesSection(Section):
             If it is not there.
         """
         chips = {
-            name: FeatureSurface(
-                chip=chip.body.build(),
-                shear_band=chip.shear_band.build(),
-                workpiece=self.workpiece.build(),
-                tool=self.tool.build(),
-                grain=self.grain,
-                follow=self.follow,
-                seed=seed,
-                restore_standard_deviation=self.restore_standard_deviation,
-            )
+            name: self._features(chip.body.build(), chip.shear_band.build(), seed)
             for name, chip in self.chips.items()
         }
         maps = {name: read_emissivity_map(file) for name, file in self.maps.items()}
-        surfaces: dict[str, Surface] = {**chips, **maps}
+        measured = {name: self._measured(file, seed) for name, file in self.measured.items()}
+        surfaces: dict[str, Surface] = {**chips, **maps, **measured}
+        if self.oxide is not None:
+            oxide = self.oxide.build()
+            surfaces = {name: OxidisedSurface(bare, oxide) for name, bare in surfaces.items()}
         if self.reflections is None:
             return surfaces
         shape = self.reflections.build()
         return {name: ReflectingSurface(bare, shape) for name, bare in surfaces.items()}
+
+    def _features(self, chip: Emissivity, shear_band: Emissivity, seed: int) -> FeatureSurface:
+        return FeatureSurface(
+            chip=chip,
+            shear_band=shear_band,
+            workpiece=self.workpiece.build(),
+            tool=self.tool.build(),
+            grain=self.grain,
+            follow=self.follow,
+            seed=seed,
+            restore_standard_deviation=self.restore_standard_deviation,
+        )
+
+    def _measured(self, file: str, seed: int) -> FeatureTrends:
+        try:
+            areas = measured_features(read_measured_areas(file))
+            means = {
+                name: Emissivity(area.trend.emissivity, area.standard_deviation)
+                for name, area in areas.items()
+            }
+        except ValueError as error:
+            raise ValueError(f"surface.measured: {file}: {error}") from None
+        bare = self._features(means["body"], means["shear_band"], seed)
+        bare = replace(
+            bare,
+            workpiece=means.get("workpiece", bare.workpiece),
+            tool=means.get("tool", bare.tool),
+        )
+        return FeatureTrends(
+            bare, {_FEATURE.get(name, name): area.trend for name, area in areas.items()}
+        )
 
 
 SURFACES.add("features", FeaturesSection)

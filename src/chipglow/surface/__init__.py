@@ -11,7 +11,21 @@ from chipglow.surface.feature import (
     chip_fraction,
     shear_band_fraction,
 )
+from chipglow.surface.line import (
+    EmissivityTrend,
+    FeatureTrends,
+    FeatureTrendsField,
+    TrendSurface,
+)
 from chipglow.surface.map import MapField, MapSurface
+from chipglow.surface.oxide import (
+    OXIDES,
+    Oxide,
+    OxideHistory,
+    OxidisedField,
+    OxidisedSurface,
+    ParabolicOxide,
+)
 from chipglow.surface.reflecting import ReflectingField, ReflectingSurface
 from chipglow.surface.side_flow import REFLECTIONS, SideElements, SideShape, Wedge
 from chipglow.surface.spectral import HagenRubens, SpectralSurface, SpectralTable
@@ -23,6 +37,7 @@ from chipglow.surface.surface import (
     SurfaceChoice,
     UniformEmissivity,
     UniformSurface,
+    WrappedSurface,
 )
 from chipglow.surface.temperature import PhaseEmissivity, TemperatureSurface, TemperatureTable
 from chipglow.surface.texture import Texture
@@ -30,18 +45,27 @@ from chipglow.surface.texture import Texture
 __all__ = [
     "CHIP_1",
     "CHIP_2",
+    "OXIDES",
     "REFLECTIONS",
     "SURFACES",
     "Emissivity",
     "EmissivityField",
     "EmissivityStack",
+    "EmissivityTrend",
     "Exchange",
     "FeatureField",
     "FeatureFields",
     "FeatureSurface",
+    "FeatureTrends",
+    "FeatureTrendsField",
     "HagenRubens",
     "MapField",
     "MapSurface",
+    "Oxide",
+    "OxideHistory",
+    "OxidisedField",
+    "OxidisedSurface",
+    "ParabolicOxide",
     "PhaseEmissivity",
     "ReflectingField",
     "ReflectingSurface",
@@ -54,9 +78,11 @@ __all__ = [
     "TemperatureSurface",
     "TemperatureTable",
     "Texture",
+    "TrendSurface",
     "UniformEmissivity",
     "UniformSurface",
     "Wedge",
+    "WrappedSurface",
     "chip_fraction",
     "shear_band_fraction",
 ]

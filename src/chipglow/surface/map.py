@@ -1,7 +1,7 @@
 """A surface whose emissivity was measured, as a fixed image."""
 
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,15 @@ class MapSurface(Surface):
     elsewhere : float
         Emissivity off the image, and where no pixel around is known; 0 by default, the paper's for
         what is not defined.
+    slopes : ndarray, optional
+        Change of the emissivity with the true temperature in 1/K; none by default.
+    middle : float
+        True temperature in K at which `values` hold, if there are slopes.
+    uncertainty : ndarray, optional
+        Standard uncertainty of the emissivity, of which other draws (`redrawn`) are made; all of
+        it is taken as one error of all pixels.
+    draw : int
+        Number of the draw; 0 is without an error.
 
     Raises
     ------
@@ -44,6 +53,10 @@ class MapSurface(Surface):
     values: NDArray[np.floating]
     raster: Raster
     elsewhere: float = 0.0
+    slopes: NDArray[np.floating] | None = None
+    middle: float = 0.0
+    uncertainty: NDArray[np.floating] | None = None
+    draw: int = 0
 
     def __post_init__(self) -> None:
         if self.values.shape != self.raster.shape:
@@ -61,30 +74,58 @@ class MapSurface(Surface):
             raise ValueError(
                 f"emissivity map: goes from {known.min():.4g} to {known.max():.4g}, expected 0 to 1"
             )
+        for name in ("slopes", "uncertainty"):
+            image = getattr(self, name)
+            if image is not None and image.shape != self.raster.shape:
+                raise ValueError(
+                    f"emissivity map: {name} have shape {image.shape}, expected {self.raster.shape}"
+                )
         if not 0 <= self.elsewhere <= 1:
             raise ValueError(f"emissivity map: elsewhere is {self.elsewhere!r}, expected 0 to 1")
 
     def on(self, scene: Scene) -> "MapField":
         """Resample the image to a scene's samples."""
-        return MapField(self.at(scene.raster))
+        slopes = None
+        if self.slopes is not None:
+            known = np.isfinite(self.values)
+            slopes = self._resampled(np.where(known, self.slopes, np.nan), scene.raster, 0.0)
+        return MapField(self.at(scene.raster), slopes, self.middle)
+
+    def redrawn(self, number: int) -> Self:
+        """Another draw of the error that all pixels have in common."""
+        if self.uncertainty is None or not number:
+            return self
+        return replace(self, draw=self.draw + number)
 
     def known_fraction(self, raster: Raster) -> float:
         """Fraction of other samples, 0 to 1, at which the image gives the emissivity."""
-        return float(np.mean(self._on(raster)[1] > _KNOWN))
+        return float(np.mean(self._on(self.values, raster)[1] > _KNOWN))
 
     def at(self, raster: Raster) -> NDArray[np.float32]:
         """Emissivity on other samples, float32 of shape `raster.shape`."""
-        total, weight = self._on(raster)
-        result = np.full(raster.shape, self.elsewhere)
-        np.divide(total, weight, out=result, where=weight > _KNOWN)
-        return np.asarray(np.clip(result, 0.0, 1.0), np.float32)
+        values = self.values
+        if self.uncertainty is not None and self.draw:
+            error = np.random.default_rng(self.draw).standard_normal()
+            values = np.clip(values + error * np.nan_to_num(self.uncertainty), 0.0, 1.0)
+        result = self._resampled(values, raster, self.elsewhere)
+        return np.clip(result, np.float32(0.0), np.float32(1.0))
 
-    def _on(self, raster: Raster) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _resampled(
+        self, image: NDArray[np.floating], raster: Raster, elsewhere: float
+    ) -> NDArray[np.float32]:
+        total, weight = self._on(image, raster)
+        result = np.full(raster.shape, elsewhere)
+        np.divide(total, weight, out=result, where=weight > _KNOWN)
+        return np.asarray(result, np.float32)
+
+    def _on(
+        self, image: NDArray[np.floating], raster: Raster
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Weighted sum of the known pixels about each sample, and their weight."""
         across = taps(self.raster.x, raster.spacing, raster.x)
         down = taps(-self.raster.y, raster.spacing, -raster.y)
-        known = np.isfinite(self.values)
-        total = _resampled(np.where(known, self.values, 0.0), across, down)
+        known = np.isfinite(image)
+        total = _resampled(np.where(known, image, 0.0), across, down)
         return total, _resampled(known.astype(np.float64), across, down)
 
 
@@ -96,9 +137,15 @@ class MapField(EmissivityField):
     ----------
     image : ndarray
         Emissivity of the scene's samples, float32 of shape (y, x).
+    slopes : ndarray, optional
+        Its change with the true temperature in 1/K.
+    middle : float
+        True temperature in K at which `image` holds, if there are slopes.
     """
 
     image: NDArray[np.float32]
+    slopes: NDArray[np.float32] | None = None
+    middle: float = 0.0
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -117,7 +164,11 @@ class MapField(EmissivityField):
             raise ValueError(
                 f"frame: has shape {frame.material.shape}, expected {self.image.shape}"
             )
-        return np.where(frame.material == Material.VOID, np.float32(0.0), self.image)
+        values = self.image
+        if self.slopes is not None:
+            away = frame.temperature - np.float32(self.middle)
+            values = np.clip(values + self.slopes * away, np.float32(0.0), np.float32(1.0))
+        return np.where(frame.material == Material.VOID, np.float32(0.0), values)
 
 
 def _resampled(image: NDArray[np.float64], across: Taps, down: Taps) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Raster, Scene, Tool
 from chipglow.surface.side_flow import SideShape, Wedge
-from chipglow.surface.surface import EmissivityField, EmissivityStack, Surface
+from chipglow.surface.surface import EmissivityField, EmissivityStack, WrappedSurface
 
 TOUCHING: Final = 3e-6
 """Distance from the rake face in m within which chip counts as touching it."""
@@ -20,7 +20,7 @@ _INSIDE: Final = 0.75
 
 
 @dataclass(frozen=True)
-class ReflectingSurface(Surface):
+class ReflectingSurface(WrappedSurface):
     """Another surface with the reflections between rake face and chip's side.
 
     Parameters
@@ -44,20 +44,14 @@ class ReflectingSurface(Surface):
     1 where more is reflected than the sample would emit as a blackbody.
     """
 
-    bare: Surface
     shape: SideShape = field(default_factory=Wedge)
     band: Band | None = None
     reflected: float | None = None
 
-    def in_band(self, band: Band, reflected: float | None) -> "ReflectingSurface":
+    def in_band(self, band: Band, reflected: float | None) -> Self:
         """See `Surface.in_band`."""
         bare = self.bare.in_band(band, reflected)
         return replace(self, bare=bare, band=band, reflected=reflected)
-
-    def redrawn(self, number: int) -> Self:
-        """See `Surface.redrawn`."""
-        bare = self.bare.redrawn(number)
-        return self if bare is self.bare else replace(self, bare=bare)
 
     def on(self, scene: Scene) -> "ReflectingField":
         """Lay the surface on a scene.

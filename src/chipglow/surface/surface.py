@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Final, Self
 
 import numpy as np
@@ -137,6 +137,29 @@ class Surface(SurfaceChoice):
             Which draw; 0 is this surface.
         """
         return self
+
+
+@dataclass(frozen=True)
+class WrappedSurface(Surface):
+    """Another surface, of which something more is seen.
+
+    Parameters
+    ----------
+    bare : Surface
+        The other one.
+    """
+
+    bare: Surface
+
+    def in_band(self, band: Band, reflected: float | None) -> Self:
+        """See `Surface.in_band`."""
+        bare = self.bare.in_band(band, reflected)
+        return self if bare is self.bare else replace(self, bare=bare)
+
+    def redrawn(self, number: int) -> Self:
+        """See `Surface.redrawn`."""
+        bare = self.bare.redrawn(number)
+        return self if bare is self.bare else replace(self, bare=bare)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Emissivity from images of heated objects, and true temperatures by it."""
 
 from chipglow.laboratory.emissivity.emissivity import (
+    AreaEmissivity,
     EmissivityLine,
     EmissivityMap,
     Heating,
@@ -11,8 +12,10 @@ from chipglow.laboratory.emissivity.emissivity import (
 )
 from chipglow.laboratory.emissivity.file import (
     EmissivityMapFile,
-    StoredEmissivity,
+    MeasuredArea,
+    MeasuredEmissivity,
     read_emissivity_map,
+    read_measured_areas,
     read_region_emissivity,
     write_emissivity,
 )
@@ -22,7 +25,11 @@ from chipglow.laboratory.emissivity.region_emissivities import (
     determine_emissivities,
 )
 from chipglow.laboratory.emissivity.regions import RegionSection, load_regions
-from chipglow.laboratory.emissivity.study_sections import surface_text
+from chipglow.laboratory.emissivity.study_sections import (
+    measured_features,
+    measured_text,
+    surface_text,
+)
 from chipglow.laboratory.emissivity.temperature import (
     KnownEmissivity,
     ReflectedTemperature,
@@ -33,6 +40,7 @@ from chipglow.laboratory.emissivity.temperature import (
 )
 
 __all__ = [
+    "AreaEmissivity",
     "EmissivityLine",
     "EmissivityMap",
     "EmissivityMapFile",
@@ -40,19 +48,23 @@ __all__ = [
     "HeatedRow",
     "Heating",
     "KnownEmissivity",
+    "MeasuredArea",
+    "MeasuredEmissivity",
     "ReflectedTemperature",
     "RegionEmissivities",
     "RegionEmissivity",
     "RegionSection",
     "RegionTemperatures",
-    "StoredEmissivity",
     "TrueTemperature",
     "determine_emissivities",
     "determine_emissivity",
     "emissivity_covariance",
     "emissivity_line",
     "load_regions",
+    "measured_features",
+    "measured_text",
     "read_emissivity_map",
+    "read_measured_areas",
     "read_region_emissivity",
     "surface_text",
     "true_temperature",

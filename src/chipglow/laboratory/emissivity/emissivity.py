@@ -356,6 +356,26 @@ class RegionEmissivity:
 
 
 @dataclass(frozen=True)
+class AreaEmissivity:
+    """An area's emissivity at one true temperature: of a file, or of a line.
+
+    Parameters
+    ----------
+    name, feature : str
+        The area's name, and the feature that it belongs to.
+    heating : Heating
+        How the object was heated; of a line, with the temperature at which it is taken.
+    estimate : Estimate
+        Mean emissivity, as `RegionEmissivity` has it.
+    """
+
+    name: str
+    feature: str
+    heating: Heating
+    estimate: Estimate
+
+
+@dataclass(frozen=True)
 class EmissivityLine:
     """Emissivity of an area over the temperature, as a straight line; by `emissivity_line`.
 
@@ -363,30 +383,67 @@ class EmissivityLine:
     ----------
     name, feature : str
         The area's name, and the feature that it belongs to.
-    temperatures, means, uncertainties : tuple of float
-        True temperatures in K, mean emissivities, and their standard uncertainties.
-    middle : float
-        Mean of the temperatures in K.
+    heatings : tuple of Heating
+        How the object was heated, one for each true temperature.
+    means, uncertainties : tuple of float
+        Mean emissivities, and their standard uncertainties.
     estimate : Estimate
-        Emissivity of the line there, and its change with temperature in 1/K; shape (2,).
+        Emissivity of the line at its `middle`, and its change with temperature in 1/K; shape (2,).
     residual : float
         Standard deviation about the line; NaN of two temperatures.
     """
 
     name: str
     feature: str
-    temperatures: tuple[float, ...]
+    heatings: tuple[Heating, ...]
     means: tuple[float, ...]
     uncertainties: tuple[float, ...]
-    middle: float
     estimate: Estimate
     residual: float
+
+    @property
+    def temperatures(self) -> tuple[float, ...]:
+        """True temperatures in K."""
+        return tuple(heating.reference for heating in self.heatings)
+
+    @property
+    def middle(self) -> float:
+        """Mean of the temperatures in K."""
+        return float(np.mean(self.temperatures))
+
+    @property
+    def slope(self) -> float:
+        """Change of the emissivity with the temperature in 1/K."""
+        return float(self.estimate.values[1])
 
     def at(self, temperature: Any) -> Estimate:
         """Emissivity of the line at temperatures in K, of any shape."""
         away = np.asarray(temperature, np.float64) - self.middle
         design = np.stack([np.ones(away.size), away.ravel()], axis=1)
         return self.estimate.linear(design).reshape(*away.shape)
+
+    def weights(self, temperature: float) -> NDArray[np.float64]:
+        """Weight of every mean in the emissivity at a temperature in K; their sum is 1."""
+        away = np.array([1.0, temperature - self.middle])
+        found: NDArray[np.float64] = away @ np.linalg.pinv(_design(self.temperatures))
+        return found
+
+    def area(self, temperature: float) -> AreaEmissivity:
+        """Emissivity of the area at a temperature in K.
+
+        Raises
+        ------
+        ValueError
+            If it is no temperature that a heated object has.
+        """
+        heating = replace(self.heatings[0], reference=temperature)
+        return AreaEmissivity(self.name, self.feature, heating, self.at(temperature))
+
+
+def _design(temperatures: Sequence[float]) -> NDArray[np.float64]:
+    """Design matrix of a line about the middle of the temperatures, shape (n, 2)."""
+    kelvins = np.array(temperatures)
+    return np.stack([np.ones_like(kelvins), kelvins - kelvins.mean()], axis=1)
 
 
 def emissivity_of_radiance(
@@ -462,12 +519,12 @@ def emissivity_covariance(rows: Sequence[RegionEmissivity]) -> NDArray[np.float6
     return chance + Estimate.stack([row.estimate.without(RANDOM) for row in rows]).covariance()
 
 
-def emissivity_line(rows: Sequence[RegionEmissivity]) -> EmissivityLine:
+def emissivity_line(rows: Sequence[RegionEmissivity | AreaEmissivity]) -> EmissivityLine:
     """Straight line through an area's emissivity at several temperatures, by least squares.
 
     Parameters
     ----------
-    rows : sequence of RegionEmissivity
+    rows : sequence of RegionEmissivity or AreaEmissivity
         The same area at two temperatures or more.
 
     Raises
@@ -482,33 +539,40 @@ def emissivity_line(rows: Sequence[RegionEmissivity]) -> EmissivityLine:
     same at all temperatures. Chance is that of the rows, or the scatter about the line where that
     is more.
     """
-    temperature = np.array([row.heating.reference for row in rows])
-    if len(set(temperature.tolist())) < 2:
+    heatings = tuple(row.heating for row in rows)
+    temperatures = [heating.reference for heating in heatings]
+    if len(set(temperatures)) < 2:
         raise ValueError("emissivity over temperature: expected 2 temperatures or more")
-    means = np.array([row.mean for row in rows])
-    middle = float(temperature.mean())
-    design = np.stack([np.ones_like(temperature), temperature - middle], axis=1)
+    means = np.array([float(row.estimate.values) for row in rows])
+    design = _design(temperatures)
     solve = np.linalg.pinv(design)
-    at_middle, slope = (solve @ means).tolist()
-    residual = _residual(means - design @ (at_middle, slope))
+    line = solve @ means
+    residual = _residual(means - design @ line)
     chance = np.array([_of_one_image(row.estimate) for row in rows])
     if isfinite(residual):
         chance = np.maximum(chance, residual)
-    observed = Estimate(means).with_component(RANDOM, chance, independent="per element")
+    identity = " ".join(
+        one.cause.identity for row in rows for one in row.estimate.only(RANDOM).components
+    )
+    observed = Estimate(means).with_component(
+        RANDOM, chance, independent="per element", identity=identity
+    )
     for cause in COMMON:
         shift = np.array([row.estimate.effect(cause) for row in rows])
         if cause == "reference":
             # An error of the temperature moves the points along the line too.
-            shift = shift - slope * np.array([row.heating.reference_uncertainty for row in rows])
+            shift = shift - line[1] * np.array([one.reference_uncertainty for one in heatings])
         observed = observed.with_component(cause, shift)
+    if not isfinite(residual) and any("drift" in row.estimate.unevaluated for row in rows):
+        observed = observed.with_unevaluated("drift")
+    warnings = (warning for row in rows for warning in row.estimate.warnings)
     return EmissivityLine(
         name=rows[0].name,
         feature=rows[0].feature,
-        temperatures=tuple(temperature.tolist()),
+        heatings=heatings,
         means=tuple(means.tolist()),
         uncertainties=tuple(float(row.estimate.standard_uncertainty) for row in rows),
-        middle=middle,
-        estimate=observed.linear(solve),
+        estimate=observed.with_warnings(*warnings).linear(solve),
         residual=residual,
     )
 

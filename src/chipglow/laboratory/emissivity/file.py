@@ -1,28 +1,38 @@
 """Determined emissivities in files: maps and regions as NetCDF-4, the table of regions as CSV."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from chipglow.io import write_dataset
 from chipglow.io.measurement_file import Made, read_dataset
 from chipglow.laboratory.emissivity.emissivity import (
     BUDGET,
     COMMON,
+    AreaEmissivity,
+    EmissivityLine,
     Heating,
     emissivity_covariance,
+    emissivity_line,
 )
 from chipglow.laboratory.emissivity.observations import RANDOM
 from chipglow.laboratory.emissivity.region_emissivities import RegionEmissivities
 from chipglow.quantities import FileBeside, Parameter
 from chipglow.scene import Raster
 from chipglow.scene.scene import raster_coordinates
-from chipglow.surface import SURFACES, MapSurface, SurfaceChoice
+from chipglow.surface import (
+    SURFACES,
+    EmissivityTrend,
+    MapSurface,
+    SurfaceChoice,
+    TrendSurface,
+)
 from chipglow.uncertainty import Cause, Component, Estimate
 
 _KIND: Final = "emissivity map"
@@ -116,60 +126,48 @@ def _say_correlations(data: xr.Dataset) -> None:
     data["region_mean"].attrs["unc_comps"] = known
 
 
-@dataclass(frozen=True)
-class StoredEmissivity:
-    """An area's emissivity as a file keeps it; fields as `RegionEmissivity` has them."""
-
-    heating: Heating
-    estimate: Estimate
-
-
-def read_region_emissivity(path: str | os.PathLike[str]) -> dict[str, StoredEmissivity]:
+def read_region_emissivity(
+    path: str | os.PathLike[str],
+) -> dict[str, AreaEmissivity] | dict[str, EmissivityLine]:
     """Read the emissivity of areas.
 
     Parameters
     ----------
     path : path-like
-        A file of `write_emissivity`, of one true temperature.
+        A file of `write_emissivity`.
 
     Returns
     -------
     dict
-        By the areas' names.
+        By the areas' names: of several true temperatures the line over the temperature.
 
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     ValueError
-        If the file is cut short, no emissivity map, or of several true temperatures; the message
-        names the file.
+        If the file is cut short or no emissivity map; the message names the file.
     """
-    found = _read(Path(path), _regions)
-    if isinstance(found, int):
-        raise ValueError(
-            f"{path}: has emissivities at {found} true temperatures, expected those at one "
-            "(chipglow emissivity with the images of that temperature alone)"
-        )
-    return found
+    return _read(Path(path), _regions)
 
 
-def _regions(data: xr.Dataset) -> dict[str, StoredEmissivity] | int:
-    """Emissivities at one true temperature, or how many there are."""
-    if data.sizes["reference"] != 1:
-        return int(data.sizes["reference"])
+def _regions(data: xr.Dataset) -> dict[str, AreaEmissivity] | dict[str, EmissivityLine]:
     if "observations" not in data:
         raise ValueError("it is of an earlier version, expected one that is written anew")
-    one = data.isel(reference=0)
+    rows = [_areas(data.isel(reference=index)) for index in range(data.sizes["reference"])]
+    if len(rows) == 1:
+        return {area.name: area for area in rows[0]}
+    return {areas[0].name: emissivity_line(areas) for areas in zip(*rows, strict=True)}
+
+
+def _areas(one: xr.Dataset) -> list[AreaEmissivity]:
+    """Areas at one true temperature."""
     reflected, *spreads = (float(one[name]) for name in _HEATING)
     heating = Heating(float(one["reference"]), reflected, *spreads)
-    return {
-        str(name): _stored(one.isel(region=index), heating)
-        for index, name in enumerate(one["region"].values)
-    }
+    return [_stored(one.isel(region=index), heating) for index in range(one.sizes["region"])]
 
 
-def _stored(row: xr.Dataset, heating: Heating) -> StoredEmissivity:
+def _stored(row: xr.Dataset, heating: Heating) -> AreaEmissivity:
     parts = {cause: float(row[f"region_{cause}_uncertainty"]) for cause in BUDGET}
     observations = str(row["observations"].values)
     estimate = Estimate(np.array(float(row["region_mean"])))
@@ -184,7 +182,9 @@ def _stored(row: xr.Dataset, heating: Heating) -> StoredEmissivity:
     identity = f"{observations} {row['region'].values}"
     random = Cause(RANDOM, identity, len(names), freedom, parts=tuple(names))
     effects = np.array([[parts[name] for name in names]])
-    return StoredEmissivity(
+    return AreaEmissivity(
+        str(row["region"].values),
+        str(row["feature"].values),
         heating,
         replace(
             estimate,
@@ -203,12 +203,14 @@ def read_emissivity_map(path: str | os.PathLike[str], reference: float | None = 
     path : path-like
         A file of `write_emissivity`.
     reference : float, optional
-        True temperature in K of the map to take, the nearest; the file's first by default.
+        True temperature in K of the map to take, the nearest. By default every pixel of several
+        maps has its straight line over the temperature.
 
     Returns
     -------
     MapSurface
-        Where noise took a pixel out of 0 to 1, it has the nearer of these.
+        Where noise took a pixel out of 0 to 1, it has the nearer of these. With the standard
+        uncertainty of the pixels, the mean of that at several temperatures.
 
     Raises
     ------
@@ -219,15 +221,97 @@ def read_emissivity_map(path: str | os.PathLike[str], reference: float | None = 
     """
 
     def surface(data: xr.Dataset) -> MapSurface:
-        index = (
-            0 if reference is None else int(np.abs(data["reference"].values - reference).argmin())
-        )
-        values = np.clip(data["emissivity"].values[index].astype(np.float64), 0.0, 1.0)
+        temperatures = data["reference"].values
+        if reference is not None:
+            data = data.isel(reference=[int(np.abs(temperatures - reference).argmin())])
+        values = data["emissivity"].values.astype(np.float64)
+        spread = data["standard_uncertainty"].values.astype(np.float64).mean(axis=0)
         x, y, pitch = data["x"].values, data["y"].values, float(data.attrs["pitch"])
         raster = Raster(float(x[0]) - pitch / 2, float(y[0]) + pitch / 2, pitch, len(y), len(x))
-        return MapSurface(values, raster)
+        away = data["reference"].values - data["reference"].values.mean()
+        middle, scatter = float(data["reference"].values.mean()), float((away**2).sum())
+        slopes = np.tensordot(away, values, axes=1) / scatter if scatter else None
+        mean = np.clip(values.mean(axis=0), 0.0, 1.0)
+        return MapSurface(mean, raster, 0.0, slopes, middle, spread)
 
     return _read(Path(path), surface)
+
+
+@dataclass(frozen=True)
+class MeasuredArea:
+    """An area's emissivity as a surface takes it.
+
+    Parameters
+    ----------
+    name, feature : str
+        The area's name, and the feature that it belongs to.
+    trend : EmissivityTrend
+        The line over the temperature; measured at one temperature, the same at all.
+    standard_deviation : float
+        Over the pixels; the mean of that at several temperatures.
+    """
+
+    name: str
+    feature: str
+    trend: EmissivityTrend
+    standard_deviation: float
+
+
+def read_measured_areas(path: str | os.PathLike[str]) -> dict[str, MeasuredArea]:
+    """Read the emissivity of areas for surfaces.
+
+    Parameters
+    ----------
+    path : path-like
+        A file of `write_emissivity`.
+
+    Returns
+    -------
+    dict
+        By the areas' names.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If the file is cut short or no emissivity map; the message names the file.
+    """
+
+    def found(data: xr.Dataset) -> dict[str, MeasuredArea]:
+        spreads = data["region_standard_deviation"].mean("reference").values.tolist()
+        regions: Mapping[str, AreaEmissivity | EmissivityLine] = _regions(data)
+        return {
+            name: MeasuredArea(name, one.feature, _trend(one), spread)
+            for (name, one), spread in zip(regions.items(), spreads, strict=True)
+        }
+
+    return _read(Path(path), found)
+
+
+def _trend(area: AreaEmissivity | EmissivityLine) -> EmissivityTrend:
+    if isinstance(area, EmissivityLine):
+        estimate, temperatures = area.estimate, area.temperatures
+    else:
+        of_constant = np.array([[1.0], [0.0]])
+        estimate, temperatures = area.estimate.linear(of_constant), (area.heating.reference,)
+    shared = (*COMMON, "drift")
+    effects = {one.cause.name: one.effects for one in estimate.components}
+    common = [effects[name][:, 0] if name in effects else np.zeros(2) for name in shared]
+    own = [column for name, of in effects.items() if name not in shared for column in of.T]
+    emissivity, slope = estimate.values.tolist()
+    return EmissivityTrend(
+        middle=float(np.mean(temperatures)),
+        emissivity=emissivity,
+        slope=slope,
+        common=_pairs(common),
+        own=_pairs(own),
+        measured=(min(temperatures), max(temperatures)),
+    )
+
+
+def _pairs(effects: Sequence[NDArray[np.float64]]) -> tuple[tuple[float, float], ...]:
+    return tuple((float(one), float(other)) for one, other in effects)
 
 
 def _read(path: Path, made_of: Callable[[xr.Dataset], Made]) -> Made:
@@ -251,3 +335,23 @@ class EmissivityMapFile(SurfaceChoice):
     def surface(self) -> MapSurface:
         """The surface."""
         return read_emissivity_map(self.file)
+
+
+@SURFACES.part
+@dataclass(frozen=True)
+class MeasuredEmissivity(SurfaceChoice):
+    """A measured region's emissivity, everywhere: its line over the temperature."""
+
+    kind: ClassVar[str] = "measured"
+    example: ClassVar[str] = "{kind: measured, file: emissivity.nc, region: chip body}"
+    file: Annotated[FileBeside, Parameter("What chipglow emissivity writes.")]
+    region: Annotated[str, Parameter("Name of a region in it.")]
+
+    def surface(self) -> TrendSurface:
+        """The surface."""
+        areas = read_measured_areas(self.file)
+        if self.region not in areas:
+            raise ValueError(
+                f"region: {self.region!r} is not in {self.file}, expected one of {', '.join(areas)}"
+            )
+        return TrendSurface(areas[self.region].trend)

@@ -1,11 +1,14 @@
 """Determined emissivities as the sections of a study."""
 
+import os
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 import yaml
 
 from chipglow.laboratory.emissivity.emissivity import RegionEmissivity
+from chipglow.laboratory.emissivity.file import MeasuredArea
 
 _FIELDS: Final[Mapping[str, str]] = {
     "chip": "body",
@@ -54,6 +57,49 @@ def surface_text(rows: Iterable[RegionEmissivity]) -> str:
     if not surface:
         return ""
     return yaml.safe_dump(sections, sort_keys=False, allow_unicode=True)
+
+
+def measured_text(file: str | os.PathLike[str]) -> str:
+    """Sections of a study with the chip of a file of `write_emissivity`, as YAML.
+
+    Parameters
+    ----------
+    file : path-like
+        The file, which has the chip's body and its shear bands.
+    """
+    sections = {
+        "surface": {"measured": {_CHIP: os.fspath(file)}},
+        "analysis": {"rake_chip": _CHIP, "band_chip": _CHIP},
+    }
+    return yaml.safe_dump(sections, sort_keys=False, allow_unicode=True)
+
+
+def measured_features(areas: Mapping[str, MeasuredArea]) -> dict[str, MeasuredArea]:
+    """Measured areas by the features of a study: body, shear_band, workpiece, tool.
+
+    Parameters
+    ----------
+    areas : mapping
+        As `read_measured_areas` gives them. Of several areas of a feature that counts which is
+        all of it: the one that is called as it is.
+
+    Raises
+    ------
+    ValueError
+        If the chip's body or its shear bands are not among them.
+    """
+    number = Counter(area.feature for area in areas.values())
+    found = {
+        _FIELDS[area.feature.lower()]: area
+        for area in areas.values()
+        if area.feature.lower() in _FIELDS
+        and (number[area.feature] == 1 or area.name == area.feature)
+    }
+    if not {"body", "shear_band"} <= set(found):
+        raise ValueError(
+            f"is of the features {', '.join(number)}, expected chip body and shear band among them"
+        )
+    return found
 
 
 def _possible(row: RegionEmissivity) -> bool:

@@ -3,16 +3,18 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from math import inf, isnan, sqrt
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, TypeAlias
 from uuid import uuid4
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from chipglow.camera import FittedCalibration, Flag, Measurement
-from chipglow.laboratory.emissivity.emissivity import LABORATORY, Heating
+from chipglow.laboratory.emissivity.emissivity import LABORATORY, EmissivityLine, Heating
 from chipglow.laboratory.emissivity.observations import (
     RANDOM,
     area_estimate,
@@ -26,6 +28,7 @@ from chipglow.laboratory.emissivity.observations import (
     uncertainty_columns,
 )
 from chipglow.radiometry import Band
+from chipglow.radiometry.band import TABLE_HOTTEST
 from chipglow.scene import Area, Region, areas
 from chipglow.uncertainty import Estimate, propagate
 
@@ -41,6 +44,7 @@ FAR: Final = 50.0
 _UNEVEN: Final = 0.5
 _NO_MATTER: Final = 0.01
 _STEP: Final = 0.5
+_STEPS: Final = 200
 
 
 class DeterminedEmissivity(Protocol):
@@ -53,6 +57,10 @@ class DeterminedEmissivity(Protocol):
     @property
     def estimate(self) -> Estimate:
         """Mean emissivity, with the components of `COMMON`, ``drift`` and ``random``."""
+
+
+Emissivity: TypeAlias = DeterminedEmissivity | EmissivityLine
+"""What `determine_emissivities` finds of an area, at one true temperature or over several."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +181,7 @@ class TrueTemperature:
 def true_temperature(
     measurements: Sequence[Measurement],
     area: Area,
-    emissivity: DeterminedEmissivity | KnownEmissivity,
+    emissivity: Emissivity | KnownEmissivity,
     surroundings: ReflectedTemperature | None = None,
     calibration: FittedCalibration | None = None,
     drift: float | None = None,
@@ -186,8 +194,9 @@ def true_temperature(
         Images of the object; several of them are repetitions.
     area : Area
         Pixels of uniform temperature.
-    emissivity : RegionEmissivity or KnownEmissivity
-        The area's emissivity, determined with the same camera, or known from elsewhere.
+    emissivity : RegionEmissivity, AreaEmissivity, EmissivityLine or KnownEmissivity
+        The area's emissivity, determined with the same camera, or known from elsewhere. A line
+        over the temperature is taken at the temperature that is found.
     surroundings : ReflectedTemperature, optional
         What the area reflects. By default those in which the emissivity was determined, with the
         same error; of a `KnownEmissivity` the paper's 293 K.
@@ -202,7 +211,8 @@ def true_temperature(
     ------
     ValueError
         If there is no image, the images are of different pixels, fewer than two pixels can be
-        used, or the area is darker than what it reflects.
+        used, or the area is darker than what it reflects; if by a line the radiance does not
+        rise with the temperature.
 
     Notes
     -----
@@ -212,6 +222,8 @@ def true_temperature(
     emissivity too small. What is reflected is the same for both, unless another is given. The
     calibration's have the correlation that its covariance says; without `calibration`
     none is taken, which is too much rather than too little as long as they are of one sign.
+    With a line ε(T) the equation is solved for T, and all sensitivities are those of a constant
+    emissivity over 1 + (dε/dT) (L − L_env) / (ε dL/dT).
     """
     check_same_pixels(measurements, "temperature")
     band, radiance = measurements[0].band, observed_radiance(measurements)
@@ -227,9 +239,11 @@ def true_temperature(
     mean = float(values.mean())
     reflecting = _surroundings(emissivity, surroundings)
     room = float(reflecting.values)
-    equation = _Equation(float(emissivity.estimate.values), room, band)
+    taken, slope = _taken(emissivity, area.name, mean, room, band)
+    equation = _Equation(float(taken.estimate.values), room, band, slope)
     sensitivity = equation.sensitivity(area.name, mean)
-    correlation = _correlation(emissivity, mean, calibration, band)
+    at = float(equation.temperature(np.array(mean)))
+    correlation = _correlation(emissivity, at, mean, calibration, band)
     determined = not isinstance(emissivity, KnownEmissivity)
     shared = (correlation or 0.0) if determined else 1.0
     stated = stated_calibration(measurements)
@@ -237,7 +251,7 @@ def true_temperature(
     seen = _seen(values, error, shared, drift, len(measurements))
     found = propagate(
         lambda _, seen, __: equation.temperature(seen),
-        emissivity.estimate.renamed(RANDOM, "emissivity"),
+        taken.estimate.renamed(RANDOM, "emissivity"),
         seen,
         reflecting,
         derivatives=sensitivity.partials,
@@ -257,7 +271,7 @@ def true_temperature(
         radiance_temperature=float(band.temperature(np.array(mean))),
         standard_deviation=float(pixels.std(ddof=1)),
         mean_of_pixels=mean_of_pixels,
-        emissivity=float(emissivity.estimate.values),
+        emissivity=float(taken.estimate.values),
         estimate=replace(found, warnings=tuple(warnings)),
         correlation=correlation,
     )
@@ -309,7 +323,7 @@ class RegionTemperatures:
 def true_temperatures(
     measurements: Sequence[Measurement],
     regions: Sequence[Region],
-    emissivities: Mapping[str, DeterminedEmissivity] | KnownEmissivity,
+    emissivities: Mapping[str, Emissivity] | KnownEmissivity,
     surroundings: ReflectedTemperature | None = None,
     calibration: FittedCalibration | None = None,
     drift: float | None = None,
@@ -339,7 +353,7 @@ def true_temperatures(
     check_same_pixels(measurements, "temperature", names)
     found = areas(regions, measurements[0].raster)
     if isinstance(emissivities, KnownEmissivity):
-        known: Mapping[str, DeterminedEmissivity | KnownEmissivity] = dict.fromkeys(
+        known: Mapping[str, Emissivity | KnownEmissivity] = dict.fromkeys(
             (area.name for area in found), emissivities
         )
     else:
@@ -358,18 +372,25 @@ def true_temperatures(
     if not isinstance(emissivities, KnownEmissivity):
         warnings.extend(_far_from_the_heating(rows, emissivities))
     unknown_drift = drift is None and len(measurements) == 1
-    unknown_drift |= any(isnan(one.estimate.contribution("drift")) for one in known.values())
+    unknown_drift |= any(
+        np.isnan(one.estimate.contribution("drift")).any() for one in known.values()
+    )
     fixed = isinstance(emissivities, KnownEmissivity)
-    assumed = _assumptions(rows, fixed, surroundings is None, unknown_drift)
+    lines = any(isinstance(one, EmissivityLine) for one in known.values())
+    assumed = _assumptions(rows, fixed, lines, surroundings is None, unknown_drift)
     return RegionTemperatures(rows, tuple(assumed), tuple(warnings))
 
 
 def _far_from_the_heating(
-    rows: Iterable[TrueTemperature], emissivities: Mapping[str, DeterminedEmissivity]
+    rows: Iterable[TrueTemperature], emissivities: Mapping[str, Emissivity]
 ) -> Iterator[str]:
     """Regions whose temperature is another than that at which their emissivity was determined."""
     for row in rows:
-        heated = emissivities[row.name].heating.reference
+        emissivity = emissivities[row.name]
+        if isinstance(emissivity, EmissivityLine):
+            yield from _beyond_the_line(row, emissivity)
+            continue
+        heated = emissivity.heating.reference
         difference = abs(float(row.estimate.values) - heated)
         if difference > FAR:
             yield (
@@ -379,11 +400,29 @@ def _far_from_the_heating(
             )
 
 
+def _beyond_the_line(row: TrueTemperature, line: EmissivityLine) -> Iterator[str]:
+    low, high = min(line.temperatures), max(line.temperatures)
+    found = float(row.estimate.values)
+    difference = max(low - found, found - high)
+    if difference > FAR:
+        yield (
+            f"{row.name}: is {difference:.0f} K beyond the {low - 273.15:.0f} °C to "
+            f"{high - 273.15:.0f} °C at which its emissivity was determined; that the line goes "
+            "on straight is not in u."
+        )
+
+
 def _assumptions(
-    rows: Sequence[TrueTemperature], known: bool, same_surroundings: bool, unknown_drift: bool
+    rows: Sequence[TrueTemperature],
+    known: bool,
+    lines: bool,
+    same_surroundings: bool,
+    unknown_drift: bool,
 ) -> Iterator[str]:
     yield "every region is of uniform temperature and emissivity."
-    if not known:
+    if lines:
+        yield "the emissivity is a straight line over the temperature."
+    elif not known:
         yield "the emissivity is the same at all temperatures."
     if known and not any(row.estimate.contribution("emissivity") for row in rows):
         yield "the emissivity is exact (emissivity_uncertainty)."
@@ -480,11 +519,15 @@ class _Sensitivity:
 
 @dataclass(frozen=True)
 class _Equation:
-    """Equation 2 for an emissivity and the temperature in K of what is reflected."""
+    """Equation 2 for an emissivity and the temperature in K of what is reflected.
+
+    The emissivity is that at the object's temperature; `slope` is its change with that in 1/K.
+    """
 
     emissivity: float
     reflected: float
     band: Band
+    slope: float = 0.0
 
     @property
     def reflected_radiance(self) -> float:
@@ -503,12 +546,17 @@ class _Equation:
         """How the temperature of a radiance in W/(m² sr) of an area depends on all that."""
         own = float(self.own(radiance))
         if not own > self.reflected_radiance:
-            raise ValueError(
-                f"region {name}: is darker than what it reflects at "
-                f"{self.reflected - 273.15:.6g} °C, expected a hotter object"
-            )
+            raise _too_dark(name, self.reflected)
         value = float(self.band.temperature(np.array(own)))
-        by_radiance = 1 / (self.emissivity * self._slope(value))
+        rise = self.emissivity * self._slope(value)
+        rise += self.slope * (own - self.reflected_radiance)
+        if not rise > 0:
+            raise ValueError(
+                f"region {name}: by the line of its emissivity the radiance does not rise with "
+                f"the temperature at {value - 273.15:.6g} °C, expected an emissivity that falls "
+                "less"
+            )
+        by_radiance = 1 / rise
         by_environment = -(1 - self.emissivity) * self._slope(self.reflected) * by_radiance
         return _Sensitivity(
             by_radiance, -(own - self.reflected_radiance) * by_radiance, by_environment
@@ -520,31 +568,92 @@ class _Equation:
         return float(ends[1] - ends[0]) / (2 * _STEP)
 
 
+def _too_dark(name: str, reflected: float) -> ValueError:
+    return ValueError(
+        f"region {name}: is darker than what it reflects at {reflected - 273.15:.6g} °C, expected "
+        "a hotter object"
+    )
+
+
+def _taken(
+    emissivity: Emissivity | KnownEmissivity,
+    name: str,
+    radiance: float,
+    reflected: float,
+    band: Band,
+) -> tuple[DeterminedEmissivity | KnownEmissivity, float]:
+    """The emissivity at the temperature at which it makes an area's radiance, and its slope."""
+    if not isinstance(emissivity, EmissivityLine):
+        return emissivity, 0.0
+    room = float(band.radiance(np.array(reflected)))
+
+    def excess(temperature: float) -> float:
+        value = float(emissivity.at(temperature).values)
+        return value * (float(band.radiance(np.array(temperature))) - room) - (radiance - room)
+
+    if not radiance > room:
+        raise _too_dark(name, reflected)
+    temperatures = np.geomspace(reflected, TABLE_HOTTEST, _STEPS).tolist()
+    for colder, hotter in pairwise(temperatures):
+        if excess(hotter) > 0:
+            found = float(brentq(excess, colder, hotter, xtol=1e-6))
+            return emissivity.area(found), emissivity.slope
+    raise ValueError(
+        f"region {name}: no temperature up to {TABLE_HOTTEST - 273.15:.0f} °C has its radiance by "
+        "the line of its emissivity, expected an emissivity that falls less with the temperature"
+    )
+
+
 def _surroundings(
-    emissivity: DeterminedEmissivity | KnownEmissivity, given: ReflectedTemperature | None
+    emissivity: Emissivity | KnownEmissivity, given: ReflectedTemperature | None
 ) -> Estimate:
     """Temperature in K of what is reflected; by default with the error that the emissivity has."""
     if given is not None:
         return given.estimate
     if isinstance(emissivity, KnownEmissivity):
         return ReflectedTemperature().estimate
-    heating = emissivity.heating
+    heating = _heatings(emissivity)[0]
     return Estimate(np.array(heating.reflected)).with_component(
         "reflected", heating.reflected_uncertainty
     )
 
 
+def _heatings(emissivity: Emissivity) -> tuple[Heating, ...]:
+    return emissivity.heatings if isinstance(emissivity, EmissivityLine) else (emissivity.heating,)
+
+
 def _correlation(
-    emissivity: DeterminedEmissivity | KnownEmissivity,
+    emissivity: Emissivity | KnownEmissivity,
+    temperature: float,
     radiance: float,
     calibration: FittedCalibration | None,
     band: Band,
 ) -> float | None:
-    """Correlation of the calibration's errors at the emissivity's radiance and at this one."""
+    """Correlation of the calibration's errors at the emissivity's radiances and at this one.
+
+    That of a line is the mean over its points, with their parts in the emissivity that is taken.
+    """
     if calibration is None or isinstance(emissivity, KnownEmissivity):
         return None
-    heating = emissivity.heating
+    if isinstance(emissivity, EmissivityLine):
+        means, weights = emissivity.means, emissivity.weights(temperature)
+    else:
+        means, weights = (float(emissivity.estimate.values),), np.ones(1)
+    found = [
+        _correlation_of(mean, heating, radiance, calibration, band)
+        for mean, heating in zip(means, _heatings(emissivity), strict=True)
+    ]
+    return float(np.clip(weights @ np.array(found), -1.0, 1.0))
+
+
+def _correlation_of(
+    emissivity: float,
+    heating: Heating,
+    radiance: float,
+    calibration: FittedCalibration,
+    band: Band,
+) -> float:
     hot, cold = band.radiance(np.array([heating.reference, heating.reflected])).tolist()
-    then = cold + float(emissivity.estimate.values) * (hot - cold)
+    then = cold + emissivity * (hot - cold)
     found = calibration.errors.estimate([then, radiance]).correlation()[0, 1]
     return float(np.nan_to_num(found))

@@ -1,0 +1,241 @@
+"""Oxide that grows on hot material by the parabolic law, and what it does to the emissivity."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from functools import lru_cache
+from math import ceil
+from typing import Annotated, ClassVar, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.constants import R
+
+from chipglow.quantities import Family, Parameter, Part
+from chipglow.quantities.units import ACTIVATION_ENERGY, LENGTH, OXIDATION_RATE, POSITION
+from chipglow.scene import Frame, Material, Scene
+from chipglow.surface.surface import EmissivityField, WrappedSurface
+
+OXIDES: Final = Family("oxide")
+"""Laws of oxide by their kind; other packages add theirs in the group ``chipglow.oxide``."""
+
+_MOST_CELLS: Final = 256
+_SAMPLES: Final = 4
+_GROWN_FIELDS: Final = ("material_x", "material_y")
+
+
+@dataclass(frozen=True)
+class Oxide(Part, ABC):
+    """A law of growth of oxide, and the emissivity of material under it.
+
+    A class of a family that adds `growth`.
+    """
+
+    initial: Annotated[
+        float,
+        Parameter(
+            "Thickness of the oxide when a material point comes into view.", POSITION, least=0.0
+        ),
+    ] = 0.0
+    emissivity: Annotated[
+        float, Parameter("Emissivity under much oxide: chip 2 of the paper.", least=0.0, most=1.0)
+    ] = 0.77
+    opaque: Annotated[
+        float,
+        Parameter(
+            "Thickness over which a film takes on 63 % of that emissivity; an assumption.",
+            LENGTH,
+            over=0.0,
+        ),
+    ] = 0.5e-6
+
+    @abstractmethod
+    def growth(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Rate d(x²)/dt of the squared thickness in m²/s at temperatures in K."""
+
+    def of_thickness(self, bare: ArrayLike, thickness: ArrayLike) -> NDArray[np.float64]:
+        """Emissivity of material of a bare emissivity under oxide of a thickness in m."""
+        covered = -np.expm1(-np.asarray(thickness, np.float64) / self.opaque)
+        clear = np.asarray(bare, np.float64)
+        return np.asarray(clear + (self.emissivity - clear) * covered, np.float64)
+
+
+@OXIDES.part
+@dataclass(frozen=True)
+class ParabolicOxide(Oxide):
+    """Growth by diffusion through the oxide: d(x²)/dt = k₀ exp(−Q / (R T)).
+
+    Numbers by default: scale on iron at 700 °C to 1250 °C (Païdassi 1958, as Chen and Yuen 2003
+    state them), faster than on carbon steel, and under 570 °C than magnetite grows. That they hold
+    at nanometres and microseconds is an assumption.
+    """
+
+    kind: ClassVar[str] = "parabolic"
+    example: ClassVar[str] = (
+        "{kind: parabolic, rate: 6.1e-4 m^2/s, activation_energy: 169.5 kJ/mol}"
+    )
+    rate: Annotated[float, Parameter("Its factor k₀.", OXIDATION_RATE, over=0.0)] = 6.1e-4
+    activation_energy: Annotated[
+        float, Parameter("Its activation energy Q.", ACTIVATION_ENERGY, over=0.0)
+    ] = 169_452.0
+
+    def growth(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """See `Oxide.growth`."""
+        kelvins = np.asarray(temperature, np.float64)
+        return np.asarray(self.rate * np.exp(-self.activation_energy / (R * kelvins)), np.float64)
+
+
+@dataclass(frozen=True)
+class OxidisedSurface(WrappedSurface):
+    """Another surface under oxide that grows while the material is in view.
+
+    Parameters
+    ----------
+    bare : Surface
+        The emissivity without oxide.
+    oxide : Oxide
+        The law of its growth.
+    """
+
+    oxide: Oxide = field(default_factory=ParabolicOxide)
+
+    def on(self, scene: Scene) -> "OxidisedField":
+        """Lay the surface on a scene; all its frames are read once.
+
+        Raises
+        ------
+        ValueError
+            If the scene has no material coordinates, by which a point's temperature is followed.
+        """
+        if not scene.has_material_coordinates:
+            raise ValueError(
+                "oxide: the scene has no material coordinates, expected them, as a point's oxide "
+                "follows from the temperatures that it had"
+            )
+        return OxidisedField(self.bare.on(scene), self.oxide, _history(scene, self.oxide))
+
+
+@dataclass(frozen=True, eq=False)
+class OxideHistory:
+    """Squared thickness of the oxide of every material point over time.
+
+    Parameters
+    ----------
+    times : ndarray
+        Times of the scene's frames in s, shape (time,).
+    grown : ndarray
+        What came to the squared thickness in m² since the scene's first frame, in cells of material
+        coordinates, float32 of shape (time, row, column).
+    left, bottom, cell : float
+        Corner of the cells in material coordinates, and their size, in m.
+
+    Notes
+    -----
+    x² = x₀² + ∫ d(x²)/dt (T(t)) dt along the material point, by the trapezoidal rule from frame to
+    frame. A cell's rate is the mean over the samples in it. Where it is not seen nothing grows.
+    """
+
+    times: NDArray[np.float64]
+    grown: NDArray[np.float32]
+    left: float
+    bottom: float
+    cell: float
+
+    @classmethod
+    def of(cls, scene: Scene, oxide: Oxide) -> "OxideHistory":
+        """Follow the material of a scene."""
+        (left, right), (bottom, top) = _reach(scene)
+        cell = max(
+            _SAMPLES * scene.raster.spacing, max(right - left, top - bottom) / _MOST_CELLS, 1e-12
+        )
+        shape = ceil((top - bottom) / cell) + 1, ceil((right - left) / cell) + 1
+        made = cls(
+            scene.times, np.zeros((len(scene.times), *shape), np.float32), left, bottom, cell
+        )
+        total, before = np.zeros(shape), np.full(shape, np.nan)
+        steps = np.diff(scene.times, prepend=scene.times[0])
+        for number, frame in enumerate(scene.frames(names=_GROWN_FIELDS)):
+            rate = made._rates(frame, oxide)
+            between = np.where(np.isnan(before), 0.0, (rate + before) / 2)
+            total += np.nan_to_num(between) * steps[number]
+            made.grown[number] = total
+            before = rate
+        return made
+
+    def squared(self, frame: Frame) -> NDArray[np.float64]:
+        """What came to the squared thickness of every sample of a frame in m², shape (y, x)."""
+        place = float(np.interp(frame.time, self.times, np.arange(self.times.size)))
+        first = min(int(place), max(self.times.size - 2, 0))
+        share = place - first
+        last = min(first + 1, self.times.size - 1)
+        cells = self._cells(frame)
+        found = (1 - share) * self.grown[first].ravel()[cells]
+        return np.asarray(found + share * self.grown[last].ravel()[cells], np.float64)
+
+    def _cells(self, frame: Frame) -> NDArray[np.intp]:
+        """Number of the cell of every sample."""
+        rows, columns = self.grown.shape[1:]
+        column = np.floor((frame.needed("material_x") - self.left) / self.cell).astype(np.intp)
+        row = np.floor((frame.needed("material_y") - self.bottom) / self.cell).astype(np.intp)
+        return np.asarray(
+            np.clip(row, 0, rows - 1) * columns + np.clip(column, 0, columns - 1), np.intp
+        )
+
+    def _rates(self, frame: Frame, oxide: Oxide) -> NDArray[np.float64]:
+        """Mean rate in every cell; NaN where it is not seen."""
+        seen = frame.material == Material.WORKPIECE
+        cells, count = self._cells(frame)[seen], self.grown[0].size
+        rate = oxide.growth(frame.temperature[seen])
+        number = np.bincount(cells, minlength=count)
+        total = np.bincount(cells, rate, count)
+        mean = np.divide(total, number, out=np.full(count, np.nan), where=number > 0)
+        return mean.reshape(self.grown.shape[1:])
+
+
+@dataclass(frozen=True, eq=False)
+class OxidisedField(EmissivityField):
+    """An `OxidisedSurface` on one scene; made by `OxidisedSurface.on`."""
+
+    bare: EmissivityField
+    oxide: Oxide
+    history: OxideHistory
+
+    @property
+    def needs(self) -> tuple[str, ...] | None:
+        """See `EmissivityField.needs`."""
+        of_bare = self.bare.needs
+        return None if of_bare is None else tuple({*of_bare, *_GROWN_FIELDS})
+
+    @property
+    def most(self) -> float:
+        """See `EmissivityField.most`."""
+        return self.bare.most
+
+    def thickness(self, frame: Frame) -> NDArray[np.float64]:
+        """Thickness of the oxide of every sample in m, shape (y, x); 0 but on the workpiece."""
+        found = np.sqrt(self.oxide.initial**2 + self.history.squared(frame))
+        return np.where(frame.material == Material.WORKPIECE, found, 0.0)
+
+    def emissivity(self, frame: Frame) -> NDArray[np.float32]:
+        """Emissivity of every sample of a frame, shape (y, x); 0 in the void."""
+        bare = self.bare.emissivity(frame)
+        return self.oxide.of_thickness(bare, self.thickness(frame)).astype(np.float32)
+
+
+@lru_cache(maxsize=1)
+def _history(scene: Scene, oxide: Oxide) -> OxideHistory:
+    """History of the oxide on the scene that was looked at last: many surfaces share it."""
+    return OxideHistory.of(scene, oxide)
+
+
+def _reach(scene: Scene) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Range of the material coordinates of the workpiece over all frames."""
+    ends = []
+    for frame in scene.frames(names=_GROWN_FIELDS):
+        seen = frame.material == Material.WORKPIECE
+        if seen.any():
+            places = [frame.needed(name)[seen] for name in _GROWN_FIELDS]
+            ends.append([(one.min(), one.max()) for one in places])
+    if not ends:
+        return (0.0, 0.0), (0.0, 0.0)
+    low, high = np.min(ends, axis=0)[:, 0], np.max(ends, axis=0)[:, 1]
+    return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
