@@ -18,9 +18,12 @@ from chipglow.quantities.units import Length
 from chipglow.surface import (
     CHIP_1,
     CHIP_2,
+    DIRECTIONS,
     OXIDES,
     REFLECTIONS,
     SURFACES,
+    Direction,
+    DirectionalSurface,
     Emissivity,
     FeatureSurface,
     FeatureTrends,
@@ -45,6 +48,7 @@ def _numbers(emissivity: Emissivity) -> dict[str, float]:
 
 
 OxideSection = Annotated[Declared[Oxide], OXIDES]
+DirectionalSection = Annotated[Declared[Direction], DIRECTIONS]
 ReflectionsSection = Annotated[Declared[SideShape], REFLECTIONS]
 
 
@@ -113,6 +117,11 @@ class FeaturesSection(Section):
         "Oxide that grows on the material while it is in view, by its temperatures, or none.\n"
         f"Kinds:\n{OXIDES.examples}",
     )
+    directional: Annotated[DirectionalSection | None, OR_NONE] = described(
+        "none",
+        "How emissivities depend on the angle at which they are seen, or none: they do not.\n"
+        f"Kinds:\n{DIRECTIONS.examples}",
+    )
     reflections: Annotated[ReflectionsSection | None, OR_NONE] = described(
         "none",
         "Reflections between the rake face and the chip's side, which flowed sideways, or none.\n"
@@ -168,6 +177,9 @@ class FeaturesSection(Section):
         if self.oxide is not None:
             oxide = self.oxide.build()
             surfaces = {name: OxidisedSurface(bare, oxide) for name, bare in surfaces.items()}
+        if self.directional is not None:
+            law = self.directional.build()
+            surfaces = {name: DirectionalSurface(bare, law) for name, bare in surfaces.items()}
         if self.reflections is None:
             return surfaces
         shape = self.reflections.build()

@@ -1,5 +1,12 @@
 """Surfaces: emissivity maps that follow the material."""
 
+from chipglow.surface.directional import (
+    DIRECTIONS,
+    Direction,
+    DirectionalField,
+    DirectionalSurface,
+    Fresnel,
+)
 from chipglow.surface.emissivity import Emissivity
 from chipglow.surface.exchange import Exchange
 from chipglow.surface.feature import (
@@ -45,9 +52,13 @@ from chipglow.surface.texture import Texture
 __all__ = [
     "CHIP_1",
     "CHIP_2",
+    "DIRECTIONS",
     "OXIDES",
     "REFLECTIONS",
     "SURFACES",
+    "Direction",
+    "DirectionalField",
+    "DirectionalSurface",
     "Emissivity",
     "EmissivityField",
     "EmissivityStack",
@@ -58,6 +69,7 @@ __all__ = [
     "FeatureSurface",
     "FeatureTrends",
     "FeatureTrendsField",
+    "Fresnel",
     "HagenRubens",
     "MapField",
     "MapSurface",

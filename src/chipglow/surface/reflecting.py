@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from chipglow.radiometry import Band
 from chipglow.scene import Frame, Material, Raster, Scene, Tool
+from chipglow.surface.directional import slope_ratio
 from chipglow.surface.side_flow import SideShape, Wedge
 from chipglow.surface.surface import EmissivityField, EmissivityStack, WrappedSurface
 
@@ -74,6 +75,7 @@ class ReflectingSurface(WrappedSurface):
             self.band,
             0.0 if self.reflected is None else float(self.band.radiance(self.reflected)),
             _Sections.of(scene.raster, scene.tool, self.shape),
+            slope_ratio(self.bare, self.shape.elements.cosines),
         )
 
 
@@ -86,6 +88,7 @@ class ReflectingField(EmissivityField):
     band: Band
     surroundings: float
     sections: "_Sections"
+    slope_ratio: NDArray[np.float64]
 
     @property
     def most(self) -> float:
@@ -106,11 +109,16 @@ class ReflectingField(EmissivityField):
 
     def _is_like(self, other: "ReflectingField") -> bool:
         return (
-            (self.shape, self.band, self.surroundings)
-            == (other.shape, other.band, other.surroundings)
-        ) and (self.sections.raster, self.sections.tool) == (
-            other.sections.raster,
-            other.sections.tool,
+            (
+                (self.shape, self.band, self.surroundings)
+                == (other.shape, other.band, other.surroundings)
+            )
+            and np.array_equal(self.slope_ratio, other.slope_ratio)
+            and (self.sections.raster, self.sections.tool)
+            == (
+                other.sections.raster,
+                other.sections.tool,
+            )
         )
 
 
@@ -136,13 +144,15 @@ class _ReflectingStack(EmissivityStack):
         black = self.first.band.radiance(frame.temperature[rows, columns].astype(np.float64))
         environment = self.first.surroundings
         gain = np.asarray(black, np.float64) - environment
+        of_element = self.first.slope_ratio
+        slopes = (1 - share) * of_element[element] + share * of_element[element + 1]
         # A sample just as warm as its surroundings shows neither itself nor what it reflects.
         told = np.abs(gain) > 1e-6 * environment
         for emissivity in result:
             incident = self._incident(frame, emissivity, touching)
             added = (1 - share) * incident[section, element]
             added += share * incident[section, element + 1]
-            own = emissivity[rows, columns].astype(np.float64)
+            own = np.minimum(emissivity[rows, columns] * slopes, 1.0)
             effective = own + (1.0 - own) * np.divide(
                 added - environment, gain, out=np.zeros_like(gain), where=told
             )

@@ -49,6 +49,12 @@ class SideElements:
         """Middles of the elements from the rake face into the chip in m; 0 on the face."""
         return self.exchange.middles[:, 0]
 
+    @cached_property
+    def cosines(self) -> NDArray[np.float64]:
+        """Cosines of the angles between the elements' normals and the direction to the camera."""
+        along = self.exchange.ends - self.exchange.starts
+        return np.asarray(along[:, 0] / self.exchange.lengths, np.float64)
+
     @property
     def chip(self) -> slice:
         """The elements of the chip."""
