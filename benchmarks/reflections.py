@@ -1,11 +1,11 @@
 """How much of the paper's missing 100 °C at the rake face reflections explain.
 
-    python benchmarks/reflections.py [--draws 40] [--study quick.yaml]
+    python benchmarks/reflections.py [--draws 40] [--study quick.yaml] [--cell 40]
 
 Measures the hottest square of the row beside the rake face (its Figure 7) in one instant of the
-quick study, or of a study's cut, with the light that rake face and chip's side reflect on each
-other and without. The paper's simulated peak with chip 2 is about 100 °C under the measured one:
-what has to be explained is 100 °C with chip 2, and that and the difference of the chips with
+quick study, or of a study's cut or scene, with the light that rake face and chip's side reflect on
+each other and without. The paper's simulated peak with chip 2 is about 100 °C under the measured
+one: what has to be explained is 100 °C with chip 2, and that and the difference of the chips with
 chip 1. Wedge angle, bulge radius, fraction of mirror-like reflection and the emissivities of chip
 and tool are drawn; the tool is as warm as it was cut, or as the chip that it touches. Minutes.
 """
@@ -74,6 +74,13 @@ class Face:
         return float(np.nanmax(rake_grid(measured, measured.tool).frame_mean[0]))
 
 
+def on_cells(study: Study, cell: float) -> Study:
+    """The study with a cut on cells of another side in m."""
+    numerics = study.cutting.numerics.model_copy(update={"cell": cell})
+    cutting = study.cutting.model_copy(update={"numerics": numerics})
+    return study.model_copy(update={"cutting": cutting})
+
+
 def with_hot_tool(scene: Scene, temperature: np.ndarray, material: np.ndarray) -> np.ndarray:
     """Temperatures with a tool that is as warm as the chip on the other side of its rake face."""
     tool, raster = scene.tool, scene.raster
@@ -115,8 +122,8 @@ def differences(face: Face, chip: FeatureSurface, draws: int) -> np.ndarray:
         )
         bare = flat(
             chip,
-            drawn(chip.chip.mean, chip.chip.deviation, generator),
-            drawn(chip.tool.mean, chip.tool.deviation, generator),
+            drawn(chip.chip.mean, chip.chip.standard_deviation, generator),
+            drawn(chip.tool.mean, chip.tool.standard_deviation, generator),
         )
         found.append((face.peak(bare), face.peak(ReflectingSurface(bare, wedge))))
     return np.array(found)
@@ -176,10 +183,14 @@ def _added(face: Face, chip: FeatureSurface, wedge: Wedge) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--draws", type=int, default=40, help="draws of each row, 2 or more")
-    parser.add_argument("--study", type=Path, help="a study whose cut is looked at")
+    parser.add_argument("--study", type=Path, help="a study whose cut or scene is looked at")
+    parser.add_argument("--cell", type=float, help="side of a cell of the cut in um")
     given = parser.parse_args()
     study = Study.quick() if given.study is None else load_study(given.study)
-    scene, camera = open_scene(cut(study)), study.camera.build()
+    if given.cell is not None:
+        study = on_cells(study, 1e-6 * given.cell)
+    path = cut(study) if study.scene is None else study.scene
+    scene, camera = open_scene(path), study.camera.build()
     make: Callable[[bool], Face] = partial(Face.of, scene, camera)
     faces = {"as cut": make(False), "as warm as the chip": make(True)}
     print(aligned(by_shape(faces)))

@@ -45,14 +45,13 @@ def draw_section(axes: Axes) -> None:
     """The wedge in cross-section."""
     for angle, colour in ANGLES.items():
         side = 1e6 * Wedge(angle=radians(angle)).outline
-        axes.plot(*np.vstack([side, [130, 0]]).T, color=colour, label=f"{angle:.0f}°")
+        axes.plot(*np.vstack([side, [130, 0]]).T, color=colour)
     axes.fill_between([-60, 0], -60, 0, color=GREY, lw=0)
     axes.annotate("tool", (-30, -30), color="white", ha="center")
     axes.annotate("chip", (95, -30), ha="center")
     axes.annotate("to the camera", (90, 32), (90, 8), arrowprops={"arrowstyle": "->"}, ha="center")
     axes.set(xlim=(-60, 130), ylim=(-60, 40), aspect="equal")
     axes.set(xlabel="depth from the rake face / µm", ylabel="height / µm")
-    axes.legend(title="angle", loc="lower right")
 
 
 def draw_emissivity(axes: Axes) -> None:
@@ -60,10 +59,12 @@ def draw_emissivity(axes: Axes) -> None:
     for angle, colour in ANGLES.items():
         for warmth, line in ((1.0, "-"), (0.35, "--")):
             depth, found = Wedge(angle=radians(angle)).effective_emissivity(0.42, 0.58, warmth)
-            axes.plot(1e6 * depth, found, line, color=colour)
+            label = f"{angle:.0f}°" if line == "-" else None
+            axes.plot(1e6 * depth, found, line, color=colour, label=label)
     axes.axhline(0.42, color=GREY, lw=0.8)
     axes.set(xlim=(0, 80), ylim=(0.4, 1.0))
     axes.set(xlabel="depth from the rake face / µm", ylabel="effective emissivity")
+    axes.legend(title="angle", loc="upper right")
     axes.set_title("solid: tool as warm as the chip; dashed: 0.35 of its radiance", fontsize=7)
 
 

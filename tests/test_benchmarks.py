@@ -81,15 +81,7 @@ NEEDED = {
     "fuzz/fuzz.py": ("hypothesis", "lasso", "pyvista", "tifffile", "zarr"),
     "movie_codecs.py": ("av",),
     "movie_matrix.py": ("av",),
-    "optics.py": (
-        "--samples 128",
-        {"| OTF, defocus 2.0 mm |": 1, "| OTF, vibration |": 1, "| PSF, defocus 30 um |": 2},
-    ),
     "rasterise.py": ("pyvista",),
-    "reflections.py": (
-        "--draws 2 --study tiny.yaml",
-        {"45 ": 6, "as cut ": 8, "as warm as the chip": 8},
-    ),
     "registration_libraries.py": ("skimage",),
     "synthetic_laboratory.py": ("tifffile",),
 }

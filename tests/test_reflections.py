@@ -58,7 +58,7 @@ def test_view_factor_of_a_groove(angle):
 
 def test_view_factor_of_opposite_strips():
     exchange = Exchange(*lines([[1, 0.7], [0, 0.7]], [[0, 0], [1, 0]]))
-    expected = np.hypot(1, 0.7) - 0.7
+    expected = np.hypot(1, 0.7) - 0.7  # within two of 2048 rays
     np.testing.assert_allclose(exchange.view_factors[[0, 1], [1, 0]], expected, atol=1e-3)
 
 
@@ -114,7 +114,8 @@ def test_vertex_of_an_isothermal_diffuse_groove(angle):
     found = exchange.irradiation(np.ones(80), CHIP)[[39, 40]]
     sees = (1 + np.cos(turn)) / 2
     expected = CHIP / (1 - (1 - CHIP) * sees)
-    np.testing.assert_allclose(CHIP + (1 - CHIP) * found, expected, rtol=4e-3)
+    # Two of 2048 rays: found are 2e-4 to 4e-4, less with more rays.
+    np.testing.assert_allclose(CHIP + (1 - CHIP) * found, expected, rtol=1e-3)
 
 
 def test_a_diffuse_groove_along_its_walls():
@@ -132,7 +133,8 @@ def test_a_diffuse_groove_along_its_walls():
     places = exchange.middles[40:, 0]
     inside = (places > 0.01) & (places < 0.98)
     expected = np.interp(places, x, bright)
-    np.testing.assert_allclose(found[inside], expected[inside], atol=4e-3)
+    # Two of 2048 rays: found are 4e-4, and 2e-4 with 8192.
+    np.testing.assert_allclose(found[inside], expected[inside], atol=1e-3)
 
 
 @pytest.mark.parametrize("angle", [35.0, 50.0, 70.0, 100.0, 130.0])
@@ -209,6 +211,16 @@ def test_impossible_elements_are_refused(starts, ends, rays, message):
 
 
 # ---- the side of chip and tool
+
+
+def test_without_mirrors_it_is_solved_at_once_as_the_iteration_would():
+    elements = Wedge(angle=np.radians(30.0)).elements.exchange
+    generator = np.random.default_rng(4)
+    black, emissivity = generator.uniform(0.1, 1.0, (2, 5, len(elements.lengths)))
+    at_once = elements.irradiation(black, emissivity, 0.2)
+    # A mirror that reflects nothing takes the other way, which ends at changes of 1e-9.
+    step_by_step = elements.irradiation(black, emissivity, 0.2, mirror=1e-300)
+    np.testing.assert_allclose(at_once, step_by_step, rtol=1e-7)
 
 
 def test_the_wedge_is_as_wide_and_deep_as_its_arc():
@@ -376,6 +388,14 @@ def test_where_nothing_touches_the_face_all_is_as_without(camera):
     np.testing.assert_array_equal(
         apparent(scene, reflecting, camera), apparent(scene, CHIP_1, camera)
     )
+
+
+def test_it_reads_no_more_of_a_scene_than_the_bare_surface():
+    scene = a_scene()
+    for bare in (CHIP_1, UniformSurface(CHIP)):
+        field = CAMERA.lay(ReflectingSurface(bare), scene)
+        assert field.needs == bare.on(scene).needs
+        assert set(field.beside([field]).needs) == set(bare.on(scene).needs)
 
 
 def test_several_surfaces_are_seen_as_each_alone():

@@ -80,7 +80,7 @@ class Exchange:
         """Middles of the elements in m, shape (element, 2)."""
         return (self.starts + self.ends) / 2
 
-    @property
+    @cached_property
     def view_factors(self) -> NDArray[np.float64]:
         """Fraction of each element's diffuse radiation that first meets each other one.
 
@@ -166,11 +166,22 @@ class Exchange:
         own = (emissivities * black).reshape(-1, count)
         reflectance = (1.0 - emissivities).reshape(-1, count)
         mirror_part = np.ascontiguousarray(mirrors.reshape(-1, count))
+        if not mirrors.any():
+            return self._diffuse(own, reflectance, surroundings).reshape(shape)
         looked = np.zeros((0, 0), np.int16) if eye is None else self._mirrored(eye)
-        result, paths = np.empty_like(own), self._all_hits if mirrors.any() else self._first_hits
+        result, paths = np.empty_like(own), self._all_hits
         scale = max(float(np.max(black, initial=0.0)), surroundings) * TOLERANCE
         _solve(own, reflectance, mirror_part, *paths, looked, surroundings, scale, result)
         return result.reshape(shape)
+
+    def _diffuse(
+        self, own: NDArray[np.float64], reflectance: NDArray[np.float64], surroundings: float
+    ) -> NDArray[np.float64]:
+        """Irradiation without mirrors, case by case: H − F (1 − ε) H = F ε L + F_open L_env."""
+        to_elements, leaving = self.view_factors[:, :-1], self.view_factors[:, -1]
+        matrix = np.eye(len(leaving)) - to_elements * reflectance[:, None, :]
+        known = own @ to_elements.T + surroundings * leaving
+        return np.asarray(np.linalg.solve(matrix, known[..., None])[..., 0], np.float64)
 
     @cached_property
     def _first_hits(self) -> _Paths:

@@ -1,6 +1,6 @@
 """A surface that reflects what the rake face and the chip's side send each other."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, Self
 
@@ -91,6 +91,11 @@ class ReflectingField(EmissivityField):
     slope_ratio: NDArray[np.float64]
 
     @property
+    def needs(self) -> Collection[str] | None:
+        """See `EmissivityField.needs`."""
+        return self.bare.needs
+
+    @property
     def most(self) -> float:
         """No limit: more may be reflected than a blackbody emits."""
         return np.inf
@@ -128,6 +133,11 @@ class _ReflectingStack(EmissivityStack):
 
     first: ReflectingField
     bare: EmissivityStack
+
+    @property
+    def needs(self) -> Collection[str] | None:
+        """See `EmissivityStack.needs`."""
+        return self.bare.needs
 
     @property
     def most(self) -> float:
