@@ -29,7 +29,15 @@ from chipglow.study import (
     study_text,
 )
 from chipglow.study.fitting import uncovered
-from chipglow.surface import CHIP_1, CHIP_2, MapSurface
+from chipglow.surface import (
+    CHIP_1,
+    CHIP_2,
+    EmissivityTrend,
+    FeatureTrends,
+    MapSurface,
+    ReflectingSurface,
+    TrendSurface,
+)
 from chipglow.text import DescriptionError
 
 
@@ -660,6 +668,29 @@ def test_a_scene_without_tool_and_coordinates_is_fitted_and_says_so():
         "The scene shows no tool",
         "The scene does not say ",
     ]
+
+
+def test_a_scene_without_coordinates_is_fitted_under_what_is_seen_over_a_surface():
+    whole = AnalyticChip(frames=2).scene()
+    fields = {name: whole.data[name].values for name in FIELD_UNITS}
+    scene = Scene.from_fields(whole.raster, whole.times, fields, whole.tool)
+    law = {"kind": "fresnel", "n": 4.6, "k": 15}
+    study = Study(surface={"directional": law, "reflections": {"kind": "wedge"}})
+    for surface in fit(study, scene).surfaces.values():
+        assert isinstance(surface, ReflectingSurface)
+        assert surface.bare.bare.follow == "mean"
+
+
+def test_where_an_emissivity_was_measured_is_said(monkeypatch):
+    scene = AnalyticChip(frames=2).scene()
+    for measured, said in (((650.0, 850.0), "at 377 °C to 577 °C"), ((650.0, 650.0), "the same")):
+        trend = EmissivityTrend(750.0, 0.5, measured=measured)
+        for surface in (TrendSurface(trend), FeatureTrends(CHIP_1, {"chip": trend})):
+            found = {"heated": ReflectingSurface(surface)}
+            monkeypatch.setattr("chipglow.study.fitting.surfaces_of", lambda *_, of=found: of)
+            (sentence,) = fit(Study(), scene).assumed
+            assert sentence.startswith("The emissivity of 'heated' was measured at 377 °C")
+            assert said in sentence
 
 
 def test_what_an_emissivity_map_leaves_of_the_scene_is_said():
