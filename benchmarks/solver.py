@@ -11,7 +11,7 @@ from chipglow.cutting.heat import conduct, return_heat
 from chipglow.cutting.library import AISI_1045
 from chipglow.cutting.material import ROOM_TEMPERATURE
 from chipglow.cutting.momentum import NODE_VALUES, SUMS, VELOCITY_VALUES, Step, advance_with
-from chipglow.cutting.plastic_heat import heat_shares
+from chipglow.cutting.plastic_heat import heat_fractions
 from chipglow.cutting.points import POINT, Grid, block_of_points, sort_by_cell
 from chipglow.scene import ToolGeometry
 
@@ -66,7 +66,7 @@ class Block:
         self.damage = Damage.of(material.damage, material.failing_layer(cell))
         self.elastic = material.elastic_ratios()
         self.capacity = material.heat_capacity.sampled()
-        self.heat_shares = heat_shares(material.taylor_quinney)
+        self.heat_fractions = heat_fractions(material.taylor_quinney)
         self.conductivity = material.conductivity.sampled()
         self.tool = tool or ToolGeometry().surface._replace(x=FAR, y=FAR)
         shape = (self.grid.columns, self.grid.rows)
@@ -98,7 +98,7 @@ class Block:
             assert advance_with(self.law)(
                 now, self.points, self.starts, self.velocity, self.nodes, self.heat, self.tool,
                 self.grid, self.step, self.law, self.damage, self.elastic, self.capacity,
-                self.heat_shares, self.sums, get_num_threads(),
+                self.heat_fractions, self.sums, get_num_threads(),
             )  # fmt: skip
             self.force /= now
             steps -= now
