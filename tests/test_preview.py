@@ -117,7 +117,7 @@ def test_a_preview_has_samples_where_the_scene_has_but_fewer():
     view = Study().cutting.field_of_view.build()
     coarse = preview_raster(Study())
     assert coarse.extent == pytest.approx(view.extent)
-    assert coarse.shape == (270, 300)
+    assert coarse.shape == (270, 330)
     flat = Study(cutting={"field_of_view": {"rows": 21, "columns": 700}})
     assert preview_raster(flat).shape == (10, 350)
 

@@ -156,7 +156,7 @@ def test_bad_input_is_one_line(folder, arguments, text):
 @pytest.mark.parametrize(
     ("section", "text"),
     [
-        ({"file": "psf.nc", "spacing": "1 um"}, "expected none: the file tells it"),
+        ({"file": "psf.nc", "spacing": "1 um"}, "expected none: the file states it"),
         ({"file": "psf.npy"}, "expected a length such as 1e-6 m"),
         ({"file": "edge.nc"}, "edge.nc is not a kernel"),
         ({"file": "cut.nc"}, "cut.nc is not a kernel: cut short"),

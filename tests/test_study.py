@@ -155,10 +155,10 @@ def test_the_default_study_has_the_librarys_defaults():
     assert list(chips.values()) == [CHIP_1, CHIP_2]
 
 
-def test_the_default_view_holds_the_papers_sensors():
+def test_the_default_view_holds_the_papers_sensors_and_ten_columns_more():
     study = Study()
     raster = study.cutting.field_of_view.build()
-    assert study.camera.build().pixels(raster).shape == (90, 100)
+    assert study.camera.build().pixels(raster).shape == (90, 110)
     frames = study.cutting.duration / study.cutting.window.interval
     assert round(frames) == 455
 
