@@ -484,7 +484,7 @@ class Camera:
         return blurred(integrate(image, scene, whole, self.fill_factor), self.psf, self.pitch)[own]
 
     def _sensitive(self, scene: Raster) -> float:
-        """Share of a pixel's square that it integrates: a sample, if the blur did the rest."""
+        """Fraction of a pixel's square that it integrates: a sample, if the blur did the rest."""
         if not self._blur_has_footprint:
             return self.fill_factor
         return min((scene.spacing / self.pitch) ** 2, 1.0)

@@ -34,6 +34,9 @@ _STRAIN, _RATE, _X, _Y = (
     SPLINE_FIELDS.index(name)
     for name in ("plastic_strain", "plastic_strain_rate", "material_x", "material_y")
 )
+_MEAN: Final = 3
+"""Place of the mean among what the kernels get of their sums: see `Sums._own`."""
+
 _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
 
 
@@ -104,7 +107,7 @@ class Sums:
         given = _filled([np.ascontiguousarray(e, np.float32) for e in emissivities])
 
         def add(first: int, last: int) -> None:
-            _add_given(temperature, material, given, weights, middle, first, last, *self._own)
+            _add_given(temperature, material, given, weights, middle, first, last, self._own)
 
         self._in_blocks(add)
 
@@ -138,7 +141,7 @@ class Sums:
         fields = (temperature, material, strain, rate, x, y)
 
         def add(first: int, last: int) -> None:
-            _add_features(fields, shifts, tuple(textures), weights, middle, first, last, *self._own)
+            _add_features(fields, shifts, tuple(textures), weights, middle, first, last, self._own)
 
         self._in_blocks(add)
 
@@ -172,7 +175,7 @@ class Sums:
         def add(first: int, last: int) -> None:
             _add_splines(
                 nodes, limits, grid, fixed, shifts, tuple(textures), weights, middle, first, last,
-                *self._own,
+                self._own,
             )  # fmt: skip
 
         self._in_blocks(add)
@@ -250,10 +253,10 @@ def _raise(apparent, peak):  # type: ignore[no-untyped-def]
 
 @njit(**_FAST)
 def _add_row(  # type: ignore[no-untyped-def]
-    temperature, kind, emissivity, weight, is_middle, row, work, number, table, environment,
-    most, mean, centre, peak, hottest,
-):  # fmt: skip
+    temperature, kind, emissivity, weight, is_middle, row, work, number, own
+):
     """Add a row of a sub-frame, with the emissivities (surface, x), to row `row` of the sums."""
+    table, environment, most, mean, centre, peak, hottest = own
     past, black, apparent = work[0], work[1], work[2]
     _find(temperature, table.shape[0] - 1, number, past)
     _look_up(table, number, past, black)
@@ -275,22 +278,16 @@ def _add_given(  # type: ignore[no-untyped-def]
     middle,
     first,
     last,
-    table,
-    environment,
-    most,
-    mean,
-    centre,
-    peak,
-    hottest,
+    own,
 ):
-    work = np.empty((3, hottest.shape[1]), np.float32)
-    number = np.empty(hottest.shape[1], np.int32)
+    columns = own[_MEAN].shape[2]
+    work = np.empty((3, columns), np.float32)
+    number = np.empty(columns, np.int32)
     for row in range(first, last):
         for k in range(weights.size):
             _add_row(
                 temperature[k][row], material[k][row], emissivities[k][:, row], weights[k],
-                k == middle, row, work, number, table, environment, most, mean, centre, peak,
-                hottest,
+                k == middle, row, work, number, own,
             )  # fmt: skip
 
 
@@ -303,16 +300,10 @@ def _add_features(  # type: ignore[no-untyped-def]
     middle,
     first,
     last,
-    table,
-    environment,
-    most,
-    mean,
-    centre,
-    peak,
-    hottest,
+    own,
 ):
     temperature, material, strain, rate, x, y = fields
-    surfaces, columns = mean.shape[0], mean.shape[2]
+    surfaces, _, columns = own[_MEAN].shape
     scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
     corner = np.empty(columns, np.int32)
     emissivity = np.empty((surfaces, columns), np.float32)
@@ -326,7 +317,7 @@ def _add_features(  # type: ignore[no-untyped-def]
             )  # fmt: skip
             _add_row(
                 temperature[k][row], material[k][row], emissivity, weights[k], k == middle, row,
-                work, number, table, environment, most, mean, centre, peak, hottest,
+                work, number, own,
             )  # fmt: skip
 
 
@@ -372,16 +363,10 @@ def _add_splines(  # type: ignore[no-untyped-def]
     middle,
     first,
     last,
-    table,
-    environment,
-    most,
-    mean,
-    centre,
-    peak,
-    hottest,
+    own,
 ):
     first_down, down, first_across, across, in_tool = grid
-    surfaces, columns = mean.shape[0], mean.shape[2]
+    surfaces, _, columns = own[_MEAN].shape
     scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
     corner = np.empty(columns, np.int32)
     emissivity = np.empty((surfaces, columns), np.float32)
@@ -415,6 +400,5 @@ def _add_splines(  # type: ignore[no-untyped-def]
                 textures, row, scratch, corner, emissivity,
             )  # fmt: skip
             _add_row(
-                values[0], kind, emissivity, weights[k], k == middle, row, work, number,
-                table, environment, most, mean, centre, peak, hottest,
+                values[0], kind, emissivity, weights[k], k == middle, row, work, number, own,
             )  # fmt: skip

@@ -24,7 +24,7 @@ from chipglow.report.page import (
 )
 from chipglow.report.paper import EmissivityTexts, stands_beside, table_1
 from chipglow.report.results import results_dataset, summary
-from chipglow.report.steady_tool import steady_tool_part, steady_tool_summary
+from chipglow.report.steady_tool import steady_tool_part, steady_tool_summary, tool_rows
 
 _PAPER: Final = (
     "J. C. Heigel, E. P. Whitenton: The effects of emissivity and camera point spread function on "
@@ -92,6 +92,7 @@ def write_report(
     beside = stands_beside(result)
     rows, causes, chip = comparison_rows(result), cause_rows(result), chip_rows(result.chip)
     camera = camera_rows(result.camera, result.raster)
+    beside_steady = tool_rows(result, steady) if steady else []
     figures, emissivities = list(draw_figures(result, pictures)), table_1(result)
     bodies = {
         "comparison": _comparison(result, rows),
@@ -106,7 +107,7 @@ def write_report(
         first,
         ("scatter", "What makes the scatter", _causes(causes)),
         *others,
-        *_beside_steady(result, steady),
+        *([("steady-tool", _STEADY, steady_tool_part(result, beside_steady))] if steady else []),
         ("chip", "The chip", _chip_table(chip)),
         *([("camera", "The camera", camera_table(camera))] if camera else []),
         *closing_sections(study_text, provenance),
@@ -118,21 +119,10 @@ def write_report(
         results_dataset(result, provenance),
         {
             **summary(rows, causes, chip, provenance, camera),
-            **_steady_numbers(result, steady),
+            **({"steady_tool": steady_tool_summary(beside_steady)} if steady else {}),
         },
         study_text,
     )
-
-
-def _beside_steady(
-    result: StudyResult, steady: StudyResult | None
-) -> Iterator[tuple[str, str, str]]:
-    if steady is not None:
-        yield "steady-tool", _STEADY, steady_tool_part(result, steady)
-
-
-def _steady_numbers(result: StudyResult, steady: StudyResult | None) -> dict[str, object]:
-    return {} if steady is None else {"steady_tool": steady_tool_summary(result, steady)}
 
 
 def _comparison(result: StudyResult, rows: Sequence[Row]) -> str:

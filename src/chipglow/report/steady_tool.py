@@ -76,8 +76,6 @@ def tool_rows(own: StudyResult, steady: StudyResult) -> list[ToolRow]:
         "standard deviation of the frames' peaks."
     )
     kinds: list[tuple[str, str, str, _Of, str]] = [
-        ("rake_chip_degC", "Chip at the rake face", "°C", partial(_beside, 0), beside),
-        ("rake_tool_degC", "Tool at the rake face", "°C", partial(_beside, 1), beside),
         *(
             (
                 f"rake_peak_{name.replace(' ', '_')}_degC",
@@ -104,22 +102,24 @@ def tool_rows(own: StudyResult, steady: StudyResult) -> list[ToolRow]:
         ("cutting_N_per_mm", "Cutting force", "N/mm", partial(_force, "cutting_mean"), _OVER_CUT),
         ("thrust_N_per_mm", "Thrust force", "N/mm", partial(_force, "thrust_mean"), _OVER_CUT),
     ]
+    (chip, tool), (steady_chip, steady_tool) = _beside(own), _beside(steady)
     return [
-        ToolRow(key, quantity, unit, of(own), of(steady), explanation)
-        for key, quantity, unit, of, explanation in kinds
+        ToolRow("rake_chip_degC", "Chip at the rake face", "°C", chip, steady_chip, beside),
+        ToolRow("rake_tool_degC", "Tool at the rake face", "°C", tool, steady_tool, beside),
+        *(
+            ToolRow(key, quantity, unit, of(own), of(steady), explanation)
+            for key, quantity, unit, of, explanation in kinds
+        ),
     ]
 
 
-def steady_tool_part(own: StudyResult, steady: StudyResult) -> str:
-    """The report's section."""
-    rows = tool_rows(own, steady)
+def steady_tool_part(own: StudyResult, rows: list[ToolRow]) -> str:
+    """The report's section, of `tool_rows`."""
     heads = ("Quantity", "This study's tool", "Steady tool", "Difference")
     return table_part(" ".join(_sentences(own, rows)), heads, (row.line for row in rows))
 
 
-def steady_tool_summary(
-    own: StudyResult, steady: StudyResult
-) -> dict[str, dict[str, float | None]]:
+def steady_tool_summary(rows: list[ToolRow]) -> dict[str, dict[str, float | None]]:
     """The same numbers for scripts."""
     names = ("own", "steady", "difference")
     return {
@@ -128,7 +128,7 @@ def steady_tool_summary(
             for name in names
             for suffix, value in zip(("", "_standard_deviation"), getattr(row, name), strict=True)
         }
-        for row in tool_rows(own, steady)
+        for row in rows
     }
 
 
@@ -152,13 +152,14 @@ def _key(result: StudyResult) -> str:
     return result.plan.rake_surface.replace(" ", "_")
 
 
-def _beside(which: int, result: StudyResult) -> tuple[float, float]:
-    kelvins = [
-        contact_temperatures(one.frame, result.raster, one.tool, one.contact_length)[which]
+def _beside(result: StudyResult) -> list[tuple[float, float]]:
+    """Of the chip and of the tool, in °C."""
+    found = [
+        contact_temperatures(one.frame, result.raster, one.tool, one.contact_length)
         for one in result.segments
     ]
-    mean, deviation = _spread(kelvins)
-    return mean - 273.15, deviation
+    spreads = (_spread(list(kelvins)) for kelvins in zip(*found, strict=True))
+    return [(mean - 273.15, deviation) for mean, deviation in spreads]
 
 
 def _peak(name: str, result: StudyResult) -> tuple[float, float]:

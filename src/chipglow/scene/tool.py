@@ -100,6 +100,19 @@ class Tool(ABC):
         along = np.asarray(distance, dtype=np.float64)[..., None]
         return np.asarray(self.rake_foot + along * np.array(self.rake_direction), dtype=np.float64)
 
+    def face_coordinates(
+        self, points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Distance of points up the rake face from `rake_foot`, and from the face into the chip.
+
+        Parameters
+        ----------
+        points : ndarray
+            x and y in m, shape (..., 2).
+        """
+        offset = points - self.rake_foot
+        return offset @ np.array(self.rake_direction), offset @ np.array(self.rake_normal)
+
     def signed_distance(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
         """Distance to the tool's surface in m, negative inside the tool.
 

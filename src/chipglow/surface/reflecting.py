@@ -218,9 +218,7 @@ class _Sections:
     def of(cls, raster: Raster, tool: Tool, shape: SideShape) -> "_Sections":
         """Cross-sections of one shape on one scene."""
         x, y = np.meshgrid(raster.x, raster.y)
-        from_foot = np.stack([x, y], axis=-1) - tool.rake_foot
-        along = from_foot @ np.array(tool.rake_direction)
-        depth = from_foot @ np.array(tool.rake_normal)
+        along, depth = tool.face_coordinates(np.stack([x, y], axis=-1))
         count = max(int(along.max() / raster.spacing) + 1, 0)
         foot = tool.rake_point((np.arange(count) + 0.5) * raster.spacing)
         step = raster.spacing / 2

@@ -98,7 +98,7 @@ class FlatFieldCalibration:
         full = _frames(detector, point, shape, light, _SATURATED_FRAMES, "saturated")
         saturated = full.mean(axis=0) - _MARGIN * float(np.sqrt(full.var(axis=0).mean()))
         bad = find_bad_pixels(cold, hot).unresponsive
-        bad |= ~bad & (mean_frame(hot) >= saturated)
+        bad |= mean_frame(hot) >= saturated
         low, high = (
             float(np.median(mean_frame(uniformity.apply(frames))[~bad])) for frames in (cold, hot)
         )

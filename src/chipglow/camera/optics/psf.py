@@ -42,7 +42,9 @@ ANNULAR_ENERGY: Final = 0.99
 The camera's blur has no use for it: `PointSpreadFunction.view_kernel` leaves out nothing.
 """
 
-_FWHM_PER_SIGMA: Final = 2 * sqrt(2 * log(2))
+FWHM_PER_SIGMA: Final = 2 * sqrt(2 * log(2))
+"""Full width at half maximum of a Gaussian over its standard deviation."""
+
 _FAR: Final = 30.0
 """Radius, as v, from which on the mean of diffraction's rings falls as 1/r³: within 2 %."""
 
@@ -245,7 +247,7 @@ class GaussianPSF(PointSpreadFunction):
 
     def kernel(self, spacing: float) -> NDArray[np.float64]:
         """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""
-        deviation = self.fwhm / _FWHM_PER_SIGMA
+        deviation = self.fwhm / FWHM_PER_SIGMA
         reach = sqrt(2) * deviation * float(erfinv(sqrt(GAUSSIAN_ENERGY)))
         half = half_size(reach, spacing)
         edges = spacing * (np.arange(-half, half + 2) - 0.5)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from chipglow.camera.optics.kernel import half_size, poisson_squares
-from chipglow.camera.optics.psf import GaussianPSF, PointSpreadFunction
+from chipglow.camera.optics.psf import FWHM_PER_SIGMA, GaussianPSF, PointSpreadFunction
 from chipglow.quantities import Family, Parameter, Part
 from chipglow.quantities.units import LENGTH, TEMPERATURE
 from chipglow.radiometry import Band
@@ -19,9 +19,6 @@ from chipglow.scene import Raster
 
 Blur: TypeAlias = Callable[[NDArray[np.float64], PointSpreadFunction, float], NDArray[np.float64]]
 """A convolution with a point spread function: `chipglow.camera.blur`, or `blur_of_like`."""
-
-_FWHM: Final = sqrt(8 * log(2))
-"""Full width at half maximum of a Gaussian over its standard deviation."""
 
 OPTICS_TERMS: Final = Family("optics_term")
 """Terms by their kind; other packages add theirs in the group ``chipglow.optics_term``."""
@@ -274,7 +271,7 @@ class FieldBlur(OpticsTerm):
         variance = (self.standard_deviation * (x**2 + y**2) / self.radius**2) ** 2
         result, sharper, low, high = radiance.copy(), radiance, 0.0, (scene.spacing / 2) ** 2
         while low < variance.max():
-            softer = blurred(radiance, GaussianPSF(_FWHM * sqrt(high)), scene.spacing)
+            softer = blurred(radiance, GaussianPSF(FWHM_PER_SIGMA * sqrt(high)), scene.spacing)
             here = (variance > low) & (variance <= high)
             part = (variance[here] - low) / (high - low)
             result[here] = sharper[here] + part * (softer[here] - sharper[here])

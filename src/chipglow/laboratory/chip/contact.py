@@ -79,8 +79,7 @@ def contact_temperatures(
     """
     x, y = np.meshgrid(raster.x, raster.y)
     distance = tool.signed_distance(x, y)
-    (left, up), foot = tool.rake_direction, tool.rake_foot
-    along = (x - foot[0]) * left + (y - foot[1]) * up
+    along, _ = tool.face_coordinates(np.stack([x, y], axis=-1))
     beside = (np.abs(distance) < BESIDE) & (along > 0) & (along < length)
     chip, inside = (
         frame.temperature[beside & where]

@@ -428,7 +428,7 @@ class _Squares:
 
     @classmethod
     def of(cls, raster: Raster, tool: Tool, size: float, rows: int, columns: int) -> "_Squares":
-        along, across = _face_coordinates(_middles(raster), tool)
+        along, across = tool.face_coordinates(_middles(raster))
         column = np.floor(along / size + _ROUNDING).astype(np.int64)
         row = np.floor(across / size + _ROUNDING).astype(np.int64)
         inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
@@ -482,14 +482,6 @@ def _middles(raster: Raster) -> NDArray[np.float64]:
     return np.stack(np.meshgrid(raster.x, raster.y), axis=-1).reshape(-1, 2)
 
 
-def _face_coordinates(
-    points: NDArray[np.float64], tool: Tool
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Distance of points along the rake face from its foot, and from the face into the chip."""
-    offset = points - tool.rake_foot
-    return offset @ np.array(tool.rake_direction), offset @ np.array(tool.rake_normal)
-
-
 def _columns(raster: Raster, tool: Tool, size: float, rows: int) -> int:
     """Number of squares along the face up to the last that is whole inside the image.
 
@@ -500,7 +492,7 @@ def _columns(raster: Raster, tool: Tool, size: float, rows: int) -> int:
     """
     left, right, bottom, top = raster.extent
     corners = np.array([[left, bottom], [left, top], [right, bottom], [right, top]])
-    furthest = float(_face_coordinates(corners, tool)[0].max())
+    furthest = float(tool.face_coordinates(corners)[0].max())
     most = max(int(furthest / size + _ROUNDING), 0)
     whole = np.flatnonzero(_whole(raster, tool, size, rows, most).any(axis=0))
     if whole.size == 0:

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import ceil, cos, exp, log, pi, sin, sqrt
+from math import ceil, cos, exp, pi, sin, sqrt
 from typing import Final
 
 import numpy as np
@@ -14,8 +14,8 @@ from scipy.optimize import brentq
 from scipy.special import chndtr, gamma, j0, j1, kve, ndtr
 
 from chipglow.camera import AnnularAperturePSF, GaussianPSF, MeasuredPSF, PointSpreadFunction
+from chipglow.camera.optics.psf import FWHM_PER_SIGMA
 
-_FWHM_PER_SIGMA: Final = 2 * sqrt(2 * log(2))
 _SAMPLES_PER_FOOTPRINT: Final = 8
 _PERIODS: Final = 64
 """Length of the table of an edge, in its largest distance.
@@ -179,7 +179,7 @@ class GaussianTailModel(PSFModel):
         self, values: NDArray[np.float64], radius: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         core, fraction, length = self._numbers(values)
-        sigma = core / _FWHM_PER_SIGMA
+        sigma = core / FWHM_PER_SIGMA
         gauss = np.exp(-(radius**2) / (2 * sigma**2)) / sigma**2
         tail = np.exp(-radius / length) / length**2
         return np.asarray(((1 - fraction) * gauss + fraction * tail) / (2 * pi))
@@ -337,7 +337,7 @@ class DefocusedDiscModel(PSFModel):
 
     def _lengths(self, values: NDArray[np.float64]) -> tuple[float, float]:
         """Radius of the disc and standard deviation of the blur in m."""
-        return float(values[0]) / 2, float(values[1]) / _FWHM_PER_SIGMA
+        return float(values[0]) / 2, float(values[1]) / FWHM_PER_SIGMA
 
     def _density(
         self, values: NDArray[np.float64], radius: NDArray[np.float64]
@@ -405,7 +405,7 @@ class EllipticalModel(PSFModel):
 
     def psf(self, values: NDArray[np.float64]) -> PointSpreadFunction:
         """See `PSFModel.psf`."""
-        inverse = np.linalg.inv(self._squares(values)) * _FWHM_PER_SIGMA**2
+        inverse = np.linalg.inv(self._squares(values)) * FWHM_PER_SIGMA**2
         greatest, least, _ = self.axes(values)
 
         def density(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -577,7 +577,7 @@ def sampled_kernel(
 
 
 def _gaussian_transfer(fwhm: float, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
-    sigma = fwhm / _FWHM_PER_SIGMA
+    sigma = fwhm / FWHM_PER_SIGMA
     return np.asarray(np.exp(-2 * (pi * sigma * frequency) ** 2))
 
 
