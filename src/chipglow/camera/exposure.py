@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.sweep import BATCH, STEPS_PER_KELVIN, Sums
+from chipglow.camera.sweep import BATCH, STEPS_PER_KELVIN, Check, Sums
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Frame, Raster, Scene, is_gap
@@ -111,6 +111,7 @@ def expose_all(
     start: float,
     duration: float,
     reflected: float | None = None,
+    check: Check | None = None,
 ) -> tuple[Exposure, ...]:
     """Exposures of a scene with several surfaces: each of its frames is read once.
 
@@ -120,6 +121,8 @@ def expose_all(
         As for `expose`.
     emissivities : sequence of EmissivityField
         The surfaces, laid on the scene; one or more.
+    check : callable, optional
+        Called now and then meanwhile; what it raises ends the pass.
 
     Returns
     -------
@@ -136,7 +139,7 @@ def expose_all(
     environment = 0.0 if reflected is None else float(band.radiance(reflected))
     stack = emissivities[0].beside(emissivities[1:])
     stacked = (stack.most, len(emissivities), scene.raster.shape)
-    sums = Sums.zero(_fine_table(band), environment, *stacked)
+    sums = Sums.zero(_fine_table(band), environment, *stacked, check or _nothing)
     _sweep(scene, stack, indices, weights, indices.index(middle), sums)
     mean, centre, peak, hottest = sums.mean, sums.centre, sums.peak, sums.hottest
     if not np.isfinite(mean).all():
@@ -158,6 +161,10 @@ def expose_all(
         )
         for n in range(len(emissivities))
     )
+
+
+def _nothing() -> None:
+    pass
 
 
 def frame_weights(

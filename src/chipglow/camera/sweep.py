@@ -11,7 +11,7 @@ take them block by block, with the loops over columns as its threads.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numba import get_num_threads, njit
@@ -37,6 +37,9 @@ _STRAIN, _RATE, _X, _Y = (
 _MEAN: Final = 3
 """Place of the mean among what the kernels get of their sums: see `Sums._own`."""
 
+Check: TypeAlias = Callable[[], None]
+"""Called now and then in a long pass, which it ends by raising an error."""
+
 _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
 
 
@@ -59,6 +62,8 @@ class Sums:
         Float32 of the same shape.
     hottest : ndarray
         Float32 of shape (y, x).
+    check : callable
+        Called before every block of rows; what it raises ends the pass.
     """
 
     table: NDArray[np.float32]
@@ -68,6 +73,7 @@ class Sums:
     centre: NDArray[np.float64]
     peak: NDArray[np.float32]
     hottest: NDArray[np.float32]
+    check: Check
 
     @classmethod
     def zero(
@@ -77,11 +83,12 @@ class Sums:
         most: float,
         surfaces: int,
         shape: tuple[int, int],
+        check: Check,
     ) -> "Sums":
         """Sums of nothing."""
         mean, centre = (np.zeros((surfaces, *shape)) for _ in range(2))
         peak, hottest = (np.zeros(of, np.float32) for of in (mean.shape, shape))
-        return cls(table, environment, most, mean, centre, peak, hottest)
+        return cls(table, environment, most, mean, centre, peak, hottest, check)
 
     def add_given(
         self,
@@ -188,8 +195,13 @@ class Sums:
     def _in_blocks(self, add: Callable[[int, int], None]) -> None:
         rows = len(self.hottest)
         firsts = range(0, rows, _ROWS)
+
+        def checked(first: int) -> None:
+            self.check()
+            add(first, min(first + _ROWS, rows))
+
         with ThreadPoolExecutor(get_num_threads()) as pool:
-            list(pool.map(add, firsts, (min(first + _ROWS, rows) for first in firsts)))
+            list(pool.map(checked, firsts))
 
 
 def _filled(arrays: list[NDArray[Any]]) -> tuple[NDArray[Any], ...]:

@@ -10,6 +10,7 @@ from chipglow.errors.error_images import (
     error_images,
     reference_temperature,
 )
+from chipglow.errors.error_parts import ErrorParts, error_parts
 from chipglow.errors.local_error import LocalError
 from chipglow.errors.places import LinePlace, Place, PointPlace, RegionPlace
 from chipglow.errors.rake_error import RakeErrors, rake_errors
@@ -21,6 +22,7 @@ __all__ = [
     "Distribution",
     "Draws",
     "ErrorImages",
+    "ErrorParts",
     "Headline",
     "LineDraws",
     "LinePlace",
@@ -39,6 +41,7 @@ __all__ = [
     "analyse",
     "band_errors",
     "error_images",
+    "error_parts",
     "rake_errors",
     "reference_temperature",
     "scene_errors",

@@ -398,6 +398,23 @@ class StoredScene(Scene):
         self._near: Decoded[NDArray[Any]] = Decoded(CACHED_BYTES)
         super().__init__(data)
 
+    def coarser(self, step: int) -> Scene:
+        """The same scene with fewer samples, for a quick look.
+
+        Parameters
+        ----------
+        step : int
+            How many samples, in either direction, become one.
+
+        Raises
+        ------
+        ValueError
+            If the file holds no splines, or too few samples remain.
+        """
+        if self.lattice is None:
+            raise ValueError(f"{self.path}: has samples, expected splines")
+        return _CoarserScene(self, self.lattice.coarser(step))
+
     @property
     def hottest(self) -> float:
         """Temperature in K over which the file can have none."""
@@ -470,6 +487,30 @@ class StoredScene(Scene):
             raise SceneError(
                 f"{self.path}: {name!r} of frame {index} cannot be read: {_first_line(error)}"
             ) from error
+
+
+class _CoarserScene(Scene):
+    """A stored scene of splines on fewer samples; see `StoredScene.coarser`."""
+
+    def __init__(self, stored: StoredScene, lattice: Lattice) -> None:
+        self._stored, self._lattice = stored, lattice
+        places = raster_coordinates(lattice.raster, stored.times)
+        empty = xr.Dataset(coords=places, attrs=stored.data.attrs)
+        super().__init__(spline_file.with_samples(empty, self._read, _LONG_NAMES))
+
+    def splines(self, index: int) -> SplineFrame:
+        """The splines of one frame."""
+        found = self._stored.splines(index)
+        assert found is not None
+        return SplineFrame(self._lattice, found.time, found.nodes, found.limits)
+
+    def _unchecked(self, index: int, names: Collection[str] | None) -> Frame:
+        return self.splines(index).frame(names)
+
+    def _read(self, name: str, index: int) -> NDArray[Any]:
+        frame = self.splines(index)
+        material = frame.material()
+        return material if name == "material" else frame.values(name, material)
 
 
 def open_scene(path: str | os.PathLike[str]) -> StoredScene:

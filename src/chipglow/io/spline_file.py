@@ -155,4 +155,4 @@ def with_samples(data: xr.Dataset, read: Read, long_names: Mapping[str, str]) ->
         )
         for name, unit in UNITS.items()
     }
-    return data.drop_vars(list(OWN)).assign(fields)
+    return data.drop_vars(list(OWN), errors="ignore").assign(fields)

@@ -5,7 +5,7 @@ a small part of the numbers that its samples are.
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -119,6 +119,30 @@ class Lattice:
             int(last - first) + 1,
             in_tool,
             ambient,
+        )
+
+    def coarser(self, step: int) -> "Lattice":
+        """The same nodes with fewer samples: larger ones, each as its middle shows.
+
+        Parameters
+        ----------
+        step : int
+            How many samples, in either direction, become one.
+
+        Raises
+        ------
+        ValueError
+            If there are not two samples of that size in either direction.
+        """
+        fine = self.raster
+        rows, columns = fine.rows // step, fine.columns // step
+        if step < 1 or min(rows, columns) < 2:
+            raise ValueError(f"step: {step}, expected 1 to {min(fine.shape) // 2}")
+        middles = slice(step // 2, None, step)
+        return replace(
+            self,
+            raster=replace(fine, spacing=fine.spacing * step, rows=rows, columns=columns),
+            in_tool=self.in_tool[middles, middles][:rows, :columns].copy(),
         )
 
     @cached_property

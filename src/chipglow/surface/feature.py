@@ -130,6 +130,11 @@ class FeatureSurface(Surface):
         """The surface with the seed `number` further on."""
         return replace(self, seed=self.seed + number) if number else self
 
+    def without_texture(self) -> Self:
+        """The surface with each feature's mean emissivity everywhere on it."""
+        means = {name: Emissivity(getattr(self, name).mean, 0.0) for name in FEATURES}
+        return replace(self, **means)
+
     def _texture(self, emissivity: Emissivity, generator: np.random.Generator) -> Texture:
         return Texture.random(
             emissivity,

@@ -140,6 +140,10 @@ class FeatureTrends(WrappedSurface):
             return self
         return replace(self, bare=self.bare.redrawn(number), draw=self.draw + number)
 
+    def without_texture(self) -> Self:
+        """See `Surface.without_texture`."""
+        return replace(self, bare=self.bare.without_texture())
+
     def on(self, scene: Scene) -> "FeatureTrendsField":
         """Lay the features on a scene, as `FeatureSurface.on` does."""
         return FeatureTrendsField(self.bare.on(scene), _drawn(self.trends, self.draw))

@@ -138,6 +138,10 @@ class Surface(SurfaceChoice):
         """
         return self
 
+    def without_texture(self) -> Self:
+        """The surface with the mean of what is random in it; itself where nothing is."""
+        return self
+
 
 @dataclass(frozen=True)
 class WrappedSurface(Surface):
@@ -159,6 +163,11 @@ class WrappedSurface(Surface):
     def redrawn(self, number: int) -> Self:
         """See `Surface.redrawn`."""
         bare = self.bare.redrawn(number)
+        return self if bare is self.bare else replace(self, bare=bare)
+
+    def without_texture(self) -> Self:
+        """See `Surface.without_texture`."""
+        bare = self.bare.without_texture()
         return self if bare is self.bare else replace(self, bare=bare)
 
 

@@ -1,0 +1,83 @@
+"""How the app is begun: as a local server, or as a part of a notebook."""
+
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from chipglow.scene import Scene
+from chipglow.study import Study
+
+
+def explore(scene: Scene | str | Path | None = None, study: Study | None = None) -> Any:
+    """Look at a scene with a camera whose knobs can be turned: the app's page in a notebook.
+
+    Parameters
+    ----------
+    scene : Scene or path-like, optional
+        A scene, or what ``chipglow app`` opens; the scene that comes with the app by default.
+    study : Study, optional
+        Surface and camera to begin with; the paper's by default.
+
+    Returns
+    -------
+    panel.viewable.Viewable
+        A notebook shows it as the last line of a cell.
+
+    Raises
+    ------
+    ValueError
+        If Panel is not installed, or the scene cannot be opened.
+    """
+    _check_installed()
+    import panel as pn
+
+    from chipglow.app.opening import OpenedScene, open_any
+    from chipglow.app.view import View
+
+    pn.extension()
+    if isinstance(scene, Scene):
+        opened: Any = OpenedScene.of(scene, study or Study(), "scene")
+    else:
+        opened = open_any(scene, study)
+    view = View(opened, embedded=True)
+    view.start(None)
+    return view.page
+
+
+def serve(
+    path: Path | None,
+    address: str,
+    port: int,
+    told: Callable[[str], None],
+) -> None:
+    """Serve the app until Ctrl-C.
+
+    Parameters
+    ----------
+    path : Path, optional
+        What to open; the scene that comes with the app by default.
+    address : str
+        Where to listen.
+    port : int
+        0 for any that is free.
+    told : callable
+        Called with the address for a browser, when it can be opened.
+
+    Raises
+    ------
+    ValueError
+        If Panel is not installed, the path cannot be opened, or the address cannot be had.
+    """
+    _check_installed()
+    from chipglow.app.opening import open_any
+    from chipglow.app.server import App
+
+    app = App(open_any(path), address, port)
+    told(app.url)
+    app.run()
+
+
+def _check_installed() -> None:
+    if find_spec("panel") is None:
+        raise ValueError("app: needs Panel, expected pip install 'chipglow[app]'")

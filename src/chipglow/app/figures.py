@@ -1,0 +1,445 @@
+"""The figures of the page: images with linked ranges and cursors, and temperatures along lines."""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+from bokeh.models import (
+    ColorBar,
+    ColumnDataSource,
+    CrosshairTool,
+    CustomJS,
+    HoverTool,
+    LinearColorMapper,
+    Range1d,
+    Span,
+    WheelZoomTool,
+)
+from bokeh.plotting import figure
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+from numpy.typing import NDArray
+
+from chipglow.app.knobs import ERRORS, LINE_NAMES, LINES, SHOWN, Ends, Knobs
+from chipglow.app.picture import Drawn, LineValues, Picture
+from chipglow.drawing.drawing import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
+from chipglow.scene import Raster, Tool
+
+MICRONS: Final = 1e6
+IMAGES: Final = ("scene", "measured", "error")
+
+_THEMES: Final = {
+    "light": {"ground": "#ffffff", "text": "#16191d", "grid": "#d7dbe0", "void": "#e5e7eb"},
+    "dark": {"ground": "#14171c", "text": "#e8eaed", "grid": "#39414b", "void": "#2b313a"},
+}
+_LINE_COLOURS: Final = {"rake_line": "#56B4E9", "band_line": "#F0A020"}
+_MEASURED: Final = {"light": "#0060a8", "dark": "#7db7ff"}
+_REFERENCE: Final = {"light": "#5b6068", "dark": "#b4bcc8"}
+
+_TITLES: Final = {
+    "scene": "Scene: true temperature / °C",
+    "measured": "Measured radiance temperature / °C",
+    "error": "Error / K",
+}
+_UNITS: Final = {
+    "temperature": " / °C",
+    "radiance_temperature": " / °C",
+    "plastic_strain_rate": " / (1/s)",
+    "speed": " / (m/s)",
+}
+
+_BORDER: Final = 46
+_GAP: Final = 8
+_LEAST_FRAME: Final = 180
+
+_DRAG: Final = """
+// Drag: the end of a line, the cursor, or else the view.
+const px = (x_range.end - x_range.start) / frame.inner_width;
+const near = (x, y) => Math.hypot(x - cb_obj.x, y - cb_obj.y) / px < 12;
+if (cb_obj.event_name === "panstart") {
+  grip.held = null;
+  for (const source of [...lines, cursor]) {
+    const { x, y } = source.data;
+    for (let i = 0; i < x.length; i++) if (near(x[i], y[i])) grip.held = [source, i];
+    if (grip.held) break;
+  }
+  grip.last = [cb_obj.sx, cb_obj.sy];
+} else if (cb_obj.event_name === "pan" && grip.held) {
+  const [source, i] = grip.held;
+  const x = Array.from(source.data.x), y = Array.from(source.data.y);
+  x[i] = Math.round(10 * Math.min(Math.max(cb_obj.x, extent[0]), extent[1])) / 10;
+  y[i] = Math.round(10 * Math.min(Math.max(cb_obj.y, extent[2]), extent[3])) / 10;
+  source.data = { x, y };
+} else if (cb_obj.event_name === "pan" && grip.last) {
+  const dx = (grip.last[0] - cb_obj.sx) * px, dy = (cb_obj.sy - grip.last[1]) * px;
+  grip.last = [cb_obj.sx, cb_obj.sy];
+  x_range.setv({ start: x_range.start + dx, end: x_range.end + dx });
+  y_range.setv({ start: y_range.start + dy, end: y_range.end + dy });
+} else if (cb_obj.event_name === "panend") {
+  grip.held = grip.last = null;
+}
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class ImageFigure:
+    """One image with its colours.
+
+    Parameters
+    ----------
+    figure : figure
+        Bokeh's figure.
+    source : ColumnDataSource
+        The image and its place.
+    mapper : LinearColorMapper
+        Its colours.
+    bar : ColorBar
+        Their legend.
+    """
+
+    figure: Any
+    source: ColumnDataSource
+    mapper: LinearColorMapper
+    bar: ColorBar
+
+
+class Figures:
+    """All figures of one page.
+
+    Parameters
+    ----------
+    raster : Raster
+        What the images show.
+    tool : Tool or None
+        Its outline is drawn over them.
+    knobs : Knobs
+        Cursor and lines.
+    names : tuple of str
+        Which of `IMAGES` there are.
+    """
+
+    def __init__(
+        self, raster: Raster, tool: Tool | None, knobs: Knobs, names: tuple[str, ...]
+    ) -> None:
+        self._extent = tuple(MICRONS * edge for edge in raster.extent)
+        left, right, bottom, top = self._extent
+        self.x_range, self.y_range = Range1d(left, right), Range1d(bottom, top)
+        self.cursor = ColumnDataSource(_points((knobs.cursor,)))
+        self.ends = {name: ColumnDataSource(_points(getattr(knobs, name))) for name in LINES}
+        self._spans = [
+            Span(dimension=one, line_color="#808080", line_width=1) for one in ("height", "width")
+        ]
+        self._outline = _outline(tool)
+        self.images = {name: self._image(name, name == names[0]) for name in names}
+        self.line_sources: dict[str, ColumnDataSource] = {}
+        self.band_sources: dict[str, ColumnDataSource] = {}
+        self.lines = {name: self._line(name, len(names) > 1) for name in LINES}
+        self.figures = [one.figure for one in self.images.values()] + list(self.lines.values())
+        self._link_drags()
+        self.set_theme("light")
+
+    def show(self, picture: Picture) -> None:
+        """Show a picture."""
+        measured = np.where(picture.flagged, np.nan, picture.measured) - KELVIN
+        scene, error = picture.scene, picture.error
+        if scene is not None:
+            title = f"Scene: {SHOWN[scene.name].lower()}{_UNITS.get(scene.name, '')}"
+            self.images["scene"].figure.title.text = title
+        limits = ends(measured, 0.0, 100.0, 10.0)
+        if scene is not None and scene.name in ("temperature", "radiance_temperature"):
+            celsius = scene.values - KELVIN
+            limits = min(limits[0], _lowest(picture)), max(limits[1], float(np.nanmax(celsius)))
+            self._set("scene", celsius, scene.raster, limits, HEAT)
+        elif scene is not None:
+            self._set("scene", scene.values, scene.raster, ends(scene.values), PLAIN)
+        self._set("measured", measured, picture.raster, limits, HEAT)
+        if error is not None:
+            shown = np.where(picture.flagged, np.nan, error)
+            limit = round_limit(shown, 99, 5.0)
+            self.images["error"].figure.title.text = f"{ERRORS[picture.knobs.error]} / K"
+            self._set("error", shown, picture.raster, (-limit, limit), SIGNED)
+        for name, values in picture.lines.items():
+            self.line_sources[name].data = _line_data(values)
+
+    def show_drawn(self, drawn: Drawn | None) -> None:
+        """Shade what the draws cover along the lines; nothing for None."""
+        for name, source in self.band_sources.items():
+            if drawn is None:
+                source.data = {"along": [], "low": [], "high": []}
+                continue
+            values = drawn.lines[name].measured - KELVIN
+            known = np.isfinite(values).all(axis=0)
+            along = np.asarray(self.line_sources[name].data["along"])
+            source.data = {
+                "along": along[known],
+                "low": values[:, known].min(axis=0),
+                "high": values[:, known].max(axis=0),
+            }
+
+    def set_places(self, knobs: Knobs) -> None:
+        """Put cursor and lines where the knobs have them."""
+        for source, points in (
+            (self.cursor, (knobs.cursor,)),
+            *((self.ends[name], getattr(knobs, name)) for name in LINES),
+        ):
+            data = _points(points)
+            if source.data != data:
+                source.data = data
+
+    def view(self, middle: tuple[float, float] | None, width: float = 0.0) -> None:
+        """Show what is around a place in m, so wide; or everything."""
+        left, right, bottom, top = self._extent
+        if middle is not None:
+            half = MICRONS * width / 2
+            tall = half * (top - bottom) / (right - left)
+            x, y = (MICRONS * one for one in middle)
+            left, right, bottom, top = x - half, x + half, y - tall, y + tall
+        self.x_range.update(start=left, end=right)
+        self.y_range.update(start=bottom, end=top)
+
+    def set_size(self, width: int, height: int) -> None:
+        """Fit the figures into an area of the page, in CSS pixels."""
+        left, right, bottom, top = self._extent
+        count = max(len(self.images), 2)
+        shape = (top - bottom) / (right - left)
+        frame = (width - _BORDER - (count - 1) * (_GAP + 10)) / count - 12
+        tallest = max(0.52 * height - 60, _LEAST_FRAME)
+        frame = int(max(min(frame, tallest / shape), _LEAST_FRAME))
+        for one in self.images.values():
+            one.figure.update(frame_width=frame, frame_height=int(frame * shape))
+        below = int(max(min(height - frame * shape - 330, 330), 150))
+        across = int((width - 2 * _BORDER - 330) / 2 - 20)
+        for one in self.lines.values():
+            one.update(frame_width=max(across, _LEAST_FRAME), frame_height=below)
+
+    def set_theme(self, theme: str) -> None:
+        """Draw everything on light or dark ground."""
+        colours = _THEMES["dark" if theme == "dark" else "light"]
+        text = colours["text"]
+        for one in self.figures:
+            one.update(
+                background_fill_color=colours["ground"],
+                border_fill_color=colours["ground"],
+                outline_line_color=colours["grid"],
+            )
+            one.title.text_color = text
+            for axis in one.axis:
+                axis.update(
+                    axis_label_text_color=text,
+                    major_label_text_color=text,
+                    axis_line_color=text,
+                    major_tick_line_color=text,
+                    minor_tick_line_color=None,
+                )
+            for grid in one.grid:
+                grid.grid_line_color = colours["grid"]
+        for image in self.images.values():
+            image.mapper.nan_color = colours["void"]
+            image.figure.background_fill_color = colours["void"]
+            image.bar.update(
+                background_fill_color=colours["ground"],
+                major_label_text_color=text,
+                title_text_color=text,
+            )
+            for grid in image.figure.grid:
+                grid.grid_line_color = None
+        dark = theme == "dark"
+        for one in self.lines.values():
+            one.select_one("measured").glyph.line_color = _MEASURED["dark" if dark else "light"]
+            one.select_one("drawn").glyph.fill_color = _MEASURED["dark" if dark else "light"]
+            if (reference := one.select_one("reference")) is not None:
+                reference.glyph.line_color = _REFERENCE["dark" if dark else "light"]
+            for legend in one.legend:
+                legend.update(
+                    background_fill_color=colours["ground"],
+                    background_fill_alpha=0.8,
+                    border_line_color=None,
+                    label_text_color=text,
+                )
+
+    def _set(
+        self,
+        name: str,
+        values: NDArray[Any],
+        raster: Raster,
+        limits: tuple[float, float],
+        colours: str,
+    ) -> None:
+        """An image, its rows from the bottom as Bokeh has them."""
+        image = self.images[name]
+        left, right, bottom, top = (MICRONS * edge for edge in raster.extent)
+        image.mapper.update(low=limits[0], high=limits[1], palette=_palette(colours))
+        image.source.data = {
+            "image": [np.ascontiguousarray(values[::-1], np.float32)],
+            "x": [left],
+            "y": [bottom],
+            "dw": [right - left],
+            "dh": [top - bottom],
+        }
+
+    def _image(self, name: str, labelled: bool) -> ImageFigure:
+        one = figure(
+            x_range=self.x_range,
+            y_range=self.y_range,
+            frame_width=_LEAST_FRAME,
+            frame_height=_LEAST_FRAME,
+            tools="",
+            toolbar_location=None,
+            title=_TITLES[name],
+            name=f"{name}_figure",
+            min_border=4,
+            output_backend="canvas",
+        )
+        source = ColumnDataSource(
+            {"image": [np.zeros((2, 2), np.float32)], "x": [0], "y": [0], "dw": [1], "dh": [1]},
+            name=f"{name}_image",
+        )
+        mapper = LinearColorMapper(palette=_palette(HEAT), low=0.0, high=1.0)
+        drawn = one.image(
+            image="image", x="x", y="y", dw="dw", dh="dh", source=source, color_mapper=mapper
+        )
+        bar = ColorBar(
+            color_mapper=mapper,
+            height=10,
+            padding=2,
+            margin=0,
+            title_text_font_size="11px",
+        )
+        one.add_layout(bar, "below")
+        wheel = WheelZoomTool()
+        unit = "K" if name == "error" else "°C"
+        tip = [("", f"@image{{0.0}} {unit}" if name != "scene" else "@image{0.00}")]
+        place = [("x, y", "$x{0.0}, $y{0.0} µm")]
+        one.add_tools(
+            wheel,
+            CrosshairTool(overlay=self._spans),
+            HoverTool(renderers=[drawn], tooltips=tip + place, attachment="above"),
+        )
+        one.toolbar.active_scroll = wheel
+        self._draw_over(one)
+        one.xaxis.axis_label = "x / µm"
+        one.yaxis.axis_label = "y / µm" if labelled else None
+        one.yaxis.visible = labelled
+        if labelled:
+            one.min_border_left = _BORDER
+        return ImageFigure(one, source, mapper, bar)
+
+    def _draw_over(self, one: Any) -> None:
+        """The tool, the lines and the cursor, each seen on any ground."""
+        if self._outline is not None:
+            for colour, width in (("white", 2.4), ("black", 1.2)):
+                one.line(*self._outline, line_color=colour, line_width=width)
+        for name, source in self.ends.items():
+            one.line("x", "y", source=source, line_color="black", line_width=3.4)
+            one.line("x", "y", source=source, line_color=_LINE_COLOURS[name], line_width=1.8)
+            one.scatter(
+                "x", "y", source=source, size=9, marker="circle", line_color="black",
+                fill_color=_LINE_COLOURS[name], line_width=1.2,
+            )  # fmt: skip
+        for colour, width in (("black", 4.0), ("white", 1.8)):
+            one.scatter(
+                "x", "y", source=self.cursor, marker="cross", size=15, line_color=colour,
+                line_width=width,
+            )  # fmt: skip
+
+    def _line(self, name: str, with_reference: bool) -> Any:
+        one = figure(
+            frame_width=_LEAST_FRAME,
+            frame_height=150,
+            tools="",
+            toolbar_location=None,
+            title=f"Temperature {LINE_NAMES[name]}",
+            name=f"{name}_figure",
+            min_border=4,
+        )
+        empty = {"along": [0.0, 1.0], "measured": [0.0, 1.0], "reference": [0.0, 1.0]}
+        source = self.line_sources[name] = ColumnDataSource(empty, name=f"{name}_values")
+        band = self.band_sources[name] = ColumnDataSource({"along": [], "low": [], "high": []})
+        colour = _LINE_COLOURS[name]
+        one.add_layout(Span(dimension="height", line_color=colour, line_width=3, location=0))
+        one.varea("along", "low", "high", source=band, fill_alpha=0.25, name="drawn")
+        if with_reference:
+            one.line(
+                "along", "reference", source=source, line_width=2, line_dash="dashed",
+                legend_label="reference", name="reference",
+            )  # fmt: skip
+        one.line(
+            "along", "measured", source=source, line_width=2, legend_label="measured",
+            name="measured",
+        )  # fmt: skip
+        for legend in one.legend:
+            legend.update(
+                location="top_right", orientation="horizontal", padding=2, margin=2, spacing=8,
+                label_text_font_size="11px", glyph_height=14,
+            )  # fmt: skip
+        tips = [("distance", "@along{0.0} µm"), ("measured", "@measured{0.0} °C")]
+        if with_reference:
+            tips.append(("reference", "@reference{0.0} °C"))
+        measured = [one.select_one("measured")]
+        one.add_tools(HoverTool(tooltips=tips, mode="vline", renderers=measured))
+        one.xaxis.axis_label = "distance / µm"
+        one.yaxis.axis_label = "radiance temperature / °C"
+        one.min_border_left = _BORDER + 6
+        one.title.text_font_size = "12px"
+        return one
+
+    def _link_drags(self) -> None:
+        """Let the lines' ends and the cursor be dragged, and the view with them."""
+        for image in self.images.values():
+            one = image.figure
+            code = CustomJS(
+                args={
+                    "frame": one,
+                    "x_range": self.x_range,
+                    "y_range": self.y_range,
+                    "lines": list(self.ends.values()),
+                    "cursor": self.cursor,
+                    "extent": list(self._extent),
+                },
+                code=f"const grip = (window.__chipglow_grip ??= {{}});\n{_DRAG}",
+            )
+            for event in ("panstart", "pan", "panend"):
+                one.js_on_event(event, code)
+
+
+def places(source: ColumnDataSource) -> str:
+    """Places of a source as a knob's text."""
+    return ";".join(
+        f"{x:.1f},{y:.1f}" for x, y in zip(source.data["x"], source.data["y"], strict=True)
+    )
+
+
+def _points(points: tuple[tuple[float, float], ...] | Ends) -> dict[str, list[float]]:
+    return {
+        "x": [round(MICRONS * x, 3) for x, _ in points],
+        "y": [round(MICRONS * y, 3) for _, y in points],
+    }
+
+
+def _line_data(values: LineValues) -> dict[str, NDArray[np.float64]]:
+    reference = values.measured if values.reference is None else values.reference
+    return {
+        "along": MICRONS * values.distance,
+        "measured": values.measured - KELVIN,
+        "reference": reference - KELVIN,
+    }
+
+
+def _outline(tool: Tool | None) -> tuple[list[float], list[float]] | None:
+    if tool is None:
+        return None
+    x, y = MICRONS * tool.outline(3e-3).T
+    return x.tolist(), y.tolist()
+
+
+def _lowest(picture: Picture) -> float:
+    """Lower end of the colours of temperature in °C: the camera's range limit if it has one."""
+    assert picture.scene is not None
+    limit = picture.camera.lower_limit if picture.camera else None
+    return float(np.nanmin(picture.scene.values) if limit is None else limit) - KELVIN
+
+
+@cache
+def _palette(name: str) -> list[str]:
+    return [to_hex(colormaps[name](value)) for value in np.linspace(0.0, 1.0, 256)]

@@ -1,0 +1,98 @@
+"""What makes the error of every pixel: the paper's differences, one effect after the other."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.camera import Camera, Exposure
+from chipglow.errors.error_images import (
+    ErrorImages,
+    ReferenceKind,
+    error_images,
+    reference_temperature,
+)
+
+
+@dataclass(frozen=True)
+class ErrorParts:
+    """Parts of the error of every pixel, in K of radiance temperature, each of shape (y, x).
+
+    The effects are added one after the other, in the order of the light, and each part is the
+    difference that its effect makes: `emissivity`, `motion`, `footprint`, `psf` and `detector` sum
+    to the error of case 1. `texture` is in them.
+
+    Parameters
+    ----------
+    errors : ErrorImages
+        The whole errors.
+    emissivity : ndarray
+        Radiance temperature less true temperature, where the reference is the true one; else 0.
+    motion : ndarray
+        Mean over the exposure less its greatest, at the samples that make the reference.
+    footprint : ndarray
+        Mean over the pixel's area less the reference of a scene that stands still.
+    psf : ndarray
+        With the point spread function less without it; the paper's case 1 − case 2.
+    detector : ndarray
+        What noise, counts and calibration of the detector add.
+    texture : ndarray or None
+        The error less that with a surface whose features have no texture; None if that is not
+        known.
+    """
+
+    errors: ErrorImages
+    emissivity: NDArray[np.float64]
+    motion: NDArray[np.float64]
+    footprint: NDArray[np.float64]
+    psf: NDArray[np.float64]
+    detector: NDArray[np.float64]
+    texture: NDArray[np.float64] | None
+
+
+def error_parts(
+    camera: Camera,
+    exposure: Exposure,
+    reference: ReferenceKind = "maximum",
+    untextured: Exposure | None = None,
+) -> ErrorParts:
+    """Tell apart what makes the error of every pixel in one exposure.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    exposure : Exposure
+        What reached it.
+    reference : ReferenceKind
+        What to compare with; the paper's is the maximum.
+    untextured : Exposure, optional
+        The same exposure with the surface's `Surface.without_texture`.
+
+    Notes
+    -----
+    Heigel and Whitenton (2010) tell the point spread function's part from the rest (case 1 and
+    case 2, their Figure 10); motion and footprint continue that within case 2.
+    """
+    errors = error_images(camera, exposure, reference)
+    noiseless = error_images(replace(camera, detector=None), exposure, reference)
+    of_radiance: ReferenceKind = "maximum" if reference == "true" else reference
+    radiant = reference_temperature(camera, exposure, of_radiance)
+    still = reference_temperature(camera, _standing_still(exposure), of_radiance)
+    return ErrorParts(
+        errors=errors,
+        emissivity=radiant - errors.reference,
+        motion=still - radiant,
+        footprint=noiseless.reference + noiseless.case_2 - still,
+        psf=noiseless.psf_portion,
+        detector=errors.case_1 - noiseless.case_1,
+        texture=None
+        if untextured is None
+        else errors.case_1 - error_images(camera, untextured, reference).case_1,
+    )
+
+
+def _standing_still(exposure: Exposure) -> Exposure:
+    """The exposure as of a scene that has its mean radiance all the time."""
+    mean = exposure.mean_radiance
+    return replace(exposure, peak_radiance=mean.astype(np.float32), centre_radiance=mean)
