@@ -131,6 +131,8 @@ class Figures:
             Span(dimension=one, line_color="#808080", line_width=1) for one in ("height", "width")
         ]
         self._outline = _outline(tool)
+        self._palettes: dict[str, str] = {}
+        self._shown: dict[str, NDArray[Any]] = {}
         self.images = {name: self._image(name, name == names[0]) for name in names}
         self.line_sources: dict[str, ColumnDataSource] = {}
         self.band_sources: dict[str, ColumnDataSource] = {}
@@ -148,7 +150,7 @@ class Figures:
             self.images["scene"].figure.title.text = title
         limits = ends(measured, 0.0, 100.0, 10.0)
         if scene is not None and scene.name in ("temperature", "radiance_temperature"):
-            celsius = scene.values - KELVIN
+            celsius = scene.celsius
             limits = min(limits[0], _lowest(picture)), max(limits[1], float(np.nanmax(celsius)))
             self._set("scene", celsius, scene.raster, limits, HEAT)
         elif scene is not None:
@@ -166,7 +168,8 @@ class Figures:
         """Shade what the draws cover along the lines; nothing for None."""
         for name, source in self.band_sources.items():
             if drawn is None:
-                source.data = {"along": [], "low": [], "high": []}
+                if len(source.data["along"]):
+                    source.data = {"along": [], "low": [], "high": []}
                 continue
             values = drawn.lines[name].measured - KELVIN
             known = np.isfinite(values).all(axis=0)
@@ -269,7 +272,14 @@ class Figures:
         """An image, its rows from the bottom as Bokeh has them."""
         image = self.images[name]
         left, right, bottom, top = (MICRONS * edge for edge in raster.extent)
-        image.mapper.update(low=limits[0], high=limits[1], palette=_palette(colours))
+        if (image.mapper.low, image.mapper.high) != limits:
+            image.mapper.update(low=limits[0], high=limits[1])
+        if self._palettes.get(name) != colours:
+            self._palettes[name] = colours
+            image.mapper.palette = _palette(colours)
+        if self._shown.get(name) is values:
+            return
+        self._shown[name] = values
         image.source.data = {
             "image": [np.ascontiguousarray(values[::-1], np.float32)],
             "x": [left],
@@ -368,11 +378,12 @@ class Figures:
             "along", "measured", source=source, line_width=2, legend_label="measured",
             name="measured",
         )  # fmt: skip
-        for legend in one.legend:
-            legend.update(
-                location="top_right", orientation="horizontal", padding=2, margin=2, spacing=8,
-                label_text_font_size="11px", glyph_height=14,
-            )  # fmt: skip
+        legend = one.legend[0]
+        legend.update(
+            orientation="horizontal", padding=0, margin=0, spacing=10, glyph_height=12,
+            label_text_font_size="11px",
+        )  # fmt: skip
+        one.add_layout(legend, "above")
         tips = [("distance", "@along{0.0} µm"), ("measured", "@measured{0.0} °C")]
         if with_reference:
             tips.append(("reference", "@reference{0.0} °C"))

@@ -34,6 +34,7 @@ from chipglow.errors import (
     error_parts,
 )
 from chipglow.errors.draws import pixel_phases
+from chipglow.errors.error_images import Unblurred
 from chipglow.io import StoredScene
 from chipglow.scene import Material, Scene, sample
 from chipglow.scene.lines import nearest
@@ -89,8 +90,10 @@ class SceneModel:
         self._fitted: Kept[tuple[Scene, Surface]] = Kept(4)
         self._exact: Kept[tuple[Exposure, ...]] = Kept(_EXPOSURES)
         self._quick: Kept[tuple[Exposure, ...]] = Kept(_COARSE_EXPOSURES)
-        self._images: Kept[SceneImage] = Kept(1)
-        self._errors: Kept[ErrorImages] = Kept(2)
+        self._images: Kept[SceneImage] = Kept(2)
+        self._formed: Kept[NDArray[np.float64]] = Kept(8)
+        self._unblurred: Kept[Unblurred] = Kept(8)
+        self._errors: Kept[ErrorImages] = Kept(8)
         self._parts: Kept[ErrorParts] = Kept(2)
         self._frames: Kept[tuple[NDArray[np.float32], NDArray[np.float32]]] = Kept(1)
         self._displayed = _displayed(opened.scene)
@@ -128,10 +131,7 @@ class SceneModel:
         scene, surface = self._on(study, knobs, coarse)
         camera = study.camera.on(scene.raster, study.seed)
         exposures = self._exposed(scene, surface, camera, knobs, coarse, check)
-        reference = study.analysis.reference
-        errors = self._errors.get(
-            (knobs_key(knobs), coarse), lambda: error_images(camera, exposures[0], reference)
-        )
+        errors = self._image_errors(camera, exposures[0], knobs, coarse)
         picture = Picture(
             knobs=knobs,
             raster=errors.raster,
@@ -139,7 +139,7 @@ class SceneModel:
             flagged=errors.flagged,
             lines=line_values(errors, knobs),
             coarse=coarse,
-            scene=self._scene_image(study, knobs, exposures[0]),
+            scene=self._scene_image(study, knobs, exposures[0], coarse),
             errors=errors,
             error=errors.case_1,
             camera=camera,
@@ -148,6 +148,24 @@ class SceneModel:
         if knobs.error == "total":
             return picture
         return replace(picture, error=getattr(self.parts(picture), knobs.error))
+
+    def _image_errors(
+        self, camera: Camera, exposure: Exposure, knobs: Knobs, coarse: bool
+    ) -> ErrorImages:
+        """As `error_images`, of which what the changed knobs do not matter to is kept."""
+        seen = self._exposure_key(knobs), coarse
+        pixels = knobs.pitch, knobs.offset_right, knobs.offset_down
+        optics = knobs.psf, knobs.numerical_aperture, knobs.fwhm, knobs.psf_order
+        read = knobs.netd, knobs.lower_limit
+        reference = self.panel.study.analysis.reference
+        unblurred = self._unblurred.get(
+            (seen, pixels, read), lambda: Unblurred.of(camera, exposure, reference)
+        )
+        formed = self._formed.get(
+            (seen, pixels, optics),
+            lambda: camera.form_image(exposure.mean_radiance, exposure.raster),
+        )
+        return self._errors.get((seen, pixels, optics, read), lambda: unblurred.errors(formed))
 
     def parts(self, picture: Picture) -> ErrorParts:
         """What makes the errors of a picture."""
@@ -271,24 +289,25 @@ class SceneModel:
         key = self._exposure_key(knobs)
         return kept.get((key, both) if coarse else key, make)
 
-    def _scene_image(self, study: Study, knobs: Knobs, exposure: Exposure) -> SceneImage:
-        scene = self._displayed
+    def _scene_image(
+        self, study: Study, knobs: Knobs, exposure: Exposure, coarse: bool
+    ) -> SceneImage:
+        scene = self.opened.coarse if coarse and self.opened.coarse else self._displayed
         index = _middle_frame(scene, knobs)
 
         def make() -> SceneImage:
-            values = self._shown(study, knobs, exposure, index)
+            values = self._shown(study, knobs, exposure, scene, index)
             void = scene.field("material", index) == Material.VOID
             values = np.where(void, np.nan, values).astype(np.float32)
             return SceneImage(knobs.shown, values, scene.raster)
 
         of_surface = knobs.shown in ("radiance_temperature", "emissivity")
         seen = (self._exposure_key(knobs), exposure.raster.shape) if of_surface else ()
-        return self._images.get((index, knobs.shown, seen), make)
+        return self._images.get((index, knobs.shown, seen, coarse), make)
 
     def _shown(
-        self, study: Study, knobs: Knobs, exposure: Exposure, index: int
+        self, study: Study, knobs: Knobs, exposure: Exposure, scene: Scene, index: int
     ) -> NDArray[np.floating]:
-        scene = self._displayed
         if knobs.shown == "speed":
             return np.hypot(scene.field("velocity_x", index), scene.field("velocity_y", index))
         camera = study.camera.build(study.seed)

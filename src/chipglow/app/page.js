@@ -1,5 +1,5 @@
-// The page of the app: what stands around its figures. Everything it shows comes from Python as
-// JSON; everything the user does goes back as one message.
+// The page of the app: what stands around its figures. What it shows comes from Python in messages
+// of a kind and a content; what the user does goes back in messages, too.
 
 const FIGURES = ["scene", "measured", "error", "rake_line", "band_line"];
 
@@ -13,7 +13,7 @@ export function render({ model, el }) {
 
   const send = (message) => {
     sent += 1;
-    model.message = JSON.stringify({ n: sent, ...message });
+    model.send_msg({ n: sent, ...message });
     return sent;
   };
 
@@ -179,7 +179,7 @@ export function render({ model, el }) {
     const zooms = element("div", { class: "zooms", role: "toolbar", "aria-label": "View" });
     for (const [name, text] of spec.views) zooms.append(button(text, () => send({ view: name })));
     zooms.append(place("cursor", "Cursor x, y / µm"));
-    zooms.append(element("span", { class: "hint" }, "Click an image: cursor. Drag: move it, or the end of a line. Wheel: zoom."));
+    zooms.append(element("span", { class: "hint" }, "Click: cursor. Drag: cursor, line, view. Wheel: zoom. Grey: out of range."));
     const images = element("div", { class: "images" });
     const below = element("div", { class: "below" });
     for (const name of FIGURES) {
@@ -218,8 +218,7 @@ export function render({ model, el }) {
 
   // What comes from Python.
 
-  function showValues() {
-    const { n, values, visible, can_undo, link } = JSON.parse(model.values);
+  function showValues({ n, values, visible, can_undo, link }) {
     for (const [name, text] of Object.entries(values)) {
       const entry = controls.get(name);
       if (entry && entry.sent <= n) setControl(entry, text);
@@ -234,8 +233,7 @@ export function render({ model, el }) {
     }
   }
 
-  function showStatus() {
-    const { text, kind, progress, invalid } = JSON.parse(model.status);
+  function showStatus({ text, kind, progress, invalid }) {
     find("#status").textContent = text;
     find("#status").className = kind;
     const bar = find("#progress");
@@ -248,8 +246,7 @@ export function render({ model, el }) {
     for (const name of invalid) controls.get(name)?.field.setAttribute("aria-invalid", "true");
   }
 
-  function showNumbers() {
-    const { rows, parts, note } = JSON.parse(model.numbers);
+  function showNumbers({ rows, parts, note }) {
     const box = find(".numbers");
     const table = element("table", {}, element("caption", {}, "At the cursor"));
     for (const [label, value, tip] of rows) {
@@ -271,9 +268,7 @@ export function render({ model, el }) {
     box.append(bars, element("p", { class: "note" }, note));
   }
 
-  function saveDownload() {
-    if (!model.download) return;
-    const { name, type, data } = JSON.parse(model.download);
+  function saveDownload({ name, type, data }) {
     const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
     const url = URL.createObjectURL(new Blob([bytes], { type }));
     const link = element("a", { href: url, download: name });
@@ -284,8 +279,7 @@ export function render({ model, el }) {
   }
 
   // A picture is told to be painted when the browser had the time for it: then comes the next.
-  function painted() {
-    const number = model.picture;
+  function painted(number) {
     requestAnimationFrame(() => setTimeout(() => {
       send({ painted: number });
       if (!playing) return;
@@ -296,10 +290,7 @@ export function render({ model, el }) {
 
   function upload(file) {
     const request = new XMLHttpRequest();
-    const say = (text, kind, progress) => {
-      model.status = JSON.stringify({ text, kind, progress, invalid: [] });
-      showStatus();
-    };
+    const say = (text, kind, progress) => showStatus({ text, kind, progress, invalid: [] });
     request.upload.onprogress = (event) => {
       const done = event.loaded === event.total;
       say(`${done ? "Checking" : "Uploading"} ${file.name}`, "busy", event.loaded / event.total);
@@ -359,20 +350,14 @@ export function render({ model, el }) {
       send({ undo: true });
     }
   });
-  model.on("values", showValues);
-  model.on("status", showStatus);
-  model.on("numbers", showNumbers);
-  model.on("download", saveDownload);
-  model.on("picture", painted);
+  const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: painted };
+  model.on("msg:custom", ({ kind, content }) => shows[kind](content));
   const watcher = new ResizeObserver(measure);
   model.on("after_render", () => {
+    send({ ready: true });
     setTheme();
-    showValues();
-    showStatus();
-    showNumbers();
     measure();
     watcher.observe(find("main"));
-    if (model.picture) painted();
   });
   model.on("remove", () => watcher.disconnect());
   addEventListener("resize", measure);

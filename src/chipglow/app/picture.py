@@ -1,6 +1,7 @@
 """What the page shows at one state of its knobs."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from chipglow.app.knobs import Knobs
 from chipglow.camera import Camera, Exposure
 from chipglow.errors import Distribution, ErrorImages, ErrorParts
 from chipglow.scene import Raster
+from chipglow.scene.notebook import ZERO_CELSIUS
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +30,11 @@ class SceneImage:
     name: str
     values: NDArray[np.float32]
     raster: Raster
+
+    @cached_property
+    def celsius(self) -> NDArray[np.float32]:
+        """Values that are temperatures, in °C."""
+        return self.values - np.float32(ZERO_CELSIUS)
 
 
 @dataclass(frozen=True, eq=False)

@@ -276,8 +276,7 @@ class App:
             return pn.pane.HTML("<p>This file is not open any more: open it again.</p>")
         link = {OPEN: key} if key else {}
         view = View(opened, given, link, _WORDS)
-        document = pn.state.curdoc
-        pn.state.onload(lambda: view.start(document))
+        view.start(pn.state.curdoc)
         pn.state.on_session_destroyed(lambda _: view.session.end())
         return view.page
 

@@ -60,15 +60,9 @@ _PARTS: Final = (
 
 
 class Page(JSComponent):
-    """What stands around the figures; texts are JSON, see page.js."""
+    """What stands around the figures; what changes goes to and fro as messages, see page.js."""
 
     spec = param.String()
-    values = param.String()
-    status = param.String()
-    numbers = param.String()
-    download = param.String()
-    message = param.String()
-    picture = param.Integer(0)
     scene_figure = Child()
     measured_figure = Child()
     error_figure = Child()
@@ -121,12 +115,11 @@ class View:
         names = IMAGES if scene is not None else ("measured",)
         self.figures = Figures(source.raster, source.tool, self.session.knobs, names)
         self._document: Document | None = None
-        self._handled = self._saved = self._progress = 0
-        self._began = perf_counter()
+        self._handled = 0
+        self._began = 0.0
         self._picture: Picture | None = None
         self.page = Page(
             spec=json.dumps(self._spec(opened, uploads)),
-            numbers=json.dumps({"rows": [], "parts": [], "note": ""}),
             sizing_mode="stretch_width",
             **{
                 f"{name}_figure": pn.pane.Bokeh(one, sizing_mode="fixed", margin=0)
@@ -136,14 +129,22 @@ class View:
                 )
             },
         )
-        self._put_values()
-        self._say(refused or "Computing the first picture.", "error" if refused else "busy")
+        self._refused = refused
         self._listen()
 
     def start(self, document: Document | None) -> None:
-        """Begin to compute; a document is where the results are shown from other threads."""
+        """Say in which document the results of other threads are shown; None of a notebook's."""
         self._document = document
+
+    def _ready(self) -> None:
+        """Fill a page that is there now, and compute its picture."""
+        self._put_values()
+        text = self._refused or "Computing the first picture."
+        self._say(text, "error" if self._refused else "busy")
         self.session.show()
+
+    def _send(self, kind: str, content: Any) -> None:
+        self.page._send_msg({"kind": kind, "content": content})
 
     def _restore(self, texts: dict[str, str]) -> str:
         """Turn the knobs as a link says; what is wrong with it, or nothing."""
@@ -155,7 +156,7 @@ class View:
         return ""
 
     def _listen(self) -> None:
-        self.page.param.watch(lambda event: self._receive(event.new), "message")
+        self.page.on_msg(lambda event: self._receive(event.data))
         for image in self.figures.images.values():
             image.figure.on_event(Tap, self._tapped)
             image.figure.on_event(PanEnd, lambda _: self._turn({}, True))
@@ -177,11 +178,12 @@ class View:
 
         return moved
 
-    def _receive(self, text: str) -> None:
+    def _receive(self, message: dict[str, Any]) -> None:
         """Do what the page's message says."""
-        message = json.loads(text)
         self._handled = int(message["n"])
-        if "painted" in message:
+        if "ready" in message:
+            self._ready()
+        elif "painted" in message:
             self.session.painted(int(message["painted"]))
         elif "turn" in message:
             self._turn(message["turn"], bool(message["final"]))
@@ -244,24 +246,25 @@ class View:
                 "measurement.nc",
                 "application/x-netcdf",
             )
-        self._saved += 1
-        text = {"n": self._saved, "name": name, "type": kind, "data": b64encode(data).decode()}
-        self.page.download = json.dumps(text)
+        text = b64encode(data).decode()
+        self._send("download", {"name": name, "type": kind, "data": text})
         self._say(f"{name} is saved.", "")
 
     def _show(self, number: int, picture: Picture) -> None:
         self._picture = picture
         self.figures.show(picture)
         self.figures.show_drawn(None)
-        self.page.picture = number
-        took = 1e3 * (perf_counter() - self._began)
         assert picture.scene is not None or picture.errors is None
         if picture.coarse:
             step = picture.exposures[0].raster.spacing
             text = f"Quick look on samples of {1e6 * step:.3g} µm; the exact picture follows."
         else:
-            text = f"Exact picture, {took:.0f} ms after the last change."
+            text = "Exact picture."
+            if self._began:
+                took = 1e3 * (perf_counter() - self._began)
+                text = f"Exact picture, {took:.0f} ms after the last change."
         self._say(text, "busy" if picture.coarse else "")
+        self._send("picture", number)
         if picture.coarse:
             self._put_numbers([], [])
 
@@ -312,13 +315,12 @@ class View:
 
     def _put_numbers(self, rows: list[tuple[str, str, str]], parts: list[dict[str, Any]]) -> None:
         note = "They sum to the error; ± is the standard uncertainty (k = 1)." if parts else ""
-        self.page.numbers = json.dumps({"rows": rows, "parts": parts, "note": note})
+        self._send("numbers", {"rows": rows, "parts": parts, "note": note})
 
     def _show_drawn(self, drawn: Drawn) -> None:
         if drawn.knobs != self.session.knobs:
             return
         self.figures.show_drawn(drawn)
-        self._progress = 0
         if drawn.error is None:
             self._say("Drawn: shaded is the range of the draws.", "")
             return
@@ -336,9 +338,8 @@ class View:
     def _say(
         self, text: str, kind: str, progress: float | None = None, invalid: list[str] | None = None
     ) -> None:
-        self.page.status = json.dumps(
-            {"text": text, "kind": kind, "progress": progress, "invalid": invalid or []}
-        )
+        said = {"text": text, "kind": kind, "progress": progress, "invalid": invalid or []}
+        self._send("status", said)
 
     def _put_values(self) -> None:
         knobs, panel = self.session.knobs, self.session.model.panel
@@ -347,15 +348,14 @@ class View:
             points = (knobs.cursor,) if name == CURSOR else getattr(knobs, name)
             values[name] = "; ".join(f"{1e6 * x:.1f}, {1e6 * y:.1f}" for x, y in points)
         visible = [knob.name for knob in panel.knobs if _counts(knob, knobs)]
-        self.page.values = json.dumps(
-            {
-                "n": self._handled,
-                "values": values,
-                "visible": visible,
-                "can_undo": self.session.can_undo,
-                "link": {**self._link, **panel.texts(knobs)},
-            }
-        )
+        content = {
+            "n": self._handled,
+            "values": values,
+            "visible": visible,
+            "can_undo": self.session.can_undo,
+            "link": {**self._link, **panel.texts(knobs)},
+        }
+        self._send("values", content)
 
     def _spec(self, opened: OpenedScene | OpenedMeasurement, uploads: str) -> dict[str, Any]:
         is_scene = isinstance(opened, OpenedScene)
@@ -382,23 +382,12 @@ class View:
 
     def _later(self, show: Callable[[], None]) -> None:
         """Show something that another thread found."""
-        document = self._document
-        if document is None:
+        if self._document is None:
             show()
-            if self._embedded:
-                pn.io.push_notebook(self.page)
             return
-
-        def at_once() -> None:
-            document.hold("combine")
-            try:
-                show()
-            finally:
-                document.unhold()
-
         try:
-            document.add_next_tick_callback(at_once)
-        except RuntimeError:  # the session ended meanwhile
+            self._document.add_next_tick_callback(show)
+        except RuntimeError:  # the page was closed meanwhile
             self.session.end()
 
 

@@ -1,0 +1,146 @@
+"""How long the app takes from a knob to the new picture, in a real browser.
+
+    python benchmarks/app_latency.py [--scene FILE] [--turns N] [--chromium PATH]
+
+Presses keys on the sliders of a page in headless Chromium, as fast as pictures come. Each time is
+from the key's event to the frame of the screen after the new image was there, by the browser's
+clock: the first picture, which of a large scene is a quick look on fewer samples, and the exact one
+that follows where the hand rests. Then the memory of the server beside that of the scene's own
+splines or samples.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+CHROMIUM = os.environ.get("CHIPGLOW_CHROMIUM", "/usr/bin/chromium")
+FLAGS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+)  # fmt: skip
+KNOBS = (
+    "Exposure begins", "Band from", "Pixel pitch", "Exposure", "Numerical aperture",
+    "Noise (NETD at 300 °C)", "Lower range limit", "Seed",
+)  # fmt: skip
+SERVE = """
+import sys
+from pathlib import Path
+from chipglow.app import serve
+path = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+serve(path, "127.0.0.1", 0, lambda url: print(url, flush=True))
+"""
+WATCH = """() => {
+  const log = (window.chipglowLog = { asked: 0, first: [], exact: [], fresh: false });
+  addEventListener("keydown", (event) => { log.asked = event.timeStamp; log.fresh = true; }, true);
+  for (const model of Bokeh.documents[0]._all_models.values()) {
+    if (model.name !== "measured_image") continue;
+    model.properties.data.change.connect(() => {
+      const asked = log.asked, first = log.fresh;
+      log.fresh = false;
+      requestAnimationFrame(() => setTimeout(() => {
+        if (first) log.first.push(performance.now() - asked);
+        log.last = performance.now() - asked;
+      }, 0));
+    });
+    return true;
+  }
+  return false;
+}"""
+
+
+def main():
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scene", type=Path, help="a scene's file; the app's own by default")
+    parser.add_argument("--turns", type=int, default=40, help="turns of each knob")
+    parser.add_argument("--knobs", nargs="+", default=KNOBS, help="labels of knobs")
+    parser.add_argument("--chromium", default=CHROMIUM)
+    given = parser.parse_args()
+    command = [sys.executable, "-c", SERVE, *([str(given.scene)] if given.scene else [])]
+    begun = time.perf_counter()
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            url = server.stdout.readline().strip()
+            times = measured(url, given)
+            report(times, time_to(begun, times), server.pid, given.scene)
+        finally:
+            server.terminate()
+
+
+def measured(url, given):
+    """Milliseconds by knob, of first and of exact pictures; when the first one was there."""
+    from playwright.sync_api import sync_playwright
+
+    found = {}
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=given.chromium, args=list(FLAGS))
+        page = browser.new_page(viewport={"width": 1280, "height": 800})
+        page.goto(url)
+        page.get_by_text("Exact picture").wait_for(timeout=300_000)
+        found["opened"] = time.perf_counter()
+        page.wait_for_function(WATCH)
+        for label in given.knobs:
+            found[label] = turned(page, label, given.turns)
+        browser.close()
+    return found
+
+
+def turned(page, label, turns):
+    """Turn one knob to and fro: milliseconds to the first pictures, then to an exact one."""
+    slider = page.get_by_role("slider", name=label, exact=True)
+    slider.focus()
+    page.evaluate("() => { chipglowLog.first = []; }")
+    on = True
+    for number in range(turns):
+        before = page.evaluate("() => chipglowLog.first.length")
+        at, least, most = slider.evaluate("one => [one.value, one.min, one.max].map(Number)")
+        on = at <= least or (at < most and (not on if number % 10 == 0 else on))
+        slider.press("ArrowRight" if on else "ArrowLeft")
+        page.wait_for_function(f"() => chipglowLog.first.length > {before}", polling="raf")
+    page.get_by_text("Exact picture").wait_for(timeout=60_000)
+    page.wait_for_timeout(300)
+    return page.evaluate("() => [chipglowLog.first, chipglowLog.last]")
+
+
+def time_to(begun, times):
+    """Seconds from the start of the process to the first exact picture."""
+    return times.pop("opened") - begun
+
+
+def report(times, opened, process, scene):
+    """Print milliseconds by knob, and what the server holds."""
+    print(f"{'knob':26}{'turns':>7}{'median':>9}{'95 %':>9}{'most':>9}{'exact':>9}   ms")
+    for label, (first, last) in times.items():
+        middle, late, most = np.percentile(first, (50, 95, 100))
+        print(f"{label:26}{len(first):7}{middle:9.0f}{late:9.0f}{most:9.0f}{last:9.0f}")
+    every = np.concatenate([first for first, _ in times.values()])
+    middle, late, most = np.percentile(every, (50, 95, 100))
+    print(f"{'all':26}{every.size:7}{middle:9.0f}{late:9.0f}{most:9.0f}")
+    print(f"opened, with the process: {opened:.1f} s; load {os.getloadavg()[0]:.1f}")
+    print(f"memory: {resident(process) / 1e6:.0f} MB resident; {own(scene)}")
+
+
+def resident(process):
+    """Bytes of a process that are in memory."""
+    pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+def own(path):
+    """What a scene is itself: its splines or samples in memory, and its samples if all were."""
+    from chipglow.app.opening import bundled_path
+    from chipglow.io import open_scene
+
+    scene = open_scene(path or bundled_path())
+    samples = len(scene) * scene.raster.rows * scene.raster.columns * 4 * len(scene.fields)
+    kept = samples if scene.lattice is None else 4 * len(scene) * int(np.prod(scene.lattice.shape))
+    return f"the scene's own {kept / 1e6:.0f} MB, its samples {samples / 1e6:.0f} MB"
+
+
+if __name__ == "__main__":
+    main()
