@@ -1,4 +1,6 @@
-"""The scene that comes with the app: python docs/app_scene.py
+"""Write the scene that comes with the app.
+
+    python docs/app_scene.py
 
 A part of the quick study's cut: every second frame of the time in which its first shear band
 develops. It is cut anew where it is not in the cache.

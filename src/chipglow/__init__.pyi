@@ -1,4 +1,5 @@
 from . import (
+    app as app,
     camera as camera,
     cutting as cutting,
     errors as errors,
@@ -11,6 +12,7 @@ from . import (
     surface as surface,
     uncertainty as uncertainty,
 )
+from .app import explore as explore
 from .camera import (
     AnnularAperturePSF as AnnularAperturePSF,
     BlurredPSF as BlurredPSF,

@@ -309,7 +309,8 @@ class SceneModel:
         self, study: Study, knobs: Knobs, exposure: Exposure, scene: Scene, index: int
     ) -> NDArray[np.floating]:
         if knobs.shown == "speed":
-            return np.hypot(scene.field("velocity_x", index), scene.field("velocity_y", index))
+            velocity = (scene.field(f"velocity_{axis}", index) for axis in "xy")
+            return np.asarray(np.hypot(*velocity))
         camera = study.camera.build(study.seed)
         if knobs.shown == "emissivity":
             _, surface = self._on(study, knobs, coarse=False)

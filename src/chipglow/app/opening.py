@@ -17,8 +17,10 @@ from chipglow.errors.starts import spread_starts
 from chipglow.io import StoredScene, is_measurement, open_scene, read_measurement
 from chipglow.io.sandbox import Message, Sandbox, patience_for
 from chipglow.laboratory.chip import Instant, contact_length
+from chipglow.quantities import Declared
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study
+from chipglow.surface import UniformEmissivity
 
 BUNDLED: Final = "bundled scene"
 QUICK_SAMPLES: Final = 60_000
@@ -70,8 +72,10 @@ class OpenedScene:
             If the scene is shorter than the study's exposure.
         """
         if "plastic_strain" not in scene.fields and study.surface == Study().surface:
-            surface = Study(surface={"kind": "uniform", "emissivity": 0.5}).surface
-            study = study.model_copy(update={"surface": surface})
+            surface = {"kind": "uniform", "emissivity": 0.5}
+            study = study.model_copy(
+                update={"surface": Declared[UniformEmissivity].model_validate(surface)}
+            )
         coarse = _coarse(scene)
         start = _start(coarse or scene, study.camera.integration_time)
         place = _places(scene, start, study.camera.integration_time)

@@ -99,7 +99,7 @@ class Door(AuthProvider):  # type: ignore[misc]
         return handler.get_cookie(_cookie_name(handler), "") or ""
 
 
-class _Closed(RequestHandler):
+class _Closed(RequestHandler):  # type: ignore[misc]
     def get(self) -> None:
         self.set_status(403)
         self.finish("Open the address that chipglow app printed: it holds a token.")
@@ -150,7 +150,7 @@ class Opened:
 
 
 @stream_request_body
-class Upload(RequestHandler):
+class Upload(RequestHandler):  # type: ignore[misc]
     """Takes a file, piece by piece, and opens it."""
 
     def initialize(self, opened: Opened, door: Door, origins: tuple[str, ...]) -> None:
@@ -168,7 +168,7 @@ class Upload(RequestHandler):
         if length > MOST_UPLOADED:
             self._refuse(413, f"{self._name}: {length} bytes, expected up to {_WORDS}")
             return
-        self.request.connection.set_max_body_size(MOST_UPLOADED)  # type: ignore[union-attr]
+        self.request.connection.set_max_body_size(MOST_UPLOADED)
         self._path = self._opened.folder / f"{secrets.token_urlsafe(12)}.nc"
         self._path.touch(mode=0o600)
 

@@ -59,7 +59,7 @@ _PARTS: Final = (
 )  # fmt: skip
 
 
-class Page(JSComponent):
+class Page(JSComponent):  # type: ignore[misc]
     """What stands around the figures; what changes goes to and fro as messages, see page.js."""
 
     spec = param.String()

@@ -284,6 +284,36 @@ def show(
         show_scene(file, at, plot)
 
 
+@app.command("app")
+def open_app(
+    path: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[PATH]",
+            help="A scene or a measurement, NetCDF, or a folder of results; by default a small "
+            "scene that comes with the program.",
+            show_default=False,
+        ),
+    ] = None,
+    address: Annotated[
+        str,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Where to listen; another than this machine's own lets others in who have the "
+            "printed address, unencrypted.",
+        ),
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(metavar="PORT", help="0 for any that is free.")] = 0,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")
+    ] = True,
+) -> None:
+    """Turn the camera's knobs in a browser and see the error change; ends with Ctrl-C."""
+    from chipglow.cli.serving import serve_app
+
+    serve_app(path, address, port, browser)
+
+
 @app.command()
 def materials(
     name: Annotated[

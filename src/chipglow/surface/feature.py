@@ -132,8 +132,13 @@ class FeatureSurface(Surface):
 
     def without_texture(self) -> Self:
         """The surface with each feature's mean emissivity everywhere on it."""
-        means = {name: Emissivity(getattr(self, name).mean, 0.0) for name in FEATURES}
-        return replace(self, **means)
+        return replace(
+            self,
+            chip=Emissivity(self.chip.mean),
+            shear_band=Emissivity(self.shear_band.mean),
+            workpiece=Emissivity(self.workpiece.mean),
+            tool=Emissivity(self.tool.mean),
+        )
 
     def _texture(self, emissivity: Emissivity, generator: np.random.Generator) -> Texture:
         return Texture.random(

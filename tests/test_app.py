@@ -1,0 +1,367 @@
+"""The app without a browser: its numbers are the library's, its knobs the study's."""
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+from threading import Event
+
+import numpy as np
+import pytest
+
+import chipglow
+from chipglow.app.files import figure_file, measurement_file, study_file
+from chipglow.app.knobs import OWN, UNIFORM
+from chipglow.app.model import MeasurementModel, SceneModel
+from chipglow.app.opening import bundled_path, open_any, open_uploaded
+from chipglow.app.session import Listener, Newest, Session, SupersededError
+from chipglow.camera import expose, expose_all
+from chipglow.errors import LinePlace, error_images, error_parts
+from chipglow.io import is_measurement, open_scene
+from chipglow.io.sources import SourceError
+from chipglow.scene.lines import nearest
+from chipglow.study import Study, fit, load_study
+from chipglow.surface import CHIP_1, UniformSurface
+
+pytest.importorskip("panel", reason="needs the extra app")
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def opened():
+    return open_any(None)
+
+
+@pytest.fixture(scope="module")
+def model(opened):
+    return SceneModel(opened)
+
+
+def seen_by_the_library(study, start):
+    """What the library makes of the bundled scene, by none of the app's ways."""
+    fitted = fit(study, open_scene(bundled_path()))
+    camera = study.camera.on(fitted.scene.raster, study.seed)
+    (surface,) = fitted.surfaces.values()
+    return camera, camera.expose(fitted.scene, surface, start), surface
+
+
+# Every number is the library's
+
+
+STATES = [
+    {},
+    {"start": "440 us", "pitch": "5 um", "offset_right": "2 um"},
+    {"band_lower": "3.5", "integration_time": "7 us", "reflected": "60 degC"},
+    {"psf": "gaussian", "fwhm": "9", "psf_order": "optics", "netd": "0.4", "seed": "7"},
+    {"surface": OWN, "body_mean": "0.6", "band_deviation": "0.01", "lower_limit": "none"},
+    {"surface": UNIFORM, "emissivity": "0.7", "numerical_aperture": "0.4"},
+]
+
+
+@pytest.mark.parametrize("texts", STATES, ids=lambda texts: ", ".join(texts) or "first")
+def test_a_saved_study_gives_the_same_numbers(model, tmp_path, texts):
+    knobs = model.panel.changed(model.panel.initial, texts)
+    picture = model.picture(knobs)
+    file = tmp_path / "study.yaml"
+    file.write_bytes(study_file(model, knobs))
+    study = load_study(file)
+    assert Path(study.scene) == bundled_path()
+    camera, exposure, _ = seen_by_the_library(study, knobs.start)
+    expected = error_images(camera, exposure, study.analysis.reference)
+    np.testing.assert_array_equal(picture.measured, expected.measured)
+    np.testing.assert_array_equal(picture.error, expected.case_1)
+    np.testing.assert_array_equal(picture.flagged, expected.flagged)
+    place = LinePlace("line", study.analysis.lines["across the rake face"])
+    reference, error, _ = place.profile(expected)
+    np.testing.assert_array_equal(picture.lines["rake_line"].measured, reference + error)
+
+
+def test_the_readout_is_that_of_the_pixel_and_the_sample(model):
+    texts = {"netd": "0.5", "cursor": "-40,200", "error": "psf"}
+    knobs = model.panel.changed(model.panel.initial, texts)
+    picture = model.picture(knobs)
+    found = model.readout(picture)
+    study = model.panel.study_of(knobs)
+    camera, exposure, surface = seen_by_the_library(study, knobs.start)
+    scene, at = model.opened.scene, (-40e-6, 200e-6)
+    plain = camera.expose(scene, surface.without_texture(), knobs.start)
+    parts = error_parts(camera, exposure, "maximum", plain)
+    np.testing.assert_array_equal(picture.error, parts.psf)
+    np.testing.assert_array_equal(found.parts.texture, parts.texture)
+    assert found.measured == nearest(parts.errors.measured, parts.errors.raster, at)
+    assert found.uncertainty == camera.calibration(parts.errors.raster.shape).netd(found.measured)
+    frame = scene.frame(int(np.searchsorted(scene.times, knobs.start + 5e-6 + 1e-12)) - 1)
+    assert found.true == nearest(frame.temperature, scene.raster, at)
+    laid = camera.lay(surface, scene).emissivity(frame)
+    assert found.emissivity == nearest(laid, scene.raster, at)
+
+
+def test_draws_are_those_of_other_pixels_and_textures(model):
+    knobs = model.panel.initial
+    told = []
+    found = model.drawn(knobs, 2, 2, told.append)
+    assert told == sorted(told) and told[-1] == 1.0
+    assert found.error.values.shape == (2, 4)
+    camera, _, surface = seen_by_the_library(model.panel.study_of(knobs), knobs.start)
+    second = replace(camera, offset=(camera.pitch / 2, 0.0))
+    exposure = camera.expose(model.opened.scene, surface.redrawn(1), knobs.start)
+    errors = error_images(second, exposure)
+    assert found.error.values[1, 1] == nearest(errors.case_1, errors.raster, knobs.cursor)
+    profile = LinePlace("line", knobs.band_line).profile(errors)
+    # Measured less reference is the error but for rounding.
+    np.testing.assert_allclose(found.lines["band_line"].error[5], profile[1], atol=1e-9)
+
+
+def test_a_quick_look_is_the_same_scene_on_fewer_samples(model):
+    coarse, scene = model.opened.coarse, model.opened.scene
+    step = round(coarse.raster.spacing / scene.raster.spacing)
+    fine, few = scene.frame(20), coarse.frame(20)
+    middles = slice(step // 2, None, step)
+    rows, columns = coarse.raster.shape
+    kept = fine.material[middles, middles][:rows, :columns]
+    assert step == 2 and coarse.raster.rows == scene.raster.rows // 2
+    # Middles of an even number of samples lie between them, half a sample off.
+    alike = np.abs(fine.temperature[middles, middles][:rows, :columns] - few.temperature) < 40
+    assert alike[(kept == few.material)].mean() > 0.99
+    quick = model.picture(model.panel.initial, quick=True)
+    exact = model.picture(model.panel.initial)
+    assert quick.coarse and not exact.coarse
+    known = ~(quick.flagged | exact.flagged)
+    assert np.median(np.abs(quick.measured - exact.measured)[known]) < 3.0
+
+
+# Knobs and files
+
+
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [
+        ({"pitch": "-3 um"}, "Pixel pitch: -3 um is not over 0"),
+        ({"pitch": "5 kg"}, "expected one such as 6 um"),
+        ({"numerical_aperture": "1.5"}, "expected"),
+        ({"surface": OWN, "body_mean": "2"}, "body.mean: 2, expected 0 to 1"),
+        ({"band_lower": "6"}, "reversed"),
+        ({"psf": "sharp"}, "PSF: 'sharp', expected annular-aperture, gaussian, none"),
+        ({"seed": "1.5"}, "Seed: '1.5', expected a number"),
+        ({"rake_line": "1,2"}, "across the rake face: '1,2', expected 2 different points"),
+        ({"cursor": "here"}, "cursor: 'here', expected positions"),
+        ({"zoom": "2"}, "zoom: unknown knob"),
+    ],
+)
+def test_what_a_knob_cannot_be_is_one_clear_error(model, texts, said):
+    with pytest.raises(ValueError) as error:
+        model.panel.changed(model.panel.initial, texts)
+    assert said in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_link_brings_the_state_back(model):
+    texts = {
+        "start": "441.5 us",
+        "psf": "none",
+        "lower_limit": "none",
+        "band_line": "-310,90;-250,200",
+    }
+    knobs = model.panel.changed(model.panel.initial, texts)
+    assert model.panel.changed(model.panel.initial, model.panel.texts(knobs)) == knobs
+    assert model.panel.texts(model.panel.initial) == {}
+
+
+def test_what_is_saved_can_be_opened(model, tmp_path):
+    picture = model.picture(model.panel.initial)
+    file = tmp_path / "measurement.nc"
+    file.write_bytes(measurement_file(picture, model))
+    assert is_measurement(file)
+    again = open_uploaded(file, "mine.nc")
+    assert again.name == "mine.nc"
+    shown = MeasurementModel(again)
+    seen = shown.picture(shown.panel.initial)
+    np.testing.assert_array_equal(seen.flagged, picture.flagged)
+    usable = ~picture.flagged
+    np.testing.assert_array_equal(seen.measured[usable], picture.measured[usable])
+    assert shown.readout(seen).parts is None
+    assert figure_file(picture, model).startswith(b"\x89PNG")
+
+
+def test_what_is_no_scene_is_refused_by_its_own_name(tmp_path):
+    file = tmp_path / "x7y8.nc"
+    file.write_bytes(b"no scene at all")
+    with pytest.raises(SourceError, match=r"^my scene\.nc: "):
+        open_uploaded(file, "my scene.nc")
+    with pytest.raises(FileNotFoundError, match="expected a folder of results"):
+        open_any(tmp_path)
+    with pytest.raises(FileNotFoundError, match="there is no such file"):
+        open_any(tmp_path / "nothing.nc")
+
+
+def test_the_bundled_scene_is_small_and_says_where_it_is_from():
+    path = bundled_path()
+    attributes = open_scene(path).data.attrs
+    assert path.stat().st_size < 1e6
+    assert "docs/app_scene.py" in attributes["origin"] and "quick study" in attributes["origin"]
+    assert int(attributes["solver_version"]) > 0
+
+
+def test_a_scene_of_temperature_alone_is_seen_with_one_emissivity(tmp_path):
+    raster = chipglow.scene.Raster(0.0, 60e-6, 2e-6, 30, 40)
+    hot = np.full((1, 30, 40), 900.0)
+    scene = chipglow.Scene.from_fields(raster, [0.0], {"temperature": hot})
+    view = chipglow.explore(scene)
+    assert "plastic_strain" not in view.spec
+    opened = open_any(None)
+    assert opened.panel.knob("shown").choices.keys() >= {"speed", "plastic_strain"}
+
+
+# Sessions
+
+
+class Heard:
+    """A listener that keeps what it hears."""
+
+    def __init__(self):
+        self.pictures, self.readouts, self.failures = [], [], []
+        self.listener = Listener(
+            picture=lambda number, picture: self.pictures.append(picture),
+            readout=lambda picture, found: self.readouts.append(found),
+            drawn=lambda drawn: None,
+            progress=lambda done: None,
+            failed=self.failures.append,
+        )
+
+
+def test_two_sessions_on_one_scene_do_not_disturb_each_other(opened):
+    heard = Heard(), Heard()
+    first, second = (Session(opened, one.listener) for one in heard)
+    first.turn({"pitch": "5 um"})
+    second.turn({"pitch": "8 um"})
+    assert first.settle() and second.settle()
+    first.turn({"emissivity": "0.3"})
+    first.undo()
+    assert first.settle()
+    assert [session.knobs.pitch for session in (first, second)] == [5e-6, 8e-6]
+    assert [one.pictures[-1].raster.spacing for one in heard] == [5e-6, 8e-6]
+    assert heard[0].failures == heard[1].failures == []
+    first.end()
+    second.end()
+
+
+def test_undo_goes_back_knob_by_knob(opened):
+    session = Session(opened, Heard().listener)
+    assert not session.can_undo
+    session.turn({"pitch": "5 um"})
+    for pitch in ("5.5 um", "6.5 um", "7 um"):
+        session.turn({"pitch": pitch}, final=pitch == "7 um")
+    session.turn({"psf": "none"})
+    session.undo()
+    assert (session.knobs.psf, session.knobs.pitch) == ("annular-aperture", 7e-6)
+    session.undo()
+    assert session.knobs.pitch == 5e-6
+    session.undo()
+    assert session.knobs == session.model.panel.initial and not session.can_undo
+    session.end()
+
+
+def test_what_is_not_possible_on_the_scene_is_said(opened):
+    heard = Heard()
+    session = Session(opened, heard.listener)
+    session.turn({"integration_time": "60 us"})
+    assert session.settle()
+    assert "is not within the scene" in heard.failures[0]
+    session.end()
+
+
+def test_only_the_newest_job_is_done():
+    begun, go, done = Event(), Event(), []
+
+    def work(job):
+        begun.set()
+        go.wait(10)
+        done.append(job)
+
+    newest = Newest(work, done.append)
+    newest.ask("first")
+    assert begun.wait(10)
+    for job in ("second", "third", "fourth"):
+        newest.ask(job)
+    assert newest.superseded
+    go.set()
+    assert newest.settle(10)
+    assert done == ["first", "fourth"]
+    newest.end()
+
+
+def test_a_pass_that_nobody_waits_for_ends_early(opened):
+    scene, camera = opened.scene, Study().camera.build()
+    field = camera.lay(CHIP_1, scene)
+    start = opened.panel.initial.start
+    calls = []
+
+    def check():
+        calls.append(1)
+        raise SupersededError
+
+    with pytest.raises(SupersededError):
+        expose_all(scene, (field,), camera.band, start, 10e-6, check=check)
+    assert calls
+    whole = expose(scene, field, camera.band, start, 10e-6)
+    (again,) = expose_all(scene, (field,), camera.band, start, 10e-6, check=lambda: None)
+    np.testing.assert_array_equal(whole.mean_radiance, again.mean_radiance)
+
+
+# Parts of the error
+
+
+def test_parts_sum_to_the_error_and_vanish_with_their_effects(opened):
+    scene, start = opened.scene, opened.panel.initial.start
+    camera = Study(camera={"psf": "none", "lower_limit": "none"}).camera.build()
+    exposure = camera.expose(scene, CHIP_1, start)
+    for reference in ("maximum", "mean", "centre", "true"):
+        parts = error_parts(camera, exposure, reference)
+        whole = parts.emissivity + parts.motion + parts.footprint + parts.psf + parts.detector
+        # Sums of differences of the same five images.
+        np.testing.assert_allclose(whole, parts.errors.case_1, atol=1e-9)
+        assert not np.nan_to_num(parts.psf).any() and not np.nan_to_num(parts.detector).any()
+    paper = error_parts(Study().camera.build(), exposure)
+    assert np.nanmax(np.abs(paper.psf)) > 5 and not np.nan_to_num(paper.emissivity).any()
+    # Nothing is over its maximum, but for the rounding of 32 bits.
+    assert np.nanmax(paper.motion) <= 1e-3 and np.nanmax(paper.footprint) <= 1e-3
+    smooth = camera.expose(scene, CHIP_1.without_texture(), start)
+    textured = error_parts(camera, exposure, "maximum", smooth)
+    assert np.nanmax(np.abs(textured.texture)) > 5
+    plain = error_parts(camera, smooth, "maximum", smooth)
+    assert not np.nan_to_num(plain.texture).any()
+    still = replace(exposure, peak_radiance=exposure.mean_radiance.astype(np.float32))
+    assert not np.nan_to_num(error_parts(camera, still).motion).any()
+    true = error_parts(camera, camera.expose(scene, UniformSurface(1.0), start), "true")
+    # A blackbody's radiance temperature is its own, but for rounding.
+    assert np.nanmax(np.abs(true.emissivity)) < 0.1
+
+
+# The room
+
+
+def test_nothing_but_the_command_line_imports_the_app():
+    source = ROOT / "src" / "chipglow"
+    found = set()
+    for path in source.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            if isinstance(node, ast.Import):
+                names = [one.name for one in node.names]
+            if any(name == "chipglow.app" or name.startswith("chipglow.app.") for name in names):
+                found.add(path.relative_to(source).parts[0])
+    assert found == {"app", "cli"}
+
+
+def test_the_app_knows_no_room_above_the_study():
+    rooms = set()
+    for path in (ROOT / "src" / "chipglow" / "app").glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("chipglow."):
+                rooms.add(node.module.split(".")[1])
+    assert rooms.isdisjoint({"cli", "report", "cutting"})
+
+
+def test_a_missing_panel_is_named_with_its_extra(monkeypatch):
+    monkeypatch.setattr("chipglow.app.exploring.find_spec", lambda name: None)
+    with pytest.raises(ValueError, match=r"expected pip install 'chipglow\[app\]'"):
+        chipglow.explore()

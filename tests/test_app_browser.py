@@ -1,0 +1,295 @@
+"""The app in Debian's Chromium: one server, and pages that are used as a user does.
+
+Without Chromium or Playwright these tests are skipped. CHIPGLOW_CHROMIUM names another browser.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import numpy as np
+import pytest
+
+from chipglow.app.model import SceneModel
+from chipglow.app.opening import open_any
+from chipglow.io import open_scene
+from chipglow.study import fit, load_study
+
+CHROMIUM = os.environ.get("CHIPGLOW_CHROMIUM") or shutil.which("chromium")
+FLAGS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+)  # fmt: skip
+PATIENCE = 60_000  # ms: of a machine with much else to do
+
+pytest.importorskip("panel", reason="needs the extra app")
+playwright = pytest.importorskip("playwright.sync_api", reason="needs Playwright")
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium, which is not installed")
+
+EXACT = "Exact picture"
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    """Address of the app, as the command prints it."""
+    command = [sys.executable, "-m", "chipglow", "app", "--no-browser"]
+    environment = {**os.environ, "TMPDIR": str(tmp_path_factory.mktemp("uploads"))}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, encoding="utf-8", env=environment
+    ) as process:
+        yield re.search(r"http://\S+", process.stdout.readline())[0]
+        process.terminate()
+        process.wait(30)
+    assert os.listdir(environment["TMPDIR"]) == []
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def visit(server, chromium):
+    """Open pages, each a user of their own; nothing may go wrong in them or leave the machine."""
+    contexts, wrong = [], []
+
+    def opened(query=""):
+        context = chromium.new_context(viewport={"width": 1280, "height": 800})
+        context.set_default_timeout(PATIENCE)
+        contexts.append(context)
+        page = context.new_page()
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
+        page.on("request", lambda one: None if local(one.url) else wrong.append(one.url))
+        page.goto(server + query)
+        ready(page)
+        return page
+
+    yield opened
+    for context in contexts:
+        context.close()
+    refused = "Failed to load resource: the server responded with a status of 400"
+    assert [one for one in wrong if not one.startswith(refused)] == []
+
+
+@pytest.fixture(scope="module")
+def model():
+    return SceneModel(open_any(None))
+
+
+def local(url):
+    return url.startswith(("http://127.0.0.1:", "data:", "blob:"))
+
+
+def ready(page):
+    """Wait for the exact picture and its numbers."""
+    page.locator("#status", has_text=EXACT).wait_for()
+    page.get_by_role("table", name="Parts of the error").wait_for()
+
+
+def number(page, row):
+    """A number at the cursor as the page shows it."""
+    return page.locator(".numbers tr", has=page.get_by_role("rowheader", name=row, exact=True))
+
+
+def turn(page, label, text):
+    field = page.get_by_label(label, exact=True).and_(page.locator("input[type=text]"))
+    field.fill(text)
+    field.press("Enter")
+
+
+def expected(model, texts):
+    """What the library measures at the cursor, as the page writes it."""
+    knobs = model.panel.changed(model.panel.initial, texts)
+    found = model.readout(model.picture(knobs))
+    return f"{found.measured - 273.15:.1f} °C"
+
+
+def place(page, figure, x, y):
+    """Where a point of a figure in µm is on the screen."""
+    return page.evaluate(
+        """([name, x, y]) => {
+          const model = Bokeh.documents[0].get_model_by_name(name);
+          const view = Bokeh.index.find_one_by_id(model.id);
+          const box = view.canvas_view.el.getBoundingClientRect();
+          return [box.x + view.frame.x_scale.compute(x), box.y + view.frame.y_scale.compute(y)];
+        }""",
+        [figure, x, y],
+    )
+
+
+def test_a_page_opens_only_with_the_token(server, visit, model):
+    for wrong in (server.split("?")[0], re.sub(r"token=.*", "token=x", server)):
+        with pytest.raises(HTTPError) as refused:
+            urlopen(wrong)
+        assert refused.value.code == 403
+    port = server.split("?")[0]
+    for headers in ({"Origin": "http://elsewhere.org"}, {}):
+        token = server.split("?")[1]
+        with pytest.raises(HTTPError) as refused:
+            urlopen(Request(f"{port}upload?{token}", b"x", headers))
+        assert refused.value.code == 403
+    page = visit()
+    assert "token" not in page.url
+    assert expected(model, {}) in number(page, "measured").inner_text()
+    assert page.get_by_label("Pixel pitch", exact=True).first.input_value() == "6"
+
+
+def test_knobs_change_what_the_library_says(visit, model):
+    page = visit()
+    for label, text, texts in (
+        ("Pixel pitch", "5", {"pitch": "5"}),
+        ("Numerical aperture", "0.2", {"pitch": "5", "numerical_aperture": "0.2"}),
+    ):
+        turn(page, label, text)
+        number(page, "measured").get_by_text(expected(model, texts)).wait_for()
+    page.get_by_label("Emissivity", exact=True).select_option("uniform")
+    texts["surface"] = "uniform"
+    number(page, "measured").get_by_text(expected(model, texts)).wait_for()
+    assert not page.get_by_label("Chip, mean").first.is_visible()
+    slider = page.get_by_role("slider", name="Uniform emissivity")
+    slider.press("ArrowRight")
+    texts["emissivity"] = "0.51"
+    number(page, "measured").get_by_text(expected(model, texts)).wait_for()
+    page.get_by_role("button", name="Undo").click()
+    texts["emissivity"] = "0.5"
+    number(page, "measured").get_by_text(expected(model, texts)).wait_for()
+
+
+def test_a_wrong_number_is_said_and_changes_nothing(visit, model):
+    page = visit()
+    turn(page, "Pixel pitch", "-5")
+    page.locator("#status.error", has_text="Pixel pitch: -5 um is not over 0").wait_for()
+    field = page.locator("#knob-pitch")
+    assert field.get_attribute("aria-invalid") == "true"
+    assert expected(model, {}) in number(page, "measured").inner_text()
+    turn(page, "Exposure", "90")
+    page.locator("#status.error", has_text="is not within the scene").wait_for()
+
+
+def test_a_line_and_the_cursor_are_dragged(visit, model):
+    page = visit()
+    (x, y), _ = model.panel.initial.band_line
+    start = place(page, "measured_figure", 1e6 * x, 1e6 * y)
+    end = place(page, "measured_figure", -400, 150)
+    page.mouse.move(*start)
+    page.mouse.down()
+    page.mouse.move((start[0] + end[0]) / 2, (start[1] + end[1]) / 2)
+    page.mouse.move(*end)
+    page.mouse.up()
+    ends = page.locator("#place-band_line")
+    page.wait_for_function("one => one.value.startsWith('-4') || one.value.startsWith('-39')",
+                           arg=ends.element_handle())  # fmt: skip
+    found = [float(one) for one in re.split("[,;]", ends.input_value())]
+    pixel = 660 / 290  # µm on the screen, about
+    assert np.hypot(found[0] + 400, found[1] - 150) < 3 * pixel
+    moved = {"band_line": ends.input_value()}
+    knobs = model.panel.changed(model.panel.initial, moved)
+    shown = page.evaluate("""async () => {
+      const source = Bokeh.documents[0].get_model_by_name("band_line_values");
+      return Array.from(source.data.measured);
+    }""")
+    values = model.picture(knobs).lines["band_line"].measured - 273.15
+    np.testing.assert_allclose(shown, values, atol=1e-6)
+    page.mouse.click(*place(page, "error_figure", -100, 300))
+    page.wait_for_function("one => one.value.startsWith('-10') || one.value.startsWith('-99')",
+                           arg=page.locator("#place-cursor").element_handle())  # fmt: skip
+    cursor = page.locator("#place-cursor").input_value()
+    text = expected(model, {"cursor": cursor})
+    number(page, "measured").get_by_text(text).wait_for()
+
+
+def test_downloads_hold_what_is_shown(visit, tmp_path, model):
+    page = visit("&pitch=5+um&start=440+us")
+    with page.expect_download() as started:
+        page.get_by_role("button", name="study.yaml").click()
+    file = tmp_path / "study.yaml"
+    started.value.save_as(file)
+    study = load_study(file)
+    assert study.camera.pitch == 5e-6
+    assert "--start '440 us'" in file.read_text(encoding="utf-8").splitlines()[1]
+    fitted = fit(study, open_scene(study.scene))
+    (surface,) = fitted.surfaces.values()
+    camera = study.camera.on(fitted.scene.raster, study.seed)
+    measured = camera.measure(fitted.scene, surface, 440e-6)
+    with page.expect_download() as started:
+        page.get_by_role("button", name="NetCDF").click()
+    saved = tmp_path / "measurement.nc"
+    started.value.save_as(saved)
+    opened = open_any(saved)
+    np.testing.assert_array_equal(opened.measurement.radiance, measured.radiance)
+    with page.expect_download() as started:
+        page.get_by_role("button", name="Figure").click()
+    assert started.value.suggested_filename == "chipglow.png"
+    # What was saved is opened again, and it has no knobs of a camera.
+    page.locator("input[type=file]").set_input_files(saved)
+    page.wait_for_url("**open=*")
+    page.get_by_text(saved.name, exact=True).wait_for()
+    page.locator("#status", has_text=EXACT).wait_for()
+    assert page.get_by_label("Pixel pitch").count() == 0
+    assert number(page, "measured").is_visible()
+
+
+def test_a_wrong_file_is_one_clear_error(visit, tmp_path):
+    page = visit()
+    file = tmp_path / "holiday.nc"
+    file.write_bytes(b"no scene" * 100)
+    page.locator("input[type=file]").set_input_files(file)
+    status = page.locator("#status.error")
+    status.wait_for()
+    said = status.inner_text()
+    assert said.startswith("holiday.nc: ") and "not a scene" in said and "/" not in said
+    assert number(page, "measured").is_visible()
+
+
+def test_reloading_brings_the_state_back_and_sessions_stay_apart(visit, model):
+    first, second = visit("&pitch=5+um"), visit()
+    turn(second, "Pixel pitch", "8")
+    turn(first, "Numerical aperture", "0.3")
+    texts = {"pitch": "5", "numerical_aperture": "0.3"}
+    number(first, "measured").get_by_text(expected(model, texts)).wait_for()
+    number(second, "measured").get_by_text(expected(model, {"pitch": "8"})).wait_for()
+    assert "pitch=5" in first.url and "numerical_aperture=0.3" in first.url
+    first.reload()
+    ready(first)
+    number(first, "measured").get_by_text(expected(model, texts)).wait_for()
+    assert first.locator("#knob-pitch").input_value() == "5"
+    assert second.locator("#knob-pitch").input_value() == "8"
+
+
+def test_draws_show_progress_and_can_be_cancelled(visit):
+    page = visit("&surface=uniform")
+    page.get_by_role("button", name="Draw phases").click()
+    page.get_by_role("progressbar", name="Progress").wait_for()
+    page.get_by_role("button", name="Cancel").click()
+    page.locator("#status", has_text="was cancelled").wait_for()
+    assert not page.get_by_role("progressbar", name="Progress").is_visible()
+    page.get_by_role("button", name="Draw phases").click()
+    page.locator("#status", has_text="over 9 draws").wait_for()
+
+
+def test_all_is_reached_by_the_keyboard_in_either_theme(visit):
+    page = visit()
+    reached = set()
+    page.locator("button", has_text="Open…").focus()
+    for _ in range(70):
+        name = page.evaluate("""() => {
+          let one = document.activeElement;
+          while (one?.shadowRoot?.activeElement) one = one.shadowRoot.activeElement;
+          return one ? (one.id || one.textContent || one.getAttribute("aria-label")) : "";
+        }""")
+        reached.add(name)
+        page.keyboard.press("Tab")
+    assert {"knob-pitch", "Pixel pitch", "place-cursor", "place-rake_line", "draw"} <= reached
+    themes = set()
+    for _ in range(2):
+        page.locator("#theme").press("Enter")
+        themes.add(page.evaluate("getComputedStyle(document.body).backgroundColor"))
+    assert len(themes) == 2
