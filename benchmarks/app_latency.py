@@ -11,6 +11,7 @@ splines or samples.
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -18,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-CHROMIUM = os.environ.get("CHIPGLOW_CHROMIUM", "/usr/bin/chromium")
+CHROMIUM = os.environ.get("CHIPGLOW_CHROMIUM") or shutil.which("chromium")
 FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",

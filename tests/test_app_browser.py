@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
@@ -24,7 +25,7 @@ FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
 )  # fmt: skip
-PATIENCE = 60_000  # ms: of a machine with much else to do
+PATIENCE = 180_000  # ms: of a machine with much else to do
 
 pytest.importorskip("panel", reason="needs the extra app")
 playwright = pytest.importorskip("playwright.sync_api", reason="needs Playwright")
@@ -44,7 +45,7 @@ def server(tmp_path_factory):
         yield re.search(r"http://\S+", process.stdout.readline())[0]
         process.terminate()
         process.wait(30)
-    assert os.listdir(environment["TMPDIR"]) == []
+    assert list(Path(environment["TMPDIR"]).iterdir()) == []
 
 
 @pytest.fixture(scope="module")

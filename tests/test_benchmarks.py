@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -23,6 +24,10 @@ NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|\bnan\b|\binf\b")
 
 # What each program is called with, and rows of its table with the numbers that each holds at least.
 PROGRAMS = {
+    "app_latency.py": (
+        "--turns 2 --knobs Seed",
+        {"Seed": 5, "all": 4, "opened, with the process": 2, "memory": 3},
+    ),
     "band_width.py": (COARSEST, {f"| {COARSEST} |": 7}),
     "calibration.py": ("--repeats 2", {"| none |": 5, "| 15 counts": 6, "| 3 points": 6}),
     "camera_pass.py": (
@@ -78,6 +83,7 @@ PROGRAMS = {
     "warm_tool.py": (f"--cell {COARSEST} --length 0.4", {"cold": 5, "steady": 5}),
 }
 NEEDED = {
+    "app_latency.py": ("panel", "playwright"),
     "fuzz/fuzz.py": ("hypothesis", "lasso", "pyvista", "tifffile", "zarr"),
     "movie_codecs.py": ("av",),
     "movie_matrix.py": ("av",),
@@ -125,6 +131,10 @@ def test_every_program_is_run():
 def test_a_program_prints_its_table(program, tmp_path):
     for package in NEEDED.get(program, ()):
         pytest.importorskip(package)
+    if program == "app_latency.py" and not (
+        os.environ.get("CHIPGLOW_CHROMIUM") or shutil.which("chromium")
+    ):
+        pytest.skip("needs Chromium, which is not installed")
     if program == "fuzz/fuzz.py" and sys.platform != "linux":
         pytest.skip("fuzz.py limits its forks as Linux does")
     printed = run(program, tmp_path)

@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from chipglow.scene import Scene
-from chipglow.study import Study
+if TYPE_CHECKING:
+    from chipglow.scene import Scene
+    from chipglow.study import Study
 
 
-def explore(scene: Scene | str | Path | None = None, study: Study | None = None) -> Any:
+def explore(scene: "Scene | str | Path | None" = None, study: "Study | None" = None) -> Any:
     """Look at a scene with a camera whose knobs can be turned: the app's page in a notebook.
 
     Parameters
@@ -34,6 +35,8 @@ def explore(scene: Scene | str | Path | None = None, study: Study | None = None)
 
     from chipglow.app.opening import OpenedScene, open_any
     from chipglow.app.view import View
+    from chipglow.scene import Scene
+    from chipglow.study import Study
 
     pn.extension()
     if isinstance(scene, Scene):

@@ -1,6 +1,5 @@
 """What the app opens: a scene, a folder of results, a measurement, or the scene that it brings."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.resources import files
@@ -12,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.app.knobs import ControlPanel, Ends, Point, knobs_of
+from chipglow.app.probing import probed
 from chipglow.camera import Measurement
 from chipglow.errors.starts import spread_starts
 from chipglow.io import StoredScene, is_measurement, open_scene, read_measurement
-from chipglow.io.sandbox import Message, Sandbox, patience_for
+from chipglow.io.sandbox import Sandbox, patience_for
 from chipglow.laboratory.chip import Instant, contact_length
 from chipglow.quantities import Declared
 from chipglow.scene import Material, Raster, Scene
@@ -31,6 +31,9 @@ MOST_UPLOADED: Final = 512 * 1024**2
 
 _REACH: Final = 60e-6
 """Reach of the lines to either side of rake face and shear band in m: the paper's."""
+
+_PATIENCE: Final = 4.0
+"""Times as long as an import may take to answer: the server has other work besides."""
 
 _STARTS: Final = 17
 _TOUCHING: Final = 3e-6
@@ -152,7 +155,8 @@ def open_uploaded(path: Path, name: str) -> OpenedScene | OpenedMeasurement:
     ValueError
         If it cannot be read, or asks for more time or memory than an import may have.
     """
-    with Sandbox(name, patience_for((str(path),))).answers(partial(_probed, path)) as answers:
+    patience = _PATIENCE * patience_for((str(path),))
+    with Sandbox(name, patience).answers(partial(probed, path, name)) as answers:
         next(answers)
     try:
         opened = open_any(path)
@@ -166,16 +170,6 @@ def open_uploaded(path: Path, name: str) -> OpenedScene | OpenedMeasurement:
 def bundled_path() -> Path:
     """File of the scene that comes with the app."""
     return Path(str(files("chipglow.app").joinpath("scene.nc")))
-
-
-def _probed(path: Path) -> Iterator[Message]:
-    """Read what opening will read; for a subprocess."""
-    if is_measurement(path):
-        yield Message({"frames": len(read_measurement(path))})
-        return
-    scene = open_scene(path)
-    scene.frame(len(scene) // 2)
-    yield Message({"frames": len(scene)})
 
 
 def _results(folder: Path) -> OpenedScene:

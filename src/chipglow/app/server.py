@@ -259,6 +259,8 @@ class App:
         self.server.start()
         try:
             self.server.io_loop.start()
+        except KeyboardInterrupt:
+            pass
         finally:
             self.stop()
 
