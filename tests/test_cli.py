@@ -5,10 +5,12 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from json import dumps, loads
+from pathlib import Path
 
 import numpy as np
 import pytest
 import typer
+import yaml
 from analytic_chip import AnalyticChip
 from typer.testing import CliRunner
 
@@ -28,6 +30,7 @@ from chipglow.scene import Area, Material, Raster
 from chipglow.study import Study, cut, load_study
 from chipglow.surface import UniformSurface
 
+ROOT = Path(__file__).parents[1]
 RASTER = AnalyticChip().raster
 STUDY = f"""
 title: A chip in closed form
@@ -153,6 +156,10 @@ def test_run_writes_a_report_and_prints_the_comparison(folder, runs):
     for heading in ("quantity", "the paper", "here", "range of draws", "differs", "−42", "90"):
         assert heading in result.output
     assert "Warning: The edge radius, 20 um, is 2 cells, expected 5 or more" in result.stdout
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    last = result.stdout.splitlines()[-1]
+    assert last.startswith(f"Cite as: The chipglow developers: chipglow {citation['version']}.")
+    assert citation["references"][0]["title"] in last
     names = {path.name for path in (folder / "results").iterdir()}
     assert {"report.html", "summary.json", "results.nc", "study.yaml", "figures"} <= names
     assert load_study("results/study.yaml") == load_study("study.yaml")

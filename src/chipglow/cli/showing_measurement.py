@@ -5,12 +5,11 @@ from math import degrees
 from pathlib import Path
 from typing import Final
 
-from rich.console import Console
-
 from chipglow.camera import Flag, Measurement
 from chipglow.cli.assumed import say_of_measurements
 from chipglow.cli.pictures import write_picture
-from chipglow.cli.showing import attribute_rows, listed, microseconds, where_and_when
+from chipglow.cli.screen import current
+from chipglow.cli.showing import microseconds, raster_values, show_attributes, where_and_when
 from chipglow.cli.times import parse_instant
 from chipglow.io import read_measurement
 from chipglow.laboratory.measurement import (
@@ -67,16 +66,15 @@ def say_measurement(measurement: Measurement, time: float | None = None) -> None
         summary = measurement_summary(measurement, time)
     except ValueError as error:
         raise ValueError(f"--at: {error}") from None
-    console = Console(highlight=False, markup=False)
-    console.print(listed(_facts(measurement, summary)))
+    screen = current()
+    screen.facts("measurement", _facts(measurement, summary))
+    screen.values(raster_values(measurement.raster, measurement.times))
     attributes = {
         str(name): value
         for name, value in measurement.data.attrs.items()
         if not str(name).startswith(_SAID_APART) and name not in _IN_FACTS
     }
-    if attributes:
-        console.print("\nAttributes:")
-        console.print(listed(attribute_rows(attributes)))
+    show_attributes(attributes)
     say_of_measurements(measurement)
 
 

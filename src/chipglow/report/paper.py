@@ -36,6 +36,13 @@ class PaperValues:
 PAPER: Final = PaperValues()
 
 
+REFERENCE: Final = (
+    "J. C. Heigel, E. P. Whitenton: The effects of emissivity and camera point spread function on "
+    "the temperature measurement of segmented chip formation using infrared thermography. "
+    "Proceedings of the ASME International Manufacturing Science and Engineering Conference, 2010."
+)
+
+
 def stands_beside(result: StudyResult) -> bool:
     """Whether the paper's figures may stand beside a result: its study cuts and looks as it did."""
     study = result.plan.study

@@ -22,15 +22,9 @@ from chipglow.report.page import (
     table_part,
     write_files,
 )
-from chipglow.report.paper import EmissivityTexts, stands_beside, table_1
+from chipglow.report.paper import REFERENCE, EmissivityTexts, stands_beside, table_1
 from chipglow.report.results import results_dataset, summary
 from chipglow.report.steady_tool import steady_tool_part, steady_tool_summary, tool_rows
-
-_PAPER: Final = (
-    "J. C. Heigel, E. P. Whitenton: The effects of emissivity and camera point spread function on "
-    "the temperature measurement of segmented chip formation using infrared thermography. "
-    "Proceedings of the ASME International Manufacturing Science and Engineering Conference, 2010."
-)
 
 _BESIDE_PAPER: Final = {
     "comparison": "The paper beside this study",
@@ -244,5 +238,5 @@ def _citation() -> str:
     own = f"chipglow {__version__}: a virtual infrared camera for metal cutting."
     return (
         f"<p>This program: {escape(own)} Name the version and attach the study above.</p>\n"
-        f"<p>The method: {escape(_PAPER)}</p>"
+        f"<p>The method: {escape(REFERENCE)}</p>"
     )
