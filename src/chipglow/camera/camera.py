@@ -388,7 +388,8 @@ class Camera:
         Returns
         -------
         Measurement
-            As many frames as starts; it tells the scene's tool.
+            As many frames as starts. It states the scene's tool, and in its attributes camera and
+            surface: every effect that made it.
 
         Raises
         ------
@@ -401,6 +402,7 @@ class Camera:
             expose(scene, emissivity, self.band, at, self.integration_time, self.reflected)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
         )
+        measured = Measurement(measured.data.assign_attrs(emissivity=repr(surface)))
         return measured.with_tool(scene.tool) if scene.tool else measured
 
     def light_from_beyond(self, scene: Raster) -> NDArray[np.float64]:
