@@ -201,7 +201,7 @@ class Camera:
 
     @classmethod
     def paper(cls) -> "Camera":
-        """The camera of the paper's simulation, as far as the paper tells it.
+        """The camera of the paper's simulation, as far as the paper states it.
 
         The blur is applied from pixel to pixel (`psf_order` is ``detector``), as in its Figure 6:
         that is what it differs in from `Camera()`, by up to 7 K. The point spread function, which
@@ -526,7 +526,7 @@ class Camera:
         Returns
         -------
         radiance : ndarray
-            As the camera tells it; without a detector the images themselves.
+            As the camera reads it; without a detector the images themselves.
         flags : ndarray or None
             Sums of `Flag`, uint8, of the same shape; None without a detector.
         """

@@ -114,14 +114,14 @@ class SpectralTable(SpectralSurface):
         """See `SpectralSurface.spectral_emissivity`."""
         wavelengths, temperatures, values = self._grid
         table = values.reshape(wavelengths.size, temperatures.size)
-        first, share = _between(wavelengths, np.asarray(wavelength, np.float64))
+        first, weight = _between(wavelengths, np.asarray(wavelength, np.float64))
         lower, part = _between(temperatures, np.asarray(temperature, np.float64))
         last, upper = (
             np.minimum(at + 1, axis.size - 1)
             for at, axis in ((first, wavelengths), (lower, temperatures))
         )
-        cold = (1 - share) * table[first, lower] + share * table[last, lower]
-        hot = (1 - share) * table[first, upper] + share * table[last, upper]
+        cold = (1 - weight) * table[first, lower] + weight * table[last, lower]
+        hot = (1 - weight) * table[first, upper] + weight * table[last, upper]
         return np.asarray((1 - part) * cold + part * hot, np.float64)
 
 
