@@ -154,13 +154,13 @@ def _print_table(result: StudyResult | SceneErrors) -> None:
     """The paper's figures beside ours; of any scene the error at each place."""
     if isinstance(result, StudyResult):
         beside = stands_beside(result)
-        heads = ("the paper", "here", "range of draws", "differs")
+        heads = ("the paper", "here", "95 % interval", "differs")
         table = Table("quantity", *(heads if beside else heads[1:3]))
         for row in comparison_rows(result):
-            texts = (row.paper_text, row.here_text, row.range_text, row.differs_text)
+            texts = (row.paper_text, row.here_text, row.interval_text, row.differs_text)
             table.add_row(row.quantity, *(texts if beside else texts[1:3]))
     else:
-        table = Table("place", "reference", "error", "range", "PSF's portion")
+        table = Table("place", "reference", "error", "95 % interval", "PSF's portion")
         for place in place_rows(result):
             table.add_row(*place)
     Console().print(table)

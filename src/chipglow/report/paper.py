@@ -8,6 +8,12 @@ from chipglow.errors import StudyResult
 from chipglow.study import Study
 from chipglow.surface import Emissivity
 
+CITATION: Final = (
+    "J. C. Heigel, E. P. Whitenton: The effects of emissivity and camera point spread function on "
+    "the temperature measurement of segmented chip formation using infrared thermography. "
+    "Proceedings of the ASME International Manufacturing Science and Engineering Conference, 2010."
+)
+
 
 @dataclass(frozen=True)
 class PaperValue:
