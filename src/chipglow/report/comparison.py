@@ -164,9 +164,11 @@ class CauseRow:
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """Standard deviation and fraction of each cause."""
+        """Standard deviation and fraction of each cause; a dash for one of a single value."""
         return tuple(
             f"{quantity_text(deviation, self.unit, self.decimals)} ({fraction:.0f} %)"
+            if deviation is not None
+            else "–"
             for _, _, deviation, fraction in self.causes
         )
 

@@ -102,7 +102,8 @@ class Player:
             f'<figure class="player" id="{self.name}" data-times="{escape(dumps(self.times))}">\n'
             f"<h3>{escape(self.title)}</h3>\n{self._drawn_once()}\n"
             f'<div class="views" style="--columns: {self.columns}">\n{views}\n</div>\n'
-            f'{self._controls()}<p class="when">{escape(self.times[self.still])}</p>\n'
+            f'<div class="time">{self._controls()}'
+            f'<p class="when">{escape(self.times[self.still])}</p></div>\n'
             f"<figcaption>{shown(self.caption)}</figcaption></figure>"
         )
 
@@ -134,7 +135,7 @@ class Player:
         return (
             '<div class="controls" hidden><button type="button">Play</button>'
             f'<input type="range" min="0" max="{len(self.times) - 1}" value="{self.still}" '
-            'aria-label="Exposure" autocomplete="off"></div>\n'
+            'aria-label="Exposure" autocomplete="off"></div>'
         )
 
     @property
@@ -173,10 +174,10 @@ class Player:
         length = _round_down((right - left) / 4)
         x, y, size = left + (right - left) / 25, -bottom - (top - bottom) / 16, (right - left) / 18
         points = f"{x:.1f},{y:.1f} {x + length:.1f},{y:.1f}"
+        text = f'x="{x:.1f}" y="{y - size / 2:.1f}" font-size="{size:.1f}"'
         return (
-            f'<polyline class="under" points="{points}"/><polyline class="length" '
-            f'points="{points}"/><text class="length" x="{x:.1f}" y="{y - size / 2:.1f}" font-size="{size:.1f}" '
-            f'stroke-width="{size / 6:.2f}">{length:g} {unit}</text>'
+            f'<polyline class="under" points="{points}"/><polyline points="{points}"/>'
+            f'<text {text} stroke-width="{size / 6:.2f}">{length:g} {unit}</text>'
         )
 
 

@@ -121,7 +121,7 @@ def write_report(
             ),
         ),
         Section(
-            "paper",
+            "comparison",
             "The paper beside this study" if stands_beside(result) else "The errors, and figures",
             "\n".join((_comparison(result, compared), *map(figure_part, figures.values()))),
         ),

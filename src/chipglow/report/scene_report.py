@@ -196,10 +196,12 @@ def _answer(result: SceneErrors) -> Iterator[Statement]:
                 continue
             said.add(one.place)
             of_surface = f" ({name})" if len(result.surfaces) > 1 else ""
+            sense = -1.0 if one.error.mean < 0 else 1.0
+            portion = Distribution(sense * one.psf_portion.values, one.psf_portion.causes)
             yield Statement(
                 f"{one.place.capitalize()}, {one.reading}{of_surface}: the camera reads "
                 f"{error_text(one.error)}; the point spread function makes "
-                f"{_mean_text(one.psf_portion)} °C of the error.",
+                f"{_mean_text(portion)} °C of it.",
                 "causes",
             )
 
