@@ -146,7 +146,9 @@ def table_part(text: str, heads: Sequence[str | Term], lines: Iterable[Line]) ->
     """
     names = [head.name if isinstance(head, Term) else head for head in heads]
     first, *numbers = map(_head, heads)
-    head = f"<th>{first}</th>" + "".join(f'<th class="number">{name}</th>' for name in numbers)
+    head = f'<th scope="col">{first}</th>' + "".join(
+        f'<th scope="col" class="number">{name}</th>' for name in numbers
+    )
     body = "\n".join(_row(line, names) for line in lines)
     paragraph = f"<p>{shown(text)}</p>\n" if text else ""
     return f"{paragraph}<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table>"
