@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.errors import Distribution, LocalError, StudyResult
+from chipglow.errors import Distribution, Headline, LocalError, StudyResult
 from chipglow.quantities.format import quantity_text
 from chipglow.report import evidence
 from chipglow.report.page import Term
@@ -211,24 +211,33 @@ def part_rows(result: StudyResult) -> list[PartRow]:
     result : StudyResult
         The study.
     """
+    quantities = {row.key: row.quantity for row in error_rows(result)}
+    return [
+        PartRow(
+            key := f"{name}_error_degC",
+            quantities[key],
+            headline.error,
+            _parts(result, name, headline),
+        )
+        for name, headline in result.draws.headlines.items()
+        if name in ("rake", "band", "band_worst")
+    ]
+
+
+def _parts(result: StudyResult, name: str, headline: Headline) -> dict[str, Distribution]:
+    error, psf = headline.error, headline.psf_portion
+    rest = error.values - psf.values
     motions = {"rake": result.draws.rake_line.motion, "band": result.draws.band_line.motion}
-    found = []
-    for row in error_rows(result):
-        name = row.key.removesuffix("_error_degC")
-        headline = result.draws.headlines.get(name)
-        if name not in ("rake", "band", "band_worst") or headline is None:
-            continue
-        error, psf = headline.error, headline.psf_portion
-        parts, rest = {"psf": psf}, error.values - psf.values
-        # The motion's part is known against the peak of the exposure.
-        if name in motions and result.plan.reference == "maximum":
-            motion = np.broadcast_to(motions[name][..., None], rest.shape)
-            parts["motion"] = Distribution(motion, error.causes)
-            parts["footprint"] = Distribution(rest - motion, error.causes)
-        else:
-            parts["rest"] = Distribution(rest, error.causes)
-        found.append(PartRow(row.key, row.quantity, error, parts))
-    return found
+    motion = motions.get(name)
+    # It is known where the line crosses face or ridge, and against the peak of the exposure.
+    if motion is None or result.plan.reference != "maximum" or not np.isfinite(motion).all():
+        return {"psf": psf, "rest": Distribution(rest, error.causes)}
+    moved = np.broadcast_to(motion[..., None], rest.shape)
+    return {
+        "psf": psf,
+        "motion": Distribution(moved, error.causes),
+        "footprint": Distribution(rest - moved, error.causes),
+    }
 
 
 def comparison_frame(result: StudyResult) -> pd.DataFrame:
