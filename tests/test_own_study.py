@@ -150,7 +150,7 @@ def test_the_paper_stands_beside_its_own_study_only(own_result, tmp_path):
     assert all(row.paper is None and not row.where for row in rows)
     write_report(own_result, tmp_path, "Titanium", "cutting: {}\n", {"seed": "1"})
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    told = page[page.index("<main>") : page.index('<section id="study">')]
+    told = page[page.index("<main>") : page.index('<div class="part" id="study">')]
     assert "paper" not in told.lower().replace("data:image/png;base64", "")
     assert "Figure 5" not in told
     assert (tmp_path / "figures" / "scene.png").exists()

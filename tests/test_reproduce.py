@@ -4,6 +4,7 @@ import json
 import re
 from html.parser import HTMLParser
 
+import jsonschema
 import pytest
 import xarray as xr
 from documented import ROOT
@@ -31,11 +32,11 @@ class Page(HTMLParser):
         values = dict(attrs)
         if tag == "img":
             self.images.append(values["src"])
-        if tag in ("script", "link") or values.get("src", "data:").startswith("http"):
+        if tag == "link" or not values.get("src", "data:").startswith("data:"):
             self.links.append(values)
 
     def handle_data(self, data):
-        self.words += data
+        self.words += data.replace("\u00a0", " ")
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +48,7 @@ def results(quick_study):
 
 def test_summary_holds_the_papers_figures_beside_ours(results):
     summary = json.loads((results / "summary.json").read_text(encoding="utf-8"))
+    jsonschema.validate(summary, json.loads((results / "summary.schema.json").read_text("utf-8")))
     for name in PAPER_ROWS:
         assert name in summary["paper"]
         assert summary["explanation"][name]

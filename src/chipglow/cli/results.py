@@ -16,7 +16,7 @@ from chipglow.cutting import SOLVER_VERSION
 from chipglow.errors import SceneErrors, StudyResult
 from chipglow.io import atomic_folder
 from chipglow.report import comparison_rows, place_rows, table_2, write_report, write_scene_report
-from chipglow.report.paper import REFERENCE, stands_beside
+from chipglow.report.paper import CITATION, stands_beside
 from chipglow.study import Progress, Study, errors, run, study_text
 
 
@@ -99,7 +99,7 @@ def _write(
         text = (folder / "summary.json").read_text(encoding="utf-8")
         screen.values({"summary": json.loads(text)})
     screen.file(folder / report.relative_to(temporary), "Report")
-    screen.say(f"Cite as: The chipglow developers: chipglow {version('chipglow')}. {REFERENCE}")
+    screen.say(f"Cite as: The chipglow developers: chipglow {version('chipglow')}. {CITATION}")
 
 
 def _steady(beside: Study | None, progress: Progress, resume: bool) -> StudyResult | None:
@@ -163,12 +163,12 @@ def _print_table(result: StudyResult | SceneErrors) -> None:
             "quantity": "quantity",
             **({"the paper": "paper_text"} if beside else {}),
             "here": "here_text",
-            "range of draws": "range_text",
+            "95 % interval": "interval_text",
             **({"differs": "differs_text"} if beside else {}),
         }
         rows = [[getattr(row, name) for name in texts.values()] for row in comparison_rows(result)]
         frame = pd.DataFrame(rows, columns=list(texts))
     else:
-        heads = ["place", "reference", "error", "range", "PSF's portion"]
+        heads = ["place", "reference", "error", "95 % interval", "PSF's portion"]
         frame = pd.DataFrame(place_rows(result), columns=heads)
     current().table("results", frame, {head: f"{{{head}}}" for head in frame.columns})

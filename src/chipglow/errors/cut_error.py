@@ -12,7 +12,12 @@ from chipglow.camera import Camera, Exposure, Measurement, expose_all
 from chipglow.cutting import EnergyHistory
 from chipglow.errors.band_error import BandErrors
 from chipglow.errors.draws import Draws, Site, draw_errors
-from chipglow.errors.error_images import ErrorImages, ReferenceKind, error_images
+from chipglow.errors.error_images import (
+    ErrorImages,
+    ReferenceKind,
+    error_images,
+    reference_temperature,
+)
 from chipglow.errors.rake_error import RakeErrors
 from chipglow.errors.sensitivity import Sensitivity, sensitivity
 from chipglow.errors.starts import other_starts, spread_starts
@@ -122,6 +127,9 @@ class SurfaceResult:
         In the middle of the developed instant's exposure, on the scene's samples, shape (y, x).
     scene_temperature : ndarray
         Radiance temperature of the scene's samples then in K; NaN where nothing radiates.
+    references : ndarray
+        What the pixels of every instant are compared with in K, shape (instant, y, x); NaN where
+        nothing radiates.
     errors : ErrorImages
         At the developed instant.
     rake : RakeErrors
@@ -139,6 +147,7 @@ class SurfaceResult:
     rake_grid: RakeGrid | None
     emissivity: NDArray[np.float32]
     scene_temperature: NDArray[np.float64]
+    references: NDArray[np.float64]
     errors: ErrorImages
     rake: RakeErrors
     band: BandErrors
@@ -401,18 +410,20 @@ def _measure(
     fields = [camera.lay(surface, scene) for surface in surfaces.values()]
     frames: list[list[Exposure]] = []
     images: list[list[NDArray[np.float64]]] = [[] for _ in fields]
+    references: list[list[NDArray[np.float64]]] = [[] for _ in fields]
     for i, instant in enumerate(instants):
         tell("camera", i / len(instants))
         exposures = _expose(scene, fields, camera, instant.start)
-        for image, exposure in zip(images, exposures, strict=True):
+        for image, reference, exposure in zip(images, references, exposures, strict=True):
             image.append(camera.form_image(exposure.mean_radiance, exposure.raster))
+            reference.append(reference_temperature(camera, exposure, plan.reference))
         if i == developed:
             frames.append(list(exposures))
     tell("camera", 1.0)
     starts = np.array([instant.start for instant in instants])
     results = {}
-    for number, (name, on_scene, exposure, image) in enumerate(
-        zip(surfaces, fields, frames[0], images, strict=True)
+    for number, (name, on_scene, exposure, image, reference) in enumerate(
+        zip(surfaces, fields, frames[0], images, references, strict=True)
     ):
         looking = camera.redrawn(number)
         measurement = looking.measurement(np.stack(image), starts, scene.raster)
@@ -423,6 +434,7 @@ def _measure(
             rake_grid=_rake_grid(measurement, segment.tool),
             emissivity=on_scene.emissivity(segment.frame),
             scene_temperature=np.asarray(camera.band.temperature(exposure.centre_radiance)),
+            references=np.stack(reference),
             errors=errors,
             rake=site.rake_errors(errors),
             band=site.band_errors(errors),

@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 from chipglow.camera import Camera, Exposure, Measurement, expose_all
 from chipglow.errors.distribution import Distribution
 from chipglow.errors.draws import pixel_phases
-from chipglow.errors.error_images import ErrorImages, ReferenceKind, error_images
+from chipglow.errors.error_images import (
+    ErrorImages,
+    ReferenceKind,
+    error_images,
+    reference_temperature,
+)
 from chipglow.errors.places import HottestPlace, LinePlace, Place, RakePlace, Reading
 from chipglow.errors.starts import spread_starts
 from chipglow.laboratory.chip import contact_length
@@ -122,6 +127,9 @@ class SurfaceErrors:
         In the middle of the shown exposure, on the scene's samples, shape (y, x).
     scene_temperature : ndarray
         Radiance temperature of the scene's samples then in K; NaN where nothing radiates.
+    references : ndarray
+        What the pixels of every exposure are compared with in K, shape (exposure, y, x); NaN where
+        nothing radiates.
     errors : ErrorImages
         Of the shown exposure.
     readings : tuple of PlaceErrors
@@ -135,6 +143,7 @@ class SurfaceErrors:
     measurement: Measurement
     emissivity: NDArray[np.float32]
     scene_temperature: NDArray[np.float64]
+    references: NDArray[np.float64]
     errors: ErrorImages
     readings: tuple[PlaceErrors, ...]
     profiles: tuple[Profile, ...]
@@ -312,6 +321,7 @@ class _Collected:
 
     shape: tuple[int, int, int]
     images: list[NDArray[np.float64]] = field(default_factory=list)
+    references: list[NDArray[np.float64]] = field(default_factory=list)
     shown: list[Exposure] = field(default_factory=list)
     errors: list[ErrorImages] = field(default_factory=list)
     readings: list[Mapping[tuple[str, str], Reading]] = field(default_factory=list)
@@ -333,6 +343,7 @@ class _Collected:
             measurement=camera.measurement(np.stack(self.images), starts, scene.raster),
             emissivity=emissivity.emissivity(frame),
             scene_temperature=np.asarray(camera.band.temperature(exposure.centre_radiance)),
+            references=np.stack(self.references),
             errors=self.errors[0],
             readings=tuple(self._distributions()),
             profiles=tuple(
@@ -388,11 +399,13 @@ def _collect(
         number = count()
         for surface, (one, textures) in enumerate(zip(collected, fields, strict=True)):
             of_surface = [next(exposures) for _ in textures]
-            one.images.append(camera.form_image(of_surface[0].mean_radiance, scene.raster))
+            first = of_surface[0]
+            one.images.append(camera.form_image(first.mean_radiance, scene.raster))
+            one.references.append(reference_temperature(camera, first, plan.reference))
             if i == shown:
                 looking = camera.redrawn(surface)
-                one.shown.append(of_surface[0])
-                one.errors.append(error_images(looking, of_surface[0], plan.reference))
+                one.shown.append(first)
+                one.errors.append(error_images(looking, first, plan.reference))
             for exposure in of_surface:
                 for phase in cameras:
                     errors = error_images(phase.redrawn(next(number)), exposure, plan.reference)
