@@ -19,6 +19,7 @@ from chipglow.cli.rake import rake
 from chipglow.cli.register import register
 from chipglow.cli.shearband import shearband
 from chipglow.cli.temperature import temperature
+from chipglow.cli.wavelengths import wavelengths
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 ERROR_FOLDER: Final = Path("chipglow-error")
@@ -257,6 +258,9 @@ def measure(
 
     measure_scene(scene, load_study(study), out, start, chip)
     print(out)
+
+
+app.command()(wavelengths)
 
 
 @app.command()
