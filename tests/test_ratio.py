@@ -31,6 +31,7 @@ from chipglow.camera import (
 from chipglow.cli import app
 from chipglow.errors import (
     RATIO_CAUSES,
+    Plan,
     Spot,
     WavelengthPlan,
     cut_spots,
@@ -280,7 +281,8 @@ def test_exposures_that_do_not_last_alike():
     longer = replace(camera, second=replace(camera.second, integration_time=3e-6))
     errors = ratio_errors(longer, warming(), UniformSurface(0.4), 0.0)
     expected = of_wien(1000.5, 1001.0) - 1001.0
-    np.testing.assert_allclose(errors.causes["motion"], expected, atol=0.01)
+    # The mean of the radiances is that of the middle but for its bend, 0.02 K.
+    np.testing.assert_allclose(errors.causes["motion"], expected, atol=0.03)
     measured = longer.measure(warming(), UniformSurface(0.4), 0.0)
     np.testing.assert_allclose(measured.temperature[0], errors.measured, rtol=1e-9)
 
@@ -289,12 +291,13 @@ def test_what_is_not_grey_is_an_error_of_the_emissivity():
     camera = two(NARROW)
     table = SpectralTable(((0.9001e-6, 300.0, 0.5), (1.0001e-6, 300.0, 0.4)))
     errors = ratio_errors(camera, sloping(), table, 0.0)
-    truth = 1000.0 + GRADIENT * (errors.raster.x + 0.5e-6)
+    truth = 1000.0 + GRADIENT * errors.raster.x
     expected = 1 / (1 / truth - LAMBDA * np.log(0.5 / 0.4) / C2) - truth
-    # The sample under a centre between two is the right one.
     np.testing.assert_allclose(errors.causes["emissivity"][3], expected, rtol=1e-3)
     told = ratio_errors(replace(camera, emissivity_ratio=1.25), sloping(), table, 0.0)
-    np.testing.assert_allclose(told.causes["emissivity"], 0.0, atol=0.01)
+    # Beyond its ends, which are in the bands' middles, the table is flat: the mean emissivities
+    # are 5e-5 and 6e-5 off, at 630 K for a ratio of e.
+    np.testing.assert_allclose(told.causes["emissivity"], 0.0, atol=0.1)
 
 
 def test_the_causes_add_up_to_what_is_measured():
@@ -391,8 +394,8 @@ def test_a_study_of_bands_beside_the_loop_of_figure_6():
         1,
     )
     kernel = GaussianPSF(10e-6).kernel(4e-6)
-    # The sample whose lower left corner is the pixel's middle.
-    truth = float(np.float32(values[1, 38, 66]))
+    # The pixel's middle is the corner of four samples.
+    truth = float(values.astype(np.float32)[1, 37:39, 65:67].mean(dtype=np.float64))
 
     def image(band, frames, left=0, up=0, psf=kernel):
         part = [one[up : up + 76, left : left + 116] for one in frames]
@@ -440,10 +443,8 @@ def ratio_at(kelvins):
 
 
 def test_spots_of_a_cut(analytic_scene):
-    study = Study.quick()
-    camera = replace(Camera.paper(), pitch=6e-6)
-    spots = cut_spots(analytic_scene, camera, study.plan)
-    assert [(spot.place, spot.surface) for spot in spots[:2]] == [
+    spots = cut_spots(analytic_scene, Camera.paper(), Plan(exposures=2))
+    assert [(spot.place, spot.surface) for spot in spots] == [
         ("rake face", "chip 2"),
         ("shear band", "chip 1"),
     ]
@@ -458,7 +459,7 @@ def test_what_a_study_of_bands_refuses():
         WavelengthPlan((SHORT, SHORT))
     with pytest.raises(ValueError, match="delay: -1, expected 0 or more"):
         WavelengthPlan((SHORT, LONG), delay=-1)
-    with pytest.raises(ValueError, match=r"wavelengths.*misregistration: -1e-06, expected 0"):
+    with pytest.raises(ValueError, match=r"(?s)wavelengths.*misregistration: -1e-06, expected 0"):
         Study(wavelengths={"misregistration": "-1 um"})
     spot = Spot("far", "plate", 0.0, np.array([1.0, 0.0]))
     arguments = {"plate": UniformSurface()}, CAMERA, WavelengthPlan((SHORT, LONG), delay=1e-3)
@@ -490,6 +491,6 @@ def test_the_command_reads_a_users_points(tmp_path, monkeypatch):
     assert (tmp_path / "bands.png").stat().st_size > 10_000
     (tmp_path / "study.yaml").write_text(text % "")
     result = CliRunner().invoke(app, ["wavelengths", "study.yaml"])
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     assert "scene.nc: No rake face is read" in result.output
     assert "Expected points to read (analysis.points)" in " ".join(result.output.split())

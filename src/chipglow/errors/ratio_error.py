@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from chipglow.camera import Camera, Exposure, RatioCamera, expose_views
 from chipglow.camera.ratio_camera import views_of
-from chipglow.scene import Material, Raster, Scene
-from chipglow.scene.lines import nearest
+from chipglow.scene import Material, Raster, Scene, sample
 from chipglow.surface import Surface
 
 RATIO_CAUSES: Final = (
@@ -34,8 +33,8 @@ class RatioErrors:
     raster : Raster
         Where the pixels are taken to look.
     truth : ndarray
-        True temperature in K of the sample under every pixel's centre in the middle of the first
-        channel's exposure, shape (y, x); NaN where there is no material.
+        True temperature in K at every pixel's centre, linear between the samples, in the middle of
+        the first channel's exposure, shape (y, x); NaN where there is no material.
     causes : mapping
         By the names of `RATIO_CAUSES` what each adds to the error, of the same shape:
         ``emissivity`` where its ratio is another than it is taken to be, or something is
@@ -80,8 +79,8 @@ def ratio_errors(camera: RatioCamera, scene: Scene, surface: Surface, start: flo
 
     Notes
     -----
-    Differences of ratio temperatures, each with one cause more than the one before: of the sample
-    under the pixel's centre in the middle of the exposure; of its mean over the exposure; of ideal
+    Differences of ratio temperatures, each with one cause more than the one before: of the samples
+    at the pixel's centre in the middle of the exposure; of their means over the exposure; of ideal
     pixels; with the optics; with the second channel's pixels where they truly are; with its
     exposure when it truly is; and as the detectors read them.
     """
@@ -99,19 +98,25 @@ def ratio_errors(camera: RatioCamera, scene: Scene, surface: Surface, start: flo
     delayed = second.form_image(late.mean_radiance, scene.raster)
     pixels = first.pixels(scene.raster)
     points = np.stack(np.meshgrid(pixels.x, pixels.y), axis=-1)
-    radiances = [
-        tuple(nearest(e.centre_radiance, scene.raster, points) for e in alike),
-        tuple(nearest(e.mean_radiance, scene.raster, points) for e in (one, two)),
+    told = [
+        sample(on_samples, scene.raster, points)
+        for on_samples in (
+            true_temperature(scene, start + duration / 2),
+            camera.thermometer.temperature(*(e.centre_radiance for e in alike)),
+            camera.thermometer.temperature(one.mean_radiance, two.mean_radiance),
+        )
+    ]
+    images = [
         (ideal_image(first, one), ideal_image(aligned, two)),
         (formed, aligned.form_image(two.mean_radiance, scene.raster)),
         (formed, second.form_image(two.mean_radiance, scene.raster)),
         (formed, delayed),
         (_read(first, formed, one.start), _read(second, delayed, late.start)),
     ]
-    truth = nearest(true_temperature(scene, start + duration / 2), scene.raster, points)
-    told = [truth, *(camera.thermometer.temperature(*pair) for pair in radiances)]
+    told += [camera.thermometer.temperature(*pair) for pair in images]
     steps = zip(RATIO_CAUSES, told[1:], told[:-1], strict=True)
-    return RatioErrors(pixels, truth, {name: after - before for name, after, before in steps})
+    causes = {name: after - before for name, after, before in steps}
+    return RatioErrors(pixels, told[0], causes)
 
 
 def ideal_image(camera: Camera, exposure: Exposure) -> NDArray[np.float64]:
@@ -124,9 +129,10 @@ def true_temperature(scene: Scene, time: float) -> NDArray[np.float64]:
     """True temperature of a scene's samples at a time in K, shape (y, x); NaN in the void."""
     number = np.searchsorted(scene.times, time + 1e-6 * scene.frame_spacing, side="right") - 1
     frame = scene.frame(max(int(number), 0), ())
-    return np.where(frame.material == Material.VOID, np.nan, frame.temperature).astype(np.float64)
+    void = frame.material == Material.VOID
+    return np.where(void, np.nan, np.asarray(frame.temperature, np.float64))
 
 
 def _read(camera: Camera, image: NDArray[np.float64], start: float) -> NDArray[np.float64]:
     """What the camera's detector makes of an image."""
-    return camera.read(image[None], np.array([start]))[0][0]
+    return np.asarray(camera.read(image[None], np.array([start]))[0][0], np.float64)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from math import isfinite, log, nan
+from math import hypot, isfinite, log, nan
 from typing import Any, Final
 
 import numpy as np
@@ -19,7 +19,7 @@ from chipglow.errors.ratio_error import ideal_image, true_temperature
 from chipglow.errors.scene_error import ScenePlan
 from chipglow.errors.starts import spread_starts
 from chipglow.radiometry import Band, RatioThermometer
-from chipglow.scene import Scene
+from chipglow.scene import Raster, Scene
 from chipglow.scene.lines import nearest
 from chipglow.surface import Surface
 
@@ -28,8 +28,8 @@ Progress = Callable[[str, float], None]
 STEPS: Final = ("emissivity", "motion", "footprint", "optics", "delay")
 """Causes of the mean error, in the order in which they come one upon the other."""
 
-_CENTRE, _MEAN, _FOOTPRINT, _FORMED, _DELAYED, _SHIFTED = range(6)
-"""What is read of every band; from the last on there is one for each of the directions."""
+_FOOTPRINT, _FORMED, _DELAYED, _SHIFTED = range(4)
+"""Pixels read in every band; from the last on there is one for each of the directions."""
 
 _DIRECTIONS: Final = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 _NOISE_SHAPE: Final = (64, 64)
@@ -131,8 +131,8 @@ class WavelengthError:
     @property
     def total(self) -> float:
         """Root of the sum of the squares of mean error, scatter over draws and uncertainties."""
-        squares = np.mean(self.error**2), self.shift_error**2, self.noise**2, self.emissivity**2
-        return float(np.sqrt(sum(squares)))
+        mean = float(np.sqrt(np.mean(self.error**2)))
+        return hypot(mean, self.shift_error, self.noise, self.emissivity)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,9 +229,10 @@ def wavelength_errors(
 
     Notes
     -----
-    The pixel that holds the spot is read. Its true temperature is that of the sample under its
-    centre in the middle of the exposure. One band is told the emissivity of just that sample, the
-    ratio that the emissivities are the same. Steps are differences as those of `ratio_errors`.
+    The pixel that holds the spot is read. Its true temperature is that at its centre in the middle
+    of the exposure, linear between the four samples around it. One band is told the emissivity of
+    just that place, the ratio that emissivities are the same. Steps are differences as those of
+    `ratio_errors`.
     """
     tell = progress or (lambda label, part: None)
     cameras = [replace(camera.in_band(band), detector=None) for band in plan.bands]
@@ -253,7 +254,7 @@ def wavelength_errors(
     for place, parts in gathered.items():
         readings = _Readings.joined(place, parts)
         noise = [
-            _noise(camera.in_band(band), readings.radiance[number, _FORMED])
+            _noise(camera.in_band(band), readings.pixel[number, _FORMED])
             for number, band in enumerate(plan.bands)
         ]
         found += [
@@ -343,24 +344,37 @@ class _Readings:
 
     Parameters
     ----------
+    weights : ndarray
+        Of the four samples around the pixel's centre, shape (sample, draw).
     truth : ndarray
-        True temperature under the pixel's centre in K, shape (draw,).
-    radiance : ndarray
-        In W/(m² sr), shape (band, step, draw); the steps are `_CENTRE` to `_SHIFTED` and on.
+        Their true temperatures in K, of the same shape.
+    local : ndarray
+        Their radiance in W/(m² sr) in the middle of the exposure and on average, shape (band, 2,
+        sample, draw).
+    pixel : ndarray
+        Radiance of the pixel, shape (band, step, draw): `_FOOTPRINT` to `_SHIFTED` and on.
     """
 
+    weights: NDArray[np.float64]
     truth: NDArray[np.float64]
-    radiance: NDArray[np.float64]
+    local: NDArray[np.float64]
+    pixel: NDArray[np.float64]
 
     @classmethod
     def joined(cls, place: str, parts: Sequence["_Readings"]) -> "_Readings":
-        """All draws of a place but those with a pixel whose centre shows no material."""
-        truth = np.concatenate([one.truth for one in parts])
-        known = np.isfinite(truth)
+        """All draws of a place but those with a pixel at whose centre there is no material."""
+        weights, truth, local, pixel = (
+            np.concatenate([getattr(one, name) for one in parts], axis=-1)
+            for name in ("weights", "truth", "local", "pixel")
+        )
+        known = np.isfinite(truth).all(axis=0)
         if not known.any():
             raise ValueError(f"{place}: no material is there, expected some in one draw or more")
-        radiance = np.concatenate([one.radiance for one in parts], axis=-1)
-        return cls(truth[known], radiance[..., known])
+        return cls(weights[:, known], truth[:, known], local[..., known], pixel[..., known])
+
+    def at_centre(self, values: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Values of the samples, shape (..., sample, draw), at the pixel's centre."""
+        return np.asarray((values * self.weights).sum(axis=-2), np.float64)
 
 
 def _read(
@@ -377,17 +391,40 @@ def _read(
     exposures = late = expose_views(scene, views, spot.start, duration)
     if plan.delay:
         late = expose_views(scene, views, spot.start + plan.delay, duration)
-    truth = true_temperature(scene, spot.start + duration / 2)
     centres = [_centre(one, scene, spot) for one in pixel_phases(cameras[0], phases)]
-    radiance = [
+    rows, columns, weights = _around(scene.raster, np.array(centres))
+    truth = true_temperature(scene, spot.start + duration / 2)
+    local = [
+        [one.centre_radiance[rows, columns], one.mean_radiance[rows, columns]] for one in exposures
+    ]
+    pixel = [
         [
-            _radiances(phase, exposure, later, centre, plan.misregistration)
+            _of_pixel(phase, exposure, later, centre, plan.misregistration)
             for phase, centre in zip(pixel_phases(camera, phases), centres, strict=True)
         ]
         for camera, exposure, later in zip(cameras, exposures, late, strict=True)
     ]
     return _Readings(
-        nearest(truth, scene.raster, np.array(centres)), np.moveaxis(np.array(radiance), 1, 2)
+        weights, truth[rows, columns], np.array(local), np.moveaxis(np.array(pixel), 1, 2)
+    )
+
+
+def _around(
+    raster: Raster, points: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+    """Rows, columns and weights of the four samples around points, each of shape (4, point)."""
+    column = (points[:, 0] - raster.x[0]) / raster.spacing
+    row = (raster.y[0] - points[:, 1]) / raster.spacing
+    left = np.clip(np.floor(column), 0, max(raster.columns - 2, 0)).astype(np.intp)
+    upper = np.clip(np.floor(row), 0, max(raster.rows - 2, 0)).astype(np.intp)
+    right, lower = np.minimum(left + 1, raster.columns - 1), np.minimum(upper + 1, raster.rows - 1)
+    across, down = np.clip(column - left, 0.0, 1.0), np.clip(row - upper, 0.0, 1.0)
+    return (
+        np.stack([upper, upper, lower, lower]),
+        np.stack([left, right, left, right]),
+        np.stack(
+            [(1 - down) * (1 - across), (1 - down) * across, down * (1 - across), down * across]
+        ),
     )
 
 
@@ -401,14 +438,14 @@ def _centre(camera: Camera, scene: Scene, spot: Spot) -> NDArray[np.float64]:
     return np.array([pixels.x[column], pixels.y[row]])
 
 
-def _radiances(
+def _of_pixel(
     camera: Camera,
     exposure: Exposure,
     late: Exposure,
     centre: NDArray[np.float64],
     distance: float,
 ) -> list[float]:
-    """Radiance of the pixel with a centre, step by step."""
+    """Radiance of the pixel with a centre: ideal, formed, delayed, shifted."""
     raster, pixels = exposure.raster, camera.pixels(exposure.raster)
 
     def formed(of: Exposure, shift: tuple[float, float] = (0.0, 0.0)) -> float:
@@ -420,8 +457,6 @@ def _radiances(
 
     own = formed(exposure)
     return [
-        float(nearest(exposure.centre_radiance, raster, centre)),
-        float(nearest(exposure.mean_radiance, raster, centre)),
         float(nearest(ideal_image(camera, exposure), pixels, centre)),
         own,
         own if late is exposure else formed(late),
@@ -450,24 +485,31 @@ def _alone(
     readings: _Readings,
     noise: float,
 ) -> WavelengthError:
-    """One band, by the emissivity of the sample under the pixel's centre."""
-    band, radiance, truth = plan.bands[number], readings.radiance[number], readings.truth
+    """One band, by the emissivity that is at the pixel's centre."""
+    band, truth = plan.bands[number], readings.at_centre(readings.truth)
     environment = 0.0 if reflected is None else float(band.radiance(reflected))
-    black = band.radiance(truth) - environment
-    emissivity = (radiance[_CENTRE] - environment) / black
-    own = (radiance - environment) / emissivity + environment
-    told = [truth, *band.temperature(own[: _FORMED + 1])]
-    told.append(told[-1])
+    of_samples = (readings.local[number, 0] - environment) / (
+        band.radiance(readings.truth) - environment
+    )
+    emissivity = readings.at_centre(of_samples)
+
+    def told(radiance: NDArray[np.float64], by: NDArray[np.float64]) -> NDArray[np.float64]:
+        own = (radiance - environment) / by + environment
+        return np.asarray(band.temperature(own), np.float64)
+
+    centre, mean = (readings.at_centre(told(one, of_samples)) for one in readings.local[number])
+    ideal, formed = (told(one, emissivity) for one in readings.pixel[number, : _FORMED + 1])
     slope = band.slope(truth)
+    uncertain = plan.emissivity_uncertainty * (band.radiance(truth) - environment) / slope
     return WavelengthError(
         place=place,
         first=band,
         second=None,
         truth=truth,
-        steps=_steps(told),
+        steps=_steps([truth, centre, mean, ideal, formed, formed]),
         misregistration=np.zeros((len(_DIRECTIONS), truth.size)),
-        noise=float(np.mean(noise * radiance[_FORMED] / (emissivity * slope))),
-        emissivity=float(np.mean(plan.emissivity_uncertainty * black / slope)),
+        noise=float(np.mean(noise * readings.pixel[number, _FORMED] / (emissivity * slope))),
+        emissivity=float(np.mean(uncertain)),
     )
 
 
@@ -480,22 +522,25 @@ def _ratio(
 ) -> WavelengthError:
     """The ratio of two bands, as of a grey body."""
     first, second = (plan.bands[number] for number in pair)
-    one, other = (readings.radiance[number] for number in pair)
+    one, other = (readings.pixel[number] for number in pair)
     middles = first.lower + first.upper, second.lower + second.upper
     uncertainty = plan.exponent_uncertainty * log(middles[1] / middles[0])
     thermometer = RatioThermometer(first, second, 1.0, uncertainty)
-    aligned = thermometer.temperature(one[: _FORMED + 1], other[: _FORMED + 1])
+    centre, mean = readings.at_centre(
+        thermometer.temperature(readings.local[pair[0]], readings.local[pair[1]])
+    )
+    ideal, formed = thermometer.temperature(one[: _FORMED + 1], other[: _FORMED + 1])
     delayed = thermometer.temperature(one[_FORMED], other[_DELAYED])
     shifted = thermometer.temperature(one[_FORMED], other[_SHIFTED:])
-    truth = readings.truth
-    relative = float(np.hypot(*(noise[number] for number in pair)))
+    truth = readings.at_centre(readings.truth)
+    relative = hypot(*(noise[number] for number in pair))
     return WavelengthError(
         place=place,
         first=first,
         second=second,
         truth=truth,
-        steps=_steps([truth, *aligned, delayed]),
-        misregistration=shifted - aligned[_FORMED],
+        steps=_steps([truth, centre, mean, ideal, formed, delayed]),
+        misregistration=shifted - formed,
         noise=float(np.mean(relative / thermometer.sensitivity(truth))),
         emissivity=float(np.mean(thermometer.uncertainty(truth))),
     )

@@ -37,7 +37,8 @@ def draw_wavelengths(found: WavelengthErrors) -> Figure:
     with drawing.style():
         figure = drawing.new_figure(6.4)
         panels = figure.subplots(2, len(found.places), squeeze=False)
-        norm = LogNorm(*_limits(found))
+        low, high = _limits(found)
+        norm = LogNorm(low, high)
         for column, place in zip(panels.T, found.places, strict=True):
             errors = [one for one in found.errors if one.place == place]
             picture = _draw_all(column[0], found, errors, norm)
@@ -45,7 +46,7 @@ def draw_wavelengths(found: WavelengthErrors) -> Figure:
             truth = float(errors[0].truth.mean()) - drawing.KELVIN
             column[0].set_title(f"{place}, {truth:.0f} °C")
         panels[0, 0].set_ylabel("first band / µm")
-        ticks = [one for one in _TICKS if norm.vmin <= one <= norm.vmax]
+        ticks = [one for one in _TICKS if low <= one <= high]
         bar = figure.colorbar(picture, ax=panels[0], label="error / K", aspect=25, extend="max")
         bar.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks], minor=False)
         bar.ax.minorticks_off()
