@@ -30,6 +30,7 @@ DETECTOR = {
     "terms": [{"kind": "shot-noise"}, {"kind": "read-noise", "standard_deviation": 400}],
 }
 METAL = {"kind": "hagen-rubens", "resistivity": "6e-7 ohm*m"}
+HOT = 400.0 + KELVIN
 CAUSES = ("motion", "footprint", "optics", "misregistration")
 
 
@@ -78,21 +79,21 @@ def print_thermometers() -> None:
 def draw_images(errors: RatioErrors, tool: Any) -> None:
     """Truth, ratio temperature, and what makes its error."""
     with drawing.style():
-        figure = drawing.image_figure(errors.raster, 2.1, 2)
-        axes = figure.subplots(2, 3, sharex=True, sharey=True)
+        figure = drawing.image_figure(errors.raster, 2.6, 3)
+        axes = figure.subplots(3, 2, sharex=True, sharey=True)
         shown = {"true temperature": errors.truth, "ratio temperature": errors.measured}
         for axis, (title, image) in zip(axes.flat, shown.items(), strict=False):
             celsius = image - KELVIN
             heat = drawing.show_image(axis, celsius, errors.raster, tool, HEAT, (20.0, 800.0))
             axis.set_title(title)
-        drawing.colour_bar(figure, heat, axes.flat[1], "°C")
+        drawing.colour_bar(figure, heat, axes[0], "°C")
         for axis, name in zip(axes.flat[2:], CAUSES, strict=True):
             image = errors.causes[name]
-            part = drawing.show_image(axis, image, errors.raster, tool, SIGNED, (-40.0, 40.0))
+            part = drawing.show_image(axis, image, errors.raster, tool, SIGNED, (-20.0, 20.0))
             axis.set_title(f"by {name}")
-            middle = np.nanpercentile(np.abs(image), 50)
-            print(f"{name}: half of the pixels within {middle:.2f} K")
-        drawing.colour_bar(figure, part, axes, "K")
+            hot = np.abs(image[errors.truth > HOT])
+            print(f"{name}: over 400 °C {np.median(hot):.2f} K and less, {hot.max():.1f} K at most")
+        drawing.colour_bar(figure, part, axes[1:], "K")
         for axis in axes.flat:
             axis.label_outer()
     figure.savefig(HERE / "ratio.png", dpi=150)

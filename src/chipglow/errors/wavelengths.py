@@ -268,7 +268,9 @@ def wavelength_errors(
 def cut_spots(
     scene: Scene, camera: Camera, plan: Plan, progress: Progress | None = None
 ) -> list[Spot]:
-    """The rake face at mid-contact and the middle of the shear band, in every segment of a cut.
+    """The chip at the rake face and the middle of the shear band, in every segment of a cut.
+
+    The first is half a pixel from the face, at mid-contact: on the face itself chip and tool differ.
 
     Parameters
     ----------
@@ -288,7 +290,9 @@ def cut_spots(
     """
     spots = []
     for segment in find_segments(scene, camera.integration_time, plan, progress):
-        face = segment.tool.rake_point(segment.contact_length / 2)
+        tool = segment.tool
+        inside = camera.pitch / 2 * np.array(tool.rake_normal)
+        face = tool.rake_point(segment.contact_length / 2) + inside
         middle = segment.band.ridge.points[segment.band.middle]
         spots += [
             Spot("rake face", plan.rake_surface, segment.start, face),
