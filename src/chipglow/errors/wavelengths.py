@@ -270,7 +270,7 @@ def cut_spots(
 ) -> list[Spot]:
     """The chip at the rake face and the middle of the shear band, in every segment of a cut.
 
-    The first is half a pixel from the face, at mid-contact: on the face itself chip and tool differ.
+    The first is half a pixel from the face, at mid-contact; on the face chip and tool differ.
 
     Parameters
     ----------
