@@ -225,6 +225,17 @@ class Camera:
         """
         return sensor_raster(scene, self.pitch, self.offset, self.shape)
 
+    def in_band(self, band: Band) -> "Camera":
+        """The camera with another band: its diffraction is that of the band.
+
+        Parameters
+        ----------
+        band : Band
+            The other band. There is no lower range limit in it: the camera's is of its own band.
+        """
+        psf = None if self.psf is None else self.psf.in_band(band)
+        return replace(self, band=band, psf=psf, lower_limit=None)
+
     def redrawn(self, number: int) -> "Camera":
         """The camera with other noise of its detector: the seed `number` further on."""
         return replace(self, seed=self.seed + number) if number and self.detector else self

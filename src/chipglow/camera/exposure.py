@@ -62,6 +62,30 @@ class Exposure:
                 )
 
 
+@dataclass(frozen=True, eq=False)
+class View:
+    """A surface as a camera of one band looks at it.
+
+    Parameters
+    ----------
+    emissivity : EmissivityField
+        The surface, laid on the scene: what it is in this band.
+    band : Band
+        The band.
+    reflected : float, optional
+        Temperature in K of surroundings that the surface reflects; none by default.
+    """
+
+    emissivity: EmissivityField
+    band: Band
+    reflected: float | None = None
+
+    @property
+    def environment(self) -> float:
+        """Radiance of the surroundings in W/(m² sr)."""
+        return 0.0 if self.reflected is None else float(self.band.radiance(self.reflected))
+
+
 def expose(
     scene: Scene,
     emissivity: EmissivityField,
@@ -131,12 +155,48 @@ def expose_all(
     ValueError
         As for `expose`.
     """
+    views = [View(emissivity, band, reflected) for emissivity in emissivities]
+    return expose_views(scene, views, start, duration)
+
+
+def expose_views(
+    scene: Scene, views: Sequence[View], start: float, duration: float
+) -> tuple[Exposure, ...]:
+    """Exposures of a scene with several surfaces in several bands: each frame is read once.
+
+    A surface that is seen in several bands, and a band in which several surfaces are seen, are
+    computed once for each frame.
+
+    Parameters
+    ----------
+    scene, start, duration
+        As for `expose`.
+    views : sequence of View
+        What is looked at, and in which band; one or more.
+
+    Returns
+    -------
+    tuple of Exposure
+        One for each view, the same as `expose` makes.
+
+    Raises
+    ------
+    ValueError
+        As for `expose`.
+    """
     indices, weights = frame_weights(scene.times, scene.frame_spacing, start, duration)
     middle = _frame_at(scene, start + duration / 2, indices)
-    environment = 0.0 if reflected is None else float(band.radiance(reflected))
-    stack = emissivities[0].beside(emissivities[1:])
-    stacked = (stack.most, len(emissivities), scene.raster.shape)
-    sums = Sums.zero(_fine_table(band), environment, *stacked)
+    fields = list({id(view.emissivity): view.emissivity for view in views}.values())
+    bands = list(dict.fromkeys(view.band for view in views))
+    places = {id(one): number for number, one in enumerate(fields)}
+    stack = fields[0].beside(fields[1:])
+    sums = Sums.zero(
+        np.array([[places[id(view.emissivity)], bands.index(view.band)] for view in views]),
+        np.stack([_fine_table(band) for band in bands]),
+        np.array([view.environment for view in views], np.float32),
+        stack.most,
+        scene.raster.shape,
+    )
     _sweep(scene, stack, indices, weights, indices.index(middle), sums)
     mean, centre, peak, hottest = sums.mean, sums.centre, sums.peak, sums.hottest
     if not np.isfinite(mean).all():
@@ -156,7 +216,7 @@ def expose_all(
             peak_temperature=hottest,
             centre_radiance=centre[n],
         )
-        for n in range(len(emissivities))
+        for n in range(len(views))
     )
 
 

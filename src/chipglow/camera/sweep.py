@@ -35,7 +35,8 @@ _STRAIN, _RATE, _X, _Y = (
     for name in ("plastic_strain", "plastic_strain_rate", "material_x", "material_y")
 )
 _MEAN: Final = 3
-"""Place of the mean among what the kernels get of their sums: see `Sums._own`."""
+_VIEWS: Final = 7
+"""Places of the mean and of the views among what the kernels get of their sums: `Sums._own`."""
 
 _FAST: Final[Any] = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
 
@@ -46,23 +47,26 @@ class Sums:
 
     Parameters
     ----------
-    table : ndarray
-        Radiance from 200 K on, `STEPS_PER_KELVIN` to a kelvin, and its change to the next value;
-        float32 of shape (n, 2).
-    environment : float
-        Radiance of the surroundings in W/(m² sr).
+    views : ndarray
+        Numbers of the surface and of the band of every view, int64 of shape (view, 2).
+    tables : ndarray
+        Radiance in every band from 200 K on, `STEPS_PER_KELVIN` to a kelvin, and its change to the
+        next value; float32 of shape (band, n, 2).
+    environments : ndarray
+        Radiance of every view's surroundings in W/(m² sr), float32 of shape (view,).
     most : float
         Largest emissivity that is possible.
     mean, centre : ndarray
-        Float64 of shape (surface, y, x), zero to start with.
+        Float64 of shape (view, y, x), zero to start with.
     peak : ndarray
         Float32 of the same shape.
     hottest : ndarray
         Float32 of shape (y, x).
     """
 
-    table: NDArray[np.float32]
-    environment: float
+    views: NDArray[np.int64]
+    tables: NDArray[np.float32]
+    environments: NDArray[np.float32]
     most: float
     mean: NDArray[np.float64]
     centre: NDArray[np.float64]
@@ -72,16 +76,16 @@ class Sums:
     @classmethod
     def zero(
         cls,
-        table: NDArray[np.float32],
-        environment: float,
+        views: NDArray[np.int64],
+        tables: NDArray[np.float32],
+        environments: NDArray[np.float32],
         most: float,
-        surfaces: int,
         shape: tuple[int, int],
     ) -> "Sums":
         """Sums of nothing."""
-        mean, centre = (np.zeros((surfaces, *shape)) for _ in range(2))
+        mean, centre = (np.zeros((len(views), *shape)) for _ in range(2))
         peak, hottest = (np.zeros(of, np.float32) for of in (mean.shape, shape))
-        return cls(table, environment, most, mean, centre, peak, hottest)
+        return cls(views, tables, environments, most, mean, centre, peak, hottest)
 
     def add_given(
         self,
@@ -182,8 +186,8 @@ class Sums:
 
     @property
     def _own(self) -> tuple[Any, ...]:
-        environment, most = np.float32(self.environment), np.float32(self.most)
-        return self.table, environment, most, self.mean, self.centre, self.peak, self.hottest
+        sums = self.mean, self.centre, self.peak, self.hottest
+        return self.tables, self.environments, np.float32(self.most), *sums, self.views
 
     def _in_blocks(self, add: Callable[[int, int], None]) -> None:
         rows = len(self.hottest)
@@ -256,13 +260,17 @@ def _add_row(  # type: ignore[no-untyped-def]
     temperature, kind, emissivity, weight, is_middle, row, work, number, own
 ):
     """Add a row of a sub-frame, with the emissivities (surface, x), to row `row` of the sums."""
-    table, environment, most, mean, centre, peak, hottest = own
+    tables, environments, most, mean, centre, peak, hottest, views = own
     past, black, apparent = work[0], work[1], work[2]
-    _find(temperature, table.shape[0] - 1, number, past)
-    _look_up(table, number, past, black)
+    _find(temperature, tables.shape[1] - 1, number, past)
     _heat(temperature, kind, hottest[row])
-    for n in range(emissivity.shape[0]):
-        _apparent(emissivity[n], black, kind, environment, most, apparent)
+    looked_up = -1
+    for n in range(views.shape[0]):
+        surface, band = views[n]
+        if band != looked_up:
+            _look_up(tables[band], number, past, black)
+            looked_up = band
+        _apparent(emissivity[surface], black, kind, environments[n], most, apparent)
         _sum(apparent, weight, mean[n, row])
         _raise(apparent, peak[n, row])
         if is_middle:
@@ -303,7 +311,7 @@ def _add_features(  # type: ignore[no-untyped-def]
     own,
 ):
     temperature, material, strain, rate, x, y = fields
-    surfaces, _, columns = own[_MEAN].shape
+    surfaces, columns = own[_VIEWS][:, 0].max() + 1, own[_MEAN].shape[2]
     scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
     corner = np.empty(columns, np.int32)
     emissivity = np.empty((surfaces, columns), np.float32)
@@ -366,7 +374,7 @@ def _add_splines(  # type: ignore[no-untyped-def]
     own,
 ):
     first_down, down, first_across, across, in_tool = grid
-    surfaces, _, columns = own[_MEAN].shape
+    surfaces, columns = own[_VIEWS][:, 0].max() + 1, own[_MEAN].shape[2]
     scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
     corner = np.empty(columns, np.int32)
     emissivity = np.empty((surfaces, columns), np.float32)

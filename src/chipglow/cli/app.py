@@ -20,6 +20,7 @@ from chipglow.cli.register import register
 from chipglow.cli.screen import current
 from chipglow.cli.shearband import shearband
 from chipglow.cli.temperature import temperature
+from chipglow.cli.wavelengths import wavelengths
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 ERROR_FOLDER: Final = Path("chipglow-error")
@@ -258,6 +259,9 @@ def measure(
 
     measure_scene(scene, load_study(study), out, start, chip)
     current().file(out)
+
+
+app.command()(wavelengths)
 
 
 @app.command()

@@ -13,10 +13,21 @@ from chipglow.errors.error_images import (
 from chipglow.errors.local_error import LocalError
 from chipglow.errors.places import LinePlace, Place, PointPlace, RegionPlace
 from chipglow.errors.rake_error import RakeErrors, rake_errors
+from chipglow.errors.ratio_error import RATIO_CAUSES, RatioErrors, ratio_errors
 from chipglow.errors.scene_error import SceneErrors, ScenePlan, scene_errors
 from chipglow.errors.sensitivity import Sensitivity, sensitivity
+from chipglow.errors.wavelengths import (
+    Spot,
+    WavelengthError,
+    WavelengthErrors,
+    WavelengthPlan,
+    cut_spots,
+    point_spots,
+    wavelength_errors,
+)
 
 __all__ = [
+    "RATIO_CAUSES",
     "BandErrors",
     "Distribution",
     "Draws",
@@ -29,18 +40,27 @@ __all__ = [
     "Plan",
     "PointPlace",
     "RakeErrors",
+    "RatioErrors",
     "ReferenceKind",
     "RegionPlace",
     "SceneErrors",
     "ScenePlan",
     "Sensitivity",
+    "Spot",
     "StudyResult",
     "VarianceComponent",
+    "WavelengthError",
+    "WavelengthErrors",
+    "WavelengthPlan",
     "analyse",
     "band_errors",
+    "cut_spots",
     "error_images",
+    "point_spots",
     "rake_errors",
+    "ratio_errors",
     "reference_temperature",
     "scene_errors",
     "sensitivity",
+    "wavelength_errors",
 ]

@@ -294,11 +294,9 @@ def analyse(
     _check(scene, surfaces, plan)
     tell = progress or _say_nothing
     duration = camera.integration_time
-    starts = spread_starts(scene, duration, plan.exposures)
-    others = other_starts(scene, duration)
-    instants = _instants(scene, duration, (*starts, *others), tell)
-    developed = _developed(scene, instants[: len(starts)])
-    segments = _segments(scene, duration, plan, [instants[developed], *instants[len(starts) :]])
+    instants, others, developed = _band_over_time(scene, duration, plan, tell)
+    in_longest = instants[: len(instants) - others]
+    segments = _segments(scene, duration, plan, instants, others, developed)
     results = _measure(scene, surfaces, camera, plan, instants, developed, segments[0], tell)
     sites = _sites(scene, surfaces, camera, plan, segments, tell)
     chip = _chip(scene, tell)
@@ -308,9 +306,9 @@ def analyse(
         camera=camera,
         raster=scene.raster,
         instants=instants,
-        other_parts=len(others),
+        other_parts=others,
         developed=developed,
-        moments=_moments(scene, duration, instants[: len(starts)], developed),
+        moments=_moments(scene, duration, in_longest, developed),
         segments=segments,
         surfaces=results,
         draws=draw_errors(camera, sites, plan.phases, lambda part: tell("draws", part)),
@@ -335,6 +333,33 @@ def analyse(
     )
 
 
+def find_segments(
+    scene: Scene, duration: float, plan: Plan, progress: Progress | None = None
+) -> tuple[Segment, ...]:
+    """Segments of a cut's chip with a developed shear band: one for each part of the scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is truly there; it must state its tool.
+    duration : float
+        How long an exposure lasts in s.
+    plan : Plan
+        How many exposures are looked at, and what counts as touching the tool.
+    progress : callable, optional
+        Called with what is being done and how far it is.
+
+    Raises
+    ------
+    ValueError
+        If the scene is shorter than an exposure or has no shear band or no contact at the rake
+        face.
+    """
+    tell = progress or _say_nothing
+    instants, others, developed = _band_over_time(scene, duration, plan, tell)
+    return _segments(scene, duration, plan, instants, others, developed)
+
+
 def _check(scene: Scene, surfaces: Mapping[str, Surface], plan: Plan) -> None:
     for name in (plan.rake_surface, plan.band_surface):
         if name not in surfaces:
@@ -345,6 +370,16 @@ def _check(scene: Scene, surfaces: Mapping[str, Surface], plan: Plan) -> None:
 
 def _say_nothing(label: str, part: float) -> None:
     pass
+
+
+def _band_over_time(
+    scene: Scene, duration: float, plan: Plan, tell: Progress
+) -> tuple[tuple[Instant, ...], int, int]:
+    """Instants of the longest part and of the others, how many these are, the developed one."""
+    starts = spread_starts(scene, duration, plan.exposures)
+    others = other_starts(scene, duration)
+    instants = _instants(scene, duration, (*starts, *others), tell)
+    return instants, len(others), _developed(scene, instants[: len(starts)])
 
 
 def _instants(
@@ -383,17 +418,22 @@ def _moments(
 
 
 def _segments(
-    scene: Scene, duration: float, plan: Plan, instants: Sequence[Instant]
+    scene: Scene,
+    duration: float,
+    plan: Plan,
+    instants: Sequence[Instant],
+    others: int,
+    developed: int,
 ) -> tuple[Segment, ...]:
     """The developed segment, then those of the scene's other parts that have band and contact."""
-    first, *others = [
+    first, *later = [
         Segment.of(scene, instant, duration, plan.touching)
-        for instant in instants
+        for instant in (instants[developed], *instants[len(instants) - others :])
         if instant.band is not None
     ]
     if not first.contact_length > 0:
         raise NoContactError("rake face: the chip does not touch it in the developed instant")
-    return (first, *(segment for segment in others if segment.contact_length > 0))
+    return (first, *(segment for segment in later if segment.contact_length > 0))
 
 
 def _measure(
