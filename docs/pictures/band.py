@@ -1,15 +1,15 @@
-"""Draws the pictures of shear bands and comparisons: ``python docs/band_pictures.py``.
+"""Draws the pictures of shear bands and comparisons: ``python docs/pictures/band.py``.
 
 The cut is the quick one. The "experiment" is simulated too, with emissivities between those of the
 paper's two chips, other textures, noise and a calibration that is 0.4 % off.
 """
 
+import sys
 from pathlib import Path
 
 import numpy as np
 
 import chipglow
-from chipglow.camera import CalibrationErrors, Camera, Measurement
 from chipglow.laboratory.chip import (
     band_profile,
 )
@@ -20,13 +20,12 @@ from chipglow.laboratory.comparison import (
     compare,
 )
 from chipglow.laboratory.comparison.figure import draw_comparison
-from chipglow.scene import Scene
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent))
+from samples.experiment import experiment  # noqa: E402
+
 FRAMES = 9
-EXPERIMENT = chipglow.FeatureSurface(
-    chip=chipglow.Emissivity(0.68, 0.04), shear_band=chipglow.Emissivity(0.56, 0.04), seed=77
-)
 
 
 def main() -> None:
@@ -50,23 +49,6 @@ def main() -> None:
     result = compare(measured, simulated, measured.tool, stated=stated)
     draw_comparison(result).savefig(HERE / "compare.png", dpi=150)
     tell(result)
-
-
-def experiment(camera: Camera, scene: Scene, starts: np.ndarray) -> Measurement:
-    """Frames with noise, a hidden error of the calibration and its stated uncertainty of 1 %."""
-    clean = camera.measure(scene, EXPERIMENT, starts)
-    generator = np.random.default_rng(5)
-    noise = 6e-4 * clean.radiance.max() * generator.standard_normal(clean.radiance.shape)
-    radiance = 1.004 * clean.radiance + noise
-    assert clean.tool is not None
-    return Measurement.from_radiance(
-        radiance,
-        clean.band,
-        clean.times,
-        clean.raster,
-        camera.lower_limit,
-        calibration_errors=CalibrationErrors(np.array([0.0, 1e6]), np.array([[0.0, 1e4]])),
-    ).with_tool(clean.tool)
 
 
 def tell(result: Comparison) -> None:

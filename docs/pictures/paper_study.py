@@ -1,4 +1,6 @@
-"""Tables and picture of the page on the paper's study: ``python docs/paper_study.py RESULTS``.
+"""Tables and picture of the page on the paper's study.
+
+    python docs/pictures/paper_study.py RESULTS
 
 RESULTS is the folder that ``chipglow reproduce`` wrote. Prints the tables in Markdown.
 """

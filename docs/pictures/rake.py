@@ -1,4 +1,4 @@
-"""Draws the picture of the page on the rake face: ``python docs/rake_pictures.py``."""
+"""Draws the picture of the page on the rake face: ``python docs/pictures/rake.py``."""
 
 from math import degrees
 from pathlib import Path

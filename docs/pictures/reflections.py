@@ -1,4 +1,4 @@
-"""Draws the picture of the page on reflections: ``python docs/reflections_pictures.py``.
+"""Draws the picture of the page on reflections: ``python docs/pictures/reflections.py``.
 
 The cut is the quick one, in the middle of its time; the tool is as warm as it was cut.
 """

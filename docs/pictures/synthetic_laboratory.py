@@ -1,6 +1,6 @@
 """Pictures and numbers of synthetic-laboratory.md: the commands of the page, and all repeats.
 
-``python docs/synthetic_laboratory_pictures.py``; the repeats are those that
+``python docs/pictures/synthetic_laboratory.py``; the repeats are those that
 ``python benchmarks/synthetic_laboratory.py`` kept, or are computed.
 """
 
@@ -19,7 +19,7 @@ from chipglow.cli import app
 from chipglow.drawing.drawing import BLUE, GREEN, GREY, VERMILLION, new_figure, style
 
 HERE = Path(__file__).parent.resolve()
-sys.path.insert(0, str(HERE.parent / "benchmarks"))
+sys.path.insert(0, str(HERE.parents[1] / "benchmarks"))
 from synthetic_laboratory import QUANTITIES, Laboratory, kept, table  # noqa: E402
 
 SEED = 50
@@ -54,7 +54,7 @@ def main() -> None:
             app(shlex.split(command.format(reading=f"{reading:.2f}")), standalone_mode=False)
         for picture in Path(folder).glob("synthetic-*.png"):
             (HERE / picture.name).write_bytes(picture.read_bytes())
-        os.chdir(HERE.parent)
+        os.chdir(HERE.parents[1])
     rows = [kept(seed) for seed in range(REPEATS)]
     for line in table(rows):
         print(*line, sep=" | ")

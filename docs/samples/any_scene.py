@@ -1,12 +1,5 @@
-"""Fields of the page on any scene, as other programs write them, and its pictures.
+"""Fields of the page on any scene, as other programs write them."""
 
-    python docs/any_scene.py RESULTS
-
-takes the pictures of the page from the folder in which its commands were typed.
-"""
-
-import shutil
-import sys
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,7 +7,6 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-HERE: Final = Path(__file__).parent
 AMBIENT: Final = 293.0
 
 POWER, SPEED = 90.0, 0.8
@@ -106,15 +98,3 @@ def samples(folder: Path) -> None:
     kolsky_bar(folder)
     brake_disc(folder)
 
-
-def main() -> None:
-    """Take the pictures."""
-    folder = Path(sys.argv[1])
-    for name, figure in (("pool", "error-images"), ("bar", "profiles"), ("disc", "error-images")):
-        shutil.copyfile(
-            folder / f"{name}-error" / "figures" / f"{figure}.png", HERE / f"any-scene-{name}.png"
-        )
-
-
-if __name__ == "__main__":
-    main()

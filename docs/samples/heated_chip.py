@@ -1,24 +1,15 @@
-"""Pictures and numbers of the page on emissivity: ``python docs/emissivity_pictures.py``."""
+"""A heated chip as a camera sees it: the emissivities of the paper's chip 1, with a texture."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera import Camera, Measurement
-from chipglow.laboratory.emissivity import (
-    EmissivityMap,
-    Heating,
-    determine_emissivity,
-    emissivity_line,
-)
-from chipglow.laboratory.emissivity.figure import draw_emissivity
 from chipglow.radiometry import Band
-from chipglow.scene import FIELD_UNITS, Polygon, Raster, Region, Scene, areas
+from chipglow.scene import FIELD_UNITS, Polygon, Raster, Region, Scene
 from chipglow.surface import Emissivity, MapSurface, Texture
 
-HERE = Path(__file__).parent
 BAND = Band(3.8e-6, 5.1e-6)
 RASTER = Raster(left=0.0, top=0.0, spacing=2e-6, rows=240, columns=390)
 PITCH, LABORATORY = 6e-6, 293.0
@@ -30,17 +21,6 @@ REGIONS = (
     Region("shear band 1", Polygon(((38, 12), (42, 12), (50, 72), (46, 72))), "shear band"),
     Region("shear band 2", Polygon(((83, 12), (87, 12), (95, 72), (91, 72))), "shear band"),
 )
-
-
-def main() -> None:
-    """Draw both pictures."""
-    heating = Heating(391.0 + 273.15, LABORATORY, 2.0, 1.0, 2.0)
-    chip, background = chip_emissivity()
-    found = determine_emissivity([heated(chip, background, heating.reference)], heating)
-    draw_emissivity(found, REGIONS).savefig(HERE / "emissivity.png", dpi=150)
-    table(found, chip)
-    over_temperature(chip, background)
-    widths()
 
 
 def chip_emissivity() -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -91,21 +71,6 @@ def heated_scene(background: NDArray[np.bool_], temperature: float) -> Scene:
     return Scene.from_fields(RASTER, np.arange(11) * 1e-6, fields)
 
 
-def table(found: EmissivityMap, chip: NDArray[np.float64]) -> None:
-    """Print the table of regions."""
-    samples = {area.name: area.mask for area in areas(fine(REGIONS), RASTER)}
-    for area in areas(REGIONS, found.raster):
-        row, put_in = found.of(area), chip[samples[area.name]]
-        print(f"{row.name}: put in {put_in.mean():.4f}, sd {put_in.std():.4f}")
-        parts = row.estimate.budget().standard_uncertainty.to_series()
-        budget = ", ".join(f"{cause} {part:.2g}" for cause, part in parts.items())
-        print(
-            f"{row.name}: n {row.pixels}, mean {row.mean:.4f}, sd {row.standard_deviation:.4f}, "
-            f"u {row.estimate.standard_uncertainty:.2g}, "
-            f"U {row.estimate.expanded_uncertainty():.2g}; {budget}"
-        )
-
-
 def fine(regions: tuple[Region, ...]) -> tuple[Region, ...]:
     """The same regions in the scene's coordinates."""
     return tuple(
@@ -118,40 +83,6 @@ def fine(regions: tuple[Region, ...]) -> tuple[Region, ...]:
     )
 
 
-def over_temperature(chip: NDArray[np.float64], background: NDArray[np.bool_]) -> None:
-    """A chip that oxidises no further and has 0.02 more emissivity each 100 K."""
-    maps = []
-    for celsius in (391.0, 470.0, 570.0):
-        heating = Heating(celsius + 273.15, LABORATORY, 2.0, 1.0, 2.0)
-        values = chip + 2e-4 * (celsius - 391.0)
-        maps.append(determine_emissivity([heated(values, background, heating.reference)], heating))
-    found = [area for area in areas(REGIONS, maps[0].raster) if area.whole]
-    lines = [emissivity_line([one.of(area) for one in maps]) for area in found]
-    for line in lines:
-        middle, slope = line.estimate.values
-        of_middle, of_slope = line.estimate.standard_uncertainty
-        print(
-            f"{line.name}: {100 * slope:.4f} ± {100 * of_slope:.4f} in 100 K, "
-            f"{middle:.4f} ± {of_middle:.4f} at {line.middle - 273.15:.0f} °C"
-        )
-    draw_emissivity(maps[0], REGIONS, lines).savefig(HERE / "emissivity-temperature.png", dpi=150)
-
-
-def widths() -> None:
-    """Print what the blur of the optics makes of shear bands of several widths."""
-    heating = Heating(391.0 + 273.15)
-    background = chip_emissivity()[1]
-    for width in (12e-6, 24e-6, 36e-6, 48e-6, 72e-6, 96e-6):
-        flat = np.where(in_shear_band(width), 0.53, 0.42)
-        found = determine_emissivity([heated(flat, background, heating.reference)], heating)
-        means = [
-            found.of(areas((shear_band(width / 2 - inset),), found.raster)[0]).mean
-            for inset in (0.0, PITCH, 2 * PITCH)
-            if width / 2 - inset > 5e-6
-        ]
-        print(f"{width * 1e6:.0f} um:", ", ".join(f"{mean:.3f}" for mean in means))
-
-
 def shear_band(half_width: float) -> Region:
     """Region of the first shear band, so far to either side of its middle."""
     places = [(side * half_width, -height) for side, height in ((-1, 72e-6), (1, 72e-6))]
@@ -159,6 +90,3 @@ def shear_band(half_width: float) -> Region:
     corners = tuple((BANDS[0] + x - LEAN * y, y) for x, y in places)
     return Region("shear band", Polygon(corners), unit="m")
 
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,8 @@
-"""The example of import-movie.md: a movie that FFmpeg draws, and what is read from it.
+"""The example of import-movie.md: a movie that FFmpeg draws, and what it drew.
 
-FFmpeg is taken from the path, or from ``pip install imageio-ffmpeg``.
+    python docs/samples/hot_spot.py
+
+draws it anew. FFmpeg is taken from the path, or from ``pip install imageio-ffmpeg``.
 """
 
 import shutil
@@ -10,11 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from chipglow.io.sources.movie import FieldMovie, MovieSource
-from chipglow.io.sources.moving_pictures import index_movie, pictures
-from chipglow.scene import FILLED, Material, Raster
 
-FOLDER = Path(__file__).parent
-MOVIE = FOLDER / "hot-spot.avi"
+MOVIE = Path(__file__).parents[1] / "data" / "hot-spot.avi"
 COLDEST, HOTTEST = 293.15, 1400.15
 
 # A hot spot and a band that move to the right, as a fraction of the scale; X, Y: pixel, N: picture.
@@ -81,41 +80,5 @@ def truth(number: int) -> np.ndarray:
     return np.where(void | tool, np.nan, COLDEST + (HOTTEST - COLDEST) * fraction)
 
 
-def main() -> None:
-    """Make the movie, read it, and draw what was read."""
-    import matplotlib.pyplot as plt
-
-    draw()
-    movie = source()
-    survey = movie.survey()
-    print(f"{MOVIE.stat().st_size / 1000:.0f} kB, {survey.kind}")
-    print(*survey.assumed, sep="\n")
-    left, _, _, top = survey.extent
-    frame = next(movie.frames(Raster(left, top, survey.spacing, 240, 250)))
-    known = truth(0)
-    temperature = np.where(frame.material == Material.TOOL, np.nan, frame.fields["temperature"])
-    error = temperature - known
-    for name, chosen in (("read", frame.quality != FILLED), ("filled", frame.quality == FILLED)):
-        values = error[chosen & np.isfinite(error)]
-        print(
-            f"{name}: {values.size} pixels, {np.sqrt((values**2).mean()):.1f} K RMS, "
-            f"{np.abs(values).max():.0f} K at most"
-        )
-    picture = next(pictures(MOVIE, index_movie(MOVIE)))
-    extent = tuple(1e3 * value for value in survey.extent)
-    figure, (one, two, three) = plt.subplots(
-        1, 3, figsize=(11, 3.2), layout="constrained", width_ratios=(1.15, 1, 1)
-    )
-    one.imshow(picture)
-    one.set(title="Picture of the movie", xlabel="pixels", ylabel="pixels")
-    shown = two.imshow(temperature - 273.15, extent=extent, cmap="inferno")
-    two.set(title="Temperature, °C", xlabel="x, mm", ylabel="y, mm")
-    figure.colorbar(shown, ax=two)
-    shown = three.imshow(error, extent=extent, cmap="RdBu_r", vmin=-20, vmax=20)
-    three.set(title="Error, K", xlabel="x, mm")
-    figure.colorbar(shown, ax=three, extend="both")
-    figure.savefig(FOLDER / "import-movie.png", dpi=80)
-
-
 if __name__ == "__main__":
-    main()
+    draw()

@@ -1,7 +1,17 @@
-"""Draws `tool-edges.png`, the edge preparations: ``python docs/tool_edges.py``."""
+r"""
+Edges of the tool
+=================
+
+The edge decides how much material goes under the tool. Four preparations, by the names that a study gives them.
+
+What you see: a round edge of radius r, a chamfer of width b and angle γ, a hone whose arc reaches Sγ along the rake
+face and Sα along the flank face, and an outline of a worn tool from points. The square is the place from which
+distances up the rake face count.
+
+Source: ISO 3002 (faces and angles); form factors of the hone after Denkena. More: :doc:`/understand/cutting`.
+"""
 
 from math import radians
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,26 +35,6 @@ WORN = ToolOutline.placed(
         ]
     )
 )
-
-
-def main() -> None:
-    """Draw the four tools side by side."""
-    with style():
-        figure = new_figure(2.35)
-        panels = figure.subplots(1, 4, sharey=True)
-        for axes, tool, title in zip(
-            panels,
-            (ROUND, CHAMFERED, HONED, WORN),
-            ("edge_radius", "chamfer", "hone", "outline"),
-            strict=True,
-        ):
-            _draw(axes, tool, title)
-        panels[0].set_ylabel("y / µm")
-        _mark_radius(panels[0])
-        _mark_chamfer(panels[1])
-        _mark_hone(panels[2])
-        panels[3].plot(*(WORN.corners * 1e6).T, "o", color=BLUE, markersize=3)
-        figure.savefig(Path(__file__).with_name("tool-edges.png"), dpi=150)
 
 
 def _draw(axes: Axes, tool: Tool, title: str) -> None:
@@ -117,5 +107,14 @@ def _arrow(
     axes.annotate("", end, start, arrowprops=look)
 
 
-if __name__ == "__main__":
-    main()
+with style():
+    figure = new_figure(2.35)
+    panels = figure.subplots(1, 4, sharey=True)
+    tools = {"edge_radius": ROUND, "chamfer": CHAMFERED, "hone": HONED, "outline": WORN}
+    for axes, (title, tool) in zip(panels, tools.items(), strict=True):
+        _draw(axes, tool, title)
+    panels[0].set_ylabel("y / µm")
+    _mark_radius(panels[0])
+    _mark_chamfer(panels[1])
+    _mark_hone(panels[2])
+    panels[3].plot(*(WORN.corners * 1e6).T, "o", color=BLUE, markersize=3)

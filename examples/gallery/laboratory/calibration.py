@@ -1,22 +1,25 @@
-"""Draws the pictures of `measurements.md` and prints its numbers.
+r"""
+Calibration with blackbodies
+============================
 
-``python docs/measurement_pictures.py``; all of it is simulated.
+Blackbodies of known temperature tell what a count means. A straight line over the in-band radiance needs the band; the
+Planckian form of Sakuma and Hattori finds its effective wavelength from the points:
+
+.. math:: S = S_0 + g\,L(T) \qquad\text{or}\qquad S = S_0 + \frac{C}{\exp\bigl(c_2/(A\,T + B)\bigr) - 1} .
+
+What you see: eight points between 300 °C and 1000 °C with both forms, and below what is left in kelvins; then a chip by
+pixels whose gains differ by 5 %, as they are and after a two-point correction with the dead ones replaced.
+
+Source: Sakuma and Hattori (1982); uncertainties by JCGM 100. More: :doc:`/do/measurements`.
 """
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from chipglow.camera import (
-    CalibrationFit,
     DeadElements,
     Detector,
     EnergyResponse,
     GainPattern,
-    Measurement,
     NonUniformity,
     OffsetPattern,
     ReadNoise,
@@ -26,135 +29,95 @@ from chipglow.camera import (
     fit_sakuma_hattori,
 )
 from chipglow.drawing.drawing import HEAT, KELVIN, new_figure, show_image, style
-from chipglow.laboratory.measurement import (
-    calibrate_recording,
-)
+from chipglow.laboratory.measurement import calibrate_recording
 from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
 from chipglow.radiometry import Band
 
-HERE = Path(__file__).parent
 BAND = Band(3.8e-6, 5.1e-6)
 KELVINS = np.arange(300.0, 1001.0, 100.0) + KELVIN
-SHAPE = (60, 80)
 COUNT_UNCERTAINTY, TEMPERATURE_UNCERTAINTY = 2.0, 0.3
 
+rng = np.random.default_rng(3)
+true = KELVINS + rng.normal(0.0, TEMPERATURE_UNCERTAINTY, KELVINS.size)
+counts = 400.0 + 1.8 * BAND.radiance(true) + rng.normal(0.0, COUNT_UNCERTAINTY, KELVINS.size)
+stated = (COUNT_UNCERTAINTY, TEMPERATURE_UNCERTAINTY)
+fits = {
+    "linear": fit_linear(KELVINS, counts, BAND, *stated),
+    "sakuma-hattori": fit_sakuma_hattori(KELVINS, counts, BAND, *stated),
+}
+figure = draw_calibrations(fits)
 
-def main() -> None:
-    """Draw and print everything."""
-    draw_calibrations(_fits()).savefig(HERE / "calibration.png", dpi=150)
-    _draw_sensors().savefig(HERE / "non-uniformity.png", dpi=150)
-    _print_misfits()
-    _print_wrong_band()
-    for model in ("linear", "sakuma-hattori"):
-        _print_coverage(model)
+# %%
+# How far the Planckian form is from the integral over several bands, without any noise, and what a straight line over
+# the radiance of a wrong band leaves:
 
+for lower, upper, coldest, hottest in (
+    (3.8, 5.1, 300, 1000),
+    (3.0, 5.0, 300, 1000),
+    (1.5, 5.0, 300, 1000),
+    (7.5, 13.0, 0, 300),
+):
+    band = Band(lower * 1e-6, upper * 1e-6)
+    kelvins = np.linspace(coldest, hottest, 141) + KELVIN
+    fit = fit_sakuma_hattori(kelvins, band.radiance(kelvins), band, temperature_uncertainty=1.0)
+    worst = np.abs(fit.residuals_temperature).max()
+    print(f"{lower}-{upper} µm, {coldest} to {hottest} °C: at most {1e3 * worst:.1f} mK")
+for lower, upper in ((3.9, 5.1), (3.8, 5.0), (3.0, 5.0)):
+    band = Band(lower * 1e-6, upper * 1e-6)
+    seen = 400.0 + 1.8 * BAND.radiance(KELVINS)
+    fit = fit_linear(KELVINS, seen, band, temperature_uncertainty=TEMPERATURE_UNCERTAINTY)
+    worst = np.abs(fit.residuals_temperature).max()
+    print(f"fitted with {lower}-{upper} µm: residuals to {worst:.2f} K")
 
-def _fits() -> dict[str, CalibrationFit[Any]]:
-    rng = np.random.default_rng(3)
-    true = KELVINS + rng.normal(0.0, TEMPERATURE_UNCERTAINTY, KELVINS.size)
-    counts = 400.0 + 1.8 * BAND.radiance(true) + rng.normal(0.0, COUNT_UNCERTAINTY, KELVINS.size)
-    said = (COUNT_UNCERTAINTY, TEMPERATURE_UNCERTAINTY)
-    return {
-        "linear": fit_linear(KELVINS, counts, BAND, *said),
-        "sakuma-hattori": fit_sakuma_hattori(KELVINS, counts, BAND, *said),
-    }
+# %%
+# Pixels that differ
+# ------------------
+#
+# Two flat-field sources, at 350 °C and 850 °C, give each pixel its gain and its offset.
 
-
-def _draw_sensors() -> Figure:
-    """A chip as it is, as the counts show it, and as the measurement does."""
-    rng = np.random.default_rng(1)
-    detector = Detector(
-        response=EnergyResponse(1.8),
-        gain=1.0,
-        bits=14,
-        terms=(GainPattern(0.05), DeadElements(0.004), OffsetPattern(40), ReadNoise(3.0)),
-    )
-    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
-    truth = 700.0 + 350.0 * np.exp(-((x - 50) ** 2 + (y - 25) ** 2) / 250.0)
-    cold, hot, chip = (_seen(detector, kelvins, rng) for kelvins in (623.15, 1123.15, truth))
-    found = find_bad_pixels(cold, hot)
-    recording = Recording(
-        signal=chip[:1], quantity="counts", times=np.zeros(1), camera="simulated", pitch=6e-6
-    )
-    calibration = fit_linear(
-        KELVINS, [np.median(_seen(detector, kelvins, rng)) for kelvins in KELVINS], BAND
-    ).calibration
-    plain = calibrate_recording(recording, calibration)
-    repaired = calibrate_recording(
-        recording, calibration, NonUniformity.two_point(cold, hot), found.mask
-    )
-    for name, measured in (("as it is", plain), ("corrected", repaired)):
-        error = measured.radiance_temperature()[0] - truth
-        print(f"{name}: error {np.sqrt(np.nanmean(error**2)):.2f} K rms")
-    made = DeadElements(0.004).mask(SHAPE, detector.seed)
-    print(f"bad pixels: {found.mask.sum()} found, {made.sum()} made")
-    return _side_by_side(plain, repaired)
+SHAPE = (60, 80)
+detector = Detector(
+    response=EnergyResponse(1.8),
+    gain=1.0,
+    bits=14,
+    terms=(GainPattern(0.05), DeadElements(0.004), OffsetPattern(40), ReadNoise(3.0)),
+)
+rng = np.random.default_rng(1)
 
 
-def _seen(
-    detector: Detector, kelvins: float | NDArray[np.float64], rng: np.random.Generator
-) -> NDArray[np.uint32]:
+def frames(kelvins):
+    """Counts of twenty frames."""
     return detector.counts(np.broadcast_to(BAND.radiance(kelvins), (20, *SHAPE)), rng)
 
 
-def _side_by_side(plain: Measurement, repaired: Measurement) -> Figure:
-    with style():
-        figure = new_figure(2.9)
-        panels = figure.subplots(1, 2, sharey=True)
-        titles = ("the pixels as they are", "two-point correction, bad pixels replaced")
-        for axes, measured, title in zip(panels, (plain, repaired), titles, strict=True):
-            celsius = measured.radiance_temperature()[0] - KELVIN
-            picture = show_image(axes, celsius, measured.raster, None, HEAT, (400.0, 800.0))
-            axes.set_title(title)
-            axes.label_outer()
-        figure.colorbar(
-            picture, ax=panels, label="radiance temperature / °C", aspect=25, extend="both"
-        )
-    return figure
+y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+truth = 700.0 + 350.0 * np.exp(-((x - 50) ** 2 + (y - 25) ** 2) / 250.0)
+cold, hot, chip = (frames(kelvins) for kelvins in (623.15, 1123.15, truth))
+found = find_bad_pixels(cold, hot)
+recording = Recording(
+    signal=chip[:1], quantity="counts", times=np.zeros(1), camera="simulated", pitch=6e-6
+)
+calibration = fit_linear(
+    KELVINS, [np.median(frames(kelvins)) for kelvins in KELVINS], BAND
+).calibration
+plain = calibrate_recording(recording, calibration)
+corrected = calibrate_recording(
+    recording, calibration, NonUniformity.two_point(cold, hot), found.mask
+)
 
-
-def _print_misfits() -> None:
-    """How far the Planckian form is from the integral over bands, without any noise."""
-    for lower, upper, coldest, hottest in (
-        (3.8, 5.1, 300, 1000), (3.0, 5.0, 300, 1000), (1.5, 5.0, 300, 1000), (7.5, 13.0, 0, 300),
-    ):  # fmt: skip
-        band = Band(lower * 1e-6, upper * 1e-6)
-        kelvins = np.linspace(coldest, hottest, 141) + KELVIN
-        fit = fit_sakuma_hattori(kelvins, band.radiance(kelvins), band, temperature_uncertainty=1.0)
-        worst = np.abs(fit.residuals_temperature).max()
-        print(f"{lower}-{upper} um, {coldest} to {hottest} degC: at most {1e3 * worst:.1f} mK")
-
-
-def _print_wrong_band() -> None:
-    """A straight line over the radiance of a band that is not the camera's."""
-    for lower, upper in ((3.9, 5.1), (3.8, 5.0), (3.0, 5.0)):
-        counts = 400.0 + 1.8 * BAND.radiance(KELVINS)
-        band = Band(lower * 1e-6, upper * 1e-6)
-        fit = fit_linear(KELVINS, counts, band, temperature_uncertainty=TEMPERATURE_UNCERTAINTY)
-        worst = np.abs(fit.residuals_temperature).max()
-        print(f"fitted with {lower}-{upper} um: residuals to {worst:.2f} K")
-
-
-def _print_coverage(model: str, repeats: int = 2000) -> None:
-    """How often 95 % intervals hold the truth, and how wide they are."""
-    fit = {"linear": fit_linear, "sakuma-hattori": fit_sakuma_hattori}[model]
-    kelvins = np.array([350.0, 600.0, 950.0]) + KELVIN
-    counts = 400.0 + 1.8 * BAND.radiance(kelvins)
-    inside = np.zeros((2, kelvins.size))
-    for seed in range(repeats):
-        rng = np.random.default_rng(seed)
-        true = KELVINS + rng.normal(0.0, TEMPERATURE_UNCERTAINTY, KELVINS.size)
-        seen = 400 + 1.8 * BAND.radiance(true) + rng.normal(0, COUNT_UNCERTAINTY, KELVINS.size)
-        stated = fit(KELVINS, seen, BAND, COUNT_UNCERTAINTY, TEMPERATURE_UNCERTAINTY)
-        for row, found in enumerate((stated, fit(KELVINS, seen, BAND))):
-            error = found.calibration.radiance(counts) - BAND.radiance(kelvins)
-            interval = found.coverage_factor() * found.calibration.uncertainty(counts)
-            inside[row] += np.abs(error) < interval
-    widths = stated.calibration.uncertainty(counts) / BAND.slope(kelvins)
-    print(f"{model}: uncertainty {np.round(widths, 3)} K at {kelvins - KELVIN} degC")
-    print(f"  stated: inside in {np.round(100 * inside[0] / repeats, 1)} %")
-    print(f"  from the scatter: inside in {np.round(100 * inside[1] / repeats, 1)} %")
-
-
-if __name__ == "__main__":
-    main()
+with style():
+    non_uniformity = new_figure(2.9)
+    panels = non_uniformity.subplots(1, 2, sharey=True)
+    titles = ("the pixels as they are", "two-point correction, bad pixels replaced")
+    for axes, measured, title in zip(panels, (plain, corrected), titles, strict=True):
+        celsius = measured.radiance_temperature()[0] - KELVIN
+        picture = show_image(axes, celsius, measured.raster, None, HEAT, (400.0, 800.0))
+        axes.set_title(title)
+        axes.label_outer()
+    label = "radiance temperature / °C"
+    non_uniformity.colorbar(picture, ax=panels, label=label, aspect=25, extend="both")
+for name, measured in (("as it is", plain), ("corrected", corrected)):
+    error = measured.radiance_temperature()[0] - truth
+    print(f"{name}: error {np.sqrt(np.nanmean(error**2)):.2f} K rms")
+made = DeadElements(0.004).mask(SHAPE, detector.seed)
+print(f"bad pixels: {found.mask.sum()} found, {made.sum()} made")
