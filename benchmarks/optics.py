@@ -1,4 +1,4 @@
-"""Transfer and point spread functions beside closed forms, pyBSM and prysm: docs/optics.md.
+"""Transfer and point spread functions beside closed forms, pyBSM and prysm: docs/understand/optics.md.
 
 python benchmarks/optics.py [--samples 512]
 

@@ -8,8 +8,7 @@ import typer
 from chipglow.cli.options import file_option, picture_option
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
+    from chipglow.cli.screen import Screen
     from chipglow.errors import WavelengthErrors
 
 
@@ -29,11 +28,9 @@ def wavelengths(
     ] = False,
 ) -> None:
     """Compare bands, alone and as ratios of two: the error of the true temperature."""
-    from rich.console import Console
-
-    from chipglow.cli.assumed import say_assumed
     from chipglow.cli.pictures import write_picture
     from chipglow.cli.progress import progress_bars, say_where_it_starts
+    from chipglow.cli.screen import current
     from chipglow.laboratory.result_file import write_frame
     from chipglow.report.wavelength_figure import draw_wavelengths
     from chipglow.study import load_study, wavelengths as compare
@@ -43,21 +40,19 @@ def wavelengths(
         say_where_it_starts(loaded, resume, yes)
     with progress_bars() as report:
         found = compare(loaded, report, resume, assumed.append)
-    console = Console(highlight=False, markup=False)
+    screen = current()
     for place in found.places:
-        console.print(_table(found, place))
-        console.print()
-    say_assumed(assumed)
+        _print(screen, found, place)
+        screen.heading()
+    screen.assumed(assumed)
     if out is not None:
         write_frame(found.to_frame(), out)
-        print(out)
+        screen.file(out)
     if plot is not None:
         write_picture(draw_wavelengths(found), plot)
 
 
-def _table(found: "WavelengthErrors", place: str) -> "Table":
-    from chipglow.cli.tables import screen_table
-
+def _print(screen: "Screen", found: "WavelengthErrors", place: str) -> None:
     frame = found.to_frame()
     frame = frame[frame.place == place].sort_values("total_K")
     truth, draws = frame.truth_degC.iloc[0], frame.draws.iloc[0]
@@ -71,4 +66,4 @@ def _table(found: "WavelengthErrors", place: str) -> "Table":
         "u(ε) / K": "{emissivity_uncertainty_K:.1f}",
     }
     title = f"{place}: {truth:.0f} °C on average over {draws} draws; the least error first"
-    return screen_table(frame, cells, title, unbroken=("band / µm", "over / µm"))
+    screen.table("bands", frame, cells, title, unbroken=("band / µm", "over / µm"))
