@@ -153,7 +153,7 @@ def test_run_writes_a_report_and_prints_the_comparison(folder, runs):
     result = chipglow("run", "study.yaml", "--out", "results")
     assert result.exit_code == 0, result.output
     assert "results/report.html" in result.output
-    for heading in ("quantity", "the paper", "here", "range of draws", "differs", "−42", "90"):
+    for heading in ("quantity", "the paper", "here", "95 % interval", "differs", "−42", "90"):
         assert heading in result.output
     assert "Warning: The edge radius, 20 um, is 2 cells, expected 5 or more" in result.stdout
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
@@ -161,7 +161,14 @@ def test_run_writes_a_report_and_prints_the_comparison(folder, runs):
     assert last.startswith(f"Cite as: The chipglow developers: chipglow {citation['version']}.")
     assert citation["references"][0]["title"] in last
     names = {path.name for path in (folder / "results").iterdir()}
-    assert {"report.html", "summary.json", "results.nc", "study.yaml", "figures"} <= names
+    assert {
+        "report.html",
+        "summary.json",
+        "summary.schema.json",
+        "results.nc",
+        "study.yaml",
+        "figures",
+    } <= names
     assert load_study("results/study.yaml") == load_study("study.yaml")
     assert sorted(path.name for path in folder.iterdir()) == ["results", "study.yaml"]
 

@@ -368,7 +368,7 @@ def test_numbers_are_printed_with_sign_unit_and_dash():
     draws = Distribution(np.array([[[-30.0, -50.0, -40.0, -44.0]]]), CAUSES)
     drawn = replace(row, here=draws.mean, draws=draws, one_draw=-30.0, uncertainty=None)
     # Four draws of one cause: Student's t of 3 degrees of freedom, 3.182 times 8.4 times 1.118.
-    assert (drawn.here_text, drawn.interval_text) == ("−41 ± 8 °C", "−71 °C to −11 °C")
+    assert (drawn.here_text, drawn.interval_text) == ("−41 ± 8 °C", "−71 to −11 °C")
     assert (drawn.one_draw_text, drawn.differs_text) == ("−30 °C", "no")
 
 

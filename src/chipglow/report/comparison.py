@@ -90,8 +90,8 @@ class Row:
         ends = self.draws.interval if self.draws is not None else (nan, nan)
         if not all(map(isfinite, ends)):
             return "–"
-        low, high = map(self._text, ends)
-        return f"{low} to {high}"
+        low, high = (quantity_text(end, "", self.decimals) for end in ends)
+        return f"{low} to {high} {self.unit}".strip()
 
     @property
     def one_draw_text(self) -> str:

@@ -39,6 +39,7 @@ from chipglow.report.paper import CITATION, EmissivityTexts, stands_beside, tabl
 from chipglow.report.results import results_dataset
 from chipglow.report.steady_tool import ToolRow, steady_tool_part, tool_rows
 from chipglow.report.summary import cut_summary
+from chipglow.report.terms import INTERVAL, PSF
 from chipglow.study import Study
 
 
@@ -76,8 +77,8 @@ def write_report(
     Returns
     -------
     Path
-        ``report.html``; beside it are ``figures/``, ``summary.json``, ``results.nc`` and
-        ``study.yaml``.
+        ``report.html``; beside it are ``figures/``, ``summary.json`` and its schema,
+        ``results.nc`` and ``study.yaml``.
 
     Raises
     ------
@@ -152,13 +153,6 @@ _HERE: Final = Term(
     "Mean ± sample standard deviation of the draws. Of a single number ± is its standard "
     "uncertainty, or what its explanation says; a number without it has none that is known.",
 )
-_INTERVAL: Final = Term(
-    "interval",
-    "95 % interval",
-    "Where one more draw, of another segment, texture and pixel phase, lies with 95 % probability: "
-    "a prediction interval about the mean with the degrees of freedom of Welch and Satterthwaite "
-    "(JCGM 100, G.4). Few segments or textures widen it.",
-)
 _ONE_DRAW: Final = Term(
     "one-draw",
     "One draw",
@@ -169,11 +163,6 @@ _DIFFERS: Final = Term(
     "Differs",
     "Whether the paper's figure lies outside the 95 % interval. Of a single number: whether the "
     "two are more than two standard uncertainties apart.",
-)
-_PSF: Final = Term(
-    "psf",
-    "PSF's portion",
-    "The error less that of the same camera without point spread function (PSF), in the same draw.",
 )
 _MOTION: Final = Term(
     "motion",
@@ -202,7 +191,7 @@ _SCATTER: Final = Term(
 _TOGETHER: Final = Term(
     "together", "Causes together", "What none of the causes makes by itself: a rest."
 )
-_HEADS: Final = ("Quantity", _HERE, _INTERVAL, _ONE_DRAW)
+_HEADS: Final = ("Quantity", _HERE, INTERVAL, _ONE_DRAW)
 
 
 def _note(result: StudyResult) -> str:
@@ -212,10 +201,10 @@ def _note(result: StudyResult) -> str:
 
 def _terms(result: StudyResult) -> Iterator[Term]:
     yield Term("error", "Error", error_definition(result))
-    yield from (_HERE, _INTERVAL, _ONE_DRAW)
+    yield from (_HERE, INTERVAL, _ONE_DRAW)
     if stands_beside(result):
         yield _DIFFERS
-    yield from (_PSF, _MOTION, _FOOTPRINT, _REST, _SCATTER, _TOGETHER)
+    yield from (PSF, _MOTION, _FOOTPRINT, _REST, _SCATTER, _TOGETHER)
     yield _FOUND
 
 
@@ -254,7 +243,7 @@ def _parts(rows: Sequence[PartRow]) -> str:
     """Of what each error consists; motion and footprint apart where that is known."""
     names = ("psf", "motion", "footprint", "rest")
     shown = [name for name in names if any(name in row.parts for row in rows)]
-    heads = {"psf": _PSF, "motion": _MOTION, "footprint": _FOOTPRINT, "rest": _REST}
+    heads = {"psf": PSF, "motion": _MOTION, "footprint": _FOOTPRINT, "rest": _REST}
     lines = (
         Line(
             (row.quantity, row.error_text, *(row.text(name) for name in shown)),

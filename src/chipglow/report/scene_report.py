@@ -29,6 +29,7 @@ from chipglow.report.page import (
 )
 from chipglow.report.scene_error_figures import draw_scene_errors
 from chipglow.report.summary import scene_summary_file
+from chipglow.report.terms import INTERVAL, PSF
 
 
 class PlaceRow(NamedTuple):
@@ -93,8 +94,8 @@ def write_scene_report(
     Returns
     -------
     Path
-        ``report.html``; beside it are ``figures/``, ``summary.json``, ``results.nc`` and
-        ``study.yaml``.
+        ``report.html``; beside it are ``figures/``, ``summary.json`` and its schema,
+        ``results.nc`` and ``study.yaml``.
 
     Raises
     ------
@@ -154,17 +155,6 @@ _MEAN: Final = Term(
 _REFERENCE: Final = Term(
     "reference", "Reference", "What a camera without error would read: mean over the draws."
 )
-_INTERVAL: Final = Term(
-    "interval",
-    "95 % interval",
-    "Where one more draw lies with 95 % probability: a prediction interval about the mean with the "
-    "degrees of freedom of Welch and Satterthwaite (JCGM 100, G.4).",
-)
-_PSF: Final = Term(
-    "psf",
-    "PSF's portion",
-    "The error less that of the same camera without point spread function (PSF), in the same draw.",
-)
 _SCATTER: Final = Term(
     "causes-of-scatter",
     "Causes of scatter",
@@ -180,7 +170,7 @@ def _note(result: SceneErrors) -> str:
 
 def _terms(result: SceneErrors) -> Iterator[Term]:
     yield _error(result)
-    yield from (_REFERENCE, _MEAN, _INTERVAL, _PSF, _SCATTER)
+    yield from (_REFERENCE, _MEAN, INTERVAL, PSF, _SCATTER)
 
 
 def _error(result: SceneErrors) -> Term:
@@ -207,7 +197,7 @@ def _answer(result: SceneErrors) -> Iterator[Statement]:
 
 
 def _places(result: SceneErrors) -> str:
-    heads = ("Place", _REFERENCE, _error(result), _INTERVAL, _PSF)
+    heads = ("Place", _REFERENCE, _error(result), INTERVAL, PSF)
     text = f"{definition_of(result.plan.reference)} Mean ± standard deviation over the draws."
     return table_part(text, heads, (Line(row, "°C", "mean") for row in place_rows(result)))
 
@@ -245,7 +235,7 @@ def _cause_text(part: Any) -> str:
 
 def _interval_text(draws: Distribution) -> str:
     low, high = draws.interval
-    return f"{_rounded(low)} °C to {_rounded(high)} °C" if np.isfinite(low) else "–"
+    return f"{_rounded(low)} to {_rounded(high)} °C" if np.isfinite(low) else "–"
 
 
 def _mean_text(draws: Distribution, offset: float = 0.0) -> str:
