@@ -228,6 +228,7 @@ def test_a_place_that_is_not_there_is_refused_before_anything_is_computed(comman
 
 
 PICTURES = ("--plot", "--overlay")
+OUT_ENDINGS = {"register": ".yaml", "wavelengths": ".csv"}
 ENDINGS = {"--out": ".nc", "--table": ".csv", "--pairs": ".csv", "--blink": ".gif"}
 WRITTEN = [
     (name, option.opts[0])
@@ -243,9 +244,8 @@ def test_a_file_that_cannot_be_written_is_refused_before_anything_is_read(comman
     if option in PICTURES:
         message = f"{option}: a.txt, expected a file that ends in .png, .pdf or .svg"
         assert_refused(chipglow(command, option, "a.txt"), message)
-    ending = ENDINGS.get(option, ".PNG")
-    if (command, option) == ("register", "--out"):
-        ending = ".yaml"
+    ending = OUT_ENDINGS.get(command) if option == "--out" else None
+    ending = ending or ENDINGS.get(option, ".PNG")
     assert_refused(chipglow(command, option, f"no/a{ending}"), "there is no folder no")
 
 
