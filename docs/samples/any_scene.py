@@ -97,4 +97,3 @@ def samples(folder: Path) -> None:
     melt_pool(folder)
     kolsky_bar(folder)
     brake_disc(folder)
-

@@ -48,4 +48,3 @@ def measured(fraction: NDArray[np.float64], cold: float, hot: float, seed: int) 
     raster = Raster(0.0, 0.0, PITCH, *fraction.shape)
     frame = (low + (high - low) * (fraction + noise))[None]
     return Measurement.from_radiance(frame, BAND, np.zeros(1), raster)
-

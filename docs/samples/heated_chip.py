@@ -89,4 +89,3 @@ def shear_band(half_width: float) -> Region:
     places += [(side * half_width, -height) for side, height in ((1, 432e-6), (-1, 432e-6))]
     corners = tuple((BANDS[0] + x - LEAN * y, y) for x, y in places)
     return Region("shear band", Polygon(corners), unit="m")
-

@@ -23,4 +23,3 @@ def chip() -> Recording:
     )
     counts = detector.counts(0.4 * BAND.radiance(np.array(frames)), np.random.default_rng(1))
     return Recording(counts, "counts", np.arange(4) / 600, "simulated", 30e-6, 4094.0)
-

@@ -2,11 +2,15 @@
 Points as a scene
 =================
 
-Particles carry their values with them. A sample is the weighted mean of the points near it; where the points fill less
-than half of the area, nothing is.
+.. image:: images/sphx_glr_points_001.png
+   :alt: Points as a scene
 
-What you see: 9000 points of a simulation by the material point method, of water, jelly and snow that fall into a box of 1 m,
-with their speed: as they are in the file, and on the samples of a scene; on the right a close-up.
+Particles carry their values with them. A sample is the weighted mean of the points near it; where
+the points fill less than half of the area, nothing is.
+
+What you see: 9000 points of a simulation by the material point method, of water, jelly and snow
+that fall into a box of 1 m, with their speed: as they are in the file, and on the samples of a
+scene; on the right a close-up.
 
 More: :doc:`/do/import-points`.
 """
@@ -32,9 +36,7 @@ with style():
         speed = np.hypot(frame.fields["velocity_x"], frame.fields["velocity_y"])
         upper.scatter(*places.T, s=size, c=speeds, vmin=0, vmax=6, linewidths=0)
         upper.set(xlim=raster.extent[:2], ylim=raster.extent[2:], aspect="equal")
-        picture = lower.imshow(
-            speed, extent=raster.extent, interpolation="nearest", vmin=0, vmax=6
-        )
+        picture = lower.imshow(speed, extent=raster.extent, interpolation="nearest", vmin=0, vmax=6)
         lower.set(xlabel="x / m", facecolor=VOID)
     panels[0, 0].set_ylabel("y / m")
     panels[1, 0].set_ylabel("y / m")
