@@ -49,7 +49,7 @@ sphinx_gallery_conf = {
         "../examples/gallery/laboratory",
         "../examples/gallery/fields",
     ],
-    "within_subsection_order": "FileNameSortKey",
+    "within_subsection_order": "example_figures.Order",
     "remove_config_comments": True,
     "show_memory": False,
     "min_reported_time": 1e9,

@@ -2,14 +2,18 @@ r"""
 Noise, fixed pattern and its correction
 =======================================
 
-Electrons are counted, so their number scatters by its root; elements differ in gain and dark signal; a few are dead. A
-flat-field source corrects the offsets (one point), two correct offsets and gains:
+.. image:: images/sphx_glr_detector_001.png
+   :alt: Noise, fixed pattern and its correction
+
+Electrons are counted, so their number scatters by its root; elements differ in gain and dark
+signal; a few are dead. A flat-field source corrects the offsets (one point), two correct offsets
+and gains:
 
 .. math:: \sigma_e^2 = N + \sigma_\mathrm{read}^2, \qquad
    N_{ij} = g_{ij}\, \eta\, \Phi\, t_e + d_{ij} .
 
-What you see: the same frame of a chip, and below it the change by noise, by patterns of 3 % in gain and 40 000
-electrons in the dark, and by what a correction leaves.
+What you see: the same frame of a chip, and below it the change by noise, by patterns of 3 % in gain
+and 40 000 electrons in the dark, and by what a correction leaves.
 
 Source: EMVA 1288. More: :doc:`/understand/detector`.
 """

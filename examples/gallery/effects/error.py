@@ -2,14 +2,20 @@ r"""
 The error, and the optics' part of it
 =====================================
 
-The paper's error of a pixel is the measured radiance temperature less the *greatest* that was there:
+.. image:: images/sphx_glr_error_001.png
+   :alt: The error, and the optics' part of it
 
-.. math:: e = T_\mathrm{measured} - \max_{(x, y) \in \text{pixel},\ t \in \text{exposure}} T_r(x, y, t) .
+The paper's error of a pixel is the measured radiance temperature less the *greatest* that was
+there:
 
-Case 1 has everything, case 2 no point spread function; their difference is the optics' part. The rest is the mean
-over the detector's footprint and over the exposure.
+.. math:: e = T_\mathrm{measured}
+   - \max_{(x, y) \in \text{pixel},\ t \in \text{exposure}} T_r(x, y, t) .
 
-What you see, where the radiance temperature is over the camera's lower range limit of 300 °C: the error is largest where the temperature is steep, at the rake face and beside the shear band, and the
+Case 1 has everything, case 2 no point spread function; their difference is the optics' part. The
+rest is the mean over the detector's footprint and over the exposure.
+
+What you see, where the radiance temperature is over the camera's lower range limit of 300 °C: the
+error is largest where the temperature is steep, at the rake face and beside the shear band, and the
 optics make it *smaller* in places: light from what is hot falls on what is cold.
 
 Source: Figures 10 and 11 of Heigel and Whitenton (2010). More: :doc:`/learn/paper-study`.

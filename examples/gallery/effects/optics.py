@@ -2,13 +2,16 @@ r"""
 What the optics add and take away
 =================================
 
-Between a scene and its image stand windows that absorb and radiate, lenses that shine by themselves, the reflected
-image of the cold detector (narcissus), light scattered far (veil, the size-of-source effect), distortion, and a blur
-that grows toward the edge.
+.. image:: images/sphx_glr_optics_001.png
+   :alt: What the optics add and take away
 
-What you see: a hot chip with a colder band across it, and the change of the radiance temperature by each term alone.
-A window that the calibration does not know costs most; a veil brightens what is cold; distortion acts where the image
-is steep.
+Between a scene and its image stand windows that absorb and radiate, lenses that shine by
+themselves, the reflected image of the cold detector (narcissus), light scattered far (veil, the
+size-of-source effect), distortion, and a blur that grows toward the edge.
+
+What you see: a hot chip with a colder band across it, and the change of the radiance temperature by
+each term alone. A window that the calibration does not know costs most; a veil brightens what is
+cold; distortion acts where the image is steep.
 
 More, with the equation of each term: :doc:`/understand/optics`.
 """

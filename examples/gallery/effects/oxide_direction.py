@@ -2,12 +2,16 @@ r"""
 Oxide and direction
 ===================
 
-A hot chip oxidises, and a surface seen obliquely radiates otherwise than one seen straight on. The oxide grows as
-:math:`\sqrt{k(T)\,t}`; the directional emissivity follows from Fresnel's equations for :math:`n + \mathrm{i}k`.
+.. image:: images/sphx_glr_oxide_direction_001.png
+   :alt: Oxide and direction
 
-What you see: left, how the emissivity of the paper's chip 1 would rise at one temperature. In the time that the chip is
-in view (shaded) there is no oxide to speak of; while a chip is heated for seconds in the laboratory there is. Right,
-metals shine more toward grazing angles, oxides less.
+A hot chip oxidises, and a surface seen obliquely radiates otherwise than one seen straight on. The
+oxide grows as :math:`\sqrt{k(T)\,t}`; the directional emissivity follows from Fresnel's equations
+for :math:`n + \mathrm{i}k`.
+
+What you see: left, how the emissivity of the paper's chip 1 would rise at one temperature. In the
+time that the chip is in view (shaded) there is no oxide to speak of; while a chip is heated for
+seconds in the laboratory there is. Right, metals shine more toward grazing angles, oxides less.
 
 More: :doc:`/understand/physics`.
 """

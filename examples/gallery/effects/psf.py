@@ -2,16 +2,22 @@ r"""
 Point spread functions
 ======================
 
-The optics make a spot of every point. The spot of a pupil :math:`P` with a path difference :math:`W` (defocus, and
-aberrations as Zernike polynomials) is, at one wavelength,
+.. image:: images/sphx_glr_psf_001.png
+   :alt: Point spread functions
+
+The optics make a spot of every point. The spot of a pupil :math:`P` with a path difference
+:math:`W` (defocus, and aberrations as Zernike polynomials) is, at one wavelength,
 
 .. math:: \mathrm{PSF}_\lambda(x, y) \propto \left| \iint P(u, v)\,
-   e^{2\pi \mathrm{i} W(u, v) / \lambda}\, e^{-2\pi \mathrm{i} (ux + vy)/\lambda}\, \mathrm{d}u\, \mathrm{d}v \right|^2 ,
+   e^{2\pi \mathrm{i} W(u, v) / \lambda}\, e^{-2\pi \mathrm{i} (ux + vy)/\lambda}\,
+   \mathrm{d}u\, \mathrm{d}v \right|^2 ,
 
-and what the camera has is its mean over the band. Diffusion of charge, motion and vibration blur it further.
+and what the camera has is its mean over the band. Diffusion of charge, motion and vibration blur it
+further.
 
-What you see: a pupil of numerical aperture 0.28 with an obscuration of 0.35 over 3.8 µm to 5.1 µm, and what each effect
-alone makes of it; the root of the density, so that the faint parts show, and the peak.
+What you see: a pupil of numerical aperture 0.28 with an obscuration of 0.35 over 3.8 µm to 5.1 µm,
+and what each effect alone makes of it; the root of the density, so that the faint parts show, and
+the peak.
 
 Source: Goodman, *Introduction to Fourier Optics*; Zernike's polynomials in Noll's order. More:
 :doc:`/understand/optics`.

@@ -2,15 +2,19 @@ r"""
 Emissivity: radiance temperature is not temperature
 ===================================================
 
-A camera measures radiance, and a chip radiates less than a blackbody does. Its *radiance temperature* is that of the
-blackbody with the same radiance in the camera's band. For an emissivity :math:`\varepsilon` it is
+.. image:: images/sphx_glr_radiance_001.png
+   :alt: Emissivity: radiance temperature is not temperature
+
+A camera measures radiance, and a chip radiates less than a blackbody does. Its *radiance
+temperature* is that of the blackbody with the same radiance in the camera's band. For an emissivity
+:math:`\varepsilon` it is
 
 .. math:: T_r = L^{-1}\bigl(\varepsilon L(T) + (1 - \varepsilon) L(T_\mathrm{env})\bigr),
    \qquad L(T) = \int_{\lambda_1}^{\lambda_2}
    \frac{c_{1L}\,\lambda^{-5}}{\exp(c_2 / (\lambda T)) - 1}\, \mathrm{d}\lambda .
 
-What you see: at 700 °C the paper's chip 1 (:math:`\varepsilon = 0.42`) seems 195 K too cold, its chip 2 (0.77) 68 K; and
-the same emissivity costs more in a band of longer waves.
+What you see: at 700 °C the paper's chip 1 (:math:`\varepsilon = 0.42`) seems 195 K too cold, its
+chip 2 (0.77) 68 K; and the same emissivity costs more in a band of longer waves.
 
 Source: Equations 1 and 2 of Heigel and Whitenton (2010). More: :doc:`/understand/physics`.
 """

@@ -2,18 +2,23 @@ r"""
 Reflections between tool and chip
 =================================
 
-At the rake face the chip's side bulges, and with the tool it makes a wedge in which radiation goes to and fro. A wedge
-looks blacker than its walls: its *effective emissivity* is what the camera sees over what a blackbody as warm as the
-chip would send,
+.. image:: images/sphx_glr_reflections_001.png
+   :alt: Reflections between tool and chip
+
+At the rake face the chip's side bulges, and with the tool it makes a wedge in which radiation goes
+to and fro. A wedge looks blacker than its walls: its *effective emissivity* is what the camera sees
+over what a blackbody as warm as the chip would send,
 
 .. math:: \varepsilon_\mathrm{eff} = \frac{\varepsilon L + (1 - \varepsilon) H}{L} ,
 
 with the irradiation :math:`H` from all that is around.
 
-What you see: the wedge in cross-section at three angles, and its effective emissivity over the depth from the rake
-face. A tool as warm as the chip (solid) brings 0.42 to over 0.8 in the corner; a cold one (dashed) does little.
+What you see: the wedge in cross-section at three angles, and its effective emissivity over the
+depth from the rake face. A tool as warm as the chip (solid) brings 0.42 to over 0.8 in the corner;
+a cold one (dashed) does little.
 
-Source: the Discussion of Heigel and Whitenton (2010); view factors by rays. More: :doc:`/understand/reflections`.
+Source: the Discussion of Heigel and Whitenton (2010); view factors by rays. More:
+:doc:`/understand/reflections`.
 """
 
 from math import radians

@@ -2,19 +2,24 @@ r"""
 Exposure, detector footprint and optics: one step after the other
 =================================================================
 
-A detector element takes the mean of the radiance over its footprint and over the exposure, and the optics spread each
-point before:
+.. image:: images/sphx_glr_steps_001.png
+   :alt: Exposure, detector footprint and optics: one step after the other
 
-.. math:: \bar L_{ij} = \frac{1}{t_e A} \int_{t}^{t + t_e} \int_{A_{ij}} (L * \mathrm{PSF})(x, y, t')\,
+A detector element takes the mean of the radiance over its footprint and over the exposure, and the
+optics spread each point before:
+
+.. math:: \bar L_{ij} = \frac{1}{t_e A} \int_{t}^{t + t_e}
+   \int_{A_{ij}} (L * \mathrm{PSF})(x, y, t')\,
    \mathrm{d}A\, \mathrm{d}t' ,
 
 and only then is the radiance turned into a temperature.
 
-What you see, with the highest value of each: a chip in closed form, its hot contact with the tool and its shear band. An exposure of 8 µs
-smears the band, which moves and still grows; pixels of 12 µm and the point spread function take most from what is hot
-and narrow.
+What you see, with the highest value of each: a chip in closed form, its hot contact with the tool
+and its shear band. An exposure of 8 µs smears the band, which moves and still grows; pixels of 12
+µm and the point spread function take most from what is hot and narrow.
 
-Source: Figure 6 of Heigel and Whitenton (2010). More: :doc:`/understand/physics`, :doc:`/understand/optics`.
+Source: Figure 6 of Heigel and Whitenton (2010). More: :doc:`/understand/physics`,
+:doc:`/understand/optics`.
 """
 
 from dataclasses import replace

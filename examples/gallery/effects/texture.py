@@ -2,18 +2,22 @@ r"""
 Emissivity that differs from place to place
 ===========================================
 
-Chip, shear band, workpiece and tool have an emissivity each, and each varies over its surface. Where the plastic strain
-passes from 0.3 to 0.5 the workpiece becomes chip; where its rate passes from 6 000 /s to 30 000 /s the chip becomes
-shear band:
+.. image:: images/sphx_glr_texture_001.png
+   :alt: Emissivity that differs from place to place
 
-.. math:: \varepsilon = (1 - b)\,\bigl[(1 - c)\,\varepsilon_\mathrm{workpiece} + c\,\varepsilon_\mathrm{chip}\bigr]
+Chip, shear band, workpiece and tool have an emissivity each, and each varies over its surface.
+Where the plastic strain passes from 0.3 to 0.5 the workpiece becomes chip; where its rate passes
+from 6 000 /s to 30 000 /s the chip becomes shear band:
+
+.. math:: \varepsilon = (1 - b)\,\bigl[(1 - c)\,\varepsilon_\mathrm{workpiece}
+   + c\,\varepsilon_\mathrm{chip}\bigr]
    + b\,\varepsilon_\mathrm{band} .
 
-What you see: emissivities drawn from the paper's Table 1 in grains of 20 µm, and what they make of the radiance
-temperature. The texture moves with the material.
+What you see: emissivities drawn from the paper's Table 1 in grains of 20 µm, and what they make of
+the radiance temperature. The texture moves with the material.
 
-Source: "Create emissivity maps for each feature" and Equation 3 of Heigel and Whitenton (2010). More:
-:doc:`/understand/physics`.
+Source: "Create emissivity maps for each feature" and Equation 3 of Heigel and Whitenton (2010).
+More: :doc:`/understand/physics`.
 """
 
 from samples.chip import closed_form_chip

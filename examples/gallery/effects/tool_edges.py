@@ -2,13 +2,18 @@ r"""
 Edges of the tool
 =================
 
-The edge decides how much material goes under the tool. Four preparations, by the names that a study gives them.
+.. image:: images/sphx_glr_tool_edges_001.png
+   :alt: Edges of the tool
 
-What you see: a round edge of radius r, a chamfer of width b and angle γ, a hone whose arc reaches Sγ along the rake
-face and Sα along the flank face, and an outline of a worn tool from points. The square is the place from which
-distances up the rake face count.
+The edge decides how much material goes under the tool. Four preparations, by the names that a study
+gives them.
 
-Source: ISO 3002 (faces and angles); form factors of the hone after Denkena. More: :doc:`/understand/cutting`.
+What you see: a round edge of radius r, a chamfer of width b and angle γ, a hone whose arc reaches
+Sγ along the rake face and Sα along the flank face, and an outline of a worn tool from points. The
+square is the place from which distances up the rake face count.
+
+Source: ISO 3002 (faces and angles); form factors of the hone after Denkena. More:
+:doc:`/understand/cutting`.
 """
 
 from math import radians

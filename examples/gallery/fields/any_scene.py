@@ -2,14 +2,17 @@
 The error without a cut
 =======================
 
-A scene needs a temperature and nothing else. A melt pool of laser powder-bed fusion, an adiabatic shear band in a Kolsky
-bar, and a brake disc from a movie are looked at by three cameras.
+.. image:: images/sphx_glr_any_scene_001.png
+   :alt: The error without a cut
 
-What you see: for each of them the error that its camera makes. Where the hot spot is narrower than what a detector
-element sees, the highest temperature is lost.
+A scene needs a temperature and nothing else. A melt pool of laser powder-bed fusion, an adiabatic
+shear band in a Kolsky bar, and a brake disc from a movie are looked at by three cameras.
 
-Source: Rosenthal's moving point source for the pool; the bar is about as Marchand and Duffy (1988) found it in HY-100
-steel. More, with every file and command: :doc:`/do/any-scene`.
+What you see: for each of them the error that its camera makes. Where the hot spot is narrower than
+what a detector element sees, the highest temperature is lost.
+
+Source: Rosenthal's moving point source for the pool; the bar is about as Marchand and Duffy (1988)
+found it in HY-100 steel. More, with every file and command: :doc:`/do/any-scene`.
 """
 
 import re

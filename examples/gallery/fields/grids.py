@@ -2,10 +2,14 @@
 A grid as a scene
 =================
 
-Samples of the scene that are wider than the grid's are means over their area, finer ones are interpolated.
+.. image:: images/sphx_glr_grids_001.png
+   :alt: A grid as a scene
 
-What you see: heights of the ground near Jacksboro fault, which Matplotlib brings, on samples as fine as the file's and
-on samples of 600 m. Metres stand in for kelvins here.
+Samples of the scene that are wider than the grid's are means over their area, finer ones are
+interpolated.
+
+What you see: heights of the ground near Jacksboro fault, which Matplotlib brings, on samples as
+fine as the file's and on samples of 600 m. Metres stand in for kelvins here.
 
 More: :doc:`/do/import-grid`.
 """

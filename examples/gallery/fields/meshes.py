@@ -2,13 +2,17 @@ r"""
 A mesh as a scene
 =================
 
-Results of a finite-element program are sampled on a regular grid: each sample takes the value at its centre, in a
-triangle by its corners' weights,
+.. image:: images/sphx_glr_meshes_001.png
+   :alt: A mesh as a scene
+
+Results of a finite-element program are sampled on a regular grid: each sample takes the value at
+its centre, in a triangle by its corners' weights,
 
 .. math:: T(x, y) = \sum_{k=1}^{3} \lambda_k(x, y)\, T_k, \qquad \sum_k \lambda_k = 1 .
 
-What you see: PyVista's small beam of 40 hexahedra, cut with the values of its nodes, with those of its elements, and its
-surface as a camera sees it. The numbers in the file are not temperatures, but another program wrote it.
+What you see: PyVista's small beam of 40 hexahedra, cut with the values of its nodes, with those of
+its elements, and its surface as a camera sees it. The numbers in the file are not temperatures, but
+another program wrote it.
 
 More: :doc:`/do/import-mesh`.
 """

@@ -2,16 +2,21 @@ r"""
 A movie as a scene
 ==================
 
-Where only a movie is left of a simulation, its colours are turned back into values: each colour takes the place of the
-nearest one of the legend in CIE L*a*b*,
+.. image:: images/sphx_glr_movies_001.png
+   :alt: A movie as a scene
+
+Where only a movie is left of a simulation, its colours are turned back into values: each colour
+takes the place of the nearest one of the legend in CIE L*a*b*,
 
 .. math:: T = T_\mathrm{first} + \frac{k}{n - 1}\,(T_\mathrm{last} - T_\mathrm{first}), \qquad
    |\mathbf{c} - \mathbf{c}_k| \to \min .
 
-What you see: a picture of a movie that FFmpeg drew, the temperature that was read from it, and its error against what
-FFmpeg was asked to draw. Under the mesh lines the value is that of the nearest pixel that shows one.
+What you see: a picture of a movie that FFmpeg drew, the temperature that was read from it, and its
+error against what FFmpeg was asked to draw. Under the mesh lines the value is that of the nearest
+pixel that shows one.
 
-Source: the paper's own way, an AVI exported by a finite-element program. More: :doc:`/do/import-movie`.
+Source: the paper's own way, an AVI exported by a finite-element program. More:
+:doc:`/do/import-movie`.
 """
 
 import numpy as np

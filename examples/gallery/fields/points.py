@@ -2,11 +2,15 @@
 Points as a scene
 =================
 
-Particles carry their values with them. A sample is the weighted mean of the points near it; where the points fill less
-than half of the area, nothing is.
+.. image:: images/sphx_glr_points_001.png
+   :alt: Points as a scene
 
-What you see: 9000 points of a simulation by the material point method, of water, jelly and snow that fall into a box of 1 m,
-with their speed: as they are in the file, and on the samples of a scene; on the right a close-up.
+Particles carry their values with them. A sample is the weighted mean of the points near it; where
+the points fill less than half of the area, nothing is.
+
+What you see: 9000 points of a simulation by the material point method, of water, jelly and snow
+that fall into a box of 1 m, with their speed: as they are in the file, and on the samples of a
+scene; on the right a close-up.
 
 More: :doc:`/do/import-points`.
 """

@@ -2,11 +2,15 @@
 One block from six programs
 ===========================
 
-The files in which AdvantEdge, DEFORM, Abaqus, LS-DYNA, Ansys and OpenFOAM would give the same block, in mm and °C, or in
-SI: each is imported with the description of its page.
+.. image:: images/sphx_glr_programs_001.png
+   :alt: One block from six programs
 
-What you see: the temperature that arrives. A wrong unit, axis or origin would show; below is how far the six are from
-what was written: linear between nodes 10 µm apart, or constant in OpenFOAM's cells.
+The files in which AdvantEdge, DEFORM, Abaqus, LS-DYNA, Ansys and OpenFOAM would give the same
+block, in mm and °C, or in SI: each is imported with the description of its page.
+
+What you see: the temperature that arrives. A wrong unit, axis or origin would show; below is how
+far the six are from what was written: linear between nodes 10 µm apart, or constant in OpenFOAM's
+cells.
 
 More: :doc:`/do/import`, and a page for each program.
 """

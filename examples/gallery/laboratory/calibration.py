@@ -2,13 +2,19 @@ r"""
 Calibration with blackbodies
 ============================
 
-Blackbodies of known temperature tell what a count means. A straight line over the in-band radiance needs the band; the
-Planckian form of Sakuma and Hattori finds its effective wavelength from the points:
+.. image:: images/sphx_glr_calibration_001.png
+   :alt: Calibration with blackbodies
 
-.. math:: S = S_0 + g\,L(T) \qquad\text{or}\qquad S = S_0 + \frac{C}{\exp\bigl(c_2/(A\,T + B)\bigr) - 1} .
+Blackbodies of known temperature tell what a count means. A straight line over the in-band radiance
+needs the band; the Planckian form of Sakuma and Hattori finds its effective wavelength from the
+points:
 
-What you see: eight points between 300 °C and 1000 °C with both forms, and below what is left in kelvins; then a chip by
-pixels whose gains differ by 5 %, as they are and after a two-point correction with the dead ones replaced.
+.. math:: S = S_0 + g\,L(T) \qquad\text{or}\qquad
+   S = S_0 + \frac{C}{\exp\bigl(c_2/(A\,T + B)\bigr) - 1} .
+
+What you see: eight points between 300 °C and 1000 °C with both forms, and below what is left in
+kelvins; then a chip by pixels whose gains differ by 5 %, as they are and after a two-point
+correction with the dead ones replaced.
 
 Source: Sakuma and Hattori (1982); uncertainties by JCGM 100. More: :doc:`/do/measurements`.
 """
@@ -48,8 +54,8 @@ fits = {
 figure = draw_calibrations(fits)
 
 # %%
-# How far the Planckian form is from the integral over several bands, without any noise, and what a straight line over
-# the radiance of a wrong band leaves:
+# How far the Planckian form is from the integral over several bands, without any noise, and what a
+# straight line over the radiance of a wrong band leaves:
 
 for lower, upper, coldest, hottest in (
     (3.8, 5.1, 300, 1000),

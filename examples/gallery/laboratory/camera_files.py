@@ -2,13 +2,17 @@ r"""
 Files of cameras
 ================
 
-A recording has counts, times, and what the camera knew: its constants, the object parameters that its operator set, the
-exposure. A FLIR camera's own constants turn its counts into the temperature of a blackbody,
+.. image:: images/sphx_glr_camera_files_001.png
+   :alt: Files of cameras
+
+A recording has counts, times, and what the camera knew: its constants, the object parameters that
+its operator set, the exposure. A FLIR camera's own constants turn its counts into the temperature
+of a blackbody,
 
 .. math:: T = \frac{B}{\ln\left(\frac{R_1}{R_2\,(S + O)} + F\right)} .
 
-What you see: left, a simulated chip in a file of Telops' format, as counts; right, a frame of a real FLIR T420 through
-its own constants.
+What you see: left, a simulated chip in a file of Telops' format, as counts; right, a frame of a
+real FLIR T420 through its own constants.
 
 Source: the layouts are described, with what was tested, on :doc:`/do/camera-files`.
 """

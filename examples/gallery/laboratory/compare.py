@@ -2,18 +2,22 @@ r"""
 Measured beside simulated
 =========================
 
-Which emissivities describe the chip? Differences at the rake face and along the shear band are judged by their
-uncertainties,
+.. image:: images/sphx_glr_compare_001.png
+   :alt: Measured beside simulated
+
+Which emissivities describe the chip? Differences at the rake face and along the shear band are
+judged by their uncertainties,
 
 .. math:: E_n = \frac{|T_\mathrm{simulated} - T_\mathrm{measured}|}
    {\sqrt{U_\mathrm{measured}^2 + U_\mathrm{simulated}^2}} ,
 
 and up to 1 the two agree.
 
-What you see: an "experiment" whose emissivities lie between those of the paper's two chips, with noise and a calibration
-that is 0.4 % off, beside simulations with either set.
+What you see: an "experiment" whose emissivities lie between those of the paper's two chips, with
+noise and a calibration that is 0.4 % off, beside simulations with either set.
 
-Source: ISO/IEC 17043 (:math:`E_n`); Figures 7 to 9 of Heigel and Whitenton (2010). More: :doc:`/do/compare`.
+Source: ISO/IEC 17043 (:math:`E_n`); Figures 7 to 9 of Heigel and Whitenton (2010). More:
+:doc:`/do/compare`.
 """
 
 import sample_files

@@ -2,13 +2,17 @@ r"""
 Emissivity of a heated chip
 ===========================
 
-A chip is heated to a known temperature and looked at. What it radiates beyond its reflections, over what a blackbody
-would, is its emissivity:
+.. image:: images/sphx_glr_emissivity_001.png
+   :alt: Emissivity of a heated chip
+
+A chip is heated to a known temperature and looked at. What it radiates beyond its reflections, over
+what a blackbody would, is its emissivity:
 
 .. math:: \varepsilon = \frac{L_\mathrm{app} - L(T_\mathrm{env})}{L(T) - L(T_\mathrm{env})} .
 
-What you see: a simulated chip with the emissivities of the paper's chip 1 in grains of 20 µm at 391 °C, ten frames with
-noise and drift, its radiance temperature with four regions, and the emissivity of every pixel.
+What you see: a simulated chip with the emissivities of the paper's chip 1 in grains of 20 µm at 391
+°C, ten frames with noise and drift, its radiance temperature with four regions, and the emissivity
+of every pixel.
 
 Source: Equation 2 and Table 1 of Heigel and Whitenton (2010). More: :doc:`/do/emissivity`.
 """
@@ -73,8 +77,8 @@ for line in lines:
 # What blur makes of narrow bands
 # -------------------------------
 #
-# The mean of a band of 0.53 in a body of 0.42, by its width; of all its pixels, and with one and two pixels left out on
-# either side.
+# The mean of a band of 0.53 in a body of 0.42, by its width; of all its pixels, and with one and
+# two pixels left out on either side.
 
 for width in (12e-6, 24e-6, 36e-6, 48e-6, 72e-6, 96e-6):
     flat = np.where(heated_chip.in_shear_band(width), 0.53, 0.42)

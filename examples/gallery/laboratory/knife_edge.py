@@ -2,15 +2,19 @@ r"""
 Point spread function by a knife edge
 =====================================
 
-A blade before a blackbody is a step, and its image is the integral of how the camera spreads a line:
+.. image:: images/sphx_glr_knife_edge_001.png
+   :alt: Point spread function by a knife edge
+
+A blade before a blackbody is a step, and its image is the integral of how the camera spreads a
+line:
 
 .. math:: \mathrm{ESF}(s) = \int_{-\infty}^{s} \mathrm{LSF}(t)\, \mathrm{d}t, \qquad
    \mathrm{MTF}(f) = \left| \int \mathrm{LSF}(s)\, e^{-2\pi\mathrm{i} f s}\, \mathrm{d}s \right| .
 
 An edge a few degrees off the rows shows the step at distances much finer than a pixel.
 
-What you see: a simulated edge between 300 °C and 600 °C with the line that was found, the edge-spread function with the
-fit and what it leaves, the line-spread function, and the MTF.
+What you see: a simulated edge between 300 °C and 600 °C with the line that was found, the
+edge-spread function with the fit and what it leaves, the line-spread function, and the MTF.
 
 Source: ISO 12233; ISO 15529. More: :doc:`/do/knife-edge`.
 """
@@ -36,8 +40,8 @@ print("\n".join(sentences(found)))
 # Use radiance, not temperature
 # -----------------------------
 #
-# The optics add radiances. A step of temperature is another one, by Planck's law, and the width found from it is wrong.
-# The true one is 10 µm:
+# The optics add radiances. A step of temperature is another one, by Planck's law, and the width
+# found from it is wrong. The true one is 10 µm:
 
 
 def in_temperature(measurement):

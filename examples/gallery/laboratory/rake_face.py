@@ -2,14 +2,18 @@ r"""
 Temperature along the rake face
 ===============================
 
-The paper lays squares of 3 by 3 pixels on the chip, which stand on the rake face, and averages the radiance temperature
-in each. Pixels in a turned square do not lie evenly about its middle, so the mean weights them:
+.. image:: images/sphx_glr_rake_face_001.png
+   :alt: Temperature along the rake face
+
+The paper lays squares of 3 by 3 pixels on the chip, which stand on the rake face, and averages the
+radiance temperature in each. Pixels in a turned square do not lie evenly about its middle, so the
+mean weights them:
 
 .. math:: \sum_i w_i = 1, \qquad \sum_i w_i\,\mathbf{r}_i = \mathbf{r}_\mathrm{middle}, \qquad
    \sum_i w_i^2 \to \min .
 
-What you see: the grid on an image of a chip in closed form, and the profiles along the face at several depths; bars
-are one standard deviation between the four frames.
+What you see: the grid on an image of a chip in closed form, and the profiles along the face at
+several depths; bars are one standard deviation between the four frames.
 
 Source: Figure 7 of Heigel and Whitenton (2010). More: :doc:`/do/rake-face`.
 """

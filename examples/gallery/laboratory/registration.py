@@ -2,29 +2,44 @@ r"""
 Infrared on visible images
 ==========================
 
-Two cameras look at the same chip, and a map leads from one image to the other. With points in both it is fitted by
-least squares; without them by what both images have in common, their mutual information
+.. image:: images/sphx_glr_registration_001.png
+   :alt: Infrared on visible images
 
-.. math:: I = \sum_{a, b} p(a, b) \ln \frac{p(a, b)}{p(a)\, p(b)} .
+Two cameras look at the same chip, and a map leads from one image to the other. With points that
+are seen in both it is fitted by least squares,
 
-What you see: the infrared image with the tool's outline, and the visible picture with the infrared image laid over it;
-then both in turns. Registration by points and by a target of dots: :doc:`/do/registration`.
+.. math:: \min_{A,\, \mathbf{b}} \sum_i |A\,\mathbf{x}_i + \mathbf{b} - \mathbf{p}_i|^2 ,
 
-Source: Viola and Wells (1997); Mattes et al. (2003).
+and how far they miss says how surely it is known.
+
+What you see: the infrared image with the tool's outline and six points, and the visible picture
+with the infrared image laid over it; then both in turns.
+
+Without points the map is found by a target's dots, or by what both images have in common:
+:doc:`/do/registration`.
 """
 
+import numpy as np
 import sample_files
 from dual_spectrum import DualSpectrum
 
-from chipglow import fit_images
+from chipglow import fit_points
 from chipglow.laboratory.registration.figure import blink_pictures, draw_registration
 from chipglow.laboratory.registration.picture_file import write_blink
 
 pair = DualSpectrum()
 seen = pair.infrared
-fit = fit_images(seen.radiance[0], seen.raster, pair.visible, "affine")
+
+# %%
+# The sample files of the page have the points: column and row in either image.
+
+table = sample_files.folder("registration") / "points.csv"
+points = np.loadtxt(table, delimiter=",", skiprows=1)
+columns, rows = points[:, :2].astype(int).T
+positions = np.stack((seen.raster.x[columns], seen.raster.y[rows]), axis=-1)
+fit = fit_points(positions, points[:, 2:])
 shown = (seen.radiance_temperature()[0], seen.raster, pair.visible, pair.tool)
-figure = draw_registration(fit.registration, *shown)
+figure = draw_registration(fit.registration, *shown, points=(positions, points[:, 2:]))
 
 # %%
 # Both in turns, which shows a misfit of a pixel:

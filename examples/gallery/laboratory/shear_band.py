@@ -2,15 +2,18 @@ r"""
 Temperature along the shear band
 ================================
 
-A band is a ridge of the radiance temperature: across it the second derivative, after a Gaussian blur, is most negative.
-The path from the edge that gathers the most of it,
+.. image:: images/sphx_glr_shear_band_001.png
+   :alt: Temperature along the shear band
+
+A band is a ridge of the radiance temperature: across it the second derivative, after a Gaussian
+blur, is most negative. The path from the edge that gathers the most of it,
 
 .. math:: \max_{s} \int_s -\frac{\partial^2 (G_\sigma * T)}{\partial n^2}\, \mathrm{d}s ,
 
 is found by dynamic programming.
 
-What you see: the bands of four frames of a chip in closed form on the image of the reference, and the radiance
-temperature along them.
+What you see: the bands of four frames of a chip in closed form on the image of the reference, and
+the radiance temperature along them.
 
 Source: Figure 9 of Heigel and Whitenton (2010). More: :doc:`/do/shear-band`.
 """

@@ -2,15 +2,19 @@ r"""
 True temperature of a region
 ============================
 
-With an emissivity that was measured by the same camera, the mean radiance of a region of one temperature gives that
-temperature:
+.. image:: images/sphx_glr_temperature_001.png
+   :alt: True temperature of a region
 
-.. math:: T = L^{-1}\!\left(\frac{L_\mathrm{app} - (1 - \varepsilon)\, L(T_\mathrm{env})}{\varepsilon}\right) .
+With an emissivity that was measured by the same camera, the mean radiance of a region of one
+temperature gives that temperature:
+
+.. math:: T = L^{-1}\!\left(
+   \frac{L_\mathrm{app} - (1 - \varepsilon)\, L(T_\mathrm{env})}{\varepsilon}\right) .
 
 What is wrong in both, the camera's calibration and the room, is one error and does not count twice.
 
-What you see: the regions of a chip at 470 °C, as a blackbody's radiance would have it, and with the emissivity that was
-measured at 391 °C and 570 °C, a line between; bars are 95 % intervals.
+What you see: the regions of a chip at 470 °C, as a blackbody's radiance would have it, and with the
+emissivity that was measured at 391 °C and 570 °C, a line between; bars are 95 % intervals.
 
 Source: Equation 2 of Heigel and Whitenton (2010); JCGM 100. More: :doc:`/do/emissivity`.
 """
