@@ -11,21 +11,11 @@ from analytic_chip import AnalyticChip
 from PIL import Image
 from typer.testing import CliRunner
 
-from chipglow.camera import (
-    Camera,
-    Detector,
-    GaussianPSF,
-    OpticalElement,
-    RangeResponse,
-    Veil,
-)
 from chipglow.cli import app
-from chipglow.io import StoredScene, open_scene, write_measurement, write_scene
+from chipglow.io import StoredScene, open_scene, write_scene
 from chipglow.quantities.format import rounded_text
-from chipglow.radiometry import Band
 from chipglow.report import draw_scene, scene_summary
 from chipglow.scene import FILLED, Material, Raster, Scene
-from chipglow.surface import CHIP_2, OxidisedSurface, UniformSurface
 
 RASTER = Raster(left=-100e-6, top=50e-6, spacing=2e-6, rows=30, columns=40)
 TIMES = np.arange(101) * 1e-6
@@ -244,53 +234,3 @@ def test_what_is_wrong_is_one_line(path):
 )
 def test_numbers_have_four_digits_that_count(number, text):
     assert rounded_text(number) == text
-
-
-BARE = UniformSurface(0.6)
-EFFECTS = {
-    "none": ({}, BARE),
-    "point spread": ({"psf": GaussianPSF(8e-6)}, BARE),
-    "order": ({"psf": GaussianPSF(8e-6), "psf_order": "detector"}, BARE),
-    "band": ({"band": Band(3e-6, 5e-6)}, BARE),
-    "fill factor": ({"fill_factor": 0.8}, BARE),
-    "exposure": ({"integration_time": 5e-6}, BARE),
-    "frame rate": ({"frame_rate": 1000.0}, BARE),
-    "limit": ({"lower_limit": None}, BARE),
-    "surroundings": ({"reflected": 300.0}, BARE),
-    "veil": ({"optics": (Veil(0.02, 30e-6),)}, BARE),
-    "lens": ({"optics": (OpticalElement(0.9),)}, BARE),
-    "detector": ({"detector": Detector(response=RangeResponse(900.0), full_well=1e6)}, BARE),
-    "another emissivity": ({}, UniformSurface(0.61)),
-    "texture": ({}, CHIP_2),
-    "grain": ({}, replace(CHIP_2, grain=25e-6)),
-    "oxide": ({}, OxidisedSurface(BARE)),
-}
-
-
-@pytest.fixture(scope="module")
-def shown_effects(tmp_path_factory):
-    """What the command prints of a measurement with each effect."""
-    x, y = (np.broadcast_to(one, (12, *RASTER.shape)) for one in np.meshgrid(RASTER.x, RASTER.y))
-    scene = a_scene(TIMES[:12], material_x=x, material_y=y)
-    folder, texts = tmp_path_factory.mktemp("effects"), {}
-    for name, (changed, surface) in EFFECTS.items():
-        camera = replace(Camera(pitch=10e-6, psf=None), **changed)
-        write_measurement(camera.measure(scene, surface, 0.0), folder / "seen.nc")
-        code, texts[name] = show(folder / "seen.nc")
-        assert code == 0, texts[name]
-    return texts
-
-
-def settings_shown(text):
-    """The lines of a measurement that say how it was made."""
-    heads = ("integration time", "lower range limit", "band")
-    own, _, attributes = text.partition("Attributes:")
-    return [line for line in own.splitlines() if line.strip().startswith(heads)], attributes
-
-
-def test_every_effect_that_made_a_measurement_is_shown(shown_effects):
-    said = {name: settings_shown(text) for name, text in shown_effects.items()}
-    for name, one in said.items():
-        assert [other for other, two in said.items() if two == one] == [name]
-    assert "UniformSurface(value=0.6)" in shown_effects["none"]
-    assert "grain=2.5e-05" in shown_effects["grain"].replace("\n", "").replace(" ", "")

@@ -312,9 +312,10 @@ class Camera:
             fit it.
         """
         self.pixels(scene.raster)
-        return expose(
+        exposure = expose(
             scene, self.lay(surface, scene), self.band, start, self.integration_time, self.reflected
         )
+        return replace(exposure, effects=surface.effects)
 
     def form_measurement(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
         """Make the frames that the camera reads from exposures.
@@ -349,13 +350,14 @@ class Camera:
         """
         if isinstance(exposures, Exposure):
             exposures = (exposures,)
-        starts, frames, alike, sensors = [], [], [], None
+        starts, frames, alike, effects, sensors = [], [], [], [], None
         for exposure in exposures:
             found = self.pixels(exposure.raster)
             if sensors not in (None, found):
                 raise ValueError(f"camera: exposures of different grids, {sensors} and {found}")
             sensors = found
             starts.append(exposure.start)
+            effects.append(set(exposure.effects.items()))
             image, scene = exposure.mean_radiance, exposure.raster
             like = image
             if self.psf is not None and self.psf_order == "optics":
@@ -367,6 +369,7 @@ class Camera:
             raise ValueError("camera: no exposure to develop, expected 1 or more")
         images, times = np.stack(frames), np.array(starts)
         measured = self._measurement(images, times, sensors)
+        measured.data.attrs |= sorted(set.intersection(*effects))
         said = list(self._warnings(times))
         if alike:
             other = np.asarray(self.band.temperature(np.stack(alike)), np.float64)
@@ -413,7 +416,7 @@ class Camera:
             expose(scene, emissivity, self.band, at, self.integration_time, self.reflected)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
         )
-        measured = Measurement(measured.data.assign_attrs(emissivity=repr(surface)))
+        measured.data.attrs.update(surface.effects)
         return measured.with_tool(scene.tool) if scene.tool else measured
 
     def light_from_beyond(self, scene: Raster) -> NDArray[np.float64]:
@@ -590,7 +593,7 @@ class Camera:
         }
         if calibration := self.calibration(shape):
             attributes |= {
-                "detector": repr(self.detector),
+                **calibration.effects,
                 "noise_seed": self.seed,
                 "netd": calibration.half_netd,
                 "netd_temperature": calibration.half_temperature,

@@ -1,8 +1,8 @@
 """The exposure: a scene's radiance, summed over the integration time in one pass."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Final
 
@@ -38,6 +38,8 @@ class Exposure:
         sub-frame had material.
     centre_radiance : ndarray
         Apparent radiance at the middle of the integration in W/(m² sr), float64, shape (y, x).
+    effects : mapping
+        What a measurement of it states of the surface: `Surface.effects`. Nothing by default.
 
     Raises
     ------
@@ -52,6 +54,7 @@ class Exposure:
     peak_radiance: NDArray[np.float32]
     peak_temperature: NDArray[np.float32]
     centre_radiance: NDArray[np.float64]
+    effects: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("mean_radiance", "peak_radiance", "peak_temperature", "centre_radiance"):

@@ -1,6 +1,6 @@
 """A surface whose emissivity was measured in one band and goes on to others by a law."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final, Self
 
@@ -42,6 +42,13 @@ class DispersiveSurface(WrappedSurface):
     measured_in: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
     band: Band | None = None
     reflected: float | None = None
+
+    @property
+    def effects(self) -> Mapping[str, str]:
+        """See `Surface.effects`."""
+        known = self.measured_in
+        band = f"{1e6 * known.lower:g} um to {1e6 * known.upper:g} um"
+        return {**self.bare.effects, "spectral": f"measured in {band}, elsewhere by {self.law!r}"}
 
     def in_band(self, band: Band, reflected: float | None) -> Self:
         """See `Surface.in_band`."""

@@ -92,6 +92,19 @@ class FeatureSurface(Surface):
             for name, stream in zip(FEATURES, streams, strict=True)
         }
 
+    @property
+    def effects(self) -> Mapping[str, str]:
+        """See `Surface.effects`."""
+        numbers = {name: getattr(self, name) for name in FEATURES}
+        restored = "" if self.restore_standard_deviation else ", standard deviation not restored"
+        return {
+            "emissivity": ", ".join(
+                f"{name} {one.mean:g} (standard deviation {one.standard_deviation:g})"
+                for name, one in numbers.items()
+            ),
+            "texture": f"grain {self.grain:g} m, follow {self.follow}, seed {self.seed}{restored}",
+        }
+
     def on(self, scene: Scene) -> "FeatureField":
         """Lay the textures on a scene.
 

@@ -1,6 +1,7 @@
 """Oxide that grows on hot material by the parabolic law, and what it does to the emissivity."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import ceil
@@ -97,6 +98,11 @@ class OxidisedSurface(WrappedSurface):
     """
 
     oxide: Oxide = field(default_factory=ParabolicOxide)
+
+    @property
+    def effects(self) -> Mapping[str, str]:
+        """See `Surface.effects`."""
+        return {**self.bare.effects, "oxide": repr(self.oxide)}
 
     def on(self, scene: Scene) -> "OxidisedField":
         """Lay the surface on a scene; all its frames are read once.

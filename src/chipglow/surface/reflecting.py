@@ -1,6 +1,6 @@
 """A surface that reflects what the rake face and the chip's side send each other."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, Self
 
@@ -48,6 +48,11 @@ class ReflectingSurface(WrappedSurface):
     shape: SideShape = field(default_factory=Wedge)
     band: Band | None = None
     reflected: float | None = None
+
+    @property
+    def effects(self) -> Mapping[str, str]:
+        """See `Surface.effects`."""
+        return {**self.bare.effects, "reflections": repr(self.shape)}
 
     def in_band(self, band: Band, reflected: float | None) -> Self:
         """See `Surface.in_band`."""
