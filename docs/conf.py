@@ -52,7 +52,7 @@ sphinx_gallery_conf = {
     "within_subsection_order": "example_figures.Order",
     "remove_config_comments": True,
     "show_memory": False,
-    "min_reported_time": 1e9,
+    "write_computation_times": False,
     "show_signature": False,
     "download_all_examples": False,
 }
