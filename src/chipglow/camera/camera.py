@@ -369,7 +369,7 @@ class Camera:
             raise ValueError("camera: no exposure to develop, expected 1 or more")
         images, times = np.stack(frames), np.array(starts)
         measured = self._measurement(images, times, sensors)
-        measured.data.attrs |= sorted(set.intersection(*effects))
+        measured.data.attrs.update(sorted(set.intersection(*effects)))
         said = list(self._warnings(times))
         if alike:
             other = np.asarray(self.band.temperature(np.stack(alike)), np.float64)
