@@ -1,6 +1,7 @@
 """Draws the pictures of the detector: ``python docs/detector_pictures.py``.
 
-The scene is a made one: a hot chip with a colder band across it, in front of a cold background.
+The scene is a made one: a hot chip with a colder band across it, in front of a cold background;
+for the shutter, hot segments that move.
 """
 
 from dataclasses import replace
@@ -19,17 +20,25 @@ from chipglow.camera import (
     ReadNoise,
     ShotNoise,
 )
-from chipglow.scene import Raster
+from chipglow.scene import Raster, Scene
+from chipglow.surface import UniformSurface
 
 HERE = Path(__file__).parent
 SCENE = Raster(-270e-6, 240e-6, 2e-6, 240, 270)
 NOISE = (ShotNoise(), ReadNoise(1500.0))
 PATTERN = (GainPattern(0.03), OffsetPattern(40_000.0), DeadElements(0.003))
 DETECTOR = Detector(response=PhotonResponse(0.8, 15e-6, 4.0), full_well=3e6, bits=14, terms=NOISE)
+SPEED, LINE_TIME = 4.0, 0.25e-6
 CAMERA = Camera(lower_limit=None, detector=DETECTOR)
 
 
 def main() -> None:
+    """Draw the pictures."""
+    draw_noise()
+    draw_rolling_shutter()
+
+
+def draw_noise() -> None:
     """Draw the same frame without detector, with noise, with the pattern and its correction."""
     image = replace(CAMERA, detector=None).form_image(chip(), SCENE)
     shown = {
@@ -62,6 +71,44 @@ def main() -> None:
     assert calibration is not None
     print(f"half of the range: {calibration.half_temperature - 273.15:.1f} °C")
     print(f"NETD there: {1e3 * calibration.half_netd:.1f} mK")
+
+
+def draw_rolling_shutter() -> None:
+    """Draw hot segments that move to the right, with a global and with a rolling shutter."""
+    scene, surface = moving_segments(), UniformSurface(0.6)
+    figure, axes = plt.subplots(1, 3, figsize=(10.5, 3.3), layout="constrained")
+    extent = tuple(1e6 * side for side in CAMERA.pixels(SCENE).extent)
+    plain = replace(CAMERA, detector=None, integration_time=2e-6)
+    frames = [
+        replace(plain, line_time=line_time).measure(scene, surface, 0.0).celsius()
+        for line_time in (None, LINE_TIME)
+    ]
+    titles = ("global shutter", f"rolling shutter, {1e6 * LINE_TIME:g} µs a row")
+    for axis, title, frame in zip(axes, titles, frames, strict=False):
+        picture = axis.imshow(frame, extent=extent, cmap="inferno", vmin=250, vmax=450)
+        axis.set_title(title, fontsize=10)
+    change = frames[1] - frames[0]
+    difference = axes[2].imshow(change, extent=extent, cmap="RdBu_r", vmin=-150, vmax=150)
+    axes[2].set_title("rolling less global", fontsize=10)
+    for axis in axes:
+        axis.set_xlabel("x / µm")
+    axes[0].set_ylabel("y / µm")
+    figure.colorbar(picture, ax=axes[:2], label="radiance temperature / °C")
+    figure.colorbar(difference, ax=axes[2], label="change / K", extend="both")
+    figure.savefig(HERE / "detector-shutter.png", dpi=130)
+    rows = CAMERA.pixels(SCENE).rows
+    print(f"{rows} rows: the last one {1e6 * (rows - 1) * SPEED * LINE_TIME:.1f} um to the right")
+    print(f"greatest change: {np.abs(change).max():.0f} K")
+
+
+def moving_segments() -> Scene:
+    """Segments of 60 µm at 550 °C, every 120 µm in 400 °C, that move to the right."""
+    times = np.arange(60) * 0.5e-6
+    x = SCENE.x - SPEED * times[:, None]
+    kelvins = np.where(np.sin(2 * np.pi * x / 120e-6) > 0.0, 823.15, 673.15)
+    temperature = np.repeat(kelvins[:, None, :], SCENE.rows, axis=1).astype(np.float32)
+    material = np.ones(temperature.shape, np.uint8)
+    return Scene.from_fields(SCENE, times, {"temperature": temperature, "material": material})
 
 
 def patterned(correction: str) -> Detector:

@@ -88,7 +88,7 @@ class Sums:
         frames: Sequence[Frame],
         emissivities: Sequence[NDArray[np.float32]],
         weights: NDArray[np.float64],
-        middle: int,
+        middles: NDArray[np.intp],
     ) -> None:
         """Add frames with the emissivities of all surfaces, each of shape (surface, y, x).
 
@@ -99,15 +99,16 @@ class Sums:
         emissivities : sequence of ndarray
             One of each frame.
         weights : ndarray
-            Fraction of the exposure that each frame stands for.
-        middle : int
-            Which of them is in the middle of the exposure; -1 for none.
+            Fraction of each row's exposure that each frame stands for, shape (row, frame); 0 where
+            the row is not exposed.
+        middles : ndarray
+            Which of them is in the middle of each row's exposure, if any of them is, shape (row,).
         """
         temperature, material = (_batch(frames, name) for name in ("temperature", "material"))
         given = _filled([np.ascontiguousarray(e, np.float32) for e in emissivities])
 
         def add(first: int, last: int) -> None:
-            _add_given(temperature, material, given, weights, middle, first, last, self._own)
+            _add_given(temperature, material, given, weights, middles, first, last, self._own)
 
         self._in_blocks(add)
 
@@ -118,13 +119,13 @@ class Sums:
         shifts: NDArray[np.float32],
         textures: Textures,
         weights: NDArray[np.float64],
-        middle: int,
+        middles: NDArray[np.intp],
     ) -> None:
         """Add frames with the emissivities that their features have.
 
         Parameters
         ----------
-        frames, weights, middle
+        frames, weights, middles
             As for `add_given`.
         positions : sequence of tuple of ndarray
             Where each frame's samples are looked up in the textures.
@@ -141,7 +142,7 @@ class Sums:
         fields = (temperature, material, strain, rate, x, y)
 
         def add(first: int, last: int) -> None:
-            _add_features(fields, shifts, tuple(textures), weights, middle, first, last, self._own)
+            _add_features(fields, shifts, tuple(textures), weights, middles, first, last, self._own)
 
         self._in_blocks(add)
 
@@ -152,7 +153,7 @@ class Sums:
         shifts: NDArray[np.float32],
         textures: Textures,
         weights: NDArray[np.float64],
-        middle: int,
+        middles: NDArray[np.intp],
     ) -> None:
         """Add frames of splines: their samples are never written anywhere.
 
@@ -163,7 +164,7 @@ class Sums:
         positions : tuple of ndarray, optional
             Where the samples are looked up in the textures; by their material coordinates if left
             out.
-        shifts, textures, weights, middle
+        shifts, textures, weights, middles
             As for `add_features`.
         """
         lattice = frames[0].lattice
@@ -174,7 +175,7 @@ class Sums:
 
         def add(first: int, last: int) -> None:
             _add_splines(
-                nodes, limits, grid, fixed, shifts, tuple(textures), weights, middle, first, last,
+                nodes, limits, grid, fixed, shifts, tuple(textures), weights, middles, first, last,
                 self._own,
             )  # fmt: skip
 
@@ -275,7 +276,7 @@ def _add_given(  # type: ignore[no-untyped-def]
     material,
     emissivities,
     weights,
-    middle,
+    middles,
     first,
     last,
     own,
@@ -284,10 +285,12 @@ def _add_given(  # type: ignore[no-untyped-def]
     work = np.empty((3, columns), np.float32)
     number = np.empty(columns, np.int32)
     for row in range(first, last):
-        for k in range(weights.size):
+        for k in range(weights.shape[1]):
+            if weights[row, k] == 0.0:
+                continue
             _add_row(
-                temperature[k][row], material[k][row], emissivities[k][:, row], weights[k],
-                k == middle, row, work, number, own,
+                temperature[k][row], material[k][row], emissivities[k][:, row], weights[row, k],
+                k == middles[row], row, work, number, own,
             )  # fmt: skip
 
 
@@ -297,7 +300,7 @@ def _add_features(  # type: ignore[no-untyped-def]
     shifts,
     textures,
     weights,
-    middle,
+    middles,
     first,
     last,
     own,
@@ -310,14 +313,16 @@ def _add_features(  # type: ignore[no-untyped-def]
     work = np.empty((3, columns), np.float32)
     number = np.empty(columns, np.int32)
     for row in range(first, last):
-        for k in range(weights.size):
+        for k in range(weights.shape[1]):
+            if weights[row, k] == 0.0:
+                continue
             blend_row(
                 material[k][row], strain[k][row], rate[k][row], x[k][row], y[k][row], shifts[k],
                 textures, row, scratch, corner, emissivity,
             )  # fmt: skip
             _add_row(
-                temperature[k][row], material[k][row], emissivity, weights[k], k == middle, row,
-                work, number, own,
+                temperature[k][row], material[k][row], emissivity, weights[row, k],
+                k == middles[row], row, work, number, own,
             )  # fmt: skip
 
 
@@ -360,7 +365,7 @@ def _add_splines(  # type: ignore[no-untyped-def]
     shifts,
     textures,
     weights,
-    middle,
+    middles,
     first,
     last,
     own,
@@ -377,11 +382,15 @@ def _add_splines(  # type: ignore[no-untyped-def]
     wide = np.empty((nodes.shape[1], count, columns), np.float32)
     values = np.zeros((nodes.shape[1], columns), np.float32)
     kind = np.empty(columns, np.uint8)
-    for k in range(weights.size):
+    for k in range(weights.shape[1]):
+        if not weights[first:last, k].any():
+            continue
         for f in (0, _STRAIN, _RATE, _X, _Y, FILLED_SPLINE, TOOL_SPLINE):
             for j in range(count):
                 spread(nodes[k, f, top + j], first_across, across, 0, columns, wide[f, j])
         for row in range(first, last):
+            if weights[row, k] == 0.0:
+                continue
             base = first_down[row] - top
             u, v, w = down[0, row], down[1, row], down[2, row]
             _combine(wide[FILLED_SPLINE], base, u, v, w, values[FILLED_SPLINE])
@@ -400,5 +409,6 @@ def _add_splines(  # type: ignore[no-untyped-def]
                 textures, row, scratch, corner, emissivity,
             )  # fmt: skip
             _add_row(
-                values[0], kind, emissivity, weights[k], k == middle, row, work, number, own,
+                values[0], kind, emissivity, weights[row, k], k == middles[row], row, work, number,
+                own,
             )  # fmt: skip
