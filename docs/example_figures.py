@@ -9,7 +9,7 @@ from sphinx_gallery.scrapers import figure_rst
 DOTS_PER_INCH: Final = 130
 ORDER: Final = (
     *("radiance", "texture", "oxide_direction", "reflections", "steps", "psf", "optics"),
-    *("detector", "error", "tool_edges"),
+    *("detector", "shutter", "error", "tool_edges"),
     *("camera_files", "calibration", "emissivity", "temperature", "knife_edge", "registration"),
     *("rake_face", "shear_band", "compare"),
     *("programs", "meshes", "grids", "points", "movies", "any_scene"),

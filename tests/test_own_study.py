@@ -249,8 +249,17 @@ def test_a_camera_by_name_has_its_data_sheets_numbers_and_says_where_they_stand(
     said = " ".join(left_to_the_paper(study))
     assert "integration_time 10 us" in said
     assert "band" not in said.split("camera")[-1]
-    for preset in CAMERAS.values():
+    for name, preset in CAMERAS.items():
         assert preset.source
+        built = Study(camera={"preset": name, "magnification": 1.0}).camera
+        assert f"{built.array[0]} x {built.array[1]}" in preset.source
+        assert f"{1e6 * built.build().pitch:g} um" in preset.source
+
+
+def test_the_insb_camera_with_a_1_x_lens():
+    camera = Study(camera={"preset": "flir-a6751", "magnification": 1.0}).camera.build()
+    assert (camera.band, camera.pitch) == (Band(3e-6, 5e-6), pytest.approx(15e-6, rel=1e-12))
+    assert camera.psf.numerical_aperture == pytest.approx(1 / (4 * 2.5), rel=1e-12)
 
 
 def test_an_unknown_camera_is_refused():

@@ -16,7 +16,9 @@ from chipglow.surface import (
     Texture,
     UniformSurface,
     chip_fraction,
+    feature,
     shear_band_fraction,
+    texture,
 )
 from chipglow.surface.cubic import cubic_convolution
 from chipglow.surface.emissivity import REACH
@@ -407,3 +409,8 @@ def test_a_uniform_surface_is_black_but_for_the_void():
     found = UniformSurface().on(scene).emissivity(scene.frame(0))
     assert (found[0] == 0).all()
     assert (found[1:] == 1).all()
+
+
+def test_no_kernel_of_the_surface_waits_by_spinning():
+    for kernel in (feature._blend, feature._sum_velocities, texture._look_up):
+        assert kernel.targetoptions.get("nogil") and not kernel.targetoptions.get("parallel")

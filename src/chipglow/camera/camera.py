@@ -19,7 +19,7 @@ from chipglow.camera.detector import (
     flat_field_calibration,
 )
 from chipglow.camera.detector.terms import follows
-from chipglow.camera.exposure import Exposure, expose
+from chipglow.camera.exposure import Exposure, expose_all
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics import (
     BLURS,
@@ -78,6 +78,9 @@ class Camera:
         In s.
     frame_rate : float
         Frames a second.
+    line_time : float, optional
+        Of a rolling shutter: how much later in s each row's integration begins than that of the row
+        above it. None by default: a global shutter, all rows at once.
     lower_limit : float, optional
         Lowest radiance temperature in K that the camera measures; what is under it is flagged.
         The paper's 300 °C by default; None for no lower range limit.
@@ -112,6 +115,7 @@ class Camera:
     psf_order: Literal["optics", "detector"] = "optics"
     integration_time: float = 10e-6
     frame_rate: float = 600.0
+    line_time: float | None = None
     lower_limit: float | None = 573.15
     reflected: float | None = None
     optics: tuple[OpticsTerm, ...] = ()
@@ -177,6 +181,14 @@ class Camera:
             1 / self.frame_rate,
             f"over 0 to {1 / self.frame_rate:g} s, the time between frames",
         )
+        if self.line_time is not None:
+            _expect_number(
+                "line_time",
+                self.line_time,
+                0.0,
+                1 / self.frame_rate,
+                f"over 0 to {1 / self.frame_rate:g} s, the time between frames, or None",
+            )
         for name in ("lower_limit", "reflected"):
             value = getattr(self, name)
             _expect(
@@ -270,6 +282,49 @@ class Camera:
         """
         return start + np.arange(count) / self.frame_rate
 
+    def row_delays(self, scene: Raster) -> NDArray[np.float64]:
+        """How much later than the first row's each sample's integration begins.
+
+        Parameters
+        ----------
+        scene : Raster
+            The scene's samples.
+
+        Returns
+        -------
+        ndarray
+            For each row of samples that of the pixels in which its middle lies, or of the nearest
+            ones, in s, shape (y,); 0 with a global shutter.
+
+        Raises
+        ------
+        ValueError
+            If the pixels do not fit the scene, or all their rows take longer than there is between
+            frames.
+        """
+        sensors = self.pixels(scene)
+        if self.line_time is None:
+            return np.zeros(scene.rows)
+        _expect(
+            sensors.rows * self.line_time <= 1 / self.frame_rate,
+            "line_time",
+            self.line_time,
+            f"up to {1 / (self.frame_rate * sensors.rows):.4g} s: {sensors.rows} rows within the "
+            f"{1 / self.frame_rate:.4g} s between frames",
+        )
+        rows = np.floor((sensors.top - scene.y) / self.pitch)
+        return np.asarray(self.line_time * np.clip(rows, 0, sensors.rows - 1), np.float64)
+
+    def frame_duration(self, scene: Raster) -> float:
+        """Time in s from the beginning of the first row's integration to the end of the last's.
+
+        Parameters
+        ----------
+        scene : Raster
+            The scene's samples.
+        """
+        return self.integration_time + float(self.row_delays(scene).max())
+
     def lay(self, surface: Surface, scene: Scene) -> EmissivityField:
         """Lay a surface on a scene as this camera sees it, in its band and its surroundings.
 
@@ -311,11 +366,31 @@ class Camera:
             If the surface is none, the integration reaches beyond the scene, or the pixels do not
             fit it.
         """
-        self.pixels(scene.raster)
-        exposure = expose(
-            scene, self.lay(surface, scene), self.band, start, self.integration_time, self.reflected
-        )
+        (exposure,) = self.expose_fields(scene, (self.lay(surface, scene),), start)
         return replace(exposure, effects=surface.effects)
+
+    def expose_fields(
+        self, scene: Scene, fields: Sequence[EmissivityField], start: float
+    ) -> tuple[Exposure, ...]:
+        """Exposures of a scene with several surfaces: each of its frames is read once.
+
+        Parameters
+        ----------
+        scene : Scene
+            What is truly there.
+        fields : sequence of EmissivityField
+            The surfaces as this camera sees them (`lay`); one or more.
+        start : float
+            When the integration of the first row begins in s.
+
+        Raises
+        ------
+        ValueError
+            As for `expose`.
+        """
+        delays = self.row_delays(scene.raster)
+        duration = self.integration_time
+        return expose_all(scene, fields, self.band, start, duration, self.reflected, delays)
 
     def form_measurement(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
         """Make the frames that the camera reads from exposures.
@@ -411,12 +486,11 @@ class Camera:
             If an integration reaches beyond the scene, or the pixels do not fit it.
         """
         self.pixels(scene.raster)
-        emissivity = self.lay(surface, scene)
+        fields = (self.lay(surface, scene),)
         measured = self.form_measurement(
-            expose(scene, emissivity, self.band, at, self.integration_time, self.reflected)
+            replace(self.expose_fields(scene, fields, at)[0], effects=surface.effects)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
         )
-        measured.data.attrs.update(surface.effects)
         return measured.with_tool(scene.tool) if scene.tool else measured
 
     def light_from_beyond(self, scene: Raster) -> NDArray[np.float64]:
@@ -588,6 +662,9 @@ class Camera:
             "psf_order": self.psf_order,
             "integration_time": self.integration_time,
             "frame_rate": self.frame_rate,
+            "shutter": (
+                "global" if self.line_time is None else f"rolling, {self.line_time:g} s a row"
+            ),
             "reflected": self.reflected,
             "optics": repr(self.optics) if self.optics else None,
         }

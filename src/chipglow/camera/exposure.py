@@ -96,6 +96,7 @@ def expose(
     start: float,
     duration: float,
     reflected: float | None = None,
+    delays: NDArray[np.float64] | None = None,
 ) -> Exposure:
     """Sum a scene's apparent radiance over an integration time.
 
@@ -111,6 +112,9 @@ def expose(
         When the integration begins and how long it lasts, in s.
     reflected : float, optional
         Temperature in K of surroundings that the surface reflects; none by default.
+    delays : ndarray, optional
+        How much later than `start` the integration of each row of samples begins in s, 0 or more,
+        shape (y,): a rolling shutter's (`Camera.row_delays`). All at once by default.
 
     Returns
     -------
@@ -128,7 +132,7 @@ def expose(
     (Equation 2). The void, "undefined" in the paper, has no radiance at all. L is looked up
     between values 1/32 K apart, within 6e-7 of it from 250 K on.
     """
-    return expose_all(scene, (emissivity,), band, start, duration, reflected)[0]
+    return expose_all(scene, (emissivity,), band, start, duration, reflected, delays)[0]
 
 
 def expose_all(
@@ -138,12 +142,13 @@ def expose_all(
     start: float,
     duration: float,
     reflected: float | None = None,
+    delays: NDArray[np.float64] | None = None,
 ) -> tuple[Exposure, ...]:
     """Exposures of a scene with several surfaces: each of its frames is read once.
 
     Parameters
     ----------
-    scene, band, start, duration, reflected
+    scene, band, start, duration, reflected, delays
         As for `expose`.
     emissivities : sequence of EmissivityField
         The surfaces, laid on the scene; one or more.
@@ -159,11 +164,15 @@ def expose_all(
         As for `expose`.
     """
     views = [View(emissivity, band, reflected) for emissivity in emissivities]
-    return expose_views(scene, views, start, duration)
+    return expose_views(scene, views, start, duration, delays)
 
 
 def expose_views(
-    scene: Scene, views: Sequence[View], start: float, duration: float
+    scene: Scene,
+    views: Sequence[View],
+    start: float,
+    duration: float,
+    delays: NDArray[np.float64] | None = None,
 ) -> tuple[Exposure, ...]:
     """Exposures of a scene with several surfaces in several bands: each frame is read once.
 
@@ -172,7 +181,7 @@ def expose_views(
 
     Parameters
     ----------
-    scene, start, duration
+    scene, start, duration, delays
         As for `expose`.
     views : sequence of View
         What is looked at, and in which band; one or more.
@@ -187,8 +196,9 @@ def expose_views(
     ValueError
         As for `expose`.
     """
-    indices, weights = frame_weights(scene.times, scene.frame_spacing, start, duration)
-    middle = _frame_at(scene, start + duration / 2, indices)
+    if delays is None:
+        delays = np.zeros(scene.raster.rows)
+    indices, weights, middles = _row_weights(scene, start, duration, delays)
     fields = list({id(view.emissivity): view.emissivity for view in views}.values())
     bands = list(dict.fromkeys(view.band for view in views))
     places = {id(one): number for number, one in enumerate(fields)}
@@ -200,7 +210,7 @@ def expose_views(
         stack.most,
         scene.raster.shape,
     )
-    _sweep(scene, stack, indices, weights, indices.index(middle), sums)
+    _sweep(scene, stack, indices, weights, middles, sums)
     mean, centre, peak, hottest = sums.mean, sums.centre, sums.peak, sums.hottest
     if not np.isfinite(mean).all():
         raise ValueError(
@@ -277,6 +287,31 @@ def frame_weights(
     return range(int(covered[0]), int(covered[-1]) + 1), weights / weights.sum()
 
 
+def _row_weights(
+    scene: Scene, start: float, duration: float, delays: NDArray[np.float64]
+) -> tuple[range, NDArray[np.float64], NDArray[np.intp]]:
+    """Sub-frames of an exposure, their weights in each row, and which is in a row's middle."""
+    times, spacing = scene.times, scene.frame_spacing
+    different, row_of = np.unique(delays, return_inverse=True)
+    starts = start + different
+    try:
+        covered = [frame_weights(times, spacing, one, duration) for one in starts[::-1]][::-1]
+    except ValueError as error:
+        if not different[-1]:
+            raise
+        late = f"line_time: the last row's exposure begins {different[-1]:.4g} s after the first's"
+        raise ValueError(f"{late}; {error}") from None
+    indices = range(covered[0][0].start, covered[-1][0].stop)
+    weights = np.zeros((different.size, len(indices)))
+    for of_row, (own, values) in zip(weights, covered, strict=True):
+        of_row[own.start - indices.start : own.stop - indices.start] = values
+    middles = [
+        _frame_at(scene, one + duration / 2, own) - indices.start
+        for one, (own, _) in zip(starts, covered, strict=True)
+    ]
+    return indices, weights[row_of], np.array(middles, np.intp)[row_of]
+
+
 def _frame_at(scene: Scene, time: float, indices: range) -> int:
     """The one of these frames that stands for a time."""
     rounded = time + _ROUNDING * scene.frame_spacing
@@ -289,7 +324,7 @@ def _sweep(
     stack: EmissivityStack,
     indices: range,
     weights: NDArray[np.float64],
-    middle: int,
+    middles: NDArray[np.intp],
     sums: Sums,
 ) -> None:
     """Add sub-frames to sums, in the quickest way that scene and surfaces allow."""
@@ -297,11 +332,11 @@ def _sweep(
     if features is not None and (splines := _splines(scene, indices)):
         shifts = np.stack([features.shifts(frame.time) for frame in splines])
         textures, fixed = features.textures, features.fixed_positions
-        sums.add_splines(splines, fixed, shifts, textures, weights, middle)
+        sums.add_splines(splines, fixed, shifts, textures, weights, middles)
         return
     for begin, frames in _batches(scene, indices, stack.needs):
-        part = weights[begin : begin + len(frames)]
-        inside = middle - begin if begin <= middle < begin + len(frames) else -1
+        part = np.ascontiguousarray(weights[:, begin : begin + len(frames)])
+        inside = middles - begin
         if features is None:
             sums.add_given(frames, [stack.emissivities(one) for one in frames], part, inside)
         else:

@@ -187,7 +187,18 @@ def views_of(surface: Surface, scene: Scene, cameras: Sequence[Camera]) -> list[
         What it is laid on.
     cameras : sequence of Camera
         The cameras.
+
+    Raises
+    ------
+    ValueError
+        If one has a rolling shutter.
     """
+    for camera in cameras:
+        if camera.line_time is not None:
+            raise ValueError(
+                f"camera: line_time is {camera.line_time!r}, expected None where bands are "
+                "compared: a global shutter"
+            )
     laid: dict[int, tuple[Surface, EmissivityField]] = {}
     views = []
     for camera in cameras:

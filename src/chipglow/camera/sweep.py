@@ -1,26 +1,26 @@
 """Sums over the sub-frames of an exposure: the rows in blocks, with time inside.
 
 A block's sums stay in the processor's cache while its sub-frames go by, and a sub-frame's fields
-are made, blended and summed row by row. Blocks are shared among threads of this module, which sleep
-when there is nothing to do; none of the sums depends on their number.
+are made, blended and summed row by row. Blocks are shared among threads (`in_row_blocks`); none of
+the sums depends on their number.
 
 The kernels are functions of arrays alone and work on one block each: a graphics processor would
 take them block by block, with the loops over columns as its threads.
 """
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numba import get_num_threads, njit
+from numba import njit
 from numpy.typing import NDArray
 
 from chipglow.radiometry.band import TABLE_COLDEST
 from chipglow.scene import Frame, Material
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, TOOL_SPLINE, SplineFrame, spread
 from chipglow.surface.blend import SCRATCH, Textures, blend_row
+from chipglow.surface.row_blocks import in_row_blocks
 
 STEPS_PER_KELVIN: Final = 32.0
 """Values of the table of radiance in a kelvin; a straight line between them is exact enough."""
@@ -28,7 +28,6 @@ STEPS_PER_KELVIN: Final = 32.0
 BATCH: Final = 8
 """Frames that are summed together where their samples are in memory."""
 
-_ROWS: Final = 16
 _VOID, _WORKPIECE, _TOOL = int(Material.VOID), int(Material.WORKPIECE), int(Material.TOOL)
 _STRAIN, _RATE, _X, _Y = (
     SPLINE_FIELDS.index(name)
@@ -92,7 +91,7 @@ class Sums:
         frames: Sequence[Frame],
         emissivities: Sequence[NDArray[np.float32]],
         weights: NDArray[np.float64],
-        middle: int,
+        middles: NDArray[np.intp],
     ) -> None:
         """Add frames with the emissivities of all surfaces, each of shape (surface, y, x).
 
@@ -103,17 +102,18 @@ class Sums:
         emissivities : sequence of ndarray
             One of each frame.
         weights : ndarray
-            Fraction of the exposure that each frame stands for.
-        middle : int
-            Which of them is in the middle of the exposure; -1 for none.
+            Fraction of each row's exposure that each frame stands for, shape (row, frame); 0 where
+            the row is not exposed.
+        middles : ndarray
+            Which of them is in the middle of each row's exposure, if any of them is, shape (row,).
         """
         temperature, material = (_batch(frames, name) for name in ("temperature", "material"))
         given = _filled([np.ascontiguousarray(e, np.float32) for e in emissivities])
 
         def add(first: int, last: int) -> None:
-            _add_given(temperature, material, given, weights, middle, first, last, self._own)
+            _add_given(temperature, material, given, weights, middles, first, last, self._own)
 
-        self._in_blocks(add)
+        in_row_blocks(len(self.hottest), add)
 
     def add_features(
         self,
@@ -122,13 +122,13 @@ class Sums:
         shifts: NDArray[np.float32],
         textures: Textures,
         weights: NDArray[np.float64],
-        middle: int,
+        middles: NDArray[np.intp],
     ) -> None:
         """Add frames with the emissivities that their features have.
 
         Parameters
         ----------
-        frames, weights, middle
+        frames, weights, middles
             As for `add_given`.
         positions : sequence of tuple of ndarray
             Where each frame's samples are looked up in the textures.
@@ -145,9 +145,9 @@ class Sums:
         fields = (temperature, material, strain, rate, x, y)
 
         def add(first: int, last: int) -> None:
-            _add_features(fields, shifts, tuple(textures), weights, middle, first, last, self._own)
+            _add_features(fields, shifts, tuple(textures), weights, middles, first, last, self._own)
 
-        self._in_blocks(add)
+        in_row_blocks(len(self.hottest), add)
 
     def add_splines(
         self,
@@ -156,7 +156,7 @@ class Sums:
         shifts: NDArray[np.float32],
         textures: Textures,
         weights: NDArray[np.float64],
-        middle: int,
+        middles: NDArray[np.intp],
     ) -> None:
         """Add frames of splines: their samples are never written anywhere.
 
@@ -167,7 +167,7 @@ class Sums:
         positions : tuple of ndarray, optional
             Where the samples are looked up in the textures; by their material coordinates if left
             out.
-        shifts, textures, weights, middle
+        shifts, textures, weights, middles
             As for `add_features`.
         """
         lattice = frames[0].lattice
@@ -178,22 +178,16 @@ class Sums:
 
         def add(first: int, last: int) -> None:
             _add_splines(
-                nodes, limits, grid, fixed, shifts, tuple(textures), weights, middle, first, last,
+                nodes, limits, grid, fixed, shifts, tuple(textures), weights, middles, first, last,
                 self._own,
             )  # fmt: skip
 
-        self._in_blocks(add)
+        in_row_blocks(len(self.hottest), add)
 
     @property
     def _own(self) -> tuple[Any, ...]:
         sums = self.mean, self.centre, self.peak, self.hottest
         return self.tables, self.environments, np.float32(self.most), *sums, self.views
-
-    def _in_blocks(self, add: Callable[[int, int], None]) -> None:
-        rows = len(self.hottest)
-        firsts = range(0, rows, _ROWS)
-        with ThreadPoolExecutor(get_num_threads()) as pool:
-            list(pool.map(add, firsts, (min(first + _ROWS, rows) for first in firsts)))
 
 
 def _filled(arrays: list[NDArray[Any]]) -> tuple[NDArray[Any], ...]:
@@ -283,7 +277,7 @@ def _add_given(  # type: ignore[no-untyped-def]
     material,
     emissivities,
     weights,
-    middle,
+    middles,
     first,
     last,
     own,
@@ -292,10 +286,12 @@ def _add_given(  # type: ignore[no-untyped-def]
     work = np.empty((3, columns), np.float32)
     number = np.empty(columns, np.int32)
     for row in range(first, last):
-        for k in range(weights.size):
+        for k in range(weights.shape[1]):
+            if weights[row, k] == 0.0:
+                continue
             _add_row(
-                temperature[k][row], material[k][row], emissivities[k][:, row], weights[k],
-                k == middle, row, work, number, own,
+                temperature[k][row], material[k][row], emissivities[k][:, row], weights[row, k],
+                k == middles[row], row, work, number, own,
             )  # fmt: skip
 
 
@@ -305,7 +301,7 @@ def _add_features(  # type: ignore[no-untyped-def]
     shifts,
     textures,
     weights,
-    middle,
+    middles,
     first,
     last,
     own,
@@ -318,14 +314,16 @@ def _add_features(  # type: ignore[no-untyped-def]
     work = np.empty((3, columns), np.float32)
     number = np.empty(columns, np.int32)
     for row in range(first, last):
-        for k in range(weights.size):
+        for k in range(weights.shape[1]):
+            if weights[row, k] == 0.0:
+                continue
             blend_row(
                 material[k][row], strain[k][row], rate[k][row], x[k][row], y[k][row], shifts[k],
                 textures, row, scratch, corner, emissivity,
             )  # fmt: skip
             _add_row(
-                temperature[k][row], material[k][row], emissivity, weights[k], k == middle, row,
-                work, number, own,
+                temperature[k][row], material[k][row], emissivity, weights[row, k],
+                k == middles[row], row, work, number, own,
             )  # fmt: skip
 
 
@@ -368,7 +366,7 @@ def _add_splines(  # type: ignore[no-untyped-def]
     shifts,
     textures,
     weights,
-    middle,
+    middles,
     first,
     last,
     own,
@@ -385,11 +383,15 @@ def _add_splines(  # type: ignore[no-untyped-def]
     wide = np.empty((nodes.shape[1], count, columns), np.float32)
     values = np.zeros((nodes.shape[1], columns), np.float32)
     kind = np.empty(columns, np.uint8)
-    for k in range(weights.size):
+    for k in range(weights.shape[1]):
+        if not weights[first:last, k].any():
+            continue
         for f in (0, _STRAIN, _RATE, _X, _Y, FILLED_SPLINE, TOOL_SPLINE):
             for j in range(count):
                 spread(nodes[k, f, top + j], first_across, across, 0, columns, wide[f, j])
         for row in range(first, last):
+            if weights[row, k] == 0.0:
+                continue
             base = first_down[row] - top
             u, v, w = down[0, row], down[1, row], down[2, row]
             _combine(wide[FILLED_SPLINE], base, u, v, w, values[FILLED_SPLINE])
@@ -408,5 +410,6 @@ def _add_splines(  # type: ignore[no-untyped-def]
                 textures, row, scratch, corner, emissivity,
             )  # fmt: skip
             _add_row(
-                values[0], kind, emissivity, weights[k], k == middle, row, work, number, own,
+                values[0], kind, emissivity, weights[row, k], k == middles[row], row, work, number,
+                own,
             )  # fmt: skip

@@ -45,7 +45,8 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
         raise ValueError(f"--chip: {name!r} is unknown, expected one of {', '.join(surfaces)}")
     current().assumed(fitted.assumed)
     first = float(scene.times[0]) if start is None else parse_instant("--start", start)
-    left = float(scene.times[-1]) + scene.frame_spacing - first - camera.integration_time
+    duration = camera.frame_duration(scene.raster)
+    left = float(scene.times[-1]) + scene.frame_spacing - first - duration
     count = max(floor(left * camera.frame_rate) + 1, 1)
     with progress_bars() as progress:
         progress("measurement", 0.0)

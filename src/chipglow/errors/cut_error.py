@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera import Camera, Exposure, Measurement, expose_all
+from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.cutting import EnergyHistory
 from chipglow.errors.band_error import BandErrors
 from chipglow.errors.draws import Draws, Site, draw_errors
@@ -41,7 +41,7 @@ from chipglow.laboratory.emissivity import HeatedObject
 from chipglow.laboratory.emissivity.heated import heated_objects
 from chipglow.radiometry import Band
 from chipglow.scene import ENERGY_UNITS, Frame, Raster, Scene, Tool, sample
-from chipglow.surface import EmissivityField, Surface
+from chipglow.surface import Surface
 
 _USUAL_SPACING: Final = 180e-6
 """Distance of shear bands along a chip in m, where the forces show no period."""
@@ -293,7 +293,7 @@ def analyse(
     """
     _check(scene, surfaces, plan)
     tell = progress or _say_nothing
-    duration = camera.integration_time
+    duration = camera.frame_duration(scene.raster)
     instants, others, developed = _band_over_time(scene, duration, plan, tell)
     in_longest = instants[: len(instants) - others]
     segments = _segments(scene, duration, plan, instants, others, developed)
@@ -453,7 +453,7 @@ def _measure(
     references: list[list[NDArray[np.float64]]] = [[] for _ in fields]
     for i, instant in enumerate(instants):
         tell("camera", i / len(instants))
-        exposures = _expose(scene, fields, camera, instant.start)
+        exposures = camera.expose_fields(scene, fields, instant.start)
         for image, reference, exposure in zip(images, references, exposures, strict=True):
             image.append(camera.form_image(exposure.mean_radiance, exposure.raster))
             reference.append(reference_temperature(camera, exposure, plan.reference))
@@ -507,7 +507,7 @@ def _sites(
     sites = []
     for i, segment in enumerate(segments):
         tell("segments and textures", i / len(segments))
-        exposures = _expose(scene, fields, camera, segment.start)
+        exposures = camera.expose_fields(scene, fields, segment.start)
         sites.append(
             [
                 _site(plan, segment, rake, band)
@@ -529,13 +529,6 @@ def _site(plan: Plan, segment: Segment, rake: Exposure, band: Exposure) -> Site:
         step=plan.line_step,
         reference=plan.reference,
     )
-
-
-def _expose(
-    scene: Scene, fields: Sequence[EmissivityField], camera: Camera, start: float
-) -> tuple[Exposure, ...]:
-    duration = camera.integration_time
-    return expose_all(scene, fields, camera.band, start, duration, camera.reflected)
 
 
 def _curves(

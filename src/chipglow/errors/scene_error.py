@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.camera import Camera, Exposure, Measurement, expose_all
+from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.errors.distribution import Distribution
 from chipglow.errors.draws import pixel_phases
 from chipglow.errors.error_images import (
@@ -250,8 +250,9 @@ def scene_errors(
     """
     tell = progress or (lambda label, part: None)
     fields = [_textures(surface, scene, camera, plan.textures) for surface in surfaces.values()]
-    starts = spread_starts(scene, camera.integration_time, plan.exposures)
-    frames = [_middle(scene, float(start), camera.integration_time) for start in starts]
+    duration = camera.frame_duration(scene.raster)
+    starts = spread_starts(scene, duration, plan.exposures)
+    frames = [_middle(scene, float(start), duration) for start in starts]
     hottest = [float(scene.field("temperature", index).max()) for index in frames]
     shown = int(np.argmax(hottest))
     frame = scene.frame(frames[shown])
@@ -391,11 +392,7 @@ def _collect(
     flat = [one for textures in fields for one in textures]
     for i, start in enumerate(starts):
         tell("camera", i / len(starts))
-        exposures = iter(
-            expose_all(
-                scene, flat, camera.band, float(start), camera.integration_time, camera.reflected
-            )
-        )
+        exposures = iter(camera.expose_fields(scene, flat, float(start)))
         number = count()
         for surface, (one, textures) in enumerate(zip(collected, fields, strict=True)):
             of_surface = [next(exposures) for _ in textures]
