@@ -1,26 +1,26 @@
 """Sums over the sub-frames of an exposure: the rows in blocks, with time inside.
 
 A block's sums stay in the processor's cache while its sub-frames go by, and a sub-frame's fields
-are made, blended and summed row by row. Blocks are shared among threads of this module, which sleep
-when there is nothing to do; none of the sums depends on their number.
+are made, blended and summed row by row. Blocks are shared among threads (`in_row_blocks`); none of
+the sums depends on their number.
 
 The kernels are functions of arrays alone and work on one block each: a graphics processor would
 take them block by block, with the loops over columns as its threads.
 """
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numba import get_num_threads, njit
+from numba import njit
 from numpy.typing import NDArray
 
 from chipglow.radiometry.band import TABLE_COLDEST
 from chipglow.scene import Frame, Material
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, TOOL_SPLINE, SplineFrame, spread
 from chipglow.surface.blend import SCRATCH, Textures, blend_row
+from chipglow.surface.row_blocks import in_row_blocks
 
 STEPS_PER_KELVIN: Final = 32.0
 """Values of the table of radiance in a kelvin; a straight line between them is exact enough."""
@@ -28,7 +28,6 @@ STEPS_PER_KELVIN: Final = 32.0
 BATCH: Final = 8
 """Frames that are summed together where their samples are in memory."""
 
-_ROWS: Final = 16
 _VOID, _WORKPIECE, _TOOL = int(Material.VOID), int(Material.WORKPIECE), int(Material.TOOL)
 _STRAIN, _RATE, _X, _Y = (
     SPLINE_FIELDS.index(name)
@@ -110,7 +109,7 @@ class Sums:
         def add(first: int, last: int) -> None:
             _add_given(temperature, material, given, weights, middles, first, last, self._own)
 
-        self._in_blocks(add)
+        in_row_blocks(len(self.hottest), add)
 
     def add_features(
         self,
@@ -144,7 +143,7 @@ class Sums:
         def add(first: int, last: int) -> None:
             _add_features(fields, shifts, tuple(textures), weights, middles, first, last, self._own)
 
-        self._in_blocks(add)
+        in_row_blocks(len(self.hottest), add)
 
     def add_splines(
         self,
@@ -179,18 +178,12 @@ class Sums:
                 self._own,
             )  # fmt: skip
 
-        self._in_blocks(add)
+        in_row_blocks(len(self.hottest), add)
 
     @property
     def _own(self) -> tuple[Any, ...]:
         environment, most = np.float32(self.environment), np.float32(self.most)
         return self.table, environment, most, self.mean, self.centre, self.peak, self.hottest
-
-    def _in_blocks(self, add: Callable[[int, int], None]) -> None:
-        rows = len(self.hottest)
-        firsts = range(0, rows, _ROWS)
-        with ThreadPoolExecutor(get_num_threads()) as pool:
-            list(pool.map(add, firsts, (min(first + _ROWS, rows) for first in firsts)))
 
 
 def _filled(arrays: list[NDArray[Any]]) -> tuple[NDArray[Any], ...]:
