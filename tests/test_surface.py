@@ -16,13 +16,12 @@ from chipglow.surface import (
     Texture,
     UniformSurface,
     chip_fraction,
-    feature,
     shear_band_fraction,
-    texture,
 )
 from chipglow.surface.cubic import cubic_convolution
 from chipglow.surface.emissivity import REACH
-from chipglow.surface.texture import MAP_SIZE
+from chipglow.surface.feature import _blend, _sum_velocities
+from chipglow.surface.texture import MAP_SIZE, _look_up
 
 RASTER = Raster(left=-60e-6, top=80e-6, spacing=2e-6, rows=50, columns=60)
 VOID, WORKPIECE, TOOL = 0, 1, 2
@@ -412,5 +411,5 @@ def test_a_uniform_surface_is_black_but_for_the_void():
 
 
 def test_no_kernel_of_the_surface_waits_by_spinning():
-    for kernel in (feature._blend, feature._sum_velocities, texture._look_up):
+    for kernel in (_blend, _sum_velocities, _look_up):
         assert kernel.targetoptions.get("nogil") and not kernel.targetoptions.get("parallel")
