@@ -11,7 +11,7 @@ import argparse
 
 import numpy as np
 
-from chipglow.camera import Blackbody, fit_linear
+from chipglow.camera import Blackbody, fit_linear, fit_sakuma_hattori
 from chipglow.radiometry import Band
 
 BAND = Band(3.8e-6, 5.1e-6)
@@ -39,6 +39,21 @@ def points(generator, kelvins=KELVINS, larger=1.0, emissivity=1.0):
 def sound(generator):
     """Nothing is wrong."""
     return fit_linear(*points(generator), BAND, **STATED)
+
+
+def planckian(generator):
+    """The same, fitted by the form of Sakuma and Hattori."""
+    return fit_sakuma_hattori(*points(generator), BAND, **STATED)
+
+
+def unstated(generator):
+    """The same, and nothing is stated."""
+    return fit_linear(*points(generator), BAND)
+
+
+def planckian_unstated(generator):
+    """Sakuma and Hattori's form, and nothing is stated."""
+    return fit_sakuma_hattori(*points(generator), BAND)
 
 
 def emissivity_given(generator):
@@ -85,6 +100,9 @@ def self_heating_twice(generator):
 
 FAULTS = {
     "none": sound,
+    "none, sakuma-hattori": planckian,
+    "nothing stated": unstated,
+    "nothing stated, sakuma-hattori": planckian_unstated,
     "emissivity 0.97, given": emissivity_given,
     "emissivity 0.97, left out": emissivity_left_out,
     "errors 7 times as stated": understated,

@@ -1,4 +1,4 @@
-"""How often the knife edge's 95 % intervals hold the truth: the tables of docs/knife-edge.md.
+"""How often the knife edge's 95 % intervals hold the truth: the tables of docs/do/knife-edge.md.
 
 python benchmarks/knife_edge.py [--repeats 60] [--only noise|optics]
 """

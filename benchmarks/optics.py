@@ -1,4 +1,4 @@
-"""Transfer and point spread functions beside closed forms, pyBSM and prysm: docs/optics.md.
+"""Transfer and point spread functions of docs/understand/optics.md beside closed forms and others.
 
 python benchmarks/optics.py [--samples 512]
 

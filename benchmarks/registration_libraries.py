@@ -1,6 +1,6 @@
 """Registration of infrared and visible images: chipglow's `fit_images` beside image libraries.
 
-The pairs are the 56 of docs/registration.md, drawn by `dual_spectrum.py`. SimpleITK maximises
+The pairs are the 56 of docs/do/registration.md, drawn by `dual_spectrum.py`. SimpleITK maximises
 Mattes' mutual information of the images, or the correlation of their edges (gradients over the
 contrast of their surroundings, as in `fit_images`), from coarse to fine by regular steps, first a
 similarity, then the model that is asked for; from the middle, or from the ten best of a grid of

@@ -26,6 +26,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
+    "sphinx_gallery.gen_gallery",
 ]
 templates_path = ["_templates"]
 exclude_patterns = [
@@ -36,6 +37,25 @@ exclude_patterns = [
     "verification/*",
 ]
 default_role = "py:obj"
+
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples/gallery",
+    "gallery_dirs": "gallery",
+    "filename_pattern": "",
+    "abort_on_example_error": True,
+    "image_scrapers": ("example_figures.take",),
+    "subsection_order": [
+        "../examples/gallery/effects",
+        "../examples/gallery/laboratory",
+        "../examples/gallery/fields",
+    ],
+    "within_subsection_order": "example_figures.Order",
+    "remove_config_comments": True,
+    "show_memory": False,
+    "write_computation_times": False,
+    "show_signature": False,
+    "download_all_examples": False,
+}
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

@@ -12,6 +12,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -22,18 +23,20 @@ import yaml
 from numpy.typing import NDArray
 
 HERE: Final = Path(__file__).parent
+GENERATED: Final = HERE / "generated"
 sys.path[:0] = [str(HERE), str(HERE.parent / "benchmarks"), str(HERE.parent / "tests")]
 
-import any_scene  # noqa: E402
 from analytic_chip import AnalyticChip  # noqa: E402
-from band_pictures import experiment  # noqa: E402
 from camera_files import cine  # noqa: E402
-from camera_files_pictures import chip as sliding_chip  # noqa: E402
 from dot_target import DotTarget  # noqa: E402
 from dual_spectrum import DualSpectrum  # noqa: E402
-from emissivity_pictures import REGIONS, chip_emissivity, heated, heated_scene  # noqa: E402
-from knife_edge_pictures import aperture, edge, measured  # noqa: E402
 from PIL import Image  # noqa: E402
+from samples import any_scene, programs  # noqa: E402
+from samples.chip import COARSE, FIRST, closed_form_chip, late  # noqa: E402
+from samples.edges import aperture, edge, measured  # noqa: E402
+from samples.experiment import experiment  # noqa: E402
+from samples.heated_chip import REGIONS, chip_emissivity, heated, heated_scene  # noqa: E402
+from samples.sliding_chip import chip as sliding_chip  # noqa: E402
 
 import chipglow  # noqa: E402
 from chipglow.camera import (  # noqa: E402
@@ -51,13 +54,10 @@ from chipglow.camera import (  # noqa: E402
 from chipglow.io import write_measurement, write_scene  # noqa: E402
 from chipglow.io.cameras import write_hcc  # noqa: E402
 from chipglow.radiometry import Band  # noqa: E402
-from chipglow.scene import Raster, Scene  # noqa: E402
+from chipglow.scene import Raster  # noqa: E402
 
 BAND: Final = Band(3.8e-6, 5.1e-6)
 CELSIUS: Final = 273.15
-COARSE: Final = Raster(left=-336e-6, top=300e-6, spacing=4e-6, rows=84, columns=105)
-FIRST: Final = 395e-6
-"""When the scene of the chip begins, in s: late, as scenes of a cut do."""
 
 
 def write_samples(page: str, folder: Path) -> None:
@@ -65,25 +65,29 @@ def write_samples(page: str, folder: Path) -> None:
     SAMPLES[page](folder)
 
 
+@cache
+def folder(page: str) -> Path:
+    """Folder with the files of one page, which goes when the program ends."""
+    made = TemporaryDirectory()
+    _made.append(made)
+    write_samples(page, Path(made.name))
+    return Path(made.name)
+
+
+_made: Final[list[TemporaryDirectory[str]]] = []
+
+
 def write_archive(page: str, path: Path) -> None:
     """Write the files of one page into an archive."""
     with TemporaryDirectory() as name, ZipFile(path, "w", ZIP_DEFLATED) as archive:
         write_samples(page, Path(name))
-        for file in sorted(Path(name).iterdir()):
-            archive.write(file, file.name)
+        for file in sorted(path for path in Path(name).rglob("*") if path.is_file()):
+            archive.write(file, file.relative_to(name))
 
 
 def a_scene(folder: Path) -> None:
     """Write a chip in closed form: samples of 4 um, 10 frames."""
-    write_scene(
-        late(AnalyticChip(raster=COARSE, frames=10, frame_spacing=1e-6)), folder / "scene.nc"
-    )
-
-
-def late(chip: AnalyticChip) -> Scene:
-    """The chip's scene, its times moved to those of a cut."""
-    data = chip.scene().data
-    return Scene(data.assign_coords(time=("time", data["time"].values + FIRST, {"units": "s"})))
+    write_scene(closed_form_chip(10), folder / "scene.nc")
 
 
 def a_chip(folder: Path) -> None:
@@ -222,46 +226,7 @@ def foreign_fields(folder: Path) -> None:
     rounded = {name: data[name].values.round(count) for name, count in digits.items()}
     fields = {name: np.where(material, values, np.nan) for name, values in rounded.items()}
     np.savez_compressed(folder / "chip.npz", material=material, **fields)
-    meshes(folder)
-
-
-def meshes(folder: Path) -> None:
-    """Write two frames of a mesh in mm and degrees Celsius."""
-    for number in (1, 2):
-        write_mesh(folder / f"chip_{number}.vtu", 4e-3 * (number - 1))
-
-
-def write_mesh(path: Path, moved: float) -> None:
-    """Write a block of elements that is hot on its left side, as text of VTK."""
-    sides = np.linspace(1.2, 1.7, 51), np.linspace(0.3, 0.7, 41)
-    x, y = (side.ravel() for side in np.meshgrid(*sides))
-    number = np.arange(x.size).reshape(41, 51)
-    corners = (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1])
-    quads = np.stack(corners, axis=-1).reshape(-1, 4)
-    arrays = {"NT11": 100 + 500 * np.exp((1.2 - x) / 0.1), "PEEQ": 5 * (y - 0.3)}
-    points = np.stack((x - moved, y, 0 * x), axis=-1)
-    path.write_text(
-        '<VTKFile type="UnstructuredGrid" version="0.1"><UnstructuredGrid>'
-        f'<Piece NumberOfPoints="{x.size}" NumberOfCells="{len(quads)}"><PointData>'
-        + "".join(data_array(name, values) for name, values in arrays.items())
-        + f"</PointData><Points>{data_array('Points', points)}</Points><Cells>"
-        + data_array("connectivity", quads)
-        + data_array("offsets", 4 * np.arange(1, len(quads) + 1))
-        + data_array("types", np.full(len(quads), 9))
-        + "</Cells></Piece></UnstructuredGrid></VTKFile>\n",
-        encoding="utf-8",
-    )
-
-
-def data_array(name: str, values: NDArray[Any]) -> str:
-    """An array as VTK's XML has it."""
-    kind = "Int64" if values.dtype.kind == "i" else "Float64"
-    components = values.shape[1] if name == "Points" else 1
-    text = " ".join(f"{value:.6g}" for value in values.ravel())
-    return (
-        f'<DataArray Name="{name}" type="{kind}" NumberOfComponents="{components}" '
-        f'format="ascii">{text}</DataArray>'
-    )
+    programs.meshes(folder)
 
 
 def given(*names: str) -> Callable[[Path], None]:
@@ -305,9 +270,15 @@ SAMPLES: Final = {
     "compare": a_chip,
     "emissivity": a_heated_chip,
     "files": a_scene,
+    "from-abaqus": programs.abaqus,
+    "from-advantedge": programs.advantedge,
+    "from-ansys": programs.ansys,
+    "from-deform": programs.deform,
+    "from-ls-dyna": programs.ls_dyna,
+    "from-openfoam": programs.openfoam,
     "import": foreign_fields,
-    "import-mesh": meshes,
-    "import-movie": given("hot-spot.avi"),
+    "import-mesh": programs.meshes,
+    "import-movie": given("data/hot-spot.avi"),
     "import-points": given("data/taichi-mpm99.npz"),
     "knife-edge": edges,
     "measurements": a_camera,

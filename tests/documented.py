@@ -17,7 +17,12 @@ from chipglow.cutting import workpiece
 from chipglow.study import load_study
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PARTS = ("learn", "do", "understand", "look-up")
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "docs" / "index.md",
+    *(page for part in PARTS for page in sorted((ROOT / "docs" / part).glob("*.md"))),
+]
 NOTE = re.compile(r" *<!-- (file|kind|not run): (.+) -->")
 FENCE = re.compile(r"( *)(```+)(.*)")
 

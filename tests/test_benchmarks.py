@@ -29,7 +29,10 @@ PROGRAMS = {
         {"Seed": 5, "all": 4, "opened, with the process": 2, "memory": 3},
     ),
     "band_width.py": (COARSEST, {f"| {COARSEST} |": 7}),
-    "calibration.py": ("--repeats 2", {"| none |": 5, "| 15 counts": 6, "| 3 points": 6}),
+    "calibration.py": (
+        "--repeats 2",
+        {"| none |": 5, "| none, sakuma": 5, "| 15 counts": 6, "| 3 points": 6},
+    ),
     "camera_pass.py": (
         "--rounds 1",
         {"given: ": 3, "in memory: ": 3, "stored: ": 3, "kept radiance: ": 3, "inverse": 3},

@@ -57,7 +57,7 @@ def test_the_slopes_are_those_of_the_counts():
 
 
 def test_the_planckian_form_follows_the_band_within_millikelvins():
-    """From 300 to 1000 degC, 3.8 to 5.1 um: docs/measurements.md states these figures."""
+    """From 300 to 1000 degC, 3.8 to 5.1 um: docs/do/measurements.md states these figures."""
     kelvins = np.linspace(573.15, 1273.15, 141)
     fit = fit_sakuma_hattori(
         kelvins, counts_of("linear", kelvins), BAND, temperature_uncertainty=1.0

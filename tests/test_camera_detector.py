@@ -87,7 +87,7 @@ def test_without_a_detector_images_are_read_as_they_are(radiance):
 
 def test_without_a_detector_nothing_of_one_is_told():
     plain = PLAIN.form_measurement(exposure())
-    assert not {"detector", "netd", "noise_seed"} & set(plain.data.attrs)
+    assert not {"detector_response", "netd", "noise_seed"} & set(plain.data.attrs)
     assert Camera().detector is None
     assert PLAIN.redrawn(3) is PLAIN
     assert Study().camera.build() == Camera.paper()
@@ -245,13 +245,13 @@ def test_noise_follows_from_the_seed_and_when_a_frame_begins():
     assert np.corrcoef((other - first)[0].ravel(), (first[1] - first[2]).ravel())[0, 1] < 0.2
 
 
-def test_a_measurement_tells_its_detector(tmp_path):
+def test_a_measurement_states_its_detector(tmp_path):
     made = camera(ShotNoise(), ReadNoise(500.0), psf=AnnularAperturePSF())
     measured = made.form_measurement(exposure())
     write_measurement(measured, tmp_path / "m.nc")
     attributes = read_measurement(tmp_path / "m.nc").data.attrs
     calibration = made.calibration(measured.raster.shape)
-    assert "ReadNoise(standard_deviation=500.0)" in attributes["detector"]
+    assert "ReadNoise(standard_deviation=500.0)" in attributes["detector_terms"]
     assert attributes["netd"] == calibration.half_netd
     assert attributes["netd_temperature"] == calibration.half_temperature
     assert calibration.netd(calibration.half_temperature) == calibration.half_netd
@@ -426,7 +426,7 @@ def test_the_errors_of_a_scene_have_the_noise_of_each_draw(tmp_path):
     calibration = noisy.camera.calibration(noisy.camera.pixels(noisy.raster).shape)
     assert np.abs(noise).max() < 5 * calibration.netd(600.0)
     shown = next(iter(noisy.surfaces.values()))
-    assert "detector" in shown.measurement.data.attrs
+    assert "detector_response" in shown.measurement.data.attrs
     np.testing.assert_allclose(
         shown.errors.measured, shown.measurement.radiance_temperature()[0], rtol=1e-12
     )
@@ -474,7 +474,7 @@ def test_every_headline_draw_of_a_cut_has_noise_of_its_own():
     assert abs(np.corrcoef((one - clean[0]).ravel(), (other - clean[1]).ravel())[0, 1]) < 0.2
 
 
-def test_show_tells_the_netd(tmp_path):
+def test_show_prints_the_netd(tmp_path):
     made = camera(ShotNoise(), ReadNoise(500.0))
     write_measurement(made.form_measurement(exposure()), tmp_path / "m.nc")
     result = CliRunner().invoke(app, ["show", str(tmp_path / "m.nc")], env={"COLUMNS": "120"})

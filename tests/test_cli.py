@@ -5,10 +5,12 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from json import dumps, loads
+from pathlib import Path
 
 import numpy as np
 import pytest
 import typer
+import yaml
 from analytic_chip import AnalyticChip
 from typer.testing import CliRunner
 
@@ -28,6 +30,7 @@ from chipglow.scene import Area, Material, Raster
 from chipglow.study import Study, cut, load_study
 from chipglow.surface import UniformSurface
 
+ROOT = Path(__file__).parents[1]
 RASTER = AnalyticChip().raster
 STUDY = f"""
 title: A chip in closed form
@@ -150,11 +153,22 @@ def test_run_writes_a_report_and_prints_the_comparison(folder, runs):
     result = chipglow("run", "study.yaml", "--out", "results")
     assert result.exit_code == 0, result.output
     assert "results/report.html" in result.output
-    for heading in ("quantity", "the paper", "here", "range of draws", "differs", "−42", "90"):
+    for heading in ("quantity", "the paper", "here", "95 % interval", "differs", "−42", "90"):
         assert heading in result.output
     assert "Warning: The edge radius, 20 um, is 2 cells, expected 5 or more" in result.stdout
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    last = result.stdout.splitlines()[-1]
+    assert last.startswith(f"Cite as: The chipglow developers: chipglow {citation['version']}.")
+    assert citation["references"][0]["title"] in last
     names = {path.name for path in (folder / "results").iterdir()}
-    assert {"report.html", "summary.json", "results.nc", "study.yaml", "figures"} <= names
+    assert {
+        "report.html",
+        "summary.json",
+        "summary.schema.json",
+        "results.nc",
+        "study.yaml",
+        "figures",
+    } <= names
     assert load_study("results/study.yaml") == load_study("study.yaml")
     assert sorted(path.name for path in folder.iterdir()) == ["results", "study.yaml"]
 
@@ -214,6 +228,7 @@ def test_a_place_that_is_not_there_is_refused_before_anything_is_computed(comman
 
 
 PICTURES = ("--plot", "--overlay")
+OUT_ENDINGS = {"register": ".yaml", "wavelengths": ".csv"}
 ENDINGS = {"--out": ".nc", "--table": ".csv", "--pairs": ".csv", "--blink": ".gif"}
 WRITTEN = [
     (name, option.opts[0])
@@ -229,9 +244,8 @@ def test_a_file_that_cannot_be_written_is_refused_before_anything_is_read(comman
     if option in PICTURES:
         message = f"{option}: a.txt, expected a file that ends in .png, .pdf or .svg"
         assert_refused(chipglow(command, option, "a.txt"), message)
-    ending = ENDINGS.get(option, ".PNG")
-    if (command, option) == ("register", "--out"):
-        ending = ".yaml"
+    ending = OUT_ENDINGS.get(command) if option == "--out" else None
+    ending = ending or ENDINGS.get(option, ".PNG")
     assert_refused(chipglow(command, option, f"no/a{ending}"), "there is no folder no")
 
 

@@ -1,21 +1,25 @@
 """The documentation: its blocks of code run as a reader types them, and its pages are whole."""
 
+import json
 import os
 import re
 import subprocess
 import sys
 from html.parser import HTMLParser
+from posixpath import join, normpath
+from urllib.parse import unquote, urlsplit
 
 import matplotlib
 import pytest
-from documented import PAGES, ROOT, Reader, blocks
+from conftest import wait_for
+from documented import PAGES, PARTS, ROOT, Reader, blocks
 from matplotlib import pyplot as plt
 
 sys.path.append(str(ROOT / "docs"))
 LANGUAGES = {"python", "console", "yaml", "text"}
 DIRECTIVES = re.compile(r"\{(eval-rst|include|literalinclude|toctree)\}.*")
 WITH_CODE = [page for page in PAGES if any(one.language in LANGUAGES for one in blocks(page))]
-MOST_NOT_RUN = 8
+MOST_NOT_RUN = 11
 
 
 def page_id(page):
@@ -68,24 +72,38 @@ def test_a_block_says_what_it_is(page):
     assert not indented.search(page.read_text(encoding="utf-8"))
 
 
-class Page(HTMLParser):
-    """What a page of HTML loads, where its column of pages leads, and its words."""
+OUTSIDE = {"https", "http", "mailto"}
 
-    def __init__(self):
+
+class Page(HTMLParser):
+    """What a page of HTML loads and is linked to, where its column of pages leads, its words."""
+
+    def __init__(self, name):
         super().__init__()
-        self.loaded, self.column, self.words = [], set(), ""
+        self.name = name
+        self.loaded, self.links, self.column, self.ids, self.words = [], [], set(), set(), ""
         self._in_column = False
 
     def handle_starttag(self, tag, attrs):
         values = dict(attrs)
+        if identity := values.get("id"):
+            self.ids.add(identity)
         if tag == "link" and values.get("rel") == "stylesheet":
             self.loaded.append(values["href"])
         elif tag != "a" and "src" in values:
             self.loaded.append(values["src"])
         elif tag == "nav":
             self._in_column = values.get("aria-label") == "Pages"
-        elif tag == "a" and self._in_column:
-            self.column.add(values["href"].split("#")[0])
+        elif tag == "a" and "href" in values:
+            self.links.append(values["href"])
+            if self._in_column:
+                self.column.add(self.target(values["href"])[0])
+
+    def target(self, link):
+        """The file in the site that a link leads to, and the place in it."""
+        parts = urlsplit(link)
+        path = normpath(join(self.name, "..", unquote(parts.path))) if parts.path else self.name
+        return path, unquote(parts.fragment)
 
     def handle_endtag(self, tag):
         self._in_column = self._in_column and tag != "nav"
@@ -94,35 +112,109 @@ class Page(HTMLParser):
         self.words += data
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    """The pages by name, built with warnings as errors from stubs that are made anew."""
-    pytest.importorskip("sphinx", reason="sphinx is not installed: pip install '.[docs]'")
+@pytest.fixture(scope="session")
+def site(tmp_path_factory, worker_id):
+    """The folder of the pages, built with warnings as errors: once for all processes."""
+    pytest.importorskip("sphinx_gallery", reason="no sphinx-gallery: pip install '.[docs]'")
+    base = tmp_path_factory.getbasetemp()
+    folder = (base if worker_id == "master" else base.parent) / "site"
+    done = folder / "done.json"
+    try:
+        folder.mkdir()
+    except FileExistsError:
+        wait_for(done)
+    else:
+        (folder / "building").write_text(json.dumps(build(folder / "html")), encoding="utf-8")
+        (folder / "building").rename(done)
+    code, errors = json.loads(done.read_text(encoding="utf-8"))
+    assert code == 0, errors
+    return folder / "html"
+
+
+def build(folder):
+    """Build the pages from stubs that are made anew; the exit code and what was said."""
     for stub in (ROOT / "docs" / "generated").glob("*.rst"):
         stub.unlink()
-    folder = tmp_path_factory.mktemp("html")
     command = [sys.executable, "-m", "sphinx", "-q", "-W", str(ROOT / "docs"), str(folder)]
-    done = subprocess.run(command, capture_output=True, encoding="utf-8")
-    assert done.returncode == 0, done.stderr
+    run = subprocess.run(command, capture_output=True, encoding="utf-8")
+    return run.returncode, run.stderr
+
+
+@pytest.fixture(scope="module")
+def built(site):
+    """The pages by their names."""
     pages = {}
-    for path in folder.glob("*.html"):
-        pages[path.name] = Page()
-        pages[path.name].feed(path.read_text(encoding="utf-8"))
+    for path in site.rglob("*.html"):
+        page = Page(path.relative_to(site).as_posix())
+        page.feed(path.read_text(encoding="utf-8"))
+        pages[page.name] = page
     return pages
 
 
+def html_name(page):
+    return page.relative_to(ROOT / "docs").with_suffix(".html").as_posix()
+
+
 def test_every_page_leads_to_all_others(built):
-    names = {f"{page.stem}.html" for page in PAGES if page.parent.name == "docs"}
-    for name in names:
-        assert names - {name, "index.html"} <= built[name].column, name
+    names = {html_name(page) for page in PAGES if page.name != "README.md"}
+    assert len({name.split("/")[0] for name in names} & set(PARTS)) == len(PARTS)
+    for name in names | {"gallery/index.html"}:
+        assert names - {"index.html"} <= built[name].column, name
+
+
+def test_links_lead_somewhere(built, site):
+    """Those within the site to a place in it; nobody asks the network for the others."""
+    for page in built.values():
+        for link in page.links:
+            parts = urlsplit(link)
+            if parts.scheme:
+                assert parts.scheme in OUTSIDE, f"{page.name}: {link}"
+                assert parts.scheme == "mailto" or "." in parts.netloc, f"{page.name}: {link}"
+                assert not re.search(r"[\s<>]", link), f"{page.name}: {link}"
+                continue
+            path, place = page.target(link)
+            assert (site / path).exists(), f"{page.name}: {link}"
+            assert not place or place in built[path].ids, f"{page.name}: {link}"
+
+
+def test_the_readmes_links_lead_to_files():
+    for name in ("README.md", "CONTRIBUTING.md"):
+        text = (ROOT / name).read_text(encoding="utf-8")
+        for link in re.findall(r"\]\((?!https?:)([^)#]+)", text):
+            assert (ROOT / link).exists(), f"{name}: {link}"
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if page.parent.name in PARTS[:3]], ids=page_id
+)
+def test_a_page_begins_with_what_you_get_and_a_picture(page):
+    _, first, then = page.read_text(encoding="utf-8").split("\n\n")[:3]
+    assert first.startswith("What you get")
+    assert then.startswith("![")
+
+
+def test_examples_say_what_is_seen():
+    examples = [*(ROOT / "examples" / "gallery").glob("*/*.py")]
+    assert len(examples) > 20
+    for example in examples:
+        text = example.read_text(encoding="utf-8")
+        assert "What you see" in text, example
+        assert f"sphx_glr_{example.stem}_001.png" in text.partition("\n\n")[2][:120], example
 
 
 def test_pages_need_no_network(built):
     assert not [source for page in built.values() for source in page.loaded if "//" in source]
 
 
+def test_the_search_needs_no_server(site):
+    index = (site / "searchindex.js").read_text(encoding="utf-8")
+    assert index.startswith("Search.setIndex(")
+    assert "learn/tutorial" in index
+
+
 def test_equations_are_drawn_by_the_browser(built):
-    shown = built["physics.html"].words
+    shown = built["understand/physics.html"].words
     assert "∫" in shown
     for name, page in built.items():
-        assert not re.search(r"\\\(|\\\[|\\[a-z]+\{", page.words), name
+        if not name.startswith(("gallery/", "_modules/")):
+            assert not re.search(r"\\\(|\\\[|\\[a-z]+\{", page.words), name

@@ -46,7 +46,8 @@ def slopes(strain, rate, temperature, law):
 
 def documented():
     """What the example of a law of one's own in the documentation defines."""
-    page = (Path(__file__).parents[1] / "docs" / "cutting.md").read_text(encoding="utf-8")
+    place = Path(__file__).parents[1] / "docs" / "understand" / "cutting.md"
+    page = place.read_text(encoding="utf-8")
     example = page.partition("### A law of your own")[2].partition("```python\n")[2]
     names = {"__name__": "own"}
     exec(example.partition("```")[0], names)

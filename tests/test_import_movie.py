@@ -370,9 +370,9 @@ def test_movies_are_read_in_step(tmp_path):
 
 
 def test_a_movie_that_ffmpeg_drew():
-    """The example of docs/import-movie.md: another program's movie, jet, legend and lines."""
-    place = Path(__file__).parents[1] / "docs" / "import_movie.py"
-    spec = spec_from_file_location("import_movie", place)
+    """The example of docs/do/import-movie.md: another program's movie, jet, legend and lines."""
+    place = Path(__file__).parents[1] / "docs" / "samples" / "hot_spot.py"
+    spec = spec_from_file_location("hot_spot", place)
     example = module_from_spec(spec)
     spec.loader.exec_module(example)
     source = example.source()

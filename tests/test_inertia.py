@@ -7,6 +7,7 @@ import pytest
 from analytic_chip import AnalyticChip
 
 from chipglow.cli.inertia import say_of_cut
+from chipglow.cli.screen import begin
 from chipglow.cutting import (
     AISI_1045,
     CuttingConditions,
@@ -122,6 +123,7 @@ def test_momentum_flow_of_the_papers_cut():
 def test_a_warning_over_one_per_cent(kinetic, force, words, capsys):
     fraction = Inertia(kinetic, force, 100.0)
     assert bool(fraction.warning) == bool(words)
+    begin()
     say_of_cut(fraction, ["The feed is 2 cells [small]."])
     said = capsys.readouterr().err
     assert f"kinetic energy at most {kinetic:.2%} of the work" in said

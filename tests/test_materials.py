@@ -257,7 +257,8 @@ def test_a_material_that_does_not_fail(tmp_path: Path) -> None:
 
 
 def test_material_of_the_documentation(tmp_path: Path) -> None:
-    page = (Path(__file__).parents[1] / "docs" / "materials.md").read_text(encoding="utf-8")
+    place = Path(__file__).parents[1] / "docs" / "look-up" / "materials.md"
+    page = place.read_text(encoding="utf-8")
     blocks = [text.partition("```")[0] for text in page.split("```yaml\n")[1:]]
     whole, law, fractions = (
         next(text for text in blocks if text.startswith(key))

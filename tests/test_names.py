@@ -1,14 +1,12 @@
 """The names of the package itself: those that its pages use, and no others."""
 
 import re
-from pathlib import Path
 
 import pytest
+from documented import PAGES
 
 import chipglow
 
-ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 CODE = re.compile(r"```python\n(.*?)```", re.DOTALL)
 
 

@@ -150,7 +150,7 @@ def test_the_paper_stands_beside_its_own_study_only(own_result, tmp_path):
     assert all(row.paper is None and not row.where for row in rows)
     write_report(own_result, tmp_path, "Titanium", "cutting: {}\n", {"seed": "1"})
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    told = page[page.index("<main>") : page.index('<section id="study">')]
+    told = page[page.index("<main>") : page.index('<div class="part" id="study">')]
     assert "paper" not in told.lower().replace("data:image/png;base64", "")
     assert "Figure 5" not in told
     assert (tmp_path / "figures" / "scene.png").exists()
@@ -249,8 +249,17 @@ def test_a_camera_by_name_has_its_data_sheets_numbers_and_says_where_they_stand(
     said = " ".join(left_to_the_paper(study))
     assert "integration_time 10 us" in said
     assert "band" not in said.split("camera")[-1]
-    for preset in CAMERAS.values():
+    for name, preset in CAMERAS.items():
         assert preset.source
+        built = Study(camera={"preset": name, "magnification": 1.0}).camera
+        assert f"{built.array[0]} x {built.array[1]}" in preset.source
+        assert f"{1e6 * built.build().pitch:g} um" in preset.source
+
+
+def test_the_insb_camera_with_a_1_x_lens():
+    camera = Study(camera={"preset": "flir-a6751", "magnification": 1.0}).camera.build()
+    assert (camera.band, camera.pitch) == (Band(3e-6, 5e-6), pytest.approx(15e-6, rel=1e-12))
+    assert camera.psf.numerical_aperture == pytest.approx(1 / (4 * 2.5), rel=1e-12)
 
 
 def test_an_unknown_camera_is_refused():

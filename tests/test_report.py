@@ -1,14 +1,19 @@
 """The report: every file is there, the numbers are strict, the page stands alone."""
 
 import json
+import re
+from base64 import b64decode
 from dataclasses import replace
 from html.parser import HTMLParser
+from io import BytesIO
 from xml.etree import ElementTree
 
+import jsonschema
 import numpy as np
 import pytest
 import xarray as xr
 from analytic_chip import AnalyticChip
+from PIL import Image
 
 from chipglow.camera import Camera
 from chipglow.errors import Distribution, Plan, analyse
@@ -16,7 +21,8 @@ from chipglow.errors.draws import CAUSES
 from chipglow.laboratory.chip import Inertia, rake_grid
 from chipglow.report import Row, comparison_frame, comparison_rows, write_report
 from chipglow.report.chip_rows import chip_rows
-from chipglow.report.comparison import cause_rows
+from chipglow.report.comparison import cause_rows, part_rows
+from chipglow.report.error_player import cut_player
 from chipglow.report.evidence import answer, crossing, place
 from chipglow.report.paper import PAPER, TABLE_1, table_1, table_2
 from chipglow.report.visible import visible_picture
@@ -65,28 +71,44 @@ def folder(result, tmp_path_factory):
 class Page(HTMLParser):
     """Checks that tags close in order, and gathers what a reader sees."""
 
-    VOID = frozenset({"meta", "img", "br", "link"})
+    VOID = frozenset({"meta", "img", "br", "link", "input"})
 
     def __init__(self, text):
         super().__init__()
         self.open, self.seen, self.text, self.sources = [], [], [], []
-        self.ids, self.alts = [], []
+        self.ids, self.alts, self.sections, self.cells = [], [], [], []
         self.feed(text)
         self.close()
 
     def handle_starttag(self, tag, attrs):
         self.seen.append(tag)
-        self.sources += [value for name, value in attrs if name in ("src", "href")]
-        self.ids += [value for name, value in attrs if name == "id"]
-        self.alts += [value for name, value in attrs if name == "alt"]
+        attrs = dict(attrs)
+        self.sources += [attrs[name] for name in ("src", "href") if name in attrs]
+        self.ids += [attrs["id"]] if "id" in attrs else []
+        self.alts += [attrs["alt"]] if tag == "img" else []  # KeyError: a picture without
+        self.sections += [attrs["id"]] if tag == "section" else []
+        if tag == "td":
+            self.cells.append([attrs, ""])
         if tag not in self.VOID:
             self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        self.handle_endtag(tag)
 
     def handle_endtag(self, tag):
         assert self.open.pop() == tag
 
     def handle_data(self, data):
+        data = data.replace("\u00a0", " ")  # no line ends before a unit
         self.text.append(data)
+        if "td" in self.open:
+            self.cells[-1][1] += data
+
+
+@pytest.fixture(scope="module")
+def page(folder):
+    return Page((folder / "report.html").read_text(encoding="utf-8"))
 
 
 def test_every_figure_is_there_as_picture_and_as_drawing(folder):
@@ -103,64 +125,104 @@ def test_every_figure_is_there_as_picture_and_as_drawing(folder):
             assert ElementTree.fromstring(content).tag.endswith("svg")
 
 
-def test_the_page_stands_alone_and_escapes_text(folder, result):
-    text = (folder / "report.html").read_text(encoding="utf-8")
-    page = Page(text)
+def test_the_page_stands_alone_and_escapes_text(page, result):
     assert page.open == []
-    assert page.seen.count("img") == len(FIGURES)
     assert all(s.startswith(("data:image/png;base64,", "#")) for s in page.sources)
-    assert not {"script", "b", "i"} & set(page.seen)
+    assert page.seen.count("script") == 1 and not {"b", "i", "link"} & set(page.seen)
     shown = "".join(page.text)
     assert STUDY in shown
-    for value in (*PROVENANCE.values(), *REMARKS, *answer(result)):
+    sentences = [sentence.text for sentence in answer(result)]
+    for value in (*PROVENANCE.values(), *REMARKS, *sentences):
         assert value in shown
-    rows, causes, chip = comparison_rows(result), cause_rows(result), chip_rows(result.chip)
-    for row in rows:
-        for part in (row.quantity, row.paper_text, row.here_text, row.range_text, row.explanation):
+    for row in (*comparison_rows(result), *chip_rows(result.chip)):
+        texts = (row.paper_text, row.here_text, row.interval_text, row.one_draw_text)
+        for part in (row.quantity, *texts, row.explanation):
             assert part in shown
-    for row in causes:
-        assert all(text in shown for text in row.texts)
-    headings = [f"{number}:" for number in PAPER_FIGURES.values()]
-    headings.insert(2, "Table 1:")
-    headings.insert(4, "Table 2:")
+    for row in cause_rows(result):
+        assert row.unit == "%" or all(text in shown for text in row.texts)
+    headings = [f"{number}:" for number in PAPER_FIGURES.values()] + ["Table 1:", "Table 2:"]
     places = [shown.index(heading) for heading in headings]
     assert places == sorted(places)
-    tables = table_1(result)
+    assert len(table_1(result)) == 5
     for setting in SETTINGS:
         assert all(text in shown for text in setting)
-    for line in chip:
-        for part in (line.quantity, line.value_text, line.spread_text, line.explanation):
-            assert part in shown
-    # Explanations have rows of their own.
-    count = 5 + 2 * len(rows) + len(causes) + 2 * len(chip) + len(tables) + len(SETTINGS)
-    assert page.seen.count("tr") == count
 
 
-def test_the_study_heads_the_page_and_the_answer_comes_first(folder, result):
-    page = Page((folder / "report.html").read_text(encoding="utf-8"))
+def test_the_answer_comes_first_then_causes_paper_tables_and_how_to_repeat_it(page, result):
+    assert page.sections == ["answer", "causes", "comparison", "tables", "repeat"]
     shown = "".join(page.text)
     assert shown.count(TITLE) == 2
-    places = [shown.index(text) for text in (TITLE, answer(result)[0], REMARKS[0], "0.0")]
+    sentences = [sentence.text for sentence in answer(result)]
+    assert len(sentences) == 3
+    assert "cutting for long" not in shown
+    later = (REMARKS[0], "What causes it\n", "Figure 2:", "Table 1:", STUDY)
+    places = [shown.index(text) for text in (TITLE, *sentences, *later)]
     assert places == sorted(places)
-    assert shown.index(PROVENANCE["Study"]) > shown.index(answer(result)[-1])
 
 
-def test_every_id_is_there_once_and_every_picture_is_described(folder, result):
-    page = Page((folder / "report.html").read_text(encoding="utf-8"))
+def test_every_link_leads_somewhere_and_every_picture_is_described(page):
     assert len(set(page.ids)) == len(page.ids)
     linked = {source[1:] for source in page.sources if source.startswith("#")}
     assert linked <= set(page.ids)
-    assert len(page.alts) == len(FIGURES)
-    assert all(len(alt) > 80 and alt.endswith(".") for alt in page.alts)
+    assert {"why-rake_error_degC", "why-feed_um", "interval", "psf"} <= linked
+    # Views: three of two chips, each with a scale of colours and three exposures.
+    assert len(page.alts) == len(FIGURES) + 6 * (1 + 3)
+    assert all(alt.endswith(".") for alt in page.alts)
+    assert len(set(page.alts)) >= len(FIGURES) + 6 * 3
+    assert sum(len(alt) > 80 for alt in page.alts) >= len(FIGURES)
 
 
-def test_the_answer_states_scatter_and_whether_the_paper_differs(result):
-    sentences = answer(result)
-    error = result.draws.headlines["rake"].error
-    assert f"{-error.mean:.0f} ± {error.standard_deviation:.0f} °C" in sentences[0]
-    assert "8 draws" in sentences[0]
-    for sentence in sentences:
-        assert ("lies within this scatter" in sentence) != ("lies outside this scatter" in sentence)
+def test_every_number_has_its_unit(page):
+    numbers = [(attrs, text) for attrs, text in page.cells if "data-unit" in attrs]
+    assert len(numbers) > 100
+    for attrs, text in numbers:
+        assert attrs["data-unit"] == "1" or attrs["data-unit"] in text, text
+    without = [
+        text for attrs, text in page.cells if "data-head" in attrs and not attrs.get("data-unit")
+    ]
+    settings = {text for row in SETTINGS for text in row}
+    assert {text for text in without if any(map(str.isdigit, text))} <= settings
+
+
+def test_images_go_through_time_and_without_script_stand_still(result, page):
+    player = cut_player(result)
+    reference, measured, error = player.views[:3]
+    surface = result.surfaces[result.plan.rake_surface]
+    seen = ~surface.errors.flagged
+    # The error of the developed instant, computed apart from the player's.
+    still = error.frames[player.still]
+    np.testing.assert_allclose(still[seen], surface.errors.case_1[seen], atol=1e-9)
+    assert np.isnan(still[surface.errors.flagged]).all()
+    np.testing.assert_array_equal(error.frames, measured.frames - reference.frames)
+    pictures = re.findall(r'<img data-frame="(\d)"([^>]*) alt="[^"]*" src="([^"]*)"', player.html)
+    assert [int(frame) for frame, hidden, _ in pictures if not hidden] == [player.still] * 6
+    assert [int(frame) for frame, *_ in pictures] == [0, 1, 2] * 6
+    # The colours say the values: 255 of them between the ends, grey where there is none.
+    source = pictures[player.still][2].removeprefix("data:image/png;base64,")
+    index = np.array(Image.open(BytesIO(b64decode(source)))).astype(float)
+    low, high = reference.limits
+    values = np.clip(reference.frames[player.still], low, high)
+    np.testing.assert_array_equal(index == 0, np.isnan(values))
+    told = np.where(index > 0, low + (index - 1) * (high - low) / 254, np.nan)
+    np.testing.assert_allclose(told, values, atol=0.51 * (high - low) / 254)
+    starts = [1e6 * instant.start for instant in result.one_segment]
+    assert [
+        f"begins at {start:.1f} µs, lasts 10 µs." in time
+        for start, time in zip(starts, player.times, strict=True)
+    ] == [True] * 3
+    assert player.times[player.still] in "".join(page.text)
+
+
+def test_the_parts_of_an_error_are_all_of_it(result):
+    rows = {row.key: row for row in part_rows(result)}
+    assert list(rows) == ["rake_error_degC", "band_error_degC", "band_worst_error_degC"]
+    for row in rows.values():
+        total = sum(part.values for part in row.parts.values())
+        np.testing.assert_allclose(total, row.error.values, atol=1e-9)
+    assert set(rows["band_error_degC"].parts) == {"psf", "motion", "footprint"}
+    assert set(rows["band_worst_error_degC"].parts) == {"psf", "rest"}
+    mean = replace(result, plan=replace(result.plan, reference="mean"))
+    assert all("motion" not in row.parts for row in part_rows(mean))
 
 
 def test_inertia_that_is_too_much_is_said(result):
@@ -174,6 +236,31 @@ def test_inertia_that_is_too_much_is_said(result):
     assert "lower" not in rows(0.009)["kinetic_fraction_percent"].explanation
     assert rows(0.009)["inertia_force_fraction_percent"].here_text == "0.40 %"
     assert "1/300 of it" in rows(0.009)["inertia_force_fraction_percent"].explanation
+
+
+def test_the_answer_states_interval_and_whether_the_paper_differs(result):
+    sentences = [sentence.text for sentence in answer(result)]
+    error = result.draws.headlines["rake"].error
+    high, low = (f"{-end:.0f}".replace("-", "−") for end in error.interval)
+    assert f"{-error.mean:.0f} ± {error.standard_deviation:.0f} °C too little" in sentences[0]
+    assert f"8 draws; 95 % interval {low} °C to {high} °C" in sentences[0]
+    for sentence in sentences:
+        assert ("lies inside the interval" in sentence) != ("lies outside the interval" in sentence)
+
+
+def test_the_summary_keeps_its_schema(folder):
+    schema = json.loads((folder / "summary.schema.json").read_text(encoding="utf-8"))
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    check = jsonschema.Draft202012Validator(schema)
+    check.check_schema(schema)
+    check.validate(summary)
+    assert "steady_tool" not in summary and "camera" not in summary
+    for wrong in (
+        summary | {"results": {"rake_error_degC": "−61"}},
+        summary | {"more": 1},
+        {name: part for name, part in summary.items() if name != "draws"},
+    ):
+        assert not check.is_valid(wrong)
 
 
 def test_the_summary_is_strict_json(folder, result):
@@ -196,7 +283,10 @@ def test_the_summary_is_strict_json(folder, result):
     assert summary["paper"]["rake_error_degC"] == -42.0
     low, high = (summary["draws"]["rake_error_degC"][f"interval_{end}"] for end in ("low", "high"))
     assert summary["differs"]["rake_error_degC"] is not (low <= -42.0 <= high)
-    assert set(summary["explanation"]) == set(summary["results"])
+    assert set(summary["explanation"]) == {*summary["results"], *summary["chip"]}
+    parts = summary["parts"]["rake_error_degC"]
+    total = sum(part["mean"] for part in parts.values())
+    assert total == pytest.approx(summary["results"]["rake_error_degC"])
     assert summary["chip"]["feed_um"] == pytest.approx(result.chip.feed * 1e6)
     assert set(summary["chip_uncertainty"]) <= set(summary["chip"])
 
@@ -206,6 +296,8 @@ def test_the_arrays_come_back_with_units(folder, result):
         surface = result.surfaces["chip 2"]
         stored = data.sel(surface="chip 2")
         np.testing.assert_array_equal(stored["error_case_1"], surface.errors.case_1)
+        reference = stored["reference_temperature"][result.developed]
+        np.testing.assert_array_equal(reference, surface.errors.reference)
         np.testing.assert_array_equal(stored["rake_error"], surface.rake.case_1)
         np.testing.assert_array_equal(data["temperature"], result.frame.temperature)
         drawn = result.draws.headlines["band_measured"].psf_portion.values
@@ -268,14 +360,15 @@ def test_a_band_that_begins_away_from_the_edge_is_as_long_as_itself(result):
 def test_numbers_are_printed_with_sign_unit_and_dash():
     row = Row("error_degC", "Error", "°C", -42.0, -35.4, 0, "Why.", uncertainty=3.1)
     assert (row.paper_text, row.here_text) == ("−42 °C", "−35 ± 3 °C")
-    assert (row.differs, row.differs_text, row.range_text) == (True, "yes", "–")
+    assert (row.differs, row.differs_text, row.interval_text) == (True, "yes", "–")
     assert replace(row, uncertainty=3.4).differs is False
     rate = Row("rate_per_s", "Rate", "1/s", None, 123456.0, -3, "Why.")
     assert (rate.paper_text, rate.here_text) == ("–", "123 000 1/s")
     assert rate.differs is None and rate.differs_text == "–"
     draws = Distribution(np.array([[[-30.0, -50.0, -40.0, -44.0]]]), CAUSES)
     drawn = replace(row, here=draws.mean, draws=draws, one_draw=-30.0, uncertainty=None)
-    assert (drawn.here_text, drawn.range_text) == ("−41 ± 8 °C", "−50 to −30")
+    # Four draws of one cause: Student's t of 3 degrees of freedom, 3.182 times 8.4 times 1.118.
+    assert (drawn.here_text, drawn.interval_text) == ("−41 ± 8 °C", "−71 to −11 °C")
     assert (drawn.one_draw_text, drawn.differs_text) == ("−30 °C", "no")
 
 

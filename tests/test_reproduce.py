@@ -4,6 +4,7 @@ import json
 import re
 from html.parser import HTMLParser
 
+import jsonschema
 import pytest
 import xarray as xr
 from documented import ROOT
@@ -31,11 +32,11 @@ class Page(HTMLParser):
         values = dict(attrs)
         if tag == "img":
             self.images.append(values["src"])
-        if tag in ("script", "link") or values.get("src", "data:").startswith("http"):
+        if tag == "link" or not values.get("src", "data:").startswith("data:"):
             self.links.append(values)
 
     def handle_data(self, data):
-        self.words += data
+        self.words += data.replace("\u00a0", " ")
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +48,7 @@ def results(quick_study):
 
 def test_summary_holds_the_papers_figures_beside_ours(results):
     summary = json.loads((results / "summary.json").read_text(encoding="utf-8"))
+    jsonschema.validate(summary, json.loads((results / "summary.schema.json").read_text("utf-8")))
     for name in PAPER_ROWS:
         assert name in summary["paper"]
         assert summary["explanation"][name]
@@ -59,7 +61,7 @@ def test_summary_holds_the_papers_figures_beside_ours(results):
 
 
 def test_the_quick_studys_remark_states_its_own_errors_and_those_of_the_page(results):
-    page = (ROOT / "docs" / "paper-study.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "learn" / "paper-study.md").read_text(encoding="utf-8")
     summary = json.loads((results / "summary.json").read_text(encoding="utf-8"))
     stated = re.findall(r"−(\d+) °C in place of −(\d+) °C", QUICK)
     names = ("rake_error_degC", "band_error_degC", "band_worst_error_degC")

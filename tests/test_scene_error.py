@@ -3,6 +3,7 @@
 import json
 import re
 
+import jsonschema
 import numpy as np
 import pytest
 import xarray as xr
@@ -219,7 +220,15 @@ def test_the_command_reports_without_a_word_of_cutting(folder):
     told = told.replace("chipglow", "")
     assert not re.search(r"\b(chip|rake|shear|cut|cutting|tool|workpiece|paper)\b", told, re.I)
     assert "Measurement error of plate.nc" in told
-    results = json.loads((folder / "out" / "summary.json").read_text())["results"]["uniform"]
+    sections = re.findall(r'<section id="(\w+)">', page)
+    assert sections == ["answer", "causes", "tables", "repeat"]
+    assert set(re.findall(r'href="#([^"]+)"', page)) <= set(re.findall(r' id="([^"]+)"', page))
+    # Two exposures of three views, and a scale of colours each.
+    assert page.count("<img data-frame=") == 6 and page.count('<div class="scale">') == 3
+    summary = json.loads((folder / "out" / "summary.json").read_text())
+    schema = json.loads((folder / "out" / "summary.schema.json").read_text())
+    jsonschema.validate(summary, schema)
+    results = summary["results"]["uniform"]
     errors = found(places=(MIDDLE, ACROSS))
     here = reading(errors, "across", "most negative").error.mean
     # The file's temperatures are rounded to 1/40 K.

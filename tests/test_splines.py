@@ -275,6 +275,28 @@ def test_a_pass_over_splines_is_that_over_their_samples(tmp_path, follow):
                 np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=2e-6)
 
 
+def test_a_row_that_begins_later_is_that_of_a_later_exposure(tmp_path):
+    scene = open_scene(a_file(tmp_path / "scene.nc"))
+    delays = np.repeat([0.0, 0.7, 1.5, 3.0], RASTER.rows)[::4][: RASTER.rows] * STEP
+    for one in (scene, in_memory(scene)):
+        for surface in (CHIP_1, UniformSurface(0.4)):
+            field = surface.on(one)
+            rolling = expose(one, field, BAND, 0.3 * STEP, 2.2 * STEP, delays=delays)
+            for delay in set(delays.tolist()):
+                later, rows = (
+                    expose(one, field, BAND, 0.3 * STEP + delay, 2.2 * STEP),
+                    delays == delay,
+                )
+                for name in (
+                    "mean_radiance",
+                    "peak_radiance",
+                    "peak_temperature",
+                    "centre_radiance",
+                ):
+                    of_row, all_at_once = (getattr(e, name)[rows] for e in (rolling, later))
+                    np.testing.assert_array_equal(of_row, all_at_once, err_msg=name)
+
+
 def test_the_pass_is_the_literal_sum(tmp_path):
     scene = open_scene(a_file(tmp_path / "scene.nc"))
     for surface in (CHIP_1, UniformSurface(0.4)):

@@ -20,7 +20,8 @@ from chipglow.surface import (
 )
 from chipglow.surface.cubic import cubic_convolution
 from chipglow.surface.emissivity import REACH
-from chipglow.surface.texture import MAP_SIZE
+from chipglow.surface.feature import _blend, _sum_velocities
+from chipglow.surface.texture import MAP_SIZE, _look_up
 
 RASTER = Raster(left=-60e-6, top=80e-6, spacing=2e-6, rows=50, columns=60)
 VOID, WORKPIECE, TOOL = 0, 1, 2
@@ -407,3 +408,8 @@ def test_a_uniform_surface_is_black_but_for_the_void():
     found = UniformSurface().on(scene).emissivity(scene.frame(0))
     assert (found[0] == 0).all()
     assert (found[1:] == 1).all()
+
+
+def test_no_kernel_of_the_surface_waits_by_spinning():
+    for kernel in (_blend, _sum_velocities, _look_up):
+        assert kernel.targetoptions.get("nogil") and not kernel.targetoptions.get("parallel")

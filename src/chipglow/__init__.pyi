@@ -26,6 +26,7 @@ from .camera import (
     Measurement as Measurement,
     PhotonResponse as PhotonResponse,
     PupilPSF as PupilPSF,
+    RatioCamera as RatioCamera,
     ReadNoise as ReadNoise,
     ShotNoise as ShotNoise,
     Veil as Veil,
@@ -41,6 +42,7 @@ from .errors import (
     StudyResult as StudyResult,
     analyse as analyse,
     error_images as error_images,
+    ratio_errors as ratio_errors,
 )
 from .io import (
     import_scene as import_scene,
@@ -92,6 +94,7 @@ from .quantities import (
 )
 from .radiometry import (
     Band as Band,
+    RatioThermometer as RatioThermometer,
 )
 from .report import (
     write_report as write_report,
@@ -107,6 +110,7 @@ from .study import (
     cut as cut,
     load_study as load_study,
     run as run,
+    wavelengths as wavelengths,
 )
 from .surface import (
     CHIP_1 as CHIP_1,

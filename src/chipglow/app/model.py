@@ -24,7 +24,7 @@ from chipglow.app.picture import (
     Readout,
     SceneImage,
 )
-from chipglow.camera import Camera, Exposure, expose_all
+from chipglow.camera import Camera, Exposure
 from chipglow.errors import (
     Distribution,
     ErrorImages,
@@ -225,13 +225,10 @@ class SceneModel:
         at_cursor: list[float] = []
         for number, one in enumerate(surfaces):
             done = number * len(cameras)
-            (exposure,) = expose_all(
+            (exposure,) = camera.expose_fields(
                 scene,
                 (camera.lay(one, scene),),
-                camera.band,
                 knobs.start,
-                camera.integration_time,
-                camera.reflected,
                 lambda done=done: progress(done / total),  # type: ignore[misc]
             )
             for phase in cameras:
@@ -283,8 +280,11 @@ class SceneModel:
         def make() -> tuple[Exposure, ...]:
             seen = (surface, plain) if both else (surface,)
             fields = [camera.lay(one, scene) for one in seen]
-            duration, reflected = camera.integration_time, camera.reflected
-            return expose_all(scene, fields, camera.band, knobs.start, duration, reflected, check)
+            found = camera.expose_fields(scene, fields, knobs.start, check)
+            return tuple(
+                replace(exposure, effects=one.effects)
+                for exposure, one in zip(found, seen, strict=True)
+            )
 
         key = self._exposure_key(knobs)
         return kept.get((key, both) if coarse else key, make)

@@ -35,7 +35,6 @@ _REACH: Final = 60e-6
 _PATIENCE: Final = 4.0
 """Times as long as an import may take to answer: the server has other work besides."""
 
-_STARTS: Final = 17
 _TOUCHING: Final = 3e-6
 _ROUNDED: Final = 1e-7
 
@@ -67,7 +66,7 @@ class OpenedScene:
 
     @classmethod
     def of(cls, scene: Scene, study: Study, name: str) -> "OpenedScene":
-        """A scene as a study sees it first: in the exposure with the hottest shear band.
+        """A scene as a study sees it first: in an exposure in its middle.
 
         Raises
         ------
@@ -80,7 +79,7 @@ class OpenedScene:
                 update={"surface": Declared[UniformEmissivity].model_validate(surface)}
             )
         coarse = _coarse(scene)
-        start = _start(coarse or scene, study.camera.integration_time)
+        start = _start(scene, study.camera.integration_time)
         place = _places(scene, start, study.camera.integration_time)
         initial = knobs_of(study, start, *place)
         return cls(name, scene, coarse, ControlPanel.of(study, scene, initial))
@@ -197,16 +196,9 @@ def _coarse(scene: Scene) -> Scene | None:
 
 
 def _start(scene: Scene, duration: float) -> float:
-    """When the exposure begins in which the shear band is hottest; without a band, the scene."""
-    starts = spread_starts(scene, duration, min(_STARTS, len(scene)))
-    middles = [float(one) + duration / 2 for one in starts]
-    if scene.tool is not None and "plastic_strain_rate" in scene.fields and len(scene) > 1:
-        bands = [Instant.at(scene, one, scene.frame_spacing) for one in middles]
-        heat = np.nan_to_num([band.mean_temperature for band in bands])
-    else:
-        index = np.searchsorted(scene.times, middles) - 1
-        heat = np.array([scene.field("temperature", max(int(i), 0)).max() for i in index])
-    return float(f"{starts[int(np.argmax(heat))]:.9g}")
+    """When the exposure begins in the middle of the scene's longest part."""
+    starts = spread_starts(scene, duration, 3)
+    return float(f"{starts[len(starts) // 2]:.9g}")
 
 
 def _places(scene: Scene, start: float, duration: float) -> tuple[Point, Ends, Ends]:

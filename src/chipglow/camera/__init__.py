@@ -50,7 +50,7 @@ from chipglow.camera.detector import (
     lower_range_limit,
     replace_bad_pixels,
 )
-from chipglow.camera.exposure import Exposure, expose, expose_all, frame_weights
+from chipglow.camera.exposure import Exposure, View, expose, expose_all, expose_views, frame_weights
 from chipglow.camera.measurement import UNUSABLE, Flag, Measurement
 from chipglow.camera.optics.blurs import (
     BLURS,
@@ -82,6 +82,7 @@ from chipglow.camera.optics.terms import (
     OpticsTerm,
     Veil,
 )
+from chipglow.camera.ratio_camera import RatioCamera, RatioMeasurement
 from chipglow.camera.recording import PlanckConversion, Recording
 from chipglow.camera.warning import ChipglowWarning
 
@@ -145,6 +146,8 @@ __all__ = [
     "Pupil",
     "PupilPSF",
     "RangeResponse",
+    "RatioCamera",
+    "RatioMeasurement",
     "ReadNoise",
     "Readout",
     "Recording",
@@ -153,9 +156,11 @@ __all__ = [
     "Stage",
     "Veil",
     "Vibration",
+    "View",
     "blur",
     "expose",
     "expose_all",
+    "expose_views",
     "find_bad_pixels",
     "fit_linear",
     "fit_models",

@@ -19,7 +19,7 @@ from chipglow.camera.detector import (
     flat_field_calibration,
 )
 from chipglow.camera.detector.terms import follows
-from chipglow.camera.exposure import Exposure, expose
+from chipglow.camera.exposure import Exposure, expose_all
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.optics import (
     BLURS,
@@ -31,6 +31,7 @@ from chipglow.camera.optics import (
 from chipglow.camera.optics.convolution import blur_of_like, both_borders, light_from_beyond
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
 from chipglow.camera.optics.terms import Blur
+from chipglow.camera.sweep import Check
 from chipglow.camera.warning import ChipglowWarning
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
@@ -78,6 +79,9 @@ class Camera:
         In s.
     frame_rate : float
         Frames a second.
+    line_time : float, optional
+        Of a rolling shutter: how much later in s each row's integration begins than that of the row
+        above it. None by default: a global shutter, all rows at once.
     lower_limit : float, optional
         Lowest radiance temperature in K that the camera measures; what is under it is flagged.
         The paper's 300 °C by default; None for no lower range limit.
@@ -112,6 +116,7 @@ class Camera:
     psf_order: Literal["optics", "detector"] = "optics"
     integration_time: float = 10e-6
     frame_rate: float = 600.0
+    line_time: float | None = None
     lower_limit: float | None = 573.15
     reflected: float | None = None
     optics: tuple[OpticsTerm, ...] = ()
@@ -177,6 +182,14 @@ class Camera:
             1 / self.frame_rate,
             f"over 0 to {1 / self.frame_rate:g} s, the time between frames",
         )
+        if self.line_time is not None:
+            _expect_number(
+                "line_time",
+                self.line_time,
+                0.0,
+                1 / self.frame_rate,
+                f"over 0 to {1 / self.frame_rate:g} s, the time between frames, or None",
+            )
         for name in ("lower_limit", "reflected"):
             value = getattr(self, name)
             _expect(
@@ -201,7 +214,7 @@ class Camera:
 
     @classmethod
     def paper(cls) -> "Camera":
-        """The camera of the paper's simulation, as far as the paper tells it.
+        """The camera of the paper's simulation, as far as the paper states it.
 
         The blur is applied from pixel to pixel (`psf_order` is ``detector``), as in its Figure 6:
         that is what it differs in from `Camera()`, by up to 7 K. The point spread function, which
@@ -224,6 +237,17 @@ class Camera:
             If not one pixel fits, or `shape` reaches beyond the scene.
         """
         return sensor_raster(scene, self.pitch, self.offset, self.shape)
+
+    def in_band(self, band: Band) -> "Camera":
+        """The camera with another band: its diffraction is that of the band.
+
+        Parameters
+        ----------
+        band : Band
+            The other band. There is no lower range limit in it: the camera's is of its own band.
+        """
+        psf = None if self.psf is None else self.psf.in_band(band)
+        return replace(self, band=band, psf=psf, lower_limit=None)
 
     def redrawn(self, number: int) -> "Camera":
         """The camera with other noise of its detector: the seed `number` further on."""
@@ -258,6 +282,49 @@ class Camera:
             Times in s, shape (count,).
         """
         return start + np.arange(count) / self.frame_rate
+
+    def row_delays(self, scene: Raster) -> NDArray[np.float64]:
+        """How much later than the first row's each sample's integration begins.
+
+        Parameters
+        ----------
+        scene : Raster
+            The scene's samples.
+
+        Returns
+        -------
+        ndarray
+            For each row of samples that of the pixels in which its middle lies, or of the nearest
+            ones, in s, shape (y,); 0 with a global shutter.
+
+        Raises
+        ------
+        ValueError
+            If the pixels do not fit the scene, or all their rows take longer than there is between
+            frames.
+        """
+        sensors = self.pixels(scene)
+        if self.line_time is None:
+            return np.zeros(scene.rows)
+        _expect(
+            sensors.rows * self.line_time <= 1 / self.frame_rate,
+            "line_time",
+            self.line_time,
+            f"up to {1 / (self.frame_rate * sensors.rows):.4g} s: {sensors.rows} rows within the "
+            f"{1 / self.frame_rate:.4g} s between frames",
+        )
+        rows = np.floor((sensors.top - scene.y) / self.pitch)
+        return np.asarray(self.line_time * np.clip(rows, 0, sensors.rows - 1), np.float64)
+
+    def frame_duration(self, scene: Raster) -> float:
+        """Time in s from the beginning of the first row's integration to the end of the last's.
+
+        Parameters
+        ----------
+        scene : Raster
+            The scene's samples.
+        """
+        return self.integration_time + float(self.row_delays(scene).max())
 
     def lay(self, surface: Surface, scene: Scene) -> EmissivityField:
         """Lay a surface on a scene as this camera sees it, in its band and its surroundings.
@@ -300,10 +367,37 @@ class Camera:
             If the surface is none, the integration reaches beyond the scene, or the pixels do not
             fit it.
         """
-        self.pixels(scene.raster)
-        return expose(
-            scene, self.lay(surface, scene), self.band, start, self.integration_time, self.reflected
-        )
+        (exposure,) = self.expose_fields(scene, (self.lay(surface, scene),), start)
+        return replace(exposure, effects=surface.effects)
+
+    def expose_fields(
+        self,
+        scene: Scene,
+        fields: Sequence[EmissivityField],
+        start: float,
+        check: Check | None = None,
+    ) -> tuple[Exposure, ...]:
+        """Exposures of a scene with several surfaces: each of its frames is read once.
+
+        Parameters
+        ----------
+        scene : Scene
+            What is truly there.
+        fields : sequence of EmissivityField
+            The surfaces as this camera sees them (`lay`); one or more.
+        start : float
+            When the integration of the first row begins in s.
+        check : callable, optional
+            Called now and then meanwhile; what it raises ends the pass.
+
+        Raises
+        ------
+        ValueError
+            As for `expose`.
+        """
+        when = start, self.integration_time
+        delays = self.row_delays(scene.raster)
+        return expose_all(scene, fields, self.band, *when, self.reflected, delays, check)
 
     def form_measurement(self, exposures: Exposure | Iterable[Exposure]) -> Measurement:
         """Make the frames that the camera reads from exposures.
@@ -338,13 +432,14 @@ class Camera:
         """
         if isinstance(exposures, Exposure):
             exposures = (exposures,)
-        starts, frames, alike, sensors = [], [], [], None
+        starts, frames, alike, effects, sensors = [], [], [], [], None
         for exposure in exposures:
             found = self.pixels(exposure.raster)
             if sensors not in (None, found):
                 raise ValueError(f"camera: exposures of different grids, {sensors} and {found}")
             sensors = found
             starts.append(exposure.start)
+            effects.append(set(exposure.effects.items()))
             image, scene = exposure.mean_radiance, exposure.raster
             like = image
             if self.psf is not None and self.psf_order == "optics":
@@ -356,6 +451,7 @@ class Camera:
             raise ValueError("camera: no exposure to develop, expected 1 or more")
         images, times = np.stack(frames), np.array(starts)
         measured = self._measurement(images, times, sensors)
+        measured.data.attrs.update(sorted(set.intersection(*effects)))
         said = list(self._warnings(times))
         if alike:
             other = np.asarray(self.band.temperature(np.stack(alike)), np.float64)
@@ -388,7 +484,8 @@ class Camera:
         Returns
         -------
         Measurement
-            As many frames as starts; it tells the scene's tool.
+            As many frames as starts. It states the scene's tool, and in its attributes camera and
+            surface: every effect that made it.
 
         Raises
         ------
@@ -396,9 +493,9 @@ class Camera:
             If an integration reaches beyond the scene, or the pixels do not fit it.
         """
         self.pixels(scene.raster)
-        emissivity = self.lay(surface, scene)
+        fields = (self.lay(surface, scene),)
         measured = self.form_measurement(
-            expose(scene, emissivity, self.band, at, self.integration_time, self.reflected)
+            replace(self.expose_fields(scene, fields, at)[0], effects=surface.effects)
             for at in np.atleast_1d(np.asarray(start, dtype=np.float64)).tolist()
         )
         return measured.with_tool(scene.tool) if scene.tool else measured
@@ -524,7 +621,7 @@ class Camera:
         Returns
         -------
         radiance : ndarray
-            As the camera tells it; without a detector the images themselves.
+            As the camera reads it; without a detector the images themselves.
         flags : ndarray or None
             Sums of `Flag`, uint8, of the same shape; None without a detector.
         """
@@ -572,12 +669,15 @@ class Camera:
             "psf_order": self.psf_order,
             "integration_time": self.integration_time,
             "frame_rate": self.frame_rate,
+            "shutter": (
+                "global" if self.line_time is None else f"rolling, {self.line_time:g} s a row"
+            ),
             "reflected": self.reflected,
             "optics": repr(self.optics) if self.optics else None,
         }
         if calibration := self.calibration(shape):
             attributes |= {
-                "detector": repr(self.detector),
+                **calibration.effects,
                 "noise_seed": self.seed,
                 "netd": calibration.half_netd,
                 "netd_temperature": calibration.half_temperature,

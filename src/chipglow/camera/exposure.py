@@ -1,8 +1,8 @@
 """The exposure: a scene's radiance, summed over the integration time in one pass."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Final
 
@@ -38,6 +38,8 @@ class Exposure:
         sub-frame had material.
     centre_radiance : ndarray
         Apparent radiance at the middle of the integration in W/(m² sr), float64, shape (y, x).
+    effects : mapping
+        What a measurement of it states of the surface: `Surface.effects`. Nothing by default.
 
     Raises
     ------
@@ -52,6 +54,7 @@ class Exposure:
     peak_radiance: NDArray[np.float32]
     peak_temperature: NDArray[np.float32]
     centre_radiance: NDArray[np.float64]
+    effects: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in ("mean_radiance", "peak_radiance", "peak_temperature", "centre_radiance"):
@@ -62,6 +65,30 @@ class Exposure:
                 )
 
 
+@dataclass(frozen=True, eq=False)
+class View:
+    """A surface as a camera of one band looks at it.
+
+    Parameters
+    ----------
+    emissivity : EmissivityField
+        The surface, laid on the scene: what it is in this band.
+    band : Band
+        The band.
+    reflected : float, optional
+        Temperature in K of surroundings that the surface reflects; none by default.
+    """
+
+    emissivity: EmissivityField
+    band: Band
+    reflected: float | None = None
+
+    @property
+    def environment(self) -> float:
+        """Radiance of the surroundings in W/(m² sr)."""
+        return 0.0 if self.reflected is None else float(self.band.radiance(self.reflected))
+
+
 def expose(
     scene: Scene,
     emissivity: EmissivityField,
@@ -69,6 +96,7 @@ def expose(
     start: float,
     duration: float,
     reflected: float | None = None,
+    delays: NDArray[np.float64] | None = None,
 ) -> Exposure:
     """Sum a scene's apparent radiance over an integration time.
 
@@ -84,6 +112,9 @@ def expose(
         When the integration begins and how long it lasts, in s.
     reflected : float, optional
         Temperature in K of surroundings that the surface reflects; none by default.
+    delays : ndarray, optional
+        How much later than `start` the integration of each row of samples begins in s, 0 or more,
+        shape (y,): a rolling shutter's (`Camera.row_delays`). All at once by default.
 
     Returns
     -------
@@ -101,7 +132,7 @@ def expose(
     (Equation 2). The void, "undefined" in the paper, has no radiance at all. L is looked up
     between values 1/32 K apart, within 6e-7 of it from 250 K on.
     """
-    return expose_all(scene, (emissivity,), band, start, duration, reflected)[0]
+    return expose_all(scene, (emissivity,), band, start, duration, reflected, delays)[0]
 
 
 def expose_all(
@@ -111,13 +142,14 @@ def expose_all(
     start: float,
     duration: float,
     reflected: float | None = None,
+    delays: NDArray[np.float64] | None = None,
     check: Check | None = None,
 ) -> tuple[Exposure, ...]:
     """Exposures of a scene with several surfaces: each of its frames is read once.
 
     Parameters
     ----------
-    scene, band, start, duration, reflected
+    scene, band, start, duration, reflected, delays
         As for `expose`.
     emissivities : sequence of EmissivityField
         The surfaces, laid on the scene; one or more.
@@ -134,13 +166,56 @@ def expose_all(
     ValueError
         As for `expose`.
     """
-    indices, weights = frame_weights(scene.times, scene.frame_spacing, start, duration)
-    middle = _frame_at(scene, start + duration / 2, indices)
-    environment = 0.0 if reflected is None else float(band.radiance(reflected))
-    stack = emissivities[0].beside(emissivities[1:])
-    stacked = (stack.most, len(emissivities), scene.raster.shape)
-    sums = Sums.zero(_fine_table(band), environment, *stacked, check or _nothing)
-    _sweep(scene, stack, indices, weights, indices.index(middle), sums)
+    views = [View(emissivity, band, reflected) for emissivity in emissivities]
+    return expose_views(scene, views, start, duration, delays, check)
+
+
+def expose_views(
+    scene: Scene,
+    views: Sequence[View],
+    start: float,
+    duration: float,
+    delays: NDArray[np.float64] | None = None,
+    check: Check | None = None,
+) -> tuple[Exposure, ...]:
+    """Exposures of a scene with several surfaces in several bands: each frame is read once.
+
+    A surface that is seen in several bands, and a band in which several surfaces are seen, are
+    computed once for each frame.
+
+    Parameters
+    ----------
+    scene, start, duration, delays, check
+        As for `expose_all`.
+    views : sequence of View
+        What is looked at, and in which band; one or more.
+
+    Returns
+    -------
+    tuple of Exposure
+        One for each view, the same as `expose` makes.
+
+    Raises
+    ------
+    ValueError
+        As for `expose`.
+    """
+    if delays is None:
+        delays = np.zeros(scene.raster.rows)
+    indices, weights, middles = _row_weights(scene, start, duration, delays)
+    fields = list({id(view.emissivity): view.emissivity for view in views}.values())
+    bands = list(dict.fromkeys(view.band for view in views))
+    places = {id(one): number for number, one in enumerate(fields)}
+    stack = fields[0].beside(fields[1:])
+    sums = Sums.zero(
+        np.array([[places[id(view.emissivity)], bands.index(view.band)] for view in views]),
+        np.stack([_fine_table(band) for band in bands]),
+        np.array([view.environment for view in views], np.float32),
+        stack.most,
+        scene.raster.shape,
+        check or _nothing,
+    )
+    _sweep(scene, stack, indices, weights, middles, sums)
     mean, centre, peak, hottest = sums.mean, sums.centre, sums.peak, sums.hottest
     if not np.isfinite(mean).all():
         raise ValueError(
@@ -159,7 +234,7 @@ def expose_all(
             peak_temperature=hottest,
             centre_radiance=centre[n],
         )
-        for n in range(len(emissivities))
+        for n in range(len(views))
     )
 
 
@@ -221,6 +296,31 @@ def frame_weights(
     return range(int(covered[0]), int(covered[-1]) + 1), weights / weights.sum()
 
 
+def _row_weights(
+    scene: Scene, start: float, duration: float, delays: NDArray[np.float64]
+) -> tuple[range, NDArray[np.float64], NDArray[np.intp]]:
+    """Sub-frames of an exposure, their weights in each row, and which is in a row's middle."""
+    times, spacing = scene.times, scene.frame_spacing
+    different, row_of = np.unique(delays, return_inverse=True)
+    starts = start + different
+    try:
+        covered = [frame_weights(times, spacing, one, duration) for one in starts[::-1]][::-1]
+    except ValueError as error:
+        if not different[-1]:
+            raise
+        late = f"line_time: the last row's exposure begins {different[-1]:.4g} s after the first's"
+        raise ValueError(f"{late}; {error}") from None
+    indices = range(covered[0][0].start, covered[-1][0].stop)
+    weights = np.zeros((different.size, len(indices)))
+    for of_row, (own, values) in zip(weights, covered, strict=True):
+        of_row[own.start - indices.start : own.stop - indices.start] = values
+    middles = [
+        _frame_at(scene, one + duration / 2, own) - indices.start
+        for one, (own, _) in zip(starts, covered, strict=True)
+    ]
+    return indices, weights[row_of], np.array(middles, np.intp)[row_of]
+
+
 def _frame_at(scene: Scene, time: float, indices: range) -> int:
     """The one of these frames that stands for a time."""
     rounded = time + _ROUNDING * scene.frame_spacing
@@ -233,7 +333,7 @@ def _sweep(
     stack: EmissivityStack,
     indices: range,
     weights: NDArray[np.float64],
-    middle: int,
+    middles: NDArray[np.intp],
     sums: Sums,
 ) -> None:
     """Add sub-frames to sums, in the quickest way that scene and surfaces allow."""
@@ -241,11 +341,11 @@ def _sweep(
     if features is not None and (splines := _splines(scene, indices)):
         shifts = np.stack([features.shifts(frame.time) for frame in splines])
         textures, fixed = features.textures, features.fixed_positions
-        sums.add_splines(splines, fixed, shifts, textures, weights, middle)
+        sums.add_splines(splines, fixed, shifts, textures, weights, middles)
         return
     for begin, frames in _batches(scene, indices, stack.needs):
-        part = weights[begin : begin + len(frames)]
-        inside = middle - begin if begin <= middle < begin + len(frames) else -1
+        part = np.ascontiguousarray(weights[:, begin : begin + len(frames)])
+        inside = middles - begin
         if features is None:
             sums.add_given(frames, [stack.emissivities(one) for one in frames], part, inside)
         else:

@@ -53,7 +53,7 @@ class Measurement:
         ``x`` ascending and ``y`` descending in m, the middles of the pixels. Attributes tell the
         camera; ``pitch`` is the distance between pixels in m, ``band_lower`` and ``band_upper``
         in m limit the band. Of a band that is not shaped like a box, ``response`` over
-        ``wavelength`` in m is the relative spectral response. A tool may be told as in a scene.
+        ``wavelength`` in m is the relative spectral response. A tool may be stated as in a scene.
         ``calibration_errors`` over (``calibration_error``, ``calibration_radiance``), in
         W/(m² sr), may be there: the effects of a calibration's independent errors on the radiance,
         as `CalibrationErrors` has them.
@@ -143,11 +143,11 @@ class Measurement:
         return len(self.times)
 
     def __repr__(self) -> str:
-        told = frames_text(self.times, self.raster, "pixels", self.celsius())
+        frames = frames_text(self.times, self.raster, "pixels", self.celsius())
         tool = f"{'with' if self.tool else 'without'} tool"
         count = len(self.warnings)
         said = f"; {count} warning{'s' if count > 1 else ''}: see .warnings" if count else ""
-        return f"<Measurement: {told}; {tool}{said}>"
+        return f"<Measurement: {frames}; {tool}{said}>"
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -192,12 +192,12 @@ class Measurement:
 
     @property
     def tool(self) -> Tool | None:
-        """The tool in the measurement's coordinates, if it is told.
+        """The tool in the measurement's coordinates, if it is stated.
 
         Raises
         ------
         ValueError
-            If what is told is no tool that can be.
+            If what is stated is no tool that can be.
         """
         return stored_tool(self.data.attrs)
 
@@ -293,7 +293,7 @@ class Measurement:
         Raises
         ------
         ValueError
-            If what is told of them cannot be.
+            If what is stated of them cannot be.
         """
         if "calibration_errors" not in self.data:
             return None
@@ -357,14 +357,14 @@ _ERRORS: Final = ("calibration_error", "calibration_radiance")
 
 
 def _errors(errors: CalibrationErrors) -> dict[str, xr.DataArray]:
-    """What a file tells of the errors of a calibration."""
+    """What a file states of the errors of a calibration."""
     units = {"units": MEASUREMENT_UNITS["radiance"]}
     coords = {_ERRORS[1]: (_ERRORS[1], errors.radiance, units)}
     return {"calibration_errors": xr.DataArray(errors.effects, coords, _ERRORS, attrs=units)}
 
 
 def _response(band: Band) -> dict[str, xr.DataArray]:
-    """A band's response where it counts, so that a file tells the same integral."""
+    """A band's response where it counts, so that a file states the same integral."""
     assert band.response is not None
     wavelength = ("wavelength", band.wavelengths, {"units": "m"})
     values = np.asarray(band.response(band.wavelengths), np.float64)

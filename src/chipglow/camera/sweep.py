@@ -1,26 +1,26 @@
 """Sums over the sub-frames of an exposure: the rows in blocks, with time inside.
 
 A block's sums stay in the processor's cache while its sub-frames go by, and a sub-frame's fields
-are made, blended and summed row by row. Blocks are shared among threads of this module, which sleep
-when there is nothing to do; none of the sums depends on their number.
+are made, blended and summed row by row. Blocks are shared among threads (`in_row_blocks`); none of
+the sums depends on their number.
 
 The kernels are functions of arrays alone and work on one block each: a graphics processor would
 take them block by block, with the loops over columns as its threads.
 """
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
 
 import numpy as np
-from numba import get_num_threads, njit
+from numba import njit
 from numpy.typing import NDArray
 
 from chipglow.radiometry.band import TABLE_COLDEST
 from chipglow.scene import Frame, Material
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, TOOL_SPLINE, SplineFrame, spread
 from chipglow.surface.blend import SCRATCH, Textures, blend_row
+from chipglow.surface.row_blocks import in_row_blocks
 
 STEPS_PER_KELVIN: Final = 32.0
 """Values of the table of radiance in a kelvin; a straight line between them is exact enough."""
@@ -28,14 +28,14 @@ STEPS_PER_KELVIN: Final = 32.0
 BATCH: Final = 8
 """Frames that are summed together where their samples are in memory."""
 
-_ROWS: Final = 16
 _VOID, _WORKPIECE, _TOOL = int(Material.VOID), int(Material.WORKPIECE), int(Material.TOOL)
 _STRAIN, _RATE, _X, _Y = (
     SPLINE_FIELDS.index(name)
     for name in ("plastic_strain", "plastic_strain_rate", "material_x", "material_y")
 )
 _MEAN: Final = 3
-"""Place of the mean among what the kernels get of their sums: see `Sums._own`."""
+_VIEWS: Final = 7
+"""Places of the mean and of the views among what the kernels get of their sums: `Sums._own`."""
 
 Check: TypeAlias = Callable[[], None]
 """Called now and then in a long pass, which it ends by raising an error."""
@@ -49,15 +49,17 @@ class Sums:
 
     Parameters
     ----------
-    table : ndarray
-        Radiance from 200 K on, `STEPS_PER_KELVIN` to a kelvin, and its change to the next value;
-        float32 of shape (n, 2).
-    environment : float
-        Radiance of the surroundings in W/(m² sr).
+    views : ndarray
+        Numbers of the surface and of the band of every view, int64 of shape (view, 2).
+    tables : ndarray
+        Radiance in every band from 200 K on, `STEPS_PER_KELVIN` to a kelvin, and its change to the
+        next value; float32 of shape (band, n, 2).
+    environments : ndarray
+        Radiance of every view's surroundings in W/(m² sr), float32 of shape (view,).
     most : float
         Largest emissivity that is possible.
     mean, centre : ndarray
-        Float64 of shape (surface, y, x), zero to start with.
+        Float64 of shape (view, y, x), zero to start with.
     peak : ndarray
         Float32 of the same shape.
     hottest : ndarray
@@ -66,8 +68,9 @@ class Sums:
         Called before every block of rows; what it raises ends the pass.
     """
 
-    table: NDArray[np.float32]
-    environment: float
+    views: NDArray[np.int64]
+    tables: NDArray[np.float32]
+    environments: NDArray[np.float32]
     most: float
     mean: NDArray[np.float64]
     centre: NDArray[np.float64]
@@ -78,24 +81,24 @@ class Sums:
     @classmethod
     def zero(
         cls,
-        table: NDArray[np.float32],
-        environment: float,
+        views: NDArray[np.int64],
+        tables: NDArray[np.float32],
+        environments: NDArray[np.float32],
         most: float,
-        surfaces: int,
         shape: tuple[int, int],
         check: Check,
     ) -> "Sums":
         """Sums of nothing."""
-        mean, centre = (np.zeros((surfaces, *shape)) for _ in range(2))
+        mean, centre = (np.zeros((len(views), *shape)) for _ in range(2))
         peak, hottest = (np.zeros(of, np.float32) for of in (mean.shape, shape))
-        return cls(table, environment, most, mean, centre, peak, hottest, check)
+        return cls(views, tables, environments, most, mean, centre, peak, hottest, check)
 
     def add_given(
         self,
         frames: Sequence[Frame],
         emissivities: Sequence[NDArray[np.float32]],
         weights: NDArray[np.float64],
-        middle: int,
+        middles: NDArray[np.intp],
     ) -> None:
         """Add frames with the emissivities of all surfaces, each of shape (surface, y, x).
 
@@ -106,15 +109,16 @@ class Sums:
         emissivities : sequence of ndarray
             One of each frame.
         weights : ndarray
-            Fraction of the exposure that each frame stands for.
-        middle : int
-            Which of them is in the middle of the exposure; -1 for none.
+            Fraction of each row's exposure that each frame stands for, shape (row, frame); 0 where
+            the row is not exposed.
+        middles : ndarray
+            Which of them is in the middle of each row's exposure, if any of them is, shape (row,).
         """
         temperature, material = (_batch(frames, name) for name in ("temperature", "material"))
         given = _filled([np.ascontiguousarray(e, np.float32) for e in emissivities])
 
         def add(first: int, last: int) -> None:
-            _add_given(temperature, material, given, weights, middle, first, last, self._own)
+            _add_given(temperature, material, given, weights, middles, first, last, self._own)
 
         self._in_blocks(add)
 
@@ -125,13 +129,13 @@ class Sums:
         shifts: NDArray[np.float32],
         textures: Textures,
         weights: NDArray[np.float64],
-        middle: int,
+        middles: NDArray[np.intp],
     ) -> None:
         """Add frames with the emissivities that their features have.
 
         Parameters
         ----------
-        frames, weights, middle
+        frames, weights, middles
             As for `add_given`.
         positions : sequence of tuple of ndarray
             Where each frame's samples are looked up in the textures.
@@ -148,7 +152,7 @@ class Sums:
         fields = (temperature, material, strain, rate, x, y)
 
         def add(first: int, last: int) -> None:
-            _add_features(fields, shifts, tuple(textures), weights, middle, first, last, self._own)
+            _add_features(fields, shifts, tuple(textures), weights, middles, first, last, self._own)
 
         self._in_blocks(add)
 
@@ -159,7 +163,7 @@ class Sums:
         shifts: NDArray[np.float32],
         textures: Textures,
         weights: NDArray[np.float64],
-        middle: int,
+        middles: NDArray[np.intp],
     ) -> None:
         """Add frames of splines: their samples are never written anywhere.
 
@@ -170,7 +174,7 @@ class Sums:
         positions : tuple of ndarray, optional
             Where the samples are looked up in the textures; by their material coordinates if left
             out.
-        shifts, textures, weights, middle
+        shifts, textures, weights, middles
             As for `add_features`.
         """
         lattice = frames[0].lattice
@@ -181,7 +185,7 @@ class Sums:
 
         def add(first: int, last: int) -> None:
             _add_splines(
-                nodes, limits, grid, fixed, shifts, tuple(textures), weights, middle, first, last,
+                nodes, limits, grid, fixed, shifts, tuple(textures), weights, middles, first, last,
                 self._own,
             )  # fmt: skip
 
@@ -189,19 +193,15 @@ class Sums:
 
     @property
     def _own(self) -> tuple[Any, ...]:
-        environment, most = np.float32(self.environment), np.float32(self.most)
-        return self.table, environment, most, self.mean, self.centre, self.peak, self.hottest
+        sums = self.mean, self.centre, self.peak, self.hottest
+        return self.tables, self.environments, np.float32(self.most), *sums, self.views
 
     def _in_blocks(self, add: Callable[[int, int], None]) -> None:
-        rows = len(self.hottest)
-        firsts = range(0, rows, _ROWS)
-
-        def checked(first: int) -> None:
+        def checked(first: int, last: int) -> None:
             self.check()
-            add(first, min(first + _ROWS, rows))
+            add(first, last)
 
-        with ThreadPoolExecutor(get_num_threads()) as pool:
-            list(pool.map(checked, firsts))
+        in_row_blocks(len(self.hottest), checked)
 
 
 def _filled(arrays: list[NDArray[Any]]) -> tuple[NDArray[Any], ...]:
@@ -268,13 +268,17 @@ def _add_row(  # type: ignore[no-untyped-def]
     temperature, kind, emissivity, weight, is_middle, row, work, number, own
 ):
     """Add a row of a sub-frame, with the emissivities (surface, x), to row `row` of the sums."""
-    table, environment, most, mean, centre, peak, hottest = own
+    tables, environments, most, mean, centre, peak, hottest, views = own
     past, black, apparent = work[0], work[1], work[2]
-    _find(temperature, table.shape[0] - 1, number, past)
-    _look_up(table, number, past, black)
+    _find(temperature, tables.shape[1] - 1, number, past)
     _heat(temperature, kind, hottest[row])
-    for n in range(emissivity.shape[0]):
-        _apparent(emissivity[n], black, kind, environment, most, apparent)
+    looked_up = -1
+    for n in range(views.shape[0]):
+        surface, band = views[n]
+        if band != looked_up:
+            _look_up(tables[band], number, past, black)
+            looked_up = band
+        _apparent(emissivity[surface], black, kind, environments[n], most, apparent)
         _sum(apparent, weight, mean[n, row])
         _raise(apparent, peak[n, row])
         if is_middle:
@@ -287,7 +291,7 @@ def _add_given(  # type: ignore[no-untyped-def]
     material,
     emissivities,
     weights,
-    middle,
+    middles,
     first,
     last,
     own,
@@ -296,10 +300,12 @@ def _add_given(  # type: ignore[no-untyped-def]
     work = np.empty((3, columns), np.float32)
     number = np.empty(columns, np.int32)
     for row in range(first, last):
-        for k in range(weights.size):
+        for k in range(weights.shape[1]):
+            if weights[row, k] == 0.0:
+                continue
             _add_row(
-                temperature[k][row], material[k][row], emissivities[k][:, row], weights[k],
-                k == middle, row, work, number, own,
+                temperature[k][row], material[k][row], emissivities[k][:, row], weights[row, k],
+                k == middles[row], row, work, number, own,
             )  # fmt: skip
 
 
@@ -309,27 +315,29 @@ def _add_features(  # type: ignore[no-untyped-def]
     shifts,
     textures,
     weights,
-    middle,
+    middles,
     first,
     last,
     own,
 ):
     temperature, material, strain, rate, x, y = fields
-    surfaces, _, columns = own[_MEAN].shape
+    surfaces, columns = own[_VIEWS][:, 0].max() + 1, own[_MEAN].shape[2]
     scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
     corner = np.empty(columns, np.int32)
     emissivity = np.empty((surfaces, columns), np.float32)
     work = np.empty((3, columns), np.float32)
     number = np.empty(columns, np.int32)
     for row in range(first, last):
-        for k in range(weights.size):
+        for k in range(weights.shape[1]):
+            if weights[row, k] == 0.0:
+                continue
             blend_row(
                 material[k][row], strain[k][row], rate[k][row], x[k][row], y[k][row], shifts[k],
                 textures, row, scratch, corner, emissivity,
             )  # fmt: skip
             _add_row(
-                temperature[k][row], material[k][row], emissivity, weights[k], k == middle, row,
-                work, number, own,
+                temperature[k][row], material[k][row], emissivity, weights[row, k],
+                k == middles[row], row, work, number, own,
             )  # fmt: skip
 
 
@@ -372,13 +380,13 @@ def _add_splines(  # type: ignore[no-untyped-def]
     shifts,
     textures,
     weights,
-    middle,
+    middles,
     first,
     last,
     own,
 ):
     first_down, down, first_across, across, in_tool = grid
-    surfaces, _, columns = own[_MEAN].shape
+    surfaces, columns = own[_VIEWS][:, 0].max() + 1, own[_MEAN].shape[2]
     scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
     corner = np.empty(columns, np.int32)
     emissivity = np.empty((surfaces, columns), np.float32)
@@ -389,11 +397,15 @@ def _add_splines(  # type: ignore[no-untyped-def]
     wide = np.empty((nodes.shape[1], count, columns), np.float32)
     values = np.zeros((nodes.shape[1], columns), np.float32)
     kind = np.empty(columns, np.uint8)
-    for k in range(weights.size):
+    for k in range(weights.shape[1]):
+        if not weights[first:last, k].any():
+            continue
         for f in (0, _STRAIN, _RATE, _X, _Y, FILLED_SPLINE, TOOL_SPLINE):
             for j in range(count):
                 spread(nodes[k, f, top + j], first_across, across, 0, columns, wide[f, j])
         for row in range(first, last):
+            if weights[row, k] == 0.0:
+                continue
             base = first_down[row] - top
             u, v, w = down[0, row], down[1, row], down[2, row]
             _combine(wide[FILLED_SPLINE], base, u, v, w, values[FILLED_SPLINE])
@@ -412,5 +424,6 @@ def _add_splines(  # type: ignore[no-untyped-def]
                 textures, row, scratch, corner, emissivity,
             )  # fmt: skip
             _add_row(
-                values[0], kind, emissivity, weights[k], k == middle, row, work, number, own,
+                values[0], kind, emissivity, weights[row, k], k == middles[row], row, work, number,
+                own,
             )  # fmt: skip

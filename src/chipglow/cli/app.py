@@ -17,8 +17,10 @@ from chipglow.cli.options import file_option, picture_option
 from chipglow.cli.psf import psf
 from chipglow.cli.rake import rake
 from chipglow.cli.register import register
+from chipglow.cli.screen import current
 from chipglow.cli.shearband import shearband
 from chipglow.cli.temperature import temperature
+from chipglow.cli.wavelengths import wavelengths
 
 PAPER_FOLDER: Final = Path("chipglow-paper")
 ERROR_FOLDER: Final = Path("chipglow-error")
@@ -139,7 +141,7 @@ def init(
         else:
             text = json_schema(Study) if schema else study_text(Study())
         temporary.write_text(text, encoding="utf-8")
-    print(path)
+    current().file(path)
 
 
 @app.command()
@@ -195,9 +197,9 @@ def cut(
     from chipglow.study import load_study
 
     cut_study(load_study(study), out, preview, resume, yes)
-    print(out)
+    current().file(out)
     if preview is not None:
-        print(preview)
+        current().file(preview)
 
 
 @app.command("import")
@@ -256,7 +258,10 @@ def measure(
     from chipglow.study import load_study
 
     measure_scene(scene, load_study(study), out, start, chip)
-    print(out)
+    current().file(out)
+
+
+app.command()(wavelengths)
 
 
 @app.command()
@@ -335,6 +340,14 @@ def materials(
         plot_material(name, plot)
 
 
+@app.command()
+def doctor() -> None:
+    """Examine this machine: versions, optional parts, threads, cache, GPU, and one number."""
+    from chipglow.cli.doctor import examine
+
+    examine()
+
+
 for command in (
     calibrate, convert, emissivity, temperature, psf, register, rake, shearband, compare,
 ):  # fmt: skip
@@ -348,12 +361,13 @@ def list_cache() -> None:
 
     from chipglow.study import cache_folder, cached_scenes
 
-    scenes = cached_scenes()
+    scenes, screen = cached_scenes(), current()
     for scene in scenes:
         when = datetime.fromtimestamp(scene.modified).strftime("%Y-%m-%d %H:%M")
-        print(f"{when}  {_megabytes(scene.size):>10}  {scene.path.name}")
-    total = _megabytes(sum(scene.size for scene in scenes))
-    print(f"{len(scenes)} scenes, {total} in {cache_folder()}")
+        screen.heading(f"{when}  {_megabytes(scene.size):>10}  {scene.path.name}")
+    total = sum(scene.size for scene in scenes)
+    screen.say(f"{len(scenes)} scenes, {_megabytes(total)} in {cache_folder()}")
+    screen.values({"scenes": {str(scene.path): scene.size for scene in scenes}, "bytes": total})
 
 
 @cache_app.command("clear")
@@ -361,7 +375,8 @@ def clear() -> None:
     """Delete the cached scenes."""
     from chipglow.study import cache_folder, clear_cache
 
-    print(f"{_megabytes(clear_cache())} freed in {cache_folder()}")
+    freed = clear_cache()
+    current().say(f"{_megabytes(freed)} freed in {cache_folder()}", {"bytes": freed})
 
 
 def _megabytes(size: int) -> str:

@@ -1,10 +1,12 @@
 """Where errors become one line and an exit code."""
 
 import sys
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import typer
 from typer.core import TyperGroup
+
+from chipglow.cli import screen
 
 BAD_INPUT: Final = 2
 FAILED: Final = 1
@@ -14,14 +16,23 @@ INTERRUPTED: Final = 130
 class Boundary(TyperGroup):
     """Commands that end in one line and an exit code, never in a traceback, if they fail.
 
+    Each has an option ``--json``: its results as one object on stdout, if it does not fail.
+
     2 for what the user can put right (input, files, disk), 1 for a simulation that went wrong,
     130 after Ctrl-C. Anything else is a defect of the program and keeps its traceback.
     """
 
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        _give_json(self)
+
     def invoke(self, ctx: Any) -> Any:
         """Run a command."""
+        shown = screen.begin()
         try:
-            return super().invoke(ctx)
+            done = super().invoke(ctx)
+            shown.close()
+            return done
         except BrokenPipeError:
             raise
         except (ValueError, OSError) as error:
@@ -47,3 +58,36 @@ def _one_line(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror:
         text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     return " ".join(text.split())
+
+
+def _give_json(group: TyperGroup) -> None:
+    """The option for programs, on every command of a group."""
+    for command in group.commands.values():
+        if isinstance(command, TyperGroup):
+            _give_json(command)
+        else:
+            command.params.extend(typer.main.get_command(_JSON).params)
+
+
+_JSON: Final = typer.Typer(add_completion=False)
+"""A command that has only that option, to take it from."""
+
+
+def _chosen(wanted: bool) -> None:
+    if wanted:
+        screen.current().for_programs()
+
+
+@_JSON.command()
+def _with_json(
+    json: Annotated[
+        bool,
+        typer.Option(
+            "--json",
+            callback=_chosen,
+            expose_value=False,
+            help="Print the results as one JSON object, for programs.",
+        ),
+    ] = False,
+) -> None:
+    pass

@@ -9,9 +9,8 @@ import typer
 from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from chipglow.camera import CalibrationFit, FittedCalibration
+    from chipglow.cli.screen import Screen
     from chipglow.laboratory.measurement import BlackbodyCalibration
 
 
@@ -76,10 +75,8 @@ def calibrate(
 
     It holds between the coldest and the hottest blackbody: what is outside is flagged later.
     """
-    from rich.console import Console
-
     from chipglow.camera import MODELS
-    from chipglow.cli.assumed import say_assumed, say_warnings
+    from chipglow.cli.screen import current
     from chipglow.laboratory.measurement import calibrate_blackbodies, write_calibration
     from chipglow.laboratory.measurement.description import band_of
     from chipglow.quantities.option import parse
@@ -103,16 +100,16 @@ def calibrate(
         integration_time=parse("--integration-time", TIME, integration_time),
         range_name=range_name,
     )
-    console = Console(highlight=False, markup=False, soft_wrap=True)
+    screen = current()
     for name in found.fits:
-        _print_fit(console, found, name)
+        _print_fit(screen, found, name)
     if len(found.fits) > 1:
-        _print_comparison(console, found)
-    say_assumed(found.assumptions)
-    say_warnings(found.warnings)
+        _print_comparison(screen, found)
+    screen.assumed(found.assumptions)
+    screen.warnings(found.warnings)
     if out is not None:
         write_calibration(found.fits[found.preferred], out)
-        print(out)
+        screen.file(out)
     if plot is not None:
         from chipglow.cli.pictures import write_picture
         from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
@@ -120,11 +117,9 @@ def calibrate(
         write_picture(draw_calibrations(found.fits), plot)
 
 
-def _print_fit(console: "Console", found: "BlackbodyCalibration", name: str) -> None:
-    from chipglow.cli.tables import screen_table
-
+def _print_fit(screen: "Screen", found: "BlackbodyCalibration", name: str) -> None:
     calibration = found.fits[name].calibration
-    console.print(
+    screen.heading(
         f"\n{name}: {calibration.description}, {calibration.lowest - 273.15:.5g} °C to "
         f"{calibration.highest - 273.15:.5g} °C"
     )
@@ -134,7 +129,7 @@ def _print_fit(console: "Console", found: "BlackbodyCalibration", name: str) -> 
         "standard uncertainty": "{standard_uncertainty:.2g}",
         "unit": "{unit}",
     }
-    console.print(screen_table(found.parameter_frame().query("model == @name"), cells))
+    screen.table("parameters", found.parameter_frame().query("model == @name"), cells)
     cells = {
         "blackbody / °C": "{temperature_degC:.2f}",
         "counts": "{counts:.6g}",
@@ -142,15 +137,29 @@ def _print_fit(console: "Console", found: "BlackbodyCalibration", name: str) -> 
         "residual / K": "{residual_K:.3g}",
         "u / K": "{standard_uncertainty_K:.2g}",
     }
-    console.print(screen_table(found.to_frame().query("model == @name"), cells))
-    console.print(_quality(found.fits[name]))
+    screen.table("blackbodies", found.to_frame().query("model == @name"), cells)
+    screen.say(_quality(found.fits[name]), {name: _numbers(found.fits[name])})
+
+
+def _numbers(fit: "CalibrationFit[FittedCalibration]") -> dict[str, float | None]:
+    """What `_quality` says, for programs."""
+    return {
+        "rms_residual_K": _scatter(fit),
+        "chi_squared": fit.chi_squared,
+        "degrees_of_freedom": fit.degrees_of_freedom,
+        "probability": fit.probability,
+        "information_criterion": fit.information_criterion,
+    }
+
+
+def _scatter(fit: "CalibrationFit[FittedCalibration]") -> float:
+    import numpy as np
+
+    return float(np.sqrt(np.mean(fit.residuals_temperature**2)))
 
 
 def _quality(fit: "CalibrationFit[FittedCalibration]") -> str:
-    import numpy as np
-
-    scatter = float(np.sqrt(np.mean(fit.residuals_temperature**2)))
-    text = f"Residuals: {scatter:.3g} K (root mean square)"
+    text = f"Residuals: {_scatter(fit):.3g} K (root mean square)"
     if not fit.stated:
         return f"{text}; the uncertainties are from their scatter, as none are stated."
     if fit.probability is None:
@@ -161,9 +170,12 @@ def _quality(fit: "CalibrationFit[FittedCalibration]") -> str:
     )
 
 
-def _print_comparison(console: "Console", found: "BlackbodyCalibration") -> None:
+def _print_comparison(screen: "Screen", found: "BlackbodyCalibration") -> None:
     criteria = ", ".join(
         f"{name} {fit.information_criterion:.4g}" for name, fit in found.fits.items()
     )
-    console.print(f"\nInformation criterion (Akaike's, corrected): {criteria}.")
-    console.print(f"Preferred: {found.preferred}, which has the least.")
+    screen.heading()
+    screen.say(f"Information criterion (Akaike's, corrected): {criteria}.")
+    screen.say(
+        f"Preferred: {found.preferred}, which has the least.", {"preferred": found.preferred}
+    )

@@ -8,8 +8,7 @@ import typer
 from chipglow.cli.options import Settings, ToolChoice, picture_option
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
+    from chipglow.cli.screen import Screen
     from chipglow.laboratory.comparison import Comparison, StatedUncertainties
 
 
@@ -76,10 +75,9 @@ def compare(
     """Lay a measurement and simulations over each other and say which fits where."""
     from dataclasses import replace
 
-    from rich.console import Console
-
-    from chipglow.cli.assumed import say_assumed, say_of_measurements, say_warnings
+    from chipglow.cli.assumed import say_of_measurements
     from chipglow.cli.pictures import write_picture
+    from chipglow.cli.screen import current
     from chipglow.cli.times import frame_at
     from chipglow.laboratory.chip import chosen_tool, read_curve
     from chipglow.laboratory.comparison import compare as compare_all, labelled_simulations
@@ -97,20 +95,21 @@ def compare(
         replace(stated, tool=chosen.uncertainty),
         None if reference is None else frame_at("--reference", reference, whole.times),
     )
-    console = Console(highlight=False, markup=False)
-    console.print(_table(result))
+    screen = current()
+    _print(screen, result)
     for sentence in chosen.found:
-        console.print(sentence)
+        screen.say(sentence)
     say_of_measurements(whole)
-    say_assumed((*chosen.assumptions, *result.assumptions))
-    say_warnings((*chosen.warnings, *result.warnings))
-    console.print()
+    screen.assumed((*chosen.assumptions, *result.assumptions))
+    screen.warnings((*chosen.warnings, *result.warnings))
+    screen.heading()
     for place in result.places:
-        console.print(place.sentence)
-    console.print(f"\n{result.statement}")
+        screen.say(place.sentence)
+    screen.heading()
+    screen.say(result.statement)
     if out is not None:
         _write(result, out)
-        print(out)
+        screen.file(out)
     if plot is not None:
         write_picture(draw_comparison(result), plot)
 
@@ -130,17 +129,17 @@ def _stated(
     return StatedUncertainties(kelvins or 0.0, emissivity, parse("--position", LENGTH, position))
 
 
-def _table(result: "Comparison") -> "Table":
-    from chipglow.cli.tables import screen_table
+def _print(screen: "Screen", result: "Comparison") -> None:
     from chipglow.laboratory.comparison.comparison import COVERAGE
 
     frame = result.fit_frame()
     frame["bias_expanded_K"] = COVERAGE * frame["bias_standard_uncertainty_K"]
-    frame.loc[frame["place"].duplicated(), "place"] = ""
-    return screen_table(
+    frame["shown_place"] = frame["place"].mask(frame["place"].duplicated(), "")
+    screen.table(
+        "fits",
         frame,
         {
-            "place": "{place}",
+            "place": "{shown_place}",
             "simulation": "{simulation}",
             "bias / K": "{bias_K:+.1f} ± {bias_expanded_K:.1f}",
             "RMS / K": "{rms_K:.1f}",

@@ -26,10 +26,7 @@ def convert(
     settings: Settings = None,
 ) -> None:
     """Make a measurement of a camera's file."""
-    from rich.console import Console
-
-    from chipglow.cli.assumed import say_assumed, say_warnings
-    from chipglow.cli.showing import listed
+    from chipglow.cli.screen import current
     from chipglow.cli.showing_measurement import say_measurement
     from chipglow.io import is_measurement, write_measurement
     from chipglow.laboratory.measurement import load_description, load_recording, measurement_of
@@ -38,24 +35,25 @@ def convert(
         raise ValueError(f"{source}: is a measurement already, expected a camera's file")
     description = load_description(source, settings or ())
     recording = load_recording(description)
-    console = Console(highlight=False, markup=False, soft_wrap=True)
+    screen = current()
     given = bool(settings) or source.suffix.lower() in (".yaml", ".yml")
-    console.print("The file, and what you said of it:" if given else "The file says:")
-    console.print(listed(_facts(recording)))
+    screen.heading("The file, and what you said of it:" if given else "The file says:")
+    screen.facts("file", _facts(recording))
     try:
         measurement = measurement_of(description, recording, str(source))
     except ValueError as error:
         if out is not None:
             raise
-        console.print(f"\nIt is no measurement yet. {error}")
-        say_assumed(recording.assumptions)
-        say_warnings(recording.warnings)
+        screen.heading()
+        screen.say(f"It is no measurement yet. {error}")
+        screen.assumed(recording.assumptions)
+        screen.warnings(recording.warnings)
         return
-    console.print("\nThe measurement:")
+    screen.heading("\nThe measurement:")
     say_measurement(measurement)
     if out is not None:
         write_measurement(measurement, out)
-        print(out)
+        screen.file(out)
 
 
 def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:

@@ -8,8 +8,7 @@ import typer
 from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
+    from chipglow.cli.screen import Screen
     from chipglow.laboratory.emissivity import Heating, RegionEmissivities
 
 
@@ -65,9 +64,8 @@ def emissivity(
     settings: Settings = None,
 ) -> None:
     """Determine emissivity from images of an object of known temperature."""
-    from rich.console import Console
-
-    from chipglow.cli.assumed import say_assumed, say_of_measurements, say_warnings
+    from chipglow.cli.assumed import say_of_measurements
+    from chipglow.cli.screen import current
     from chipglow.laboratory.emissivity import determine_emissivities, load_regions
     from chipglow.laboratory.measurement import load_measurement
 
@@ -78,14 +76,14 @@ def emissivity(
     named = load_regions(regions)
     measurements = [load_measurement(image, settings or ()) for image in images]
     found = determine_emissivities(measurements, heatings, named, list(map(str, images)))
-    console = Console(highlight=False, markup=False)
-    _print_tables(console, found)
-    console.print()
+    screen = current()
+    _print_tables(screen, found)
+    screen.heading()
     say_of_measurements(*measurements)
-    say_assumed(found.assumptions)
-    say_warnings(found.warnings)
-    _print_study(console, found, out)
-    _write(found, out, table)
+    screen.assumed(found.assumptions)
+    screen.warnings(found.warnings)
+    _print_study(screen, found, out)
+    _write(screen, found, out, table)
     if plot is not None:
         from chipglow.cli.pictures import write_picture
         from chipglow.laboratory.emissivity.figure import draw_emissivity
@@ -131,8 +129,8 @@ def _heatings(
     ]
 
 
-def _print_tables(console: "Console", found: "RegionEmissivities") -> None:
-    from chipglow.cli.tables import part_cells, screen_table
+def _print_tables(screen: "Screen", found: "RegionEmissivities") -> None:
+    from chipglow.cli.tables import part_cells
     from chipglow.laboratory.emissivity.emissivity import BUDGET
 
     cells = {
@@ -145,12 +143,12 @@ def _print_tables(console: "Console", found: "RegionEmissivities") -> None:
         "k": "{coverage_factor:.2f}",
     }
     for kelvins, rows in found.to_frame().groupby("reference_K", sort=False):
-        console.print(f"\nObject at {kelvins - 273.15:.6g} °C")
-        console.print(screen_table(rows, cells))
-        console.print()
-        console.print(screen_table(rows, {"parts of u": "{region}", **part_cells(BUDGET)}))
+        screen.heading(f"\nObject at {kelvins - 273.15:.6g} °C")
+        screen.table("regions", rows, cells)
+        screen.heading()
+        screen.table(None, rows, {"parts of u": "{region}", **part_cells(BUDGET)})
     if found.lines:
-        console.print("\nOver the temperature, with standard uncertainties")
+        screen.heading("\nOver the temperature, with standard uncertainties")
         cells = {
             "region": "{region}",
             "emissivity": "{emissivity:.4f} ± {emissivity_uncertainty:u}",
@@ -158,28 +156,35 @@ def _print_tables(console: "Console", found: "RegionEmissivities") -> None:
             "change in 100 K": "{change_in_100_K:+.4f} ± {change_in_100_K_uncertainty:u}",
             "sd about line": "{residual:u}",
         }
-        console.print(screen_table(found.line_frame(), cells))
+        screen.table("lines", found.line_frame(), cells)
 
 
-def _print_study(console: "Console", found: "RegionEmissivities", out: Path | None) -> None:
+def _print_study(screen: "Screen", found: "RegionEmissivities", out: Path | None) -> None:
     from chipglow.laboratory.emissivity import measured_text, surface_text
 
     text = surface_text(found.rows[0])
     several, kelvins = len(found.maps) > 1, found.maps[0].heating.reference
     if text and several and out is not None and "chips" in text:
-        console.print(f"\nFor a study:\n\n{measured_text(out)}", soft_wrap=True)
+        _print_yaml(screen, "For a study", measured_text(out))
     elif text:
         at = f" at {kelvins - 273.15:.6g} °C" if several else ""
-        console.print(f"\nFor a study{at}:\n\n{text}", soft_wrap=True)
+        _print_yaml(screen, f"For a study{at}", text)
 
 
-def _write(found: "RegionEmissivities", out: Path | None, table: Path | None) -> None:
+def _print_yaml(screen: "Screen", head: str, text: str) -> None:
+    screen.heading(f"\n{head}:\n\n{text}")
+    screen.values({"study": text})
+
+
+def _write(
+    screen: "Screen", found: "RegionEmissivities", out: Path | None, table: Path | None
+) -> None:
     from chipglow.laboratory.emissivity import write_emissivity
     from chipglow.laboratory.result_file import write_frame
 
     if out is not None:
         write_emissivity(found, out)
-        print(out)
+        screen.file(out)
     if table is not None:
         write_frame(found.to_frame(), table)
-        print(table)
+        screen.file(table)

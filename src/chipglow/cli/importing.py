@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+import pandas as pd
 from rich.console import Console
-from rich.table import Table
 
-from chipglow.cli.assumed import say_assumed
 from chipglow.cli.progress import progress_bars
+from chipglow.cli.screen import current
 from chipglow.io import ImportDescription, import_scene, prospect
 from chipglow.io.importing import Prospect, kept_import
 
@@ -38,7 +38,7 @@ def import_fields(description: ImportDescription, out: Path | None, resume: bool
             looked=looked,
             resume=kept if resume else None,
         )
-    print(out)
+    current().file(out)
 
 
 def _say_where_it_starts(kept: float, resume: bool) -> None:
@@ -55,20 +55,27 @@ def _say_where_it_starts(kept: float, resume: bool) -> None:
 
 
 def _say(looked: Prospect) -> None:
-    console, survey, raster = Console(stderr=True), looked.survey, looked.raster
-    table = Table("field", "from")
-    for ours, theirs in survey.found.items():
-        table.add_row(ours, theirs)
+    screen, survey, raster = current(), looked.survey, looked.raster
     times = survey.times * 1e6
-    console.print(f"{survey.kind}: {times.size} frames, {times[0]:g} us to {times[-1]:g} us")
-    console.print(table)
+    screen.say(
+        f"{survey.kind}: {times.size} frames, {times[0]:g} us to {times[-1]:g} us",
+        {"kind": survey.kind, "frames": times.size, "from_us": times[0], "to_us": times[-1]},
+    )
+    fields = pd.DataFrame(survey.found.items(), columns=["field", "from"])
+    screen.table("fields", fields, {"field": "{field}", "from": "{from}"})
     if survey.unused:
-        console.print(f"Not used: {', '.join(survey.unused)}")
+        screen.say(f"Not used: {', '.join(survey.unused)}", {"unused": list(survey.unused)})
     left, right, bottom, top = (round(edge * 1e6, 6) + 0.0 for edge in raster.extent)
-    console.print(
+    screen.say(
         f"Sampled every {raster.spacing * 1e6:.4g} um: {raster.columns} x {raster.rows} samples, "
-        f"x {left:.4g} um to {right:.4g} um, y {bottom:.4g} um to {top:.4g} um"
+        f"x {left:.4g} um to {right:.4g} um, y {bottom:.4g} um to {top:.4g} um",
+        {
+            "spacing_um": raster.spacing * 1e6,
+            "columns": raster.columns,
+            "rows": raster.rows,
+            "extent_um": [left, right, bottom, top],
+        },
     )
     for sentence in survey.from_file:
-        console.print(f"From the file: {sentence}")
-    say_assumed(looked.assumed)
+        screen.say(f"From the file: {sentence}")
+    screen.assumed(looked.assumed)

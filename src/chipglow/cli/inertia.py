@@ -3,8 +3,7 @@
 from collections.abc import Iterable
 from math import isfinite
 
-from rich.console import Console
-
+from chipglow.cli.screen import current
 from chipglow.laboratory.chip import Inertia
 
 
@@ -18,18 +17,25 @@ def say_of_cut(inertia: Inertia | None, warnings: Iterable[str] = ()) -> None:
     warnings : iterable of str, optional
         The cut's other warnings, a sentence each.
     """
-    console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
-    parts = _known(inertia) if inertia else []
+    parts = _known(inertia) if inertia else {}
     if parts:
-        console.print(f"Scaled mass after the build-up: {', '.join(parts)}.")
+        current().aside(
+            f"Scaled mass after the build-up: {', '.join(text for text, _ in parts.values())}.",
+            {name: number for name, (_, number) in parts.items()},
+        )
     own = [inertia.warning] if inertia and inertia.warning else []
-    for warning in (*own, *warnings):
-        console.print(f"Warning: {warning}")
+    current().warnings((*own, *warnings), aside=True)
 
 
-def _known(inertia: Inertia) -> list[str]:
-    known = (
-        (inertia.kinetic_fraction, "kinetic energy at most {} of the work"),
-        (inertia.force_fraction, "momentum flux {} of the mean cutting force"),
-    )
-    return [text.format(f"{fraction:.2%}") for fraction, text in known if isfinite(fraction)]
+def _known(inertia: Inertia) -> dict[str, tuple[str, float]]:
+    """What is known, by its name for programs: as text, and the number."""
+    known = {
+        "kinetic_fraction": "kinetic energy at most {:.2%} of the work",
+        "force_fraction": "momentum flux {:.2%} of the mean cutting force",
+    }
+    numbers = {name: float(getattr(inertia, name)) for name in known}
+    return {
+        name: (known[name].format(number), number)
+        for name, number in numbers.items()
+        if isfinite(number)
+    }

@@ -2,37 +2,57 @@
 
 from pathlib import Path
 
-from rich.console import Console
-from rich.table import Table
+import pandas as pd
 
 from chipglow.cli.pictures import write_picture
+from chipglow.cli.screen import current
 from chipglow.cutting import material_file, material_names
 
 
 def list_materials() -> None:
     """Print the library: names, sets of the flow stress, what they are."""
-    table = Table("name", "kind", "sets (the first is the default)", "what", box=None)
-    for name in material_names():
-        material = material_file(name)
-        kind = "tool" if material.tool else "workpiece"
-        what = f"{material.name}: {material.description}"
-        table.add_row(name, kind, ", ".join(material.workpieces), what)
-    Console().print(table)
+    cells = {
+        "name": "{name}",
+        "kind": "{kind}",
+        "sets (the first is the default)": "{sets}",
+        "what": "{what}",
+    }
+    current().table(
+        "materials", pd.DataFrame(map(_row, material_names())), cells, unbroken=("name",)
+    )
+
+
+def _row(name: str) -> dict[str, str]:
+    material = material_file(name)
+    return {
+        "name": name,
+        "kind": "tool" if material.tool else "workpiece",
+        "sets": ", ".join(material.workpieces),
+        "what": f"{material.name}: {material.description}",
+    }
 
 
 def show_material(name: str) -> None:
     """Print all numbers of a material, with units, and their sources as numbered notes."""
     material = material_file(name)
     sources = list(dict.fromkeys(number.source for number in material.properties))
-    table = Table("field", "value", "source", box=None)
-    for number in material.properties:
-        table.add_row(number.field, number.text, f"({sources.index(number.source) + 1})")
-    console = Console(highlight=False, markup=False)
-    console.print(f"{material.name}: {material.description}\n")
-    console.print(table)
-    console.print()
+    rows = [
+        {
+            "field": number.field,
+            "value": number.text,
+            "source": number.source,
+            "note": f"({sources.index(number.source) + 1})",
+        }
+        for number in material.properties
+    ]
+    screen = current()
+    screen.say(f"{material.name}: {material.description}")
+    screen.heading()
+    cells = {"field": "{field}", "value": "{value}", "source": "{note}"}
+    screen.table("properties", pd.DataFrame(rows), cells)
+    screen.heading()
     for count, source in enumerate(sources, 1):
-        console.print(f"({count}) {source}")
+        screen.heading(f"({count}) {source}")
 
 
 def plot_material(name: str, path: Path) -> None:

@@ -4,8 +4,9 @@ from math import floor
 from pathlib import Path
 
 from chipglow.camera import Measurement
-from chipglow.cli.assumed import say_assumed, say_of_measurements
+from chipglow.cli.assumed import say_of_measurements
 from chipglow.cli.progress import progress_bars
+from chipglow.cli.screen import current
 from chipglow.cli.times import parse_instant
 from chipglow.io import open_scene, write_measurement
 from chipglow.study import Study, fit
@@ -42,9 +43,10 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
     name = next(iter(surfaces)) if chip is None else chip
     if name not in surfaces:
         raise ValueError(f"--chip: {name!r} is unknown, expected one of {', '.join(surfaces)}")
-    say_assumed(fitted.assumed)
+    current().assumed(fitted.assumed)
     first = float(scene.times[0]) if start is None else parse_instant("--start", start)
-    left = float(scene.times[-1]) + scene.frame_spacing - first - camera.integration_time
+    duration = camera.frame_duration(scene.raster)
+    left = float(scene.times[-1]) + scene.frame_spacing - first - duration
     count = max(floor(left * camera.frame_rate) + 1, 1)
     with progress_bars() as progress:
         progress("measurement", 0.0)

@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from chipglow.cli.screen import current
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -13,4 +15,4 @@ def write_picture(figure: "Figure", path: Path) -> None:
 
     with atomic_path(path) as temporary:
         figure.savefig(temporary, format=path.suffix[1:].lower(), dpi=150)
-    print(path)
+    current().file(path)

@@ -8,6 +8,7 @@ import typer
 from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
+    from chipglow.cli.screen import Screen
     from chipglow.cli.tables import Cell
     from chipglow.laboratory.psf import KnifeEdge
 
@@ -52,6 +53,7 @@ def psf(
 ) -> None:
     """Determine a camera's point spread function and MTF from images of an edge."""
     from chipglow.cli.pictures import write_picture
+    from chipglow.cli.screen import current
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.psf import (
         aperture_image,
@@ -70,12 +72,13 @@ def psf(
     ]
     found = knife_edge(images, holes)
     chosen = psf_kernel(found, model)
-    _print(found)
+    screen = current()
+    _print(screen, found)
     if out is not None:
         from chipglow.laboratory.psf import write_psf
 
         write_psf(found, out, chosen)
-        print(out)
+        screen.file(out)
     if plot is not None:
         from chipglow.laboratory.psf.figure import draw_knife_edge
 
@@ -96,14 +99,9 @@ def _region(text: str) -> tuple[slice, slice]:
     return rows, columns
 
 
-def _print(found: "KnifeEdge") -> None:
-    from rich.console import Console
-
-    from chipglow.cli.assumed import say_assumed, say_warnings
-    from chipglow.cli.tables import screen_table
+def _print(screen: "Screen", found: "KnifeEdge") -> None:
     from chipglow.laboratory.psf.summary import sentences
 
-    console = Console(highlight=False, markup=False)
     models = {
         "model": "{model}",
         "FWHM / um": _uncertain("fwhm_um", "fwhm_uncertainty_um"),
@@ -120,13 +118,14 @@ def _print(found: "KnifeEdge") -> None:
         "step/noise": "{step_over_noise:.3g}",
         "MTF(Nyquist)": _uncertain("mtf_at_nyquist", "mtf_at_nyquist_uncertainty"),
     }
-    for table in (screen_table(found.to_frame(), models), screen_table(found.edge_frame(), edges)):
-        console.print(table)
-        console.print()
+    screen.table("models", found.to_frame(), models)
+    screen.heading()
+    screen.table("edges", found.edge_frame(), edges)
+    screen.heading()
     for sentence in sentences(found):
-        console.print(sentence, soft_wrap=True)
-    say_assumed(found.assumptions)
-    say_warnings(found.warnings)
+        screen.say(sentence)
+    screen.assumed(found.assumptions)
+    screen.warnings(found.warnings)
 
 
 def _uncertain(value: str, uncertainty: str) -> "Cell":

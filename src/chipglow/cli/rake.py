@@ -8,9 +8,8 @@ import typer
 from chipglow.cli.options import MeasurementFile, Settings, ToolChoice, picture_option, table_option
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from chipglow.camera import Measurement
+    from chipglow.cli.screen import Screen
     from chipglow.laboratory.chip import RakeGrid
 
 
@@ -45,16 +44,10 @@ def rake(
     settings: Settings = None,
 ) -> None:
     """Average radiance temperature in squares along the rake face, as the paper's Figure 7."""
-    from rich.console import Console
-
-    from chipglow.cli.assumed import say_assumed, say_of_measurements, say_warnings
+    from chipglow.cli.assumed import say_of_measurements
     from chipglow.cli.pictures import write_picture
-    from chipglow.cli.tables import budget_table
-    from chipglow.laboratory.chip import (
-        ToolUncertainty,
-        chosen_tool,
-        rake_grid,
-    )
+    from chipglow.cli.screen import current
+    from chipglow.laboratory.chip import ToolUncertainty, chosen_tool, rake_grid
     from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.result_file import write_result
@@ -66,21 +59,19 @@ def rake(
     given = None if stated is None else ToolUncertainty(stated, stated)
     measured = load_measurement(measurement, settings or ())
     frames = _frames(measured, frame, at)
-    console = Console(highlight=False, markup=False)
+    screen = current()
     chosen = chosen_tool(measured, tool, position)
     grid = rake_grid(measured, chosen.tool, pixels, reach, frames, given or chosen.uncertainty)
-    console.print(_table(grid))
-    console.print("\nStandard uncertainty of the squares' means")
-    console.print(budget_table(grid.frame_estimate))
-    console.print()
+    _print(screen, grid)
+    screen.budget("budget", grid.frame_estimate, "Standard uncertainty of the squares' means")
     for sentence in (*chosen.found, *grid.notes):
-        console.print(sentence)
+        screen.say(sentence)
     say_of_measurements(measured)
-    say_assumed(chosen.assumptions)
-    say_warnings((*chosen.warnings, *grid.warnings))
+    screen.assumed(chosen.assumptions)
+    screen.warnings((*chosen.warnings, *grid.warnings))
     if out is not None:
         write_result(grid, out)
-        print(out)
+        screen.file(out)
     if plot is not None:
         write_picture(draw_rake_grid(measured, grid), plot)
 
@@ -101,9 +92,7 @@ def _frames(measurement: "Measurement", frame: str, at: str | None) -> list[int]
     return [int(frame)]
 
 
-def _table(grid: "RakeGrid") -> "Table":
-    from chipglow.cli.tables import screen_table
-
+def _print(screen: "Screen", grid: "RakeGrid") -> None:
     several = grid.times.size > 1
     over = f"between {grid.times.size} frames" if several else "over a square's pixels"
     squares = grid.mean_frame()
@@ -116,4 +105,4 @@ def _table(grid: "RakeGrid") -> "Table":
     }
     cells = {"along / µm": "{along_um:.4g}", **cells}
     title = f"radiance temperature / °C ± standard deviation {over}"
-    return screen_table(wide.reset_index(), cells, title, unbroken=cells)
+    screen.table("squares", wide.reset_index(), cells, title, unbroken=cells)

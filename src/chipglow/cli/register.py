@@ -11,9 +11,9 @@ from chipglow.cli.options import Settings, file_option, picture_option
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-    from rich.console import Console
 
     from chipglow.camera import Measurement
+    from chipglow.cli.screen import Screen
     from chipglow.laboratory.registration import (
         DotFit,
         ImageFit,
@@ -111,10 +111,9 @@ def register(
     settings: Settings = None,
 ) -> None:
     """Find where each point of an infrared image is in a visible picture."""
-    from rich.console import Console
-
-    from chipglow.cli.assumed import say_assumed, say_of_measurements, say_warnings
+    from chipglow.cli.assumed import say_of_measurements
     from chipglow.cli.pictures import write_picture
+    from chipglow.cli.screen import current
     from chipglow.laboratory.chip import tool_of
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.registration import (
@@ -143,7 +142,7 @@ def register(
     _check_frame("--visible-frame", visible_frame, seen.times.size)
     picture = seen.signal[visible_frame]
     outline = measured.tool if tool is None else tool_of(measured, tool)
-    console = Console(highlight=False, markup=False)
+    screen = current()
     fit: PointFit | DotFit | ImageFit | None = None
     if known is not None:
         found = load_registration(known)
@@ -152,28 +151,28 @@ def register(
             fit = fit_points(*read_points(points, measured.raster, picture.shape), model.value)
         else:
             fit = _by_images(measured, frame, picture, model, method)
-        _print_fit(console, fit)
+        _print_fit(screen, fit)
         found = fit.registration
-    _say(console, found, measured)
+    _say(screen, found, measured)
     say_of_measurements(measured)
-    say_assumed(f"{visible}: {sentence}" for sentence in seen.assumptions)
-    say_warnings(f"{visible}: {sentence}" for sentence in seen.warnings)
+    screen.assumed(f"{visible}: {sentence}" for sentence in seen.assumptions)
+    screen.warnings(f"{visible}: {sentence}" for sentence in seen.warnings)
     if region is not None:
         clocks = align_recordings(found, measured, seen, region)
-        _say_clocks(console, clocks)
+        _say_clocks(screen, clocks)
         if pairs is not None:
             write_frame(clocks.to_frame(), pairs)
-            print(pairs)
+            screen.file(pairs)
     if out is not None:
         write_registration(found, out)
-        print(out)
+        screen.file(out)
     temperature = measured.radiance_temperature()[frame]
     shown = found, temperature, measured.raster, picture, outline
     if overlay is not None:
         write_picture(draw_registration(*shown, _marked(fit)), overlay)
     if blink is not None:
         write_blink(blink_pictures(*shown), blink)
-        print(blink)
+        screen.file(blink)
 
 
 def _marked(fit: "PointFit | DotFit | ImageFit | None") -> "Points | None":
@@ -233,32 +232,31 @@ def _by_images(
     return fit(infrared_radiance(measured, frame), measured.raster, picture, model.value)
 
 
-def _print_fit(console: "Console", fit: "PointFit | DotFit | ImageFit") -> None:
-    from chipglow.cli.assumed import say_assumed
+def _print_fit(screen: "Screen", fit: "PointFit | DotFit | ImageFit") -> None:
     from chipglow.laboratory.registration import DotFit, ImageFit
 
     if isinstance(fit, ImageFit):
-        console.print(
+        screen.say(
             f"Mutual information: {fit.information:.3f} bits a pixel; score of the placement "
             f"{fit.placement:.3g}, of {fit.by_chance.size} unrelated images at most "
-            f"{fit.by_chance.max():.3g}."
+            f"{fit.by_chance.max():.3g}.",
+            {"mutual_information_bits": fit.information, "placement_score": fit.placement},
         )
     else:
-        _print_points(console, fit.points if isinstance(fit, DotFit) else fit)
+        _print_points(screen, fit.points if isinstance(fit, DotFit) else fit)
     if isinstance(fit, DotFit):
         match = len(fit.points.pixels)
         for name, dots in (("Infrared", fit.infrared), ("Visible", fit.visible)):
-            console.print(
+            screen.say(
                 f"{name}: {len(dots.pixels)} {'bright' if dots.bright else 'dark'} dots of a "
-                f"radius of {dots.radius:.1f} {name.lower()} pixels; {match} match."
+                f"radius of {dots.radius:.1f} {name.lower()} pixels; {match} match.",
+                {f"{name.lower()}_dots": len(dots.pixels), "matching_dots": match},
             )
     if isinstance(fit, DotFit | ImageFit):
-        say_assumed(fit.assumptions)
+        screen.assumed(fit.assumptions)
 
 
-def _print_points(console: "Console", fit: "PointFit") -> None:
-    from chipglow.cli.tables import screen_table
-
+def _print_points(screen: "Screen", fit: "PointFit") -> None:
     cells = {
         "point": "{point}",
         "x / um": "{x_um:.1f}",
@@ -267,43 +265,51 @@ def _print_points(console: "Console", fit: "PointFit") -> None:
         "row": "{visible_row:.1f}",
         "off by / pixel": "{residual:.2f}",
     }
-    console.print(screen_table(fit.to_frame(), cells))
-    console.print(
+    screen.table("points", fit.to_frame(), cells)
+    screen.say(
         f"Scatter of the points: {fit.scatter:.2f} visible pixels in column and in row, with "
-        f"{fit.registration.degrees_of_freedom:.0f} degrees of freedom."
+        f"{fit.registration.degrees_of_freedom:.0f} degrees of freedom.",
+        {
+            "scatter_pixel": fit.scatter,
+            "degrees_of_freedom": fit.registration.degrees_of_freedom,
+        },
     )
 
 
-def _say(console: "Console", found: "Registration", measured: "Measurement") -> None:
-    from chipglow.cli.assumed import say_warnings
-
+def _say(screen: "Screen", found: "Registration", measured: "Measurement") -> None:
     raster = measured.raster
     size, turn, mirrored = found.geometry(raster)
     typical, worst = found.uncertainty(raster)
-    console.print(
+    screen.say(
         f"A visible pixel is {1e6 * size:.4g} um in the middle of the infrared image, turned by "
-        f"{turn:.2f} degrees{', mirrored' if mirrored else ''}."
+        f"{turn:.2f} degrees{', mirrored' if mirrored else ''}.",
+        {"visible_pixel_um": 1e6 * size, "rotation_deg": turn, "mirrored": mirrored},
     )
-    console.print(
+    screen.say(
         f"Standard uncertainty of a mapped position: {1e6 * typical:.2g} um "
         f"({typical / raster.spacing:.2g} infrared pixels) in the median, {1e6 * worst:.2g} um "
-        "at most."
+        "at most.",
+        {"position_uncertainty_um": 1e6 * typical, "greatest_position_uncertainty_um": 1e6 * worst},
     )
-    say_warnings(f"{warning}." for warning in found.warnings)
+    screen.warnings(f"{warning}." for warning in found.warnings)
 
 
-def _say_clocks(console: "Console", found: "RecordingAlignment") -> None:
-    from chipglow.cli.assumed import say_assumed, say_warnings
-
-    say_assumed(found.assumptions)
+def _say_clocks(screen: "Screen", found: "RecordingAlignment") -> None:
+    screen.assumed(found.assumptions)
     unsure = float(found.clocks.covariance[0, 0]) ** 0.5
-    console.print(
+    screen.say(
         f"Visible clock = infrared clock + {1e6 * found.clocks.offset:.2f} us, standard "
-        f"uncertainty {1e6 * unsure:.2g} us, correlation {found.clocks.correlation:.3f}."
+        f"uncertainty {1e6 * unsure:.2g} us, correlation {found.clocks.correlation:.3f}.",
+        {
+            "clock_offset_us": 1e6 * found.clocks.offset,
+            "clock_offset_uncertainty_us": 1e6 * unsure,
+            "correlation": found.clocks.correlation,
+        },
     )
-    say_warnings(f"{warning}." for warning in found.clocks.warnings)
+    screen.warnings(f"{warning}." for warning in found.clocks.warnings)
     empty = sum(numbers.size == 0 for numbers in found.visible_frames)
     if empty:
-        console.print(
-            f"{empty} of {found.infrared_times.size} infrared frames have no visible one."
+        screen.say(
+            f"{empty} of {found.infrared_times.size} infrared frames have no visible one.",
+            {"frames_without_visible": empty},
         )

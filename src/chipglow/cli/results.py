@@ -1,22 +1,22 @@
 """A study's results: computed, written into a folder, shown as a table."""
 
+import json
 import platform
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
-from rich.console import Console
-from rich.table import Table
+import pandas as pd
 
-from chipglow.cli.assumed import say_assumed, say_missing, say_warnings
 from chipglow.cli.inertia import say_of_cut
 from chipglow.cli.progress import progress_bars, say_where_it_starts
+from chipglow.cli.screen import current
 from chipglow.cutting import SOLVER_VERSION
 from chipglow.errors import SceneErrors, StudyResult
 from chipglow.io import atomic_folder
 from chipglow.report import comparison_rows, place_rows, table_2, write_report, write_scene_report
-from chipglow.report.paper import stands_beside
+from chipglow.report.paper import CITATION, stands_beside
 from chipglow.study import Progress, Study, errors, run, study_text
 
 
@@ -85,16 +85,21 @@ def _write(
             said = [*remarks, *(f"Assumed: {one}" for one in assumed), *_warnings(result)]
             report = _report(result, temporary, study, said, steady)
             progress("report", 1.0)
-    say_assumed(assumed)
+    screen = current()
+    screen.assumed(assumed)
     _print_table(result)
     for remark in remarks:
-        print(remark)
-    say_warnings(_warnings(result))
+        screen.say(remark)
+    screen.warnings(_warnings(result))
     if isinstance(result, StudyResult):
         say_of_cut(result.forces.inertia if result.forces else None)
     else:
-        say_missing(result.missing)
-    print(f"Report: {folder / report.relative_to(temporary)}")
+        screen.missing(result.missing)
+    if screen.is_for_programs:
+        text = (folder / "summary.json").read_text(encoding="utf-8")
+        screen.values({"summary": json.loads(text)})
+    screen.file(folder / report.relative_to(temporary), "Report")
+    screen.say(f"Cite as: The chipglow developers: chipglow {version('chipglow')}. {CITATION}")
 
 
 def _steady(beside: Study | None, progress: Progress, resume: bool) -> StudyResult | None:
@@ -154,13 +159,16 @@ def _print_table(result: StudyResult | SceneErrors) -> None:
     """The paper's figures beside ours; of any scene the error at each place."""
     if isinstance(result, StudyResult):
         beside = stands_beside(result)
-        heads = ("the paper", "here", "range of draws", "differs")
-        table = Table("quantity", *(heads if beside else heads[1:3]))
-        for row in comparison_rows(result):
-            texts = (row.paper_text, row.here_text, row.range_text, row.differs_text)
-            table.add_row(row.quantity, *(texts if beside else texts[1:3]))
+        texts = {
+            "quantity": "quantity",
+            **({"the paper": "paper_text"} if beside else {}),
+            "here": "here_text",
+            "95 % interval": "interval_text",
+            **({"differs": "differs_text"} if beside else {}),
+        }
+        rows = [[getattr(row, name) for name in texts.values()] for row in comparison_rows(result)]
+        frame = pd.DataFrame(rows, columns=list(texts))
     else:
-        table = Table("place", "reference", "error", "range", "PSF's portion")
-        for place in place_rows(result):
-            table.add_row(*place)
-    Console().print(table)
+        heads = ["place", "reference", "error", "95 % interval", "PSF's portion"]
+        frame = pd.DataFrame(place_rows(result), columns=heads)
+    current().table("results", frame, {head: f"{{{head}}}" for head in frame.columns})

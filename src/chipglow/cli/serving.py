@@ -4,6 +4,7 @@ import webbrowser
 from pathlib import Path
 
 from chipglow.app import serve
+from chipglow.cli.screen import current
 
 
 def serve_app(path: Path | None, address: str, port: int, browser: bool) -> None:
@@ -22,7 +23,10 @@ def serve_app(path: Path | None, address: str, port: int, browser: bool) -> None
     """
 
     def tell(url: str) -> None:
-        print(f"The app is at {url}\nCtrl-C ends it.", flush=True)
+        screen = current()
+        screen.say(f"The app is at {url}\nCtrl-C ends it.", {"url": url})
+        if screen.is_for_programs:
+            screen.close()
         if browser:
             webbrowser.open(url)
 

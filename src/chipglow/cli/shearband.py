@@ -8,8 +8,7 @@ import typer
 from chipglow.cli.options import MeasurementFile, Settings, ToolChoice, picture_option, table_option
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
+    from chipglow.cli.screen import Screen
     from chipglow.laboratory.chip import BandProfile
 
 
@@ -61,17 +60,11 @@ def shearband(
     settings: Settings = None,
 ) -> None:
     """Read the radiance temperature along the shear band, as the paper's Figure 9."""
-    from rich.console import Console
-
-    from chipglow.cli.assumed import say_assumed, say_of_measurements, say_warnings
+    from chipglow.cli.assumed import say_of_measurements
     from chipglow.cli.pictures import write_picture
-    from chipglow.cli.tables import budget_table
+    from chipglow.cli.screen import current
     from chipglow.cli.times import frame_at
-    from chipglow.laboratory.chip import (
-        band_profile,
-        chosen_tool,
-        read_curve,
-    )
+    from chipglow.laboratory.chip import band_profile, chosen_tool, read_curve
     from chipglow.laboratory.chip.band_figure import draw_band_profile
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.result_file import write_result
@@ -91,27 +84,24 @@ def shearband(
         position=parse("--position", LENGTH, position),
         uncertainty=chosen.uncertainty,
     )
-    console = Console(highlight=False, markup=False)
-    console.print(_table(profile))
-    console.print("\nStandard uncertainty of the points along the band")
-    console.print(budget_table(profile.estimate))
-    console.print()
+    screen = current()
+    _print(screen, profile)
+    screen.budget("budget", profile.estimate, "Standard uncertainty of the points along the band")
     for sentence in chosen.found:
-        console.print(sentence)
+        screen.say(sentence)
     say_of_measurements(measured)
-    say_assumed((*chosen.assumptions, *profile.assumptions))
-    say_warnings((*chosen.warnings, *profile.warnings))
+    screen.assumed((*chosen.assumptions, *profile.assumptions))
+    screen.warnings((*chosen.warnings, *profile.warnings))
     if out is not None:
         write_result(profile, out)
-        print(out)
+        screen.file(out)
     if plot is not None:
         write_picture(draw_band_profile(measured, chosen.tool, profile), plot)
 
 
-def _table(profile: "BandProfile") -> "Table":
-    from chipglow.cli.tables import screen_table
-
-    return screen_table(
+def _print(screen: "Screen", profile: "BandProfile") -> None:
+    screen.table(
+        "stages",
         profile.stage_frame(),
         {
             "at / µs": "{time_us:.7g}",

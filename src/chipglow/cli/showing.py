@@ -2,16 +2,17 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from math import degrees
+from math import degrees, nan
 from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.table import Table
 
 from chipglow.cli.pictures import write_picture
+from chipglow.cli.screen import current
+from chipglow.cli.tables import Cell
 from chipglow.cli.times import parse_instant
 from chipglow.drawing.frames import shown_frame
 from chipglow.io import StoredScene, is_scene, open_scene
@@ -41,16 +42,15 @@ def show_scene(path: Path, at: str | None, plot: Path | None) -> None:
     scene = open_scene(path)
     time = None if at is None else _time_in(scene, at)
     summary = scene_summary(scene, time)
-    console = Console(highlight=False, markup=False)
-    console.print(listed(_facts(scene, summary, path)))
-    console.print(f"\nAt {microseconds(summary.times[summary.index])}:")
-    console.print(listed(_state(summary)))
-    console.print()
-    console.print(_field_table(summary))
-    attributes = listed(attribute_rows(_other_attributes(scene)))
-    if attributes.row_count:
-        console.print("\nAttributes:")
-        console.print(attributes)
+    screen = current()
+    screen.facts("scene", _facts(scene, summary, path))
+    screen.heading(f"\nAt {microseconds(summary.times[summary.index])}:")
+    screen.facts("state", _state(summary))
+    screen.heading()
+    _show_fields(summary)
+    screen.values(raster_values(summary.raster, summary.times))
+    screen.values({"at_us": 1e6 * summary.times[summary.index]})
+    show_attributes(_other_attributes(scene))
     if plot is not None:
         write_picture(draw_scene(scene, time), plot)
     scene.data.close()
@@ -82,16 +82,6 @@ def _time_in(scene: Scene, at: str) -> float:
     except ValueError as error:
         raise ValueError(f"--at: {error}") from None
     return time
-
-
-def listed(rows: _Rows) -> Table:
-    """Names and what they are, side by side."""
-    table = Table(box=None, show_header=False)
-    table.add_column(no_wrap=True)
-    table.add_column(overflow="fold")
-    for row in rows:
-        table.add_row(*map(_printable, row))
-    return table
 
 
 def _facts(scene: StoredScene, summary: SceneSummary, path: Path) -> _Rows:
@@ -151,17 +141,54 @@ def _state(summary: SceneSummary) -> _Rows:
         )
 
 
-def _field_table(summary: SceneSummary) -> Table:
+def raster_values(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:
+    """`where_and_when` in numbers, for programs."""
+    return {
+        "rows": raster.rows,
+        "columns": raster.columns,
+        "spacing_um": 1e6 * raster.spacing,
+        "extent_um": [1e6 * edge for edge in raster.extent],
+        "times_us": 1e6 * times,
+    }
+
+
+def _show_fields(summary: SceneSummary) -> None:
     everywhere = f"in {len(summary.sampled)} frames"
-    table = Table("over the material", "unit", "least", "median", "greatest", everywhere, box=None)
-    table.columns[0].no_wrap = True
-    for column in table.columns[2:]:
-        column.justify = "right"
-    for field in summary.fields:
-        now = [rounded_text(number) for number in field.now or ()] or ["–"] * 3
-        overall = " to ".join(rounded_text(number) for number in field.overall or ()) or "–"
-        table.add_row(field.field.title, field.field.unit, *now, overall)
-    return table
+    heads = {"least": "least", "median": "median", "greatest": "greatest", everywhere: "overall"}
+    cells: dict[str, Cell] = {
+        "over the material": "{field}",
+        "unit": "{unit}",
+        **{head: _number_cell(column) for head, column in heads.items()},
+    }
+    frame = pd.DataFrame(
+        {
+            "field": field.field.title,
+            "unit": field.field.unit,
+            **dict(zip(("least", "median", "greatest"), field.now or (nan,) * 3, strict=True)),
+            "overall": field.overall or (),
+        }
+        for field in summary.fields
+    )
+    current().table("fields", frame, cells, unbroken=("over the material",))
+
+
+def _number_cell(column: str) -> Cell:
+    def text(row: Mapping[str, Any]) -> str:
+        value = row[column]
+        numbers = value if isinstance(value, tuple) else (value,)
+        return " to ".join(rounded_text(one) for one in numbers if one == one) or "–"
+
+    return text
+
+
+def show_attributes(attributes: Mapping[str, Any]) -> None:
+    """Attributes of a file, if there are some, below a heading; for programs as they are."""
+    if not attributes:
+        return
+    screen = current()
+    screen.heading("\nAttributes:")
+    screen.facts("attributes", attribute_rows(attributes))
+    screen.values({"attributes": attributes})
 
 
 def _other_attributes(scene: Scene) -> dict[str, Any]:
@@ -199,11 +226,6 @@ def _leaves(name: str, value: Any) -> Iterator[str]:
 
 def _shortened(text: str) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} … ({len(text)} characters)"
-
-
-def _printable(text: str) -> str:
-    """Without what could steer the terminal."""
-    return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def microseconds(time: float) -> str:

@@ -5,12 +5,13 @@ from math import degrees
 from pathlib import Path
 from typing import Final
 
-from rich.console import Console
+import numpy as np
 
 from chipglow.camera import Flag, Measurement
 from chipglow.cli.assumed import say_of_measurements
 from chipglow.cli.pictures import write_picture
-from chipglow.cli.showing import attribute_rows, listed, microseconds, where_and_when
+from chipglow.cli.screen import current
+from chipglow.cli.showing import microseconds, raster_values, show_attributes, where_and_when
 from chipglow.cli.times import parse_instant
 from chipglow.io import read_measurement
 from chipglow.laboratory.measurement import (
@@ -18,6 +19,7 @@ from chipglow.laboratory.measurement import (
     measurement_summary,
 )
 from chipglow.laboratory.measurement.figure import draw_measurement
+from chipglow.radiometry import Band
 
 _FLAG_NAMES: Final = {
     Flag.UNDER_RANGE: "below the lower range limit or the calibration",
@@ -67,16 +69,15 @@ def say_measurement(measurement: Measurement, time: float | None = None) -> None
         summary = measurement_summary(measurement, time)
     except ValueError as error:
         raise ValueError(f"--at: {error}") from None
-    console = Console(highlight=False, markup=False)
-    console.print(listed(_facts(measurement, summary)))
+    screen = current()
+    screen.facts("measurement", _facts(measurement, summary))
+    screen.values(raster_values(measurement.raster, measurement.times))
     attributes = {
         str(name): value
         for name, value in measurement.data.attrs.items()
         if not str(name).startswith(_SAID_APART) and name not in _IN_FACTS
     }
-    if attributes:
-        console.print("\nAttributes:")
-        console.print(listed(attribute_rows(attributes)))
+    show_attributes(attributes)
     say_of_measurements(measurement)
 
 
@@ -92,7 +93,7 @@ def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tu
         yield "NETD", f"{1e3 * netd:.3g} mK at {kelvins - 273.15:.4g} °C, half of the range filled"
     if {"band_lower", "band_upper"} <= set(data.attrs):
         band = measurement.band
-        shape = "" if band.response is None else ", with a response curve"
+        shape = "" if band.response is None else f", {_response_text(band)}"
         yield "band", f"{1e6 * band.lower:.4g} µm to {1e6 * band.upper:.4g} µm{shape}"
     if measurement.tool is not None:
         angles = measurement.tool.rake_angle, measurement.tool.clearance_angle
@@ -109,6 +110,14 @@ def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tu
     for flag, name in _FLAG_NAMES.items():
         if summary.fractions[flag]:
             yield name, f"{100 * summary.fractions[flag]:.3g} %"
+
+
+def _response_text(band: Band) -> str:
+    """A response curve in words."""
+    wavelengths = 1e6 * band.wavelengths
+    values = np.asarray(band.response(band.wavelengths) if band.response else 1.0)
+    mean, peak = np.average(wavelengths, weights=values), wavelengths[values.argmax()]
+    return f"response with its mean at {mean:.4g} µm and its peak at {peak:.4g} µm"
 
 
 def _celsius(kelvins: tuple[float, float, float] | None) -> str:

@@ -1,8 +1,8 @@
 """Results as tables on the terminal."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from string import Formatter
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,20 +32,27 @@ def screen_table(
     title : str, optional
         Above the table.
     unbroken : collection of str
-        Heads of columns that a narrow terminal must not break.
+        Heads of columns that a narrow terminal must not break. It breaks no number.
     """
     from rich.table import Table
 
+    rows = [[_text(cell, row) for cell in cells.values()] for row in frame.to_dict("records")]
     table = Table(box=None, title=title, title_justify="left")
-    for head, cell in cells.items():
-        number = callable(cell) or ":" in cell
-        table.add_column(head, justify="right" if number else "left", no_wrap=head in unbroken)
-    for row in frame.to_dict("records"):
-        table.add_row(*(_text(cell, row) for cell in cells.values()))
+    for number, (head, cell) in enumerate(cells.items()):
+        is_number = callable(cell) or ":" in cell
+        table.add_column(
+            head,
+            justify="right" if is_number else "left",
+            no_wrap=head in unbroken,
+            overflow="fold",
+            min_width=max((len(row[number]) for row in rows), default=0) if is_number else None,
+        )
+    for row in rows:
+        table.add_row(*row)
     return table
 
 
-def budget_table(estimate: "Estimate") -> "Table":
+def budget_frame(estimate: "Estimate") -> "pd.DataFrame":
     """What makes values in K uncertain: over all values, root mean square and the greatest.
 
     Parameters
@@ -61,11 +68,29 @@ def budget_table(estimate: "Estimate") -> "Table":
     if estimate.components:
         parts["u"] = estimate.standard_uncertainty[known]
     rows = [
-        {"part": name, "mean": np.sqrt((kelvins**2).mean()), "greatest": kelvins.max()}
+        {"part": name, "rms_K": np.sqrt((kelvins**2).mean()), "greatest_K": kelvins.max()}
         for name, kelvins in parts.items()
     ]
-    cells = {"parts of u / K": "{part}", "root mean square": "{mean:u}", "greatest": "{greatest:u}"}
-    return screen_table(pd.DataFrame(rows), cells)
+    return pd.DataFrame(rows)
+
+
+BUDGET_CELLS: Final[Mapping[str, Cell]] = {
+    "parts of u / K": "{part}",
+    "root mean square": "{rms_K:u}",
+    "greatest": "{greatest_K:u}",
+}
+
+
+def facts_table(rows: Iterable[tuple[str, str]]) -> "Table":
+    """Names and what they are, side by side, without what could steer the terminal."""
+    from rich.table import Table
+
+    table = Table(box=None, show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for row in rows:
+        table.add_row(*map(_printable, row))
+    return table
 
 
 def part_cells(causes: Sequence[str]) -> dict[str, str]:
@@ -85,3 +110,7 @@ class _Template(Formatter):
 def _text(cell: Cell, row: Mapping[str, Any]) -> str:
     text = cell(row) if callable(cell) else _Template().vformat(cell, (), row)
     return text.replace(" ± –", "")
+
+
+def _printable(text: str) -> str:
+    return "".join(letter if letter.isprintable() else " " for letter in text)

@@ -8,8 +8,7 @@ import typer
 from chipglow.cli.options import Settings, file_option
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
+    from chipglow.cli.screen import Screen
     from chipglow.laboratory.emissivity import (
         AreaEmissivity,
         EmissivityLine,
@@ -71,9 +70,8 @@ def temperature(
     settings: Settings = None,
 ) -> None:
     """Determine the true temperature of regions whose emissivity is known."""
-    from rich.console import Console
-
-    from chipglow.cli.assumed import say_assumed, say_of_measurements, say_warnings
+    from chipglow.cli.assumed import say_of_measurements
+    from chipglow.cli.screen import current
     from chipglow.laboratory.emissivity import load_regions, true_temperatures
     from chipglow.laboratory.measurement import load_calibration, load_measurement
     from chipglow.laboratory.result_file import write_frame
@@ -85,13 +83,14 @@ def temperature(
     given = _emissivities(emissivity, emissivity_uncertainty)
     names = list(map(str, images))
     found = true_temperatures(measurements, named, given, surroundings, known, drift, names)
-    _print(Console(highlight=False, markup=False), found)
+    screen = current()
+    _print(screen, found)
     say_of_measurements(*measurements)
-    say_assumed(found.assumptions)
-    say_warnings(found.warnings)
+    screen.assumed(found.assumptions)
+    screen.warnings(found.warnings)
     if table is not None:
         write_frame(found.to_frame(), table)
-        print(table)
+        screen.file(table)
 
 
 def _emissivities(
@@ -125,24 +124,24 @@ def _surroundings(reflected: str | None, uncertainty: str | None) -> "ReflectedT
     )
 
 
-def _print(console: "Console", found: "RegionTemperatures") -> None:
-    from chipglow.cli.tables import part_cells, screen_table
+def _print(screen: "Screen", found: "RegionTemperatures") -> None:
+    from chipglow.cli.tables import part_cells
     from chipglow.laboratory.emissivity.temperature import TEMPERATURE_BUDGET
 
     rows = found.to_frame()
     for name in ("radiance_temperature", "true_temperature"):
-        rows[name] -= 273.15
+        rows[f"{name}_degC"] = rows[name] - 273.15
     cells = {
         "region": "{region}",
         "pixels": "{pixels}",
-        "radiance temperature": "{radiance_temperature:.2f} °C",
+        "radiance temperature": "{radiance_temperature_degC:.2f} °C",
         "emissivity": "{emissivity:.4f}",
-        "true temperature": "{true_temperature:.2f} °C",
+        "true temperature": "{true_temperature_degC:.2f} °C",
         "u": "{standard_uncertainty:u} K",
         "U 95 %": "{expanded_uncertainty:u} K",
         "k": "{coverage_factor:.2f}",
     }
-    console.print(screen_table(rows, cells))
-    console.print()
+    screen.table("regions", rows, cells)
+    screen.heading()
     parts = {"parts of u / K": "{region}", **part_cells(TEMPERATURE_BUDGET)}
-    console.print(screen_table(rows, parts))
+    screen.table(None, rows, parts)

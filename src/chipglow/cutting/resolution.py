@@ -23,8 +23,13 @@ def unresolved(lengths: Mapping[str, float], cell: float) -> tuple[str, ...]:
         One sentence for each length of less than `CELLS_NEEDED` cells.
     """
     return tuple(
-        f"The {name}, {length * 1e6:.3g} um, is {length / cell:.2g} cells, expected "
+        f"The {name}, {length * 1e6:.3g} um, is {_cells(length / cell)}, expected "
         f"{CELLS_NEEDED:g} or more: take a cell of {length / CELLS_NEEDED * 1e6:.2g} um."
         for name, length in lengths.items()
         if 0.0 < length < CELLS_NEEDED * cell * (1 - 1e-9)
     )
+
+
+def _cells(count: float) -> str:
+    text = f"{count:.2g}"
+    return f"{text} cell" if text == "1" else f"{text} cells"

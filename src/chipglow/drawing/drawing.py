@@ -128,6 +128,13 @@ def length_unit(raster: Raster) -> tuple[float, str]:
     return (1e6, "µm") if longest < _LARGEST_IN_MICRONS else (1e3, "mm")
 
 
+def time_unit(longest: float) -> tuple[float, str]:
+    """Factor from s and name of the unit in which times are read."""
+    if longest < 1e-3:
+        return 1e6, "µs"
+    return (1e3, "ms") if longest < 1.0 else (1.0, "s")
+
+
 def veil(
     axes: Axes,
     where: NDArray[np.bool_],

@@ -14,10 +14,21 @@ from chipglow.errors.error_parts import ErrorParts, error_parts
 from chipglow.errors.local_error import LocalError
 from chipglow.errors.places import LinePlace, Place, PointPlace, RegionPlace
 from chipglow.errors.rake_error import RakeErrors, rake_errors
+from chipglow.errors.ratio_error import RATIO_CAUSES, RatioErrors, ratio_errors
 from chipglow.errors.scene_error import SceneErrors, ScenePlan, scene_errors
 from chipglow.errors.sensitivity import Sensitivity, sensitivity
+from chipglow.errors.wavelengths import (
+    Spot,
+    WavelengthError,
+    WavelengthErrors,
+    WavelengthPlan,
+    cut_spots,
+    point_spots,
+    wavelength_errors,
+)
 
 __all__ = [
+    "RATIO_CAUSES",
     "BandErrors",
     "Distribution",
     "Draws",
@@ -31,19 +42,28 @@ __all__ = [
     "Plan",
     "PointPlace",
     "RakeErrors",
+    "RatioErrors",
     "ReferenceKind",
     "RegionPlace",
     "SceneErrors",
     "ScenePlan",
     "Sensitivity",
+    "Spot",
     "StudyResult",
     "VarianceComponent",
+    "WavelengthError",
+    "WavelengthErrors",
+    "WavelengthPlan",
     "analyse",
     "band_errors",
+    "cut_spots",
     "error_images",
     "error_parts",
+    "point_spots",
     "rake_errors",
+    "ratio_errors",
     "reference_temperature",
     "scene_errors",
     "sensitivity",
+    "wavelength_errors",
 ]

@@ -8,11 +8,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera import Camera, Exposure, Measurement, expose_all
+from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.cutting import EnergyHistory
 from chipglow.errors.band_error import BandErrors
 from chipglow.errors.draws import Draws, Site, draw_errors
-from chipglow.errors.error_images import ErrorImages, ReferenceKind, error_images
+from chipglow.errors.error_images import (
+    ErrorImages,
+    ReferenceKind,
+    error_images,
+    reference_temperature,
+)
 from chipglow.errors.rake_error import RakeErrors
 from chipglow.errors.sensitivity import Sensitivity, sensitivity
 from chipglow.errors.starts import other_starts, spread_starts
@@ -36,7 +41,7 @@ from chipglow.laboratory.emissivity import HeatedObject
 from chipglow.laboratory.emissivity.heated import heated_objects
 from chipglow.radiometry import Band
 from chipglow.scene import ENERGY_UNITS, Frame, Raster, Scene, Tool, sample
-from chipglow.surface import EmissivityField, Surface
+from chipglow.surface import Surface
 
 _USUAL_SPACING: Final = 180e-6
 """Distance of shear bands along a chip in m, where the forces show no period."""
@@ -122,6 +127,9 @@ class SurfaceResult:
         In the middle of the developed instant's exposure, on the scene's samples, shape (y, x).
     scene_temperature : ndarray
         Radiance temperature of the scene's samples then in K; NaN where nothing radiates.
+    references : ndarray
+        What the pixels of every instant are compared with in K, shape (instant, y, x); NaN where
+        nothing radiates.
     errors : ErrorImages
         At the developed instant.
     rake : RakeErrors
@@ -139,6 +147,7 @@ class SurfaceResult:
     rake_grid: RakeGrid | None
     emissivity: NDArray[np.float32]
     scene_temperature: NDArray[np.float64]
+    references: NDArray[np.float64]
     errors: ErrorImages
     rake: RakeErrors
     band: BandErrors
@@ -284,12 +293,10 @@ def analyse(
     """
     _check(scene, surfaces, plan)
     tell = progress or _say_nothing
-    duration = camera.integration_time
-    starts = spread_starts(scene, duration, plan.exposures)
-    others = other_starts(scene, duration)
-    instants = _instants(scene, duration, (*starts, *others), tell)
-    developed = _developed(scene, instants[: len(starts)])
-    segments = _segments(scene, duration, plan, [instants[developed], *instants[len(starts) :]])
+    duration = camera.frame_duration(scene.raster)
+    instants, others, developed = _band_over_time(scene, duration, plan, tell)
+    in_longest = instants[: len(instants) - others]
+    segments = _segments(scene, duration, plan, instants, others, developed)
     results = _measure(scene, surfaces, camera, plan, instants, developed, segments[0], tell)
     sites = _sites(scene, surfaces, camera, plan, segments, tell)
     chip = _chip(scene, tell)
@@ -299,9 +306,9 @@ def analyse(
         camera=camera,
         raster=scene.raster,
         instants=instants,
-        other_parts=len(others),
+        other_parts=others,
         developed=developed,
-        moments=_moments(scene, duration, instants[: len(starts)], developed),
+        moments=_moments(scene, duration, in_longest, developed),
         segments=segments,
         surfaces=results,
         draws=draw_errors(camera, sites, plan.phases, lambda part: tell("draws", part)),
@@ -326,6 +333,33 @@ def analyse(
     )
 
 
+def find_segments(
+    scene: Scene, duration: float, plan: Plan, progress: Progress | None = None
+) -> tuple[Segment, ...]:
+    """Segments of a cut's chip with a developed shear band: one for each part of the scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is truly there; it must state its tool.
+    duration : float
+        How long an exposure lasts in s.
+    plan : Plan
+        How many exposures are looked at, and what counts as touching the tool.
+    progress : callable, optional
+        Called with what is being done and how far it is.
+
+    Raises
+    ------
+    ValueError
+        If the scene is shorter than an exposure or has no shear band or no contact at the rake
+        face.
+    """
+    tell = progress or _say_nothing
+    instants, others, developed = _band_over_time(scene, duration, plan, tell)
+    return _segments(scene, duration, plan, instants, others, developed)
+
+
 def _check(scene: Scene, surfaces: Mapping[str, Surface], plan: Plan) -> None:
     for name in (plan.rake_surface, plan.band_surface):
         if name not in surfaces:
@@ -336,6 +370,16 @@ def _check(scene: Scene, surfaces: Mapping[str, Surface], plan: Plan) -> None:
 
 def _say_nothing(label: str, part: float) -> None:
     pass
+
+
+def _band_over_time(
+    scene: Scene, duration: float, plan: Plan, tell: Progress
+) -> tuple[tuple[Instant, ...], int, int]:
+    """Instants of the longest part and of the others, how many these are, the developed one."""
+    starts = spread_starts(scene, duration, plan.exposures)
+    others = other_starts(scene, duration)
+    instants = _instants(scene, duration, (*starts, *others), tell)
+    return instants, len(others), _developed(scene, instants[: len(starts)])
 
 
 def _instants(
@@ -374,17 +418,22 @@ def _moments(
 
 
 def _segments(
-    scene: Scene, duration: float, plan: Plan, instants: Sequence[Instant]
+    scene: Scene,
+    duration: float,
+    plan: Plan,
+    instants: Sequence[Instant],
+    others: int,
+    developed: int,
 ) -> tuple[Segment, ...]:
     """The developed segment, then those of the scene's other parts that have band and contact."""
-    first, *others = [
+    first, *later = [
         Segment.of(scene, instant, duration, plan.touching)
-        for instant in instants
+        for instant in (instants[developed], *instants[len(instants) - others :])
         if instant.band is not None
     ]
     if not first.contact_length > 0:
         raise NoContactError("rake face: the chip does not touch it in the developed instant")
-    return (first, *(segment for segment in others if segment.contact_length > 0))
+    return (first, *(segment for segment in later if segment.contact_length > 0))
 
 
 def _measure(
@@ -401,18 +450,20 @@ def _measure(
     fields = [camera.lay(surface, scene) for surface in surfaces.values()]
     frames: list[list[Exposure]] = []
     images: list[list[NDArray[np.float64]]] = [[] for _ in fields]
+    references: list[list[NDArray[np.float64]]] = [[] for _ in fields]
     for i, instant in enumerate(instants):
         tell("camera", i / len(instants))
-        exposures = _expose(scene, fields, camera, instant.start)
-        for image, exposure in zip(images, exposures, strict=True):
+        exposures = camera.expose_fields(scene, fields, instant.start)
+        for image, reference, exposure in zip(images, references, exposures, strict=True):
             image.append(camera.form_image(exposure.mean_radiance, exposure.raster))
+            reference.append(reference_temperature(camera, exposure, plan.reference))
         if i == developed:
             frames.append(list(exposures))
     tell("camera", 1.0)
     starts = np.array([instant.start for instant in instants])
     results = {}
-    for number, (name, on_scene, exposure, image) in enumerate(
-        zip(surfaces, fields, frames[0], images, strict=True)
+    for number, (name, on_scene, exposure, image, reference) in enumerate(
+        zip(surfaces, fields, frames[0], images, references, strict=True)
     ):
         looking = camera.redrawn(number)
         measurement = looking.measurement(np.stack(image), starts, scene.raster)
@@ -423,6 +474,7 @@ def _measure(
             rake_grid=_rake_grid(measurement, segment.tool),
             emissivity=on_scene.emissivity(segment.frame),
             scene_temperature=np.asarray(camera.band.temperature(exposure.centre_radiance)),
+            references=np.stack(reference),
             errors=errors,
             rake=site.rake_errors(errors),
             band=site.band_errors(errors),
@@ -455,7 +507,7 @@ def _sites(
     sites = []
     for i, segment in enumerate(segments):
         tell("segments and textures", i / len(segments))
-        exposures = _expose(scene, fields, camera, segment.start)
+        exposures = camera.expose_fields(scene, fields, segment.start)
         sites.append(
             [
                 _site(plan, segment, rake, band)
@@ -477,13 +529,6 @@ def _site(plan: Plan, segment: Segment, rake: Exposure, band: Exposure) -> Site:
         step=plan.line_step,
         reference=plan.reference,
     )
-
-
-def _expose(
-    scene: Scene, fields: Sequence[EmissivityField], camera: Camera, start: float
-) -> tuple[Exposure, ...]:
-    duration = camera.integration_time
-    return expose_all(scene, fields, camera.band, start, duration, camera.reflected)
 
 
 def _curves(

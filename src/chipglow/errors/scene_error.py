@@ -8,10 +8,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.camera import Camera, Exposure, Measurement, expose_all
+from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.errors.distribution import Distribution
 from chipglow.errors.draws import pixel_phases
-from chipglow.errors.error_images import ErrorImages, ReferenceKind, error_images
+from chipglow.errors.error_images import (
+    ErrorImages,
+    ReferenceKind,
+    error_images,
+    reference_temperature,
+)
 from chipglow.errors.places import HottestPlace, LinePlace, Place, RakePlace, Reading
 from chipglow.errors.starts import spread_starts
 from chipglow.laboratory.chip import contact_length
@@ -122,6 +127,9 @@ class SurfaceErrors:
         In the middle of the shown exposure, on the scene's samples, shape (y, x).
     scene_temperature : ndarray
         Radiance temperature of the scene's samples then in K; NaN where nothing radiates.
+    references : ndarray
+        What the pixels of every exposure are compared with in K, shape (exposure, y, x); NaN where
+        nothing radiates.
     errors : ErrorImages
         Of the shown exposure.
     readings : tuple of PlaceErrors
@@ -135,6 +143,7 @@ class SurfaceErrors:
     measurement: Measurement
     emissivity: NDArray[np.float32]
     scene_temperature: NDArray[np.float64]
+    references: NDArray[np.float64]
     errors: ErrorImages
     readings: tuple[PlaceErrors, ...]
     profiles: tuple[Profile, ...]
@@ -241,8 +250,9 @@ def scene_errors(
     """
     tell = progress or (lambda label, part: None)
     fields = [_textures(surface, scene, camera, plan.textures) for surface in surfaces.values()]
-    starts = spread_starts(scene, camera.integration_time, plan.exposures)
-    frames = [_middle(scene, float(start), camera.integration_time) for start in starts]
+    duration = camera.frame_duration(scene.raster)
+    starts = spread_starts(scene, duration, plan.exposures)
+    frames = [_middle(scene, float(start), duration) for start in starts]
     hottest = [float(scene.field("temperature", index).max()) for index in frames]
     shown = int(np.argmax(hottest))
     frame = scene.frame(frames[shown])
@@ -312,6 +322,7 @@ class _Collected:
 
     shape: tuple[int, int, int]
     images: list[NDArray[np.float64]] = field(default_factory=list)
+    references: list[NDArray[np.float64]] = field(default_factory=list)
     shown: list[Exposure] = field(default_factory=list)
     errors: list[ErrorImages] = field(default_factory=list)
     readings: list[Mapping[tuple[str, str], Reading]] = field(default_factory=list)
@@ -333,6 +344,7 @@ class _Collected:
             measurement=camera.measurement(np.stack(self.images), starts, scene.raster),
             emissivity=emissivity.emissivity(frame),
             scene_temperature=np.asarray(camera.band.temperature(exposure.centre_radiance)),
+            references=np.stack(self.references),
             errors=self.errors[0],
             readings=tuple(self._distributions()),
             profiles=tuple(
@@ -380,19 +392,17 @@ def _collect(
     flat = [one for textures in fields for one in textures]
     for i, start in enumerate(starts):
         tell("camera", i / len(starts))
-        exposures = iter(
-            expose_all(
-                scene, flat, camera.band, float(start), camera.integration_time, camera.reflected
-            )
-        )
+        exposures = iter(camera.expose_fields(scene, flat, float(start)))
         number = count()
         for surface, (one, textures) in enumerate(zip(collected, fields, strict=True)):
             of_surface = [next(exposures) for _ in textures]
-            one.images.append(camera.form_image(of_surface[0].mean_radiance, scene.raster))
+            first = of_surface[0]
+            one.images.append(camera.form_image(first.mean_radiance, scene.raster))
+            one.references.append(reference_temperature(camera, first, plan.reference))
             if i == shown:
                 looking = camera.redrawn(surface)
-                one.shown.append(of_surface[0])
-                one.errors.append(error_images(looking, of_surface[0], plan.reference))
+                one.shown.append(first)
+                one.errors.append(error_images(looking, first, plan.reference))
             for exposure in of_surface:
                 for phase in cameras:
                     errors = error_images(phase.redrawn(next(number)), exposure, plan.reference)

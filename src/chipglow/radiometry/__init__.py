@@ -3,11 +3,13 @@
 from chipglow.radiometry.band import Band
 from chipglow.radiometry.object_parameters import ObjectParameters
 from chipglow.radiometry.planck import spectral_radiance
+from chipglow.radiometry.ratio import RatioThermometer
 from chipglow.radiometry.response import TabulatedResponse
 
 __all__ = [
     "Band",
     "ObjectParameters",
+    "RatioThermometer",
     "TabulatedResponse",
     "spectral_radiance",
 ]

@@ -1,12 +1,10 @@
 """What the camera's detector can tell, as a table of the report."""
 
-from collections.abc import Sequence
 from math import nan
 
 from chipglow.camera import Camera
 from chipglow.drawing.drawing import KELVIN
 from chipglow.report.comparison import Row, own_row
-from chipglow.report.page import Line, table_part
 from chipglow.scene import Raster
 
 
@@ -66,9 +64,3 @@ def camera_rows(camera: Camera, scene: Raster) -> list[Row]:
             "Beyond, pixels are saturated.",
         ),
     ]
-
-
-def camera_table(rows: Sequence[Row]) -> str:
-    """The rows as a part of a report's page."""
-    lines = (Line((row.quantity, row.value_text), row.explanation) for row in rows)
-    return table_part("", ("Quantity", "Here"), lines)

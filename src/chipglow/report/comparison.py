@@ -1,6 +1,6 @@
 """The paper's figures beside ours, with their scatter, and whether the two differ."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import isfinite, nan
 
@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.errors import Distribution, LocalError, StudyResult
+from chipglow.errors import Distribution, Headline, LocalError, StudyResult
 from chipglow.quantities.format import quantity_text
 from chipglow.report import evidence
+from chipglow.report.page import Term
 from chipglow.report.paper import PAPER, PaperValue, stands_beside
 
 
@@ -84,22 +85,13 @@ class Row:
         return f"{number} ± {spread} {self.unit}".strip()
 
     @property
-    def value_text(self) -> str:
-        """Our figure alone with its unit, or a dash."""
-        return self._text(self.here)
-
-    @property
-    def spread_text(self) -> str:
-        """Its scatter or uncertainty with its unit, or a dash."""
-        return self._text(self.uncertainty)
-
-    @property
-    def range_text(self) -> str:
-        """Least and greatest draw, or a dash."""
-        if self.draws is None or self.draws.draws < 2:
+    def interval_text(self) -> str:
+        """Where one more draw lies with 95 % probability, or a dash."""
+        ends = self.draws.interval if self.draws is not None else (nan, nan)
+        if not all(map(isfinite, ends)):
             return "–"
-        low, high = (quantity_text(value, "", self.decimals) for value in self.draws.range)
-        return f"{low} to {high}"
+        low, high = (quantity_text(end, "", self.decimals) for end in ends)
+        return f"{low} to {high} {self.unit}".strip()
 
     @property
     def one_draw_text(self) -> str:
@@ -111,8 +103,42 @@ class Row:
         """Whether the two differ: yes, no, or a dash where it is unknown."""
         return {None: "–", True: "yes", False: "no"}[self.differs]
 
+    @property
+    def term(self) -> Term:
+        """What makes it, or how it is found."""
+        return Term(f"why-{self.key}", self.quantity, self.explanation)
+
     def _text(self, value: float | None) -> str:
         return quantity_text(value, self.unit, self.decimals)
+
+
+@dataclass(frozen=True)
+class PartRow:
+    """Of what one headline error consists, draw by draw, in °C.
+
+    Parameters
+    ----------
+    key, quantity : str
+        As those of the headline's `Row`.
+    error : Distribution
+        All of it.
+    parts : mapping of Distribution
+        ``psf``; ``motion`` and ``footprint`` where the motion's part is known, else ``rest``.
+    """
+
+    key: str
+    quantity: str
+    error: Distribution
+    parts: Mapping[str, Distribution]
+
+    @property
+    def error_text(self) -> str:
+        """The error's mean ± standard deviation."""
+        return _mean_text(self.error)
+
+    def text(self, name: str) -> str:
+        """A part's mean ± standard deviation, or a dash."""
+        return _mean_text(self.parts[name]) if name in self.parts else "–"
 
 
 @dataclass(frozen=True)
@@ -138,9 +164,11 @@ class CauseRow:
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """Standard deviation and fraction of each cause."""
+        """Standard deviation and fraction of each cause; a dash for one of a single value."""
         return tuple(
             f"{quantity_text(deviation, self.unit, self.decimals)} ({fraction:.0f} %)"
+            if deviation is not None
+            else "–"
             for _, _, deviation, fraction in self.causes
         )
 
@@ -158,10 +186,58 @@ def comparison_rows(result: StudyResult) -> list[Row]:
     list of Row
         The paper's quantities first.
     """
-    rows = [*_error_rows(result), *_period_rows(result), *_further_rows(result)]
+    return [*error_rows(result), *cut_rows(result)]
+
+
+def cut_rows(result: StudyResult) -> list[Row]:
+    """What the cut gives without a camera: period, forces, contact, shear band.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    """
+    rows = [*_period_rows(result), *_further_rows(result)]
     if stands_beside(result):
         return rows
     return [replace(row, paper=None, where="") for row in rows]
+
+
+def part_rows(result: StudyResult) -> list[PartRow]:
+    """Of what the errors of the answer consist.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    """
+    quantities = {row.key: row.quantity for row in error_rows(result)}
+    return [
+        PartRow(
+            key := f"{name}_error_degC",
+            quantities[key],
+            headline.error,
+            _parts(result, name, headline),
+        )
+        for name, headline in result.draws.headlines.items()
+        if name in ("rake", "band", "band_worst")
+    ]
+
+
+def _parts(result: StudyResult, name: str, headline: Headline) -> dict[str, Distribution]:
+    error, psf = headline.error, headline.psf_portion
+    rest = error.values - psf.values
+    motions = {"rake": result.draws.rake_line.motion, "band": result.draws.band_line.motion}
+    motion = motions.get(name)
+    # It is known where the line crosses face or ridge, and against the peak of the exposure.
+    if motion is None or result.plan.reference != "maximum" or not np.isfinite(motion).all():
+        return {"psf": psf, "rest": Distribution(rest, error.causes)}
+    moved = np.broadcast_to(motion[..., None], rest.shape)
+    return {
+        "psf": psf,
+        "motion": Distribution(moved, error.causes),
+        "footprint": Distribution(rest - moved, error.causes),
+    }
 
 
 def comparison_frame(result: StudyResult) -> pd.DataFrame:
@@ -201,14 +277,25 @@ def cause_rows(result: StudyResult) -> list[CauseRow]:
             quantity=row.quantity,
             unit=row.unit,
             causes=tuple(
-                (name, part.draws, _known(part.standard_deviation), 100 * part.fraction)
+                (name, part.draws, known(part.standard_deviation), 100 * part.fraction)
                 for name, part in row.draws.parts.items()
             ),
             decimals=row.decimals,
         )
-        for row in _error_rows(result)
+        for row in error_rows(result)
         if row.draws is not None and row.draws.draws > 1
     ]
+
+
+def error_rows(result: StudyResult) -> list[Row]:
+    """The camera's errors and the point spread function's portion of each.
+
+    Parameters
+    ----------
+    result : StudyResult
+        The study.
+    """
+    return list(_error_rows(result))
 
 
 def _error_rows(result: StudyResult) -> Iterator[Row]:
@@ -282,11 +369,11 @@ def _period_rows(result: StudyResult) -> list[Row]:
             "Segment period",
             "µs",
             PAPER.segment_period.value * 1e6,
-            _known(segments.period * 1e6),
+            known(segments.period * 1e6),
             0,
             evidence.period(result, result.forces.segmentation),
             PAPER.segment_period.where,
-            uncertainty=_known(segments.period_uncertainty * 1e6),
+            uncertainty=known(segments.period_uncertainty * 1e6),
         ),
         own_row(
             "force_segments_count",
@@ -460,15 +547,15 @@ def _drawn(
         explanation,
         paper.where if paper else "",
         drawn,
-        _known(scale * one_draw),
+        known(scale * one_draw),
     )
 
 
 def _of_segments(
     key: str, quantity: str, unit: str, values: NDArray[np.float64], decimals: int, explanation: str
 ) -> Row:
-    known = values[np.isfinite(values)]
-    draws = Distribution(known, ("segment",)) if known.size else None
+    found = values[np.isfinite(values)]
+    draws = Distribution(found, ("segment",)) if found.size else None
     return Row(
         key,
         quantity,
@@ -478,8 +565,15 @@ def _of_segments(
         decimals,
         explanation,
         draws=draws,
-        one_draw=_known(float(values[0])),
+        one_draw=known(float(values[0])),
     )
+
+
+def _mean_text(draws: Distribution) -> str:
+    spread = draws.standard_deviation
+    if not isfinite(spread):
+        return quantity_text(draws.mean, "°C", 0)
+    return f"{quantity_text(draws.mean, '', 0)} ± {quantity_text(spread, '°C', 0)}"
 
 
 def own_row(
@@ -493,12 +587,13 @@ def own_row(
 ) -> Row:
     """A quantity that is not the paper's; see `Row`, NaN for what is unknown."""
     return Row(
-        key, quantity, unit, None, _known(here), decimals, explanation,
-        uncertainty=_known(uncertainty),
+        key, quantity, unit, None, known(here), decimals, explanation,
+        uncertainty=known(uncertainty),
     )  # fmt: skip
 
 
-def _known(value: float) -> float | None:
+def known(value: float) -> float | None:
+    """The number, or None where it is unknown."""
     return float(value) if isfinite(value) else None
 
 

@@ -7,10 +7,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.errors import Distribution, ReferenceKind, Sensitivity, StudyResult
+from chipglow.errors import Distribution, Headline, ReferenceKind, Sensitivity, StudyResult
 from chipglow.errors.distribution import COVERAGE
 from chipglow.laboratory.chip import Segmentation
-from chipglow.report.paper import PAPER, stands_beside
+from chipglow.quantities.format import quantity_text
+from chipglow.report.page import Statement
+from chipglow.report.paper import PAPER, PaperValue, stands_beside
 
 ORDER_TEXT: Final = {
     "detector": "from pixel to pixel",
@@ -38,64 +40,77 @@ def definition_of(reference: ReferenceKind) -> str:
     return f"Errors are measured radiance temperature less {REFERENCE_TEXT[reference]}."
 
 
-def answer(result: StudyResult) -> list[str]:
-    """What came out, in a few sentences with their scatter."""
-    sentences = [
-        _answer_text(
-            result,
+def answer(result: StudyResult) -> list[Statement]:
+    """What came out, a sentence with its interval for each place."""
+    plan = result.plan
+    places = (
+        (
             "rake",
-            "At the rake face, half-way up the contact, the camera reads",
-            _against(result, "rake", PAPER.rake_error.value),
+            f"At the rake face ({plan.rake_surface}), half-way up the contact, the camera reads",
+            PAPER.rake_error,
         ),
-        _answer_text(
-            result,
+        (
             "band",
-            "At the centre of the shear band it reads",
-            _against(result, "band", PAPER.band_error.value),
+            f"At the centre of the shear band ({plan.band_surface}) it reads",
+            PAPER.band_error,
         ),
-        _answer_text(
-            result,
-            "band_worst",
-            "Beside the band it reads up to",
-            _against(result, "band_worst", PAPER.band_worst.value),
-        ),
+        ("band_worst", "Where it is worst beside the band, it reads", PAPER.band_worst),
+    )
+    return [
+        Statement(_sentence(result, begin, result.draws.headlines[name], paper), why(name))
+        for name, begin, paper in places
+        if name in result.draws.headlines
     ]
-    return [sentence for sentence in sentences if sentence]
 
 
-def _answer_text(result: StudyResult, name: str, begin: str, end: str) -> str:
-    headline = result.draws.headlines.get(name)
-    if headline is None:
-        return ""
-    low, high = headline.error.range
-    fraction = headline.psf_fraction
-    psf = ""
+def why(name: str) -> str:
+    """Id of what explains a headline error."""
+    return f"why-{name}_error_degC"
+
+
+def _sentence(result: StudyResult, begin: str, headline: Headline, paper: PaperValue) -> str:
+    error, fraction = headline.error, headline.psf_fraction
+    parts = [f"{begin} {error_text(error)}"]
     if fraction is not None and fraction.mean > 0:  # beside the band the blur may bring light
-        psf = f", of which the point spread function makes {_mean_text(fraction, 100)} %"
-    unknown = " Its sign is not known." if low <= 0 <= high and headline.error.draws > 1 else ""
-    least, most = (f"{-end:.0f}".replace("-", "−") for end in (high, low))
+        parts.append(f"the point spread function makes {_mean_text(fraction, 100)} % of it")
+    if stands_beside(result) and error.draws > 1:
+        side = "outside" if error.differs_from(paper.value) else "inside"
+        parts.append(f"the paper's {-paper.value:.0f} °C lies {side} the interval")
+    return "; ".join(parts) + "."
+
+
+def error_text(error: Distribution) -> str:
+    """How much too little or too much is read, with its interval."""
+    scale, way = (-1.0, "little") if error.mean < 0 else (1.0, "much")
+    text = f"{_mean_text(error, scale)} °C too {way} radiance temperature"
+    if error.draws < 2:
+        return f"{text} (a single draw)"
+    ends = sorted(scale * end for end in error.interval)
+    if not all(map(isfinite, ends)):
+        return f"{text} ({error.draws} draws)"
+    low, high = (quantity_text(end, "°C", 0) for end in ends)
+    unknown = ", so its sign is not known" if ends[0] < 0 < ends[1] else ""
+    percent = f"{COVERAGE * 100:.0f} %"
+    return f"{text} ({error.draws} draws; {percent} interval {low} to {high}{unknown})"
+
+
+def answer_note(draws: Distribution | None) -> str:
+    """How the numbers of the answer are to be read."""
+    if draws is None or draws.draws < 2:
+        return ""
+    *first, last = draws.causes
     return (
-        f"{begin} {_mean_text(headline.error, -1)} °C too little radiance temperature ({least} to "
-        f"{most} °C in {headline.error.draws} draws of segment, texture and pixel phase)"
-        f"{psf}.{unknown} {end}"
-    ).strip()
+        f"± is the standard deviation over all draws of {', '.join(first)} and {last}; the "
+        f"interval is where one more draw lies with {COVERAGE * 100:.0f} % probability."
+    )
 
 
 def _mean_text(draws: Distribution, scale: float) -> str:
     """Mean and standard deviation; the mean alone of a single draw."""
-    mean = f"{scale * draws.mean:.0f}".replace("-", "−")
+    mean = quantity_text(scale * draws.mean, "", 0)
     if draws.draws < 2:
         return mean
     return f"{mean} ± {abs(scale) * draws.standard_deviation:.0f}"
-
-
-def _against(result: StudyResult, name: str, paper: float) -> str:
-    headline = result.draws.headlines.get(name)
-    if headline is None or headline.error.draws < 2 or not stands_beside(result):
-        return ""
-    if headline.error.differs_from(paper):
-        return f"The paper's {-paper:.0f} °C lies outside this scatter."
-    return f"The paper's {-paper:.0f} °C lies within this scatter."
 
 
 def rake_error(result: StudyResult) -> str:
@@ -104,12 +119,9 @@ def rake_error(result: StudyResult) -> str:
     if headline is None:
         return _OUT_OF_VIEW
     pitch = result.camera.pitch
-    without = headline.error.mean - headline.psf_portion.mean
     return joined(
-        "Means over the draws: from one pixel inside the chip to one inside the tool the radiance "
-        f"temperature changes by {_degrees(line.mean_change(pitch, -pitch))}.",
-        f"Without PSF the error is {_degrees(without)}, of which motion during the exposure alone "
-        f"makes {_degrees(float(line.motion.mean()))}: the rest is the detector footprint.",
+        "From one pixel inside the chip to one inside the tool the radiance temperature changes by "
+        f"{_degrees(line.mean_change(pitch, -pitch))} in the mean over the draws.",
         _reach(result, lambda s: s.error("rake"), PAPER.rake_error.value, _degrees),
         _scatter(headline.error),
     )
@@ -135,14 +147,11 @@ def contact(result: StudyResult) -> str:
 
 def band_error(result: StudyResult) -> str:
     """What makes the error at the centre of the shear band."""
-    headline, line = result.draws.headlines.get("band"), result.draws.band_line
+    headline = result.draws.headlines.get("band")
     if headline is None:
         return _OUT_OF_VIEW
-    without = headline.error.mean - headline.psf_portion.mean
     return joined(
         _band_text(result),
-        f"In the mean over the draws the error without PSF is {_degrees(without)}, of which motion "
-        f"during the exposure alone makes {_degrees(float(line.motion.mean()))}.",
         _reach(result, lambda s: s.error("band"), PAPER.band_error.value, _degrees),
         _scatter(headline.error),
     )

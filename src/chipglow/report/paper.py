@@ -8,6 +8,12 @@ from chipglow.errors import StudyResult
 from chipglow.study import Study
 from chipglow.surface import Emissivity
 
+CITATION: Final = (
+    "J. C. Heigel, E. P. Whitenton: The effects of emissivity and camera point spread function on "
+    "the temperature measurement of segmented chip formation using infrared thermography. "
+    "Proceedings of the ASME International Manufacturing Science and Engineering Conference, 2010."
+)
+
 
 @dataclass(frozen=True)
 class PaperValue:
@@ -24,10 +30,10 @@ class PaperValues:
     Errors in K of radiance temperature, fractions of 1, the period in s.
     """
 
-    rake_error: PaperValue = PaperValue(-42.0, "abstract; Figure 11a shows about -40")
+    rake_error: PaperValue = PaperValue(-42.0, "abstract; Figure 11a shows about −40")
     rake_psf_fraction: PaperValue = PaperValue(0.45, "abstract; the conclusion says half")
     band_error: PaperValue = PaperValue(-46.0, "abstract, Figure 11b")
-    band_psf_fraction: PaperValue = PaperValue(0.15, "abstract; -7 of -46 in Figure 11b")
+    band_psf_fraction: PaperValue = PaperValue(0.15, "abstract; −7 of −46 in Figure 11b")
     band_worst: PaperValue = PaperValue(-120.0, "Simulation measurement error, Figure 11b")
     rake_missing: PaperValue = PaperValue(100.0, "Chip Temperature Near the Tool Rake Face")
     segment_period: PaperValue = PaperValue(90e-6, "Finite element analysis simulation")

@@ -8,41 +8,39 @@ from typing import Final
 from chipglow import __version__
 from chipglow.drawing.drawing import FigureFile
 from chipglow.errors import StudyResult
-from chipglow.report.camera_rows import camera_rows, camera_table
+from chipglow.report.camera_rows import camera_rows
 from chipglow.report.chip_rows import chip_rows
-from chipglow.report.comparison import CauseRow, Row, cause_rows, comparison_rows
-from chipglow.report.evidence import answer, error_definition
+from chipglow.report.comparison import (
+    CauseRow,
+    PartRow,
+    Row,
+    cause_rows,
+    cut_rows,
+    error_rows,
+    part_rows,
+)
+from chipglow.report.error_player import cut_player
+from chipglow.report.evidence import answer, answer_note, error_definition
 from chipglow.report.figures import draw_figures
 from chipglow.report.page import (
     Line,
+    Section,
+    Term,
     answer_part,
-    closing_sections,
     document,
     figure_part,
+    repeat_section,
     table_part,
+    terms_part,
+    titled_part,
     write_files,
 )
-from chipglow.report.paper import EmissivityTexts, stands_beside, table_1
-from chipglow.report.results import results_dataset, summary
-from chipglow.report.steady_tool import steady_tool_part, steady_tool_summary, tool_rows
-
-_PAPER: Final = (
-    "J. C. Heigel, E. P. Whitenton: The effects of emissivity and camera point spread function on "
-    "the temperature measurement of segmented chip formation using infrared thermography. "
-    "Proceedings of the ASME International Manufacturing Science and Engineering Conference, 2010."
-)
-
-_BESIDE_PAPER: Final = {
-    "comparison": "The paper beside this study",
-    "figures": "The paper's figures and tables",
-    "beyond": "Beyond the paper",
-}
-_STEADY: Final = "A tool that has been cutting for long"
-_OWN: Final = {
-    "comparison": "The errors, and more",
-    "emissivity": "Emissivity",
-    "beyond": "Figures",
-}
+from chipglow.report.paper import CITATION, EmissivityTexts, stands_beside, table_1
+from chipglow.report.results import results_dataset
+from chipglow.report.steady_tool import ToolRow, steady_tool_part, tool_rows
+from chipglow.report.summary import cut_summary
+from chipglow.report.terms import INTERVAL, PSF
+from chipglow.study import Study
 
 
 def write_report(
@@ -79,8 +77,8 @@ def write_report(
     Returns
     -------
     Path
-        ``report.html``; beside it are ``figures/``, ``summary.json``, ``results.nc`` and
-        ``study.yaml``.
+        ``report.html``; beside it are ``figures/``, ``summary.json`` and its schema,
+        ``results.nc`` and ``study.yaml``.
 
     Raises
     ------
@@ -89,160 +87,269 @@ def write_report(
     """
     pictures = folder / "figures"
     pictures.mkdir()
-    beside = stands_beside(result)
-    rows, causes, chip = comparison_rows(result), cause_rows(result), chip_rows(result.chip)
-    camera = camera_rows(result.camera, result.raster)
+    errors, cut = error_rows(result), cut_rows(result)
+    chip, camera = chip_rows(result.chip), camera_rows(result.camera, result.raster)
+    causes, parts = cause_rows(result), part_rows(result)
     beside_steady = tool_rows(result, steady) if steady else []
-    figures, emissivities = list(draw_figures(result, pictures)), table_1(result)
-    bodies = {
-        "comparison": _comparison(result, rows),
-        "figures": "\n".join(_in_the_papers_order(figures, emissivities, settings)),
-        "emissivity": _emissivities(emissivities),
-        "beyond": "\n".join(figure_part(figure) for figure in figures if not figure.paper),
-    }
-    titles = (_BESIDE_PAPER if beside else _OWN).items()
-    first, *others = [(name, head, bodies[name]) for name, head in titles if bodies[name]]
+    figures = {figure.name: figure for figure in draw_figures(result, pictures)}
+    apart = {name: _figure(figures.pop(name, None)) for name in _APART}
+    compared = [*errors, *(row for row in cut if row.paper is not None)]
+    others = [row for row in cut if row.paper is None]
+    tables = (
+        *_emissivity_tables(result, settings),
+        ("cut", "The cut", f"{table_part('', _HEADS, map(_line, others))}\n{apart['forces']}"),
+        ("chip", "The chip", f"{_single(chip)}\n{apart['chip-thickness']}"),
+        ("camera", "The camera", _single(camera) if camera else ""),
+    )
+    found = [row.term for row in (*cut, *chip, *camera)] + [row.term for row in beside_steady]
     sections = [
-        ("answer", "The answer", answer_part(answer(result), remarks)),
-        first,
-        ("scatter", "What makes the scatter", _causes(causes)),
-        *others,
-        *([("steady-tool", _STEADY, steady_tool_part(result, beside_steady))] if steady else []),
-        ("chip", "The chip", _chip_table(chip)),
-        *([("camera", "The camera", camera_table(camera))] if camera else []),
-        *closing_sections(study_text, provenance),
-        ("cite", "How to cite", _citation()),
+        Section(
+            "answer",
+            "The answer",
+            answer_part(answer(result), _note(result), remarks, cut_player(result).html),
+        ),
+        Section(
+            "causes",
+            "What causes it",
+            "\n".join(
+                (
+                    _parts(parts),
+                    terms_part(row.term for row in errors),
+                    titled_part("scatter", "What makes the scatter", _causes(causes)),
+                    apart["psf-sensitivity"],
+                    *_steady(result, beside_steady),
+                )
+            ),
+        ),
+        Section(
+            "comparison",
+            "The paper beside this study" if stands_beside(result) else "The errors, and figures",
+            "\n".join((_comparison(result, compared), *map(figure_part, figures.values()))),
+        ),
+        Section("tables", "Tables", "\n".join(titled_part(*one) for one in tables if one[2])),
+        repeat_section(
+            _command(result, steady is not None),
+            study_text,
+            provenance,
+            [*_terms(result), *found],
+            _citation(),
+        ),
     ]
     return write_files(
         folder,
         document(title, sections),
         results_dataset(result, provenance),
-        {
-            **summary(rows, causes, chip, provenance, camera),
-            **({"steady_tool": steady_tool_summary(beside_steady)} if steady else {}),
-        },
+        cut_summary([*errors, *cut], causes, parts, chip, camera, beside_steady, provenance),
         study_text,
     )
 
 
+_APART: Final = ("psf-sensitivity", "forces", "chip-thickness")
+"""Figures that stand beside what they explain; the others are in the paper's order."""
+
+_HERE: Final = Term(
+    "mean",
+    "Here",
+    "Mean ± sample standard deviation of the draws. Of a single number ± is its standard "
+    "uncertainty, or what its explanation says; a number without it has none that is known.",
+)
+_ONE_DRAW: Final = Term(
+    "one-draw",
+    "One draw",
+    "What a single frame gives: one segment, one texture, one position of the pixels.",
+)
+_DIFFERS: Final = Term(
+    "differs",
+    "Differs",
+    "Whether the paper's figure lies outside the 95 % interval. Of a single number: whether the "
+    "two are more than two standard uncertainties apart.",
+)
+_MOTION: Final = Term(
+    "motion",
+    "Motion",
+    "Radiance temperature of the mean over the exposure less that of its peak, at one sample of "
+    "the scene: the error of infinitely small pixels.",
+)
+_FOOTPRINT: Final = Term(
+    "footprint",
+    "Footprint",
+    "What is left of the error: a detector element measures the mean radiance of its footprint "
+    "(the size of source), and is compared with another value in it.",
+)
+_REST: Final = Term(
+    "rest",
+    "Motion and footprint",
+    "Both together, where the motion's part is not known: the error less the PSF's portion.",
+)
+_SCATTER: Final = Term(
+    "causes-of-scatter",
+    "Segment, texture, pixel phase",
+    "What is drawn anew: which segment of the chip is looked at, the random pattern of the "
+    "emissivity, and where the pixels lie on the scene. Each cause in the mean over the others: "
+    "standard deviation of these means, and its part of the sum of squares.",
+)
+_TOGETHER: Final = Term(
+    "together", "Causes together", "What none of the causes makes by itself: a rest."
+)
+_HEADS: Final = ("Quantity", _HERE, INTERVAL, _ONE_DRAW)
+
+
+def _note(result: StudyResult) -> str:
+    headlines = list(result.draws.headlines.values())
+    return answer_note(headlines[0].error if headlines else None)
+
+
+def _terms(result: StudyResult) -> Iterator[Term]:
+    yield Term("error", "Error", error_definition(result))
+    yield from (_HERE, INTERVAL, _ONE_DRAW)
+    if stands_beside(result):
+        yield _DIFFERS
+    yield from (PSF, _MOTION, _FOOTPRINT, _REST, _SCATTER, _TOGETHER)
+    yield _FOUND
+
+
+def _figure(figure: FigureFile | None) -> str:
+    return figure_part(figure) if figure else ""
+
+
+def _line(row: Row) -> Line:
+    texts = (row.quantity, row.here_text, row.interval_text, row.one_draw_text)
+    return Line(texts, row.unit or "1", row.term.key)
+
+
+def _single(rows: Sequence[Row]) -> str:
+    """Table of what was not drawn."""
+    lines = (Line((row.quantity, row.here_text), row.unit or "1", row.term.key) for row in rows)
+    return table_part("", _HEADS[:2], lines)
+
+
 def _comparison(result: StudyResult, rows: Sequence[Row]) -> str:
-    beside = stands_beside(result)
-    text = (
-        f"{error_definition(result)} PSF: point spread function. Here: mean ± standard deviation "
-        "over the draws of segment, texture and pixel phase, or ± standard uncertainty where there "
-        "is one number. One draw: one frame"
-    )
-    heads: tuple[str, ...] = ("Quantity", "Here", "Range of draws", "One draw")
-    if not beside:
-        text += "."
-    else:
-        text += (
-            " by the paper's procedure. Differs: whether one more draw would be as far off as the "
-            "paper's figure in fewer than 5 of 100 cases."
+    if not stands_beside(result):
+        return table_part(error_definition(result), _HEADS, map(_line, rows))
+    lines = (
+        Line(
+            (row.quantity, row.paper_text, *_line(row).texts[1:], row.differs_text),
+            row.unit,
+            row.term.key,
+            f"Paper: {row.where}" if row.where else "",
         )
-        heads = ("Quantity", "Paper", *heads[1:], "Differs")
-    return table_part(text, heads, (_comparison_line(row, beside) for row in rows))
+        for row in rows
+    )
+    heads = ("Quantity", "Paper", *_HEADS[1:], _DIFFERS)
+    return table_part(error_definition(result), heads, lines)
 
 
-def _comparison_line(row: Row, beside: bool) -> Line:
-    texts = [row.here_text, row.range_text, row.one_draw_text]
-    if beside:
-        texts = [row.paper_text, *texts, row.differs_text]
-    where = f"Paper: {row.where}" if row.where else ""
-    return Line((row.quantity, *texts), row.explanation, where)
+def _parts(rows: Sequence[PartRow]) -> str:
+    """Of what each error consists; motion and footprint apart where that is known."""
+    names = ("psf", "motion", "footprint", "rest")
+    shown = [name for name in names if any(name in row.parts for row in rows)]
+    heads = {"psf": PSF, "motion": _MOTION, "footprint": _FOOTPRINT, "rest": _REST}
+    lines = (
+        Line(
+            (row.quantity, row.error_text, *(row.text(name) for name in shown)),
+            "°C",
+            f"why-{row.key}",
+        )
+        for row in rows
+    )
+    text = "Each error of the answer, and its parts: mean ± standard deviation over the draws."
+    error = Term("error", "Error", "")
+    return table_part(text, ("Quantity", error, *(heads[name] for name in shown)), lines)
 
 
 def _causes(rows: Sequence[CauseRow]) -> str:
     if not rows:
         return "<p>One draw only: it says nothing of the scatter.</p>"
-    names = [f"{name} ({count})" for name, count, _, _ in rows[0].causes]
+    *names, together = (f"{name} ({count})" for name, count, _, _ in rows[0].causes)
+    heads = [*(_SCATTER._replace(name=name) for name in names), _TOGETHER._replace(name=together)]
     text = (
-        "Each cause in the mean over the others: standard deviation, and its part of the sum of "
-        "squares. In brackets above, how many values it took. Causes together: what none of them "
-        "makes by itself."
+        "How far each cause alone makes the errors scatter, as a standard deviation, and in "
+        "brackets its part of the sum of squares. In the heads: how many values it took."
     )
-    lines = (Line((row.quantity, *row.texts)) for row in rows)
-    return table_part(text, ("Quantity", *names), lines)
+    lines = (
+        Line((row.quantity, *row.texts), row.unit, f"why-{row.key}")
+        for row in rows
+        if row.unit == "°C"
+    )
+    return table_part(text, ("Quantity", *heads), lines)
 
 
-def _chip_table(rows: Sequence[Row]) -> str:
-    lines = (Line((row.quantity, row.value_text, row.spread_text), row.explanation) for row in rows)
-    return table_part("", ("Quantity", "Here", "Spread"), lines)
+def _steady(result: StudyResult, rows: list[ToolRow]) -> Iterator[str]:
+    if rows:
+        title = "A tool that has been cutting for long"
+        yield titled_part("steady-tool", title, steady_tool_part(result, rows))
 
 
-def _in_the_papers_order(
-    figures: Sequence[FigureFile],
-    emissivities: Sequence[EmissivityTexts],
-    settings: Sequence[tuple[str, str, str]],
-) -> Iterator[str]:
-    """Figures by their numbers; Table 1 after Figure 3, Table 2 after Figure 4."""
-    after = {"Figure 3": _table_1(emissivities), "Figure 4": _table_2(settings)}
-    for figure in figures:
-        if figure.paper:
-            yield figure_part(figure)
-            yield after.pop(figure.paper, "")
-    yield from after.values()
+def _command(result: StudyResult, steady: bool) -> str:
+    if steady:
+        quick = stands_beside(result) and result.plan.study == Study.quick()
+        return f"chipglow reproduce{' --quick' if quick else ''} --steady-tool --out results"
+    return "chipglow run study.yaml --out results"
+
+
+def _emissivity_tables(
+    result: StudyResult, settings: Sequence[tuple[str, str, str]]
+) -> Iterator[tuple[str, str, str]]:
+    """Tables 1 and 2 of the paper; of another study the first without the paper's numbers."""
+    rows = table_1(result)
+    if not stands_beside(result):
+        yield ("emissivity", "Emissivity", _emissivities(rows))
+        return
+    yield ("table-1", "Table 1: emissivity of heated chips and tool", _table_1(rows))
+    yield ("table-2", "Table 2: settings of the simulation", _table_2(settings))
+
+
+_FOUND: Final = Term(
+    "found",
+    "Emissivity found",
+    "From the image of an evenly heated object: mean and standard uncertainty of one region "
+    "(thermocouple of 2 K assumed), and the standard deviation over its pixels. Several textures: "
+    "mean ± standard deviation of the means of several textures. The camera's blur takes from the "
+    "standard deviation, and draws narrow shear bands toward the bodies beside them.",
+)
+_EMISSIVITY_HEADS: Final = (
+    "Put in",
+    _FOUND._replace(name="Found"),
+    _FOUND._replace(name="Standard deviation found"),
+    _FOUND._replace(name="Several textures"),
+)
 
 
 def _emissivities(rows: Sequence[EmissivityTexts]) -> str:
     """Table 1 of a study that is not the paper's."""
-    heads = ("Feature", "Put in", "Found", "Standard deviation found", "Several textures")
-    text = (
-        "Emissivity of evenly heated objects as mean ± standard deviation put into the study. "
-        f"{_FOUND} The camera's blur takes from the standard deviation, and draws narrow shear "
-        "bands toward the bodies beside them."
-    )
+    text = "Emissivity of evenly heated objects as mean ± standard deviation put into the study."
     lines = (
-        Line((row.feature, row.true, row.mean, row.standard_deviation, row.textures))
+        Line((row.feature, row.true, row.mean, row.standard_deviation, row.textures), "1")
         for row in rows
     )
-    return table_part(text, heads, lines) if rows else ""
-
-
-_FOUND: Final = (
-    "Found: mean and standard uncertainty of one heated object's region (thermocouple of 2 K "
-    "assumed), and the standard deviation over its pixels; beside it mean ± standard deviation of "
-    "the means of several textures."
-)
+    return table_part(text, ("Feature", *_EMISSIVITY_HEADS), lines) if rows else ""
 
 
 def _table_1(rows: Sequence[EmissivityTexts]) -> str:
-    if not rows:
-        return ""
-    heads = ("Feature", "Paper", "Put in", "Found", "Standard deviation found", "Several textures")
     text = (
-        f"Emissivity as mean ± standard deviation in the paper and put into the study. {_FOUND} "
-        "Same as the paper: procedure and numbers. Different: here the truth is known: the "
-        "camera's blur takes from the standard deviation of bodies and tool, and draws narrow "
-        "shear bands toward the bodies beside them."
+        "Emissivity as mean ± standard deviation in the paper and put into the study, and what "
+        "comes back. Same as the paper: procedure and numbers. Different: here the truth is known."
     )
     lines = (
-        Line((row.feature, row.paper, row.true, row.mean, row.standard_deviation, row.textures))
+        Line(
+            (row.feature, row.paper, row.true, row.mean, row.standard_deviation, row.textures), "1"
+        )
         for row in rows
     )
-    table = table_part(text, heads, lines)
-    return _titled("table-1", "Table 1: emissivity of heated chips and tool", table)
+    return table_part(text, ("Feature", "Paper", *_EMISSIVITY_HEADS), lines) if rows else ""
 
 
 def _table_2(rows: Sequence[tuple[str, str, str]]) -> str:
-    if not rows:
-        return ""
-    heads = ("Setting", "Paper", "Here")
     text = (
         "Settings of the cutting simulation. Not legible: a cell of the paper's table that its "
         "copy does not show."
     )
-    table = table_part(text, heads, map(Line, rows))
-    return _titled("table-2", "Table 2: settings of the simulation", table)
-
-
-def _titled(name: str, title: str, table: str) -> str:
-    return f'<div class="part" id="{name}">\n<h3>{escape(title)}</h3>\n{table}\n</div>'
+    return table_part(text, ("Setting", "Paper", "Here"), map(Line, rows)) if rows else ""
 
 
 def _citation() -> str:
     own = f"chipglow {__version__}: a virtual infrared camera for metal cutting."
     return (
         f"<p>This program: {escape(own)} Name the version and attach the study above.</p>\n"
-        f"<p>The method: {escape(_PAPER)}</p>"
+        f"<p>The method: {escape(CITATION)}</p>"
     )

@@ -1,15 +1,13 @@
-"""The study's arrays and numbers as data: results.nc and summary.json."""
+"""The study's arrays as data: results.nc."""
 
 from collections.abc import Mapping, Sequence
-from math import isfinite
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chipglow.errors import Distribution, StudyResult
-from chipglow.report.comparison import CauseRow, Row
+from chipglow.errors import StudyResult
 from chipglow.scene import FIELD_UNITS
 from chipglow.scene.tool_attributes import tool_attributes
 
@@ -63,68 +61,6 @@ def results_dataset(result: StudyResult, provenance: Mapping[str, str]) -> xr.Da
     return xr.Dataset(variables, coords=coordinates, attrs=attributes)
 
 
-def summary(
-    rows: Sequence[Row],
-    causes: Sequence[CauseRow],
-    chip: Sequence[Row],
-    provenance: Mapping[str, str],
-    camera: Sequence[Row] = (),
-) -> dict[str, Any]:
-    """Numbers of the study for scripts; a name ends in its unit, what is unknown is None.
-
-    Parameters
-    ----------
-    rows : sequence of Row
-        The comparison.
-    causes : sequence of CauseRow
-        What makes the headlines scatter.
-    chip : sequence of Row
-        What describes the chip.
-    provenance : mapping
-        What, when, version, seed and the like.
-    camera : sequence of Row
-        What the camera's detector can tell, if it has one.
-    """
-    return {
-        "provenance": dict(provenance),
-        **({"camera": {row.key: row.here for row in camera}} if camera else {}),
-        "results": {row.key: row.here for row in rows},
-        "draws": {row.key: scatter(row.draws) for row in rows if row.draws is not None},
-        "causes": {row.key: _causes(row) for row in causes},
-        "one_draw": {row.key: row.one_draw for row in rows if row.one_draw is not None},
-        "chip": {row.key: row.here for row in chip},
-        "chip_uncertainty": {
-            row.key: row.uncertainty for row in chip if row.uncertainty is not None
-        },
-        "paper": {row.key: row.paper for row in rows if row.paper is not None},
-        "differs": {row.key: row.differs for row in rows if row.paper is not None},
-        "explanation": {row.key: row.explanation for row in rows},
-    }
-
-
-def scatter(draws: Distribution) -> dict[str, float | int | None]:
-    """How a figure scatters, for summary.json; what is unknown is None."""
-    low, high = draws.range
-    ends = [end if isfinite(end) else None for end in draws.interval]
-    deviation = draws.standard_deviation
-    return {
-        "count": draws.draws,
-        "mean": draws.mean,
-        "standard_deviation": deviation if isfinite(deviation) else None,
-        "lowest": low,
-        "highest": high,
-        "interval_low": ends[0],
-        "interval_high": ends[1],
-    }
-
-
-def _causes(row: CauseRow) -> dict[str, dict[str, float | int | None]]:
-    return {
-        name: {"count": count, "standard_deviation": deviation, "fraction_percent": fraction}
-        for name, count, deviation, fraction in row.causes
-    }
-
-
 def _scene(result: StudyResult) -> dict[str, Any]:
     place, surfaces = ("y", "x"), result.surfaces.values()
     names = ("temperature", "plastic_strain", "plastic_strain_rate", "material")
@@ -148,9 +84,9 @@ def _pixels(result: StudyResult) -> dict[str, Any]:
     place, surfaces = ("pixel_y", "pixel_x"), result.surfaces.values()
     raster = next(iter(surfaces)).errors.raster
     measured = np.stack([s.measurement.radiance_temperature() for s in surfaces])
+    references = np.stack([s.references for s in surfaces])
     flags = np.stack([s.measurement.flags for s in surfaces])
     errors = {
-        "reference_temperature": [s.errors.reference for s in surfaces],
         "error_case_1": [s.errors.case_1 for s in surfaces],
         "error_case_2": [s.errors.case_2 for s in surfaces],
         "error_psf_portion": [s.errors.psf_portion for s in surfaces],
@@ -159,6 +95,7 @@ def _pixels(result: StudyResult) -> dict[str, Any]:
         "pixel_y": ("pixel_y", raster.y, {"units": "m"}),
         "pixel_x": ("pixel_x", raster.x, {"units": "m"}),
         "radiance_temperature": (("surface", "instant", *place), measured, {"units": "K"}),
+        "reference_temperature": (("surface", "instant", *place), references, {"units": "K"}),
         "flags": (("surface", "instant", *place), flags, {"units": "1"}),
         **{
             name: (("surface", *place), np.stack(images), {"units": "K"})

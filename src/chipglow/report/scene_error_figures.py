@@ -142,7 +142,7 @@ def over_time(result: SceneErrors) -> Figure | None:
         return None
     figure = drawing.new_figure(3.2)
     panels = figure.subplots(1, len(result.surfaces), sharex=True, sharey=True, squeeze=False)[0]
-    factor, unit = _time_unit(float(result.starts[-1]))
+    factor, unit = drawing.time_unit(float(result.starts[-1]))
     for axes, (name, surface) in zip(panels, result.surfaces.items(), strict=True):
         for reading in _first_readings(surface)[:_MOST_CURVES]:
             values = reading.error.values.reshape(len(result.starts), -1)
@@ -214,15 +214,8 @@ def _grid_of(panels: list[ImagePanel], result: SceneErrors) -> Figure:
     return figure
 
 
-def _time_unit(longest: float) -> tuple[float, str]:
-    """Factor from s and name of the unit in which times are read."""
-    if longest < 1e-3:
-        return 1e6, "µs"
-    return (1e3, "ms") if longest < 1.0 else (1.0, "s")
-
-
 def _when(result: SceneErrors) -> str:
-    factor, unit = _time_unit(float(result.starts[-1]))
+    factor, unit = drawing.time_unit(float(result.starts[-1]))
     return f"{result.frame.time * factor:.4g} {unit}"
 
 
@@ -234,7 +227,7 @@ def _scene_caption(result: SceneErrors) -> str:
 
 
 def _measurement_caption(result: SceneErrors) -> str:
-    exposure, unit = _time_unit(result.camera.integration_time)
+    exposure, unit = drawing.time_unit(result.camera.integration_time)
     lower_limit = result.camera.lower_limit
     grey = (
         "" if lower_limit is None else f" Grey: under the camera's {lower_limit - KELVIN:.0f} °C."

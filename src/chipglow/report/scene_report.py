@@ -11,32 +11,34 @@ import xarray as xr
 from chipglow.drawing.drawing import KELVIN
 from chipglow.errors import Distribution, SceneErrors
 from chipglow.errors.distribution import TOGETHER
-from chipglow.errors.scene_error import PlaceErrors
-from chipglow.report.camera_rows import camera_rows, camera_table
-from chipglow.report.comparison import Row
-from chipglow.report.evidence import definition_of
+from chipglow.report.camera_rows import camera_rows
+from chipglow.report.error_player import scene_player
+from chipglow.report.evidence import answer_note, definition_of, error_text
 from chipglow.report.page import (
     Line,
+    Section,
+    Statement,
+    Term,
     answer_part,
-    closing_sections,
     document,
     figure_part,
+    repeat_section,
     table_part,
+    titled_part,
     write_files,
 )
-from chipglow.report.results import scatter
 from chipglow.report.scene_error_figures import draw_scene_errors
-
-_HEADS: Final = ("Place", "Reference", "Error", "Range", "PSF's portion")
+from chipglow.report.summary import scene_summary_file
+from chipglow.report.terms import INTERVAL, PSF
 
 
 class PlaceRow(NamedTuple):
-    """A reading as printed: where, what a camera without error would say, error, range, PSF."""
+    """A reading as printed: where, what a camera without error would say, error, interval, PSF."""
 
     place: str
     reference: str
     error: str
-    range: str
+    interval: str
     psf_portion: str
 
 
@@ -51,14 +53,13 @@ def place_rows(result: SceneErrors) -> list[PlaceRow]:
     rows = []
     for name, surface in result.surfaces.items():
         for one in surface.readings:
-            low, high = one.error.range
             where = f"{one.place}, {one.reading}"
             rows.append(
                 PlaceRow(
                     f"{where} ({name})" if len(result.surfaces) > 1 else where,
                     f"{_mean_text(one.reference, -KELVIN)} °C",
                     f"{_mean_text(one.error)} °C",
-                    f"{_rounded(low)} to {_rounded(high)}" if one.error.draws > 1 else "–",
+                    _interval_text(one.error),
                     f"{_mean_text(one.psf_portion)} °C",
                 )
             )
@@ -93,8 +94,8 @@ def write_scene_report(
     Returns
     -------
     Path
-        ``report.html``; beside it are ``figures/``, ``summary.json``, ``results.nc`` and
-        ``study.yaml``.
+        ``report.html``; beside it are ``figures/``, ``summary.json`` and its schema,
+        ``results.nc`` and ``study.yaml``.
 
     Raises
     ------
@@ -103,28 +104,80 @@ def write_scene_report(
     """
     pictures = folder / "figures"
     pictures.mkdir()
-    figures = [figure_part(figure) for figure in draw_scene_errors(result, pictures)]
+    figures = "\n".join(map(figure_part, draw_scene_errors(result, pictures)))
     camera = camera_rows(result.camera, result.raster)
     missing = "".join(f"<p>{escape(sentence)}</p>\n" for sentence in result.missing)
-    sections = [
-        ("answer", "The answer", answer_part(list(_answer(result)), remarks)),
+    lines = (Line((row.quantity, row.here_text), row.unit, row.term.key) for row in camera)
+    tables = (
         ("places", "The error at each place", _places(result)),
-        ("scatter", "What makes the scatter", _causes(result)),
-        ("figures", "Figures", "\n".join(figures)),
-        *([("camera", "The camera", camera_table(camera))] if camera else []),
-        *([("missing", "What is not here", missing)] if missing else []),
-        *closing_sections(study_text, provenance),
+        ("camera", "The camera", table_part("", ("Quantity", "Here"), lines) if camera else ""),
+        ("missing", "What is not here", missing),
+    )
+    sections = [
+        Section(
+            "answer",
+            "The answer",
+            answer_part(
+                list(_answer(result))[:_SENTENCES],
+                _note(result),
+                remarks,
+                scene_player(result).html,
+            ),
+        ),
+        Section("causes", "What causes it", f"{_causes(result)}\n{figures}"),
+        Section("tables", "Tables", "\n".join(titled_part(*one) for one in tables if one[2])),
+        repeat_section(
+            "chipglow error scene.nc --study study.yaml --out results",
+            study_text,
+            provenance,
+            [*_terms(result), *(row.term for row in camera)],
+            "",
+        ),
     ]
     return write_files(
         folder,
         document(title, sections),
         _dataset(result, provenance),
-        _summary(result, provenance, camera),
+        scene_summary_file(result, camera, provenance),
         study_text,
     )
 
 
-def _answer(result: SceneErrors) -> Iterator[str]:
+_SENTENCES: Final = 3
+"""How many places the answer speaks of; the table has all."""
+
+_MEAN: Final = Term(
+    "mean",
+    "Mean and standard deviation",
+    "Over the draws of exposure, texture (the random pattern of the emissivity) and pixel phase "
+    "(where the pixels lie on the scene).",
+)
+_REFERENCE: Final = Term(
+    "reference", "Reference", "What a camera without error would read: mean over the draws."
+)
+_SCATTER: Final = Term(
+    "causes-of-scatter",
+    "Causes of scatter",
+    "Each cause in the mean over the others: standard deviation of these means, and its part of "
+    "the sum of squares. Causes together: what none of them makes by itself.",
+)
+
+
+def _note(result: SceneErrors) -> str:
+    readings = [one for surface in result.surfaces.values() for one in surface.readings]
+    return answer_note(readings[0].error if readings else None)
+
+
+def _terms(result: SceneErrors) -> Iterator[Term]:
+    yield _error(result)
+    yield from (_REFERENCE, _MEAN, INTERVAL, PSF, _SCATTER)
+
+
+def _error(result: SceneErrors) -> Term:
+    return Term("error", "Error", definition_of(result.plan.reference))
+
+
+def _answer(result: SceneErrors) -> Iterator[Statement]:
     """The first reading of every place with every surface, as sentences."""
     for name, surface in result.surfaces.items():
         said: set[str] = set()
@@ -133,30 +186,20 @@ def _answer(result: SceneErrors) -> Iterator[str]:
                 continue
             said.add(one.place)
             of_surface = f" ({name})" if len(result.surfaces) > 1 else ""
-            yield f"{one.place.capitalize()}, {one.reading}{of_surface}: {_sentence(one)}"
-
-
-def _sentence(one: PlaceErrors) -> str:
-    mean = one.error.mean
-    way = "little" if mean < 0 else "much"
-    scale = -1.0 if mean < 0 else 1.0
-    scaled = Distribution(scale * one.error.values, one.error.causes)
-    text = f"the camera reads {_mean_text(scaled)} °C too {way} radiance temperature"
-    if one.error.draws > 1:
-        low, high = one.error.range
-        text += (
-            f" (error of {_rounded(low)} to {_rounded(high)} °C in {one.error.draws} draws of "
-            "exposure, texture and pixel phase)"
-        )
-    return f"{text}; the point spread function makes {_mean_text(one.psf_portion)} °C of the error."
+            sense = -1.0 if one.error.mean < 0 else 1.0
+            portion = Distribution(sense * one.psf_portion.values, one.psf_portion.causes)
+            yield Statement(
+                f"{one.place.capitalize()}, {one.reading}{of_surface}: the camera reads "
+                f"{error_text(one.error)}; the point spread function makes "
+                f"{_mean_text(portion)} °C of it.",
+                "causes",
+            )
 
 
 def _places(result: SceneErrors) -> str:
-    text = (
-        f"{definition_of(result.plan.reference)} PSF: point spread function. Mean ± standard "
-        f"deviation over the draws of {len(result.starts)} exposures, of textures and pixel phases."
-    )
-    return table_part(text, _HEADS, map(Line, place_rows(result)))
+    heads = ("Place", _REFERENCE, _error(result), INTERVAL, PSF)
+    text = f"{definition_of(result.plan.reference)} Mean ± standard deviation over the draws."
+    return table_part(text, heads, (Line(row, "°C", "mean") for row in place_rows(result)))
 
 
 def _causes(result: SceneErrors) -> str:
@@ -168,13 +211,17 @@ def _causes(result: SceneErrors) -> str:
     ]
     if not readings:
         return "<p>One draw only: it says nothing of the scatter.</p>"
-    heads = ("Error", *readings[0][1].error.causes, TOGETHER)
+    causes = (*readings[0][1].error.causes, TOGETHER)
+    heads: tuple[str | Term, ...] = (
+        "Error",
+        *(_SCATTER._replace(name=cause) for cause in causes),
+    )
     text = (
-        "Each cause in the mean over the others: standard deviation, and its part of the sum of "
-        "squares. Causes together: what none of them makes by itself."
+        "How far each cause alone makes the error scatter, as a standard deviation, and in "
+        "brackets its part of the sum of squares."
     )
     lines = (
-        Line((name, *(_cause_text(part) for part in one.error.parts.values())))
+        Line((name, *(_cause_text(part) for part in one.error.parts.values())), "°C", "error")
         for name, one in readings
     )
     return table_part(text, heads, lines)
@@ -184,6 +231,11 @@ def _cause_text(part: Any) -> str:
     if part.draws < 2 or not np.isfinite(part.standard_deviation):
         return "–"
     return f"{part.standard_deviation:.1f} °C ({100 * part.fraction:.0f} %)"
+
+
+def _interval_text(draws: Distribution) -> str:
+    low, high = draws.interval
+    return f"{_rounded(low)} to {_rounded(high)} °C" if np.isfinite(low) else "–"
 
 
 def _mean_text(draws: Distribution, offset: float = 0.0) -> str:
@@ -199,26 +251,6 @@ def _rounded(value: float, digits: int | None = None) -> str:
     """Without decimals from 10 on, with the sign of minus that is read."""
     text = f"{value:.{(0 if abs(value) >= 9.95 else 1) if digits is None else digits}f}"
     return (text.removeprefix("-") if float(text) == 0 else text).replace("-", "−")
-
-
-def _summary(
-    result: SceneErrors, provenance: Mapping[str, str], camera: Sequence[Row]
-) -> dict[str, Any]:
-    surfaces: dict[str, Any] = {}
-    for name, surface in result.surfaces.items():
-        of_place = surfaces.setdefault(name, {})
-        for one in surface.readings:
-            of_place.setdefault(one.place, {})[one.reading] = {
-                "reference_degC": one.reference.mean - KELVIN,
-                "error_degC": scatter(one.error),
-                "psf_portion_degC": scatter(one.psf_portion),
-            }
-    return {
-        "provenance": dict(provenance),
-        **({"camera": {row.key: row.here for row in camera}} if camera else {}),
-        "results": surfaces,
-        "missing": list(result.missing),
-    }
 
 
 def _dataset(result: SceneErrors, provenance: Mapping[str, str]) -> xr.Dataset:
@@ -241,6 +273,16 @@ def _dataset(result: SceneErrors, provenance: Mapping[str, str]) -> xr.Dataset:
         "measured": (pixels, np.stack([one.errors.measured for one in surfaces]), kelvin),
         "error": (pixels, np.stack([one.errors.case_1 for one in surfaces]), kelvin),
         "psf_portion": (pixels, np.stack([one.errors.psf_portion for one in surfaces]), kelvin),
+        "radiance_temperature": (
+            ("surface", "exposure", "pixel_y", "pixel_x"),
+            np.stack([one.measurement.radiance_temperature() for one in surfaces]),
+            kelvin,
+        ),
+        "reference_temperature": (
+            ("surface", "exposure", "pixel_y", "pixel_x"),
+            np.stack([one.references for one in surfaces]),
+            kelvin,
+        ),
         "flagged": (
             pixels,
             np.stack([one.errors.flagged for one in surfaces]).astype(np.int8),

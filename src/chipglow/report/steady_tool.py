@@ -11,7 +11,7 @@ import numpy as np
 from chipglow.errors import StudyResult
 from chipglow.laboratory.chip import contact_temperatures
 from chipglow.quantities.format import quantity_text
-from chipglow.report.page import Line, table_part
+from chipglow.report.page import Line, Term, table_part
 from chipglow.report.paper import PAPER, stands_beside
 
 _Of = Callable[[StudyResult], tuple[float, float]]
@@ -55,8 +55,14 @@ class ToolRow:
         texts = (_text(self.own, self.unit), _text(self.steady, self.unit))
         return Line(
             (self.quantity, *texts, _text(self.difference, self.unit, "+")),
-            self.explanation,
+            self.unit,
+            self.term.key,
         )
+
+    @property
+    def term(self) -> Term:
+        """How it is found."""
+        return Term(f"tool-{self.key}", f"Steady tool: {self.quantity}", self.explanation)
 
 
 def tool_rows(own: StudyResult, steady: StudyResult) -> list[ToolRow]:
@@ -117,19 +123,6 @@ def steady_tool_part(own: StudyResult, rows: list[ToolRow]) -> str:
     """The report's section, of `tool_rows`."""
     heads = ("Quantity", "This study's tool", "Steady tool", "Difference")
     return table_part(" ".join(_sentences(own, rows)), heads, (row.line for row in rows))
-
-
-def steady_tool_summary(rows: list[ToolRow]) -> dict[str, dict[str, float | None]]:
-    """The same numbers for scripts."""
-    names = ("own", "steady", "difference")
-    return {
-        row.key: {
-            f"{name}{suffix}": value if isfinite(value) else None
-            for name in names
-            for suffix, value in zip(("", "_standard_deviation"), getattr(row, name), strict=True)
-        }
-        for row in rows
-    }
 
 
 def _sentences(own: StudyResult, rows: list[ToolRow]) -> Iterator[str]:

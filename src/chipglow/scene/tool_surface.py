@@ -102,7 +102,7 @@ def _chain(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([corners[:-1], tangent, length, normal, reach])
 
 
-@njit
+@njit(cache=True)
 def surface_distance(x, y, tool):  # type: ignore[no-untyped-def]
     """Signed distance to a `ToolSurface`, negative inside, and its outward normal."""
     if tool.chain.shape[0] == 0:

@@ -5,7 +5,16 @@ from chipglow.study.cost import Cost, expected_cost
 from chipglow.study.files import load_study, study_text
 from chipglow.study.fitting import Fitted, fit
 from chipglow.study.preview import preview_raster
-from chipglow.study.running import CUTTING_STEP, Progress, cut, errors, is_cut, kept_progress, run
+from chipglow.study.running import (
+    CUTTING_STEP,
+    Progress,
+    cut,
+    errors,
+    is_cut,
+    kept_progress,
+    run,
+    wavelengths,
+)
 from chipglow.study.schema import Study
 
 __all__ = [
@@ -28,4 +37,5 @@ __all__ = [
     "preview_raster",
     "run",
     "study_text",
+    "wavelengths",
 ]

@@ -12,7 +12,7 @@ from chipglow.study.surface_section import FeaturesSection
 _HOW_FINELY: Final = {
     "cutting": {"numerics", "window", "field_of_view", "cutting_length", "surroundings"},
     "camera": {"offset_right", "offset_down"},
-    "surface": {"kind", "maps", "measured", "follow", "restore_standard_deviation"},
+    "surface": {"kind", "measured_in", "maps", "measured", "follow", "restore_standard_deviation"},
 }
 """Fields whose defaults are no property of the paper's experiment."""
 

@@ -44,6 +44,33 @@ CAMERAS: Final[Mapping[str, CameraPreset]] = MappingProxyType(
                 },
             },
         ),
+        "flir-a6751": CameraPreset(
+            "FLIR A6751, InSb, as github.com/blitzcolo/Quantiloom-dev "
+            "(src/libQuantiloom/postprocess/CameraPresets.cpp, d3a6987e) quotes flir.com/products/"
+            "a6750-mwir: 640 x 512, 15 um, 3.0 to 5.0 um, f/2.5, up to 125 Hz in the full window, "
+            "14 bit, NETD 22 mK typical. It states no well, quantum efficiency, noise or range of "
+            "temperatures, so there is no detector here",
+            {
+                "band": "3-5 um",
+                "detector_pitch": "15 um",
+                "array": [640, 512],
+                "psf": {"kind": "airy", "f_number": 2.5},
+                "frame_rate": "125 Hz",
+            },
+        ),
+        "flir-boson-640": CameraPreset(
+            "FLIR Boson Thermal Imaging Core, datasheet 102-2013-40 release 340 (pdfslide.us/"
+            "documents/flir-boson-thermal-imaging-core.html): uncooled VOx microbolometer, "
+            "640 x 512, up to 60 Hz, as low as 40 mK at f/1.0; pixels of 12 um and 8 to 14 um as "
+            "the file of Quantiloom-dev above quotes oem.flir.com/products/boson. It states no "
+            "range of temperatures, so there is no detector here, and lenses differ",
+            {
+                "band": "8-14 um",
+                "detector_pitch": "12 um",
+                "array": [640, 512],
+                "frame_rate": "60 Hz",
+            },
+        ),
         "alpha-nir": CameraPreset(
             "List of infrared cameras of github.com/cameras/camerasIR: FLIR Alpha NIR, InGaAs, "
             "320 x 256, 30 um, 0.9 to 1.7 um",

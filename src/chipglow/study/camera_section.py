@@ -102,6 +102,12 @@ class CameraSection(Settings[Camera]):
     )
     integration_time: Time = described("10 us", "Exposure.")
     frame_rate: Frequency = described("600 Hz", "Frames a second.")
+    line_time: Annotated[Time | None, OR_NONE] = described(
+        "none",
+        "Rolling shutter: how much later each row's exposure begins than that of the row above;\n"
+        "none: a global shutter, all rows at once.",
+        "none, or over 0 us",
+    )
     lower_limit: Annotated[Temperature | None, OR_NONE, OR_DETECTOR] = described(
         "300 degC",
         "Radiance temperatures under this are flagged, not returned; or none. With a detector it\n"
@@ -150,6 +156,7 @@ class CameraSection(Settings[Camera]):
             psf_order=self.psf_order,
             integration_time=self.integration_time,
             frame_rate=self.frame_rate,
+            line_time=self.line_time,
             lower_limit=self._lower_limit(band, detector),
             reflected=self.reflected,
             optics=tuple(term.build() for term in self.optics),

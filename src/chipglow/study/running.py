@@ -15,7 +15,16 @@ from chipglow.cutting import (
     ToolMaterial,
     WorkpieceMaterial,
 )
-from chipglow.errors import SceneErrors, StudyResult, analyse, scene_errors
+from chipglow.errors import (
+    SceneErrors,
+    StudyResult,
+    WavelengthErrors,
+    analyse,
+    cut_spots,
+    point_spots,
+    scene_errors,
+    wavelength_errors,
+)
 from chipglow.io import SCENE_FORMAT, SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.interrupts import uninterrupted
 from chipglow.laboratory.chip import NoContactError, NoShearBandError
@@ -155,6 +164,52 @@ def errors(
             fitted.surfaces,
             study.camera.on(fitted.scene.raster, study.seed),
             plan,
+            progress,
+        )
+
+
+def wavelengths(
+    study: Study,
+    progress: Progress | None = None,
+    resume: bool = False,
+    assume: Callable[[str], None] | None = None,
+) -> WavelengthErrors:
+    """Errors of the bands of a study's section wavelengths, alone and as ratios of two.
+
+    They are read at the rake face and in the shear band of a cut, or at the points of the section
+    analysis, if there are any. The study's camera is given each band in turn.
+
+    Parameters
+    ----------
+    study : Study
+        What to do.
+    progress, resume, assume
+        As for `run`.
+
+    Raises
+    ------
+    ValueError
+        If the scene shows no band and no contact with a tool, and the study names no points.
+    """
+    path = cut(study, progress, resume) if study.scene is None else Path(study.scene)
+    with _naming(study):
+        fitted = _fitted(study, path, assume)
+        scene, analysis = fitted.scene, study.analysis
+        camera = study.camera.on(scene.raster, study.seed)
+        if analysis.points:
+            spots = point_spots(scene, camera, analysis.scene_plan(), list(fitted.surfaces))
+        else:
+            if lacking := list(_lacking(scene)):
+                raise ValueError(f"{lacking[0]} Expected points to read (analysis.points).")
+            spots = cut_spots(scene, camera, study.plan, progress)
+        return wavelength_errors(
+            scene,
+            fitted.surfaces,
+            camera,
+            study.wavelengths.build(),
+            spots,
+            analysis.phases,
+            analysis.textures,
             progress,
         )
 

@@ -13,6 +13,7 @@ from chipglow.study.camera_section import CameraSection
 from chipglow.study.cutting_section import STEADY, CuttingSection
 from chipglow.study.scaling import scaled
 from chipglow.study.surface_section import FeaturesSection, SurfaceSection, surface_names
+from chipglow.study.wavelengths_section import WavelengthsSection
 
 
 class Study(Section):
@@ -52,6 +53,10 @@ class Study(Section):
     )
     camera: CameraSection = described({}, "The infrared camera.")
     analysis: AnalysisSection = described({}, "What is computed from the simulated measurement.")
+
+    wavelengths: WavelengthsSection = described(
+        {}, "Bands that chipglow wavelengths compares, alone and as ratios."
+    )
 
     @property
     def plan(self) -> Plan:

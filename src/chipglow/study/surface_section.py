@@ -14,16 +14,19 @@ from chipglow.laboratory.emissivity import (
     read_measured_areas,
 )
 from chipglow.quantities import OR_NONE, Declared, FileBeside, Section, described
-from chipglow.quantities.units import Length
+from chipglow.quantities.units import Length, WavelengthRange
+from chipglow.radiometry import Band
 from chipglow.surface import (
     CHIP_1,
     CHIP_2,
     DIRECTIONS,
     OXIDES,
     REFLECTIONS,
+    SPECTRA,
     SURFACES,
     Direction,
     DirectionalSurface,
+    DispersiveSurface,
     Emissivity,
     FeatureSurface,
     FeatureTrends,
@@ -31,6 +34,7 @@ from chipglow.surface import (
     OxidisedSurface,
     ReflectingSurface,
     SideShape,
+    SpectralSurface,
     Surface,
     SurfaceChoice,
 )
@@ -48,6 +52,7 @@ def _numbers(emissivity: Emissivity) -> dict[str, float]:
 
 
 OxideSection = Annotated[Declared[Oxide], OXIDES]
+SpectralSection = Annotated[Declared[SpectralSurface], SPECTRA]
 DirectionalSection = Annotated[Declared[Direction], DIRECTIONS]
 ReflectionsSection = Annotated[Declared[SideShape], REFLECTIONS]
 
@@ -112,6 +117,14 @@ class FeaturesSection(Section):
     restore_standard_deviation: bool = described(
         True, "Make up for the standard deviation that is lost when a texture is enlarged."
     )
+    spectral: Annotated[SpectralSection | None, OR_NONE] = described(
+        "none",
+        "How all these emissivities depend on the wavelength, for cameras of other bands; or\n"
+        f"none: they are grey. Kinds:\n{SPECTRA.examples}",
+    )
+    measured_in: WavelengthRange = described(
+        "3.8-5.1 um", "Band in which they are as they stand here, where they are not grey."
+    )
     oxide: Annotated[OxideSection | None, OR_NONE] = described(
         "none",
         "Oxide that grows on the material while it is in view, by its temperatures, or none.\n"
@@ -174,6 +187,11 @@ class FeaturesSection(Section):
         maps = {name: read_emissivity_map(file) for name, file in self.maps.items()}
         measured = {name: self._measured(file, seed) for name, file in self.measured.items()}
         surfaces: dict[str, Surface] = {**chips, **maps, **measured}
+        if self.spectral is not None:
+            spectrum, band = self.spectral.build(), Band(*self.measured_in)
+            surfaces = {
+                name: DispersiveSurface(bare, spectrum, band) for name, bare in surfaces.items()
+            }
         if self.oxide is not None:
             oxide = self.oxide.build()
             surfaces = {name: OxidisedSurface(bare, oxide) for name, bare in surfaces.items()}

@@ -7,6 +7,7 @@ from chipglow.surface.directional import (
     DirectionalSurface,
     Fresnel,
 )
+from chipglow.surface.dispersive import DispersiveField, DispersiveSurface
 from chipglow.surface.emissivity import Emissivity
 from chipglow.surface.exchange import Exchange
 from chipglow.surface.feature import (
@@ -35,7 +36,7 @@ from chipglow.surface.oxide import (
 )
 from chipglow.surface.reflecting import ReflectingField, ReflectingSurface
 from chipglow.surface.side_flow import REFLECTIONS, SideElements, SideShape, Wedge
-from chipglow.surface.spectral import HagenRubens, SpectralSurface, SpectralTable
+from chipglow.surface.spectral import SPECTRA, HagenRubens, SpectralSurface, SpectralTable
 from chipglow.surface.surface import (
     SURFACES,
     EmissivityField,
@@ -55,10 +56,13 @@ __all__ = [
     "DIRECTIONS",
     "OXIDES",
     "REFLECTIONS",
+    "SPECTRA",
     "SURFACES",
     "Direction",
     "DirectionalField",
     "DirectionalSurface",
+    "DispersiveField",
+    "DispersiveSurface",
     "Emissivity",
     "EmissivityField",
     "EmissivityStack",

@@ -1,7 +1,7 @@
 """Emissivity by the angle at which a surface is looked at: Fresnel's equations."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from math import cos, radians
 from typing import Annotated, ClassVar, Final
@@ -89,6 +89,11 @@ class DirectionalSurface(WrappedSurface):
     """
 
     direction: Direction
+
+    @property
+    def effects(self) -> Mapping[str, str]:
+        """See `Surface.effects`."""
+        return {**self.bare.effects, "directional": repr(self.direction)}
 
     def on(self, scene: Scene) -> "DirectionalField":
         """Lay the surface on a scene."""

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Final, Literal, Self
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.scene import Frame, Material, Raster, Scene
@@ -22,6 +22,7 @@ from chipglow.surface.blend import (
     padded,
 )
 from chipglow.surface.emissivity import Emissivity
+from chipglow.surface.row_blocks import in_row_blocks
 from chipglow.surface.surface import EmissivityField, EmissivityStack, Surface
 from chipglow.surface.texture import Texture
 
@@ -90,6 +91,19 @@ class FeatureSurface(Surface):
         return {
             name: self._texture(getattr(self, name), np.random.default_rng(stream))
             for name, stream in zip(FEATURES, streams, strict=True)
+        }
+
+    @property
+    def effects(self) -> Mapping[str, str]:
+        """See `Surface.effects`."""
+        numbers = {name: getattr(self, name) for name in FEATURES}
+        restored = "" if self.restore_standard_deviation else ", standard deviation not restored"
+        return {
+            "emissivity": ", ".join(
+                f"{name} {one.mean:g} (standard deviation {one.standard_deviation:g})"
+                for name, one in numbers.items()
+            ),
+            "texture": f"grain {self.grain:g} m, follow {self.follow}, seed {self.seed}{restored}",
         }
 
     def on(self, scene: Scene) -> "FeatureField":
@@ -271,14 +285,16 @@ class FeatureFields(EmissivityStack):
             )
         rate = frame.plastic_strain_rate
         result = np.empty((len(self.fields), *first.raster.shape), dtype=np.float32)
-        _blend(
+        fields = (
             frame.material,
             frame.needed("plastic_strain"),
             np.zeros(first.raster.shape, np.float32) if rate is None else rate,
             *first.positions(frame),
-            self.shifts(frame.time),
-            self.textures,
-            result,
+        )
+        shifts, textures = self.shifts(frame.time), self.textures
+        in_row_blocks(
+            first.raster.rows,
+            lambda begin, end: _blend(*fields, shifts, textures, begin, end, result),
         )
         return result
 
@@ -348,14 +364,15 @@ def _mean_shifts(scene: Scene) -> NDArray[np.float64]:
 def _mean_velocities(frame: Frame, height: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean velocity of workpiece, chip and shear band in m/s, shape (3, 2); NaN if not there."""
     rows, rate = np.empty((len(height), 3, 3)), frame.plastic_strain_rate
-    _sum_velocities(
+    fields = (
         frame.material,
         frame.needed("plastic_strain"),
         np.zeros(frame.material.shape, np.float32) if rate is None else rate,
         frame.needed("velocity_x"),
         frame.needed("velocity_y"),
-        height,
-        rows,
+    )
+    in_row_blocks(
+        len(height), lambda begin, end: _sum_velocities(*fields, height, begin, end, rows)
     )
     sums = rows.sum(axis=0)
     weight = np.where(sums[:, 2:] > 0, sums[:, 2:], np.nan)
@@ -364,25 +381,28 @@ def _mean_velocities(frame: Frame, height: NDArray[np.float64]) -> NDArray[np.fl
     return np.asarray(velocity)
 
 
-@njit(cache=True, parallel=True)
-def _blend(material, strain, rate, x, y, shifts, textures, result):  # type: ignore[no-untyped-def]
-    """Emissivity of every surface."""
-    rows, columns = material.shape
-    seeds = textures[1].shape[1]
-    for r in prange(rows):
-        scratch = np.zeros((SCRATCH + seeds, columns), np.float32)
-        corner = np.empty(columns, np.int32)
+@njit(cache=True, nogil=True)
+def _blend(  # type: ignore[no-untyped-def]
+    material, strain, rate, x, y, shifts, textures, begin, end, result
+):
+    """Emissivity of every surface in some rows."""
+    columns = material.shape[1]
+    scratch = np.zeros((SCRATCH + textures[1].shape[1], columns), np.float32)
+    corner = np.empty(columns, np.int32)
+    for r in range(begin, end):
         blend_row(
             material[r], strain[r], rate[r], x[r], y[r], shifts, textures, r, scratch, corner,
             result[:, r],
         )  # fmt: skip
 
 
-@njit(cache=True, parallel=True)
-def _sum_velocities(material, strain, rate, vx, vy, height, sums):  # type: ignore[no-untyped-def]
-    """Weighted velocities and weights of the three features, summed along each row."""
-    rows, columns = material.shape
-    for r in prange(rows):
+@njit(cache=True, nogil=True)
+def _sum_velocities(  # type: ignore[no-untyped-def]
+    material, strain, rate, vx, vy, height, begin, end, sums
+):
+    """Weighted velocities and weights of the three features, summed along each of some rows."""
+    columns = material.shape[1]
+    for r in range(begin, end):
         sums[r] = 0.0
         for c in range(columns):
             if material[r, c] == _VOID or material[r, c] == _TOOL:

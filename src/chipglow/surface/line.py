@@ -44,6 +44,9 @@ class EmissivityTrend:
     own: tuple[tuple[float, float], ...] = ()
     measured: tuple[float, float] = (0.0, np.inf)
 
+    def __str__(self) -> str:
+        return f"{self.emissivity:.4g} at {self.middle:.4g} K, changing by {self.slope:.4g} 1/K"
+
     @property
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of emissivity and slope, shape (2, 2)."""
@@ -90,6 +93,11 @@ class TrendSurface(Surface, EmissivityField):
     trend: EmissivityTrend
     draw: int = 0
 
+    @property
+    def effects(self) -> Mapping[str, str]:
+        """See `Surface.effects`."""
+        return {"emissivity": f"{self.trend}{_draw_text(self.draw)}"}
+
     def on(self, scene: Scene) -> EmissivityField:
         """Return itself: it is the same on every scene."""
         return self
@@ -134,6 +142,13 @@ class FeatureTrends(WrappedSurface):
     trends: Mapping[str, EmissivityTrend]
     draw: int = 0
 
+    @property
+    def effects(self) -> Mapping[str, str]:
+        """See `Surface.effects`."""
+        lines = ", ".join(f"{name} {line}" for name, line in self.trends.items())
+        stated = f"{lines}{_draw_text(self.draw)}"
+        return {**self.bare.effects, "emissivity_by_temperature": stated}
+
     def redrawn(self, number: int) -> Self:
         """Another draw of the textures, and of the lines from their covariance."""
         if not number:
@@ -169,6 +184,10 @@ class FeatureTrendsField(EmissivityField):
                 mean = getattr(self.bare.surface, name).mean
                 result += fraction * (self.trends[name].at(frame.temperature) - mean)
         return np.clip(result, 0.0, 1.0).astype(np.float32)
+
+
+def _draw_text(draw: int) -> str:
+    return f", draw {draw} of their covariance" if draw else ""
 
 
 def _drawn(trends: Mapping[str, EmissivityTrend], draw: int) -> Mapping[str, EmissivityTrend]:

@@ -1,5 +1,6 @@
 """A surface whose emissivity was measured, as a fixed image."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final, Self
 
@@ -57,6 +58,19 @@ class MapSurface(Surface):
     middle: float = 0.0
     uncertainty: NDArray[np.floating] | None = None
     draw: int = 0
+
+    @property
+    def effects(self) -> Mapping[str, str]:
+        """See `Surface.effects`."""
+        across = f"{self.raster.columns} x {self.raster.rows} pixels of {self.raster.spacing:g} m"
+        stated = [f"image of {across}, mean {np.nanmean(self.values):.4g}"]
+        stated += [f"elsewhere {self.elsewhere:g}"]
+        if self.slopes is not None:
+            mean = np.nanmean(self.slopes)
+            stated += [f"mean change {mean:.4g} 1/K from {self.middle:g} K on"]
+        if self.draw:
+            stated += [f"draw {self.draw} of its uncertainty"]
+        return {"emissivity": ", ".join(stated)}
 
     def __post_init__(self) -> None:
         if self.values.shape != self.raster.shape:

@@ -1,6 +1,7 @@
 """Oxide that grows on hot material by the parabolic law, and what it does to the emissivity."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import ceil
@@ -98,6 +99,11 @@ class OxidisedSurface(WrappedSurface):
 
     oxide: Oxide = field(default_factory=ParabolicOxide)
 
+    @property
+    def effects(self) -> Mapping[str, str]:
+        """See `Surface.effects`."""
+        return {**self.bare.effects, "oxide": repr(self.oxide)}
+
     def on(self, scene: Scene) -> "OxidisedField":
         """Lay the surface on a scene; all its frames are read once.
 
@@ -165,11 +171,11 @@ class OxideHistory:
         """What came to the squared thickness of every sample of a frame in m², shape (y, x)."""
         place = float(np.interp(frame.time, self.times, np.arange(self.times.size)))
         first = min(int(place), max(self.times.size - 2, 0))
-        share = place - first
+        weight = place - first
         last = min(first + 1, self.times.size - 1)
         cells = self._cells(frame)
-        found = (1 - share) * self.grown[first].ravel()[cells]
-        return np.asarray(found + share * self.grown[last].ravel()[cells], np.float64)
+        found = (1 - weight) * self.grown[first].ravel()[cells]
+        return np.asarray(found + weight * self.grown[last].ravel()[cells], np.float64)
 
     def _cells(self, frame: Frame) -> NDArray[np.intp]:
         """Number of the cell of every sample."""

@@ -1,6 +1,6 @@
 """A surface that reflects what the rake face and the chip's side send each other."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, Self
 
@@ -48,6 +48,11 @@ class ReflectingSurface(WrappedSurface):
     shape: SideShape = field(default_factory=Wedge)
     band: Band | None = None
     reflected: float | None = None
+
+    @property
+    def effects(self) -> Mapping[str, str]:
+        """See `Surface.effects`."""
+        return {**self.bare.effects, "reflections": repr(self.shape)}
 
     def in_band(self, band: Band, reflected: float | None) -> Self:
         """See `Surface.in_band`."""
@@ -150,18 +155,18 @@ class _ReflectingStack(EmissivityStack):
         touching = sections.touching(frame.material)
         if not touching.any():
             return result
-        (rows, columns, section, element), share = sections.seen(touching, frame.material)
+        (rows, columns, section, element), weight = sections.seen(touching, frame.material)
         black = self.first.band.radiance(frame.temperature[rows, columns].astype(np.float64))
         environment = self.first.surroundings
         gain = np.asarray(black, np.float64) - environment
         of_element = self.first.slope_ratio
-        slopes = (1 - share) * of_element[element] + share * of_element[element + 1]
+        slopes = (1 - weight) * of_element[element] + weight * of_element[element + 1]
         # A sample just as warm as its surroundings shows neither itself nor what it reflects.
         told = np.abs(gain) > 1e-6 * environment
         for emissivity in result:
             incident = self._incident(frame, emissivity, touching)
-            added = (1 - share) * incident[section, element]
-            added += share * incident[section, element + 1]
+            added = (1 - weight) * incident[section, element]
+            added += weight * incident[section, element + 1]
             own = np.minimum(emissivity[rows, columns] * slopes, 1.0)
             effective = own + (1.0 - own) * np.divide(
                 added - environment, gain, out=np.zeros_like(gain), where=told
@@ -202,7 +207,7 @@ class _Sections:
         Rows and columns of the samples by which a section is touched, shape (2, section, height).
     samples : ndarray
         Row, column, section and element of all samples beside the face, shape (4, sample).
-    share : ndarray
+    weight : ndarray
         How far each is on the way from its element to the next one, 0 to 1, shape (sample,).
     """
 
@@ -212,7 +217,7 @@ class _Sections:
     columns: NDArray[np.intp]
     probes: NDArray[np.intp]
     samples: NDArray[np.intp]
-    share: NDArray[np.float64]
+    weight: NDArray[np.float64]
 
     @classmethod
     def of(cls, raster: Raster, tool: Tool, shape: SideShape) -> "_Sections":
@@ -225,7 +230,7 @@ class _Sections:
         heights = np.arange(raster.spacing / 4, TOUCHING + step, step)
         section = np.floor(along / raster.spacing).astype(np.intp)
         beside = np.flatnonzero((section >= 0) & (section < count))
-        number, share, known = _between(shape, depth.ravel()[beside])
+        number, weight, known = _between(shape, depth.ravel()[beside])
         beside = beside[known]
         placed = (*np.divmod(beside, raster.columns), section.ravel()[beside], number[known])
         return cls(
@@ -234,7 +239,7 @@ class _Sections:
             *_samples_at(raster, tool, foot, _looked_up(shape, raster.spacing)),
             np.stack(_samples_at(raster, tool, foot, heights)),
             np.stack(placed),
-            share[known],
+            weight[known],
         )
 
     def touching(self, material: NDArray[np.uint8]) -> NDArray[np.bool_]:
@@ -246,10 +251,10 @@ class _Sections:
     def seen(
         self, touching: NDArray[np.bool_], material: NDArray[np.uint8]
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Row, column, section and element of the samples in those sections, and their shares."""
+        """Row, column, section and element of the samples in those sections, and their weights."""
         rows, columns, section, _ = self.samples
         there = touching[section] & (material[rows, columns] != Material.VOID)
-        return self.samples[:, there], self.share[there]
+        return self.samples[:, there], self.weight[there]
 
 
 def _looked_up(shape: SideShape, spacing: float) -> NDArray[np.float64]:
@@ -270,7 +275,7 @@ def _between(
 ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.bool_]]:
     """Element before each depth, the way to the next, 0 to 1, and whether any is so near."""
     elements, middles = shape.elements, shape.elements.depths
-    number, share = np.zeros(depth.size, np.intp), np.zeros(depth.size)
+    number, weight = np.zeros(depth.size, np.intp), np.zeros(depth.size)
     known = np.zeros(depth.size, np.bool_)
     sides = (
         (range(elements.tool_side), (depth < 0) & (depth >= middles[0])),
@@ -280,9 +285,9 @@ def _between(
         if len(part) > 1:
             place = np.interp(depth[near], middles[part], np.arange(len(part)))
             first = np.minimum(place.astype(np.intp), len(part) - 2)
-            number[near], share[near] = part.start + first, place - first
+            number[near], weight[near] = part.start + first, place - first
             known |= near
-    return number, share, known
+    return number, weight, known
 
 
 def _samples_at(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Strict
 from scipy.constants import c, epsilon_0, pi
 
-from chipglow.quantities import Parameter
+from chipglow.quantities import Family, Parameter
 from chipglow.quantities.units import (
     RESISTIVITY,
     TEMPERATURE_COEFFICIENT,
@@ -21,6 +21,9 @@ from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Scene
 from chipglow.surface.surface import SURFACES, EmissivityField, Surface
 from chipglow.surface.temperature import TemperatureSurface
+
+SPECTRA: Final = Family("spectral")
+"""Laws of the wavelength by their kind; other packages add theirs in ``chipglow.spectral``."""
 
 REFERENCE: Final = 293.15
 """Temperature in K at which resistivities are stated."""
@@ -75,6 +78,7 @@ class SpectralSurface(Surface):
         raise ValueError(f"{self.kind}: no band is set, expected that of a camera (in_band)")
 
 
+@SPECTRA.part
 @SURFACES.part
 @dataclass(frozen=True)
 class SpectralTable(SpectralSurface):
@@ -114,17 +118,18 @@ class SpectralTable(SpectralSurface):
         """See `SpectralSurface.spectral_emissivity`."""
         wavelengths, temperatures, values = self._grid
         table = values.reshape(wavelengths.size, temperatures.size)
-        first, share = _between(wavelengths, np.asarray(wavelength, np.float64))
+        first, weight = _between(wavelengths, np.asarray(wavelength, np.float64))
         lower, part = _between(temperatures, np.asarray(temperature, np.float64))
         last, upper = (
             np.minimum(at + 1, axis.size - 1)
             for at, axis in ((first, wavelengths), (lower, temperatures))
         )
-        cold = (1 - share) * table[first, lower] + share * table[last, lower]
-        hot = (1 - share) * table[first, upper] + share * table[last, upper]
+        cold = (1 - weight) * table[first, lower] + weight * table[last, lower]
+        hot = (1 - weight) * table[first, upper] + weight * table[last, upper]
         return np.asarray((1 - part) * cold + part * hot, np.float64)
 
 
+@SPECTRA.part
 @SURFACES.part
 @dataclass(frozen=True)
 class HagenRubens(SpectralSurface):

@@ -1,7 +1,7 @@
 """What a surface owes the camera: an emissivity for every sample of every frame."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Final, Self
 
@@ -115,6 +115,11 @@ class Surface(SurfaceChoice):
     @abstractmethod
     def on(self, scene: Scene) -> EmissivityField:
         """Lay this surface on a scene; what depends on the whole scene is computed here."""
+
+    @property
+    def effects(self) -> Mapping[str, str]:
+        """What a measurement of it states of it, by the names of its effects, in SI."""
+        return {"emissivity": repr(self)}
 
     def in_band(self, band: Band, reflected: float | None) -> "Surface":
         """The surface as a camera sees it; itself where the camera does not matter.

@@ -6,7 +6,7 @@ from math import sqrt
 from typing import Any, Final
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.surface.cubic import autocorrelation
@@ -182,10 +182,8 @@ def emissivity_at(deviate, table):  # type: ignore[no-untyped-def]
     return table[i] + (inside - np.float32(i)) * (table[i + 1] - table[i])
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, nogil=True)
 def _look_up(nodes, table, scale, x, y, result):  # type: ignore[no-untyped-def]
-    chunk = 4096
-    for k in prange((x.size + chunk - 1) // chunk):
-        for i in range(k * chunk, min((k + 1) * chunk, x.size)):
-            down, across = cubic_taps(y[i] * scale), cubic_taps(x[i] * scale)
-            result[i] = emissivity_at(enlarged(nodes, down, across), table)
+    for i in range(x.size):
+        down, across = cubic_taps(y[i] * scale), cubic_taps(x[i] * scale)
+        result[i] = emissivity_at(enlarged(nodes, down, across), table)

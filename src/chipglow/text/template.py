@@ -26,16 +26,16 @@ def commented_yaml(header: str, section: Section, unused: Collection[str] = ()) 
     return "\n".join([header, *_section_lines(section, values, "", unused)]) + "\n"
 
 
-def json_schema(section: type[Section]) -> str:
-    """JSON schema of a section, by which editors check and complete YAML.
+def json_schema(model: type[BaseModel]) -> str:
+    """JSON schema of a model, by which editors check and complete YAML.
 
     Parameters
     ----------
-    section : type
-        The section.
+    model : type
+        The model, such as a section of a description.
     """
     dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
-    return json.dumps(dialect | section.model_json_schema(), indent=1) + "\n"
+    return json.dumps(dialect | model.model_json_schema(), indent=1) + "\n"
 
 
 def _section_lines(

@@ -1,5 +1,6 @@
 """The camera's own calibration, from frames of blackbodies that its detector sees."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import exp, log, nan
@@ -103,6 +104,25 @@ class FlatFieldCalibration:
             float(np.median(mean_frame(uniformity.apply(frames))[~bad])) for frames in (cold, hot)
         )
         return cls(detector, point, uniformity, bad, saturated, sources, (low, high))
+
+    @property
+    def effects(self) -> Mapping[str, str]:
+        """What a measurement states of detector and calibration, in SI."""
+        made, kelvins = self.detector, self.point.band.temperature(np.array(self.sources))
+        well = "" if made.full_well is None else f", full well {made.full_well:g} e-"
+        low, high = kelvins.tolist()
+        return {
+            "detector_response": repr(made.response),
+            "detector_terms": ", ".join(repr(term) for term in made.terms) or "none",
+            "digitiser": (
+                f"{made.bits} bits, gain {made.conversion_gain:g} DN/e-, offset {made.offset:g} DN"
+                f"{well}"
+            ),
+            "calibration": (
+                f"correction {made.correction}, {made.frames} frames of each of two blackbodies, "
+                f"{low:.5g} K and {high:.5g} K, seed {made.seed}"
+            ),
+        }
 
     def radiance(self, counts: NDArray[np.uint32]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Radiance and flags of frames.

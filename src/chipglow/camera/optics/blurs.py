@@ -1,7 +1,7 @@
 """What spreads light besides the optics: charge that diffuses, and a camera that moves."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from math import ceil, cos, pi, sin
 from typing import Annotated, ClassVar, Final, final
@@ -23,6 +23,7 @@ from chipglow.camera.optics.kernel import (
 from chipglow.camera.optics.psf import PointSpreadFunction
 from chipglow.quantities import Family, Parameter, Part
 from chipglow.quantities.units import ANGLE, LENGTH
+from chipglow.radiometry import Band
 
 BLURS: Final = Family("blur")
 """Blurs by their kind; other packages add theirs in the group ``chipglow.blur``."""
@@ -233,6 +234,10 @@ class BlurredPSF(PointSpreadFunction):
         row, column = peak(kernel)
         widths = [half_maximum_width(line) for line in (kernel[row], kernel[:, column])]
         return float(np.mean(widths)) * spacing
+
+    def in_band(self, band: Band) -> "BlurredPSF":
+        """The optics' own in that band, with the same blurs; see `PointSpreadFunction.in_band`."""
+        return replace(self, psf=self.psf.in_band(band))
 
     def kernel(self, spacing: float) -> NDArray[np.float64]:
         """Blur the kernel; see `PointSpreadFunction.kernel`."""

@@ -1,7 +1,7 @@
 """Point spread functions of an infrared camera."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from errno import ENOENT
 from math import ceil, inf, log, pi, sqrt
 from pathlib import Path
@@ -93,6 +93,16 @@ class PointSpreadFunction(PSFChoice):
         """Return itself: it is given on the scene."""
         return self
 
+    def in_band(self, band: Band) -> "PointSpreadFunction":
+        """That of the same optics in another band; itself where it is not by diffraction.
+
+        Parameters
+        ----------
+        band : Band
+            The other band.
+        """
+        return self
+
     @abstractmethod
     def kernel(self, spacing: float) -> NDArray[np.float64]:
         """Fractions of a point's light on a grid of squares.
@@ -180,6 +190,10 @@ class AnnularAperturePSF(PointSpreadFunction):
         super().__post_init__()
         half = brentq(lambda v: float(self._profile(np.array(v))) - 0.5, 0.1, 3.0)
         object.__setattr__(self, "fwhm", 2 * float(half) * self._unit)
+
+    def in_band(self, band: Band) -> "AnnularAperturePSF":
+        """Diffraction at the band's middle wavelength; see `PointSpreadFunction.in_band`."""
+        return replace(self, wavelength=(band.lower + band.upper) / 2)
 
     def kernel(self, spacing: float) -> NDArray[np.float64]:
         """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, factorial, log2, pi, sqrt
 from numbers import Integral, Real
@@ -244,6 +244,10 @@ class PupilPSF(PointSpreadFunction):
                 part += _interpolated(change, places)
             found[passed] += weight * part
         return found
+
+    def in_band(self, band: Band) -> "PupilPSF":
+        """Diffraction over that band; see `PointSpreadFunction.in_band`."""
+        return replace(self, band=band)
 
     def kernel(self, spacing: float) -> NDArray[np.float64]:
         """Integrate over squares of side `spacing`; see `PointSpreadFunction.kernel`."""

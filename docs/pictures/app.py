@@ -1,0 +1,57 @@
+"""The picture of the app's page.
+
+    python docs/pictures/app.py [FOLDER]
+
+Serves the scene that comes with the app and takes pictures of it in headless Chromium, at 1280 and
+1920 pixels, on light and on dark ground: into the folder, or only the page's own beside it.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+CHROMIUM = os.environ.get("CHIPGLOW_CHROMIUM") or shutil.which("chromium")
+FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking")
+SIZES = ((1280, 800), (1920, 1080))
+
+
+def main(folder):
+    """Serve, and take the pictures."""
+    from playwright.sync_api import sync_playwright
+
+    command = [sys.executable, "-m", "chipglow", "app", "--no-browser"]
+    with (
+        subprocess.Popen(command, stdout=subprocess.PIPE, encoding="utf-8") as server,
+        sync_playwright() as playwright,
+    ):
+        url = re.search(r"http://\S+", server.stdout.readline())[0]
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
+        if folder is None:
+            take(browser, url, SIZES[0], "light", HERE / "app.png")
+        else:
+            for size in SIZES:
+                for theme in ("light", "dark"):
+                    take(browser, url, size, theme, Path(folder, f"app-{size[0]}-{theme}.png"))
+        browser.close()
+        server.terminate()
+
+
+def take(browser, url, size, theme, file):
+    """One picture."""
+    width, height = size
+    page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=theme)
+    page.set_default_timeout(180_000)
+    page.goto(f"{url}&netd=0.5+K")
+    page.locator("#status", has_text="Exact picture").wait_for()
+    page.get_by_role("table", name="Parts of the error").wait_for()
+    page.wait_for_timeout(1000)
+    page.screenshot(path=file)
+    page.close()
+
+
+if __name__ == "__main__":
+    main(*(sys.argv[1:] or [None]))

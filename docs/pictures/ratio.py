@@ -1,0 +1,125 @@
+"""Draws the pictures of the page on ratio temperature: ``python docs/pictures/ratio.py``.
+
+The cut is the quick one. It prints the rows of the page's tables.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+
+import chipglow
+from chipglow.camera import RatioCamera
+from chipglow.drawing import drawing
+from chipglow.drawing.drawing import HEAT, KELVIN, SIGNED
+from chipglow.errors import RatioErrors, WavelengthErrors, ratio_errors
+from chipglow.errors.wavelengths import band_name
+from chipglow.radiometry import Band, RatioThermometer
+from chipglow.report.wavelength_figure import draw_wavelengths
+from chipglow.surface import CHIP_1
+
+matplotlib.use("Agg")
+HERE = Path(__file__).parent
+SHORT, LONG = Band(1.5e-6, 1.7e-6), Band(3.8e-6, 5.1e-6)
+DETECTOR = {
+    "response": {"kind": "range", "hottest": "900 degC"},
+    "full_well": 7e6,
+    "bits": 14,
+    "terms": [{"kind": "shot-noise"}, {"kind": "read-noise", "standard_deviation": 400}],
+}
+METAL = {"kind": "hagen-rubens", "resistivity": "6e-7 ohm*m"}
+HOT = 400.0 + KELVIN
+CAUSES = ("motion", "footprint", "optics", "misregistration")
+
+
+def main() -> None:
+    """Draw images and study, and print what the page tells."""
+    print_thermometers()
+    quick = chipglow.Study.quick()
+    scene = chipglow.open_scene(chipglow.cut(quick))
+    camera = quick.camera.build()
+    first, second = (replace(camera.in_band(band), lower_limit=None) for band in (SHORT, LONG))
+    pair = RatioCamera(first, second, shift=(1e-6, 0.0))
+    draw_images(ratio_errors(pair, scene, CHIP_1, 379e-6), scene.tool)
+    grey, metal = (chipglow.wavelengths(study(quick, law)) for law in ("none", METAL))
+    draw_wavelengths(grey).savefig(HERE / "ratio-wavelengths.png", dpi=150)
+    print_study(grey, metal)
+
+
+def study(quick: chipglow.study.Study, law: Any) -> chipglow.study.Study:
+    """The quick study with a detector, more draws, and a law of the wavelength."""
+    settings = quick.model_dump(mode="json")
+    settings["camera"]["detector"] = DETECTOR
+    settings["surface"]["spectral"] = law
+    settings["analysis"] |= {"phases": 3, "textures": 2}
+    return chipglow.study.Study.model_validate(settings)
+
+
+def print_thermometers() -> None:
+    """Sensitivity of some ratios, and errors by emissivity."""
+    bands = [Band(0.9e-6, 1.1e-6), SHORT, Band(2.0e-6, 2.4e-6), LONG, Band(8e-6, 9.5e-6)]
+    for one, other in ((0, 1), (1, 2), (1, 3), (2, 3), (3, 4)):
+        ratio = RatioThermometer(bands[one], bands[other])
+        cells = []
+        for kelvins in (693.15, 873.15):
+            error = float(ratio.emissivity_error(kelvins, 1.05))
+            cells.append(f"{100 * float(ratio.sensitivity(kelvins)):.2f} %/K | {error:+.1f} K")
+        print(f"| {band_name(bands[one])} / {band_name(bands[other])} | {' | '.join(cells)} |")
+    for band in bands:
+        cells = []
+        for kelvins in (693.15, 873.15):
+            seen = float(band.temperature(1.05 * band.radiance(kelvins)))
+            slope = float(band.slope(kelvins) / band.radiance(kelvins))
+            cells.append(f"{100 * slope:.2f} %/K | {seen - kelvins:+.1f} K")
+        print(f"| {band_name(band)} alone | {' | '.join(cells)} |")
+
+
+def draw_images(errors: RatioErrors, tool: Any) -> None:
+    """Truth, ratio temperature, and what makes its error."""
+    with drawing.style():
+        figure = drawing.image_figure(errors.raster, 2.6, 3)
+        axes = figure.subplots(3, 2, sharex=True, sharey=True)
+        shown = {"true temperature": errors.truth, "ratio temperature": errors.measured}
+        for axis, (title, image) in zip(axes.flat, shown.items(), strict=False):
+            celsius = image - KELVIN
+            heat = drawing.show_image(axis, celsius, errors.raster, tool, HEAT, (20.0, 800.0))
+            axis.set_title(title)
+        drawing.colour_bar(figure, heat, axes[0], "°C")
+        for axis, name in zip(axes.flat[2:], CAUSES, strict=True):
+            image = errors.causes[name]
+            part = drawing.show_image(axis, image, errors.raster, tool, SIGNED, (-20.0, 20.0))
+            axis.set_title(f"by {name}")
+            hot = np.abs(image[errors.truth > HOT])
+            print(f"{name}: over 400 °C {np.median(hot):.2f} K and less, {hot.max():.1f} K at most")
+        drawing.colour_bar(figure, part, axes[1:], "K")
+        for axis in axes.flat:
+            axis.label_outer()
+    figure.savefig(HERE / "ratio.png", dpi=150)
+
+
+def print_study(grey: WavelengthErrors, metal: WavelengthErrors) -> None:
+    """Rows of the table of bands, the least error first."""
+    for place in grey.places:
+        both = zip(grey.errors, metal.errors, strict=True)
+        rows = sorted((pair for pair in both if pair[0].place == place), key=lambda p: p[0].total)
+        truth = rows[0][0].truth
+        print(f"{place}: {truth.mean() - KELVIN:.0f} °C ± {truth.std():.0f} K, {truth.size} draws")
+        for one, bare in rows:
+            names = [band_name(band) for band in (one.first, one.second) if band]
+            parts = [f"{one.steps[name].mean():+.1f}" for name in ("motion", "footprint", "optics")]
+            numbers = [one.shift_error, one.noise, one.emissivity]
+            cells = [
+                " / ".join(names) + (" alone" if one.second is None else ""),
+                f"{one.total:.0f}",
+                f"{one.error.mean():+.1f} ± {one.error.std():.1f}",
+                *parts,
+                *(f"{number:.1f}" for number in numbers),
+                f"{bare.steps['emissivity'].mean():+.1f}",
+            ]
+            print(f"| {' | '.join(cells)} |")
+
+
+if __name__ == "__main__":
+    main()

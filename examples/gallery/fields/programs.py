@@ -1,0 +1,61 @@
+"""
+One block from six programs
+===========================
+
+.. image:: images/sphx_glr_programs_001.png
+   :alt: One block from six programs
+
+The files in which AdvantEdge, DEFORM, Abaqus, LS-DYNA, Ansys and OpenFOAM would give the same
+block, in mm and °C, or in SI: each is imported with the description of its page.
+
+What you see: the temperature that arrives. A wrong unit, axis or origin would show; below is how
+far the six are from what was written: linear between nodes 10 µm apart, or constant in OpenFOAM's
+cells.
+
+More: :doc:`/do/import`, and a page for each program.
+"""
+
+import re
+
+import numpy as np
+import sample_files
+
+import chipglow
+from chipglow.drawing.drawing import HEAT, KELVIN, new_figure, show_image, style
+from chipglow.scene import Material
+
+PROGRAMS = {
+    "AdvantEdge": "from-advantedge",
+    "DEFORM": "from-deform",
+    "Abaqus": "from-abaqus",
+    "LS-DYNA": "from-ls-dyna",
+    "Ansys": "from-ansys",
+    "OpenFOAM": "from-openfoam",
+}
+
+
+def imported(page):
+    """The scene of a page's files, sampled every 5 µm."""
+    folder = sample_files.folder(page)
+    text = (sample_files.HERE / "do" / f"{page}.md").read_text(encoding="utf-8")
+    name, content = re.search(r"<!-- file: (\S+) -->\n```yaml\n(.*?)```", text, re.DOTALL).groups()
+    (folder / name).write_text(content, encoding="utf-8")
+    wanted = chipglow.load_import(str(folder / name), ["field_of_view.spacing=5 um"])
+    return chipglow.read_scene(wanted.build())
+
+
+with style():
+    figure = new_figure(4.2)
+    figure.set_layout_engine("compressed")
+    panels = figure.subplots(2, 3, sharex=True, sharey=True)
+    for axes, (program, page) in zip(panels.flat, PROGRAMS.items(), strict=True):
+        scene = imported(page)
+        frame = scene.frame(0)
+        there = frame.material == Material.WORKPIECE
+        celsius = np.where(there, frame.temperature - KELVIN, np.nan)
+        picture = show_image(axes, celsius, scene.raster, None, HEAT, (100.0, 600.0))
+        axes.set_title(program)
+        axes.label_outer()
+        off = np.abs(celsius - 100 - 500 * np.exp(scene.raster.x / 100e-6))
+        print(f"{program}: off by {np.nanmedian(off):.2f} K, {np.nanmax(off):.1f} K at most")
+    figure.colorbar(picture, ax=panels, label="temperature / °C")

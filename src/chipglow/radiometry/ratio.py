@@ -1,0 +1,182 @@
+"""Ratio (two-colour) thermometry: a temperature from the radiances of two bands."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST, Band
+
+
+@dataclass(frozen=True)
+class RatioThermometer:
+    """The temperature at which two bands send radiances of a given ratio.
+
+    Parameters
+    ----------
+    first, second : Band
+        The bands, that of the shorter wavelengths first.
+    emissivity_ratio : float
+        Emissivity in the first band over that in the second; 1 for a grey body.
+    emissivity_ratio_uncertainty : float
+        Its standard uncertainty.
+
+    Raises
+    ------
+    ValueError
+        If a number is impossible, or the ratio of the radiances rises at no temperature.
+
+    Notes
+    -----
+    The ratio is r(T) = ε₁ L₁(T) / (ε₂ L₂(T)) with the in-band radiances of a blackbody. An
+    emissivity that is the same in both bands cancels, whatever it is. In `range` the ratio rises
+    with the temperature: there 1/T is tabulated over ln r, which is nearly straight, as cubics with
+    the slopes of the exact inverse. Bands apart have one temperature for each ratio from 200 K to
+    6000 K; of bands that overlap the longest such range is taken.
+    """
+
+    first: Band
+    second: Band
+    emissivity_ratio: float = 1.0
+    emissivity_ratio_uncertainty: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.emissivity_ratio < inf:
+            raise ValueError(
+                f"emissivity_ratio: {self.emissivity_ratio!r}, expected over 0, such as 1"
+            )
+        if not 0.0 <= self.emissivity_ratio_uncertainty < inf:
+            raise ValueError(
+                f"emissivity_ratio_uncertainty: {self.emissivity_ratio_uncertainty!r}, expected 0 "
+                "or more"
+            )
+        if self._rising.stop - self._rising.start < 2:
+            raise ValueError(
+                "bands: the ratio of their radiances does not rise with the temperature, expected "
+                "the band of the shorter wavelengths first"
+            )
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Least and greatest temperature in K that are told."""
+        known = self._temperatures[self._rising]
+        return float(known[0]), float(known[-1])
+
+    def ratio(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Radiance of the first band over that of the second.
+
+        Parameters
+        ----------
+        temperature : array_like
+            True temperature in K, of any shape.
+        """
+        kelvins = np.asarray(temperature, np.float64)
+        black = self.first.radiance(kelvins) / self.second.radiance(kelvins)
+        return np.asarray(self.emissivity_ratio * black, np.float64)
+
+    def temperature(self, first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
+        """Ratio temperature.
+
+        Parameters
+        ----------
+        first, second : array_like
+            Radiances in W/(m² sr) in either band, of shapes that broadcast.
+
+        Returns
+        -------
+        ndarray
+            In K; NaN where a radiance is not positive and finite, and where the ratio is one that
+            no temperature of `range` has.
+        """
+        upper, lower = np.asarray(first, np.float64), np.asarray(second, np.float64)
+        possible = (upper > 0) & (lower > 0) & np.isfinite(upper) & np.isfinite(lower)
+        logarithm = np.log(np.where(possible, upper, 1.0)) - np.log(
+            np.where(possible, lower, 1.0) * self.emissivity_ratio
+        )
+        inverse = self._inverse(logarithm)
+        return np.asarray(np.where(possible, 1.0 / inverse, np.nan), np.float64)
+
+    def sensitivity(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Relative change of the ratio with the temperature, d ln r / dT, in 1/K.
+
+        Parameters
+        ----------
+        temperature : array_like
+            True temperature in K, of any shape; NaN where it is beyond 200 K to 6000 K.
+        """
+        kelvins = np.asarray(temperature, np.float64)
+        return np.asarray(
+            self.first.slope(kelvins) / self.first.radiance(kelvins)
+            - self.second.slope(kelvins) / self.second.radiance(kelvins),
+            np.float64,
+        )
+
+    def emissivity_error(self, temperature: ArrayLike, ratio: ArrayLike) -> NDArray[np.float64]:
+        """Error of the ratio temperature where the emissivities have another ratio, in K.
+
+        Parameters
+        ----------
+        temperature : array_like
+            True temperature in K.
+        ratio : array_like
+            True emissivity in the first band over that in the second.
+
+        Notes
+        -----
+        In Wien's limit and narrow bands 1/T_r − 1/T = Λ ln(x) / c2 with x the assumed over the true
+        ratio of the emissivities and 1/Λ = 1/λ₁ − 1/λ₂.
+        """
+        kelvins = np.asarray(temperature, np.float64)
+        seen = self.first.radiance(kelvins) * np.asarray(ratio, np.float64)
+        return self.temperature(seen, self.second.radiance(kelvins)) - kelvins
+
+    def uncertainty(self, temperature: ArrayLike) -> NDArray[np.float64]:
+        """Standard uncertainty in K that the ratio of the emissivities makes.
+
+        Parameters
+        ----------
+        temperature : array_like
+            Temperature in K.
+        """
+        relative = self.emissivity_ratio_uncertainty / self.emissivity_ratio
+        return relative / self.sensitivity(temperature)
+
+    @property
+    def _temperatures(self) -> NDArray[np.float64]:
+        """Nodes of the bands' tables in K."""
+        return np.linspace(TABLE_COLDEST, TABLE_HOTTEST, len(self.first.radiance_table))
+
+    @cached_property
+    def _slopes(self) -> NDArray[np.float64]:
+        """Relative change of the ratio with the temperature at the nodes, in 1/K."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            upper, lower = (
+                band.radiance_table[:, 1] / band.radiance_table[:, 0]
+                for band in (self.first, self.second)
+            )
+        return np.asarray(upper - lower)
+
+    @cached_property
+    def _rising(self) -> slice:
+        """Nodes of the longest range in which the ratio rises."""
+        rises = np.concatenate([[False], self._slopes > 0, [False]])
+        starts, stops = (np.flatnonzero(np.diff(rises.astype(int)) == s) for s in (1, -1))
+        if not starts.size:
+            return slice(0, 0)
+        longest = int(np.argmax(stops - starts))
+        return slice(int(starts[longest]), int(stops[longest]))
+
+    @cached_property
+    def _inverse(self) -> Any:
+        """1/T over the logarithm of the blackbodies' ratio; NaN beyond."""
+        kelvins, slopes = self._temperatures[self._rising], self._slopes[self._rising]
+        upper, lower = (
+            np.log(band.radiance_table[self._rising, 0]) for band in (self.first, self.second)
+        )
+        return CubicHermiteSpline(
+            upper - lower, 1.0 / kelvins, -1.0 / (kelvins**2 * slopes), extrapolate=False
+        )
