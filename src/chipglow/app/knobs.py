@@ -303,9 +303,9 @@ class ControlPanel:
     knobs: tuple[Knob, ...]
 
     @classmethod
-    def of(cls, study: Study, scene: Scene, initial: Knobs) -> "ControlPanel":
-        """The knobs for a scene, with sliders as long as it."""
-        return cls(study, initial, tuple(_knobs(study, scene, initial)))
+    def of(cls, study: Study, scene: Scene, initial: Knobs, duration: float) -> "ControlPanel":
+        """The knobs for a scene with sliders as long as it, in which a frame takes a duration."""
+        return cls(study, initial, tuple(_knobs(study, scene, initial, duration)))
 
     @classmethod
     def of_times(cls, initial: Knobs, times: NDArray[np.float64]) -> "ControlPanel":
@@ -472,7 +472,7 @@ def surface_choices(study: Study) -> dict[str, str]:
     return {**found, **own, UNIFORM: "Uniform"}
 
 
-def _knobs(study: Study, scene: Scene, initial: Knobs) -> Any:
+def _knobs(study: Study, scene: Scene, initial: Knobs, duration: float) -> Any:
     psfs = {
         "annular-aperture": "Annular aperture",
         "gaussian": "Gaussian",
@@ -482,7 +482,7 @@ def _knobs(study: Study, scene: Scene, initial: Knobs) -> Any:
         psfs[STUDYS] = "As in the study"
     side = 1e6 * scene.raster.spacing * min(scene.raster.shape)
     shown = {k: v for k, v in SHOWN.items() if _is_there(k, scene)}
-    yield _time_knob("Exposure begins", _starts(scene, initial.integration_time))
+    yield _time_knob("Exposure begins", _starts(scene, duration))
     yield Knob("shown", "Scene image", "Scene", choices=shown)
     yield Knob("error", "Error image", "Scene", choices=ERRORS)
     yield Knob("band_lower", "Band from", "Camera", WAVELENGTH, 0.8, 8.0, 0.1)

@@ -249,7 +249,10 @@ class SceneModel:
     def _exposure_key(self, knobs: Knobs) -> Hashable:
         band = knobs.band_lower, knobs.band_upper
         when = knobs.start, knobs.integration_time
-        return (_surface_key(knobs), band, when, knobs.reflected)
+        # Of a rolling shutter it is the pixels that say when a sample's row is exposed.
+        rolling = self.panel.study.camera.line_time is not None
+        rows = (knobs.pitch, knobs.offset_down) if rolling else ()
+        return (_surface_key(knobs), band, when, knobs.reflected, rows)
 
     def _on(self, study: Study, knobs: Knobs, coarse: bool) -> tuple[Scene, Surface]:
         """The scene with its tool, and the surface that is seen."""

@@ -78,11 +78,11 @@ class OpenedScene:
             study = study.model_copy(
                 update={"surface": Declared[UniformEmissivity].model_validate(surface)}
             )
-        coarse = _coarse(scene)
-        start = _start(scene, study.camera.integration_time)
+        duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
+        start = _start(scene, duration)
         place = _places(scene, start, study.camera.integration_time)
         initial = knobs_of(study, start, *place)
-        return cls(name, scene, coarse, ControlPanel.of(study, scene, initial))
+        return cls(name, scene, _coarse(scene), ControlPanel.of(study, scene, initial, duration))
 
 
 @dataclass(frozen=True, eq=False)
