@@ -134,10 +134,9 @@ def resident(process):
 
 def own(path):
     """What a scene is itself: its splines or samples in memory, and its samples if all were."""
-    from chipglow.app.opening import bundled_path
-    from chipglow.io import open_scene
+    from chipglow.io import example_scene, open_scene
 
-    scene = open_scene(path or bundled_path())
+    scene = open_scene(path) if path else example_scene()
     samples = len(scene) * scene.raster.rows * scene.raster.columns * 4 * len(scene.fields)
     kept = samples if scene.lattice is None else 4 * len(scene) * int(np.prod(scene.lattice.shape))
     return f"the scene's own {kept / 1e6:.0f} MB, its samples {samples / 1e6:.0f} MB"

@@ -12,11 +12,11 @@ import chipglow
 from chipglow.app.files import figure_file, measurement_file, study_file
 from chipglow.app.knobs import OWN, UNIFORM
 from chipglow.app.model import MeasurementModel, SceneModel
-from chipglow.app.opening import bundled_path, open_any, open_uploaded
+from chipglow.app.opening import open_any, open_uploaded
 from chipglow.app.session import Listener, Newest, Session, SupersededError
 from chipglow.camera import expose, expose_all
 from chipglow.errors import LinePlace, error_images, error_parts
-from chipglow.io import is_measurement, open_scene
+from chipglow.io import example_scene, is_measurement, open_scene
 from chipglow.io.sources import SourceError
 from chipglow.scene.lines import nearest
 from chipglow.study import Study, fit, load_study
@@ -39,7 +39,7 @@ def model(opened):
 
 def seen_by_the_library(study, start):
     """What the library makes of the bundled scene, by none of the app's ways."""
-    fitted = fit(study, open_scene(bundled_path()))
+    fitted = fit(study, example_scene())
     camera = study.camera.on(fitted.scene.raster, study.seed)
     (surface,) = fitted.surfaces.values()
     return camera, camera.expose(fitted.scene, surface, start), surface
@@ -65,7 +65,7 @@ def test_a_saved_study_gives_the_same_numbers(model, tmp_path, texts):
     file = tmp_path / "study.yaml"
     file.write_bytes(study_file(model, knobs))
     study = load_study(file)
-    assert Path(study.scene) == bundled_path()
+    assert Path(study.scene) == example_scene().path
     camera, exposure, _ = seen_by_the_library(study, knobs.start)
     expected = error_images(camera, exposure, study.analysis.reference)
     np.testing.assert_array_equal(picture.measured, expected.measured)
@@ -194,7 +194,7 @@ def test_what_is_no_scene_is_refused_by_its_own_name(tmp_path):
 
 
 def test_the_bundled_scene_is_small_and_says_where_it_is_from():
-    path = bundled_path()
+    path = example_scene().path
     attributes = open_scene(path).data.attrs
     assert path.stat().st_size < 1e6
     assert "docs/app_scene.py" in attributes["origin"] and "quick study" in attributes["origin"]

@@ -42,9 +42,11 @@ from .errors import (
     StudyResult as StudyResult,
     analyse as analyse,
     error_images as error_images,
+    error_parts as error_parts,
     ratio_errors as ratio_errors,
 )
 from .io import (
+    example_scene as example_scene,
     import_scene as import_scene,
     load_import as load_import,
     open_scene as open_scene,

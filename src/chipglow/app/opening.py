@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib.resources import files
 from math import ceil, sqrt
 from pathlib import Path
 from typing import Final
@@ -14,7 +13,7 @@ from chipglow.app.knobs import ControlPanel, Ends, Point, knobs_of
 from chipglow.app.probing import probed
 from chipglow.camera import Measurement
 from chipglow.errors.starts import spread_starts
-from chipglow.io import StoredScene, is_measurement, open_scene, read_measurement
+from chipglow.io import StoredScene, example_scene, is_measurement, open_scene, read_measurement
 from chipglow.io.sandbox import Sandbox, patience_for
 from chipglow.laboratory.chip import Instant, contact_length
 from chipglow.quantities import Declared
@@ -128,7 +127,7 @@ def open_any(
         If it is nothing of that; the message names it.
     """
     if path is None:
-        opened = OpenedScene.of(open_scene(bundled_path()), study or Study(), BUNDLED)
+        opened = OpenedScene.of(example_scene(), study or Study(), BUNDLED)
         return replace(opened, from_file=True)
     path = Path(path)
     if path.is_dir():
@@ -164,11 +163,6 @@ def open_uploaded(path: Path, name: str) -> OpenedScene | OpenedMeasurement:
     if isinstance(opened, OpenedMeasurement):
         return OpenedMeasurement(name, opened.measurement)
     return replace(opened, name=name, from_file=False)
-
-
-def bundled_path() -> Path:
-    """File of the scene that comes with the app."""
-    return Path(str(files("chipglow.app").joinpath("scene.nc")))
 
 
 def _results(folder: Path) -> OpenedScene:

@@ -1,6 +1,7 @@
 """Readers and writers: scenes, measurements, and output that is whole or not there."""
 
 from chipglow.io.atomic import atomic_folder, atomic_path
+from chipglow.io.example_scene import example_scene
 from chipglow.io.import_description import (
     IMPORT_SOURCES,
     ImportDescription,
@@ -44,6 +45,7 @@ __all__ = [
     "atomic_path",
     "check_movie_path",
     "check_table_path",
+    "example_scene",
     "import_description",
     "import_scene",
     "import_text",

@@ -1,6 +1,6 @@
-"""Write the scene that comes with the app.
+"""Write the scene that comes with the package.
 
-    python docs/pictures/app_scene.py
+    python docs/pictures/example_scene.py
 
 A part of the quick study's cut: every second frame of the time in which its first shear band
 develops. It is cut anew where it is not in the cache.
@@ -13,17 +13,17 @@ from chipglow.cutting import SOLVER_VERSION
 from chipglow.io import SceneWriter, open_scene
 from chipglow.study import Study, cut
 
-FILE = Path(__file__).parents[2] / "src/chipglow/app/scene.nc"
+FILE = Path(__file__).parents[2] / "src/chipglow/io/example-scene.nc"
 FIRST, LAST = 425.9e-6, 470e-6  # s
 STEP = 2
 ORIGIN = (
     "chipglow: every second frame of a part of the quick study (chipglow reproduce --quick), the "
-    "cut of Heigel and Whitenton (2010) on cells of 20 um; written by docs/pictures/app_scene.py"
+    "cut of Heigel and Whitenton (2010) on cells of 20 um; by docs/pictures/example_scene.py"
 )
 
 
 def write(scene, path):
-    """Write the part of a scene that the app brings."""
+    """Write the part of a scene that comes with the package."""
     indices = [
         index
         for index in range(0, len(scene), STEP)
