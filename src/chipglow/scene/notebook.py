@@ -76,7 +76,7 @@ def plot_image(
     if axes is None:
         from matplotlib import pyplot as plt
 
-        axes = plt.subplots(layout="constrained")[1]
+        axes = plt.subplots(layout="compressed")[1]
     left, right, bottom, top = (1e6 * edge for edge in raster.extent)
     picture = axes.imshow(
         np.ma.masked_invalid(celsius),
