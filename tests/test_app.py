@@ -197,7 +197,10 @@ def test_the_bundled_scene_is_small_and_says_where_it_is_from():
     path = example_scene().path
     attributes = open_scene(path).data.attrs
     assert path.stat().st_size < 1e6
-    assert "docs/app_scene.py" in attributes["origin"] and "quick study" in attributes["origin"]
+    assert (
+        "docs/pictures/app_scene.py" in attributes["origin"]
+        and "quick study" in attributes["origin"]
+    )
     assert int(attributes["solver_version"]) > 0
 
 

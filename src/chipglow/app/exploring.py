@@ -38,7 +38,7 @@ def explore(scene: "Scene | str | Path | None" = None, study: "Study | None" = N
     from chipglow.scene import Scene
     from chipglow.study import Study
 
-    pn.extension()
+    pn.extension(inline=True)  # its scripts come with it: nothing is loaded from the network
     if isinstance(scene, Scene):
         opened: Any = OpenedScene.of(scene, study or Study(), "scene")
     else:

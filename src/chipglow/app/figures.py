@@ -6,10 +6,13 @@ from typing import Any, Final
 
 import numpy as np
 from bokeh.models import (
+    BoxAnnotation,
     ColorBar,
     ColumnDataSource,
     CrosshairTool,
     CustomJS,
+    CustomJSHover,
+    CustomJSTickFormatter,
     HoverTool,
     LinearColorMapper,
     Range1d,
@@ -52,6 +55,25 @@ _UNITS: Final = {
 _BORDER: Final = 46
 _GAP: Final = 8
 _LEAST_FRAME: Final = 180
+_NARROW: Final = 888
+"""Pixels of the page's part beside the knobs, which are 292 wide."""
+
+_WITH_UNIT: Final = """
+// The tick in the middle of a bar has the unit, which is in the image's title.
+const unit = (title.text.split(" / ")[1] ?? "").replace(/[()]/g, "");
+const large = Math.max(...ticks) >= 1e5;
+const text = large ? tick.toExponential().replace("e+", "e") : String(Number(tick.toPrecision(6)));
+const middle = index === Math.floor(ticks.length / 2);
+return text.replace("-", "−") + (middle && unit ? " " + unit : "");
+"""
+
+_VALUE: Final = """
+// The value under the pointer with the unit of the image's title.
+const found = source.data.image[0][special_vars.image_index?.flat_index];
+if (!Number.isFinite(found)) return missing;
+const unit = (title.text.split(" / ")[1] ?? "").replace(/[()]/g, "");
+return `${Number(found.toPrecision(4))} ${unit}`.replace("-", "−");
+"""
 
 _DRAG: Final = """
 // Drag: the end of a line, the cursor, or else the view.
@@ -136,6 +158,7 @@ class Figures:
         self.images = {name: self._image(name, name == names[0]) for name in names}
         self.line_sources: dict[str, ColumnDataSource] = {}
         self.band_sources: dict[str, ColumnDataSource] = {}
+        self._out_of_range: list[BoxAnnotation] = []
         self.lines = {name: self._line(name, len(names) > 1) for name in LINES}
         self.figures = [one.figure for one in self.images.values()] + list(self.lines.values())
         self._link_drags()
@@ -163,6 +186,9 @@ class Figures:
             self._set("error", shown, picture.raster, (-limit, limit), SIGNED)
         for name, values in picture.lines.items():
             self.line_sources[name].data = _line_data(values)
+        limit = picture.camera.lower_limit if picture.camera else None
+        for box in self._out_of_range:
+            box.update(top=None if limit is None else limit - KELVIN, visible=limit is not None)
 
     def show_drawn(self, drawn: Drawn | None) -> None:
         """Shade what the draws cover along the lines; nothing for None."""
@@ -211,8 +237,10 @@ class Figures:
         frame = int(max(min(frame, tallest / shape), _LEAST_FRAME))
         for one in self.images.values():
             one.figure.update(frame_width=frame, frame_height=int(frame * shape))
-        below = int(max(min(height - frame * shape - 330, 330), 150))
-        across = int((width - 2 * _BORDER - 330) / 2 - 20)
+        below = int(max(min(height - frame * shape - 345, 330), 150))
+        # Numbers stand beside the lines, or below them where it is narrow: see page.css.
+        numbers = 345 if width > _NARROW else 0
+        across = int((width - 2 * _BORDER - numbers) / 2 - 20)
         for one in self.lines.values():
             one.update(frame_width=max(across, _LEAST_FRAME), frame_height=below)
 
@@ -243,10 +271,11 @@ class Figures:
             image.bar.update(
                 background_fill_color=colours["ground"],
                 major_label_text_color=text,
-                title_text_color=text,
             )
             for grid in image.figure.grid:
                 grid.grid_line_color = None
+        for box in self._out_of_range:
+            box.update(fill_color=colours["void"], fill_alpha=1.0)
         dark = theme == "dark"
         for one in self.lines.values():
             one.select_one("measured").glyph.line_color = _MEASURED["dark" if dark else "light"]
@@ -314,17 +343,19 @@ class Figures:
             height=10,
             padding=2,
             margin=0,
-            title_text_font_size="11px",
+            formatter=CustomJSTickFormatter(code=_WITH_UNIT, args={"title": one.title}),
         )
         one.add_layout(bar, "below")
         wheel = WheelZoomTool()
-        unit = "K" if name == "error" else "°C"
-        tip = [("", f"@image{{0.0}} {unit}" if name != "scene" else "@image{0.00}")]
-        place = [("x, y", "$x{0.0}, $y{0.0} µm")]
+        missing = "no material" if name == "scene" else "out of range"
+        known = {"title": one.title, "source": source, "missing": missing}
+        tips = [("", "$sx{custom}"), ("x, y", "$x{0.0}, $y{0.0} µm")]
+        hover = HoverTool(renderers=[drawn], tooltips=tips, attachment="above")
+        hover.formatters = {"$sx": CustomJSHover(code=_VALUE, args=known)}
         one.add_tools(
             wheel,
             CrosshairTool(overlay=self._spans),
-            HoverTool(renderers=[drawn], tooltips=tip + place, attachment="above"),
+            hover,
         )
         one.toolbar.active_scroll = wheel
         self._draw_over(one)
@@ -368,6 +399,10 @@ class Figures:
         band = self.band_sources[name] = ColumnDataSource({"along": [], "low": [], "high": []})
         colour = _LINE_COLOURS[name]
         one.add_layout(Span(dimension="height", line_color=colour, line_width=3, location=0))
+        one.x_range.range_padding = 0.02
+        box = BoxAnnotation(level="underlay", line_color=None, visible=False)
+        one.add_layout(box)
+        self._out_of_range.append(box)
         one.varea("along", "low", "high", source=band, fill_alpha=0.25, name="drawn")
         if with_reference:
             one.line(

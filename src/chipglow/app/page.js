@@ -179,7 +179,7 @@ export function render({ model, el }) {
     const zooms = element("div", { class: "zooms", role: "toolbar", "aria-label": "View" });
     for (const [name, text] of spec.views) zooms.append(button(text, () => send({ view: name })));
     zooms.append(place("cursor", "Cursor x, y / µm"));
-    zooms.append(element("span", { class: "hint" }, "Click: cursor. Drag: cursor, line, view. Wheel: zoom. Grey: out of range."));
+    zooms.append(element("span", { class: "hint" }, "Drag: cursor, line, view. Wheel: zoom. Grey: out of range."));
     const images = element("div", { class: "images" });
     const below = element("div", { class: "below" });
     for (const name of FIGURES) {
@@ -334,6 +334,14 @@ export function render({ model, el }) {
     theme = theme === "dark" ? "light" : "dark";
     setTheme();
   }
+
+  // A notebook takes keys for itself, unless an element over them says otherwise.
+  function keepKeys() {
+    for (let one = page; one; one = one.getRootNode().host) {
+      one.setAttribute("data-lm-suppress-shortcuts", "true");
+    }
+  }
+  if (spec.embedded) page.addEventListener("focusin", keepKeys);
 
   let size = "";
   function measure() {

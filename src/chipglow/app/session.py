@@ -248,10 +248,13 @@ class Session:
             self._tell(self.model.picture(knobs, quick=True))
             work.pause(PAUSE)
             picture = self.model.picture(knobs, check=work.check)
+            self._tell(picture)
+            work.check()
         else:
             picture = self.model.picture(knobs)
-        self._tell(picture)
-        work.check()
+            self._tell(picture)
+            # The numbers of a large scene take longer than its picture: they let the next go first.
+            work.pause(PAUSE if self.model.has_quick_look else 0.0)
         self._listener.readout(picture, self.model.readout(picture))
 
     def _tell(self, picture: Picture) -> None:

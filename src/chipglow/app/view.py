@@ -1,9 +1,11 @@
 """The page: a session, its figures, and what stands around them, as a Panel component."""
 
 import json
+from asyncio import AbstractEventLoop, get_running_loop
 from base64 import b64encode
 from collections.abc import Callable
-from math import isfinite
+from contextlib import suppress
+from math import floor, isfinite, log10
 from pathlib import Path
 from time import perf_counter
 from typing import Any, ClassVar, Final
@@ -115,6 +117,7 @@ class View:
         names = IMAGES if scene is not None else ("measured",)
         self.figures = Figures(source.raster, source.tool, self.session.knobs, names)
         self._document: Document | None = None
+        self._loop: AbstractEventLoop | None = None
         self._handled = 0
         self._began = 0.0
         self._picture: Picture | None = None
@@ -135,6 +138,9 @@ class View:
     def start(self, document: Document | None) -> None:
         """Say in which document the results of other threads are shown; None of a notebook's."""
         self._document = document
+        if document is None:
+            with suppress(RuntimeError):  # no notebook's kernel, nothing that shows the page
+                self._loop = get_running_loop()
 
     def _ready(self) -> None:
         """Fill a page that is there now, and compute its picture."""
@@ -193,10 +199,13 @@ class View:
         elif "size" in message:
             width, height = message["size"]
             self.figures.set_size(int(width), int(height))
+            self._put_values()  # a notebook gets what changed in figures with the next message
         elif "theme" in message:
             self.figures.set_theme(str(message["theme"]))
+            self._put_values()
         elif "view" in message:
             self._view(str(message["view"]))
+            self._put_values()
         elif "save" in message:
             self._save(str(message["save"]))
         elif "draw" in message:
@@ -310,7 +319,7 @@ class View:
             return "–"
         text = _celsius(found.measured)
         if isfinite(found.uncertainty):
-            text = f"{found.measured - _KELVIN:.1f} ± {rounded_text(found.uncertainty)} °C"
+            text = _with_uncertainty(found.measured - _KELVIN, found.uncertainty)
         return f"{text} (under range)" if found.flagged else text
 
     def _put_numbers(self, rows: list[tuple[str, str, str]], parts: list[dict[str, Any]]) -> None:
@@ -326,9 +335,9 @@ class View:
             return
         found = drawn.error
         self._say(
-            f"Error at the cursor over {found.draws} draws: {found.mean:.1f} K, sample standard "
-            f"deviation {found.standard_deviation:.1f} K, {found.range[0]:.1f} to "
-            f"{found.range[1]:.1f} K. Shaded: the range along the lines.",
+            f"Error at the cursor over {found.draws} draws: {_kelvins(found.mean)}, sample "
+            f"standard deviation {found.standard_deviation:.1f} K, {_kelvins(found.range[0])} to "
+            f"{_kelvins(found.range[1])}. Shaded: the range along the lines.",
             "",
         )
 
@@ -359,7 +368,7 @@ class View:
 
     def _spec(self, opened: OpenedScene | OpenedMeasurement, uploads: str) -> dict[str, Any]:
         is_scene = isinstance(opened, OpenedScene)
-        views = {"whole": "Whole view", "cursor": "At the cursor"}
+        views = {"whole": "Whole view", "cursor": "Cursor"}
         if is_scene:
             views |= {"rake": "Rake face", "band": "Shear band"}
         titles = {
@@ -382,6 +391,9 @@ class View:
 
     def _later(self, show: Callable[[], None]) -> None:
         """Show something that another thread found."""
+        if self._loop is not None:
+            self._loop.call_soon_threadsafe(show)
+            return
         if self._document is None:
             show()
             return
@@ -416,6 +428,13 @@ def _counts(knob: Knob, knobs: Knobs) -> bool:
 
 def _celsius(kelvins: float) -> str:
     return f"{kelvins - _KELVIN:.1f} °C" if isfinite(kelvins) else "–"
+
+
+def _with_uncertainty(celsius: float, uncertainty: float) -> str:
+    """Both to the second digit that counts in the uncertainty, and at least to 0.1 °C."""
+    size = floor(log10(uncertainty)) if uncertainty > 0 else 0
+    digits = min(max(1 - size, 1), 4)
+    return f"{celsius:.{digits}f} ± {uncertainty:.{digits}f} °C".replace("-", "−")
 
 
 def _kelvins(kelvins: float) -> str:

@@ -192,12 +192,12 @@ def _maximum(
 ) -> NDArray[np.float64]:
     """Greatest value of the samples in every pixel's sensitive square; NaN for none."""
     grid, side = exposure.raster, camera.pitch * sqrt(camera.fill_factor)
-    known = np.where(np.isnan(values), -np.inf, values).astype(np.float64)
+    known = np.where(np.isnan(values), values.dtype.type(-np.inf), values)
     columns = _covered(pixels.x - grid.left, side, grid.columns, grid.spacing)
     rows = _covered(grid.top - pixels.y, side, grid.rows, grid.spacing)
-    across = np.stack([known[:, part].max(axis=1) for part in columns], axis=1)
-    greatest = np.stack([across[part].max(axis=0) for part in rows])
-    return np.where(np.isfinite(greatest), greatest, np.nan)
+    down = np.stack([known[part].max(axis=0) for part in rows])
+    greatest = np.stack([down[:, part].max(axis=1) for part in columns], axis=1)
+    return np.where(np.isfinite(greatest), greatest, np.nan).astype(np.float64)
 
 
 def _covered(

@@ -9,6 +9,7 @@ from chipglow.camera import Camera, Exposure
 from chipglow.errors.error_images import (
     ErrorImages,
     ReferenceKind,
+    Unblurred,
     error_images,
     reference_temperature,
 )
@@ -74,10 +75,14 @@ def error_parts(
     Heigel and Whitenton (2010) tell the point spread function's part from the rest (case 1 and
     case 2, their Figure 10); motion and footprint continue that within case 2.
     """
-    errors = error_images(camera, exposure, reference)
-    noiseless = error_images(replace(camera, detector=None), exposure, reference)
-    of_radiance: ReferenceKind = "maximum" if reference == "true" else reference
-    radiant = reference_temperature(camera, exposure, of_radiance)
+    unblurred = Unblurred.of(camera, exposure, reference)
+    formed = camera.form_image(exposure.mean_radiance, exposure.raster)
+    errors = unblurred.errors(formed)
+    noiseless = replace(unblurred, camera=replace(camera, detector=None)).errors(formed)
+    radiant, of_radiance = errors.reference, reference
+    if reference == "true":
+        of_radiance = "maximum"
+        radiant = reference_temperature(camera, exposure, of_radiance)
     still = reference_temperature(camera, _standing_still(exposure), of_radiance)
     return ErrorParts(
         errors=errors,
