@@ -37,8 +37,9 @@ _THEMES: Final = {
     "dark": {"ground": "#14171c", "text": "#e8eaed", "grid": "#39414b", "void": "#2b313a"},
 }
 _LINE_COLOURS: Final = {"rake_line": "#56B4E9", "band_line": "#F0A020"}
-_MEASURED: Final = {"light": "#0060a8", "dark": "#7db7ff"}
-_REFERENCE: Final = {"light": "#5b6068", "dark": "#b4bcc8"}
+_MEASURED: Final = "#2b7fd0"
+_REFERENCE: Final = "#7d858f"
+"""Seen on light and dark ground: a glyph's colour that changes comes back from notebooks."""
 
 _TITLES: Final = {
     "scene": "Scene: true temperature / °C",
@@ -186,9 +187,9 @@ class Figures:
             self._set("error", shown, picture.raster, (-limit, limit), SIGNED)
         for name, values in picture.lines.items():
             self.line_sources[name].data = _line_data(values)
-        limit = picture.camera.lower_limit if picture.camera else None
+        lowest = picture.camera.lower_limit if picture.camera else None
         for box in self._out_of_range:
-            box.update(top=None if limit is None else limit - KELVIN, visible=limit is not None)
+            box.update(top=None if lowest is None else lowest - KELVIN, visible=lowest is not None)
 
     def show_drawn(self, drawn: Drawn | None) -> None:
         """Shade what the draws cover along the lines; nothing for None."""
@@ -239,7 +240,7 @@ class Figures:
             one.figure.update(frame_width=frame, frame_height=int(frame * shape))
         below = int(max(min(height - frame * shape - 345, 330), 150))
         # Numbers stand beside the lines, or below them where it is narrow: see page.css.
-        numbers = 345 if width > _NARROW else 0
+        numbers = 345 if width > _NARROW else 60
         across = int((width - 2 * _BORDER - numbers) / 2 - 20)
         for one in self.lines.values():
             one.update(frame_width=max(across, _LEAST_FRAME), frame_height=below)
@@ -276,12 +277,7 @@ class Figures:
                 grid.grid_line_color = None
         for box in self._out_of_range:
             box.update(fill_color=colours["void"], fill_alpha=1.0)
-        dark = theme == "dark"
         for one in self.lines.values():
-            one.select_one("measured").glyph.line_color = _MEASURED["dark" if dark else "light"]
-            one.select_one("drawn").glyph.fill_color = _MEASURED["dark" if dark else "light"]
-            if (reference := one.select_one("reference")) is not None:
-                reference.glyph.line_color = _REFERENCE["dark" if dark else "light"]
             for legend in one.legend:
                 legend.update(
                     background_fill_color=colours["ground"],
@@ -403,15 +399,15 @@ class Figures:
         box = BoxAnnotation(level="underlay", line_color=None, visible=False)
         one.add_layout(box)
         self._out_of_range.append(box)
-        one.varea("along", "low", "high", source=band, fill_alpha=0.25, name="drawn")
+        one.varea("along", "low", "high", source=band, fill_alpha=0.25, color=_MEASURED)
         if with_reference:
             one.line(
                 "along", "reference", source=source, line_width=2, line_dash="dashed",
-                legend_label="reference", name="reference",
+                legend_label="reference", line_color=_REFERENCE,
             )  # fmt: skip
         one.line(
             "along", "measured", source=source, line_width=2, legend_label="measured",
-            name="measured",
+            name="measured", line_color=_MEASURED,
         )  # fmt: skip
         legend = one.legend[0]
         legend.update(
