@@ -198,7 +198,7 @@ def test_the_bundled_scene_is_small_and_says_where_it_is_from():
     attributes = open_scene(path).data.attrs
     assert path.stat().st_size < 1e6
     assert (
-        "docs/pictures/app_scene.py" in attributes["origin"]
+        "docs/pictures/example_scene.py" in attributes["origin"]
         and "quick study" in attributes["origin"]
     )
     assert int(attributes["solver_version"]) > 0
