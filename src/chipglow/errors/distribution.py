@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t
+from scipy.special import stdtrit
 
 TOGETHER: Final = "causes together"
 """What no cause makes by itself: it needs two or three of them."""
@@ -133,7 +133,7 @@ class Distribution:
         if variance == 0.0:
             return self.mean, self.mean
         freedom = variance**2 / sum(term**2 / degrees for term, degrees in terms)
-        half = float(t.ppf((1 + COVERAGE) / 2, freedom)) * sqrt(variance)
+        half = float(stdtrit(freedom, (1 + COVERAGE) / 2)) * sqrt(variance)
         return self.mean - half, self.mean + half
 
     def differs_from(self, value: float) -> bool:

@@ -8,7 +8,7 @@ from typing import Annotated, Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import root
-from scipy.stats import beta, norm
+from scipy.special import betainccinv, betaincinv, ndtr
 
 from chipglow.quantities import Parameter, Part
 from chipglow.surface.cubic import ENLARGED_VARIANCE, cubic_convolution
@@ -98,8 +98,8 @@ def _beta_values(
     size = mean * (1 - mean) / standard_deviation**2 - 1
     first, second = mean * size, (1 - mean) * size
     # The upper half by the survival function: 1 − p would be rounded away.
-    lower = beta.ppf(norm.cdf(np.minimum(deviates, 0.0)), first, second)
-    upper = beta.isf(norm.sf(np.maximum(deviates, 0.0)), first, second)
+    lower = betaincinv(first, second, ndtr(np.minimum(deviates, 0.0)))
+    upper = betainccinv(first, second, ndtr(-np.maximum(deviates, 0.0)))
     return np.asarray(np.where(deviates < 0.0, lower, upper), dtype=np.float64)
 
 

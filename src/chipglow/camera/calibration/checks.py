@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, t
+from scipy.special import chdtrc, chdtri, stdtr, stdtrit
 
 _UNLIKELY: Final = 0.01
 _ALIKE: Final = 0.05
@@ -38,7 +38,7 @@ def residual_warnings(
     """
     free = residuals.size - design.shape[1]
     total = float(residuals @ residuals)
-    if stated and free > 0 and chi2.sf(total, free) < _UNLIKELY:
+    if stated and free > 0 and chdtrc(free, total) < _UNLIKELY:
         yield (
             f"The residuals are {np.sqrt(total / free):.3g} times as large as the stated "
             f"uncertainties explain (chi-squared {total:.4g} with {free} degrees of freedom): the "
@@ -100,13 +100,13 @@ def _outlier(
     free = residuals.size - design.shape[1] - 1
     rest = max(total - float(fall[point]), 1e-300)
     scatter = max(rest / free, 1.0) if stated else rest / free
-    limit = float(chi2.isf(_UNLIKELY / residuals.size, 1)) if stated else _student_limit(free)
+    limit = float(chdtri(1, _UNLIKELY / residuals.size)) if stated else _student_limit(free)
     far = fall[point] > limit * scatter and fall[point] > _LEAST_FALL * total
     return point if far and (stated or free >= _LEAST_FREEDOM) else None
 
 
 def _student_limit(free: int) -> float:
-    return float(t.isf(_UNLIKELY / (2 * (free + 2)), free)) ** 2
+    return float(stdtrit(free, _UNLIKELY / (2 * (free + 2)))) ** 2
 
 
 def _serial_probability(residuals: NDArray[np.float64], design: NDArray[np.float64]) -> float:
@@ -140,7 +140,7 @@ def _drift_probability(residuals: NDArray[np.float64], design: NDArray[np.float6
     square = float(drift @ residuals) ** 2 / length
     free = residuals.size - design.shape[1] - 1
     rest = max((float(residuals @ residuals) - square) / free, 1e-300)
-    return float(2 * t.sf(np.sqrt(square / rest), free))
+    return float(2 * stdtr(free, -np.sqrt(square / rest)))
 
 
 def _drift(design: NDArray[np.float64]) -> NDArray[np.float64]:

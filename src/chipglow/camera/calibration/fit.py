@@ -7,7 +7,7 @@ from typing import Any, Final, Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
-from scipy.stats import chi2, norm, t
+from scipy.special import chdtrc, ndtri, stdtrit
 
 from chipglow.camera.calibration.blackbody import Blackbody
 from chipglow.camera.calibration.calibration import (
@@ -78,7 +78,7 @@ class CalibrationFit(Generic[Kind]):
         """
         if not self.stated or self.degrees_of_freedom == 0:
             return None
-        return float(chi2.sf(self.chi_squared, self.degrees_of_freedom))
+        return float(chdtrc(self.degrees_of_freedom, self.chi_squared))
 
     @property
     def information_criterion(self) -> float:
@@ -106,12 +106,12 @@ class CalibrationFit(Generic[Kind]):
         """
         free = self.degrees_of_freedom
         if not self.stated:
-            return float(t.ppf(_QUANTILE, free) / norm.ppf(_QUANTILE))
+            return float(stdtrit(free, _QUANTILE) / ndtri(_QUANTILE))
         return max(float(np.sqrt(self.chi_squared / free)), 1.0) if free else 1.0
 
     def coverage_factor(self) -> float:
         """Factor on the standard uncertainty that gives an interval of 95 %: the normal one's."""
-        return float(norm.ppf(_QUANTILE))
+        return float(ndtri(_QUANTILE))
 
 
 def fit_linear(

@@ -5,8 +5,8 @@ from math import ceil, pi, radians
 from typing import Final
 
 import numpy as np
+import scipy  # its signal part is slow to import, and loaded at its first use
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from chipglow.scene import Raster, Tool
 
@@ -235,7 +235,7 @@ def even_steps(points: NDArray[np.float64], step: float) -> NDArray[np.float64]:
     window = min(2 * round(_SMOOTHING / step / 2) + 1, (even.size - 1) // 2 * 2 + 1)
     if window < 5:
         return resampled
-    return np.asarray(savgol_filter(resampled, window, 2, axis=0, mode="interp"))
+    return np.asarray(scipy.signal.savgol_filter(resampled, window, 2, axis=0, mode="interp"))
 
 
 def arc_length(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,9 +6,9 @@ from math import nan, sqrt
 from typing import Final
 
 import numpy as np
+import scipy  # its signal part is slow to import, and loaded at its first use
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import detrend, find_peaks
 
 _LEAST_PROMINENCE: Final = 0.3
 """Least rise of the autocorrelation from the valley before its first peak to that peak: in a few
@@ -104,7 +104,8 @@ def segmentation(
     first = end_of_build_up(cutting)
     times, cutting, thrust = times[first:], cutting[first:], thrust[first:]
     regular = coarse = nan
-    if cutting.size >= 8 and _range(swing := detrend(cutting)) > _LEAST_SWING * abs(cutting.mean()):
+    swing = scipy.signal.detrend(cutting)
+    if cutting.size >= 8 and _range(swing) > _LEAST_SWING * abs(cutting.mean()):
         correlation = _correlation(swing)
         regular = _correlation_period(correlation, step)
         coarse = regular if np.isfinite(regular) else _unequal_period(swing, correlation, step)
@@ -163,7 +164,7 @@ def _correlation_period(correlation: NDArray[np.float64], step: float) -> float:
     down = np.flatnonzero(correlation < 0)
     if down.size == 0:
         return nan
-    peaks, _ = find_peaks(correlation, prominence=_LEAST_PROMINENCE)
+    peaks, _ = scipy.signal.find_peaks(correlation, prominence=_LEAST_PROMINENCE)
     peaks = peaks[peaks > down[0]]
     return float(peaks[0] * step) if peaks.size else nan
 
@@ -178,12 +179,14 @@ def _unequal_period(
     smooth = gaussian_filter1d(swing, down[0] / 4)
     if _range(smooth) < _LEAST_SMOOTH * _range(swing):
         return nan
-    peaks, _ = find_peaks(smooth, prominence=_STANDING_OUT * _range(smooth))
+    peaks, _ = scipy.signal.find_peaks(smooth, prominence=_STANDING_OUT * _range(smooth))
     return float(np.diff(peaks).mean() * step) if peaks.size > 2 else nan
 
 
 def _peaks(force: NDArray[np.float64], period: float) -> NDArray[np.int64]:
-    peaks, _ = find_peaks(force, distance=max(0.6 * period, 1.0), prominence=_range(force) / 5)
+    peaks, _ = scipy.signal.find_peaks(
+        force, distance=max(0.6 * period, 1.0), prominence=_range(force) / 5
+    )
     return np.asarray(peaks, dtype=np.int64)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from scipy.ndimage import uniform_filter
 from scipy.optimize import brentq
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from chipglow.camera import MeasuredPSF, PointSpreadFunction
 from chipglow.laboratory.psf.edge_image import EdgeImage, usable_pixels
@@ -169,7 +169,7 @@ class KnifeEdge:
         """Whether the best model leaves what noise does in less than one of a hundred edges."""
         bins = sum(edge.spread.distance.size for edge in self.edges)
         free = max(bins - self.best.free, 1)
-        chance = float(chi2.isf(_BY_CHANCE, free)) / free
+        chance = float(chdtri(free, _BY_CHANCE)) / free
         return self.best.reduced_chi_squared > chance and max(map(_left, self.edges)) > _NOTHING
 
     def to_frame(self) -> pd.DataFrame:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from chipglow.scene import Raster
 
@@ -471,7 +471,7 @@ def _misplaced(
         own = float(residual[part] @ np.linalg.solve(np.eye(2) - hat[part, part], residual[part]))
         others = max(variance * freedom - own, 0.0) / (freedom - 2)
         ratio = own / 2 / others if others > 0 else np.inf
-        misplaced[i] = f_distribution.sf(ratio, 2, freedom - 2) < _UNLIKELY / count
+        misplaced[i] = fdtrc(2, freedom - 2, ratio) < _UNLIKELY / count
     return misplaced
 
 

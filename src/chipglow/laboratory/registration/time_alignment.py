@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.fft import dct, idct
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares, minimize_scalar
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 from chipglow.laboratory.registration.registration import Registration
 from chipglow.scene import Raster
@@ -307,7 +307,7 @@ def _refined(
 def _chance(correlation: float, freedom: float, offsets: int) -> tuple[str, ...]:
     """A warning where one of so many offsets would have such a correlation by chance."""
     rest = max(1.0 - correlation**2, 1e-15)
-    likely = 2 * float(student.sf(abs(correlation) * np.sqrt(freedom / rest), freedom)) * offsets
+    likely = 2 * float(stdtr(freedom, -abs(correlation) * np.sqrt(freedom / rest))) * offsets
     if likely < _CHANCE:
         return ()
     return (
