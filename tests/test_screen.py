@@ -112,6 +112,12 @@ def test_the_doctor_finds_what_is_missing(monkeypatch):
     assert "packages: numpy (too old)" in result.stderr
 
 
+def test_threads_sleep_while_they_wait_unless_told_otherwise(monkeypatch):
+    monkeypatch.delenv("OMP_WAIT_POLICY")
+    assert "; passive while they wait" in run_piped("doctor").stdout
+    assert "; active while they wait" in run_piped("doctor", OMP_WAIT_POLICY="active").stdout
+
+
 def test_the_doctor_computes_and_lists_the_optional_parts():
     found = json.loads(chipglow("doctor", "--json").stdout)
     assert found["values"]["greatest_radiance_difference"] < 1e-6

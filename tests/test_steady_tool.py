@@ -79,7 +79,7 @@ def cold():
     # Cells of 40 um and a small region, for time: the contact is 8 cells long.
     return CuttingSimulation(
         conditions=CuttingConditions(feed=0.2e-3, cutting_length=0.3e-3),
-        numerics=Numerics(40e-6, upstream=0.5e-3, downstream=0.4e-3, height=0.7e-3),
+        numerics=Numerics(40e-6, upstream=0.36e-3, downstream=0.4e-3, height=0.56e-3),
     )
 
 

@@ -62,7 +62,8 @@ def _threads() -> str:
     count = numba.config.NUMBA_NUM_THREADS
     cores = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count()
     asked = ", by NUMBA_NUM_THREADS" if "NUMBA_NUM_THREADS" in os.environ else ""
-    return f"{count}{asked}; {cores} processors may be used"
+    waiting = os.environ["OMP_WAIT_POLICY"]
+    return f"{count}{asked}; {cores} processors may be used; {waiting} while they wait"
 
 
 def _gpu() -> str:
