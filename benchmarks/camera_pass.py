@@ -1,19 +1,30 @@
-"""Cost of one camera frame: fifty sub-frames of 810 x 900 samples to 90 x 100 pixels.
+"""Cost of what a user waits for: a frame, a study, a new image. Other programs stand beside it.
 
-Three scenes of the same splines, as smooth as those of a cut with cells of 10 um: temperature and
-emissivity given in memory; all fields in memory, the emissivity from textures and blend; and a
-file, looked at for the first time and again. Beside them the bound, which is to read once what the
-pass needs, and the paper's Figure 6 in plain NumPy (tests/figure6.py) with a radiance table, and
-with a quadrature over 64 wavelengths instead of the table. All are timed in turn, in one run, each
-after a call that is not timed; the best of the rounds counts. Processor time is that of all
-threads: it is what can be compared on a machine that others use too.
+python benchmarks/camera_pass.py [--rounds 7] [--instants 9] [--scene SCENE.nc]
+
+A frame is fifty sub-frames of 810 x 900 samples to 90 x 100 pixels, of three scenes of the same
+splines, as smooth as those of a cut with cells of 10 um: temperature and emissivity given in
+memory; all fields in memory, the emissivity from textures and blend; and a file, looked at for the
+first time and again. Beside them the bound, which is to read once what the pass needs, and the
+paper's Figure 6 in plain NumPy (tests/figure6.py) with a radiance table, and with a quadrature over
+64 wavelengths instead of the table. The study is the paper's: nine instants, two chips, on the
+same file, or on that of a cut (`chipglow cache list` says where). An image is what a camera makes
+of a kept mean radiance: GalSim, pyBSM, Pyxel and SciPy make it too, if they are there
+(``pip install galsim pybsm pyxel-sim``), and Pyxel counts.
+
+All are timed in one run, frames and studies in turn, each after a call that is not timed; the best
+of the rounds counts. Processor time is that of all threads: it is what can be compared on a machine
+that others use too.
 """
 
 import argparse
+import os
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from itertools import pairwise
+from importlib import import_module
+from importlib.util import find_spec
+from itertools import count, pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
@@ -22,12 +33,15 @@ import numba
 import numpy as np
 from scipy.signal import fftconvolve
 
-from chipglow.camera import Camera, GaussianPSF
+from chipglow.camera import AnnularAperturePSF, Camera, GaussianPSF
+from chipglow.camera.detector import Detector, OperationPoint, PhotonResponse, ReadNoise, ShotNoise
+from chipglow.camera.optics.sampling import integrate
+from chipglow.errors.starts import spread_starts
 from chipglow.io import SceneWriter, open_scene
 from chipglow.radiometry import spectral_radiance
 from chipglow.scene import Raster, Scene, ToolGeometry
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, Lattice, SplineFrame
-from chipglow.surface import CHIP_1, EmissivityField, Surface
+from chipglow.surface import CHIP_1, CHIP_2, EmissivityField, Surface
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from figure6 import figure_6
@@ -41,6 +55,20 @@ CAMERA = Camera(psf=GaussianPSF(12e-6), psf_order="detector", lower_limit=None)
 NEEDED = (
     "temperature", "material", "plastic_strain", "plastic_strain_rate", "material_x", "material_y",
 )  # fmt: skip
+PEERS = {
+    "GalSim": ("galsim", "peers.image_galsim"),
+    "pyBSM": ("pybsm", "peers.image_pybsm"),
+    "Pyxel": ("pyxel", "peers.image_pyxel"),
+}
+READ_NOISE = 500.0  # electrons
+DETECTOR = Detector(
+    response=PhotonResponse(quantum_efficiency=0.8, element=15e-6, f_number=2.5),
+    full_well=1e7,
+    offset=0.0,
+    bits=14,
+    terms=(ShotNoise(), ReadNoise(standard_deviation=READ_NOISE)),
+)
+BORDER, LEAST = 12, 573.15  # pixels and K: images are compared within and above
 LIMITS = {"temperature": (293.0, 1100.0), "plastic_strain": (0.0, 3.0)}
 
 
@@ -91,17 +119,25 @@ def spline_frame(lattice, index):
     return SplineFrame(lattice, time, nodes, limits.astype(np.float32))
 
 
-def stored_scene(path):
+def stored_scene(path, instants):
     """Write the file of the scene."""
     lattice = lattice_of(RASTER)
     with SceneWriter(path, RASTER, ToolGeometry(), lattice=lattice) as writer:
-        for index in range(SUB_FRAMES):
+        for index in range(instants * SUB_FRAMES):
             writer.append(spline_frame(lattice, index).frame())
 
 
+def open_cold(path):
+    """Open a file of which nothing is in memory, as far as the system can be told."""
+    if hasattr(os, "posix_fadvise"):
+        with path.open("rb") as file:
+            os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
+    return open_scene(path)
+
+
 def arrays_of(scene, names):
-    """Fields of a scene as contiguous arrays."""
-    return {n: np.stack([scene.field(n, i) for i in range(len(scene))]) for n in names}
+    """Fields of a frame's sub-frames as contiguous arrays."""
+    return {n: np.stack([scene.field(n, i) for i in range(SUB_FRAMES)]) for n in names}
 
 
 def table_radiance():
@@ -152,6 +188,26 @@ def read_once(arrays):
         return [one.result() for one in work]
 
 
+def study(scene, instants):
+    """Frames of both chips at instants over a scene, as the paper's study has them."""
+    camera = Camera.paper()
+    fields = [camera.lay(chip, scene) for chip in (CHIP_1, CHIP_2)]
+    starts = spread_starts(scene, camera.integration_time, instants)
+    exposures = [camera.expose_fields(scene, fields, start) for start in starts]
+    return [camera.form_measurement(chip) for chip in zip(*exposures, strict=True)]
+
+
+def peers_there():
+    """Modules of the programs that are installed, by name; of the others it is said."""
+    found = {}
+    for name, (package, module) in PEERS.items():
+        if find_spec(package):
+            found[name] = import_module(module)
+        else:
+            print(f"{name} is not installed")
+    return found
+
+
 def timed(call):
     """Wall and processor time of a call."""
     begin, busy = perf_counter(), process_time()
@@ -159,71 +215,200 @@ def timed(call):
     return perf_counter() - begin, process_time() - busy
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rounds", type=int, default=7)
-    rounds = parser.parse_args().rounds
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "scene.nc"
-        stored_scene(path)
-        compare(path, rounds)
-
-
-def compare(path, rounds):
-    """Time everything and print it."""
-    stored = open_scene(path)
-    arrays = arrays_of(stored, NEEDED)
-    whole = Scene.from_fields(RASTER, stored.times, arrays)
-    textured = CHIP_1.on(stored)
-    emissivity = np.stack([textured.emissivity(frame) for frame in stored.frames(names=NEEDED)])
-    given = {name: arrays[name] for name in ("temperature", "material")}
-    plain, surface = Scene.from_fields(RASTER, stored.times, given), GivenSurface(emissivity)
-    kernel = CAMERA.psf.view_kernel(CAMERA.pitch, 90, 100)
-    table, quadrature = table_radiance(), quadrature_radiance()
-    kept = CAMERA.expose(stored, CHIP_1, 0.0)
-    other = replace(CAMERA, psf=GaussianPSF(14e-6), lower_limit=573.15)
-    optics = replace(other, psf_order="optics")
-    blur, radiance = optics.psf.kernel(RASTER.spacing), kept.mean_radiance
-    frames = np.geomspace(1.0, 1e3, 900000).reshape(100, 90, 100)
-
-    def literal(radiance, count):
-        fields = arrays["temperature"][:count], emissivity[:count]
-        return figure_6(*fields, radiance, CAMERA.band.temperature, kernel)
-
-    calls = {
-        "given: bound, reading once": lambda: read_once([arrays["temperature"], emissivity]),
-        "given: chipglow, exposure": lambda: CAMERA.expose(plain, surface, 0.0),
-        "given: NumPy, Figure 6, table": lambda: literal(table, SUB_FRAMES),
-        "in memory: bound, reading once": lambda: read_once(list(arrays.values())),
-        "in memory: chipglow, exposure": lambda: CAMERA.expose(whole, CHIP_1, 0.0),
-        "stored: chipglow, first look": lambda: CAMERA.expose(open_scene(path), CHIP_1, 0.0),
-        "stored: chipglow, again": lambda: CAMERA.expose(stored, CHIP_1, 0.0),
-        "kept radiance: new image, order detector": lambda: other.form_measurement(kept),
-        "kept radiance: new image, order optics": lambda: optics.form_measurement(kept),
-        "kept radiance: SciPy, order optics, one border": lambda: scipy_image(radiance, blur),
-        "inverse, 100 frames of 90 x 100": lambda: [CAMERA.band.temperature(f) for f in frames],
-        "inverse, the same as one array": lambda: CAMERA.band.temperature(frames),
-    }
+def best_of(calls, rounds):
+    """Least wall and processor time of calls by name."""
     for call in calls.values():
         call()
     taken = {name: [] for name in calls}
     for _ in range(rounds):
         for name, call in calls.items():
             taken[name].append(timed(call))
-    best = {name: np.min(values, axis=0) for name, values in taken.items()}
+    return {name: np.min(values, axis=0) for name, values in taken.items()}
+
+
+def main():
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--instants", type=int, default=9, help="of the study")
+    parser.add_argument("--scene", type=Path, help="file of a cut for the study")
+    arguments = parser.parse_args()
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "scene.nc"
+        stored_scene(path, 1 if arguments.scene else arguments.instants)
+        threads = numba.get_num_threads()
+        print(f"{threads} threads; best of {arguments.rounds} rounds in turn")
+        kept = compare_frames(path, arguments.rounds)
+        compare_studies(arguments.scene or path, arguments.instants, arguments.rounds)
+    compare_images(kept, arguments.rounds)
+
+
+def compare_frames(path, rounds):
+    """Time one frame; its exposure."""
+    stored = open_scene(path)
+    arrays, times = arrays_of(stored, NEEDED), stored.times[:SUB_FRAMES]
+    whole = Scene.from_fields(RASTER, times, arrays)
+    textured = CHIP_1.on(stored)
+    frames = stored.frames(range(SUB_FRAMES), NEEDED)
+    emissivity = np.stack([textured.emissivity(frame) for frame in frames])
+    given = {name: arrays[name] for name in ("temperature", "material")}
+    plain, surface = Scene.from_fields(RASTER, times, given), GivenSurface(emissivity)
+    kernel = CAMERA.psf.view_kernel(CAMERA.pitch, 90, 100)
+    table, quadrature = table_radiance(), quadrature_radiance()
+
+    def literal(radiance, count):
+        fields = arrays["temperature"][:count], emissivity[:count]
+        return figure_6(*fields, radiance, CAMERA.band.temperature, kernel)
+
+    best = best_of(
+        {
+            "given: bound, reading once": lambda: read_once([arrays["temperature"], emissivity]),
+            "given: chipglow, exposure": lambda: CAMERA.expose(plain, surface, 0.0),
+            "given: NumPy, Figure 6, table": lambda: literal(table, SUB_FRAMES),
+            "in memory: bound, reading once": lambda: read_once(list(arrays.values())),
+            "in memory: chipglow, exposure": lambda: CAMERA.expose(whole, CHIP_1, 0.0),
+            "stored: chipglow, first look": lambda: CAMERA.expose(open_cold(path), CHIP_1, 0.0),
+            "stored: chipglow, again": lambda: CAMERA.expose(stored, CHIP_1, 0.0),
+        },
+        rounds,
+    )
     one = np.min([timed(lambda: literal(quadrature, 1)) for _ in range(2)], axis=0)
     best["given: NumPy, Figure 6, 64 wavelengths (1 x 50)"] = one * SUB_FRAMES
     found = CAMERA.measure(plain, surface, 0.0).radiance_temperature()[0]
     difference = np.nanmax(np.abs(found - literal(table, SUB_FRAMES)))
-
-    size, samples = path.stat().st_size, RASTER.rows * RASTER.columns * SUB_FRAMES
-    print(f"{SUB_FRAMES} sub-frames of 810 x 900 to 90 x 100; {numba.get_num_threads()} threads;")
-    print(f"best of {rounds} rounds in turn; Figure 6 differs by {difference * 1e3:.3f} mK;")
-    print(f"the file has {size / 1e6:.1f} MB, {8 * size / samples:.2f} bits a sample\n")
+    samples = RASTER.rows * RASTER.columns * SUB_FRAMES
+    bits = 8 * path.stat().st_size / (RASTER.rows * RASTER.columns * len(stored))
+    print(
+        f"\n{SUB_FRAMES} sub-frames of 810 x 900 to 90 x 100; {bits:.2f} bits a sample in the file;"
+    )
+    print(f"Figure 6 differs by {difference * 1e3:.3f} mK\n")
     print(f"{'':50}{'wall ms':>10}{'processor ms':>14}{'ns/sample':>11}")
     for name, (wall, busy) in best.items():
-        count = frames.size if name.startswith("inverse") else samples
-        print(f"{name:50}{wall * 1e3:10.1f}{busy * 1e3:14.1f}{busy / count * 1e9:11.2f}")
+        print(f"{name:50}{wall * 1e3:10.1f}{busy * 1e3:14.1f}{busy / samples * 1e9:11.2f}")
+    return CAMERA.expose(stored, CHIP_1, 0.0)
+
+
+def compare_studies(path, instants, rounds):
+    """Time all frames of the paper's study."""
+    kept = open_scene(path)
+    raster = kept.raster
+    print(
+        f"\n{instants} instants x 2 chips, {len(kept)} frames of {raster.rows} x {raster.columns}"
+    )
+    best = best_of(
+        {
+            "study: first look": lambda: study(open_cold(path), instants),
+            "study: again": lambda: study(kept, instants),
+        },
+        min(rounds, 3),
+    )
+    for name, (wall, busy) in best.items():
+        print(f"{name:50}{wall * 1e3:10.1f}{busy * 1e3:14.1f}")
+
+
+def compare_images(kept, rounds):
+    """Time what cameras and other programs make of an exposure, and compare the images."""
+    print("\nImages of 810 x 900 samples, at 90 x 100 pixels")
+    peers, radiance = peers_there(), kept.mean_radiance
+    calls, images = counted(radiance, peers), same_images(radiance, peers)
+    # Not in turn: of so many point spread functions the oldest would be forgotten.
+    best = {
+        name: best_of({name: call}, rounds)[name]
+        for name, call in {**new_images(kept), **images, **calls}.items()
+    }
+    ours = images["image: chipglow"]()
+    print(f"{'':50}{'wall ms':>10}{'processor ms':>14}{'apart, K: rms':>15}{'most':>8}")
+    for name, (wall, busy) in best.items():
+        line = f"{name:50}{wall * 1e3:10.1f}{busy * 1e3:14.1f}"
+        if name in images and name != "image: chipglow":
+            line += "{:15.4f}{:8.4f}".format(*apart(images[name](), ours))
+        print(line)
+    if "Pyxel" in peers:
+        print(f"counts of chipglow and Pyxel apart, over their noise: {counts_apart(calls):.3f}")
+    frames = np.geomspace(1.0, 1e3, 900000).reshape(100, 90, 100)
+    inverses = {
+        "inverse, 100 frames of 90 x 100": lambda: [CAMERA.band.temperature(f) for f in frames],
+        "inverse, the same as one array": lambda: CAMERA.band.temperature(frames),
+    }
+    print(f"\n{'':50}{'wall ms':>10}{'processor ms':>14}{'ns/pixel':>11}")
+    for name, (wall, busy) in best_of(inverses, rounds).items():
+        print(f"{name:50}{wall * 1e3:10.1f}{busy * 1e3:14.1f}{busy / frames.size * 1e9:11.2f}")
+
+
+def new_images(kept):
+    """New images of a kept exposure; with "new PSF" also one that was not used before."""
+    other = replace(CAMERA, psf=GaussianPSF(14e-6), lower_limit=573.15)
+    optics = replace(other, psf_order="optics")
+    sharp, scales = replace(optics, psf=AnnularAperturePSF()), (1 + i / 1000 for i in count())
+    sharp_detector = replace(sharp, psf_order="detector")
+
+    def wider(camera):
+        psf = GaussianPSF(14e-6 * next(scales))
+        return replace(camera, psf=psf).form_measurement(kept)
+
+    def sharper(camera):
+        psf = AnnularAperturePSF(numerical_aperture=0.28 * next(scales))
+        return replace(camera, psf=psf).form_measurement(kept)
+
+    return {
+        "new image: order detector": lambda: other.form_measurement(kept),
+        "new image: order detector, new PSF": lambda: wider(other),
+        "new image: order detector, diffraction": lambda: sharp_detector.form_measurement(kept),
+        "new image: order detector, diffraction, new PSF": lambda: sharper(sharp_detector),
+        "new image: order optics": lambda: optics.form_measurement(kept),
+        "new image: order optics, new PSF": lambda: wider(optics),
+        "new image: order optics, diffraction": lambda: sharp.form_measurement(kept),
+        "new image: order optics, diffraction, new PSF": lambda: sharper(sharp),
+    }
+
+
+def same_images(radiance, peers):
+    """The image behind a Gaussian on square pixels, as each program makes it."""
+    camera = replace(CAMERA, psf_order="optics")
+    kernel, given = camera.psf.kernel(RASTER.spacing), (camera.psf.fwhm, RASTER.spacing, 9)
+    calls = {
+        "image: chipglow": lambda: camera.form_image(radiance, RASTER),
+        "image: SciPy": lambda: scipy_image(radiance, kernel),
+    }
+    for name, module in peers.items():
+        form = module.prepared(kernel, *given)
+        calls[f"image: {name}"] = lambda form=form: form(radiance)
+    return calls
+
+
+def counted(radiance, peers):
+    """Image, point spread function from pixel to pixel, noise and digitiser, in counts."""
+    camera, generator = replace(CAMERA, psf_order="detector"), np.random.default_rng(1)
+    sensors, point = camera.pixels(RASTER), OperationPoint(band=CAMERA.band)
+    kernel = camera.psf.kernel(camera.pitch)
+    calls = {
+        "counts: chipglow": lambda: DETECTOR.counts(
+            camera.form_image(radiance, RASTER)[None], generator, point
+        )[0]
+    }
+    if "Pyxel" in peers:
+        digitise = peers["Pyxel"].prepared_detector(DETECTOR, DETECTOR.per_radiance(point), kernel)
+        calls["counts: Pyxel"] = lambda: digitise(integrate(radiance, RASTER, sensors, 1.0))
+    return calls
+
+
+def apart(image, expected):
+    """Root of the mean square and the most of differences of radiance temperature in K."""
+    inner = (slice(BORDER, -BORDER),) * 2
+    found, ours = (CAMERA.band.temperature(one[inner]) for one in (image, expected))
+    differences = np.abs(found - ours)[ours > LEAST]
+    return np.sqrt(np.mean(differences**2)), differences.max()
+
+
+def counts_apart(calls):
+    """Differences of counts over the standard deviation that the noise of both gives them: 1."""
+    inner = (slice(BORDER, -BORDER),) * 2
+    ours, theirs = (
+        calls[f"counts: {name}"]()[inner].astype(float) for name in ("chipglow", "Pyxel")
+    )
+    gain = DETECTOR.conversion_gain
+    noise = np.sqrt(2 * (gain * ours + (gain * READ_NOISE) ** 2 + 1 / 12))
+    return np.sqrt(np.mean(((theirs + 0.5 - ours) / noise) ** 2))
 
 
 if __name__ == "__main__":

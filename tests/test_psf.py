@@ -9,8 +9,17 @@ from scipy.ndimage import convolve
 from scipy.special import erf, j0, j1
 
 from chipglow.camera import AnnularAperturePSF, GaussianPSF, MeasuredPSF
-from chipglow.camera.optics.convolution import blur, blur_of_like, both_borders, light_from_beyond
+from chipglow.camera.optics.convolution import (
+    blur,
+    blur_of_like,
+    both_borders,
+    both_images_on_pixels,
+    image_on_pixels,
+    light_from_beyond,
+)
 from chipglow.camera.optics.psf import ANNULAR_ENERGY, GAUSSIAN_ENERGY
+from chipglow.camera.optics.sampling import integrate, sensor_raster
+from chipglow.scene import Raster
 
 FWHM_PER_SIGMA = 2 * sqrt(2 * log(2))
 LOPSIDED = np.array([[0, 1, 2], [3, 8, 1], [0, 2, 1]], dtype=float)
@@ -370,6 +379,30 @@ def test_both_borders_are_the_images_by_either_rule(psf):
     # The same operations.
     np.testing.assert_array_equal(edge, blur(radiance, psf, 2e-6))
     np.testing.assert_array_equal(like, blur_of_like(radiance, psf, 2e-6))
+
+
+# A pixel of samples, of parts of them, of less than one, and the middle of one.
+@pytest.mark.parametrize(
+    ("pitch", "fill"), [(6e-6, 1.0), (7.3e-6, 1.0), (1.7e-6, 1.0), (6e-6, 0.1)]
+)
+@pytest.mark.parametrize("psf", KINDS, ids=repr)
+def test_an_image_on_pixels_is_what_they_integrate_of_the_whole_one(psf, pitch, fill):
+    # Rows and columns differ, and no edge of the pixels is one of the scene.
+    scene = Raster(-10e-6, 20e-6, 2e-6, 37, 52)
+    sensors = sensor_raster(scene, pitch, (3.1e-6, 4.7e-6), None)
+    radiance = np.random.default_rng(6).lognormal(0.0, 3.0, scene.shape)
+    image, like = both_images_on_pixels(radiance, psf, scene, sensors, fill)
+    expected = integrate(blur(radiance, psf, scene.spacing), scene, sensors, fill)
+    # What transforms round is a part of the largest value, not of each.
+    np.testing.assert_allclose(image, expected, rtol=1e-13, atol=1e-15 * radiance.max())
+    np.testing.assert_array_equal(image_on_pixels(radiance, psf, scene, sensors, fill), image)
+    # Where nothing is at the edges, the first rule has no light from beyond.
+    radiance[[0, -1]] = radiance[:, [0, -1]] = 0.0
+    image, like = both_images_on_pixels(radiance, psf, scene, sensors, fill)
+    within = 1 - integrate(light_from_beyond(psf, 2e-6, scene.shape), scene, sensors, fill)
+    np.testing.assert_allclose(like, image / within, rtol=1e-12, atol=1e-15 * radiance.max())
+    _, like = both_images_on_pixels(np.full(scene.shape, 5.0), psf, scene, sensors, fill)
+    np.testing.assert_allclose(like, 5.0, rtol=1e-13)
 
 
 def test_half_the_light_at_a_border_is_from_beyond_it():

@@ -10,6 +10,7 @@ from scipy.interpolate import BSpline
 
 from chipglow.camera.exposure import expose, expose_all
 from chipglow.camera.sweep import STEPS_PER_KELVIN
+from chipglow.cutting import CuttingConditions, CuttingSimulation, Numerics, OutputWindow
 from chipglow.io import SceneWriter, StoredScene, open_scene, unfinished_scenes, write_scene
 from chipglow.io.decoded import Decoded
 from chipglow.io.spline_file import STEPS
@@ -148,6 +149,27 @@ def test_splines_come_back_within_their_steps(tmp_path, portable):
             )
     assert scene.tool == ToolGeometry()
     np.testing.assert_array_equal(scene.data["cutting_force"], [4e5, 4.5e5])
+
+
+def test_a_cut_comes_back_within_a_millikelvin(tmp_path):
+    simulation = CuttingSimulation(
+        CuttingConditions(cutting_length=0.06e-3), numerics=Numerics(cell=30e-6)
+    )
+    raster = Raster(-150e-6, 100e-6, 4e-6, 60, 60)
+    window = OutputWindow(start=0.05e-3, end=0.06e-3, interval=0.5e-6, later_bands=0)
+    drawn = []
+    simulation.run(window, raster, drawn.append)
+    path = tmp_path / "cut.nc"
+    with SceneWriter(path, raster, lattice=simulation.lattice(raster)) as writer:
+        for frame in drawn:
+            writer.append(frame)
+    apart, scene = [], open_scene(path)
+    for kept, frame in zip(scene.frames(), drawn, strict=True):
+        assert frame.temperature.max() > 320.0
+        apart.append(np.abs(kept.temperature - frame.temperature)[kept.material == frame.material])
+    most = np.concatenate(apart).max()
+    # Half a step, and what float32 rounds of some 300 K: without steps it would be the latter.
+    assert 0.5e-3 < most < 2**-10 + 2 * np.spacing(np.float32(400.0))
 
 
 def test_a_copy_keeps_the_splines_and_a_portable_one_the_samples(tmp_path):

@@ -28,7 +28,13 @@ from chipglow.camera.optics import (
     PointSpreadFunction,
     blur,
 )
-from chipglow.camera.optics.convolution import blur_of_like, both_borders, light_from_beyond
+from chipglow.camera.optics.convolution import (
+    blur_of_like,
+    both_borders,
+    both_images_on_pixels,
+    image_on_pixels,
+    light_from_beyond,
+)
 from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_raster
 from chipglow.camera.optics.terms import Blur
 from chipglow.camera.sweep import Check
@@ -440,13 +446,10 @@ class Camera:
             sensors = found
             starts.append(exposure.start)
             effects.append(set(exposure.effects.items()))
-            image, scene = exposure.mean_radiance, exposure.raster
-            like = image
-            if self.psf is not None and self.psf_order == "optics":
-                image, like = both_borders(image, self.psf, scene.spacing)
-            frames.append(self._read_out(image, scene, sensors, blur))
-            if self.psf is not None or self.optics:
-                alike.append(self._read_out(like, scene, sensors, blur_of_like))
+            image, like = self._both_images(exposure.mean_radiance, exposure.raster, sensors)
+            frames.append(image)
+            if like is not None:
+                alike.append(like)
         if sensors is None:
             raise ValueError("camera: no exposure to develop, expected 1 or more")
         images, times = np.stack(frames), np.array(starts)
@@ -556,8 +559,27 @@ class Camera:
             raise ValueError("camera: radiance must be finite and 0 W/(m² sr) or more")
         sensors = self.pixels(scene)
         if self.psf is not None and self.psf_order == "optics":
+            if not self.optics:
+                return image_on_pixels(image, self.psf, scene, sensors, self._sensitive(scene))
             image = blur(image, self.psf, scene.spacing)
         return self._read_out(image, scene, sensors, blur)
+
+    def _both_images(
+        self, radiance: NDArray[np.float64], scene: Raster, sensors: Raster
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+        """Image on the pixels by either rule of what is beyond the scene, if that matters."""
+        image = like = radiance
+        if self.psf is None and not self.optics:
+            return self._read_out(image, scene, sensors, blur), None
+        if self.psf is not None and self.psf_order == "optics":
+            if not self.optics:
+                sensitive = self._sensitive(scene)
+                return both_images_on_pixels(image, self.psf, scene, sensors, sensitive)
+            image, like = both_borders(image, self.psf, scene.spacing)
+        return (
+            self._read_out(image, scene, sensors, blur),
+            self._read_out(like, scene, sensors, blur_of_like),
+        )
 
     def _read_out(
         self, image: NDArray[np.float64], scene: Raster, sensors: Raster, blurred: Blur

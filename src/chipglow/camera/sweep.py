@@ -1,7 +1,7 @@
 """Sums over the sub-frames of an exposure: the rows in blocks, with time inside.
 
 A block's sums stay in the processor's cache while its sub-frames go by, and a sub-frame's fields
-are made, blended and summed row by row. Blocks are shared among threads (`in_row_blocks`); none of
+are made, blended and summed row by row. Blocks are shared among threads (`in_blocks`); none of
 the sums depends on their number.
 
 The kernels are functions of arrays alone and work on one block each: a graphics processor would
@@ -20,7 +20,7 @@ from chipglow.radiometry.band import TABLE_COLDEST
 from chipglow.scene import Frame, Material
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, TOOL_SPLINE, SplineFrame, spread
 from chipglow.surface.blend import SCRATCH, Textures, blend_row
-from chipglow.surface.row_blocks import in_row_blocks
+from chipglow.surface.blocks import in_blocks
 
 STEPS_PER_KELVIN: Final = 32.0
 """Values of the table of radiance in a kelvin; a straight line between them is exact enough."""
@@ -201,7 +201,7 @@ class Sums:
             self.check()
             add(first, last)
 
-        in_row_blocks(len(self.hottest), checked)
+        in_blocks(len(self.hottest), checked)
 
 
 def _filled(arrays: list[NDArray[Any]]) -> tuple[NDArray[Any], ...]:

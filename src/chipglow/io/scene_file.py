@@ -384,7 +384,8 @@ class StoredScene(Scene):
     def __init__(self, path: Path) -> None:
         self.path = path
         self._file = h5py.File(path, "r")
-        self._datasets = {name: self._file[name] for name in PACKING if name in self._file}
+        names = (*PACKING, *spline_file.CHUNKED)
+        self._datasets = {name: self._file[name] for name in names if name in self._file}
         self._direct = {
             name: packing
             for name, packing in (*PACKING.items(), ("temperature", HOT))
@@ -455,7 +456,7 @@ class StoredScene(Scene):
         found = self._near_splines.get(index)
         if found is None:
             with self._telling(spline_file.SPLINES, index):
-                nodes, limits = (self._file[name][index] for name in spline_file.CHUNKED)
+                nodes, limits = (self._datasets[name][index] for name in spline_file.CHUNKED)
             found = SplineFrame(self.lattice, float(self.times[index]), nodes, limits)
             spline_file.check(found)
             self._near_splines.keep(index, found, nodes.nbytes)

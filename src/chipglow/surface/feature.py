@@ -21,8 +21,8 @@ from chipglow.surface.blend import (
     fraction_between,
     padded,
 )
+from chipglow.surface.blocks import in_blocks
 from chipglow.surface.emissivity import Emissivity
-from chipglow.surface.row_blocks import in_row_blocks
 from chipglow.surface.surface import EmissivityField, EmissivityStack, Surface
 from chipglow.surface.texture import Texture
 
@@ -292,7 +292,7 @@ class FeatureFields(EmissivityStack):
             *first.positions(frame),
         )
         shifts, textures = self.shifts(frame.time), self.textures
-        in_row_blocks(
+        in_blocks(
             first.raster.rows,
             lambda begin, end: _blend(*fields, shifts, textures, begin, end, result),
         )
@@ -371,9 +371,7 @@ def _mean_velocities(frame: Frame, height: NDArray[np.float64]) -> NDArray[np.fl
         frame.needed("velocity_x"),
         frame.needed("velocity_y"),
     )
-    in_row_blocks(
-        len(height), lambda begin, end: _sum_velocities(*fields, height, begin, end, rows)
-    )
+    in_blocks(len(height), lambda begin, end: _sum_velocities(*fields, height, begin, end, rows))
     sums = rows.sum(axis=0)
     weight = np.where(sums[:, 2:] > 0, sums[:, 2:], np.nan)
     velocity = sums[:, :2] / weight

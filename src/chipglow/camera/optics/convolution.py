@@ -1,17 +1,24 @@
 """Convolution with a point spread function."""
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Final, Literal, cast
+from functools import cached_property, lru_cache
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
+from scipy import fft, sparse
 
 from chipglow.camera.optics.kernel import resized
 from chipglow.camera.optics.psf import PointSpreadFunction
+from chipglow.camera.optics.sampling import line_weights
+from chipglow.scene import Raster
+from chipglow.surface.blocks import in_blocks
+
+_Kernel: TypeAlias = tuple[NDArray[np.float64], tuple[NDArray[np.float64], ...]]
+"""A kernel, and its sums over all that is beyond the left, right, upper and lower edge."""
 
 _ROUNDING: Final = 1e-13
+_COLUMNS: Final = 32
 _FARTHEST: Final = 2048
 """Squares that a kernel reaches at most: light that goes farther is taken to go so far."""
 
@@ -42,8 +49,8 @@ def blur(
     known: `light_from_beyond` says how much of the light it decides, and `blur_of_like` gives the
     image under another assumption.
     """
-    transfer = _transfer(psf, spacing, radiance.shape)
-    return _without_rounding(transfer.within(radiance) + transfer.from_edges(radiance))
+    within = _transfer(psf, spacing, radiance.shape).within(radiance)
+    return _without_rounding(within + _edges(psf, spacing, radiance.shape).light(radiance))
 
 
 def blur_of_like(
@@ -80,11 +87,64 @@ def both_borders(
     tuple of ndarray
         Radiance in W/(m² sr), each of shape (y, x).
     """
-    transfer = _transfer(psf, spacing, radiance.shape)
-    within = transfer.within(radiance)
+    within = _transfer(psf, spacing, radiance.shape).within(radiance)
     like = within / (1 - light_from_beyond(psf, spacing, radiance.shape))
-    within += transfer.from_edges(radiance)
+    within += _edges(psf, spacing, radiance.shape).light(radiance)
     return _without_rounding(within), _without_rounding(like)
+
+
+def image_on_pixels(
+    radiance: NDArray[np.float64],
+    psf: PointSpreadFunction,
+    scene: Raster,
+    sensors: Raster,
+    fill_factor: float,
+) -> NDArray[np.float64]:
+    """What pixels integrate of the image by `blur`, which is formed nowhere but on them.
+
+    Parameters
+    ----------
+    radiance : ndarray
+        Radiance of the scene's samples in W/(m² sr), shape `scene.shape`.
+    psf : PointSpreadFunction
+        How a point is spread.
+    scene, sensors : Raster
+        Where the samples and the pixels are.
+    fill_factor : float
+        Fraction of a pixel's square that is sensitive: a square in its middle.
+
+    Returns
+    -------
+    ndarray
+        Radiance in W/(m² sr), shape `sensors.shape`.
+    """
+    seen = _seen(psf, scene, sensors, fill_factor)
+    return _without_rounding(seen.within(radiance) + seen.from_edges(radiance))
+
+
+def both_images_on_pixels(
+    radiance: NDArray[np.float64],
+    psf: PointSpreadFunction,
+    scene: Raster,
+    sensors: Raster,
+    fill_factor: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The same, and the image if beyond the scene there is for each pixel the like of within.
+
+    Parameters
+    ----------
+    radiance, psf, scene, sensors, fill_factor
+        As `image_on_pixels`.
+
+    Returns
+    -------
+    tuple of ndarray
+        Radiance in W/(m² sr), each of shape `sensors.shape`.
+    """
+    seen = _seen(psf, scene, sensors, fill_factor)
+    within = seen.within(radiance)
+    image = _without_rounding(within + seen.from_edges(radiance))
+    return image, _without_rounding(within / seen.own_light)
 
 
 @lru_cache(maxsize=2)
@@ -121,7 +181,7 @@ class _Strip:
     ----------
     spectrum : ndarray
         Transform along the edge of the kernel's sums over all that is beyond, shape (n, frequency),
-        for the n lines of the field beside the edge that its light reaches.
+        for the n lines of the field beside the edge that its light reaches, or n means of them.
     length, reach : int
         Of what is transformed, and of the kernel to either side.
     """
@@ -131,12 +191,11 @@ class _Strip:
     reach: int
 
     @classmethod
-    def of(cls, kernel: NDArray[np.float64], shape: tuple[int, int]) -> "_Strip":
-        """That of the left edge of a field of this shape."""
-        reach = kernel.shape[0] // 2
-        beyond = kernel[:, : kernel.shape[1] // 2 : -1].cumsum(axis=1)[:, ::-1]
-        length = fft.next_fast_len(shape[0] + 2 * reach, real=True)
-        return cls(fft.rfft(beyond[:, : shape[1]].T, n=length), length, reach)
+    def of(cls, lines: NDArray[np.float64], count: int) -> "_Strip":
+        """That of an edge of so many values, from the kernel's sums (n, place along the edge)."""
+        reach = lines.shape[1] // 2
+        length = fft.next_fast_len(count + 2 * reach, real=True)
+        return cls(fft.rfft(lines, n=length), length, reach)
 
     def light(
         self, edge: NDArray[np.float64], beyond: Literal["edge", "constant"]
@@ -147,9 +206,41 @@ class _Strip:
         return np.asarray(sent[:, 2 * self.reach :][:, : edge.size])
 
 
+class _Edges(NamedTuple):
+    """What comes from beyond each edge of a field."""
+
+    left: _Strip
+    right: _Strip
+    top: _Strip
+    bottom: _Strip
+
+    def light(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Light from beyond a field that goes on with the value at the nearest edge."""
+        light = np.zeros(field.shape)
+        left, right, top, bottom = self.strips(field)
+        for towards, sent in (
+            (light.T, left),
+            (light[:, ::-1].T, right),
+            (light, top),
+            (light[::-1], bottom),
+        ):
+            towards[: len(sent)] += sent
+        return light
+
+    def strips(self, field: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        """The light by the edges that it comes over, each (lines away from the edge, along it)."""
+        # Above and below the field the left and the right edge go on as its corners.
+        return (
+            self.left.light(field[:, 0], "edge"),
+            self.right.light(field[:, -1], "edge"),
+            self.top.light(field[0], "constant"),
+            self.bottom.light(field[-1], "constant"),
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class _Transfer:
-    """Transforms of a kernel for fields of one shape.
+    """Transform of a kernel for fields of one shape.
 
     Parameters
     ----------
@@ -158,46 +249,89 @@ class _Transfer:
     shape : tuple of int
         Shape of what is transformed: so much larger than the field that what wraps around falls
         beside it.
-    left, right, top, bottom : _Strip
-        What comes from beyond each edge.
     """
 
     spectrum: NDArray[np.complex128]
     shape: tuple[int, int]
-    left: _Strip
-    right: _Strip
-    top: _Strip
-    bottom: _Strip
 
-    def within(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The convolution of a field with nothing beyond it."""
+    def within(
+        self, field: NDArray[np.float64], down: sparse.csr_array | None = None
+    ) -> NDArray[np.float64]:
+        """The convolution of a field with nothing beyond it, or weighted sums `down` its rows."""
         rows, columns = field.shape
         # Rows beyond the field hold nothing: they are transformed in one direction only.
         lines = fft.rfft(field, n=self.shape[1], axis=1)
-        whole = fft.fft(lines, n=self.shape[0], axis=0)
-        whole *= self.spectrum
-        kept = fft.ifft(whole, axis=0, overwrite_x=True)[:rows]
+        kept = np.empty((rows if down is None else down.shape[0], lines.shape[1]), np.complex128)
+
+        def convolve(begin: int, end: int) -> None:
+            block = fft.fft(lines[:, begin:end], n=self.shape[0], axis=0)
+            block *= self.spectrum[:, begin:end]
+            own = fft.ifft(block, axis=0, overwrite_x=True)[:rows]
+            kept[:, begin:end] = own if down is None else down @ own
+
+        # So few columns stay in a processor's cache from one transform to the other.
+        in_blocks(lines.shape[1], convolve, _COLUMNS)
         return np.asarray(fft.irfft(kept, n=self.shape[1], axis=1)[:, :columns])
 
-    def from_edges(self, field: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Light from beyond a field that goes on with the value at the nearest edge."""
-        light = np.zeros(field.shape)
-        # Above and below the field the left and the right edge go on as its corners.
-        for strip, edge, beyond, towards in (
-            (self.left, field[:, 0], "edge", light.T),
-            (self.right, field[:, -1], "edge", light[:, ::-1].T),
-            (self.top, field[0], "constant", light),
-            (self.bottom, field[-1], "constant", light[::-1]),
-        ):
-            sent = strip.light(edge, cast(Literal["edge", "constant"], beyond))
-            towards[: len(sent)] += sent
-        return light
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What pixels see of a scene behind a point spread function.
+
+    Parameters
+    ----------
+    transfer : _Transfer
+        Of the samples.
+    down, across : csr_array
+        Weights of the samples in the pixels.
+    edges : _Edges
+        Light from beyond: over the left and the right edge on columns of pixels and rows of
+        samples, over the others on rows of pixels and columns of samples.
+    """
+
+    transfer: _Transfer
+    down: sparse.csr_array
+    across: sparse.csr_array
+    edges: _Edges
+
+    def within(self, radiance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Light from within the scene."""
+        return np.asarray((self.across @ self.transfer.within(radiance, self.down).T).T)
+
+    def from_edges(self, radiance: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Light from beyond the scene, which goes on as at its edges."""
+        left, right, top, bottom = self.edges.strips(radiance)
+        beside, over = self.down @ (left + right).T, self.across @ (top + bottom).T
+        return np.asarray(beside + over.T)
+
+    @cached_property
+    def own_light(self) -> NDArray[np.float64]:
+        """Fraction of the light of each pixel that comes from within the scene."""
+        fraction = self.within(np.ones((self.down.shape[1], self.across.shape[1])))
+        return np.where(fraction < 1 - _ROUNDING, fraction, 1.0)
+
+
+@lru_cache(maxsize=2)
+def _kernel(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]) -> _Kernel:
+    rows, columns = (min(count, _FARTHEST) for count in shape)
+    kernel = psf.view_kernel(spacing, rows, columns)
+    beyond = (
+        _sums_beyond(kernel, shape[1]),
+        _sums_beyond(kernel[:, ::-1], shape[1]),
+        _sums_beyond(kernel.T, shape[0]),
+        _sums_beyond(kernel[::-1].T, shape[0]),
+    )
+    return kernel, beyond
+
+
+def _sums_beyond(kernel: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Sums of a kernel over all that is beyond the left edge, for so many lines beside it."""
+    return kernel[:, : kernel.shape[1] // 2 : -1].cumsum(axis=1)[:, ::-1][:, :count].T
 
 
 @lru_cache(maxsize=2)
 def _transfer(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]) -> _Transfer:
-    rows, columns = (min(count, _FARTHEST) for count in shape)
-    kernel = psf.view_kernel(spacing, rows, columns)
+    kernel, _ = _kernel(psf, spacing, shape)
     # No value of the field is farther from another than this.
     reach = tuple(min(n // 2, most - 1) for n, most in zip(kernel.shape, shape, strict=True))
     inner = resized(kernel, *reach)
@@ -207,15 +341,34 @@ def _transfer(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]) 
     )
     whole = np.zeros(padded)
     whole[: inner.shape[0], : inner.shape[1]] = inner
-    spectrum = fft.rfft2(np.roll(whole, (-reach[0], -reach[1]), axis=(0, 1)), overwrite_x=True)
-    return _Transfer(
-        spectrum,
-        padded,
-        left=_Strip.of(kernel, shape),
-        right=_Strip.of(kernel[:, ::-1], shape),
-        top=_Strip.of(kernel.T, shape[::-1]),
-        bottom=_Strip.of(kernel[::-1].T, shape[::-1]),
+    centred = np.roll(whole, (-reach[0], -reach[1]), axis=(0, 1))
+    return _Transfer(fft.rfft2(centred, overwrite_x=True), padded)
+
+
+@lru_cache(maxsize=2)
+def _edges(psf: PointSpreadFunction, spacing: float, shape: tuple[int, int]) -> _Edges:
+    """Light from beyond on the values of a field."""
+    (left, right, top, bottom), (rows, columns) = _kernel(psf, spacing, shape)[1], shape
+    return _Edges(
+        _Strip.of(left, rows),
+        _Strip.of(right, rows),
+        _Strip.of(top, columns),
+        _Strip.of(bottom, columns),
     )
+
+
+@lru_cache(maxsize=4)
+def _seen(psf: PointSpreadFunction, scene: Raster, sensors: Raster, fill_factor: float) -> _Seen:
+    rows, columns = shape = scene.shape
+    down, across = line_weights(scene, sensors, fill_factor)
+    left, right, top, bottom = _kernel(psf, scene.spacing, shape)[1]
+    edges = _Edges(
+        _Strip.of(across[:, : len(left)] @ left, rows),
+        _Strip.of(across[:, ::-1][:, : len(right)] @ right, rows),
+        _Strip.of(down[:, : len(top)] @ top, columns),
+        _Strip.of(down[:, ::-1][:, : len(bottom)] @ bottom, columns),
+    )
+    return _Seen(_transfer(psf, scene.spacing, shape), down, across, edges)
 
 
 def _without_rounding(image: NDArray[np.float64]) -> NDArray[np.float64]:

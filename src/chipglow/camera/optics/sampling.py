@@ -114,14 +114,33 @@ def integrate(
     ndarray
         Radiance in W/(m² sr), shape `sensors.shape`.
     """
+    down, across = line_weights(scene, sensors, fill_factor)
+    # Sparse products are summed in one order, whatever the number of threads.
+    return np.asarray((across @ (down @ radiance).T).T)
+
+
+def line_weights(
+    scene: Raster, sensors: Raster, fill_factor: float
+) -> tuple[sparse.csr_array, sparse.csr_array]:
+    """Weights of the samples in the pixels, whose mean of a column and of a row they make.
+
+    Parameters
+    ----------
+    scene, sensors, fill_factor
+        As for `integrate`.
+
+    Returns
+    -------
+    down, across : csr_array
+        Shapes (sensors.rows, scene.rows) and (sensors.columns, scene.columns), each row of sum 1.
+    """
     down = _line_weights(
         scene.top - sensors.top, scene.rows, sensors.rows, scene, sensors, fill_factor
     )
     across = _line_weights(
         sensors.left - scene.left, scene.columns, sensors.columns, scene, sensors, fill_factor
     )
-    # Sparse products are summed in one order, whatever the number of threads.
-    return np.asarray((across @ (down @ radiance).T).T)
+    return down, across
 
 
 def _line_weights(
