@@ -56,7 +56,7 @@ def wait_for(file):
     """Wait until another process has made a file."""
     end = time.monotonic() + MOST_SECONDS
     while not file.exists():
-        assert time.monotonic() < end, "the quick study failed in another process"
+        assert time.monotonic() < end, f"{file} did not come from another process"
         time.sleep(0.2)
 
 
