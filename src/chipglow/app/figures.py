@@ -24,7 +24,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 
-from chipglow.app.knobs import ERRORS, LINE_NAMES, LINES, SHOWN, Ends, Knobs
+from chipglow.app.knobs import CURSOR, ERRORS, LINE_NAMES, LINES, Knobs, Point
 from chipglow.app.picture import Drawn, LineValues, Picture
 from chipglow.drawing.drawing import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
 from chipglow.scene import Raster, Tool
@@ -36,7 +36,7 @@ _THEMES: Final = {
     "light": {"ground": "#ffffff", "text": "#16191d", "grid": "#d7dbe0", "void": "#e5e7eb"},
     "dark": {"ground": "#14171c", "text": "#e8eaed", "grid": "#39414b", "void": "#2b313a"},
 }
-_LINE_COLOURS: Final = {"rake_line": "#56B4E9", "band_line": "#F0A020"}
+LINE_COLOURS: Final = {"rake_line": "#56B4E9", "band_line": "#E69F00"}
 _MEASURED: Final = "#2b7fd0"
 _REFERENCE: Final = "#7d858f"
 """Seen on light and dark ground: a glyph's colour that changes comes back from notebooks."""
@@ -45,12 +45,6 @@ _TITLES: Final = {
     "scene": "Scene: true temperature / °C",
     "measured": "Measured radiance temperature / °C",
     "error": "Error / K",
-}
-_UNITS: Final = {
-    "temperature": " / °C",
-    "radiance_temperature": " / °C",
-    "plastic_strain_rate": " / (1/s)",
-    "speed": " / (m/s)",
 }
 
 _BORDER: Final = 46
@@ -148,8 +142,8 @@ class Figures:
         self._extent = tuple(MICRONS * edge for edge in raster.extent)
         left, right, bottom, top = self._extent
         self.x_range, self.y_range = Range1d(left, right), Range1d(bottom, top)
-        self.cursor = ColumnDataSource(_points((knobs.cursor,)))
-        self.ends = {name: ColumnDataSource(_points(getattr(knobs, name))) for name in LINES}
+        self.cursor = ColumnDataSource(_points(knobs.points(CURSOR)))
+        self.ends = {name: ColumnDataSource(_points(knobs.points(name))) for name in LINES}
         self._spans = [
             Span(dimension=one, line_color="#808080", line_width=1) for one in ("height", "width")
         ]
@@ -170,15 +164,13 @@ class Figures:
         measured = np.where(picture.flagged, np.nan, picture.measured) - KELVIN
         scene, error = picture.scene, picture.error
         if scene is not None:
-            title = f"Scene: {SHOWN[scene.name].lower()}{_UNITS.get(scene.name, '')}"
-            self.images["scene"].figure.title.text = title
+            self.images["scene"].figure.title.text = f"Scene: {scene.label}"
         limits = ends(measured, 0.0, 100.0, 10.0)
-        if scene is not None and scene.name in ("temperature", "radiance_temperature"):
-            celsius = scene.celsius
-            limits = min(limits[0], _lowest(picture)), max(limits[1], float(np.nanmax(celsius)))
-            self._set("scene", celsius, scene.raster, limits, HEAT)
+        if scene is not None and scene.is_temperature:
+            limits = min(limits[0], _lowest(picture)), max(limits[1], float(np.nanmax(scene.shown)))
+            self._set("scene", scene.shown, scene.raster, limits, HEAT)
         elif scene is not None:
-            self._set("scene", scene.values, scene.raster, ends(scene.values), PLAIN)
+            self._set("scene", scene.shown, scene.raster, ends(scene.shown), PLAIN)
         self._set("measured", measured, picture.raster, limits, HEAT)
         if error is not None:
             shown = np.where(picture.flagged, np.nan, error)
@@ -209,11 +201,8 @@ class Figures:
 
     def set_places(self, knobs: Knobs) -> None:
         """Put cursor and lines where the knobs have them."""
-        for source, points in (
-            (self.cursor, (knobs.cursor,)),
-            *((self.ends[name], getattr(knobs, name)) for name in LINES),
-        ):
-            data = _points(points)
+        for name, source in {CURSOR: self.cursor, **self.ends}.items():
+            data = _points(knobs.points(name))
             if source.data != data:
                 source.data = data
 
@@ -369,10 +358,10 @@ class Figures:
                 one.line(*self._outline, line_color=colour, line_width=width)
         for name, source in self.ends.items():
             one.line("x", "y", source=source, line_color="black", line_width=3.4)
-            one.line("x", "y", source=source, line_color=_LINE_COLOURS[name], line_width=1.8)
+            one.line("x", "y", source=source, line_color=LINE_COLOURS[name], line_width=1.8)
             one.scatter(
                 "x", "y", source=source, size=9, marker="circle", line_color="black",
-                fill_color=_LINE_COLOURS[name], line_width=1.2,
+                fill_color=LINE_COLOURS[name], line_width=1.2,
             )  # fmt: skip
         for colour, width in (("black", 4.0), ("white", 1.8)):
             one.scatter(
@@ -393,7 +382,7 @@ class Figures:
         empty = {"along": [0.0, 1.0], "measured": [0.0, 1.0], "reference": [0.0, 1.0]}
         source = self.line_sources[name] = ColumnDataSource(empty, name=f"{name}_values")
         band = self.band_sources[name] = ColumnDataSource({"along": [], "low": [], "high": []})
-        colour = _LINE_COLOURS[name]
+        colour = LINE_COLOURS[name]
         one.add_layout(Span(dimension="height", line_color=colour, line_width=3, location=0))
         one.x_range.range_padding = 0.02
         box = BoxAnnotation(level="underlay", line_color=None, visible=False)
@@ -452,7 +441,7 @@ def places(source: ColumnDataSource) -> str:
     )
 
 
-def _points(points: tuple[tuple[float, float], ...] | Ends) -> dict[str, list[float]]:
+def _points(points: tuple[Point, ...]) -> dict[str, list[float]]:
     return {
         "x": [round(MICRONS * x, 3) for x, _ in points],
         "y": [round(MICRONS * y, 3) for _, y in points],

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from chipglow.app.knobs import LINE_NAMES, LINES, Knobs
+from chipglow.app.figures import LINE_COLOURS
+from chipglow.app.knobs import LINE_NAMES, LINES, SHOWN, Knobs
 from chipglow.app.model import SceneModel
 from chipglow.app.picture import Picture
 from chipglow.drawing.drawing import (
@@ -27,8 +27,6 @@ from chipglow.drawing.drawing import (
 )
 from chipglow.io import StoredScene, write_dataset
 from chipglow.study import study_text
-
-_LINE_COLOURS: Final = {"rake_line": "#56B4E9", "band_line": "#E69F00"}
 
 
 def study_file(model: SceneModel, knobs: Knobs) -> bytes:
@@ -79,18 +77,15 @@ def _figure(picture: Picture, model: SceneModel) -> Figure:
     measured = np.where(picture.flagged, np.nan, picture.measured) - KELVIN
     error = np.where(picture.flagged, np.nan, picture.error)
     limit = round_limit(error, 98, 5.0)
-    kelvins = picture.scene.name in ("temperature", "radiance_temperature")
-    shown = picture.scene.values - (KELVIN if kelvins else 0.0)
-    quantity = model.panel.knob("shown").choices or {}
+    shown = picture.scene.shown
     part = model.panel.knob("error").choices or {}
-    unit = {"speed": " / (m/s)", "plastic_strain_rate": " / (1/s)"}.get(picture.scene.name, "")
     panels = (
         ImagePanel(
-            quantity[picture.scene.name],
-            f"{quantity[picture.scene.name].lower()}{' / °C' if kelvins else unit}",
+            SHOWN[picture.scene.name],
+            picture.scene.label,
             shown,
             ends(shown),
-            HEAT if kelvins else PLAIN,
+            HEAT if picture.scene.is_temperature else PLAIN,
         ),
         ImagePanel("Measured", "radiance temperature / °C", measured, ends(measured), HEAT),
         ImagePanel(part[knobs.error], "error / K", error, (-limit, limit), SIGNED),
@@ -100,7 +95,7 @@ def _figure(picture: Picture, model: SceneModel) -> Figure:
         panel.draw(figure, one, raster, tool)
         for name in LINES:
             corners = np.array(getattr(knobs, name))
-            draw_line(one, corners, _LINE_COLOURS[name], factor=length_unit(raster)[0])
+            draw_line(one, corners, LINE_COLOURS[name], factor=length_unit(raster)[0])
     for name, one in zip(LINES, axes[1], strict=False):
         values = picture.lines[name]
         assert values.reference is not None

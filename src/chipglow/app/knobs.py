@@ -207,6 +207,10 @@ lower_limit, reflected
     rake_line: Ends
     band_line: Ends
 
+    def points(self, name: str) -> tuple[Point, ...]:
+        """The cursor, or the ends of one of the lines, by its name."""
+        return (self.cursor,) if name == CURSOR else getattr(self, name)
+
 
 def knobs_of(study: Study, start: float, cursor: Point, rake: Ends, band: Ends) -> Knobs:
     """The knobs that mean a study.

@@ -7,7 +7,7 @@ result is kept: surfaces, exposures, images.
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import replace
-from math import ceil, nan, sqrt
+from math import nan
 from threading import Lock
 from typing import Final, Generic, TypeVar
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.app.knobs import LINES, ControlPanel, Knobs
-from chipglow.app.opening import OpenedMeasurement, OpenedScene
+from chipglow.app.opening import OpenedMeasurement, OpenedScene, with_samples
 from chipglow.app.picture import (
     Drawn,
     LineBand,
@@ -25,6 +25,7 @@ from chipglow.app.picture import (
     SceneImage,
 )
 from chipglow.camera import Camera, Exposure
+from chipglow.camera.sweep import Check
 from chipglow.errors import (
     Distribution,
     ErrorImages,
@@ -35,13 +36,12 @@ from chipglow.errors import (
 )
 from chipglow.errors.draws import pixel_phases
 from chipglow.errors.error_images import Unblurred
-from chipglow.io import StoredScene
+from chipglow.radiometry import Band
 from chipglow.scene import Material, Scene, sample
 from chipglow.scene.lines import nearest
 from chipglow.study import Study, fit
 from chipglow.surface import Surface
 
-Check = Callable[[], None]
 Progress = Callable[[float], None]
 
 DISPLAYED: Final = 100_000
@@ -87,6 +87,7 @@ class SceneModel:
     def __init__(self, opened: OpenedScene) -> None:
         self.opened = opened
         self.panel: ControlPanel = opened.panel
+        self._bands: Kept[Band] = Kept(4)
         self._fitted: Kept[tuple[Scene, Surface]] = Kept(4)
         self._exact: Kept[tuple[Exposure, ...]] = Kept(_EXPOSURES)
         self._quick: Kept[tuple[Exposure, ...]] = Kept(_COARSE_EXPOSURES)
@@ -96,7 +97,7 @@ class SceneModel:
         self._errors: Kept[ErrorImages] = Kept(8)
         self._parts: Kept[ErrorParts] = Kept(2)
         self._frames: Kept[tuple[NDArray[np.float32], NDArray[np.float32]]] = Kept(1)
-        self._displayed = _displayed(opened.scene)
+        self._displayed = with_samples(opened.scene, DISPLAYED)
 
     @property
     def has_quick_look(self) -> bool:
@@ -129,7 +130,7 @@ class SceneModel:
         coarse = quick and self.opened.coarse is not None
         study = self.panel.study_of(knobs)
         scene, surface = self._on(study, knobs, coarse)
-        camera = study.camera.on(scene.raster, study.seed)
+        camera = self._camera(study, scene)
         exposures = self._exposed(scene, surface, camera, knobs, coarse, check)
         errors = self._image_errors(camera, exposures[0], knobs, coarse)
         picture = Picture(
@@ -215,7 +216,7 @@ class SceneModel:
         """
         study = self.panel.study_of(knobs)
         scene, surface = self._on(study, knobs, coarse=False)
-        camera = study.camera.on(scene.raster, study.seed)
+        camera = self._camera(study, scene)
         cameras = pixel_phases(camera, phases)
         surfaces = [surface.redrawn(number) for number in range(textures)]
         if surface.redrawn(1) is surface:
@@ -266,6 +267,12 @@ class SceneModel:
 
         return self._fitted.get((_surface_key(knobs), coarse), make)
 
+    def _camera(self, study: Study, scene: Scene) -> Camera:
+        """The study's camera; its band is kept, whose tables take longer than an image."""
+        camera = study.camera.on(scene.raster, study.seed)
+        ends = camera.band.lower, camera.band.upper
+        return replace(camera, band=self._bands.get(ends, lambda: camera.band))
+
     def _exposed(
         self,
         scene: Scene,
@@ -295,7 +302,7 @@ class SceneModel:
     def _scene_image(
         self, study: Study, knobs: Knobs, exposure: Exposure, coarse: bool
     ) -> SceneImage:
-        scene = self.opened.coarse if coarse and self.opened.coarse else self._displayed
+        scene = (self.opened.coarse if coarse else None) or self._displayed
         index = _middle_frame(scene, knobs)
 
         def make() -> SceneImage:
@@ -314,7 +321,7 @@ class SceneModel:
         if knobs.shown == "speed":
             velocity = (scene.field(f"velocity_{axis}", index) for axis in "xy")
             return np.asarray(np.hypot(*velocity))
-        camera = study.camera.build(study.seed)
+        camera = self._camera(study, scene)
         if knobs.shown == "emissivity":
             _, surface = self._on(study, knobs, coarse=False)
             return camera.lay(surface, scene).emissivity(scene.frame(index))
@@ -332,7 +339,7 @@ class SceneModel:
 
         def make() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
             frame = scene.frame(index)
-            camera = study.camera.build(study.seed)
+            camera = self._camera(study, scene)
             void = frame.material == Material.VOID
             emissivity = camera.lay(surface, scene).emissivity(frame)
             temperature, emissivity = (
@@ -434,13 +441,6 @@ def _middle_frame(scene: Scene, knobs: Knobs) -> int:
     """Number of the frame that stands for the middle of the exposure."""
     middle = knobs.start + knobs.integration_time / 2 + 1e-6 * scene.frame_spacing
     return max(int(np.searchsorted(scene.times, middle, side="right")) - 1, 0)
-
-
-def _displayed(scene: Scene) -> Scene:
-    step = ceil(sqrt(scene.raster.rows * scene.raster.columns / DISPLAYED))
-    if step < 2 or not isinstance(scene, StoredScene) or scene.lattice is None:
-        return scene
-    return scene.coarser(step)
 
 
 def _line_band(rows: list[LineValues]) -> LineBand:

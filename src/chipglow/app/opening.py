@@ -81,7 +81,9 @@ class OpenedScene:
         start = _start(scene, duration)
         place = _places(scene, start, study.camera.integration_time)
         initial = knobs_of(study, start, *place)
-        return cls(name, scene, _coarse(scene), ControlPanel.of(study, scene, initial, duration))
+        coarse = with_samples(scene, QUICK_SAMPLES)
+        panel = ControlPanel.of(study, scene, initial, duration)
+        return cls(name, scene, None if coarse is scene else coarse, panel)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,11 +183,11 @@ def _results(folder: Path) -> OpenedScene:
     return OpenedScene.of(open_scene(cut(study)), study, folder.name)
 
 
-def _coarse(scene: Scene) -> Scene | None:
-    """A scene with so few samples that a picture of it is there at once."""
-    step = ceil(sqrt(scene.raster.rows * scene.raster.columns / QUICK_SAMPLES))
+def with_samples(scene: Scene, most: int) -> Scene:
+    """The scene with so many samples a frame at most, if it is one of splines; else as it is."""
+    step = ceil(sqrt(scene.raster.rows * scene.raster.columns / most))
     if step < 2 or not isinstance(scene, StoredScene) or scene.lattice is None:
-        return None
+        return scene
     return scene.coarser(step)
 
 

@@ -6,11 +6,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.app.knobs import Knobs
+from chipglow.app.knobs import SHOWN, Knobs
 from chipglow.camera import Camera, Exposure
+from chipglow.drawing.drawing import KELVIN
 from chipglow.errors import Distribution, ErrorImages, ErrorParts
 from chipglow.scene import Raster
-from chipglow.scene.notebook import ZERO_CELSIUS
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,10 +31,21 @@ class SceneImage:
     values: NDArray[np.float32]
     raster: Raster
 
+    @property
+    def is_temperature(self) -> bool:
+        """Whether the quantity is one, and is shown in °C."""
+        return self.name in ("temperature", "radiance_temperature")
+
     @cached_property
-    def celsius(self) -> NDArray[np.float32]:
-        """Values that are temperatures, in °C."""
-        return self.values - np.float32(ZERO_CELSIUS)
+    def shown(self) -> NDArray[np.float32]:
+        """Values as people read them: temperatures in °C."""
+        return self.values - np.float32(KELVIN) if self.is_temperature else self.values
+
+    @property
+    def label(self) -> str:
+        """Quantity and unit."""
+        units = {"plastic_strain_rate": " / (1/s)", "speed": " / (m/s)"}
+        return SHOWN[self.name].lower() + units.get(self.name, " / °C" * self.is_temperature)
 
 
 @dataclass(frozen=True, eq=False)

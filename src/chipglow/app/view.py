@@ -30,6 +30,7 @@ from chipglow.app.model import SceneModel
 from chipglow.app.opening import OpenedMeasurement, OpenedScene
 from chipglow.app.picture import Drawn, Picture, Readout
 from chipglow.app.session import Listener, Session
+from chipglow.drawing.drawing import KELVIN
 from chipglow.quantities.format import rounded_text
 from chipglow.scene.lines import nearest
 
@@ -39,7 +40,6 @@ TEXTURES: Final = 5
 
 _FOLDER: Final = Path(__file__).parent
 _VIEW_WIDTH: Final = 160e-6
-_KELVIN: Final = 273.15
 
 _WHEN: Final = {
     "numerical_aperture": ("psf", "annular-aperture"),
@@ -176,8 +176,7 @@ class View:
 
     def _dragged(self, name: str, source: Any) -> Callable[..., None]:
         def moved(attribute: str, old: Any, new: Any) -> None:
-            knobs = self.session.knobs
-            points = (knobs.cursor,) if name == CURSOR else getattr(knobs, name)
+            points = self.session.knobs.points(name)
             kept = ";".join(f"{1e6 * x:.1f},{1e6 * y:.1f}" for x, y in points)
             if places(source) != kept:
                 self._turn({name: places(source)}, False)
@@ -319,7 +318,7 @@ class View:
             return "–"
         text = _celsius(found.measured)
         if isfinite(found.uncertainty):
-            text = _with_uncertainty(found.measured - _KELVIN, found.uncertainty)
+            text = _with_uncertainty(found.measured - KELVIN, found.uncertainty)
         return f"{text} (under range)" if found.flagged else text
 
     def _put_numbers(self, rows: list[tuple[str, str, str]], parts: list[dict[str, Any]]) -> None:
@@ -354,7 +353,7 @@ class View:
         knobs, panel = self.session.knobs, self.session.model.panel
         values = {knob.name: knob.number(getattr(knobs, knob.name)) for knob in panel.knobs}
         for name in (CURSOR, *LINES):
-            points = (knobs.cursor,) if name == CURSOR else getattr(knobs, name)
+            points = knobs.points(name)
             values[name] = "; ".join(f"{1e6 * x:.1f}, {1e6 * y:.1f}" for x, y in points)
         visible = [knob.name for knob in panel.knobs if _counts(knob, knobs)]
         content = {
@@ -427,7 +426,7 @@ def _counts(knob: Knob, knobs: Knobs) -> bool:
 
 
 def _celsius(kelvins: float) -> str:
-    return f"{kelvins - _KELVIN:.1f} °C" if isfinite(kelvins) else "–"
+    return f"{kelvins - KELVIN:.1f} °C" if isfinite(kelvins) else "–"
 
 
 def _with_uncertainty(celsius: float, uncertainty: float) -> str:

@@ -104,8 +104,8 @@ def segmentation(
     first = end_of_build_up(cutting)
     times, cutting, thrust = times[first:], cutting[first:], thrust[first:]
     regular = coarse = nan
-    swing = scipy.signal.detrend(cutting)
-    if cutting.size >= 8 and _range(swing) > _LEAST_SWING * abs(cutting.mean()):
+    least = _LEAST_SWING * abs(cutting.mean())
+    if cutting.size >= 8 and _range(swing := scipy.signal.detrend(cutting)) > least:
         correlation = _correlation(swing)
         regular = _correlation_period(correlation, step)
         coarse = regular if np.isfinite(regular) else _unequal_period(swing, correlation, step)
