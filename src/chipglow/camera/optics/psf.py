@@ -23,6 +23,7 @@ from chipglow.camera.optics.kernel import (
     normalised,
     peak,
 )
+from chipglow.camera.optics.round import light_on_squares
 from chipglow.camera.optics.sampling import overlap_lengths
 from chipglow.quantities import Family, FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, WAVELENGTH
@@ -211,17 +212,10 @@ class AnnularAperturePSF(PointSpreadFunction):
         """Fractions of the light on squares, so many up and down and to either side."""
         # Gauss nodes: two, and three more for every ring (π in v) that a square spans.
         count = 2 + ceil(3 * spacing / (pi * self._unit))
-        node, weight = np.polynomial.legendre.leggauss(count)
         side = spacing / self._unit
-        down = (np.arange(rows + 1)[:, None] + node / 2) * side
-        across = ((np.arange(columns + 1)[:, None] + node / 2) * side).ravel()
-        weights = np.tile(weight, columns + 1)
-        quadrant = np.empty((rows + 1, columns + 1))
-        for row, v in enumerate(down):
-            value = self._profile(np.hypot(v[:, None], across)) * weights
-            quadrant[row] = weight @ value.reshape(count, columns + 1, count).sum(axis=2)
+        quadrant = light_on_squares(self._amplitude, side, rows, columns, count)
         # The integral of the profile over the plane is 4π / (1 − o²), by Parseval.
-        quadrant *= (side / 2) ** 2 * (1 - self.obscuration**2) / (4 * pi)
+        quadrant *= (1 - self.obscuration**2) / (4 * pi)
         return np.pad(quadrant, ((rows, 0), (columns, 0)), mode="reflect")
 
     @property
@@ -241,9 +235,11 @@ class AnnularAperturePSF(PointSpreadFunction):
 
     def _profile(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
         """Irradiance over that in the middle."""
+        return self._amplitude(v) ** 2
+
+    def _amplitude(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
         inner = self.obscuration**2
-        amplitude = (_jinc(v) - inner * _jinc(self.obscuration * v)) / (1 - inner)
-        return np.asarray(amplitude**2)
+        return np.asarray((_jinc(v) - inner * _jinc(self.obscuration * v)) / (1 - inner))
 
 
 @final
