@@ -53,7 +53,13 @@ def a_stack():
 
 
 def a_source(files, **changed):
-    given = {"spacing": SPACING, "left": LEFT, "top": TOP, "interval": 1e-6}
+    given = {
+        "spacing": SPACING[0],
+        "row_spacing": SPACING[1],
+        "left": LEFT,
+        "top": TOP,
+        "interval": 1e-6,
+    }
     return GridSource(files=files, **{**given, **changed})
 
 
@@ -195,7 +201,7 @@ def test_16_bit_tiff_and_attributes_of_packing(tmp_path):
     with h5py.File(tmp_path / "T.h5", "w") as file:
         packed = file.create_dataset("T", data=np.array([[[0, 10], [20, -1]]], np.int16))
         packed.attrs.update(scale_factor=0.5, add_offset=300.0, _FillValue=np.int16(-1))
-    source = GridSource(str(tmp_path / "T.h5"), spacing=(1e-6, 1e-6))
+    source = GridSource(str(tmp_path / "T.h5"), spacing=1e-6)
     (frame,) = source.frames(Raster(0.0, 0.0, 1e-6, 2, 2))
     np.testing.assert_array_equal(frame.fields["temperature"], [[300.0, 305.0], [310.0, np.nan]])
     np.testing.assert_array_equal(frame.material, [[1, 1], [1, 0]])
@@ -571,7 +577,7 @@ def of_scipy(name):
 def test_a_file_that_matlab_wrote():
     """MATLAB 7.4, ``reshape(1:24, 2, 3, 4)``: rows, columns, time."""
     path = of_scipy("matlab/tests/data/test3dmatrix_7.4_GLNX86.mat")
-    source = GridSource(path, axes=("y", "x", "time"), spacing=(1.0, 1.0))
+    source = GridSource(path, axes=("y", "x", "time"), spacing=1.0)
     frames = list(source.frames(Raster(0.0, 0.0, 1.0, 2, 3)))
     expected = np.arange(1, 25).reshape(2, 3, 4, order="F")
     found = np.stack([frame.fields["temperature"] for frame in frames], axis=2)
@@ -583,7 +589,7 @@ def test_a_file_that_matlab_wrote():
 )
 def test_damaged_files_of_matlab(name):
     path = of_scipy(f"matlab/tests/data/{name}.mat")
-    refused(GridSource(path, spacing=(1.0, 1.0)), f"{name}.mat")
+    refused(GridSource(path, spacing=1.0), f"{name}.mat")
 
 
 def test_a_file_that_ncgen_wrote():
@@ -622,7 +628,8 @@ def test_coordinates_that_go_wrong(tmp_path):
 @pytest.mark.parametrize(
     ("changed", "text"),
     [
-        ({"spacing": (0.0, 1.0)}, "spacing"),
+        ({"spacing": 0.0}, "spacing"),
+        ({"row_spacing": 0.0}, "row_spacing"),
         ({"interval": float("nan")}, "interval"),
         ({"axes": ("time", "x")}, "axes"),
         ({"files": {"heat": "T.npy"}}, "unknown field 'heat'"),

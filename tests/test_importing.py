@@ -368,7 +368,7 @@ def test_frames_of_another_shape_are_refused(worker_finds_tests):
 
 def a_stack(folder, values):
     np.save(folder / "T.npy", np.broadcast_to(values, (3, 4, 5)))
-    return Import(GridSource(str(folder / "T.npy"), spacing=(5e-6, 5e-6), interval=1e-6))
+    return Import(GridSource(str(folder / "T.npy"), spacing=5e-6, interval=1e-6))
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,7 @@ def _temperature():
 
 
 def _grid(path: Path) -> GridSource:
-    return GridSource(str(path), spacing=(0.03, 0.03), top=1.0, interval=1e-6)
+    return GridSource(str(path), spacing=0.03, top=1.0, interval=1e-6)
 
 
 def _grids(folder: Path) -> list[Seed]:

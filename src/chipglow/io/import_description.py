@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from pydantic import Strict, create_model, model_validator
+from pydantic import create_model, model_validator
 
 from chipglow.io.importing import Import, View
 from chipglow.io.sandbox import Isolated
@@ -17,19 +17,32 @@ from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.conventions import SI_UNITS
 from chipglow.io.sources.grid import GridSource
 from chipglow.io.sources.mesh import MESH_READERS, MeshSource
-from chipglow.io.sources.movie import FieldMovie, Legend, MovieSource, NamedMap, metre_per_pixel
+from chipglow.io.sources.movie import (
+    FieldMovie,
+    Legend,
+    MovieSource,
+    NamedMap,
+    Pixel,
+    metre_per_pixel,
+)
+from chipglow.io.sources.overlays import Box
 from chipglow.io.tool_section import ToolSection
-from chipglow.quantities import OR_NONE, Declared, Family, FileBeside, Section, Settings, described
+from chipglow.quantities import (
+    OR_NONE,
+    Declared,
+    Family,
+    FileBeside,
+    Parameters,
+    Section,
+    Settings,
+    described,
+)
 from chipglow.quantities.units import Length, Position, Time, Unit, parse_unit
 from chipglow.scene.completion import Completion
 from chipglow.text import commented_yaml, described_by
 
 IMPORT_SOURCES: Final = Family("import_source")
 """Kinds of sources; those of other packages are sections with their kind and endings, too."""
-
-Pixels = Annotated[tuple[float, float], Strict(False)]
-ColourSection = Annotated[tuple[int, int, int], Strict(False)]
-BoxSection = Annotated[tuple[int, int, int, int], Strict(False)]
 
 
 class UnitsSection(Settings[Units]):
@@ -122,22 +135,15 @@ class FieldMovieSection(Section):
         "none, rainbow, jet, viridis, ... of matplotlib",
     )
     bands: int = described(0, "Number of the map's bands; 0: it runs without steps.", "0, 2 to 256")
-    legend: Annotated[BoxSection | None, OR_NONE] = described(
+    legend: Annotated[Box | None, OR_NONE] = described(
         "none",
         "Left, top, right and bottom pixel of the legend's colours; none: it is looked for.",
         "none, or [600, 40, 620, 400]",
     )
 
 
-@IMPORT_SOURCES.part
-class MovieSection(SourceSection):
-    """Movies of fields with a colour scale, a movie a field."""
-
-    kind: ClassVar[str] = "movie"
-    title: ClassVar[str] = "a movie"
-    endings: ClassVar[tuple[str, ...]] = (
-        ".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif",
-    )  # fmt: skip
+class MoviesSection(Section):
+    """Movies by their field, and how large their pixels are."""
 
     temperature: FieldMovieSection = described({}, "The movie of the temperature.")
     plastic_strain: Annotated[FieldMovieSection | None, OR_NONE] = described(
@@ -147,36 +153,23 @@ class MovieSection(SourceSection):
         "none", "The movie of the plastic strain rate."
     )
     pixel: Annotated[Length | None, OR_NONE] = described("none", "Side of a pixel.")
-    scale_from: Annotated[Pixels | None, OR_NONE] = described(
+    scale_from: Annotated[Pixel | None, OR_NONE] = described(
         "none", "A point whose distance from another is known, in pixels right and down.",
         "none, or [120, 400]",
     )  # fmt: skip
-    scale_to: Annotated[Pixels | None, OR_NONE] = described("none", "The other point.")
+    scale_to: Annotated[Pixel | None, OR_NONE] = described("none", "The other point.")
     scale_length: Annotated[Length | None, OR_NONE] = described("none", "Their distance.")
-    origin: Pixels = described(
-        [0.0, 0.0], "The tip of the tool, in pixels right and down from the upper left corner."
-    )
-    crop: Annotated[BoxSection | None, OR_NONE] = described(
-        "none", "Left, top, right and bottom pixel of what shows the field; none: all."
-    )
-    every: int = described(1, "Take one picture of so many.", "1 or more")
-    background: Annotated[tuple[ColourSection, ...] | None, Strict(False), OR_NONE] = described(
-        "none",
-        "Colours of where nothing is; none: looked for at the border.",
-        "none, or [[255, 255, 255]]",
-    )
-    covered: Annotated[tuple[BoxSection, ...], Strict(False)] = described(
-        [], "Boxes where something else is drawn, such as text."
-    )
-    overlay_limit: float = described(
-        20.0, "Distance from the scale in CIE L*a*b* beyond which a colour is a line or text."
-    )
-    tool_polygon: Annotated[tuple[Pixels, ...], Strict(False)] = described(
-        [], "Corners of the tool in pixels; two are the corners of a box."
-    )
-    tool_colour: Annotated[ColourSection | None, OR_NONE] = described(
-        "none", "Colour of a tool that shows no values."
-    )
+
+
+@IMPORT_SOURCES.part
+class MovieSection(SourceSection, Parameters[MovieSource], MoviesSection):
+    """Movies of fields with a colour scale, a movie a field."""
+
+    kind: ClassVar[str] = "movie"
+    title: ClassVar[str] = "a movie"
+    endings: ClassVar[tuple[str, ...]] = (
+        ".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif",
+    )  # fmt: skip
 
     def source(self, whole: "ImportDescription") -> MovieSource:
         """The source that this section describes."""
@@ -188,16 +181,9 @@ class MovieSection(SourceSection):
         return MovieSource(
             movies=movies,
             metre_per_pixel=self._metre_per_pixel(),
-            origin=self.origin,
-            crop=self.crop,
             frame_interval=whole.interval,
-            every=self.every,
             placement=whole.placement.build(),
-            background=self.background,
-            covered=self.covered,
-            overlay_limit=self.overlay_limit,
-            tool_polygon=self.tool_polygon,
-            tool_colour=self.tool_colour,
+            **self.values,
         )
 
     def _metre_per_pixel(self) -> float:
@@ -256,28 +242,12 @@ _EXAMPLES: Final = {
 
 
 @IMPORT_SOURCES.part
-class MeshSection(SourceSection):
+class MeshSection(SourceSection, Parameters[MeshSource]):
     """Finite-element results."""
 
     kind: ClassVar[str] = "mesh"
     title: ClassVar[str] = "a mesh"
     endings: ClassVar[tuple[str, ...]] = (*MESH_READERS, "d3plot")
-
-    section: Annotated[Position | Literal["facing"] | None, OR_NONE] = described(
-        "none",
-        "Of solid elements: where to cut along the axis of depth, or the surface that faces the\n"
-        "camera.",
-        "none, 0 mm, facing",
-    )
-    tool_parts: Annotated[tuple[str | int, ...], Strict(False)] = described(
-        [], "Names of the blocks, parts or sets that are tool, or their numbers.", "[TOOL], [2]"
-    )
-    part_field: Annotated[str | None, OR_NONE] = described(
-        "none", "Field of elements that numbers the parts; none: it is guessed."
-    )
-    displacement: Annotated[str | None, OR_NONE] = described(
-        "none", "Field of node vectors to be added to the positions."
-    )
 
     def source(self, whole: "ImportDescription") -> MeshSource:
         """The source that this section describes."""
@@ -287,15 +257,12 @@ class MeshSection(SourceSection):
             units=whole.units.build(),
             placement=whole.placement.build(),
             interval=whole.interval,
-            section=self.section,
-            tool_parts=tuple(str(part) for part in self.tool_parts),
-            part_field=self.part_field,
-            displacement=self.displacement,
+            **self.values,
         )
 
 
 @IMPORT_SOURCES.part
-class PointsSection(SourceSection):
+class PointsSection(SourceSection, Parameters[CloudSource]):
     """Points, as of smoothed particles or material points."""
 
     kind: ClassVar[str] = "points"
@@ -303,34 +270,20 @@ class PointsSection(SourceSection):
     # Most files of points have another ending: they are called by their kind.
     endings: ClassVar[tuple[str, ...]] = lammps_dump.ENDINGS
 
-    spacing: Annotated[Length | None, OR_NONE] = described(
-        "none", "Distance of neighbours before the cut; none: from volumes or the first frame."
-    )
-    tool_parts: Annotated[tuple[int, ...], Strict(False)] = described(
-        [], "Numbers of the part field that are tool.", "[], [2]"
-    )
-    depth: Position = described("0 um", "Middle of the slab that is seen of points in space.")
-    thickness: Annotated[Length | None, OR_NONE] = described(
-        "none", "Thickness of that slab; none: all points."
-    )
-
     def source(self, whole: "ImportDescription") -> CloudSource:
         """The source that this section describes."""
         return CloudSource(
             files=whole.file,
             names=whole.fields,
-            spacing=self.spacing,
-            tool_parts=self.tool_parts,
-            depth=self.depth,
-            thickness=self.thickness,
             interval=whole.interval,
             units=whole.units.build(),
             placement=whole.placement.build(),
+            **self.values,
         )
 
 
 @IMPORT_SOURCES.part
-class GridSection(SourceSection):
+class GridSection(SourceSection, Parameters[GridSource]):
     """Arrays on a regular grid."""
 
     kind: ClassVar[str] = "grid"
@@ -342,37 +295,16 @@ class GridSection(SourceSection):
         "Files by the names of fields, in the place of source.",
         "none, or {temperature: T.npy, plastic_strain: strain.npy}",
     )
-    axes: Annotated[tuple[str, ...] | None, Strict(False), OR_NONE] = described(
-        "none", "Order of the arrays' axes; none: as the file says, or [time, y, x]."
-    )
-    top_first: bool = described(True, "Whether row 0 is the top one, without a coordinate y.")
-    spacing: Annotated[Length | None, OR_NONE] = described(
-        "none", "Distance of the columns; none: as the file says."
-    )
-    row_spacing: Annotated[Length | None, OR_NONE] = described(
-        "none", "Distance of the rows; none: that of the columns."
-    )
-    left: Position = described("0 um", "Left edge of the grid, with spacing.")
-    top: Position = described("0 um", "Upper edge of the grid, with spacing.")
-    void_value: Annotated[float | None, OR_NONE] = described(
-        "none", "Number that stands for no material; NaN always does."
-    )
 
     def source(self, whole: "ImportDescription") -> GridSource:
         """The source that this section describes."""
-        across, down = self.spacing, self.row_spacing or self.spacing
         return GridSource(
             files=self.files or whole.file,
             names=whole.fields,
-            axes=self.axes,
-            top_first=self.top_first,
-            spacing=None if across is None or down is None else (across, down),
-            left=self.left,
-            top=self.top,
             interval=whole.interval,
-            void_value=self.void_value,
             units=whole.units.build(),
             placement=whole.placement.build(),
+            **self.values,
         )
 
 

@@ -2,7 +2,15 @@
 
 from chipglow.quantities.field_tables import FieldEntry, field_entries, field_tables
 from chipglow.quantities.format import quantity_text, rounded_text
-from chipglow.quantities.part import Declared, Family, Parameter, Part, Settings, of_other_packages
+from chipglow.quantities.part import (
+    Declared,
+    Family,
+    Parameter,
+    Parameters,
+    Part,
+    Settings,
+    of_other_packages,
+)
 from chipglow.quantities.section import (
     OR_NONE,
     FileBeside,
@@ -22,6 +30,7 @@ __all__ = [
     "FileBeside",
     "OrWord",
     "Parameter",
+    "Parameters",
     "Part",
     "Quantity",
     "Section",

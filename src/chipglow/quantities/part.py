@@ -1,10 +1,11 @@
 """Parts that a description can choose: parameters declared once, kinds found by their name."""
 
 import inspect
+import re
 import reprlib
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, dataclass, fields
 from functools import cache, cached_property
 from importlib.metadata import entry_points
 from math import isfinite
@@ -188,8 +189,8 @@ class Part:
     def __init_subclass__(cls, **arguments: Any) -> None:
         super().__init_subclass__(**arguments)
         own = inspect.cleandoc(cls.__dict__.get("__doc__") or "")
-        if own and "\nParameters\n" not in own:
-            cls.__doc__ = "\n\n".join([own, *_documented(cls)])
+        if own and (rows := _documented(cls)):
+            cls.__doc__ = _with_parameters(own, rows)
 
     def __post_init__(self) -> None:
         part: Any = type(self)
@@ -222,8 +223,8 @@ class Settings(Section, Generic[Built]):
         return self
 
 
-class Declared(Settings[Built]):
-    """The section of a part: ``Declared[Friction]`` has its parameters, and builds it."""
+class Parameters(Section, Generic[Built]):
+    """The parameters of a part, as the fields of a section: ``Parameters[MeshSource]``."""
 
     part: ClassVar[type[Part]]
 
@@ -233,10 +234,19 @@ class Declared(Settings[Built]):
 
     @classmethod
     def __class_getitem__(cls, part: Any) -> Any:
-        """Section of a part."""
+        """Section of a part; of one that is abstract this class."""
         if isinstance(part, TypeVar):
             return super().__class_getitem__(part)
-        return _section_of(part) if is_dataclass(part) else cls
+        return _section(part, cls) if hasattr(part, "__dataclass_fields__") else cls
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """What the parameters are, by their names."""
+        return {name: getattr(self, name) for name in parameters(self.part)}
+
+
+class Declared(Parameters[Built], Settings[Built]):
+    """The section of a part: ``Declared[Friction]`` has its parameters, and builds it."""
 
     def build(self) -> Built:
         """The part; a file that it names is read once."""
@@ -250,8 +260,7 @@ class Declared(Settings[Built]):
 
     @cached_property
     def _built(self) -> Built:
-        names = parameters(self.part)
-        built: Any = self.part(**{name: getattr(self, name) for name in names})
+        built: Any = self.part(**self.values)
         return built  # type: ignore[no-any-return]
 
 
@@ -368,7 +377,8 @@ def _place(part: type) -> tuple[str, str]:
 
 
 def _section_of(part: Any) -> type[Section]:
-    return part if issubclass(part, Section) else _section(part)
+    section: type[Section] = part if issubclass(part, Section) else _section(part, Declared)
+    return section
 
 
 @cache
@@ -384,7 +394,7 @@ def _declared(part: Any) -> dict[str, tuple[Parameter, Any]]:
 
 
 @cache
-def _section(part: Any) -> "type[Declared[Any]]":
+def _section(part: Any, base: Any) -> Any:
     definitions: dict[str, Any] = {}
     if part.kind:
         definitions["kind"] = (Literal[part.kind], described(part.kind, _first_sentence(part)))
@@ -393,7 +403,7 @@ def _section(part: Any) -> "type[Declared[Any]]":
         definitions[name] = (annotation, _field(parameter, defaults[name]))
     made = create_model(
         f"{part.__name__}Section",
-        __base__=Declared,
+        __base__=base,
         __module__=part.__module__,
         __doc__=_first_sentence(part),
         **definitions,
@@ -441,16 +451,29 @@ def _first_sentence(part: type[Part]) -> str:
     return " ".join((part.__doc__ or "").split("\n\n")[0].split())
 
 
-def _documented(cls: type[Part]) -> Iterator[str]:
-    """Parameters for the documentation, of a class that is being made."""
-    rows = []
+def _with_parameters(text: str, rows: dict[str, str]) -> str:
+    """A class's documentation with rows of its parameters, after those that it has already."""
+    blocks = text.split("\n\n")
+    titles = [i for i, block in enumerate(blocks) if re.match(r"\w+\n-+\n", block)]
+    at = titles[0] if titles else len(blocks)
+    if not (titles and blocks[at].startswith("Parameters\n")):
+        blocks.insert(at, "Parameters\n----------")
+    heads = re.findall(r"^(\w.*?) :", blocks[at], re.MULTILINE)
+    told = {name for head in heads for name in head.split(", ")}
+    blocks[at] = "\n".join([blocks[at], *(row for name, row in rows.items() if name not in told)])
+    return "\n\n".join(blocks)
+
+
+def _documented(cls: type[Part]) -> dict[str, str]:
+    """Rows of the documentation for the parameters of a class that is being made."""
+    rows = {}
     annotations = [inspect.get_annotations(one) for one in reversed(cls.__mro__)]
     for name, annotation in [pair for one in annotations for pair in one.items()]:
         for metadata in getattr(annotation, "__metadata__", ()):
             if isinstance(metadata, Parameter):
-                rows += [f"{name} : {_type_text(annotation, metadata)}", f"    {metadata.meaning}"]
-    if rows:
-        yield "\n".join(["Parameters", "----------", *rows])
+                meaning = metadata.meaning.replace("\n", "\n    ")
+                rows[name] = f"{name} : {_type_text(annotation, metadata)}\n    {meaning}"
+    return rows
 
 
 def _type_text(annotation: Any, parameter: Parameter) -> str:

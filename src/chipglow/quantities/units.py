@@ -9,7 +9,7 @@ from decimal import Decimal
 from fractions import Fraction
 from functools import cache
 from math import isfinite
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, get_origin
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -186,8 +186,8 @@ class Quantity:
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Schema of a field with this annotation: one number, or a pair of limits."""
-        one = (self.parse, self.text)
-        parse, text = one if source is float else (self.parse_range, self.range_text)
+        pair = (self.parse_range, self.range_text)
+        parse, text = pair if get_origin(source) is tuple else (self.parse, self.text)
         return core_schema.no_info_plain_validator_function(
             parse,
             serialization=core_schema.plain_serializer_function_ser_schema(text, when_used="json"),

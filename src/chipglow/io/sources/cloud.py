@@ -4,10 +4,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Strict
 
 from chipglow.io.sources.conventions import (
     COMMON_NAMES,
@@ -27,7 +28,8 @@ from chipglow.io.sources.source import (
     naming,
     span_of,
 )
-from chipglow.quantities.units import Unit
+from chipglow.quantities import Parameter, Part
+from chipglow.quantities.units import LENGTH, POSITION, Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.cloud import Cloud, neighbour_distance, sample_cloud
 
@@ -55,7 +57,7 @@ _FULLEST: Final = 4.0
 
 
 @dataclass(frozen=True)
-class CloudSource(Source):
+class CloudSource(Source, Part):
     """Points over time.
 
     Parameters
@@ -66,15 +68,6 @@ class CloudSource(Source):
     names : mapping
         Name that a field has in the files, by its name in a scene; also of ``x``, ``y``, ``z``,
         ``time``, ``part`` and ``volume``. Those not named are guessed.
-    spacing : float, optional
-        Distance of neighbours in the undeformed state in m; if not given, it is taken from the
-        points' volume or, without one, from the neighbours' distance in the first frame.
-    tool_parts : tuple of int
-        Numbers of ``part`` that are tool.
-    depth : float
-        Middle of the slab that is seen of points in three dimensions, in m.
-    thickness : float, optional
-        Thickness of the slab in m.
     interval : float, optional
         Time between frames in s; comes before times in the files.
     units : Units
@@ -90,23 +83,36 @@ class CloudSource(Source):
 
     files: str
     names: Mapping[str, str] = field(default_factory=dict)
-    spacing: float | None = None
-    tool_parts: tuple[int, ...] = ()
-    depth: float = 0.0
-    thickness: float | None = None
+    spacing: Annotated[
+        float | None,
+        Parameter(
+            "Distance of neighbours before the cut; none: from the points' volumes or, without\n"
+            "them, from the first frame.",
+            LENGTH,
+            over=0.0,
+        ),
+    ] = None
+    tool_parts: Annotated[
+        tuple[int, ...],
+        Strict(False),
+        Parameter("Numbers of the part field that are tool, such as [2]."),
+    ] = ()
+    depth: Annotated[
+        float, Parameter("Middle of the slab that is seen of points in space.", POSITION)
+    ] = 0.0
+    thickness: Annotated[
+        float | None, Parameter("Thickness of that slab; none: all points.", LENGTH, over=0.0)
+    ] = None
     interval: float | None = None
     units: Units = field(default_factory=Units)
     placement: Placement = field(default_factory=Placement)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not self.files:
             raise ValueError("files: there is none, expected a path")
-        for name in ("spacing", "thickness", "interval"):
-            value = getattr(self, name)
-            if value is not None and not (isfinite(value) and value > 0):
-                raise ValueError(f"{name}: {value!r}, expected over 0")
-        if not isfinite(self.depth):
-            raise ValueError(f"depth: {self.depth!r}, expected a finite length")
+        if self.interval is not None and not (isfinite(self.interval) and self.interval > 0):
+            raise ValueError(f"interval: {self.interval!r}, expected over 0")
 
     @property
     def inputs(self) -> tuple[str, ...]:

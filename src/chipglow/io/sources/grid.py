@@ -5,10 +5,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
 from math import isfinite, prod
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Strict
 
 from chipglow.io.sources.arrays import (
     MOST_ON_A_SIDE,
@@ -39,7 +40,8 @@ from chipglow.io.sources.source import (
     even_times,
     span_of,
 )
-from chipglow.quantities.units import SI, Unit
+from chipglow.quantities import Parameter, Part
+from chipglow.quantities.units import LENGTH, POSITION, SI, Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.regrid import regrid, taps
 
@@ -51,7 +53,7 @@ _BLOCK: Final = 64_000_000
 
 
 @dataclass(frozen=True)
-class GridSource(Source):
+class GridSource(Source, Part):
     """Fields on a regular grid over time.
 
     Parameters
@@ -63,19 +65,8 @@ class GridSource(Source):
     names : mapping
         Name that a field has in its file, by its name in a scene; also of ``material`` (0 void,
         1 workpiece, 2 tool), ``time``, ``x`` and ``y``. Those not named are guessed.
-    axes : tuple of str, optional
-        What the axes of the arrays are: ``time``, ``y`` and ``x`` in their order, without ``time``
-        for a single frame. As the file says or, if it does not, in this order.
-    top_first : bool
-        Whether row 0 is the top one; where the file has no coordinate y.
-    spacing : tuple of float, optional
-        Distance of the columns and of the rows in m; comes before coordinates in the file.
-    left, top : float
-        Outer corner of the grid in m; with ``spacing``.
     interval : float, optional
         Time between frames in s; comes before times in the file.
-    void_value : float, optional
-        Number that stands for no material, in the file's unit; NaN always does.
     units : Units
         Units of what is in the files; where one is not SI, it comes before what a file says.
     placement : Placement
@@ -89,17 +80,37 @@ class GridSource(Source):
 
     files: str | Mapping[str, str]
     names: Mapping[str, str] = field(default_factory=dict)
-    axes: tuple[str, ...] | None = None
-    top_first: bool = True
-    spacing: tuple[float, float] | None = None
-    left: float = 0.0
-    top: float = 0.0
+    axes: Annotated[
+        tuple[str, ...] | None,
+        Strict(False),
+        Parameter(
+            "Order of the arrays' axes, without time for a single frame; none: as the file\n"
+            "says, or [time, y, x]."
+        ),
+    ] = None
+    top_first: Annotated[
+        bool, Parameter("Whether row 0 is the top one, without a coordinate y.")
+    ] = True
+    spacing: Annotated[
+        float | None,
+        Parameter("Distance of the columns; none: as the file says.", LENGTH, over=0.0),
+    ] = None
+    row_spacing: Annotated[
+        float | None,
+        Parameter("Distance of the rows, with spacing; none: the same.", LENGTH, over=0.0),
+    ] = None
+    left: Annotated[float, Parameter("Left edge of the grid, with spacing.", POSITION)] = 0.0
+    top: Annotated[float, Parameter("Upper edge of the grid, with spacing.", POSITION)] = 0.0
+    void_value: Annotated[
+        float | None,
+        Parameter("Number that stands for no material, in the file's unit; NaN always does."),
+    ] = None
     interval: float | None = None
-    void_value: float | None = None
     units: Units = field(default_factory=Units)
     placement: Placement = field(default_factory=Placement)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not self.files:
             raise ValueError("files: there is none, expected a path or paths by field")
         if not isinstance(self.files, str):
@@ -113,13 +124,8 @@ class GridSource(Source):
             raise ValueError(
                 f"axes: {self.axes!r}, expected time, y and x in any order, or y and x"
             )
-        for name in ("spacing", "interval"):
-            value = getattr(self, name)
-            numbers = value if isinstance(value, tuple) else (value,)
-            if value is not None and not all(isfinite(n) and n > 0 for n in numbers):
-                raise ValueError(f"{name}: {value!r}, expected over 0")
-        if not (isfinite(self.left) and isfinite(self.top)):
-            raise ValueError(f"left, top: {self.left!r}, {self.top!r}, expected finite lengths")
+        if self.interval is not None and not (isfinite(self.interval) and self.interval > 0):
+            raise ValueError(f"interval: {self.interval!r}, expected over 0")
         if self.placement.depth != 2:
             raise ValueError("placement: a grid has the axes x and y, expected no z")
 
@@ -408,9 +414,10 @@ def _positions(
     if coordinate(axis, files, source.names.get(axis), layer.dim(axis), count) is not None:
         remarks.from_file.append(f"its coordinate {axis} is not used, as the spacing is given")
     if axis == "x":
-        return source.left + source.spacing[0] * number
+        return source.left + source.spacing * number
     remarks.assumed.append(f"row 0 is the {'upper' if source.top_first else 'lower'} edge")
-    return source.top - source.spacing[1] * (number if source.top_first else number[::-1])
+    down = source.row_spacing or source.spacing
+    return source.top - down * (number if source.top_first else number[::-1])
 
 
 def _times(

@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Strict
 
 from chipglow.io.sources import mesh_meshio, mesh_tecplot, mesh_vtk
 from chipglow.io.sources.conventions import Placement, Units, match_names, simple
@@ -27,6 +28,8 @@ from chipglow.io.sources.source import (
     required,
     span_of,
 )
+from chipglow.quantities import OrWord, Parameter, Part
+from chipglow.quantities.units import POSITION
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.rasterise import NOTHING, rasterise
 
@@ -50,7 +53,7 @@ _TENSOR_SIZES: Final = (6, 9)
 
 
 @dataclass(frozen=True)
-class MeshSource(Source):
+class MeshSource(Source, Part):
     """Finite-element results: meshes with fields, one for each time.
 
     Elements are sampled exactly as they are: fields of nodes by the element's own shape, fields of
@@ -74,22 +77,11 @@ class MeshSource(Source):
         Times of the frames in s, in the place of the file's.
     interval : float, optional
         Time from frame to frame in s, in the place of the file's.
-    section : float, "facing" or None
-        For meshes of solid elements: where to cut along the axis of depth, in m, or the surface
-        that faces the camera, which looks at the scene's x and y from the front.
-    tool_parts : tuple of str
-        What is the tool: names of blocks, parts or sets of elements, or numbers in the field of
-        parts.
-    part_field : str, optional
-        Field of elements that numbers the parts; guessed if nothing is given.
-    displacement : str, optional
-        Field of node vectors to be added to the positions.
 
     Raises
     ------
     ValueError
-        If a time is not finite, an interval is not positive, both are given, or the section is
-        neither a finite position nor ``facing``.
+        If a time is not finite, an interval is not positive, or both are given.
     """
 
     path: Path
@@ -98,12 +90,32 @@ class MeshSource(Source):
     placement: Placement = field(default_factory=Placement)
     times: tuple[float, ...] = ()
     interval: float | None = None
-    section: float | Literal["facing"] | None = None
-    tool_parts: tuple[str, ...] = ()
-    part_field: str | None = None
-    displacement: str | None = None
+    section: Annotated[
+        float | Literal["facing"] | None,
+        Parameter(
+            "Of solid elements: where to cut along the axis of depth, such as 0 mm; facing: the\n"
+            "surface that faces the camera, which looks at the scene's x and y from the front.",
+            POSITION,
+        ),
+        OrWord("facing", "facing"),
+    ] = None
+    tool_parts: Annotated[
+        tuple[str | int, ...],
+        Strict(False),
+        Parameter(
+            "Names of the blocks, parts or sets of elements that are tool, such as [TOOL], or\n"
+            "their numbers in the field of parts, such as [2]."
+        ),
+    ] = ()
+    part_field: Annotated[
+        str | None, Parameter("Field of elements that numbers the parts; none: it is guessed.")
+    ] = None
+    displacement: Annotated[
+        str | None, Parameter("Field of node vectors to be added to the positions.")
+    ] = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not all(isfinite(time) for time in self.times):
             raise ValueError(f"times: expected finite times, got {self.times!r}")
         if self.interval is not None and not (isfinite(self.interval) and self.interval > 0):
@@ -112,8 +124,6 @@ class MeshSource(Source):
             raise ValueError("interval: times are given too, expected one of them")
         if isinstance(self.section, str) and self.section != "facing":
             raise ValueError(f"section: {self.section!r}, expected a position or facing")
-        if isinstance(self.section, float) and not isfinite(self.section):
-            raise ValueError(f"section: expected a finite position, got {self.section!r}")
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -250,13 +260,14 @@ class MeshSource(Source):
         """Which elements of each block are of the tool."""
         parts = [_parts(block, self.part_field) for block in blocks]
         known = {name for block in parts for name in block}
-        for name in self.tool_parts:
+        tool_parts = [str(part) for part in self.tool_parts]
+        for name in tool_parts:
             if name not in known:
                 listed = ", ".join(sorted(known)) or "none"
                 raise SourceError(f"tool_parts: there is no part {name!r}, it has {listed}")
         return [
             np.any(
-                [block[name] for name in self.tool_parts if name in block]
+                [block[name] for name in tool_parts if name in block]
                 or [np.zeros(grid.n_cells, np.bool_)],
                 axis=0,
             )

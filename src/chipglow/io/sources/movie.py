@@ -5,10 +5,11 @@ from dataclasses import dataclass, field, replace
 from math import hypot, isfinite, sqrt
 from pathlib import Path
 from statistics import fmean
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Strict
 
 from chipglow.io.sources.colour_scale import (
     ColourScale,
@@ -36,13 +37,15 @@ from chipglow.io.sources.overlays import (
 )
 from chipglow.io.sources.picture_sampling import PictureSampling
 from chipglow.io.sources.source import Source, SourceError, Survey, naming
+from chipglow.quantities import Parameter, Part
 from chipglow.scene import FIELD_UNITS, FILLED, Material, Raster, SampledFrame
 from chipglow.scene.nearest import fill
 
 MOVIE_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate")
 """Fields that a movie can show, the first of those given decides on the material."""
 
-OVERLAY_LIMIT: Final = 20.0
+Pixel = Annotated[tuple[float, float], Strict(False)]
+"""A place in a picture: pixels right and down from its upper left corner."""
 
 _LEGEND_MARGIN: Final = 3
 _HALF: Final = 0.5
@@ -115,7 +118,7 @@ class FieldMovie:
 
 
 @dataclass(frozen=True)
-class MovieSource(Source):
+class MovieSource(Source, Part):
     """Fields shown by movies, a movie a field.
 
     Parameters
@@ -124,27 +127,10 @@ class MovieSource(Source):
         Movies by names of `MOVIE_FIELDS`. They have the same size and number of pictures.
     metre_per_pixel : float
         Side of a pixel in m; see `metre_per_pixel`.
-    origin : tuple of float
-        The scene's origin, that is the tool's tip, in pixels right of and down from the upper left
-        corner of the whole picture: 0.5, 0.5 is the middle of the first pixel.
-    crop : Box, optional
-        What part of the pictures shows the field.
     frame_interval : float, optional
         Time from picture to picture in s; the movie's own playing time if nothing is said.
-    every : int
-        Take one picture of so many.
     placement : Placement
         How the picture lies in the scene: ``x`` is to the right, ``y`` is up.
-    background : tuple of Colour, optional
-        Colours that show nothing; looked for at the border if nothing is said, none if empty.
-    covered : tuple of Box
-        Parts of the whole picture where something else is drawn, such as text.
-    overlay_limit : float
-        Distance from the scale in CIE L*a*b* beyond which a colour is a line or text.
-    tool_polygon : tuple of (float, float)
-        Corners of the tool in pixels of the whole picture; two are opposite corners of a box.
-    tool_colour : Colour, optional
-        Colour of a tool that shows no values.
 
     Raises
     ------
@@ -154,27 +140,61 @@ class MovieSource(Source):
 
     movies: Mapping[str, FieldMovie]
     metre_per_pixel: float
-    origin: tuple[float, float]
-    crop: Box | None = None
+    origin: Annotated[
+        Pixel,
+        Parameter(
+            "The tip of the tool, in pixels right and down from the upper left corner of the\n"
+            "whole picture: 0.5, 0.5 is the middle of the first pixel."
+        ),
+    ] = (0.0, 0.0)
+    crop: Annotated[
+        Box | None,
+        Parameter(
+            "Left, top, right and bottom pixel of what shows the field, such as [0, 0, 600, 400];\n"
+            "none: all."
+        ),
+    ] = None
     frame_interval: float | None = None
-    every: int = 1
+    every: Annotated[int, Parameter("Take one picture of so many.", least=1)] = 1
     placement: Placement = field(default_factory=Placement)
-    background: tuple[Colour, ...] | None = None
-    covered: tuple[Box, ...] = ()
-    overlay_limit: float = OVERLAY_LIMIT
-    tool_polygon: tuple[tuple[float, float], ...] = ()
-    tool_colour: Colour | None = None
+    background: Annotated[
+        tuple[Colour, ...] | None,
+        Strict(False),
+        Parameter(
+            "Colours of where nothing is, such as [[255, 255, 255]]; none: looked for at the\n"
+            "border."
+        ),
+    ] = None
+    covered: Annotated[
+        tuple[Box, ...],
+        Strict(False),
+        Parameter("Boxes where something else is drawn, such as text."),
+    ] = ()
+    overlay_limit: Annotated[
+        float,
+        Parameter(
+            "Distance from the scale in CIE L*a*b* beyond which a colour is a line or text.",
+            over=0.0,
+        ),
+    ] = 20.0
+    tool_polygon: Annotated[
+        tuple[Pixel, ...],
+        Strict(False),
+        Parameter("Corners of the tool in pixels; two are opposite corners of a box."),
+    ] = ()
+    tool_colour: Annotated[Colour | None, Parameter("Colour of a tool that shows no values.")] = (
+        None
+    )
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         unknown = sorted(set(self.movies) - set(MOVIE_FIELDS))
         if unknown or not self.movies:
             raise ValueError(f"movies: {unknown}, expected one or more of {list(MOVIE_FIELDS)}")
-        for name in ("metre_per_pixel", "frame_interval", "overlay_limit"):
+        for name in ("metre_per_pixel", "frame_interval"):
             value = getattr(self, name)
             if value is not None and not (isfinite(value) and value > 0):
                 raise ValueError(f"{name}: {value!r}, expected a finite number over 0")
-        if self.every < 1:
-            raise ValueError(f"every: {self.every!r}, expected 1 or more")
         if not all(isfinite(value) for value in self.origin):
             raise ValueError(f"origin: {self.origin!r}, expected finite numbers of pixels")
         colours = [*(self.background or ()), *([self.tool_colour] if self.tool_colour else [])]

@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Strict
 from scipy.ndimage import grey_closing, maximum_filter, minimum_filter
 
 from chipglow.io.sources.colour_scale import ColourScale, Picture, lab
@@ -15,10 +16,10 @@ from chipglow.scene import FILLED, Material
 from chipglow.scene.nearest import fill
 from chipglow.scene.polygon import in_polygon
 
-Box = tuple[int, int, int, int]
+Box = Annotated[tuple[int, int, int, int], Strict(False)]
 """Left, top, right and bottom edge in whole pixels from the upper left corner of a picture."""
 
-Colour = tuple[int, int, int]
+Colour = Annotated[tuple[int, int, int], Strict(False)]
 """Red, green and blue of 0 to 255."""
 
 MARK_TOLERANCE: Final = 10.0
