@@ -357,6 +357,10 @@ export function render({ model, el }) {
       event.preventDefault();
       send({ undo: true });
     }
+    if (event.key === "Enter" && event.target.type === "text") {
+      event.preventDefault(); // in notebooks no change would follow from it
+      event.target.dispatchEvent(new Event("change"));
+    }
   });
   const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: painted };
   model.on("msg:custom", ({ kind, content }) => shows[kind](content));
