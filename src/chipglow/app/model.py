@@ -40,7 +40,7 @@ from chipglow.radiometry import Band
 from chipglow.scene import Material, Scene, sample
 from chipglow.scene.lines import nearest
 from chipglow.study import Study, fit
-from chipglow.surface import Surface
+from chipglow.surface import EmissivityField, Surface
 
 Progress = Callable[[float], None]
 
@@ -89,6 +89,7 @@ class SceneModel:
         self.panel: ControlPanel = opened.panel
         self._bands: Kept[Band] = Kept(4)
         self._fitted: Kept[tuple[Scene, Surface]] = Kept(4)
+        self._laid: Kept[list[EmissivityField]] = Kept(4)
         self._exact: Kept[tuple[Exposure, ...]] = Kept(_EXPOSURES)
         self._quick: Kept[tuple[Exposure, ...]] = Kept(_COARSE_EXPOSURES)
         self._images: Kept[SceneImage] = Kept(2)
@@ -286,10 +287,14 @@ class SceneModel:
         plain = surface.without_texture()
         both = plain is not surface and (not coarse or knobs.error == "texture")
         kept = self._quick if coarse else self._exact
+        band = knobs.band_lower, knobs.band_upper
 
         def make() -> tuple[Exposure, ...]:
             seen = (surface, plain) if both else (surface,)
-            fields = [camera.lay(one, scene) for one in seen]
+            fields = self._laid.get(
+                (_surface_key(knobs), band, knobs.reflected, coarse, both),
+                lambda: [camera.lay(one, scene) for one in seen],
+            )
             found = camera.expose_fields(scene, fields, knobs.start, check)
             return tuple(
                 replace(exposure, effects=one.effects)
