@@ -448,13 +448,15 @@ def _points(points: tuple[Point, ...]) -> dict[str, list[float]]:
     }
 
 
-def _line_data(values: LineValues) -> dict[str, NDArray[np.float64]]:
+def _line_data(values: LineValues) -> dict[str, list[float]]:
+    """As lists: every array would be a message of its own."""
     reference = values.measured if values.reference is None else values.reference
-    return {
+    data = {
         "along": MICRONS * values.distance,
         "measured": values.measured - KELVIN,
         "reference": reference - KELVIN,
     }
+    return {name: one.tolist() for name, one in data.items()}
 
 
 def _outline(tool: Tool | None) -> tuple[list[float], list[float]] | None:

@@ -15,6 +15,7 @@ import param
 from bokeh.document import Document
 from bokeh.events import PanEnd, Tap
 from panel.custom import Child, JSComponent
+from panel.io import unlocked
 
 from chipglow.app.figures import IMAGES, Figures, places
 from chipglow.app.files import figure_file, measurement_file, study_file
@@ -396,8 +397,13 @@ class View:
         if self._document is None:
             show()
             return
+
+        def together() -> None:
+            with unlocked():  # one message, that the browser draws once
+                show()
+
         try:
-            self._document.add_next_tick_callback(show)
+            self._document.add_next_tick_callback(together)
         except RuntimeError:  # the page was closed meanwhile
             self.session.end()
 
