@@ -1,5 +1,6 @@
 """What the page gives away: the study, a figure, the measurement."""
 
+import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -27,6 +28,9 @@ from chipglow.drawing.drawing import (
 )
 from chipglow.io import StoredScene, write_dataset
 from chipglow.study import study_text
+
+_IMAGE_WIDTH, _LINES_HEIGHT = 1.35, 2.2
+"""Width of an image and height of the plots of lines in inches."""
 
 
 def study_file(model: SceneModel, knobs: Knobs) -> bytes:
@@ -72,8 +76,12 @@ def figure_file(picture: Picture, model: SceneModel) -> bytes:
 def _figure(picture: Picture, model: SceneModel) -> Figure:
     assert picture.scene is not None and picture.error is not None
     tool, knobs = model.opened.scene.tool, picture.knobs
-    figure = new_figure(5.4)
-    axes = figure.subplots(2, 3, height_ratios=(3, 2))
+    raster = picture.raster
+    upper = 0.7 + _IMAGE_WIDTH * raster.rows / raster.columns
+    figure = new_figure(upper + _LINES_HEIGHT)
+    grid = figure.add_gridspec(2, 1, height_ratios=(upper, _LINES_HEIGHT))
+    top, bottom = (figure.add_subfigure(grid[row]) for row in (0, 1))
+    images, plots = top.subplots(1, 3), bottom.subplots(1, 3)
     measured = np.where(picture.flagged, np.nan, picture.measured) - KELVIN
     error = np.where(picture.flagged, np.nan, picture.error)
     limit = round_limit(error, 98, 5.0)
@@ -87,16 +95,16 @@ def _figure(picture: Picture, model: SceneModel) -> Figure:
             ends(shown),
             HEAT if picture.scene.is_temperature else PLAIN,
         ),
-        ImagePanel("Measured", "radiance temperature / °C", measured, ends(measured), HEAT),
+        ImagePanel("Radiance temperature", "measured / °C", measured, ends(measured), HEAT),
         ImagePanel(part[knobs.error], "error / K", error, (-limit, limit), SIGNED),
     )
     rasters = (picture.scene.raster, picture.raster, picture.raster)
-    for panel, raster, one in zip(panels, rasters, axes[0], strict=True):
-        panel.draw(figure, one, raster, tool)
+    for panel, raster, one in zip(panels, rasters, images, strict=True):
+        panel.draw(top, one, raster, tool)
         for name in LINES:
             corners = np.array(getattr(knobs, name))
             draw_line(one, corners, LINE_COLOURS[name], factor=length_unit(raster)[0])
-    for name, one in zip(LINES, axes[1], strict=False):
+    for name, one in zip(LINES, plots, strict=False):
         values = picture.lines[name]
         assert values.reference is not None
         along = 1e6 * values.distance
@@ -104,9 +112,9 @@ def _figure(picture: Picture, model: SceneModel) -> Figure:
         one.plot(along, values.measured - KELVIN, color=BLUE, label="measured")
         one.set_title(LINE_NAMES[name].capitalize(), color="black")
         one.set(xlabel="distance / µm", ylabel="radiance temperature / °C")
-        one.legend()
-    axes[1, 2].axis("off")
-    axes[1, 2].text(0, 1, _caption(picture, model), va="top", fontsize=7.5)
+    plots[2].axis("off")
+    plots[2].text(0, 1, _caption(picture, model), va="top", fontsize=7.5)
+    plots[2].legend(*plots[0].get_legend_handles_labels(), loc="lower left")
     return figure
 
 
@@ -116,4 +124,4 @@ def _caption(picture: Picture, model: SceneModel) -> str:
     texts = {"start": model.panel.knob("start").text(knobs.start), **model.panel.texts(knobs)}
     known = {knob.name: knob.label for knob in model.panel.knobs}
     rows = [f"{known[name]}: {text}" for name, text in texts.items() if name in known]
-    return "\n".join([model.opened.name, *rows])
+    return re.sub(r"\bu(m|s)\b", r"µ\1", "\n".join([model.opened.name, *rows]))

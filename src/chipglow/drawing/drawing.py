@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Colormap, LogNorm, Normalize, to_rgba
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
@@ -172,7 +172,7 @@ def draw_line(
     axes.plot(*(points * factor).T, color=colour, linewidth=1.6, label=label)
 
 
-def colour_bar(figure: Figure, picture: AxesImage, axes: Any, label: str) -> None:
+def colour_bar(figure: FigureBase, picture: AxesImage, axes: Any, label: str) -> None:
     """Colour bar beside one or several axes, with its quantity and unit; arrows where it ends."""
     values, low, high = picture.get_array(), picture.norm.vmin, picture.norm.vmax
     assert values is not None and low is not None and high is not None
@@ -208,7 +208,7 @@ class ImagePanel:
     colours: str = PLAIN
     log: bool = False
 
-    def draw(self, figure: Figure, axes: Axes, raster: Raster, tool: Tool | None) -> None:
+    def draw(self, figure: FigureBase, axes: Axes, raster: Raster, tool: Tool | None) -> None:
         """Draw it, with the labels of its axes only at the edges of the figure."""
         picture = show_image(
             axes, self.image, raster, tool, self.colours, self.limits, log=self.log
