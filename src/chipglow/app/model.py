@@ -291,8 +291,9 @@ class SceneModel:
 
         def make() -> tuple[Exposure, ...]:
             seen = (surface, plain) if both else (surface,)
+            grey = all(one.in_band(camera.band, camera.reflected) is one for one in seen)
             fields = self._laid.get(
-                (_surface_key(knobs), band, knobs.reflected, coarse, both),
+                (_surface_key(knobs), coarse, both, () if grey else (band, knobs.reflected)),
                 lambda: [camera.lay(one, scene) for one in seen],
             )
             found = camera.expose_fields(scene, fields, knobs.start, check)

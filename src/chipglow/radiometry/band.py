@@ -12,7 +12,11 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eigh_tridiagonal
 
-from chipglow.radiometry.planck import SECOND_RADIATION_CONSTANT, spectral_radiance
+from chipglow.radiometry.planck import (
+    FIRST_RADIATION_CONSTANT,
+    SECOND_RADIATION_CONSTANT,
+    spectral_radiance,
+)
 
 Response: TypeAlias = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Relative spectral response of a camera: wavelengths in m to values of 0 or more."""
@@ -225,7 +229,7 @@ class Band:
         """Radiance and its derivative at every 0.25 K from 200 K to 6000 K, shape (n, 2)."""
         count = round((TABLE_HOTTEST - TABLE_COLDEST) / _TEMPERATURE_STEP) + 1
         temperature = TABLE_COLDEST + _TEMPERATURE_STEP * np.arange(count, dtype=np.float64)
-        return np.stack([self._integrate(temperature), self._derivative(temperature)], axis=1)
+        return np.stack(self._with_slope(temperature), axis=1)
 
     @cached_property
     def _quadrature(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -252,28 +256,30 @@ class Band:
         radiance = (np.arange(first, last + 2) << _SHIFT).view(np.float64)
         temperature = self._invert(radiance)
         begin, rise, step = temperature[:-1], np.diff(temperature), np.diff(radiance)
-        slope = 1.0 / self._derivative(temperature)
+        slope = 1.0 / self._with_slope(temperature)[1]
         left, right = step * slope[:-1], step * slope[1:]
         cubics = [begin, left, 3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise]
         return int(first), np.stack(cubics, axis=1)
 
     def _integrate(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self._with_slope(temperature)[0]
+
+    def _with_slope(
+        self, temperature: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """In-band radiance, and its derivative in W/(m² sr K)."""
         wavelength, weights = self._quadrature
-        result = np.empty_like(temperature)
+        radiance, slope = np.empty_like(temperature), np.empty_like(temperature)
         for at in range(0, temperature.size, _BLOCK):
             part = slice(at, at + _BLOCK)
-            result[part] = spectral_radiance(wavelength, temperature[part, None]) @ weights
-        return result
-
-    def _derivative(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
-        """dL/dT in W/(m² sr K)."""
-        wavelength, weights = self._quadrature
-        exponent = SECOND_RADIATION_CONSTANT / (wavelength * temperature[:, None])
-        growth = exponent / -np.expm1(-exponent) / temperature[:, None]
-        return np.asarray(
-            (spectral_radiance(wavelength, temperature[:, None]) * growth) @ weights,
-            dtype=np.float64,
-        )
+            kelvins = temperature[part, None]
+            spectral = spectral_radiance(wavelength, kelvins)
+            radiance[part] = spectral @ weights
+            # 1 / (1 - exp(-x)) is one more than Planck's 1 / (exp(x) - 1), x = c2 / (wavelength T).
+            growth = 1.0 + spectral * (wavelength**5 / FIRST_RADIATION_CONSTANT)
+            spectral *= growth * (SECOND_RADIATION_CONSTANT / wavelength)
+            slope[part] = (spectral @ weights) / temperature[part] ** 2
+        return radiance, slope
 
     def _invert(self, radiance: NDArray[np.float64]) -> NDArray[np.float64]:
         """Newton's method on ln L over 1/T, which is nearly straight."""
@@ -281,8 +287,8 @@ class Band:
         inverse = np.full_like(target, 1e-3)
         for _ in range(60):
             temperature = 1.0 / inverse
-            value = self._integrate(temperature)
-            slope = -self._derivative(temperature) * temperature**2 / value
+            value, rise = self._with_slope(temperature)
+            slope = -rise * temperature**2 / value
             step = (np.log(value) - target) / slope
             inverse = np.maximum(inverse - step, 0.2 * inverse)
             if (np.abs(step) <= 1e-14 * inverse).all():
