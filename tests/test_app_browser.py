@@ -164,6 +164,20 @@ def test_knobs_change_what_the_library_says(visit, model):
     number(page, "measured").get_by_text(expected(model, texts)).wait_for()
 
 
+def test_what_is_being_typed_stays_while_the_page_changes(visit, model):
+    page = visit()
+    turn(page, "Pixel pitch", "5")
+    number(page, "measured").get_by_text(expected(model, {"pitch": "5"})).wait_for()
+    aperture = page.locator("#knob-numerical_aperture")
+    aperture.fill("0.2")
+    page.locator(".app").dispatch_event("keydown", {"key": "z", "ctrlKey": True})
+    playwright.expect(page.locator("#knob-pitch")).to_have_value("6", timeout=PATIENCE)
+    assert aperture.input_value() == "0.2"
+    aperture.press("Enter")
+    texts = {"numerical_aperture": "0.2"}
+    number(page, "measured").get_by_text(expected(model, texts)).wait_for()
+
+
 def test_a_wrong_number_is_said_and_changes_nothing(visit, model):
     page = visit()
     turn(page, "Pixel pitch", "-5")

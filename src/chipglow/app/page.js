@@ -104,7 +104,7 @@ export function render({ model, el }) {
   function control(knob) {
     const id = `knob-${knob.name}`;
     const row = element("div", { class: "knob", "data-knob": knob.name });
-    const entry = { knob, row, sent: 0 };
+    const entry = { knob, row, sent: 0, text: "", typing: false };
     controls.set(knob.name, entry);
     const label = element("label", { for: id }, knob.label);
     if (knob.choices) {
@@ -114,11 +114,7 @@ export function render({ model, el }) {
       row.append(label, entry.field);
       return row;
     }
-    entry.field = element("input", {
-      id, type: "text", inputmode: "decimal", autocomplete: "off", spellcheck: "false",
-      placeholder: knob.optional ? "none" : null,
-      onchange: () => turn(knob.name, entry.field.value, true),
-    });
+    entry.field = entryField(entry, { id, inputmode: "decimal", placeholder: knob.optional ? "none" : null });
     row.append(label, element("span", { class: "value" }, entry.field, element("span", { class: "unit" }, knob.unit)));
     const stepped = knob.stops.length > 1;
     if (!knob.stops.length || stepped) {
@@ -138,10 +134,29 @@ export function render({ model, el }) {
     return row;
   }
 
+  // What is being typed stays, whatever comes from Python meanwhile.
+  function entryField(entry, attributes) {
+    return element("input", {
+      type: "text", autocomplete: "off", spellcheck: "false", ...attributes,
+      oninput: () => { entry.typing = true; },
+      onchange: () => {
+        entry.typing = false;
+        turn(entry.knob.name, entry.field.value, true);
+      },
+      onblur: () => {
+        if (entry.typing) entry.field.value = entry.text;
+        entry.typing = false;
+      },
+    });
+  }
+
   function setControl(entry, text) {
     const { knob, field, slider } = entry;
-    field.removeAttribute("aria-invalid");
-    if (field.value !== text) field.value = text;
+    entry.text = text;
+    if (!entry.typing) {
+      field.removeAttribute("aria-invalid");
+      field.value = text;
+    }
     if (!slider) return;
     let at = Number(text === "" ? knob.low : text);
     if (knob.stops.length > 1) {
@@ -206,9 +221,8 @@ export function render({ model, el }) {
   function place(name, label) {
     const id = `place-${name}`;
     const row = element("span", { class: "place" });
-    const entry = { knob: { name, unit: "", stops: [] }, row, sent: 0 };
-    entry.field = element("input", { id, type: "text", autocomplete: "off", spellcheck: "false",
-      onchange: () => turn(name, entry.field.value, true) });
+    const entry = { knob: { name, unit: "", stops: [] }, row, sent: 0, text: "", typing: false };
+    entry.field = entryField(entry, { id });
     controls.set(name, entry);
     row.append(element("label", { for: id }, label), entry.field);
     return row;
