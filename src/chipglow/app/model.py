@@ -7,7 +7,7 @@ result is kept: surfaces, exposures, images.
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import replace
-from math import nan
+from math import ceil, nan
 from threading import Lock
 from typing import Final, Generic, TypeVar
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.app.knobs import LINES, ControlPanel, Knobs
-from chipglow.app.opening import OpenedMeasurement, OpenedScene, with_samples
+from chipglow.app.opening import QUICK_SAMPLES, OpenedMeasurement, OpenedScene, with_samples
 from chipglow.app.picture import (
     Drawn,
     LineBand,
@@ -92,13 +92,14 @@ class SceneModel:
         self._laid: Kept[list[EmissivityField]] = Kept(4)
         self._exact: Kept[tuple[Exposure, ...]] = Kept(_EXPOSURES)
         self._quick: Kept[tuple[Exposure, ...]] = Kept(_COARSE_EXPOSURES)
-        self._images: Kept[SceneImage] = Kept(2)
+        self._images: Kept[SceneImage] = Kept(4)
         self._formed: Kept[NDArray[np.float64]] = Kept(8)
         self._unblurred: Kept[Unblurred] = Kept(8)
         self._errors: Kept[ErrorImages] = Kept(8)
         self._parts: Kept[ErrorParts] = Kept(2)
         self._frames: Kept[tuple[NDArray[np.float32], NDArray[np.float32]]] = Kept(1)
         self._displayed = with_samples(opened.scene, DISPLAYED)
+        self._glimpsed = with_samples(opened.scene, QUICK_SAMPLES)
 
     @property
     def has_quick_look(self) -> bool:
@@ -107,9 +108,12 @@ class SceneModel:
 
     def is_ready(self, knobs: Knobs) -> bool:
         """Whether the exposure of these knobs is at hand, and an exact picture a matter of ms."""
-        return self._exposure_key(knobs) in self._exact and (
-            knobs.psf_order == "detector" or knobs.psf != "annular-aperture"
-        )
+        if self._exposure_key(knobs) not in self._exact:
+            return False
+        on_samples = knobs.psf_order != "detector" and knobs.psf == "annular-aperture"
+        coarse = self.opened.coarse
+        many = on_samples or (coarse is not None and knobs.pitch < coarse.raster.spacing)
+        return not many or self._image_key(knobs, coarse=False) in self._errors
 
     def picture(self, knobs: Knobs, quick: bool = False, check: Check | None = None) -> Picture:
         """Images and lines at a state of the knobs.
@@ -131,7 +135,7 @@ class SceneModel:
         coarse = quick and self.opened.coarse is not None
         study = self.panel.study_of(knobs)
         scene, surface = self._on(study, knobs, coarse)
-        camera = self._camera(study, scene)
+        camera = self._camera(study, scene, coarse)
         exposures = self._exposed(scene, surface, camera, knobs, coarse, check)
         errors = self._image_errors(camera, exposures[0], knobs, coarse)
         picture = Picture(
@@ -155,10 +159,7 @@ class SceneModel:
         self, camera: Camera, exposure: Exposure, knobs: Knobs, coarse: bool
     ) -> ErrorImages:
         """As `error_images`, of which what the changed knobs do not matter to is kept."""
-        seen = self._exposure_key(knobs), coarse
-        pixels = knobs.pitch, knobs.offset_right, knobs.offset_down
-        optics = knobs.psf, knobs.numerical_aperture, knobs.fwhm, knobs.psf_order
-        read = knobs.netd, knobs.lower_limit
+        seen, pixels, optics, read = key = self._image_key(knobs, coarse)
         reference = self.panel.study.analysis.reference
         unblurred = self._unblurred.get(
             (seen, pixels, read), lambda: Unblurred.of(camera, exposure, reference)
@@ -167,7 +168,16 @@ class SceneModel:
             (seen, pixels, optics),
             lambda: camera.form_image(exposure.mean_radiance, exposure.raster),
         )
-        return self._errors.get((seen, pixels, optics, read), lambda: unblurred.errors(formed))
+        return self._errors.get(key, lambda: unblurred.errors(formed))
+
+    def _image_key(self, knobs: Knobs, coarse: bool) -> tuple[Hashable, ...]:
+        """What an image depends on: exposure, pixels, optics and how it is read."""
+        return (
+            (self._exposure_key(knobs), coarse),
+            (knobs.pitch, knobs.offset_right, knobs.offset_down),
+            (knobs.psf, knobs.numerical_aperture, knobs.fwhm, knobs.psf_order),
+            (knobs.netd, knobs.lower_limit),
+        )
 
     def parts(self, picture: Picture) -> ErrorParts:
         """What makes the errors of a picture."""
@@ -268,9 +278,17 @@ class SceneModel:
 
         return self._fitted.get((_surface_key(knobs), coarse), make)
 
-    def _camera(self, study: Study, scene: Scene) -> Camera:
-        """The study's camera; its band is kept, whose tables take longer than an image."""
+    def _camera(self, study: Study, scene: Scene, coarse: bool = False) -> Camera:
+        """The study's camera; if coarse, with no pixel finer than the scene's samples.
+
+        Its band is kept, whose tables take longer than an image.
+        """
         camera = study.camera.on(scene.raster, study.seed)
+        larger = scene.raster.spacing / camera.pitch
+        if coarse and larger > 1:
+            rows, columns = camera.shape or (0, 0)
+            shape = (ceil(rows / larger), ceil(columns / larger)) if camera.shape else None
+            camera = replace(camera, pitch=scene.raster.spacing, shape=shape)
         ends = camera.band.lower, camera.band.upper
         return replace(camera, band=self._bands.get(ends, lambda: camera.band))
 
@@ -308,8 +326,12 @@ class SceneModel:
     def _scene_image(
         self, study: Study, knobs: Knobs, exposure: Exposure, coarse: bool
     ) -> SceneImage:
-        scene = (self.opened.coarse if coarse else None) or self._displayed
-        index = _middle_frame(scene, knobs)
+        index = _middle_frame(self.opened.scene, knobs)
+        of_surface = knobs.shown in ("radiance_temperature", "emissivity")
+        seen = (self._exposure_key(knobs), exposure.raster.shape) if of_surface else ()
+        exact, quick = ((index, knobs.shown, seen, few) for few in (False, True))
+        few = coarse and exact not in self._images
+        scene = self._glimpsed if few else self._displayed
 
         def make() -> SceneImage:
             values = self._shown(study, knobs, exposure, scene, index)
@@ -317,9 +339,7 @@ class SceneModel:
             values = np.where(void, np.nan, values).astype(np.float32)
             return SceneImage(knobs.shown, values, scene.raster)
 
-        of_surface = knobs.shown in ("radiance_temperature", "emissivity")
-        seen = (self._exposure_key(knobs), exposure.raster.shape) if of_surface else ()
-        return self._images.get((index, knobs.shown, seen, coarse), make)
+        return self._images.get(quick if few else exact, make)
 
     def _shown(
         self, study: Study, knobs: Knobs, exposure: Exposure, scene: Scene, index: int

@@ -22,7 +22,7 @@ from chipglow.study import Study, cut, is_cut, load_study
 from chipglow.surface import UniformEmissivity
 
 BUNDLED: Final = "bundled scene"
-QUICK_SAMPLES: Final = 60_000
+QUICK_SAMPLES: Final = 35_000
 """Samples of a frame up to which a picture is computed at once, without a coarse one before."""
 
 MOST_UPLOADED: Final = 512 * 1024**2
@@ -81,7 +81,7 @@ class OpenedScene:
         start = _start(scene, duration)
         place = _places(scene, start, study.camera.integration_time)
         initial = knobs_of(study, start, *place)
-        coarse = with_samples(scene, QUICK_SAMPLES)
+        coarse = with_samples(scene, QUICK_SAMPLES, fewer_frames=True)
         panel = ControlPanel.of(study, scene, initial, duration)
         return cls(name, scene, None if coarse is scene else coarse, panel)
 
@@ -183,12 +183,15 @@ def _results(folder: Path) -> OpenedScene:
     return OpenedScene.of(open_scene(cut(study)), study, folder.name)
 
 
-def with_samples(scene: Scene, most: int) -> Scene:
-    """The scene with so many samples a frame at most, if it is one of splines; else as it is."""
+def with_samples(scene: Scene, most: int, fewer_frames: bool = False) -> Scene:
+    """The scene with so many samples a frame at most, if it is one of splines; else as it is.
+
+    With fewer frames time is as much coarser as places are.
+    """
     step = ceil(sqrt(scene.raster.rows * scene.raster.columns / most))
     if step < 2 or not isinstance(scene, StoredScene) or scene.lattice is None:
         return scene
-    return scene.coarser(step)
+    return scene.coarser(step, step if fewer_frames else 1)
 
 
 def _start(scene: Scene, duration: float) -> float:

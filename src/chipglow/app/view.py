@@ -266,7 +266,9 @@ class View:
         assert picture.scene is not None or picture.errors is None
         if picture.coarse:
             step = picture.exposures[0].raster.spacing
-            text = f"Quick look on samples of {1e6 * step:.3g} µm; the exact picture follows."
+            finer = picture.knobs.pitch < picture.raster.spacing
+            what = "samples and pixels" if finer else "samples"
+            text = f"Quick look on {what} of {1e6 * step:.3g} µm; the exact picture follows."
         else:
             text = "Exact picture."
             if self._began:

@@ -399,13 +399,15 @@ class StoredScene(Scene):
         self._near: Decoded[NDArray[Any]] = Decoded(CACHED_BYTES)
         super().__init__(data)
 
-    def coarser(self, step: int) -> Scene:
+    def coarser(self, step: int, every: int = 1) -> Scene:
         """The same scene with fewer samples, for a quick look.
 
         Parameters
         ----------
         step : int
             How many samples, in either direction, become one.
+        every : int
+            One of so many frames that follow one another is kept, the first after each gap.
 
         Raises
         ------
@@ -414,7 +416,8 @@ class StoredScene(Scene):
         """
         if self.lattice is None:
             raise ValueError(f"{self.path}: has samples, expected splines")
-        return _CoarserScene(self, self.lattice.coarser(step))
+        kept = [index for block in self.blocks for index in block[::every]]
+        return _CoarserScene(self, self.lattice.coarser(step), kept)
 
     @property
     def hottest(self) -> float:
@@ -493,15 +496,15 @@ class StoredScene(Scene):
 class _CoarserScene(Scene):
     """A stored scene of splines on fewer samples; see `StoredScene.coarser`."""
 
-    def __init__(self, stored: StoredScene, lattice: Lattice) -> None:
-        self._stored, self._lattice = stored, lattice
-        places = raster_coordinates(lattice.raster, stored.times)
+    def __init__(self, stored: StoredScene, lattice: Lattice, kept: Sequence[int]) -> None:
+        self._stored, self._lattice, self._kept = stored, lattice, kept
+        places = raster_coordinates(lattice.raster, stored.times[kept])
         empty = xr.Dataset(coords=places, attrs=stored.data.attrs)
         super().__init__(spline_file.with_samples(empty, self._read, _LONG_NAMES))
 
     def splines(self, index: int) -> SplineFrame:
         """The splines of one frame."""
-        found = self._stored.splines(index)
+        found = self._stored.splines(self._kept[index])
         assert found is not None
         return SplineFrame(self._lattice, found.time, found.nodes, found.limits)
 
