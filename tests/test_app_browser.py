@@ -284,12 +284,14 @@ def test_reloading_brings_the_state_back_and_sessions_stay_apart(visit, model):
 
 
 def test_draws_show_progress_and_can_be_cancelled(visit):
-    page = visit("&surface=uniform")
+    page = visit("&pitch=1")  # 45 draws of so many pixels are not done before they are cancelled
     page.get_by_role("button", name="Draw phases").click()
     page.get_by_role("progressbar", name="Progress").wait_for()
     page.get_by_role("button", name="Cancel").click()
     page.locator("#status", has_text="was cancelled").wait_for()
     page.get_by_role("progressbar", name="Progress").wait_for(state="hidden")
+    page.get_by_label("Emissivity", exact=True).select_option("uniform")
+    ready(page)
     page.get_by_role("button", name="Draw phases").click()
     page.locator("#status", has_text="over 9 draws").wait_for()
 

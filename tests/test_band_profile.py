@@ -9,6 +9,7 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 from measured_band import BAND, LENGTH, RASTER, TOOL, BandImage, measured
 from PIL import Image
+from scipy.signal import savgol_filter
 from typer.testing import CliRunner
 
 from chipglow.camera import Flag, Measurement
@@ -25,6 +26,7 @@ from chipglow.laboratory.chip import (
 )
 from chipglow.laboratory.chip.band_figure import draw_band_profile
 from chipglow.laboratory.chip.band_profile import CALIBRATION_UNKNOWN
+from chipglow.laboratory.chip.ridge import local_parabolas
 from chipglow.scene import Line, PlacedTool
 from chipglow.uncertainty import Estimate, from_xarray
 
@@ -44,6 +46,14 @@ def inner(along):
 
 
 # The curve
+
+
+@given(st.integers(1, 8), st.integers(0, 30), st.integers(0, 2**32 - 1))
+def test_local_parabolas_are_those_of_savitzky_and_golay(half, more, seed):
+    window = 2 * half + 1
+    values = np.random.default_rng(seed).normal(size=(window + more, 2))
+    expected = savgol_filter(values, window, 2, axis=0, mode="interp")
+    np.testing.assert_allclose(local_parabolas(values, window), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("angle", [0.6, 0.7, 0.85])

@@ -51,7 +51,7 @@ def test_a_material_whose_damage_was_not_fitted_is_not_drawn():
     ],
 )
 def test_a_wrong_entry_is_one_line(tmp_path, old, new, expected):
-    text = (FOLDER / "aisi-1045.yaml").read_text(encoding="utf-8")
+    text = (FOLDER / "workpieces" / "aisi-1045.yaml").read_text(encoding="utf-8")
     assert old in text
     path = tmp_path / "steel.yaml"
     path.write_text(text.replace(old, new), encoding="utf-8")

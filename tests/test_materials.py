@@ -135,7 +135,7 @@ def test_every_number_has_unit_and_source(name: str) -> None:
 
 
 def test_the_rooms_data_are_files_of_the_package() -> None:
-    assert len(list(FOLDER.glob("*.yaml"))) == len(material_names()) == 8
+    assert len(list(FOLDER.rglob("*.yaml"))) == len(material_names()) == 8
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_unknown_names(name: str, message: str) -> None:
 
 
 def _write(path: Path, old: str, new: str) -> Path:
-    text = (FOLDER / "aisi-4140.yaml").read_text(encoding="utf-8")
+    text = (FOLDER / "workpieces" / "aisi-4140.yaml").read_text(encoding="utf-8")
     assert old in text
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
     return path
@@ -230,7 +230,7 @@ def test_faults_name_file_field_value_and_expectation(
 
 
 def test_a_set_names_its_law_and_whether_it_fails(tmp_path: Path) -> None:
-    data = yaml.safe_load((FOLDER / "aisi-4140.yaml").read_text(encoding="utf-8"))
+    data = yaml.safe_load((FOLDER / "workpieces" / "aisi-4140.yaml").read_text(encoding="utf-8"))
     softening = {
         "law": "tanh", "damage": "none", "hardening_limit": 1.1, "recovery_temperature": 0.4,
         "recovery_strain": 12, "softening_temperature": 1, "sharpness": 0.05,
@@ -248,7 +248,7 @@ def test_a_set_names_its_law_and_whether_it_fails(tmp_path: Path) -> None:
 
 
 def test_a_material_that_does_not_fail(tmp_path: Path) -> None:
-    data = yaml.safe_load((FOLDER / "aisi-4140.yaml").read_text(encoding="utf-8"))
+    data = yaml.safe_load((FOLDER / "workpieces" / "aisi-4140.yaml").read_text(encoding="utf-8"))
     data["damage"] = "none"
     (tmp_path / "steel.yaml").write_text(yaml.safe_dump(data), encoding="utf-8")
     file = read_material(tmp_path / "steel.yaml")
@@ -321,7 +321,7 @@ def test_heat_fraction_over_the_strain_rate(tmp_path: Path) -> None:
 
 
 def test_a_number_needs_a_source(tmp_path: Path) -> None:
-    data = yaml.safe_load((FOLDER / "ceramic.yaml").read_text(encoding="utf-8"))
+    data = yaml.safe_load((FOLDER / "tools" / "ceramic.yaml").read_text(encoding="utf-8"))
     del data["density"]["source"]
     (tmp_path / "tool.yaml").write_text(yaml.safe_dump(data), encoding="utf-8")
     with pytest.raises(MaterialError, match=r"density\.source: is missing, expected a value"):

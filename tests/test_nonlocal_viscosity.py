@@ -161,7 +161,7 @@ def test_a_failing_layer_is_as_thick_as_the_band_if_it_has_a_width():
     ],
 )
 def test_a_wrong_one_in_a_materials_file_is_refused(tmp_path, text, message):
-    given = (FOLDER / "al-7075-t6.yaml").read_text(encoding="utf-8")
+    given = (FOLDER / "workpieces" / "al-7075-t6.yaml").read_text(encoding="utf-8")
     path = tmp_path / "own.yaml"
     path.write_text(f"{given}\nnonlocal_viscosity: {text}\n", encoding="utf-8")
     with pytest.raises(MaterialError, match=message):

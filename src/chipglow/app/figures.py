@@ -238,9 +238,10 @@ class Figures:
         """Draw everything on light or dark ground."""
         colours = _THEMES["dark" if theme == "dark" else "light"]
         text = colours["text"]
+        grounds = {id(image.figure): colours["void"] for image in self.images.values()}
         for one in self.figures:
             one.update(
-                background_fill_color=colours["ground"],
+                background_fill_color=grounds.get(id(one), colours["ground"]),
                 border_fill_color=colours["ground"],
                 outline_line_color=colours["grid"],
             )
@@ -257,13 +258,10 @@ class Figures:
                 grid.grid_line_color = colours["grid"]
         for image in self.images.values():
             image.mapper.nan_color = colours["void"]
-            image.figure.background_fill_color = colours["void"]
             image.bar.update(
                 background_fill_color=colours["ground"],
                 major_label_text_color=text,
             )
-            for grid in image.figure.grid:
-                grid.grid_line_color = None
         for box in self._out_of_range:
             box.update(fill_color=colours["void"], fill_alpha=1.0)
         for one in self.lines.values():
@@ -344,6 +342,7 @@ class Figures:
         )
         one.toolbar.active_scroll = wheel
         self._draw_over(one)
+        one.grid.visible = False
         one.xaxis.axis_label = "x / µm"
         one.yaxis.axis_label = "y / µm" if labelled else None
         one.yaxis.visible = labelled

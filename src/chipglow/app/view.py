@@ -163,7 +163,11 @@ class View:
         return ""
 
     def _listen(self) -> None:
-        self.page.on_msg(lambda event: self._receive(event.data))
+        def received(event: Any) -> None:
+            with unlocked():  # one answer, that the browser draws once
+                self._receive(event.data)
+
+        self.page.on_msg(received)
         for image in self.figures.images.values():
             image.figure.on_event(Tap, self._tapped)
             image.figure.on_event(PanEnd, lambda _: self._turn({}, True))

@@ -18,7 +18,10 @@ from chipglow.quantities.units import KELVINS, STRAIN_RATE
 from chipglow.text import read_yaml
 
 FOLDER: Final = Path(__file__).with_name("materials")
-_OWN: Final = {path.stem: path for path in FOLDER.glob("*.yaml")}
+_FOLDERS: Final = {"workpiece": FOLDER / "workpieces", "tool": FOLDER / "tools"}
+_OWN: Final = {
+    kind: {path.stem: path for path in folder.glob("*.yaml")} for kind, folder in _FOLDERS.items()
+}
 
 
 class MaterialError(ValueError):
@@ -80,8 +83,9 @@ def material_names(kind: str | None = None) -> list[str]:
     kind : {'workpiece', 'tool'}, optional
         Only these.
     """
-    names = sorted(of_other_packages(_GROUP).keys() | _OWN.keys())
-    return [n for n in names if kind is None or bool(material_file(n).tool) == (kind == "tool")]
+    own = {name for one, names in _OWN.items() if kind in (None, one) for name in names}
+    others = of_other_packages(_GROUP).keys()
+    return sorted(own | {n for n in others if kind in (None, _kind(material_file(n)))})
 
 
 def is_own_file(name: str) -> bool:
@@ -180,8 +184,13 @@ def _after_slash(name: str) -> str | None:
 @cache
 def _in_library(name: str) -> MaterialFile | None:
     """Of the library's own, or else of other packages: those load only if they are needed."""
-    path = _OWN.get(name) or of_other_packages(_GROUP).get(name)
+    own = {name: path for paths in _OWN.values() for name, path in paths.items()}
+    path = own.get(name) or of_other_packages(_GROUP).get(name)
     return None if path is None else read_material(Path(path))
+
+
+def _kind(material: MaterialFile) -> str:
+    return "tool" if material.tool else "workpiece"
 
 
 def _has_rows(data: object) -> bool:

@@ -5,7 +5,7 @@ from math import ceil, pi, radians
 from typing import Final
 
 import numpy as np
-import scipy  # its signal part is slow to import, and loaded at its first use
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from chipglow.scene import Raster, Tool
@@ -235,7 +235,27 @@ def even_steps(points: NDArray[np.float64], step: float) -> NDArray[np.float64]:
     window = min(2 * round(_SMOOTHING / step / 2) + 1, (even.size - 1) // 2 * 2 + 1)
     if window < 5:
         return resampled
-    return np.asarray(scipy.signal.savgol_filter(resampled, window, 2, axis=0, mode="interp"))
+    return local_parabolas(resampled, window)
+
+
+def local_parabolas(values: NDArray[np.float64], window: int) -> NDArray[np.float64]:
+    """Least-squares parabolas over windows of even steps, each at its middle (Savitzky-Golay).
+
+    As `scipy.signal.savgol_filter`, whose package takes half a second to be imported.
+
+    Parameters
+    ----------
+    values : ndarray
+        Shape (n, columns).
+    window : int
+        Values of a window, odd, 3 to n. The first and the last one hold to the ends.
+    """
+    half = window // 2
+    powers = np.vander(np.arange(-half, half + 1.0), 3)
+    fitted = powers @ np.linalg.pinv(powers)
+    first, last = fitted[:half] @ values[:window], fitted[half + 1 :] @ values[-window:]
+    middle = sliding_window_view(values, window, axis=0) @ fitted[half]
+    return np.concatenate([first, middle, last])
 
 
 def arc_length(points: NDArray[np.float64]) -> NDArray[np.float64]:
