@@ -5,8 +5,9 @@
 Presses keys on the sliders of a page in headless Chromium, as fast as pictures come. Each time is
 from the key's event to the frame of the screen after the new image was there, by the browser's
 clock: the first picture, which of a large scene is a quick look on fewer samples, and the exact one
-that follows where the hand rests. Then the memory of the server beside that of the scene's own
-splines or samples.
+that follows where the hand rests. Then how long the command took to the first exact picture, in a
+browser that was open, and the memory of the server beside that of the scene's own splines or
+samples.
 """
 
 import argparse
@@ -62,32 +63,31 @@ def main():
     parser.add_argument("--knobs", nargs="+", default=KNOBS, help="labels of knobs")
     parser.add_argument("--chromium", default=CHROMIUM)
     given = parser.parse_args()
-    command = [sys.executable, "-c", SERVE, *([str(given.scene)] if given.scene else [])]
-    begun = time.perf_counter()
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-        try:
-            url = server.stdout.readline().strip()
-            times = measured(url, given)
-            report(times, time_to(begun, times), server.pid, given.scene)
-        finally:
-            server.terminate()
-
-
-def measured(url, given):
-    """Milliseconds by knob, of first and of exact pictures; when the first one was there."""
     from playwright.sync_api import sync_playwright
 
-    found = {}
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=given.chromium, args=list(FLAGS))
-        page = browser.new_page(viewport={"width": 1280, "height": 800})
-        page.goto(url)
-        page.get_by_text("Exact picture").wait_for(timeout=300_000)
-        found["opened"] = time.perf_counter()
-        page.wait_for_function(WATCH)
-        for label in given.knobs:
-            found[label] = turned(page, label, given.turns)
+        command = [sys.executable, "-c", SERVE, *([str(given.scene)] if given.scene else [])]
+        begun = time.perf_counter()
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+            try:
+                times = measured(browser, server.stdout.readline().strip(), given)
+                report(times, time_to(begun, times), server.pid, given.scene)
+            finally:
+                server.terminate()
         browser.close()
+
+
+def measured(browser, url, given):
+    """Milliseconds by knob, of first and of exact pictures; when the first one was there."""
+    found = {}
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.goto(url)
+    page.get_by_text("Exact picture").wait_for(timeout=300_000)
+    found["opened"] = time.perf_counter()
+    page.wait_for_function(WATCH)
+    for label in given.knobs:
+        found[label] = turned(page, label, given.turns)
     return found
 
 

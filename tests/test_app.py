@@ -1,6 +1,8 @@
 """The app without a browser: its numbers are the library's, its knobs the study's."""
 
 import ast
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
@@ -382,3 +384,26 @@ def test_a_missing_panel_is_named_with_its_extra(monkeypatch):
     monkeypatch.setattr("chipglow.app.exploring.find_spec", lambda name: None)
     with pytest.raises(ValueError, match=r"expected pip install 'chipglow\[app\]'"):
         chipglow.explore()
+
+
+def test_a_signal_ends_the_server_whatever_is_at_work():
+    code = """
+import os, signal
+from chipglow.app.opening import open_any
+from chipglow.app.server import App
+signal.signal(signal.SIGTERM, signal.default_int_handler)  # as the command does
+app = App(open_any(None))
+def finaliser():
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+        sum(range(1000))
+    except BaseException:
+        pass  # as Python does with what is raised in one
+app.server.io_loop.add_callback(finaliser)
+app.run()
+print(app.opened.folder.exists())
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True
+    )
+    assert ended.stdout == "False\n"

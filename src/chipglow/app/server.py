@@ -1,6 +1,7 @@
 """The app as a local server: who may come in, what may be uploaded, how it ends."""
 
 import secrets
+import signal
 import socket
 from asyncio import get_running_loop
 from collections import OrderedDict
@@ -256,12 +257,19 @@ class App:
 
     def run(self) -> None:
         """Serve until Ctrl-C."""
+        loop = self.server.io_loop
+
+        # An exception would be lost if a finaliser were at work when the signal comes.
+        def end(*_: object) -> None:
+            loop.asyncio_loop.call_soon_threadsafe(loop.stop)
+
+        before = {one: signal.signal(one, end) for one in (signal.SIGINT, signal.SIGTERM)}
         self.server.start()
         try:
-            self.server.io_loop.start()
-        except KeyboardInterrupt:
-            pass
+            loop.start()
         finally:
+            for one, handler in before.items():
+                signal.signal(one, handler)
             self.stop()
 
     def stop(self) -> None:
