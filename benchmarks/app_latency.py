@@ -4,10 +4,10 @@
 
 Presses keys on the sliders of a page in headless Chromium, as fast as pictures come. Each time is
 from the key's event to the frame of the screen after the new image was there, by the browser's
-clock: the first picture, which of a large scene is a quick look on fewer samples, and the exact one
-that follows where the hand rests. Then how long the command took to the first exact picture, in a
-browser that was open, and the memory of the server beside that of the scene's own splines or
-samples.
+clock: the first picture, which of a large scene is a quick look on fewer samples, the curves along
+its lines, which follow its images, and the exact picture where the hand rests. Then how long the
+command took to the first exact picture, in a browser that was open, and the memory of the server
+beside that of the scene's own splines or samples.
 """
 
 import argparse
@@ -29,29 +29,26 @@ KNOBS = (
     "Exposure begins", "Band from", "Pixel pitch", "Exposure", "Numerical aperture",
     "Noise (NETD at 300 °C)", "Lower range limit", "Seed",
 )  # fmt: skip
-SERVE = """
-import sys
-from pathlib import Path
-from chipglow.app import serve
-path = Path(sys.argv[1]) if len(sys.argv) > 1 else None
-serve(path, "127.0.0.1", 0, lambda url: print(url, flush=True))
-"""
 WATCH = """() => {
-  const log = (window.chipglowLog = { asked: 0, first: [], exact: [], fresh: false });
+  const log = (window.chipglowLog = { asked: 0, shown: 0, first: [], lines: [], fresh: false });
   addEventListener("keydown", (event) => { log.asked = event.timeStamp; log.fresh = true; }, true);
-  for (const model of Bokeh.documents[0]._all_models.values()) {
-    if (model.name !== "measured_image") continue;
-    model.properties.data.change.connect(() => {
-      const asked = log.asked, first = log.fresh;
-      log.fresh = false;
-      requestAnimationFrame(() => setTimeout(() => {
-        if (first) log.first.push(performance.now() - asked);
-        log.last = performance.now() - asked;
-      }, 0));
-    });
-    return true;
-  }
-  return false;
+  const on = (name, done) => {
+    const model = Bokeh.documents[0].get_model_by_name(name);
+    model?.properties.data.change.connect(done);
+    return Boolean(model);
+  };
+  on("band_line_values", () => {
+    const asked = log.shown;
+    requestAnimationFrame(() => setTimeout(() => log.lines.push(performance.now() - asked), 0));
+  });
+  return on("measured_image", () => {
+    const asked = (log.shown = log.asked), first = log.fresh;
+    log.fresh = false;
+    requestAnimationFrame(() => setTimeout(() => {
+      if (first) log.first.push(performance.now() - asked);
+      log.last = performance.now() - asked;
+    }, 0));
+  });
 }"""
 
 
@@ -67,11 +64,12 @@ def main():
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=given.chromium, args=list(FLAGS))
-        command = [sys.executable, "-c", SERVE, *([str(given.scene)] if given.scene else [])]
+        scene = [str(given.scene)] if given.scene else []
+        command = [sys.executable, "-m", "chipglow", "app", "--no-browser", *scene]
         begun = time.perf_counter()
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
             try:
-                times = measured(browser, server.stdout.readline().strip(), given)
+                times = measured(browser, server.stdout.readline().split()[-1], given)
                 report(times, time_to(begun, times), server.pid, given.scene)
             finally:
                 server.terminate()
@@ -95,7 +93,7 @@ def turned(page, label, turns):
     """Turn one knob to and fro: milliseconds to the first pictures, then to an exact one."""
     slider = page.get_by_role("slider", name=label, exact=True)
     slider.focus()
-    page.evaluate("() => { chipglowLog.first = []; }")
+    page.evaluate("() => { chipglowLog.first = []; chipglowLog.lines = []; }")
     on = True
     for number in range(turns):
         before = page.evaluate("() => chipglowLog.first.length")
@@ -103,9 +101,10 @@ def turned(page, label, turns):
         on = at <= least or (at < most and (not on if number % 10 == 0 else on))
         slider.press("ArrowRight" if on else "ArrowLeft")
         page.wait_for_function(f"() => chipglowLog.first.length > {before}", polling="raf")
+    lines = page.evaluate("() => chipglowLog.lines")
     page.get_by_text("Exact picture").wait_for(timeout=60_000)
     page.wait_for_timeout(300)
-    return page.evaluate("() => [chipglowLog.first, chipglowLog.last]")
+    return page.evaluate("lines => [chipglowLog.first, lines, chipglowLog.last]", lines)
 
 
 def time_to(begun, times):
@@ -115,15 +114,21 @@ def time_to(begun, times):
 
 def report(times, opened, process, scene):
     """Print milliseconds by knob, and what the server holds."""
-    print(f"{'knob':26}{'turns':>7}{'median':>9}{'95 %':>9}{'most':>9}{'exact':>9}   ms")
-    for label, (first, last) in times.items():
-        middle, late, most = np.percentile(first, (50, 95, 100))
-        print(f"{label:26}{len(first):7}{middle:9.0f}{late:9.0f}{most:9.0f}{last:9.0f}")
-    every = np.concatenate([first for first, _ in times.values()])
-    middle, late, most = np.percentile(every, (50, 95, 100))
-    print(f"{'all':26}{every.size:7}{middle:9.0f}{late:9.0f}{most:9.0f}")
+    heads = "".join(f"{head:>9}" for head in ("median", "95 %", "most", "lines", "exact"))
+    print(f"{'knob':26}{'turns':>7}{heads}   ms")
+    for label, (first, lines, last) in times.items():
+        print(f"{label:26}{row(first, lines)}{last:9.0f}")
+    first, lines = (np.concatenate([one[part] for one in times.values()]) for part in (0, 1))
+    print(f"{'all':26}{row(first, lines)}")
     print(f"opened, with the process: {opened:.1f} s; load {os.getloadavg()[0]:.1f}")
     print(f"memory: {resident(process) / 1e6:.0f} MB resident; {own(scene)}")
+
+
+def row(first, lines):
+    """Columns of the first pictures, and of 95 % of their lines, if these changed."""
+    middle, late, most = np.percentile(first, (50, 95, 100))
+    drawn = f"{np.percentile(lines, 95):.0f}" if len(lines) else "-"
+    return f"{len(first):7}{middle:9.0f}{late:9.0f}{most:9.0f}{drawn:>9}"
 
 
 def resident(process):

@@ -1,5 +1,6 @@
 """How the app is begun: as a local server, or as a part of a notebook."""
 
+import gc
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -78,6 +79,8 @@ def serve(
 
     app = App(open_any(path), address, port)
     told(app.url)
+    # Garbage is not looked for in what is imported: that would take longer than a picture.
+    gc.freeze()
     app.run()
 
 

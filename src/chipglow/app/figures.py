@@ -151,7 +151,7 @@ class Figures:
         self._palettes: dict[str, str] = {}
         self._shown: dict[str, NDArray[Any]] = {}
         self.images = {name: self._image(name, name == names[0]) for name in names}
-        self.line_sources: dict[str, ColumnDataSource] = {}
+        self._along: dict[str, NDArray[np.float64]] = {}
         self.band_sources: dict[str, ColumnDataSource] = {}
         self._out_of_range: list[BoxAnnotation] = []
         self.lines = {name: self._line(name, len(names) > 1) for name in LINES}
@@ -160,7 +160,7 @@ class Figures:
         self.set_theme("light")
 
     def show(self, picture: Picture) -> None:
-        """Show a picture."""
+        """Show a picture's images; its lines are the page's to show, see `line_data`."""
         measured = np.where(picture.flagged, np.nan, picture.measured) - KELVIN
         scene, error = picture.scene, picture.error
         if scene is not None:
@@ -177,11 +177,17 @@ class Figures:
             limit = round_limit(shown, 99, 5.0)
             self.images["error"].figure.title.text = f"{ERRORS[picture.knobs.error]} / K"
             self._set("error", shown, picture.raster, (-limit, limit), SIGNED)
-        for name, values in picture.lines.items():
-            self.line_sources[name].data = _line_data(values)
         lowest = picture.camera.lower_limit if picture.camera else None
         for box in self._out_of_range:
             box.update(top=None if lowest is None else lowest - KELVIN, visible=lowest is not None)
+
+    def line_data(self, picture: Picture) -> dict[str, dict[str, list[float]]]:
+        """What stands along the lines of a picture, by the names of the lines' sources.
+
+        The page draws it when it has drawn the images: a half of the work, that they lead.
+        """
+        self._along = {name: values.distance for name, values in picture.lines.items()}
+        return {f"{name}_values": _line_data(values) for name, values in picture.lines.items()}
 
     def show_drawn(self, drawn: Drawn | None) -> None:
         """Shade what the draws cover along the lines; nothing for None."""
@@ -192,9 +198,8 @@ class Figures:
                 continue
             values = drawn.lines[name].measured - KELVIN
             known = np.isfinite(values).all(axis=0)
-            along = np.asarray(self.line_sources[name].data["along"])
             source.data = {
-                "along": along[known],
+                "along": MICRONS * self._along[name][known],
                 "low": values[:, known].min(axis=0),
                 "high": values[:, known].max(axis=0),
             }
@@ -379,7 +384,7 @@ class Figures:
             min_border=4,
         )
         empty = {"along": [0.0, 1.0], "measured": [0.0, 1.0], "reference": [0.0, 1.0]}
-        source = self.line_sources[name] = ColumnDataSource(empty, name=f"{name}_values")
+        source = ColumnDataSource(empty, name=f"{name}_values")
         band = self.band_sources[name] = ColumnDataSource({"along": [], "low": [], "high": []})
         colour = LINE_COLOURS[name]
         one.add_layout(Span(dimension="height", line_color=colour, line_width=3, location=0))
@@ -448,7 +453,6 @@ def _points(points: tuple[Point, ...]) -> dict[str, list[float]]:
 
 
 def _line_data(values: LineValues) -> dict[str, list[float]]:
-    """As lists: every array would be a message of its own."""
     reference = values.measured if values.reference is None else values.reference
     data = {
         "along": MICRONS * values.distance,

@@ -112,7 +112,8 @@ class SceneModel:
             return False
         on_samples = knobs.psf_order != "detector" and knobs.psf == "annular-aperture"
         coarse = self.opened.coarse
-        many = on_samples or (coarse is not None and knobs.pitch < coarse.raster.spacing)
+        # Of pixels that are hardly larger than the coarse samples a quick look takes half as long.
+        many = on_samples or (coarse is not None and knobs.pitch < 1.5 * coarse.raster.spacing)
         return not many or self._image_key(knobs, coarse=False) in self._errors
 
     def picture(self, knobs: Knobs, quick: bool = False, check: Check | None = None) -> Picture:
@@ -159,16 +160,16 @@ class SceneModel:
         self, camera: Camera, exposure: Exposure, knobs: Knobs, coarse: bool
     ) -> ErrorImages:
         """As `error_images`, of which what the changed knobs do not matter to is kept."""
-        seen, pixels, optics, read = key = self._image_key(knobs, coarse)
+        seen, pixels, optics, _ = key = self._image_key(knobs, coarse)
         reference = self.panel.study.analysis.reference
         unblurred = self._unblurred.get(
-            (seen, pixels, read), lambda: Unblurred.of(camera, exposure, reference)
+            (seen, pixels), lambda: Unblurred.of(camera, exposure, reference)
         )
         formed = self._formed.get(
             (seen, pixels, optics),
             lambda: camera.form_image(exposure.mean_radiance, exposure.raster),
         )
-        return self._errors.get(key, lambda: unblurred.errors(formed))
+        return self._errors.get(key, lambda: replace(unblurred, camera=camera).errors(formed))
 
     def _image_key(self, knobs: Knobs, coarse: bool) -> tuple[Hashable, ...]:
         """What an image depends on: exposure, pixels, optics and how it is read."""

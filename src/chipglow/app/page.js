@@ -3,7 +3,7 @@
 
 const FIGURES = ["scene", "measured", "error", "rake_line", "band_line"];
 
-export function render({ model, el }) {
+export function render({ view, model, el }) {
   const spec = JSON.parse(model.spec);
   const page = document.createElement("div");
   page.className = "app";
@@ -292,10 +292,14 @@ export function render({ model, el }) {
     setTimeout(() => URL.revokeObjectURL(url), 10000);
   }
 
-  // A picture is told to be painted when the browser had the time for it: then comes the next.
-  function painted(number) {
+  // A picture is told to be painted when the browser had the time for it: then comes the next, and
+  // meanwhile what stands along the lines of this one.
+  function showPicture({ number, lines }) {
     requestAnimationFrame(() => setTimeout(() => {
       send({ painted: number });
+      for (const [name, data] of Object.entries(lines)) {
+        view.model.document.get_model_by_name(name).setv({ data }, { sync: false });
+      }
       if (!playing) return;
       const left = 80 - (performance.now() - stepped);
       setTimeout(() => playing && step(controls.get("start").knob, 1), Math.max(left, 0));
@@ -376,7 +380,7 @@ export function render({ model, el }) {
       event.target.dispatchEvent(new Event("change"));
     }
   });
-  const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: painted };
+  const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture };
   model.on("msg:custom", ({ kind, content }) => shows[kind](content));
   const watcher = new ResizeObserver(measure);
   model.on("after_render", () => {

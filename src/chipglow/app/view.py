@@ -279,7 +279,7 @@ class View:
                 took = 1e3 * (perf_counter() - self._began)
                 text = f"Exact picture, {took:.0f} ms after the last change."
         self._say(text, "busy" if picture.coarse else "")
-        self._send("picture", number)
+        self._send("picture", {"number": number, "lines": self.figures.line_data(picture)})
         if picture.coarse:
             self._put_numbers([], [])
 

@@ -12,10 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Final
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import NearestNDInterpolator, RegularGridInterpolator
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import spsolve
 
 from chipglow.cutting.conditions import INITIAL_TEMPERATURE
 from chipglow.cutting.heat import ToolHeat
@@ -83,10 +81,12 @@ class SteadyTool:
         x, y = _axes(self.grid)
         filled = self.fraction > 0.0
         places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-        nearest = NearestNDInterpolator(places[filled], self.temperature[filled])
+        nearest = scipy.interpolate.NearestNDInterpolator(places[filled], self.temperature[filled])
         # Nodes beside the tool have no temperature: the nearest of the tool's own stands there.
         whole = np.where(filled, self.temperature, nearest(places))
-        inside = RegularGridInterpolator((x, y), whole, bounds_error=False, fill_value=None)
+        inside = scipy.interpolate.RegularGridInterpolator(
+            (x, y), whole, bounds_error=False, fill_value=None
+        )
         new = np.stack(np.meshgrid(*_axes(grid), indexing="ij"), axis=-1)
         beside = float(self.temperature[filled].min())
         return np.where(fraction > 0.0, inside(new), beside)
@@ -134,20 +134,20 @@ def steady_temperature(
     np.add.at(drained, (i, j), outward)
     np.add.at(given, (i, j), outward * body.holder_temperature)
     result = np.full(fraction.shape, body.holder_temperature)
-    result[filled] = spsolve(_conduction(links, drained[filled]), given[filled])
+    result[filled] = scipy.sparse.linalg.spsolve(_conduction(links, drained[filled]), given[filled])
     return result
 
 
 def _conduction(
     links: Iterable[tuple[NDArray[np.int64], NDArray[np.int64], Field]], drained: Field
-) -> csc_array:
+) -> scipy.sparse.csc_array:
     """Matrix of the heat that leaves each node, per kelvin of each."""
     one, other, flow = (np.concatenate(part) for part in zip(*links, strict=True))
     every = np.arange(drained.size)
     rows = np.concatenate([every, one, other, one, other])
     columns = np.concatenate([every, one, other, other, one])
     values = np.concatenate([drained, flow, flow, -flow, -flow])
-    return csc_array((values, (rows, columns)), shape=(drained.size, drained.size))
+    return scipy.sparse.csc_array((values, (rows, columns)), shape=(drained.size, drained.size))
 
 
 def _axes(grid: Grid) -> tuple[Field, Field]:

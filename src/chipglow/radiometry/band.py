@@ -8,9 +8,9 @@ from numbers import Real
 from typing import Any, Final, TypeAlias
 
 import numpy as np
+import scipy
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import eigh_tridiagonal
 
 from chipglow.radiometry.planck import (
     FIRST_RADIATION_CONSTANT,
@@ -197,7 +197,7 @@ class Band:
                 vector = vector - basis[: n + 1].T @ (basis[: n + 1] @ vector)
             beside[n] = np.linalg.norm(vector)
             vector = vector / beside[n]
-        found, vectors = eigh_tridiagonal(diagonal, beside[:-1])
+        found, vectors = scipy.linalg.eigh_tridiagonal(diagonal, beside[:-1])
         return middle + half * found, vectors[0] ** 2
 
     @cached_property

@@ -6,8 +6,8 @@ from math import inf
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST, Band
 
@@ -177,6 +177,6 @@ class RatioThermometer:
         upper, lower = (
             np.log(band.radiance_table[self._rising, 0]) for band in (self.first, self.second)
         )
-        return CubicHermiteSpline(
+        return scipy.interpolate.CubicHermiteSpline(
             upper - lower, 1.0 / kelvins, -1.0 / (kelvins**2 * slopes), extrapolate=False
         )

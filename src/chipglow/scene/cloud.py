@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import scipy
 from numba import njit
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from chipglow.scene.raster import Raster
 from chipglow.scene.scene import Material
@@ -103,7 +103,7 @@ def neighbour_distance(places: NDArray[np.float64]) -> float:
     count = min(shell, len(places) - 1)
     if count < 1:
         return float("nan")
-    distances, _ = KDTree(places).query(places, count + 1)
+    distances, _ = scipy.spatial.KDTree(places).query(places, count + 1)
     next_ones = float(np.median(distances[:, 1 : nearest + 1]))
     if count < shell:
         return next_ones
@@ -192,7 +192,7 @@ def _neighbours(
     nearest = np.zeros(len(places))
     if count < 1:
         return neighbours, nearest
-    tree = KDTree(places)
+    tree = scipy.spatial.KDTree(places)
     for first in range(0, len(places), _BLOCK):
         part = slice(first, first + _BLOCK)
         distances, found = tree.query(places[part], count + 1)

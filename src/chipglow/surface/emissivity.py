@@ -6,8 +6,8 @@ from math import sqrt
 from typing import Annotated, Final
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import root
 from scipy.special import betainccinv, betaincinv, ndtr
 
 from chipglow.quantities import Parameter, Part
@@ -86,7 +86,7 @@ class Emissivity(Part):
 
         fraction = self.standard_deviation / sqrt(self.mean * (1 - self.mean))
         start = np.log([self.mean / (1 - self.mean), fraction / (1 - fraction)])
-        solution = root(excess, start, tol=1e-10).x
+        solution = scipy.optimize.root(excess, start, tol=1e-10).x
         mean = float(1 / (1 + np.exp(-solution[0])))
         return mean, float(sqrt(mean * (1 - mean)) / (1 + np.exp(-solution[1])))
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import least_squares
 from scipy.special import chdtrc, ndtri, stdtrit
 
 from chipglow.camera.calibration.blackbody import Blackbody
@@ -399,7 +399,7 @@ def _least_squares(
 
     try:
         with np.errstate(over="raise", invalid="raise", divide="raise"):
-            found = least_squares(
+            found = scipy.optimize.least_squares(
                 misfit,
                 calibration.parameters,
                 jacobian,

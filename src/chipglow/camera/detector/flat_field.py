@@ -7,8 +7,8 @@ from math import exp, log, nan
 from typing import Final
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import bisect
 
 from chipglow.camera.detector.bad_pixels import find_bad_pixels, replace_bad_pixels
 from chipglow.camera.detector.detector import BRIGHTER_SOURCE, DARKER_SOURCE, Detector
@@ -285,7 +285,7 @@ def lower_range_limit(detector: Detector, point: OperationPoint) -> float:
             "lower_limit: detector: its signal is never "
             f"{detector.least_signal:g} times its noise, expected a smaller least_signal"
         )
-    found = ends[0] if excess(ends[0]) > 0 else bisect(excess, *ends, xtol=1e-4)
+    found = ends[0] if excess(ends[0]) > 0 else scipy.optimize.bisect(excess, *ends, xtol=1e-4)
     return max(float(point.band.temperature(exp(found))), TABLE_COLDEST)
 
 

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, final
 
 import numpy as np
+import scipy
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Strict
-from scipy.integrate import cumulative_simpson
-from scipy.optimize import brentq
 from scipy.special import erf, erfinv, j1
 
 from chipglow.camera.optics.kernel import (
@@ -189,7 +188,7 @@ class AnnularAperturePSF(PointSpreadFunction):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        half = brentq(lambda v: float(self._profile(np.array(v))) - 0.5, 0.1, 3.0)
+        half = scipy.optimize.brentq(lambda v: float(self._profile(np.array(v))) - 0.5, 0.1, 3.0)
         object.__setattr__(self, "fwhm", 2 * float(half) * self._unit)
 
     def in_band(self, band: Band) -> "AnnularAperturePSF":
@@ -230,7 +229,9 @@ class AnnularAperturePSF(PointSpreadFunction):
         far = 4 / (pi * (1 - self.obscuration) * (1 - ANNULAR_ENERGY))
         v = np.linspace(0.0, far, ceil(20 * far))
         clear = 1 - self.obscuration**2
-        inside = cumulative_simpson(clear / 2 * self._profile(v) * v, x=v, initial=0.0)
+        inside = scipy.integrate.cumulative_simpson(
+            clear / 2 * self._profile(v) * v, x=v, initial=0.0
+        )
         return float(v[np.searchsorted(inside, ANNULAR_ENERGY)])
 
     def _profile(self, v: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 import pandas as pd
+import scipy
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.integrate import trapezoid
 from scipy.ndimage import map_coordinates
 
 from chipglow.camera import Measurement
@@ -471,7 +471,7 @@ def _heat(measurement: Measurement, line: Line, number: int) -> float:
     frame = measurement.data["radiance_temperature"][number].values
     lower_limit = float(measurement.data.attrs.get("lower_limit", np.nanmin(frame)))
     values = np.nan_to_num(sample(frame, measurement.raster, line.points) - lower_limit)
-    return float(trapezoid(values, line.distance))
+    return float(scipy.integrate.trapezoid(values, line.distance))
 
 
 def _common(lines: Sequence[Line | None], pitch: float) -> NDArray[np.float64]:

@@ -5,9 +5,9 @@ from math import atan, cos, degrees, radians, sqrt, tan
 from typing import Any, Final
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates, maximum_filter
-from scipy.optimize import least_squares
 from scipy.special import ndtr
 
 from chipglow.camera import Measurement
@@ -295,7 +295,7 @@ def _fit(
     room = np.array([3.0, _ROOM])
     lower, upper = start[:2] - room, start[:2] + room
     middle = float(np.clip(start[2], 0.5, 2.9))
-    found = least_squares(
+    found = scipy.optimize.least_squares(
         lambda line: strip.residuals(line).ravel(),
         [start[0], start[1], middle],
         bounds=([*lower, 0.4], [*upper, 3.0]),

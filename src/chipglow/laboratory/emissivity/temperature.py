@@ -10,8 +10,8 @@ from uuid import uuid4
 
 import numpy as np
 import pandas as pd
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from chipglow.camera import FittedCalibration, Flag, Measurement
 from chipglow.laboratory.emissivity.emissivity import LABORATORY, EmissivityLine, Heating
@@ -596,7 +596,7 @@ def _taken(
     temperatures = np.geomspace(reflected, TABLE_HOTTEST, _STEPS).tolist()
     for colder, hotter in pairwise(temperatures):
         if excess(hotter) > 0:
-            found = float(brentq(excess, colder, hotter, xtol=1e-6))
+            found = float(scipy.optimize.brentq(excess, colder, hotter, xtol=1e-6))
             return emissivity.area(found), emissivity.slope
     raise ValueError(
         f"region {name}: no temperature up to {TABLE_HOTTEST - 273.15:.0f} °C has its radiance by "
