@@ -31,7 +31,8 @@ from chipglow.cutting import (
     OutputWindow,
     tool_material,
 )
-from chipglow.drawing.drawing import BLUE, GREY, VERMILLION, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import BLUE, GREY, VERMILLION
 from chipglow.io import atomic_path
 from chipglow.laboratory.chip import ChipMetrics, chip_metrics, contact_length, segmentation
 from chipglow.quantities.units import Quantity

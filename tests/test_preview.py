@@ -20,7 +20,7 @@ from chipglow.cutting import (
     Preview,
     workpiece,
 )
-from chipglow.drawing.drawing import HEAT, VOID
+from chipglow.drawing.scales import HEAT, VOID
 from chipglow.io import check_movie_path, movie_writer, open_scene
 from chipglow.report.movie import CutPicture, MovieScales, cut_movie
 from chipglow.scene import Frame, Material, Raster, ToolGeometry

@@ -10,7 +10,7 @@ from solver import DENSITY, Block
 from cases import Case, Check
 from cases.motion import MICRO, convergence
 from cases.plasticity import perfectly_plastic
-from chipglow.drawing.drawing import BLUE, VERMILLION
+from chipglow.drawing.scales import BLUE, VERMILLION
 
 INNER, OUTER = 100e-6, 200e-6
 YIELD_STRESS = 100e6

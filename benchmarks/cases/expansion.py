@@ -9,7 +9,7 @@ from cases import Case, Check
 from cases.motion import MICRO
 from chipglow.cutting import TemperatureTable
 from chipglow.cutting.momentum import EXPANSION_WORK
-from chipglow.drawing.drawing import BLUE, GREY, VERMILLION
+from chipglow.drawing.scales import BLUE, GREY, VERMILLION
 
 COLD, HOT = 293.15, 693.15
 MIDDLE = 0.5 * (COLD + HOT)

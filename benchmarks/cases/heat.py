@@ -9,7 +9,7 @@ from solver import DENSITY, Block
 from cases import Case, Check, order
 from cases.motion import MICRO, convergence
 from chipglow.cutting import AISI_1045
-from chipglow.drawing.drawing import BLUE, GREY
+from chipglow.drawing.scales import BLUE, GREY
 
 CONDUCTIVITY, CAPACITY = 45.0, 520.0
 DIFFUSIVITY = CONDUCTIVITY / (DENSITY * CAPACITY)

@@ -7,7 +7,7 @@ from matplotlib.ticker import FormatStrFormatter, LogLocator
 from solver import DENSITY, ELASTIC, Block
 
 from cases import Case, Check, order
-from chipglow.drawing.drawing import BLUE, GREEN, GREY, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
 
 SPIN = 2e5
 PULSE = 50e-6

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from solver import DENSITY, ELASTIC, UNBROKEN, Block
 
 from cases import Case, Check
-from chipglow.drawing.drawing import BLUE, GREEN, GREY, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
 from chipglow.scene import ToolGeometry
 
 RATE = 1e5

@@ -12,7 +12,7 @@ from cases import Case, Check, order
 from cases.heat import CONDUCTIVITY, DIFFUSIVITY, constant_properties
 from cases.motion import MICRO, convergence
 from chipglow.cutting.heat import conduct, heat_surface, return_heat
-from chipglow.drawing.drawing import BLUE, GREEN, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, VERMILLION
 
 FLUX, DURATION = 2e8, 60e-6
 OFFSETS = (0.0, 0.25, 0.5, 0.77)

@@ -14,7 +14,7 @@ from solver import UNBROKEN, Block
 
 from cases import Case, Check
 from chipglow.cutting import JohnsonCook, TemperatureTable
-from chipglow.drawing.drawing import BLUE, GREEN, GREY, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
 from chipglow.scene import ToolGeometry
 
 HALF, LENGTH, DURATION = 3.2e-3, 32.4e-3, 80e-6

@@ -9,7 +9,7 @@ from cases import Case, Check
 from cases.motion import MICRO
 from cases.plasticity import perfectly_plastic
 from cases.taylor import wall
-from chipglow.drawing.drawing import BLUE, GREEN, GREY, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
 
 YIELD_STRESS = 200e6
 STEEL = perfectly_plastic(YIELD_STRESS)

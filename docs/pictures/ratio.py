@@ -13,7 +13,7 @@ import numpy as np
 import chipglow
 from chipglow.camera import RatioCamera
 from chipglow.drawing import drawing
-from chipglow.drawing.drawing import HEAT, KELVIN, SIGNED
+from chipglow.drawing.scales import HEAT, KELVIN, SIGNED
 from chipglow.errors import RatioErrors, WavelengthErrors, ratio_errors
 from chipglow.errors.wavelengths import band_name
 from chipglow.radiometry import Band, RatioThermometer

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 import chipglow
 from chipglow.camera import Measurement
 from chipglow.drawing import drawing
-from chipglow.drawing.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.chip import rake_grid
 from chipglow.surface import CHIP_1, ReflectingSurface, Wedge
 

@@ -16,7 +16,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chipglow.cli import app
-from chipglow.drawing.drawing import BLUE, GREEN, GREY, VERMILLION, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
 
 HERE = Path(__file__).parent.resolve()
 sys.path.insert(0, str(HERE.parents[1] / "benchmarks"))

@@ -32,7 +32,8 @@ from chipglow.camera import (
     ReadNoise,
     ShotNoise,
 )
-from chipglow.drawing.drawing import HEAT, SIGNED, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import HEAT, SIGNED
 from chipglow.scene import Raster
 
 NOISE = (ShotNoise(), ReadNoise(1500.0))

@@ -26,7 +26,8 @@ from samples.chip import closed_form_chip
 
 import chipglow
 from chipglow.camera import expose
-from chipglow.drawing.drawing import SIGNED, new_figure, show_image, style
+from chipglow.drawing.drawing import new_figure, show_image, style
+from chipglow.drawing.scales import SIGNED
 
 scene = closed_form_chip(40)
 camera = chipglow.Camera(integration_time=8e-6, psf=chipglow.AnnularAperturePSF(4.45e-6))

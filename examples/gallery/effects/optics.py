@@ -30,7 +30,8 @@ from chipglow.camera import (
     OpticalElement,
     Veil,
 )
-from chipglow.drawing.drawing import HEAT, SIGNED, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import HEAT, SIGNED
 from chipglow.scene import Raster
 
 # %%

@@ -18,7 +18,8 @@ More: :doc:`/understand/physics`.
 
 import numpy as np
 
-from chipglow.drawing.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.surface import Fresnel, ParabolicOxide
 
 IN_VIEW = 0.4e-3

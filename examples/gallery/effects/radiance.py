@@ -22,7 +22,8 @@ Source: Equations 1 and 2 of Heigel and Whitenton (2010). More: :doc:`/understan
 import numpy as np
 
 import chipglow
-from chipglow.drawing.drawing import BLUE, GREEN, VERMILLION, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import BLUE, GREEN, VERMILLION
 
 KELVIN = 273.15
 ENVIRONMENT = 293.0

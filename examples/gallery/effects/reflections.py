@@ -25,7 +25,8 @@ from math import radians
 
 import numpy as np
 
-from chipglow.drawing.drawing import BLUE, GREEN, GREY, VERMILLION, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import BLUE, GREEN, GREY, VERMILLION
 from chipglow.surface import Wedge
 
 ANGLES = {30.0: VERMILLION, 45.0: BLUE, 60.0: GREEN}

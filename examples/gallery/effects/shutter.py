@@ -23,7 +23,8 @@ from dataclasses import replace
 import numpy as np
 
 from chipglow.camera import Camera
-from chipglow.drawing.drawing import HEAT, SIGNED, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import HEAT, SIGNED
 from chipglow.scene import Raster, Scene
 from chipglow.surface import UniformSurface
 

@@ -23,7 +23,8 @@ More: :doc:`/understand/physics`.
 from samples.chip import closed_form_chip
 
 import chipglow
-from chipglow.drawing.drawing import HEAT, KELVIN, PLAIN, new_figure, show_image, style
+from chipglow.drawing.drawing import new_figure, show_image, style
+from chipglow.drawing.scales import HEAT, KELVIN, PLAIN
 
 scene = closed_form_chip(40)
 camera = chipglow.Camera(

@@ -22,7 +22,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from chipglow.drawing.drawing import BLUE, GREY, VERMILLION, VOID, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import BLUE, GREY, VERMILLION, VOID
 from chipglow.scene import Chamfer, Hone, Tool, ToolGeometry, ToolOutline
 
 FACE = 600e-6

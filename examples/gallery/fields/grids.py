@@ -16,7 +16,8 @@ More: :doc:`/do/import-grid`.
 
 from matplotlib.cbook import get_sample_data
 
-from chipglow.drawing.drawing import VOID, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import VOID
 from chipglow.io.sources.grid import GridSource
 from chipglow.scene import Raster
 

@@ -21,7 +21,8 @@ import numpy as np
 from pyvista import examples
 
 import chipglow
-from chipglow.drawing.drawing import HEAT, KELVIN, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import HEAT, KELVIN
 from chipglow.scene import Material
 
 FILE = examples.hexbeamfile

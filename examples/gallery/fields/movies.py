@@ -22,7 +22,8 @@ Source: the paper's own way, an AVI exported by a finite-element program. More:
 import numpy as np
 from samples.hot_spot import MOVIE, source, truth
 
-from chipglow.drawing.drawing import HEAT, SIGNED, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import HEAT, SIGNED
 from chipglow.io.sources.moving_pictures import index_movie, pictures
 from chipglow.scene import FILLED, Material, Raster
 

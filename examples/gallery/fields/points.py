@@ -18,7 +18,8 @@ More: :doc:`/do/import-points`.
 import numpy as np
 import sample_files
 
-from chipglow.drawing.drawing import VOID, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import VOID
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.scene import Raster
 

@@ -21,7 +21,8 @@ import numpy as np
 import sample_files
 
 import chipglow
-from chipglow.drawing.drawing import HEAT, KELVIN, new_figure, show_image, style
+from chipglow.drawing.drawing import new_figure, show_image, style
+from chipglow.drawing.scales import HEAT, KELVIN
 from chipglow.scene import Material
 
 PROGRAMS = {

@@ -34,7 +34,8 @@ from chipglow.camera import (
     fit_linear,
     fit_sakuma_hattori,
 )
-from chipglow.drawing.drawing import HEAT, KELVIN, new_figure, show_image, style
+from chipglow.drawing.drawing import new_figure, show_image, style
+from chipglow.drawing.scales import HEAT, KELVIN
 from chipglow.laboratory.measurement import calibrate_recording
 from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
 from chipglow.radiometry import Band

@@ -25,7 +25,8 @@ import numpy as np
 import sample_files
 
 import chipglow
-from chipglow.drawing.drawing import HEAT, KELVIN, PLAIN, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import HEAT, KELVIN, PLAIN
 
 simulated = chipglow.read_recording(sample_files.folder("camera-files") / "chip.hcc")
 

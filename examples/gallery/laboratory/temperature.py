@@ -22,7 +22,8 @@ Source: Equation 2 of Heigel and Whitenton (2010); JCGM 100. More: :doc:`/do/emi
 import sample_files
 
 import chipglow
-from chipglow.drawing.drawing import GREY, KELVIN, VERMILLION, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import GREY, KELVIN, VERMILLION
 from chipglow.laboratory.emissivity import emissivity_line
 
 files = sample_files.folder("emissivity")

@@ -1,7 +1,6 @@
 """The figures of the page: images with linked ranges and cursors, and temperatures along lines."""
 
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, Final
 
 import numpy as np
@@ -19,17 +18,23 @@ from bokeh.models import (
     Span,
     WheelZoomTool,
 )
+from bokeh.palettes import Cividis256, Inferno256, RdBu11, interp_palette
 from bokeh.plotting import figure
-from matplotlib import colormaps
-from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 
 from chipglow.app.knobs import CURSOR, ERRORS, LINE_NAMES, LINES, Knobs, Point
 from chipglow.app.picture import Drawn, LineValues, Picture
-from chipglow.drawing.drawing import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
+from chipglow.drawing.scales import HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
 from chipglow.scene import Raster, Tool
 
 MICRONS: Final = 1e6
+PALETTES: Final = {
+    HEAT: Inferno256,
+    PLAIN: Cividis256,
+    SIGNED: interp_palette(RdBu11, 256),
+}
+"""As in other figures; Matplotlib itself takes long to import."""
+
 IMAGES: Final = ("scene", "measured", "error")
 
 _THEMES: Final = {
@@ -48,10 +53,7 @@ _TITLES: Final = {
 }
 
 _BORDER: Final = 46
-_GAP: Final = 8
 _LEAST_FRAME: Final = 180
-_NARROW: Final = 888
-"""Pixels of the page's part beside the knobs, which are 292 wide."""
 
 _WITH_UNIT: Final = """
 // The tick in the middle of a bar has the unit, which is in the image's title.
@@ -159,6 +161,12 @@ class Figures:
         self._link_drags()
         self.set_theme("light")
 
+    @property
+    def shape(self) -> float:
+        """Height of the images over their width."""
+        left, right, bottom, top = self._extent
+        return (top - bottom) / (right - left)
+
     def show(self, picture: Picture) -> None:
         """Show a picture's images; its lines are the page's to show, see `line_data`."""
         measured = np.where(picture.flagged, np.nan, picture.measured) - KELVIN
@@ -222,23 +230,6 @@ class Figures:
         self.x_range.update(start=left, end=right)
         self.y_range.update(start=bottom, end=top)
 
-    def set_size(self, width: int, height: int) -> None:
-        """Fit the figures into an area of the page, in CSS pixels."""
-        left, right, bottom, top = self._extent
-        count = max(len(self.images), 2)
-        shape = (top - bottom) / (right - left)
-        frame = (width - _BORDER - (count - 1) * (_GAP + 10)) / count - 12
-        tallest = max(0.52 * height - 60, _LEAST_FRAME)
-        frame = int(max(min(frame, tallest / shape), _LEAST_FRAME))
-        for one in self.images.values():
-            one.figure.update(frame_width=frame, frame_height=int(frame * shape))
-        below = int(max(min(height - frame * shape - 345, 330), 150))
-        # Numbers stand beside the lines, or below them where it is narrow: see page.css.
-        numbers = 345 if width > _NARROW else 60
-        across = int((width - 2 * _BORDER - numbers) / 2 - 20)
-        for one in self.lines.values():
-            one.update(frame_width=max(across, _LEAST_FRAME), frame_height=below)
-
     def set_theme(self, theme: str) -> None:
         """Draw everything on light or dark ground."""
         colours = _THEMES["dark" if theme == "dark" else "light"]
@@ -293,7 +284,7 @@ class Figures:
             image.mapper.update(low=limits[0], high=limits[1])
         if self._palettes.get(name) != colours:
             self._palettes[name] = colours
-            image.mapper.palette = _palette(colours)
+            image.mapper.palette = PALETTES[colours]
         if self._shown.get(name) is values:
             return
         self._shown[name] = values
@@ -322,7 +313,7 @@ class Figures:
             {"image": [np.zeros((2, 2), np.float32)], "x": [0], "y": [0], "dw": [1], "dh": [1]},
             name=f"{name}_image",
         )
-        mapper = LinearColorMapper(palette=_palette(HEAT), low=0.0, high=1.0)
+        mapper = LinearColorMapper(palette=PALETTES[HEAT], low=0.0, high=1.0)
         drawn = one.image(
             image="image", x="x", y="y", dw="dw", dh="dh", source=source, color_mapper=mapper
         )
@@ -474,8 +465,3 @@ def _lowest(picture: Picture) -> float:
     assert picture.scene is not None
     limit = picture.camera.lower_limit if picture.camera else None
     return float(np.nanmin(picture.scene.values) if limit is None else limit) - KELVIN
-
-
-@cache
-def _palette(name: str) -> list[str]:
-    return [to_hex(colormaps[name](value)) for value in np.linspace(0.0, 1.0, 256)]

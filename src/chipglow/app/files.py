@@ -11,21 +11,8 @@ from chipglow.app.figures import LINE_COLOURS
 from chipglow.app.knobs import LINE_NAMES, LINES, SHOWN, Knobs
 from chipglow.app.model import SceneModel
 from chipglow.app.picture import Picture
-from chipglow.drawing.drawing import (
-    BLUE,
-    GREY,
-    HEAT,
-    KELVIN,
-    PLAIN,
-    SIGNED,
-    ImagePanel,
-    draw_line,
-    ends,
-    length_unit,
-    new_figure,
-    round_limit,
-    style,
-)
+from chipglow.drawing.drawing import ImagePanel, draw_line, length_unit, new_figure, style
+from chipglow.drawing.scales import BLUE, GREY, HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
 from chipglow.io import StoredScene, write_dataset
 from chipglow.study import study_text
 

@@ -2,6 +2,8 @@
 // of a kind and a content; what the user does goes back in messages, too.
 
 const FIGURES = ["scene", "measured", "error", "rake_line", "band_line"];
+const BORDER = 46, GAP = 18, LEAST_FRAME = 180;
+const NARROW = 888; // pixels of the part beside the knobs, which are 292 wide
 
 export function render({ view, model, el }) {
   const spec = JSON.parse(model.spec);
@@ -40,6 +42,7 @@ export function render({ view, model, el }) {
   };
 
   page.append(header(), aside(), main());
+  el.append(page);
 
   function element(tag, attributes = {}, ...children) {
     const made = document.createElement(tag);
@@ -229,6 +232,7 @@ export function render({ view, model, el }) {
   }
 
   const find = (selector) => page.querySelector(selector);
+  const found = (name) => view.model.document.get_model_by_name(name);
 
   // What comes from Python.
 
@@ -298,7 +302,7 @@ export function render({ view, model, el }) {
     requestAnimationFrame(() => setTimeout(() => {
       send({ painted: number });
       for (const [name, data] of Object.entries(lines)) {
-        view.model.document.get_model_by_name(name).setv({ data }, { sync: false });
+        found(name).setv({ data }, { sync: false });
       }
       if (!playing) return;
       const left = 80 - (performance.now() - stepped);
@@ -361,13 +365,32 @@ export function render({ view, model, el }) {
   }
   if (spec.embedded) page.addEventListener("focusin", keepKeys);
 
+  // Figures fit their places, in CSS pixels. All change at once: every single change would lay the
+  // whole page out anew.
   let size = "";
-  function measure() {
-    const box = find("main").getBoundingClientRect();
-    const now = `${Math.round(box.width)}x${Math.round(spec.embedded ? 900 : innerHeight)}`;
-    if (now === size || box.width < 1) return;
-    size = now;
-    send({ size: now.split("x").map(Number) });
+  function fit() {
+    const width = Math.round(find("main").getBoundingClientRect().width);
+    const height = Math.round(spec.embedded ? 900 : innerHeight);
+    if (width < 1 || size === `${width}x${height}`) return false;
+    size = `${width}x${height}`;
+    const images = spec.figures.filter((name) => !name.endsWith("_line"));
+    const count = Math.max(images.length, 2);
+    const wide = (width - BORDER - (count - 1) * GAP) / count - 12;
+    const tallest = Math.max(0.52 * height - 60, LEAST_FRAME);
+    const frame = Math.trunc(Math.max(Math.min(wide, tallest / spec.shape), LEAST_FRAME));
+    const below = Math.trunc(Math.max(Math.min(height - frame * spec.shape - 345, 330), 150));
+    // Numbers stand beside the lines, or below them where it is narrow: see page.css.
+    const numbers = width > NARROW ? 345 : 60;
+    const across = Math.trunc(Math.max((width - 2 * BORDER - numbers) / 2 - 20, LEAST_FRAME));
+    for (const name of spec.figures) {
+      const [frame_width, frame_height] = images.includes(name)
+        ? [frame, Math.trunc(frame * spec.shape)] : [across, below];
+      found(`${name}_figure`).setv({ frame_width, frame_height }, { sync: false, silent: true });
+    }
+    return true;
+  }
+  function refit() {
+    if (fit()) view.invalidate_layout();
   }
 
   page.addEventListener("keydown", (event) => {
@@ -382,14 +405,15 @@ export function render({ view, model, el }) {
   });
   const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture };
   model.on("msg:custom", ({ kind, content }) => shows[kind](content));
-  const watcher = new ResizeObserver(measure);
+  const watcher = new ResizeObserver(refit);
   model.on("after_render", () => {
     send({ ready: true });
     setTheme();
-    measure();
+    refit();
     watcher.observe(find("main"));
   });
   model.on("remove", () => watcher.disconnect());
-  addEventListener("resize", measure);
+  addEventListener("resize", refit);
+  fit();
   return page;
 }

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from chipglow.app.knobs import SHOWN, Knobs
 from chipglow.camera import Camera, Exposure
-from chipglow.drawing.drawing import KELVIN
+from chipglow.drawing.scales import KELVIN
 from chipglow.errors import Distribution, ErrorImages, ErrorParts
 from chipglow.scene import Raster
 

@@ -18,7 +18,6 @@ from panel.custom import Child, JSComponent
 from panel.io import unlocked
 
 from chipglow.app.figures import IMAGES, Figures, places
-from chipglow.app.files import figure_file, measurement_file, study_file
 from chipglow.app.knobs import (
     CURSOR,
     LINES,
@@ -31,7 +30,7 @@ from chipglow.app.model import SceneModel
 from chipglow.app.opening import OpenedMeasurement, OpenedScene
 from chipglow.app.picture import Drawn, Picture, Readout
 from chipglow.app.session import Listener, Session
-from chipglow.drawing.drawing import KELVIN
+from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import rounded_text
 from chipglow.scene.lines import nearest
 
@@ -200,10 +199,6 @@ class View:
         elif "undo" in message:
             self.session.undo()
             self._turned()
-        elif "size" in message:
-            width, height = message["size"]
-            self.figures.set_size(int(width), int(height))
-            self._put_values()  # a notebook gets what changed in figures with the next message
         elif "theme" in message:
             self.figures.set_theme(str(message["theme"]))
             self._put_values()
@@ -243,6 +238,9 @@ class View:
         self.figures.view((x, y), _VIEW_WIDTH)
 
     def _save(self, what: str) -> None:
+        # Only who saves something waits for Matplotlib.
+        from chipglow.app.files import figure_file, measurement_file, study_file
+
         model, picture = self.session.model, self._picture
         if not isinstance(model, SceneModel):
             return
@@ -391,6 +389,7 @@ class View:
             "knobs": [_described(knob) for knob in self.session.model.panel.knobs],
             "views": list(views.items()),
             "figures": [*self.figures.images, *self.figures.lines],
+            "shape": self.figures.shape,
             "titles": titles,
             "draws": f"{PHASES}² positions of the pixels, {TEXTURES} textures" if is_scene else "",
         }

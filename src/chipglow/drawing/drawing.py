@@ -14,25 +14,13 @@ from matplotlib.figure import Figure, FigureBase
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
+from chipglow.drawing.scales import PLAIN, VOID
 from chipglow.scene import Raster, Tool
 
 Result = TypeVar("Result")
 
 WIDTH: Final = 7.2
 """Width of a figure in inches: a page's text."""
-
-BLUE: Final = "#0072B2"
-VERMILLION: Final = "#D55E00"
-GREEN: Final = "#009E73"
-GREY: Final = "#6b7280"
-VOID: Final = "#e5e7eb"
-
-HEAT: Final = "inferno"
-PLAIN: Final = "cividis"
-RATE: Final = "viridis"
-SIGNED: Final = "RdBu_r"
-
-KELVIN: Final = 273.15
 
 _LARGEST_IN_MICRONS: Final = 5e-3
 
@@ -240,36 +228,6 @@ def crop(axes: Axes, points: NDArray[np.float64], raster: Raster, around: float)
     (x_least, y_least), (x_most, y_most) = known.min(axis=0), known.max(axis=0)
     axes.set_xlim(max(left, x_least - 1e6 * around), min(right, x_most + 1e6 * around))
     axes.set_ylim(max(bottom, y_least - 1e6 * around), min(top, y_most + 1e6 * around))
-
-
-def ends(
-    image: NDArray[Any], low: float = 0.0, high: float = 100.0, least: float = 0.0
-) -> tuple[float, float]:
-    """Ends of the colours of an image: two percentiles of what is known, apart from each other.
-
-    Parameters
-    ----------
-    image : ndarray
-        Values, NaN where there is none.
-    low, high : float
-        The percentiles.
-    least : float
-        How far apart they are at least.
-    """
-    known = image[np.isfinite(image)]
-    if known.size == 0:
-        return 0.0, 1.0
-    first, last = map(float, np.percentile(known, (low, high)))
-    last = max(last, first + least)
-    return first, last if last - first > 1e-6 * abs(last) else first + 1.0
-
-
-def round_limit(values: NDArray[np.float64], percentile: float, step: float) -> float:
-    """Limit of a scale: a percentile of the magnitudes, up to the next whole step."""
-    known = np.abs(values[np.isfinite(values)])
-    if known.size == 0:
-        return step
-    return max(step, float(np.ceil(np.percentile(known, percentile) / step)) * step)
 
 
 @dataclass(frozen=True)

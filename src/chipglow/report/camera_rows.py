@@ -3,7 +3,7 @@
 from math import nan
 
 from chipglow.camera import Camera
-from chipglow.drawing.drawing import KELVIN
+from chipglow.drawing.scales import KELVIN
 from chipglow.report.comparison import Row, own_row
 from chipglow.scene import Raster
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.camera import Camera
-from chipglow.drawing import drawing
-from chipglow.drawing.drawing import KELVIN
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.scales import KELVIN
 from chipglow.errors import SceneErrors, StudyResult
 from chipglow.errors.cut_error import SurfaceResult
 from chipglow.errors.scene_error import SurfaceErrors
@@ -110,7 +110,7 @@ def _views(surfaces: _Surfaces, count: int, lower_limit: float | None) -> Iterat
     }
     heat = _heat_limits(np.stack(list(references.values())), lower_limit)
     errors = {name: measured[name] - references[name] for name in surfaces}
-    largest = drawing.round_limit(np.stack(list(errors.values())), 99.0, 10.0)
+    largest = scales.round_limit(np.stack(list(errors.values())), 99.0, 10.0)
     for name in surfaces:
         of = f", {name}" if len(surfaces) > 1 else ""
         yield View(
@@ -118,7 +118,7 @@ def _views(surfaces: _Surfaces, count: int, lower_limit: float | None) -> Iterat
             references[name],
             "°C",
             heat,
-            drawing.HEAT,
+            scales.HEAT,
             f"Image of the radiance temperature that is there{of}: sharp and mottled.",
         )
         yield View(
@@ -126,7 +126,7 @@ def _views(surfaces: _Surfaces, count: int, lower_limit: float | None) -> Iterat
             measured[name],
             "°C",
             heat,
-            drawing.HEAT,
+            scales.HEAT,
             f"Image of the radiance temperature that the camera measures{of}: the same, blurred.",
         )
         yield View(
@@ -134,13 +134,13 @@ def _views(surfaces: _Surfaces, count: int, lower_limit: float | None) -> Iterat
             errors[name],
             "°C",
             (-largest, largest),
-            drawing.SIGNED,
+            scales.SIGNED,
             f"Image of measured less reference{of}: blue where the camera reads too little.",
         )
 
 
 def _heat_limits(references: NDArray[np.float64], lower_limit: float | None) -> tuple[float, float]:
-    low, high = drawing.ends(references, 0.5, 99.9, 1.0)
+    low, high = scales.ends(references, 0.5, 99.9, 1.0)
     if lower_limit is not None:
         low = max(lower_limit - KELVIN - 50.0, low)
     return low, max(high, low + 1.0)

@@ -12,17 +12,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.camera import PointSpreadFunction
-from chipglow.drawing import drawing
-from chipglow.drawing.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
-    KELVIN,
-    VERMILLION,
-    Drawing,
-    FigureFile,
-    ImagePanel,
-)
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.drawing import Drawing, FigureFile, ImagePanel
+from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.errors import LineDraws, Sensitivity, StudyResult
 from chipglow.errors.cut_error import SurfaceResult
 from chipglow.report.evidence import beside, error_definition
@@ -68,10 +60,10 @@ def fields(result: StudyResult) -> Figure:
     temperature = _celsius(frame.temperature, there)
     strain = np.where(solid, frame.needed("plastic_strain"), np.nan)
     emissivity = np.where(there, surface.emissivity, np.nan)
-    hottest = drawing.round_limit(temperature, 99.9, 50.0)
+    hottest = scales.round_limit(temperature, 99.9, 50.0)
     name = result.plan.band_surface
     panels = (
-        ImagePanel("a) temperature", "temperature / °C", temperature, (0.0, hottest), drawing.HEAT),
+        ImagePanel("a) temperature", "temperature / °C", temperature, (0.0, hottest), scales.HEAT),
         ImagePanel("b) plastic strain", "plastic strain", strain, (0.0, 4.0)),
         ImagePanel("c) plastic strain rate", "strain rate / (10³ 1/s)", rate, (0.0, 60.0)),
         ImagePanel(f"d) emissivity, {name}", "emissivity", emissivity, (0.0, 1.0)),
@@ -90,13 +82,13 @@ def measurement(result: StudyResult) -> Figure:
     measured = surface.measurement.radiance_temperature()[result.developed] - KELVIN
     truth = surface.scene_temperature - KELVIN
     lower_limit = (result.camera.lower_limit or KELVIN) - KELVIN
-    top = drawing.round_limit(np.asarray(truth, np.float64), 99.9, 50.0)
+    top = scales.round_limit(np.asarray(truth, np.float64), 99.9, 50.0)
     figure = drawing.image_figure(result.raster, 2.8, rows=1)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     shown = (max(lower_limit - 50.0, 0.0), max(top, lower_limit + 50.0))
-    drawing.show_image(left, truth, result.raster, result.tool, drawing.HEAT, shown)
+    drawing.show_image(left, truth, result.raster, result.tool, scales.HEAT, shown)
     picture = drawing.show_image(
-        right, measured, surface.measurement.raster, result.tool, drawing.HEAT, shown
+        right, measured, surface.measurement.raster, result.tool, scales.HEAT, shown
     )
     left.set_title(f"a) scene, {name}, one moment")
     right.set_title(f"b) as measured ({result.camera.integration_time * 1e6:.3g} µs)")
@@ -144,10 +136,10 @@ def error_images(result: StudyResult) -> Figure:
         (rows[0], [e.case_1 for e in errors], "error", "error / °C"),
         (rows[1], [e.psf_portion for e in errors], "PSF's portion", "PSF's portion / °C"),
     ):
-        limit = drawing.round_limit(np.stack(images)[seen], 99.0, 10.0)
+        limit = scales.round_limit(np.stack(images)[seen], 99.0, 10.0)
         for axes, name, error, image in zip(axes_row, names, errors, images, strict=True):
             picture = drawing.show_image(
-                axes, image, error.raster, result.tool, drawing.SIGNED, (-limit, limit)
+                axes, image, error.raster, result.tool, scales.SIGNED, (-limit, limit)
             )
             drawing.veil(axes, error.flagged, error.raster)
             drawing.draw_tool(axes, result.tool)
@@ -212,7 +204,7 @@ def point_spread(result: StudyResult) -> Figure | None:
     picture = left.imshow(
         np.log10(np.maximum(density[near, near], 1e-6)),
         extent=(-reach, reach, -reach, reach),
-        cmap=drawing.PLAIN,
+        cmap=scales.PLAIN,
         vmin=-4.0,
         vmax=0.0,
     )
@@ -237,7 +229,7 @@ def forces(result: StudyResult) -> Figure | None:
     axes.plot(time, history.thrust * 1e-3, color=VERMILLION, label="thrust force", linewidth=1.2)
     for i, peak in enumerate(segments.peaks * 1e6):
         axes.axvline(peak, color=GREY, linewidth=0.8, linestyle=":", label="" if i else "segments")
-    axes.axvspan(time[0], segments.start * 1e6, color=drawing.VOID, label="first build-up")
+    axes.axvspan(time[0], segments.start * 1e6, color=scales.VOID, label="first build-up")
     duration = result.camera.integration_time
     for i, instant in enumerate(result.instants):
         seen = (instant.start * 1e6, (instant.start + duration) * 1e6)
@@ -262,9 +254,7 @@ def chip(result: StudyResult) -> Figure | None:
     left, right = figure.subplots(1, 2)
     frame = result.frame
     strain = np.where(frame.material == Material.WORKPIECE, frame.needed("plastic_strain"), np.nan)
-    picture = drawing.show_image(
-        left, strain, result.raster, result.tool, drawing.PLAIN, (0.0, 4.0)
-    )
+    picture = drawing.show_image(left, strain, result.raster, result.tool, scales.PLAIN, (0.0, 4.0))
     drawing.colour_bar(figure, picture, left, "plastic strain")
     thickness = float(np.interp(frame.time, scan.time, scan.thickness))
     foot, normal = result.tool.rake_point(scan.height), np.array(result.tool.rake_normal)

@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chipglow.drawing import drawing
-from chipglow.drawing.drawing import BLUE, GREY, KELVIN, VERMILLION
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.scales import BLUE, GREY, KELVIN, VERMILLION
 from chipglow.errors import StudyResult
 from chipglow.laboratory.chip import RakeGrid
 from chipglow.laboratory.emissivity import HeatedObject
@@ -68,7 +68,7 @@ def _draw_heated(figure: Figure, axes: Axes, heated: HeatedObject) -> None:
     seen = temperature[heated.map.emissivity > 0.1]
     low, high = (float(end) for end in np.percentile(seen, (1.0, 99.9)))
     picture = drawing.show_image(
-        axes, temperature, heated.map.raster, None, drawing.HEAT, (low - 10.0, high)
+        axes, temperature, heated.map.raster, None, scales.HEAT, (low - 10.0, high)
     )
     drawing.colour_bar(figure, picture, axes, "radiance temperature / °C")
     for colour, region in zip(_COLOURS, heated.regions, strict=False):
@@ -118,7 +118,7 @@ def dual_spectrum(result: StudyResult) -> Figure:
     figure = drawing.image_figure(result.raster, 2.3, rows=rows)
     grid = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
     low = (result.camera.lower_limit or KELVIN + 100.0) - KELVIN
-    top = max(drawing.round_limit(images[np.isfinite(images)], 99.9, 50.0), low + 50.0)
+    top = max(scales.round_limit(images[np.isfinite(images)], 99.9, 50.0), low + 50.0)
     letters = iter("abcdefgh")
     picture = None
     for (left, right), frame in zip(grid, result.moments, strict=True):
@@ -130,7 +130,7 @@ def dual_spectrum(result: StudyResult) -> Figure:
             images[max(number, 0)],
             surface.measurement.raster,
             None,
-            drawing.HEAT,
+            scales.HEAT,
             (low, top),
         )
         drawing.black_tool(right, result.tool)

@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chipglow.cutting import MaterialFile, WorkpieceMaterial
-from chipglow.drawing.drawing import BLUE, GREEN, KELVIN, VERMILLION, new_figure, style
+from chipglow.drawing.drawing import new_figure, style
+from chipglow.drawing.scales import BLUE, GREEN, KELVIN, VERMILLION
 
 _TEMPERATURES: Final = ((20.0, BLUE), (400.0, GREEN), (800.0, VERMILLION))
 _RATES: Final = ((1.0, ":"), (1e3, "--"), (1e5, "-"))

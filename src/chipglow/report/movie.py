@@ -17,7 +17,7 @@ from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
 from chipglow.cutting import CuttingSimulation
-from chipglow.drawing import drawing
+from chipglow.drawing import drawing, scales
 from chipglow.io import movie_writer
 from chipglow.io.movie_file import PALETTE_SIZE
 from chipglow.scene import Frame, Material, Raster
@@ -66,7 +66,7 @@ class MovieScales:
         start = conditions.initial_temperature
         melting = getattr(simulation.workpiece.flow_stress, "melting_temperature", _MELTING)
         hottest = start + _HOT * max(melting - start, 0.0)
-        top = 50.0 * ceil((hottest - drawing.KELVIN) / 50.0 + 1e-9) + drawing.KELVIN
+        top = 50.0 * ceil((hottest - scales.KELVIN) / 50.0 + 1e-9) + scales.KELVIN
         decade = floor(log10(0.1 * conditions.speed / conditions.feed) + 1e-9)
         return cls(
             temperature=(start, top),
@@ -105,7 +105,7 @@ class CutPicture:
         rate = np.maximum(frame.needed("plastic_strain_rate"), self._slowest)
         for image, values, shown in zip(
             self._images,
-            (frame.temperature - np.float32(drawing.KELVIN), frame.needed("plastic_strain"), rate),
+            (frame.temperature - np.float32(scales.KELVIN), frame.needed("plastic_strain"), rate),
             (there, solid, solid),
             strict=True,
         ):
@@ -117,20 +117,20 @@ class CutPicture:
             self._figure.draw_artist(artist)
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
-    def _build(self, scales: MovieScales) -> None:
+    def _build(self, ends: MovieScales) -> None:
         high = _AROUND + _PANEL * self._raster.rows / self._raster.columns
         height = 2 * round(min(max(high, _HEIGHTS[0]), _HEIGHTS[1]) / 2)
         self._figure = Figure(figsize=(_WIDTH / _DPI, height / _DPI), dpi=_DPI, layout="compressed")
         self._canvas = _canvas(self._figure)
-        self._slowest = scales.rate[0]
-        low, top = (limit - drawing.KELVIN for limit in scales.temperature)
+        self._slowest = ends.rate[0]
+        low, top = (limit - scales.KELVIN for limit in ends.temperature)
         self._figure.get_layout_engine().set(w_pad=0.09)  # type: ignore[union-attr, call-arg]
         left, middle, right = self._figure.subplots(1, 3, sharex=True, sharey=True)
-        rate = "plastic strain rate", "strain rate / (1/s)", drawing.RATE
+        rate = "plastic strain rate", "strain rate / (1/s)", scales.RATE
         self._images = (
-            self._panel(left, "temperature", "temperature / °C", drawing.HEAT, (low, top)),
-            self._panel(middle, "plastic strain", "plastic strain", drawing.PLAIN, scales.strain),
-            self._panel(right, *rate, scales.rate, log=True),
+            self._panel(left, "temperature", "temperature / °C", scales.HEAT, (low, top)),
+            self._panel(middle, "plastic strain", "plastic strain", scales.PLAIN, ends.strain),
+            self._panel(right, *rate, ends.rate, log=True),
         )
         for axes in (middle, right):
             axes.fill(*(self._tool.outline(_FAR) * 1e6).T, color=_TOOL, zorder=1.5)
@@ -204,7 +204,7 @@ def _palette() -> NDArray[np.uint8]:
     """The colours of the three scales and greys, as many as a GIF may have."""
     greys = 30
     each = (PALETTE_SIZE - greys) // 3
-    maps: list[Any] = [drawing.HEAT, drawing.PLAIN, drawing.RATE]
+    maps: list[Any] = [scales.HEAT, scales.PLAIN, scales.RATE]
     colours = [matplotlib.colormaps[name](np.linspace(0.0, 1.0, each))[:, :3] for name in maps]
     plain = np.repeat(np.linspace(0.0, 1.0, greys)[:, None], 3, axis=1)
     return np.asarray(np.round(np.concatenate([*colours, plain]) * 255), dtype=np.uint8)

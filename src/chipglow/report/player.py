@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 from PIL import Image
 
-from chipglow.drawing import drawing
+from chipglow.drawing import drawing, scales
 from chipglow.quantities.format import quantity_text
 from chipglow.report.page import shown
 from chipglow.scene import Raster, Tool
@@ -193,7 +193,7 @@ def _picture(values: NDArray[np.float64], view: View) -> str:
     part = np.clip((values - low) / (high - low), 0.0, 1.0)
     index = np.where(np.isfinite(values), 1 + np.round(part * (_COLOURS - 1)), 0)
     colours = matplotlib.colormaps[view.colours](np.linspace(0.0, 1.0, _COLOURS))[:, :3]
-    palette = np.concatenate([[to_rgb(drawing.VOID)], colours])
+    palette = np.concatenate([[to_rgb(scales.VOID)], colours])
     image = Image.fromarray(np.nan_to_num(index).astype(np.uint8))
     image.putpalette(np.round(palette * 255).astype(np.uint8).tobytes())
     file = BytesIO()

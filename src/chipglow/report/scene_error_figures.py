@@ -9,17 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.drawing import drawing
-from chipglow.drawing.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
-    KELVIN,
-    VERMILLION,
-    Drawing,
-    FigureFile,
-    ImagePanel,
-)
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.drawing import Drawing, FigureFile, ImagePanel
+from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.errors import SceneErrors
 from chipglow.errors.scene_error import PlaceErrors, Profile, SurfaceErrors
 from chipglow.report.evidence import definition_of
@@ -49,8 +41,8 @@ def scene(result: SceneErrors) -> Figure:
     there = frame.material != Material.VOID
     temperature = np.where(there, frame.temperature - KELVIN, np.nan)
     known = temperature[there]
-    ends = drawing.ends(known, 0.0, 99.9, 1.0)
-    panels = [ImagePanel("temperature", "temperature / °C", temperature, ends, drawing.HEAT)]
+    ends = scales.ends(known, 0.0, 99.9, 1.0)
+    panels = [ImagePanel("temperature", "temperature / °C", temperature, ends, scales.HEAT)]
     for name, surface in result.surfaces.items():
         emissivity = np.where(there, surface.emissivity, np.nan)
         panels.append(
@@ -68,12 +60,12 @@ def measurement(result: SceneErrors) -> Figure:
         truth = surface.scene_temperature - KELVIN
         measured = surface.measurement.radiance_temperature()[result.shown] - KELVIN
         lower_limit = result.camera.lower_limit
-        low, high = drawing.ends(truth, 0.5, 99.9, 1.0)
+        low, high = scales.ends(truth, 0.5, 99.9, 1.0)
         low = low if lower_limit is None else max(lower_limit - KELVIN - 50.0, low)
         shown = (low, max(high, low + 50.0))
-        drawing.show_image(axes[0], truth, result.raster, result.tool, drawing.HEAT, shown)
+        drawing.show_image(axes[0], truth, result.raster, result.tool, scales.HEAT, shown)
         pixels = surface.measurement.raster
-        picture = drawing.show_image(axes[1], measured, pixels, result.tool, drawing.HEAT, shown)
+        picture = drawing.show_image(axes[1], measured, pixels, result.tool, scales.HEAT, shown)
         axes[0].set_title(_titled("scene, one moment", name, result))
         axes[1].set_title("as measured")
         axes[0].label_outer()
@@ -94,9 +86,9 @@ def error_images(result: SceneErrors) -> Figure:
             (axes[0], errors.case_1, "error"),
             (axes[1], errors.psf_portion, "PSF's portion"),
         ):
-            limit = drawing.round_limit(image[seen], 99.5, 10.0)
+            limit = scales.round_limit(image[seen], 99.5, 10.0)
             panel = ImagePanel(
-                _titled(what, name, result), f"{what} / °C", image, (-limit, limit), drawing.SIGNED
+                _titled(what, name, result), f"{what} / °C", image, (-limit, limit), scales.SIGNED
             )
             panel.draw(figure, one, errors.raster, result.tool)
             drawing.veil(one, errors.flagged, errors.raster)

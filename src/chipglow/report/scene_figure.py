@@ -9,9 +9,10 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.drawing import drawing
-from chipglow.drawing.drawing import BLUE, GREY, VERMILLION, VOID, ImagePanel
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.frames import shown_frame
+from chipglow.drawing.scales import BLUE, GREY, VERMILLION, VOID
 from chipglow.report.scene_summary import RATE, STRAIN, TEMPERATURE
 from chipglow.scene import FILLED, Frame, Material, Raster, Scene, Tool
 
@@ -84,11 +85,11 @@ def _panels(frame: Frame) -> list[ImagePanel]:
     """Temperature, and of strain, strain rate and speed what the frame has."""
     there, solid = frame.material != Material.VOID, frame.material == Material.WORKPIECE
     temperature = np.where(there, TEMPERATURE(frame.temperature), np.nan)
-    heat = drawing.ends(temperature, 0.1, 99.9)
-    panels = [ImagePanel("temperature", TEMPERATURE.label, temperature, heat, drawing.HEAT)]
+    heat = scales.ends(temperature, 0.1, 99.9)
+    panels = [ImagePanel("temperature", TEMPERATURE.label, temperature, heat, scales.HEAT)]
     if frame.plastic_strain is not None:
         strain = np.where(solid, frame.plastic_strain, np.nan)
-        ends = (0.0, drawing.ends(strain, 0.0, 99.9)[1])
+        ends = (0.0, scales.ends(strain, 0.0, 99.9)[1])
         panels.append(ImagePanel("plastic strain", STRAIN.label, strain, ends))
     if frame.plastic_strain_rate is not None:
         rate = np.where(solid, frame.plastic_strain_rate, np.nan)
@@ -99,19 +100,19 @@ def _panels(frame: Frame) -> list[ImagePanel]:
                 RATE.label,
                 np.maximum(rate, decades[0]),
                 decades,
-                drawing.RATE,
+                scales.RATE,
                 log=True,
             )
         )
     if frame.velocity_x is not None and frame.velocity_y is not None:
         speed = np.where(solid, np.hypot(frame.velocity_x, frame.velocity_y), np.nan)
-        panels.append(ImagePanel("speed", _SPEED, speed, (0.0, drawing.ends(speed, 0.0, 99.9)[1])))
+        panels.append(ImagePanel("speed", _SPEED, speed, (0.0, scales.ends(speed, 0.0, 99.9)[1])))
     return panels
 
 
 def _decades(rate: NDArray[Any]) -> tuple[float, float]:
     """Whole decades, the last of which has the fastest."""
-    fastest = drawing.ends(rate, 0.0, 99.9)[1]
+    fastest = scales.ends(rate, 0.0, 99.9)[1]
     top = float(np.ceil(np.log10(max(fastest, 1e-30)) - 1e-9))
     return 10.0 ** (top - _DECADES), 10.0**top
 
@@ -160,7 +161,7 @@ def _draw_quality(
     there = frame.material != Material.VOID
     filled = there & (flags == FILLED)
     distance = np.where(there & ~filled, flags, np.nan)
-    ends = (0.0, drawing.ends(distance, 0.0, 99.0)[1])
+    ends = (0.0, scales.ends(distance, 0.0, 99.0)[1])
     title = f"quality; red: filled, {100 * filled.sum() / there.sum():.2g} %"
     ImagePanel(title, "colour distance / ΔE", distance, ends).draw(figure, axes, raster, tool)
     drawing.veil(axes, filled, raster, VERMILLION, 1.0)
@@ -180,7 +181,7 @@ def _draw_histogram(axes: Axes, panel: ImagePanel, values: NDArray[Any]) -> None
     if values.size == 0:
         axes.set_title("no workpiece")
         return
-    low, high = drawing.ends(values, 0.0, 100.0)
+    low, high = scales.ends(values, 0.0, 100.0)
     bins = np.geomspace(low, high, _BINS) if panel.log else np.linspace(low, high, _BINS)
     axes.hist(values, bins.tolist(), weights=np.full(values.size, 100.0 / values.size), color=BLUE)
     axes.set_yscale("log")

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import xarray as xr
 
-from chipglow.drawing.drawing import KELVIN
+from chipglow.drawing.scales import KELVIN
 from chipglow.errors import Distribution, SceneErrors
 from chipglow.errors.distribution import TOGETHER
 from chipglow.report.camera_rows import camera_rows

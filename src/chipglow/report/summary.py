@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from chipglow.drawing.drawing import KELVIN
+from chipglow.drawing.scales import KELVIN
 from chipglow.errors import Distribution, SceneErrors
 from chipglow.report.comparison import CauseRow, PartRow, Row, known
 from chipglow.report.steady_tool import ToolRow

@@ -8,7 +8,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from chipglow.drawing import drawing
+from chipglow.drawing import drawing, scales
 from chipglow.errors import WavelengthError, WavelengthErrors
 from chipglow.errors.wavelengths import band_name
 
@@ -18,11 +18,11 @@ _BEST: Final = 3
 _TICKS: Final = (1, 2, 3, 5, 7, 10, 20, 30, 50, 70, 100, 200, 300, 500)
 
 _PARTS: Final = {
-    "mean error": drawing.VERMILLION,
+    "mean error": scales.VERMILLION,
     "scatter over the draws": "#E69F00",
-    "misregistration": drawing.GREEN,
+    "misregistration": scales.GREEN,
     "noise": "#56B4E9",
-    "emissivity": drawing.BLUE,
+    "emissivity": scales.BLUE,
 }
 
 
@@ -43,7 +43,7 @@ def draw_wavelengths(found: WavelengthErrors) -> Figure:
             errors = [one for one in found.errors if one.place == place]
             picture = _draw_all(column[0], found, errors, norm)
             _draw_causes(column[1], errors)
-            truth = float(errors[0].truth.mean()) - drawing.KELVIN
+            truth = float(errors[0].truth.mean()) - scales.KELVIN
             column[0].set_title(f"{place}, {truth:.0f} °C")
         panels[0, 0].set_ylabel("first band / µm")
         ticks = [one for one in _TICKS if low <= one <= high]
@@ -69,7 +69,7 @@ def _draw_all(
     totals = np.full((len(bands), len(bands)), np.nan)
     for one in errors:
         totals[bands.index(one.first), bands.index(one.second or one.first)] = one.total
-    picture = axes.imshow(np.ma.masked_invalid(totals), cmap=f"{drawing.PLAIN}_r", norm=norm)
+    picture = axes.imshow(np.ma.masked_invalid(totals), cmap=f"{scales.PLAIN}_r", norm=norm)
     for (row, column), total in np.ndenumerate(totals):
         if np.isfinite(total):
             colour = "white" if norm(total) > 0.5 else "black"

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.camera import Measurement
-from chipglow.drawing import drawing
-from chipglow.drawing.drawing import KELVIN
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.scales import KELVIN
 from chipglow.laboratory.chip.band_profile import BandProfile, Stage
 from chipglow.scene import Tool
 
@@ -87,10 +87,10 @@ def _draw_image(
     image = measurement.data["radiance_temperature"][number].values - KELVIN
     known = image[np.isfinite(image)]
     limits = (float(known.min()), float(np.percentile(known, 99.9)) + 1.0)
-    picture = drawing.show_image(axes, image, measurement.raster, tool, drawing.HEAT, limits)
+    picture = drawing.show_image(axes, image, measurement.raster, tool, scales.HEAT, limits)
     for points, colour in zip(profile.points, colours, strict=True):
         axes.plot(*(1e6 * points).T, color=colour, linewidth=1.4)
-    drawing.draw_line(axes, profile.reference.points, drawing.BLUE)
+    drawing.draw_line(axes, profile.reference.points, scales.BLUE)
     drawing.crop(axes, profile.points, measurement.raster, _AROUND)
     axes.set_title(f"a) {1e6 * profile.times[frame]:.4g} µs; blue: the reference")
     figure.colorbar(

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.camera import Measurement
-from chipglow.drawing import drawing
-from chipglow.drawing.drawing import KELVIN
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.scales import KELVIN
 from chipglow.laboratory.chip.rake_grid import RakeGrid
 
 _HEIGHT: Final = 3.8
@@ -47,7 +47,7 @@ def _draw_image(figure: Figure, axes: Axes, measurement: Measurement, grid: Rake
     image = _mean_image(measurement, grid) - KELVIN
     known = image[np.isfinite(image)]
     limits = (float(known.min()), float(np.percentile(known, 99.9)) + 1.0)
-    picture = drawing.show_image(axes, image, measurement.raster, grid.tool, drawing.HEAT, limits)
+    picture = drawing.show_image(axes, image, measurement.raster, grid.tool, scales.HEAT, limits)
     corners = 1e6 * grid.corners()
     for line in (*corners, *corners.transpose(1, 0, 2)):
         axes.plot(*line.T, color="black", linewidth=1.1, alpha=0.6)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.drawing import drawing
-from chipglow.drawing.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 from chipglow.laboratory.comparison.comparison import COVERAGE, Comparison, GridComparison
 from chipglow.uncertainty import Estimate
 

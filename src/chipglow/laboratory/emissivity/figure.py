@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from chipglow.drawing import drawing
-from chipglow.drawing.drawing import BLUE, GREEN, KELVIN, VERMILLION, ImagePanel
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.drawing import ImagePanel
+from chipglow.drawing.scales import BLUE, GREEN, KELVIN, VERMILLION
 from chipglow.laboratory.emissivity.emissivity import EmissivityLine, EmissivityMap
 from chipglow.scene import Raster, Region
 
@@ -43,14 +44,14 @@ def draw_emissivity(
             "radiance temperature",
             "°C",
             temperature,
-            drawing.ends(temperature, 0.5, 99.5),
-            drawing.HEAT,
+            scales.ends(temperature, 0.5, 99.5),
+            scales.HEAT,
         ),
         ImagePanel(
             f"emissivity, object at {found.heating.reference - KELVIN:.4g} °C",
             "emissivity",
             found.emissivity,
-            drawing.ends(found.emissivity, 0.5, 99.5),
+            scales.ends(found.emissivity, 0.5, 99.5),
         ),
     )
     height = min(max(_PANEL_WIDTH * raster.rows / raster.columns, 1.0), 5.0) + _AROUND

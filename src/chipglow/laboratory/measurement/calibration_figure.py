@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from chipglow.camera import CalibrationFit, FittedCalibration
 from chipglow.drawing import drawing
-from chipglow.drawing.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
 
 _COLOURS: Final = (BLUE, VERMILLION, GREEN)
 _MARKS: Final = ("o", "s", "^")

@@ -9,9 +9,10 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from chipglow.camera import Flag, Measurement
-from chipglow.drawing import drawing
-from chipglow.drawing.drawing import BLUE, GREEN, GREY, KELVIN, VERMILLION, VOID, ImagePanel
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.frames import shown_frame
+from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION, VOID
 
 _FLAGS: Final = {
     Flag.UNDER_RANGE: ("below the lower range limit", VOID),
@@ -49,7 +50,7 @@ def draw_measurement(measurement: Measurement, time: float | None = None) -> Fig
         upper, lower = figure.subplots(2, 1, height_ratios=(height, _HISTOGRAM))
         title = f"{measurement.times[index] * 1e6:.6g} µs"
         panel = ImagePanel(
-            title, "radiance temperature / °C", celsius, drawing.ends(celsius), drawing.HEAT
+            title, "radiance temperature / °C", celsius, scales.ends(celsius), scales.HEAT
         )
         panel.draw(figure, upper, raster, measurement.tool)
         upper.set_xlabel("x / µm")
@@ -79,5 +80,5 @@ def _draw_histogram(axes: Axes, celsius: NDArray[np.float64]) -> None:
     axes.set_xlabel("radiance temperature / °C")
     axes.set_ylabel("pixels")
     if known.size:
-        low, high = drawing.ends(known)
+        low, high = scales.ends(known)
         axes.hist(known, np.linspace(low, high, _BINS).tolist(), color=BLUE)

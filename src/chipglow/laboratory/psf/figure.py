@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chipglow.drawing import drawing
-from chipglow.drawing.drawing import BLUE, GREY, VERMILLION, VOID
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.scales import BLUE, GREY, VERMILLION, VOID
 from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge
 from chipglow.laboratory.psf.psf_fit import FittedEdge
 from chipglow.laboratory.psf.summary import with_uncertainty
@@ -61,7 +61,7 @@ def _draw_image(figure: Any, axes: Axes, edge: EdgeResult, fitted: FittedEdge) -
     left, right, bottom, top = (end * 1e6 for end in raster.extent)
     usable = np.where(image.usable, image.radiance, np.nan)
     limits = float(np.nanmin(usable)), float(np.nanmax(usable))
-    picture = drawing.show_image(axes, usable, raster, None, drawing.HEAT, limits)
+    picture = drawing.show_image(axes, usable, raster, None, scales.HEAT, limits)
     drawing.colour_bar(figure, picture, axes, _label(image.unit))
     c, s = cos(fitted.line.normal), sin(fitted.line.normal)
     middle = float(image.x.mean()) * 1e6, float(image.y.mean()) * 1e6

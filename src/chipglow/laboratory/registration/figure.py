@@ -8,8 +8,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chipglow.drawing import drawing
-from chipglow.drawing.drawing import HEAT, KELVIN, VERMILLION, WIDTH
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.drawing import WIDTH
+from chipglow.drawing.scales import HEAT, KELVIN, VERMILLION
 from chipglow.laboratory.registration.registration import Registration
 from chipglow.scene import Raster, Tool
 
@@ -45,7 +46,7 @@ def draw_registration(
         Points that were given: positions in m, and visible columns and rows.
     """
     celsius = np.asarray(temperature) - KELVIN
-    limits = drawing.ends(celsius, 0.5, 99.8, 1.0)
+    limits = scales.ends(celsius, 0.5, 99.8, 1.0)
     with drawing.style():
         figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
         FigureCanvasAgg(figure)
@@ -89,7 +90,7 @@ def blink_pictures(
     """
     shape = (visible.shape[0], visible.shape[1])
     celsius = registration.warp(np.asarray(temperature) - KELVIN, raster, shape)
-    limits = drawing.ends(celsius, 0.5, 99.8, 1.0)
+    limits = scales.ends(celsius, 0.5, 99.8, 1.0)
     plain = _rendered(registration, visible, tool)
     hot = _rendered(registration, visible, tool, celsius, limits)
     return plain, hot
@@ -110,7 +111,7 @@ def _rendered(
         _draw_visible(axes, visible)
     else:
         axes.imshow(np.ma.masked_invalid(celsius), cmap=HEAT, vmin=limits[0], vmax=limits[1])
-        axes.set_facecolor(drawing.VOID)
+        axes.set_facecolor(scales.VOID)
     axes.set_axis_on()
     axes.set_xticks([])
     axes.set_yticks([])
