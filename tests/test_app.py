@@ -5,7 +5,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from threading import Event
+from threading import Event, Thread
 
 import numpy as np
 import pytest
@@ -407,3 +407,35 @@ print(app.opened.folder.exists())
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True
     )
     assert ended.stdout == "False\n"
+
+
+def test_a_notebooks_page_changes_while_no_message_of_it_is_taken():
+    """Panel drops what another thread changes while it takes a message of a notebook's page."""
+    from bokeh.document import Document
+
+    from chipglow.app.view import Page
+
+    page, taken, ended, changed = Page(), Event(), Event(), Event()
+    document = Document()
+    root = page.get_root(document)
+
+    class Message:
+        def apply_to_document(self, *_):
+            taken.set()
+            assert ended.wait(10)
+
+    class Comms:
+        def assemble(self, _):
+            return Message()
+
+    taking = Thread(target=page._on_msg, args=(root.ref["id"], Comms(), {"content": {}}))
+    changing = Thread(target=page.alone, args=(changed.set,))
+    taking.start()
+    assert taken.wait(10)
+    changing.start()
+    was_changed = changed.wait(0.2)
+    ended.set()
+    taking.join(10)
+    changing.join(10)
+    assert not was_changed
+    assert changed.is_set()

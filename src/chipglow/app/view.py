@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from math import floor, isfinite, log10
 from pathlib import Path
+from threading import RLock
 from time import perf_counter
 from typing import Any, ClassVar, Final
 
@@ -73,6 +74,22 @@ class Page(JSComponent):  # type: ignore[misc]
 
     _esm = (_FOLDER / "page.js").read_text(encoding="utf-8")
     _stylesheets: ClassVar[list[str]] = [(_FOLDER / "page.css").read_text(encoding="utf-8")]
+
+    def __init__(self, **params: Any) -> None:
+        self._turn = RLock()
+        super().__init__(**params)
+
+    def alone(self, change: Callable[[], None]) -> None:
+        """Change what a notebook shows while no message of its page is taken.
+
+        A notebook's messages may come in a thread of their own, and Panel drops what changes in
+        another one meanwhile.
+        """
+        with self._turn:
+            change()
+
+    def _on_msg(self, ref: str, manager: Any, msg: Any) -> None:
+        self.alone(lambda: super(Page, self)._on_msg(ref, manager, msg))
 
 
 class View:
@@ -285,7 +302,7 @@ class View:
         """Numbers at the cursor."""
         errors = picture.errors
         x, y = picture.knobs.cursor
-        rows = [("x, y", f"{1e6 * x:.1f}, {1e6 * y:.1f} µm", "")]
+        rows = [("x, y", _signed(f"{1e6 * x:.1f}, {1e6 * y:.1f} µm"), "")]
         if errors is not None:
             rows += [
                 ("true temperature", _celsius(found.true), "Of the scene's sample, in the middle"),
@@ -397,7 +414,7 @@ class View:
     def _later(self, show: Callable[[], None]) -> None:
         """Show something that another thread found."""
         if self._loop is not None:
-            self._loop.call_soon_threadsafe(show)
+            self._loop.call_soon_threadsafe(self.page.alone, show)
             return
         if self._document is None:
             show()
@@ -437,15 +454,19 @@ def _counts(knob: Knob, knobs: Knobs) -> bool:
 
 
 def _celsius(kelvins: float) -> str:
-    return f"{kelvins - KELVIN:.1f} °C" if isfinite(kelvins) else "–"
+    return _signed(f"{kelvins - KELVIN:.1f} °C") if isfinite(kelvins) else "–"
 
 
 def _with_uncertainty(celsius: float, uncertainty: float) -> str:
     """Both to the second digit that counts in the uncertainty, and at least to 0.1 °C."""
     size = floor(log10(uncertainty)) if uncertainty > 0 else 0
     digits = min(max(1 - size, 1), 4)
-    return f"{celsius:.{digits}f} ± {uncertainty:.{digits}f} °C".replace("-", "−")
+    return _signed(f"{celsius:.{digits}f} ± {uncertainty:.{digits}f} °C")
 
 
 def _kelvins(kelvins: float) -> str:
-    return f"{kelvins:+.1f} K".replace("-", "−") if isfinite(kelvins) else "–"
+    return _signed(f"{kelvins:+.1f} K") if isfinite(kelvins) else "–"
+
+
+def _signed(text: str) -> str:
+    return text.replace("-", "−")
