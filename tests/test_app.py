@@ -9,6 +9,7 @@ from threading import Event, Thread
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import chipglow
 from chipglow.app.files import figure_file, measurement_file, study_file
@@ -20,6 +21,7 @@ from chipglow.camera import expose, expose_all
 from chipglow.errors import LinePlace, error_images, error_parts
 from chipglow.io import example_scene, is_measurement, open_scene
 from chipglow.io.sources import SourceError
+from chipglow.quantities.format import rounded_text
 from chipglow.scene.lines import nearest
 from chipglow.study import Study, fit, load_study
 from chipglow.surface import CHIP_1, UniformSurface
@@ -158,15 +160,24 @@ def test_a_quick_look_has_no_pixels_finer_than_its_samples(model):
         ({"surface": OWN, "body_mean": "2"}, "body.mean: 2, expected 0 to 1"),
         ({"band_lower": "6"}, "reversed"),
         ({"psf": "sharp"}, "PSF: 'sharp', expected annular-aperture, gaussian, none"),
-        ({"seed": "1.5"}, "Seed: '1.5', expected a number"),
+        ({"seed": "1.5"}, "Seed: '1.5', expected a whole number"),
+        ({"seed": "-1"}, "Seed -1: camera: seed is -1, expected 0 or more"),
+        (
+            {"integration_time": "90"},
+            "Exposure 90: exposure: 0.000443 s to 0.000533 s is not",
+        ),
+        ({"pitch": "6 mm"}, "Pixel pitch 6 mm: camera: pitch of 0.006 m"),
+        ({"lower_limit": "9999"}, "Lower range limit 9999: camera: lower_limit"),
         ({"rake_line": "1,2"}, "across the rake face: '1,2', expected 2 different points"),
-        ({"cursor": "here"}, "cursor: 'here', expected positions"),
+        ({"rake_line": "1,2;3,461"}, "expected x from -620.0 to 40.0 µm and y from -80.0 to 460.0"),
+        ({"cursor": "here"}, "Cursor: 'here', expected positions"),
+        ({"cursor": "999,0"}, "Cursor: 999,0, expected x from -620.0 to 40.0 µm"),
         ({"zoom": "2"}, "zoom: unknown knob"),
     ],
 )
 def test_what_a_knob_cannot_be_is_one_clear_error(model, texts, said):
     with pytest.raises(ValueError) as error:
-        model.panel.changed(model.panel.initial, texts)
+        model.turned(model.panel.initial, texts)
     assert said in str(error.value) and "\n" not in str(error.value)
 
 
@@ -182,6 +193,45 @@ def test_a_link_brings_the_state_back(model):
     assert model.panel.texts(model.panel.initial) == {}
 
 
+def test_an_exponent_needs_no_unit_either(model):
+    initial = model.panel.initial
+    assert model.turned(initial, {"pitch": "5e0"}) == model.turned(initial, {"pitch": "5 um"})
+
+
+def test_off_the_material_there_is_no_emissivity(model):
+    """The readout names it a dash, at a cursor that may well be there."""
+    knobs = model.turned(model.panel.initial, {"cursor": "-610,440"})
+    readout = model.readout(model.picture(knobs))
+    assert np.isnan(readout.emissivity)
+    assert rounded_text(readout.emissivity) == "–"
+
+
+def test_the_saved_figure_shows_what_the_page_shows(model, monkeypatch):
+    """Colours shared by both temperatures, the part that is seen, the range of the draws."""
+    saved = []
+    monkeypatch.setattr(
+        Figure, "savefig", lambda figure, path, **_: saved.append(figure) or path.touch()
+    )
+    initial = model.panel.initial
+    picture = model.picture(initial)
+    drawn = model.drawn(initial, 2, 1, lambda _: None)
+    seen = (-100e-6, 20e-6, 100e-6, 200e-6)
+    figure_file(picture, model, seen, drawn)
+    scene, measured, error, rake, _, caption = saved[0].axes[:6]
+    limits = [one.images[0].get_clim() for one in (scene, measured, error)]
+    assert limits[0] == limits[1]
+    assert limits[0][0] == pytest.approx(300.0)  # the camera's range limit
+    assert limits[0][1] == pytest.approx(np.nanmax(picture.scene.values) - 273.15)
+    assert limits[2][0] == -limits[2][1]
+    for one in (scene, measured, error):
+        assert (*one.get_xlim(), *one.get_ylim()) == pytest.approx([1e6 * end for end in seen])
+    shaded = rake.collections[0].get_paths()[0].get_extents()
+    low, high = (end(drawn.lines["rake_line"].measured - 273.15) for end in (np.nanmin, np.nanmax))
+    assert (shaded.y0, shaded.y1) == pytest.approx((low, high))
+    text = caption.texts[0].get_text()
+    assert "Exposure: 10 µs" in text and "Emissivity: Chip 1" in text
+
+
 def test_what_is_saved_can_be_opened(model, tmp_path):
     picture = model.picture(model.panel.initial)
     file = tmp_path / "measurement.nc"
@@ -195,7 +245,7 @@ def test_what_is_saved_can_be_opened(model, tmp_path):
     usable = ~picture.flagged
     np.testing.assert_array_equal(seen.measured[usable], picture.measured[usable])
     assert shown.readout(seen).parts is None
-    assert figure_file(picture, model).startswith(b"\x89PNG")
+    assert figure_file(picture, model, picture.raster.extent).startswith(b"\x89PNG")
 
 
 def test_what_is_no_scene_is_refused_by_its_own_name(tmp_path):
@@ -282,7 +332,11 @@ def test_undo_goes_back_knob_by_knob(opened):
 def test_what_is_not_possible_on_the_scene_is_said(opened):
     heard = Heard()
     session = Session(opened, heard.listener)
-    session.turn({"integration_time": "60 us"})
+    before = session.knobs
+    with pytest.raises(ValueError, match="is not within the scene"):
+        session.turn({"integration_time": "60 us"})
+    assert session.knobs == before and not session.can_undo
+    session.set(replace(before, integration_time=60e-6))
     assert session.settle()
     assert "is not within the scene" in heard.failures[0]
     session.end()

@@ -189,6 +189,31 @@ def test_a_wrong_number_is_said_and_changes_nothing(visit, model):
     page.locator("#status.error", has_text="is not within the scene").wait_for()
 
 
+def test_of_a_link_that_is_wrong_in_part_the_rest_counts(visit, model):
+    page = visit("&numerical_aperture=0.2&pitch=-5+um")
+    page.locator("#status.error", has_text="Link: Pixel pitch: -5 um is not over 0").wait_for()
+    assert page.locator("#knob-numerical_aperture").input_value() == "0.2"
+    assert page.locator("#knob-pitch").input_value() == "6"
+    texts = {"numerical_aperture": "0.2"}
+    number(page, "measured").get_by_text(expected(model, texts)).wait_for()
+    assert page.locator("#status.error").is_visible()
+
+
+def test_the_wheel_leads_no_further_than_three_times_the_image(visit):
+    page = visit()
+    page.mouse.move(*place(page, "measured_figure", -300, 200))
+    for _ in range(15):
+        page.mouse.wheel(0, 2000)
+    page.wait_for_timeout(300)
+    left, right, bottom, top = page.evaluate("""() => {
+      const { x_range, y_range } = Bokeh.documents[0].get_model_by_name("measured_figure");
+      return [x_range.start, x_range.end, y_range.start, y_range.end];
+    }""")
+    assert -1280.001 <= left < right <= 700.001
+    assert -620.001 <= bottom < top <= 1000.001
+    assert (right - left) / (top - bottom) == pytest.approx(660 / 540, rel=0.02)
+
+
 def test_a_line_and_the_cursor_are_dragged(visit, model):
     page = visit()
     (x, y), _ = model.panel.initial.band_line

@@ -143,7 +143,7 @@ class Figures:
     ) -> None:
         self._extent = tuple(MICRONS * edge for edge in raster.extent)
         left, right, bottom, top = self._extent
-        self.x_range, self.y_range = Range1d(left, right), Range1d(bottom, top)
+        self.x_range, self.y_range = _range(left, right), _range(bottom, top)
         self.cursor = ColumnDataSource(_points(knobs.points(CURSOR)))
         self.ends = {name: ColumnDataSource(_points(knobs.points(name))) for name in LINES}
         self._spans = [
@@ -167,22 +167,28 @@ class Figures:
         left, right, bottom, top = self._extent
         return (top - bottom) / (right - left)
 
+    @property
+    def seen(self) -> tuple[float, float, float, float]:
+        """The part of the images that is seen: left, right, bottom and top in m."""
+        ends = (self.x_range.start, self.x_range.end, self.y_range.start, self.y_range.end)
+        left, right, bottom, top = (end / MICRONS for end in ends)
+        return left, right, bottom, top
+
     def show(self, picture: Picture) -> None:
         """Show a picture's images; its lines are the page's to show, see `line_data`."""
         measured = np.where(picture.flagged, np.nan, picture.measured) - KELVIN
         scene, error = picture.scene, picture.error
         if scene is not None:
             self.images["scene"].figure.title.text = f"Scene: {scene.label}"
-        limits = ends(measured, 0.0, 100.0, 10.0)
+        limits = temperature_limits(picture)
         if scene is not None and scene.is_temperature:
-            limits = min(limits[0], _lowest(picture)), max(limits[1], float(np.nanmax(scene.shown)))
             self._set("scene", scene.shown, scene.raster, limits, HEAT)
         elif scene is not None:
             self._set("scene", scene.shown, scene.raster, ends(scene.shown), PLAIN)
         self._set("measured", measured, picture.raster, limits, HEAT)
         if error is not None:
             shown = np.where(picture.flagged, np.nan, error)
-            limit = round_limit(shown, 99, 5.0)
+            limit = error_limit(picture)
             self.images["error"].figure.title.text = f"{ERRORS[picture.knobs.error]} / K"
             self._set("error", shown, picture.raster, (-limit, limit), SIGNED)
         lowest = picture.camera.lower_limit if picture.camera else None
@@ -374,7 +380,7 @@ class Figures:
             name=f"{name}_figure",
             min_border=4,
         )
-        empty = {"along": [0.0, 1.0], "measured": [0.0, 1.0], "reference": [0.0, 1.0]}
+        empty: dict[str, list[float]] = {"along": [], "measured": [], "reference": []}
         source = ColumnDataSource(empty, name=f"{name}_values")
         band = self.band_sources[name] = ColumnDataSource({"along": [], "low": [], "high": []})
         colour = LINE_COLOURS[name]
@@ -429,6 +435,11 @@ class Figures:
                 one.js_on_event(event, code)
 
 
+def _range(start: float, end: float) -> Range1d:
+    """Range of an image: the wheel leads no further out than to three times of it."""
+    return Range1d(start, end, bounds=(2 * start - end, 2 * end - start))
+
+
 def places(source: ColumnDataSource) -> str:
     """Places of a source as a knob's text."""
     return ";".join(
@@ -458,6 +469,21 @@ def _outline(tool: Tool | None) -> tuple[list[float], list[float]] | None:
         return None
     x, y = MICRONS * tool.outline(3e-3).T
     return x.tolist(), y.tolist()
+
+
+def temperature_limits(picture: Picture) -> tuple[float, float]:
+    """Ends of the colours of temperatures in °C: of both images where the scene's shows one."""
+    low, high = ends(np.where(picture.flagged, np.nan, picture.measured) - KELVIN, 0.0, 100.0, 10.0)
+    scene = picture.scene
+    if scene is None or not scene.is_temperature:
+        return low, high
+    return min(low, _lowest(picture)), max(high, float(np.nanmax(scene.shown)))
+
+
+def error_limit(picture: Picture) -> float:
+    """End of the colours of the error in K."""
+    assert picture.error is not None
+    return round_limit(np.where(picture.flagged, np.nan, picture.error), 99, 5.0)
 
 
 def _lowest(picture: Picture) -> float:

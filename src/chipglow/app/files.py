@@ -3,20 +3,29 @@
 import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chipglow.app.figures import LINE_COLOURS
-from chipglow.app.knobs import LINE_NAMES, LINES, SHOWN, Knobs
+from chipglow.app.figures import LINE_COLOURS, error_limit, temperature_limits
+from chipglow.app.knobs import ERRORS, LINE_NAMES, LINES, Knobs, counts
 from chipglow.app.model import SceneModel
-from chipglow.app.picture import Picture
-from chipglow.drawing.drawing import ImagePanel, draw_line, length_unit, new_figure, style
-from chipglow.drawing.scales import BLUE, GREY, HEAT, KELVIN, PLAIN, SIGNED, ends, round_limit
+from chipglow.app.picture import Drawn, Picture
+from chipglow.drawing.drawing import (
+    colour_bar,
+    draw_line,
+    length_unit,
+    new_figure,
+    show_image,
+    style,
+)
+from chipglow.drawing.scales import BLUE, GREY, HEAT, KELVIN, PLAIN, SIGNED, VOID, ends
 from chipglow.io import StoredScene, write_dataset
 from chipglow.study import study_text
 
-_IMAGE_WIDTH, _LINES_HEIGHT = 1.35, 2.2
+_IMAGE_WIDTH, _LINES_HEIGHT = 1.95, 2.4
 """Width of an image and height of the plots of lines in inches."""
 
 
@@ -52,63 +61,104 @@ def measurement_file(picture: Picture, model: SceneModel) -> bytes:
         return path.read_bytes()
 
 
-def figure_file(picture: Picture, model: SceneModel) -> bytes:
-    """The images and the lines as PNG."""
+def figure_file(
+    picture: Picture,
+    model: SceneModel,
+    seen: tuple[float, float, float, float],
+    drawn: Drawn | None = None,
+) -> bytes:
+    """The images and the lines as PNG: the part of the images that is seen, and the draws."""
     with style(), TemporaryDirectory() as folder:
         path = Path(folder, "figure.png")
-        _figure(picture, model).savefig(path, dpi=200)
+        _figure(picture, model, seen, drawn).savefig(
+            path, dpi=200, bbox_inches="tight", pad_inches=0.05
+        )
         return path.read_bytes()
 
 
-def _figure(picture: Picture, model: SceneModel) -> Figure:
-    assert picture.scene is not None and picture.error is not None
-    tool, knobs = model.opened.scene.tool, picture.knobs
-    raster = picture.raster
-    upper = 0.7 + _IMAGE_WIDTH * raster.rows / raster.columns
+def _figure(
+    picture: Picture,
+    model: SceneModel,
+    seen: tuple[float, float, float, float],
+    drawn: Drawn | None,
+) -> Figure:
+    left, right, bottom, top = seen
+    upper = 1.1 + _IMAGE_WIDTH * (top - bottom) / (right - left)
     figure = new_figure(upper + _LINES_HEIGHT)
-    grid = figure.add_gridspec(2, 1, height_ratios=(upper, _LINES_HEIGHT))
-    top, bottom = (figure.add_subfigure(grid[row]) for row in (0, 1))
-    images, plots = top.subplots(1, 3), bottom.subplots(1, 3)
-    measured = np.where(picture.flagged, np.nan, picture.measured) - KELVIN
-    error = np.where(picture.flagged, np.nan, picture.error)
-    limit = round_limit(error, 98, 5.0)
-    shown = picture.scene.shown
-    part = model.panel.knob("error").choices or {}
-    panels = (
-        ImagePanel(
-            SHOWN[picture.scene.name],
-            picture.scene.label,
-            shown,
-            ends(shown),
-            HEAT if picture.scene.is_temperature else PLAIN,
-        ),
-        ImagePanel("Radiance temperature", "measured / °C", measured, ends(measured), HEAT),
-        ImagePanel(part[knobs.error], "error / K", error, (-limit, limit), SIGNED),
-    )
-    rasters = (picture.scene.raster, picture.raster, picture.raster)
-    for panel, raster, one in zip(panels, rasters, images, strict=True):
-        panel.draw(top, one, raster, tool)
-        for name in LINES:
-            corners = np.array(getattr(knobs, name))
-            draw_line(one, corners, LINE_COLOURS[name], factor=length_unit(raster)[0])
-    for name, one in zip(LINES, plots, strict=False):
-        values = picture.lines[name]
-        assert values.reference is not None
-        along = 1e6 * values.distance
-        one.plot(along, values.reference - KELVIN, color=GREY, label="reference")
-        one.plot(along, values.measured - KELVIN, color=BLUE, label="measured")
-        one.set_title(LINE_NAMES[name].capitalize(), color="black")
-        one.set(xlabel="distance / µm", ylabel="radiance temperature / °C")
-    plots[2].axis("off")
-    plots[2].text(0, 1, _caption(picture, model), va="top", fontsize=7.5)
-    plots[2].legend(*plots[0].get_legend_handles_labels(), loc="lower left")
+    axes = figure.subplots(2, 3, height_ratios=(upper, _LINES_HEIGHT))
+    _draw_images(figure, axes[0], picture, model, seen)
+    for name, one in zip(LINES, axes[1], strict=False):
+        _draw_line(one, name, picture, drawn)
+    axes[1, 0].legend(frameon=False, fontsize=6.5)
+    axes[1, 1].set_ylabel("")
+    axes[1, 2].axis("off")
+    axes[1, 2].text(0, 1, _caption(picture, model), va="top", fontsize=6)
     return figure
 
 
+def _draw_images(
+    figure: Figure,
+    axes: Any,
+    picture: Picture,
+    model: SceneModel,
+    seen: tuple[float, float, float, float],
+) -> None:
+    """Scene, measurement and error, with the colours of the page."""
+    scene, knobs = picture.scene, picture.knobs
+    assert scene is not None and picture.error is not None
+    measured, error = (
+        np.where(picture.flagged, np.nan, image)
+        for image in (picture.measured - KELVIN, picture.error)
+    )
+    heat, limit = temperature_limits(picture), error_limit(picture)
+    of_scene = (heat, HEAT) if scene.is_temperature else (ends(scene.shown), PLAIN)
+    quantity, _, unit = scene.label.partition(" / ")
+    panels = (
+        (quantity.capitalize(), unit, scene.shown, scene.raster, *of_scene),
+        ("Measured", "°C", measured, picture.raster, heat, HEAT),
+        (ERRORS[knobs.error], "K", error, picture.raster, (-limit, limit), SIGNED),
+    )
+    factor, _ = length_unit(model.opened.scene.raster)
+    left, right, bottom, top = (factor * end for end in seen)
+    for one, (title, unit, image, raster, limits, colours) in zip(axes, panels, strict=True):
+        shown = show_image(one, image, raster, model.opened.scene.tool, colours, limits)
+        colour_bar(figure, shown, one, unit, "bottom")
+        one.set_title(title)
+        for name in LINES:
+            draw_line(one, np.array(getattr(knobs, name)), LINE_COLOURS[name], factor=factor)
+        for colour, width in (("black", 2.6), ("white", 1.2)):
+            one.plot(*factor * np.array(knobs.cursor), "+", color=colour, mew=width, ms=7)
+        one.set_xlim(left, right)
+        one.set_ylim(bottom, top)
+        if one is not axes[0]:
+            one.set(ylabel="", yticklabels=[])
+
+
+def _draw_line(axes: Axes, name: str, picture: Picture, drawn: Drawn | None) -> None:
+    values = picture.lines[name]
+    assert values.reference is not None
+    along = 1e6 * values.distance
+    if drawn is not None:
+        rows = drawn.lines[name].measured - KELVIN
+        low, high = rows.min(axis=0), rows.max(axis=0)
+        axes.fill_between(along, low, high, color=BLUE, alpha=0.25, lw=0, label="range of draws")
+    axes.plot(along, values.reference - KELVIN, "--", color=GREY, label="reference")
+    axes.plot(along, values.measured - KELVIN, color=BLUE, label="measured")
+    axes.set_title(LINE_NAMES[name].capitalize(), color="black")
+    axes.set(xlabel="distance / µm", ylabel="radiance temp. / °C")
+    limit = picture.camera.lower_limit if picture.camera else None
+    low, high = axes.get_ylim()
+    if limit is not None and limit - KELVIN > low:
+        axes.axhspan(low, limit - KELVIN, color=VOID, zorder=0)
+        axes.set_ylim(low, high)
+
+
 def _caption(picture: Picture, model: SceneModel) -> str:
-    """What the camera is, a line for each knob that is not at its first value."""
+    """What the camera and the surface are: a line for each knob."""
     knobs = picture.knobs
-    texts = {"start": model.panel.knob("start").text(knobs.start), **model.panel.texts(knobs)}
-    known = {knob.name: knob.label for knob in model.panel.knobs}
-    rows = [f"{known[name]}: {text}" for name, text in texts.items() if name in known]
-    return re.sub(r"\bu(m|s)\b", r"µ\1", "\n".join([model.opened.name, *rows]))
+    rows = [model.opened.name]
+    for knob in model.panel.knobs:
+        value = getattr(knobs, knob.name)
+        if knob.name not in ("shown", "error") and counts(knob, knobs):
+            rows.append(f"{knob.label}: {(knob.choices or {}).get(value, knob.text(value))}")
+    return re.sub(r"\bdegC\b", "°C", re.sub(r"\bu(m|s)\b", r"µ\1", "\n".join(rows)))

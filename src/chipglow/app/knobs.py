@@ -1,5 +1,6 @@
 """The knobs of the app: what they are called, how a study writes them, and the study they mean."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -20,7 +21,7 @@ from chipglow.quantities.units import (
     WAVELENGTH,
     Quantity,
 )
-from chipglow.scene import Scene
+from chipglow.scene import Raster, Scene
 from chipglow.study import Study
 from chipglow.study.analysis_section import AnalysisSection
 from chipglow.study.camera_section import CameraSection
@@ -30,6 +31,8 @@ from chipglow.text.description import problem
 
 Point: TypeAlias = tuple[float, float]
 Ends: TypeAlias = tuple[Point, Point]
+
+_BARE: Final = re.compile(r"[-+−]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE)
 
 OWN: Final = "own numbers"
 UNIFORM: Final = "uniform"
@@ -61,6 +64,9 @@ LINE_NAMES: Final[Mapping[str, str]] = {
     "band_line": "across the shear band",
 }
 CURSOR: Final = "cursor"
+
+_ROUNDED: Final = 1e-7
+"""Places of cursor and lines are written to a tenth of a micrometre."""
 
 NOISE_TEMPERATURE: Final = 573.15
 """Temperature in K of the blackbody at which the noise is stated: the paper's lower range limit."""
@@ -140,10 +146,11 @@ class Knob:
                 return int(written)
             if self.quantity is None:
                 return float(written)
-            bare = written.lstrip("+-−").replace(".", "", 1).isdigit()
-            return self.quantity.parse(f"{written} {self.quantity.unit}" if bare else written)
+            bare = f"{written} {self.quantity.unit}" if _BARE.fullmatch(written) else written
+            return self.quantity.parse(bare)
         except ValueError as error:
-            wanted = str(error) if self.quantity else f"{written!r}, expected a number"
+            kind = "a whole number" if self.whole else "a number"
+            wanted = str(error) if self.quantity else f"{written!r}, expected {kind}"
             raise ValueError(f"{self.label}: {wanted}") from None
 
 
@@ -288,6 +295,24 @@ def _detector(netd: float) -> dict[str, Any]:
     }
 
 
+_WHEN: Final = {
+    "numerical_aperture": ("psf", "annular-aperture"),
+    "fwhm": ("psf", "gaussian"),
+    "body_mean": ("surface", OWN),
+    "body_deviation": ("surface", OWN),
+    "band_mean": ("surface", OWN),
+    "band_deviation": ("surface", OWN),
+    "emissivity": ("surface", UNIFORM),
+}
+"""Knobs that only count, and are only there, while another knob has a value."""
+
+
+def counts(knob: Knob, knobs: Knobs) -> bool:
+    """Whether a knob counts beside the others."""
+    name, value = _WHEN.get(knob.name, ("", ""))
+    return not name or bool(getattr(knobs, name) == value)
+
+
 @dataclass(frozen=True)
 class ControlPanel:
     """The knobs of one study on one scene, and how they become the study again.
@@ -300,21 +325,25 @@ class ControlPanel:
         The knobs that mean it.
     knobs : tuple of Knob
         In the order of the page.
+    extent : tuple of float
+        Where cursor and lines may be: left, right, bottom and top in m.
     """
 
     study: Study
     initial: Knobs
     knobs: tuple[Knob, ...]
+    extent: tuple[float, float, float, float]
 
     @classmethod
     def of(cls, study: Study, scene: Scene, initial: Knobs, duration: float) -> "ControlPanel":
         """The knobs for a scene with sliders as long as it, in which a frame takes a duration."""
-        return cls(study, initial, tuple(_knobs(study, scene, initial, duration)))
+        knobs = tuple(_knobs(study, scene, initial, duration))
+        return cls(study, initial, knobs, scene.raster.extent)
 
     @classmethod
-    def of_times(cls, initial: Knobs, times: NDArray[np.float64]) -> "ControlPanel":
+    def of_times(cls, initial: Knobs, times: NDArray[np.float64], raster: Raster) -> "ControlPanel":
         """The knob of a measurement: which of its frames is seen."""
-        return cls(Study(), initial, (_time_knob("Frame began", times),))
+        return cls(Study(), initial, (_time_knob("Frame began", times),), raster.extent)
 
     def knob(self, name: str) -> Knob:
         """The knob of a name."""
@@ -334,14 +363,39 @@ class ControlPanel:
             if name in known:
                 changes[name] = known[name].value(text)
             elif name == CURSOR:
-                changes[name] = _points(name, text, 1)[0]
+                changes[name] = self._points("Cursor", text, 1)[0]
             elif name in LINES:
-                changes[name] = _points(LINE_NAMES[name], text, 2)
+                changes[name] = self._points(f"Line {LINE_NAMES[name]}", text, 2)
             else:
                 raise ValueError(f"{name}: unknown knob, expected one of {', '.join(known)}")
         new = replace(knobs, **changes)
-        self.study_of(new)
+        try:
+            self.study_of(new)
+        except ValueError as error:
+            raise ValueError(f"{self.named(texts)}: {error}") from None
         return new
+
+    def named(self, texts: Mapping[str, str]) -> str:
+        """Knobs and what they are set to, as a message names them."""
+        labels = {CURSOR: "Cursor", **{name: f"Line {LINE_NAMES[name]}" for name in LINES}}
+        labels |= {knob.name: knob.label for knob in self.knobs}
+        return ", ".join(f"{labels[name]} {text}" for name, text in texts.items())
+
+    def _points(self, name: str, text: str, count: int) -> Any:
+        """Points of a text such as ``-35,120;20,140`` in µm, that are in the image."""
+        found = _points(name, text, count)
+        left, right, bottom, top = self.extent
+        for x, y in found:
+            if not (
+                left - _ROUNDED <= x <= right + _ROUNDED
+                and bottom - _ROUNDED <= y <= top + _ROUNDED
+            ):
+                ends = [f"{1e6 * end:.1f}" for end in self.extent]
+                raise ValueError(
+                    f"{name}: {text}, expected x from {ends[0]} to {ends[1]} µm and y from "
+                    f"{ends[2]} to {ends[3]} µm"
+                )
+        return found
 
     def texts(self, knobs: Knobs) -> dict[str, str]:
         """The knobs that differ from the first ones, as a link writes them."""

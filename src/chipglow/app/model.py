@@ -5,7 +5,7 @@ result is kept: surfaces, exposures, images.
 """
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
 from math import ceil, nan
 from threading import Lock
@@ -25,6 +25,7 @@ from chipglow.app.picture import (
     SceneImage,
 )
 from chipglow.camera import Camera, Exposure
+from chipglow.camera.exposure import frame_weights
 from chipglow.camera.sweep import Check
 from chipglow.errors import (
     Distribution,
@@ -105,6 +106,28 @@ class SceneModel:
     def has_quick_look(self) -> bool:
         """Whether the scene is so large that a coarse picture goes before the exact one."""
         return self.opened.coarse is not None
+
+    def turned(self, knobs: Knobs, texts: Mapping[str, str]) -> Knobs:
+        """Knobs with some of them set by their text, if a picture can be made of them.
+
+        Raises
+        ------
+        ValueError
+            If not; the message names the knob.
+        """
+        new = self.panel.changed(knobs, texts)
+        try:
+            self._check(new)
+        except ValueError as error:
+            raise ValueError(f"{self.panel.named(texts)}: {error}") from None
+        return new
+
+    def _check(self, knobs: Knobs) -> None:
+        scene = self.opened.scene
+        camera = self._camera(self.panel.study_of(knobs), scene)
+        camera.pixels(scene.raster)
+        duration = camera.frame_duration(scene.raster)
+        frame_weights(scene.times, scene.frame_spacing, knobs.start, duration)
 
     def is_ready(self, knobs: Knobs) -> bool:
         """Whether the exposure of these knobs is at hand, and an exact picture a matter of ms."""
@@ -392,6 +415,10 @@ class MeasurementModel:
     def __init__(self, opened: OpenedMeasurement) -> None:
         self.opened = opened
         self.panel: ControlPanel = opened.panel
+
+    def turned(self, knobs: Knobs, texts: Mapping[str, str]) -> Knobs:
+        """Knobs with some of them set by their text; raises as that of a scene."""
+        return self.panel.changed(knobs, texts)
 
     def is_ready(self, knobs: Knobs) -> bool:
         """Whether a picture is a matter of milliseconds: always."""

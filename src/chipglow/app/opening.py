@@ -106,7 +106,7 @@ class OpenedMeasurement:
         """The one knob, the time, and lines across the middle."""
         place = _middle(self.measurement.raster)
         initial = knobs_of(Study(), float(self.measurement.times[0]), *place)
-        return ControlPanel.of_times(initial, self.measurement.times)
+        return ControlPanel.of_times(initial, self.measurement.times, self.measurement.raster)
 
 
 def open_any(

@@ -270,6 +270,7 @@ export function render({ view, model, el }) {
     for (const [label, value, tip] of rows) {
       table.append(element("tr", { title: tip ?? "" }, element("th", { scope: "row" }, label), element("td", {}, value)));
     }
+    box.classList.remove("old");
     box.replaceChildren(table);
     if (!parts.length) return;
     const most = Math.max(1e-9, ...parts.map((part) => Math.abs(part.kelvin ?? 0)));
@@ -301,6 +302,7 @@ export function render({ view, model, el }) {
   function showPicture({ number, lines }) {
     requestAnimationFrame(() => setTimeout(() => {
       send({ painted: number });
+      find(".numbers").classList.add("old"); // until those of this picture come
       for (const [name, data] of Object.entries(lines)) {
         found(name).setv({ data }, { sync: false });
       }

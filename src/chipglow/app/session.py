@@ -198,7 +198,7 @@ class Session:
         ValueError
             If that is not possible; the knobs then stay.
         """
-        self.set(self.model.panel.changed(self.knobs, texts), final)
+        self.set(self.model.turned(self.knobs, texts), final)
 
     def set(self, knobs: Knobs, final: bool = True) -> None:
         """Go to a state of the knobs."""

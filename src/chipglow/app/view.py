@@ -22,10 +22,8 @@ from chipglow.app.figures import IMAGES, Figures, places
 from chipglow.app.knobs import (
     CURSOR,
     LINES,
-    OWN,
-    UNIFORM,
     Knob,
-    Knobs,
+    counts,
 )
 from chipglow.app.model import SceneModel
 from chipglow.app.opening import OpenedMeasurement, OpenedScene
@@ -41,17 +39,6 @@ TEXTURES: Final = 5
 
 _FOLDER: Final = Path(__file__).parent
 _VIEW_WIDTH: Final = 160e-6
-
-_WHEN: Final = {
-    "numerical_aperture": ("psf", "annular-aperture"),
-    "fwhm": ("psf", "gaussian"),
-    "body_mean": ("surface", OWN),
-    "body_deviation": ("surface", OWN),
-    "band_mean": ("surface", OWN),
-    "band_deviation": ("surface", OWN),
-    "emissivity": ("surface", UNIFORM),
-}
-"""Knobs that only count, and are only there, while another knob has a value."""
 
 _PARTS: Final = (
     ("motion", "Motion", "Mean over the exposure less its greatest", ""),
@@ -138,6 +125,7 @@ class View:
         self._handled = 0
         self._began = 0.0
         self._picture: Picture | None = None
+        self._drawn: Drawn | None = None
         self.page = Page(
             spec=json.dumps(self._spec(opened, uploads)),
             sizing_mode="stretch_width",
@@ -170,13 +158,22 @@ class View:
         self.page._send_msg({"kind": kind, "content": content})
 
     def _restore(self, texts: dict[str, str]) -> str:
-        """Turn the knobs as a link says; what is wrong with it, or nothing."""
+        """Turn the knobs as a link says; what is wrong with it, or nothing.
+
+        What is right of a link counts even if something else is wrong.
+        """
+        model, knobs = self.session.model, self.session.knobs
+        refused = ""
         try:
-            knobs = self.session.model.panel.changed(self.session.knobs, texts)
-        except ValueError as error:
-            return f"Link: {error}"
+            knobs = model.turned(knobs, texts)
+        except ValueError:
+            for name, text in texts.items():
+                try:
+                    knobs = model.turned(knobs, {name: text})
+                except ValueError as error:
+                    refused = refused or f"Link: {error}"
         self.session.knobs = knobs
-        return ""
+        return refused
 
     def _listen(self) -> None:
         def received(event: Any) -> None:
@@ -240,6 +237,7 @@ class View:
         self._turned()
 
     def _turned(self) -> None:
+        self._refused = ""
         self._began = perf_counter()
         self.figures.set_places(self.session.knobs)
         self._put_values()
@@ -267,7 +265,8 @@ class View:
             self._say("The exact picture is not there yet: save it when it is.", "error")
             return
         elif what == "figure":
-            data, name, kind = figure_file(picture, model), "chipglow.png", "image/png"
+            data = figure_file(picture, model, self.figures.seen, self._drawn)
+            name, kind = "chipglow.png", "image/png"
         else:
             data, name, kind = (
                 measurement_file(picture, model),
@@ -279,7 +278,7 @@ class View:
         self._say(f"{name} is saved.", "")
 
     def _show(self, number: int, picture: Picture) -> None:
-        self._picture = picture
+        self._picture, self._drawn = picture, None
         self.figures.show(picture)
         self.figures.show_drawn(None)
         assert picture.scene is not None or picture.errors is None
@@ -293,10 +292,11 @@ class View:
             if self._began:
                 took = 1e3 * (perf_counter() - self._began)
                 text = f"Exact picture, {took:.0f} ms after the last change."
-        self._say(text, "busy" if picture.coarse else "")
+        if self._refused and not picture.coarse:
+            self._say(self._refused, "error")
+        else:
+            self._say(text, "busy" if picture.coarse else "")
         self._send("picture", {"number": number, "lines": self.figures.line_data(picture)})
-        if picture.coarse:
-            self._put_numbers([], [])
 
     def _tell(self, picture: Picture, found: Readout) -> None:
         """Numbers at the cursor."""
@@ -350,6 +350,7 @@ class View:
     def _show_drawn(self, drawn: Drawn) -> None:
         if drawn.knobs != self.session.knobs:
             return
+        self._drawn = drawn
         self.figures.show_drawn(drawn)
         if drawn.error is None:
             self._say("Drawn: shaded is the range of the draws.", "")
@@ -377,7 +378,7 @@ class View:
         for name in (CURSOR, *LINES):
             points = knobs.points(name)
             values[name] = "; ".join(f"{1e6 * x:.1f}, {1e6 * y:.1f}" for x, y in points)
-        visible = [knob.name for knob in panel.knobs if _counts(knob, knobs)]
+        visible = [knob.name for knob in panel.knobs if counts(knob, knobs)]
         content = {
             "n": self._handled,
             "values": values,
@@ -446,11 +447,6 @@ def _described(knob: Knob) -> dict[str, Any]:
         "choices": list(knob.choices.items()) if knob.choices else None,
         "optional": knob.optional,
     }
-
-
-def _counts(knob: Knob, knobs: Knobs) -> bool:
-    name, value = _WHEN.get(knob.name, ("", ""))
-    return not name or getattr(knobs, name) == value
 
 
 def _celsius(kelvins: float) -> str:

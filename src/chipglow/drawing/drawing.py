@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Final, Generic, Literal, TypeVar
 
 import matplotlib
 import numpy as np
@@ -160,7 +160,13 @@ def draw_line(
     axes.plot(*(points * factor).T, color=colour, linewidth=1.6, label=label)
 
 
-def colour_bar(figure: FigureBase, picture: AxesImage, axes: Any, label: str) -> None:
+def colour_bar(
+    figure: FigureBase,
+    picture: AxesImage,
+    axes: Any,
+    label: str,
+    location: Literal["right", "bottom"] = "right",
+) -> None:
     """Colour bar beside one or several axes, with its quantity and unit; arrows where it ends."""
     values, low, high = picture.get_array(), picture.norm.vmin, picture.norm.vmax
     assert values is not None and low is not None and high is not None
@@ -168,7 +174,7 @@ def colour_bar(figure: FigureBase, picture: AxesImage, axes: Any, label: str) ->
     extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(
         (under, over), "neither"
     )
-    figure.colorbar(picture, ax=axes, label=label, extend=extend, aspect=25)
+    figure.colorbar(picture, ax=axes, label=label, extend=extend, aspect=25, location=location)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """A number with its unit, as the tables print it."""
 
-from math import floor, log10
+from math import floor, isnan, log10
 
 
 def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "") -> str:
@@ -25,6 +25,8 @@ def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "")
 
 def rounded_text(value: float, unit: str = "") -> str:
     """Text of a number to four digits that count, with its unit."""
+    if isnan(value):
+        return quantity_text(None, unit, 0)
     if value == 0.0:
         return quantity_text(0.0, unit, 0)
     size = floor(log10(abs(value)))
