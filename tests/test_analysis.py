@@ -11,15 +11,15 @@ from hypothesis import given, settings, strategies as st
 from measured_band import BandImage
 from scipy.interpolate import RegularGridInterpolator
 
-from chipglow.camera import Camera, Exposure, GaussianPSF
-from chipglow.errors import (
+from chipglow.analysis import (
     Plan,
     analyse,
     error_images,
     rake_errors,
     reference_temperature,
 )
-from chipglow.errors.error_images import LEAST_COVERED, ErrorImages
+from chipglow.analysis.error_images import LEAST_COVERED, ErrorImages
+from chipglow.camera import Camera, Exposure, GaussianPSF
 from chipglow.laboratory.chip import NoShearBandError, contact_length, find_shear_band, segmentation
 from chipglow.radiometry import Band
 from chipglow.scene import Material, Raster, Scene, ToolGeometry, sample, straight_line

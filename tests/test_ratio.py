@@ -12,6 +12,15 @@ from scipy.integrate import simpson
 from scipy.optimize import brentq
 from typer.testing import CliRunner
 
+from chipglow.analysis import (
+    RATIO_CAUSES,
+    Plan,
+    Spot,
+    WavelengthPlan,
+    cut_spots,
+    ratio_errors,
+    wavelength_errors,
+)
 from chipglow.camera import (
     AnnularAperturePSF,
     BlurredPSF,
@@ -29,15 +38,6 @@ from chipglow.camera import (
     expose_views,
 )
 from chipglow.cli import app
-from chipglow.errors import (
-    RATIO_CAUSES,
-    Plan,
-    Spot,
-    WavelengthPlan,
-    cut_spots,
-    ratio_errors,
-    wavelength_errors,
-)
 from chipglow.io import write_scene
 from chipglow.radiometry import Band, RatioThermometer, spectral_radiance
 from chipglow.scene import Raster, Scene
