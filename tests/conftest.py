@@ -13,6 +13,10 @@ from chipglow.cutting import FLOW_LAWS
 
 MOST_SECONDS = 1200
 
+# Each process of pytest-xdist has a core: another thread of BLAS would spin while it waits for one.
+for library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
 # The same examples on every machine; --hypothesis-profile=search draws new ones. The first example
 # of a test may compile, so that no example has a time limit.
 settings.register_profile("fixed", derandomize=True, database=None, deadline=None)
