@@ -73,7 +73,7 @@ def exposure(start=0.0):
     return Exposure(start, 10e-6, SCENE, radiance, single, kelvins, radiance)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(radiance=arrays(np.float64, (90, 120), elements=st.floats(0.0, 900.0)))
 def test_without_a_detector_images_are_read_as_they_are(radiance):
     for psf in (None, AnnularAperturePSF()):

@@ -91,7 +91,7 @@ def analytic_scene():
 # --- the thermometer
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(300.0, 3000.0), st.floats(0.01, 1.0), st.floats(0.5, 2.0))
 def test_the_ratio_gives_the_temperature_back_whatever_the_emissivity(kelvins, emissivity, ratio):
     thermometer = RatioThermometer(SHORT, LONG, ratio)

@@ -393,7 +393,7 @@ def test_bad_input_is_one_line_with_file_field_value_and_expectation(
 TEMPLATE = [line for line in study_text(Study()).splitlines() if line.strip()[:1] not in ("", "#")]
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     number=st.integers(0, len(TEMPLATE) - 1),
     text=st.text(max_size=12)
