@@ -10,9 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis.distribution import Distribution, ratio
+from chipglow.analysis.looks import ALL, WITHOUT_PSF
 
-ALL = "all"
-WITHOUT_PSF = "without psf"
 _DRAWS = ("exposure", "texture", "pixel_phase")
 
 
