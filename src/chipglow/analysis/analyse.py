@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import isfinite
 from typing import Any, Final, TypeVar
 
@@ -176,11 +177,14 @@ def _segments(task: _Task) -> tuple[Segments | None, tuple[str, ...]]:
 def _cut_schedule(task: _Task, found: Segments) -> tuple[Schedule, Frame]:
     plan, surfaces = task.plan, task.surfaces
     reach = plan.line_reach, plan.line_step
-    rake = [
-        [RakePlace("rake face", one.tool, one.contact_length, *reach)] for one in found.segments
+    segments = found.segments
+    used: list[tuple[str, list[list[Place]]]] = [
+        (
+            plan.rake_surface,
+            [[RakePlace("rake face", one.tool, one.contact_length, *reach)] for one in segments],
+        ),
+        (plan.band_surface, [[BandPlace("shear band", one.band, *reach)] for one in segments]),
     ]
-    band = [[BandPlace("shear band", one.band, *reach)] for one in found.segments]
-    used = (plan.rake_surface, rake), (plan.band_surface, band)
     random = any(_is_random(surfaces[name]) for name, _ in used)
     textures, phases = plan.textures if random else 1, plan.phases**2
     strides = 2 * textures * phases, 2 * phases, 2
@@ -195,14 +199,12 @@ def _cut_schedule(task: _Task, found: Segments) -> tuple[Schedule, Frame]:
         phases=plan.phases,
         reference=plan.reference,
         vary=[
-            lambda camera, psf=GaussianPSF(width), order=order: replace(  # type: ignore[misc]
-                camera, psf=psf, psf_order=order
-            )
+            partial(replace, psf=GaussianPSF(width), psf_order=order)
             for order in PSF_ORDERS
             for width in plan.psf_widths
         ],
     )
-    return schedule, found.segments[0].frame
+    return schedule, segments[0].frame
 
 
 def _scene_schedule(task: _Task) -> tuple[Schedule, Frame]:

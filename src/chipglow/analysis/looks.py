@@ -113,7 +113,7 @@ class Table:
     def put(self, key: tuple[int, str, str], index: tuple[int, ...], values: Array) -> None:
         """Put values at an index of the first axes, and from the beginning of the last."""
         row = self.rows.setdefault(key, np.full(self.shape, np.nan))
-        row[(*index, ..., slice(values.shape[-1]))] = values
+        row[index][..., : values.shape[-1]] = values
 
     def stacked(self) -> Array:
         """All rows; the first axis is the keys'."""

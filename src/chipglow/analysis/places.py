@@ -235,7 +235,7 @@ class BandPlace(Place):
 
 def _to_both_sides(half_length: float, step: float) -> NDArray[np.float64]:
     count = round(half_length / step)
-    return step * np.arange(-count, count + 1)
+    return step * np.arange(-count, count + 1, dtype=np.float64)
 
 
 def _lowest_near(distance: NDArray[np.float64], values: Stack, pitch: float) -> int:
