@@ -18,6 +18,7 @@ from chipglow.camera import Camera, Measurement
 from chipglow.cli import app
 from chipglow.cutting import CuttingSimulation, SolverError
 from chipglow.io import atomic_folder, open_scene, read_measurement, write_scene
+from chipglow.io.digest import is_intact
 from chipglow.laboratory.emissivity import (
     Heating,
     RegionEmissivities,
@@ -195,6 +196,18 @@ def test_a_second_run_finds_the_scene_and_replaces_the_results(earlier_results, 
     assert len(runs) == 1
     assert {path.name for path in earlier_results.iterdir()} == {".chipglow-files", "summary.json"}
     assert load_study(earlier_results / "summary.json") == load_study("study.yaml")
+
+
+def test_a_damaged_scene_in_the_cache_is_computed_again(folder, runs):
+    path = cut(load_study("study.yaml"))
+    whole = path.read_bytes()
+    path.write_bytes(whole[:5000] + bytes([whole[5000] ^ 1]) + whole[5001:])
+    result = chipglow("cut", "study.yaml", "--out", "scene.nc")
+    assert result.exit_code == 0, result.output
+    assert "in the cache is damaged: it is computed again" in " ".join(result.stderr.split())
+    assert len(runs) == 2
+    assert open_scene("scene.nc").frame(1).temperature.shape == AnalyticChip().raster.shape
+    assert is_intact(path)
 
 
 def test_reproduce_runs_the_papers_study(folder, monkeypatch):

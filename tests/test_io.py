@@ -94,9 +94,8 @@ def leftovers(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-@pytest.mark.parametrize("portable", [False, True])
-def test_scene_comes_back(tmp_path, portable):
-    scene = open_scene(a_file(tmp_path, portable=portable))
+def test_scene_comes_back(tmp_path):
+    scene = open_scene(a_file(tmp_path))
     np.testing.assert_allclose(scene.raster.extent, RASTER.extent, rtol=1e-12)
     assert scene.raster.shape == RASTER.shape
     assert scene.tool == ToolGeometry()
@@ -157,7 +156,7 @@ def test_any_scene_comes_back(tmp_path, temperature, strain, speed, position):
 
 def test_write_scene_keeps_all(tmp_path):
     scene = open_scene(a_file(tmp_path))
-    write_scene(scene, tmp_path / "copy.nc", portable=True)
+    write_scene(scene, tmp_path / "copy.nc")
     copy = open_scene(tmp_path / "copy.nc")
     assert copy.tool == scene.tool
     assert copy.data.attrs == scene.data.attrs
@@ -196,8 +195,8 @@ def test_a_pixel_keeps_its_radiance_temperature(tmp_path):
     np.testing.assert_allclose(found, expected, rtol=0, atol=0.6e-3)
 
 
-def test_portable_needs_no_plugin(tmp_path):
-    path = a_file(tmp_path, portable=True)
+def test_a_scene_needs_no_plugin(tmp_path):
+    path = a_file(tmp_path)
     program = (
         "import sys, xarray as xr\n"
         f"data = xr.load_dataset({str(path)!r}, engine='h5netcdf', decode_times=False)\n"
@@ -299,7 +298,7 @@ def test_a_foreign_file_is_named(tmp_path):
 
 
 def test_a_damaged_frame_is_named(tmp_path):
-    path = a_file(tmp_path, portable=True)
+    path = a_file(tmp_path)
     with h5py.File(path) as file:
         at = file["temperature"].id.get_chunk_info(1)
     damaged = bytearray(path.read_bytes())

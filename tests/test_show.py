@@ -126,7 +126,7 @@ def test_the_command_prints_what_is_there(path):
         "-10 µm to 50 µm",
         "101, 0 µs to 100 µs",
         "not given",
-        "blosc2",
+        "shuffle, deflate",
         "At 0 µs",
         "void 20 %, workpiece 60 %, tool 20 %",
         "frames are 1 us apart",
@@ -147,7 +147,7 @@ def test_the_command_prints_flags_tool_forces_and_provenance(tmp_path, monkeypat
         .assign_attrs({"import": json.dumps({"movie": "a.avi", "box": {"left": 7}})})
         .assign_attrs(title="[bold]\x1b[31mred")
     )
-    write_scene(one, "scene.nc", portable=True)
+    write_scene(one, "scene.nc")
     code, text = show("scene.nc")
     assert code == 0
     for part in ("rake -7°", "edge radius", "filled", "100 %", "movie a.avi, box.left 7"):

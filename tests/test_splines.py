@@ -127,9 +127,8 @@ def test_nodes_that_do_not_reach_the_samples_are_refused():
         replace(a_lattice(), in_tool=np.zeros((3, 3), bool))
 
 
-@pytest.mark.parametrize("portable", [False, True])
-def test_splines_come_back_within_their_steps(tmp_path, portable):
-    scene = open_scene(a_file(tmp_path / "scene.nc", portable=portable))
+def test_splines_come_back_within_their_steps(tmp_path):
+    scene = open_scene(a_file(tmp_path / "scene.nc"))
     assert scene.fields == (*SAMPLED[:5], "material", *SAMPLED[5:])
     for index in range(len(scene)):
         made, found = a_spline_frame(index, index * STEP), scene.splines(index)
@@ -172,17 +171,16 @@ def test_a_cut_comes_back_within_a_millikelvin(tmp_path):
     assert 0.5e-3 < most < 2**-10 + 2 * np.spacing(np.float32(400.0))
 
 
-def test_a_copy_keeps_the_splines_and_a_portable_one_the_samples(tmp_path):
+def test_a_copy_keeps_the_splines_or_the_samples(tmp_path):
     scene = open_scene(a_file(tmp_path / "scene.nc"))
     write_scene(scene, tmp_path / "copy.nc")
     copy = open_scene(tmp_path / "copy.nc")
     for index in range(len(scene)):
         np.testing.assert_array_equal(copy.splines(index).nodes, scene.splines(index).nodes)
-    write_scene(scene, tmp_path / "portable.nc", portable=True)
-    portable = open_scene(tmp_path / "portable.nc")
-    assert portable.splines(0) is None
-    assert portable.compression == "shuffle, deflate"
-    found, expected = portable.frame(2), scene.frame(2)
+    write_scene(scene, tmp_path / "samples.nc", samples=True)
+    sampled = open_scene(tmp_path / "samples.nc")
+    assert sampled.splines(0) is None
+    found, expected = sampled.frame(2), scene.frame(2)
     np.testing.assert_array_equal(found.material, expected.material)
     # Half a step of the samples' packing.
     np.testing.assert_allclose(found.temperature, expected.temperature, rtol=0, atol=0.0126)
@@ -204,7 +202,7 @@ def test_xarray_sees_the_samples(tmp_path):
 
 
 def test_a_second_look_reads_nothing(tmp_path, monkeypatch):
-    for name, options in (("splines.nc", {}), ("samples.nc", {"portable": True})):
+    for name, options in (("splines.nc", {}), ("samples.nc", {"samples": True})):
         path = a_file(tmp_path / "first.nc")
         write_scene(open_scene(path), tmp_path / name, **options)
         scene = open_scene(tmp_path / name)
@@ -363,7 +361,7 @@ def test_the_table_of_radiance_is_close_enough():
 
 
 def test_only_what_a_surface_needs_is_read(tmp_path, monkeypatch):
-    write_scene(open_scene(a_file(tmp_path / "first.nc")), tmp_path / "scene.nc", portable=True)
+    write_scene(open_scene(a_file(tmp_path / "first.nc")), tmp_path / "scene.nc", samples=True)
     scene = open_scene(tmp_path / "scene.nc")
     read = []
     whole = StoredScene._read

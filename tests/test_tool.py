@@ -392,7 +392,7 @@ def test_a_tool_survives_in_a_scenes_file(tool, tmp_path):
         writer.append(scene.frame(0))
     stored = open_scene(tmp_path / "scene.nc")
     assert stored.tool == tool
-    write_scene(stored, tmp_path / "copy.nc", portable=True)
+    write_scene(stored, tmp_path / "copy.nc")
     stored.data.close()
     with open_scene(tmp_path / "copy.nc").data as copy:
         assert Scene(copy).tool == tool

@@ -17,7 +17,14 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from chipglow.study import Progress as Report, Study, expected_cost, is_cut, kept_progress
+from chipglow.study import (
+    Progress as Report,
+    Study,
+    expected_cost,
+    is_cut,
+    is_damaged,
+    kept_progress,
+)
 
 _ROOM: Final = 4
 
@@ -63,6 +70,8 @@ def say_where_it_starts(study: Study, resume: bool, agreed: bool) -> None:
 
 
 def _say_of_earlier_runs(console: Console, study: Study, resume: bool) -> None:
+    if is_damaged(study):
+        console.print("The scene of this cut in the cache is damaged: it is computed again.")
     if is_cut(study):
         console.print("The cut was computed before: its scene comes from the cache.")
     elif kept := kept_progress(study):

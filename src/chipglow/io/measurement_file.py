@@ -12,7 +12,8 @@ import xarray as xr
 from chipglow.camera import Measurement
 from chipglow.camera.measurement import MEASUREMENT_UNITS
 from chipglow.io.atomic import KeptErrorFile, atomic_path
-from chipglow.text import check_own_data
+from chipglow.io.digest import append_digest, check_file, is_intact
+from chipglow.io.packing import COMPRESSION
 
 Made = TypeVar("Made")
 
@@ -25,8 +26,7 @@ def write_measurement(measurement: Measurement, path: str | os.PathLike[str]) ->
     measurement : Measurement
         What to write.
     path : path-like
-        The file to write; one that is there is replaced at the end. It is compressed with zlib,
-        which every reader of NetCDF-4 knows, and loses nothing.
+        The file to write; one that is there is replaced at the end. It loses nothing.
     """
     write_dataset(measurement.data, path)
 
@@ -47,13 +47,14 @@ def write_dataset(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
         If the file cannot be written, as on a full disk.
     """
     encoding = {
-        str(name): {"zlib": True, "complevel": 4, "shuffle": True}
-        for name, variable in data.data_vars.items()
+        str(name): COMPRESSION
+        for name, variable in data.variables.items()
         if variable.ndim and np.issubdtype(variable.dtype, np.number)
     }
     path = Path(path)
     with atomic_path(path) as temporary, KeptErrorFile(temporary) as sink:
         data.drop_encoding().to_netcdf(sink, engine="h5netcdf", encoding=encoding)
+        append_digest(sink)
         sink.check(path)
 
 
@@ -97,7 +98,7 @@ def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, k
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such file, expected {what}")
     try:
-        check_own_data(path)
+        check_file(path)
         data = xr.load_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
         return made_of(data)
     except (OSError, ValueError, KeyError, RuntimeError) as error:
@@ -106,10 +107,18 @@ def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, k
 
 
 def holds(path: str | os.PathLike[str], names: Iterable[str]) -> bool:
-    """Whether a file is HDF5, whole enough to be opened, and has all these at its root."""
+    """Whether a file is HDF5, whole enough to be opened, and has all these at its root.
+
+    Raises
+    ------
+    ValueError
+        If the file is damaged.
+    """
     path = Path(path)
     if not path.is_file() or not h5py.is_hdf5(path):
         return False
+    if is_intact(path) is False:
+        check_file(path)
     try:
         with h5py.File(path, "r") as file:
             return set(names) <= set(file)

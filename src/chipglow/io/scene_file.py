@@ -10,7 +10,6 @@ from typing import Any, Final
 
 import h5netcdf
 import h5py
-import hdf5plugin
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from chipglow.io import spline_file
 from chipglow.io.atomic import KeptErrorFile, atomic_path
 from chipglow.io.decoded import CACHED_BYTES, Decoded
+from chipglow.io.digest import append_digest, check_file
 from chipglow.io.interrupts import uninterrupted
 from chipglow.io.measurement_file import holds
-from chipglow.io.packing import HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
+from chipglow.io.packing import COMPRESSION, HOT, HOTTEST_PACKED, PACKING, Packing, packing_for
 from chipglow.io.unfinished import (
     UnfinishedScene,
     checkpoint_path,
@@ -47,9 +47,8 @@ from chipglow.scene.scene import (
 )
 from chipglow.scene.splines import Lattice, SplineFrame
 from chipglow.scene.tool_attributes import tool_attributes
-from chipglow.text import check_own_data
 
-SCENE_FORMAT: Final = 4
+SCENE_FORMAT: Final = 5
 """Changes when the same scene is written to a file in another way."""
 
 _LONG_NAMES: Final[Mapping[str, str]] = {
@@ -75,14 +74,9 @@ _LONG_NAMES: Final[Mapping[str, str]] = {
     "moduli_loss": "elastic energy lost as the moduli fell with the temperature since the start",
     "lost_heat": "heat lost to the surroundings since the start",
 }
-_FAST: Final[Mapping[str, Any]] = dict(
-    hdf5plugin.Blosc2(cname="zstd", clevel=1, filters=hdf5plugin.Blosc2.SHUFFLE)
-)
-_PORTABLE: Final[Mapping[str, Any]] = {
-    "compression": "gzip",
-    "compression_opts": 1,
-    "shuffle": True,
-}
+# The first version of HDF5 with checksums of all metadata. "latest" may be one that no other
+# program reads yet.
+_VERSION: Final = "v110"
 
 
 CUT_FIELDS: Final = (*FIELD_UNITS, *MATERIAL_COORDINATE_UNITS)
@@ -112,9 +106,6 @@ class SceneWriter:
         temperature takes 32 bits instead of 16 and reaches all that a scene may have.
     packing : mapping
         Resolution of each field; by default one that suits any scene.
-    portable : bool
-        Compress with zlib, which every reader of NetCDF-4 knows; by default with Blosc2, several
-        times faster, which needs the HDF5 filter of ``hdf5plugin``.
     lattice : Lattice, optional
         Keep the splines of the frames instead of their samples; for frames that have them.
     resume : UnfinishedScene, optional
@@ -137,7 +128,6 @@ class SceneWriter:
         *,
         hottest: float = HOTTEST_PACKED,
         packing: Mapping[str, Packing] = PACKING,
-        portable: bool = False,
         lattice: Lattice | None = None,
         resume: UnfinishedScene | None = None,
     ) -> None:
@@ -149,7 +139,6 @@ class SceneWriter:
         self._lattice = lattice
         self._chunked = spline_file.CHUNKED if lattice else tuple(self._units)
         self._packing = packing_for(hottest, packing)
-        self._compression = _PORTABLE if portable else _FAST
         self._stack = ExitStack()
         self._times: list[float] = []
         self._chunks: list[tuple[int, int, int]] = []
@@ -274,7 +263,7 @@ class SceneWriter:
             ("force_time", "s", time),
             *((name, units[name], values) for name, values in forces.items()),
         ):
-            variable = self._file.create_variable(name, ("force_time",), data=values)
+            variable = self._file.create_variable(name, ("force_time",), data=values, **COMPRESSION)
             variable.attrs["units"] = unit
             variable.attrs["long_name"] = _LONG_NAMES.get(name, "time of the force history")
 
@@ -286,7 +275,10 @@ class SceneWriter:
         self._sink = stack.enter_context(KeptErrorFile(self._part))
         keep_hold(self._sink, moved)
         stack.callback(self._sink.check, self.path)
-        self._hdf = stack.enter_context(h5py.File(self._sink, "w", track_order=True))
+        stack.callback(append_digest, self._sink)
+        self._hdf = stack.enter_context(
+            h5py.File(self._sink, "w", track_order=True, libver=_VERSION)
+        )
         self._file = stack.enter_context(h5netcdf.File(self._hdf, "w"))
         self._create_variables()
         if self._resume is not None:
@@ -327,12 +319,12 @@ class SceneWriter:
         self._file.attrs["chipglow_format"] = SCENE_FORMAT
         coordinates = raster_coordinates(self.raster, np.empty(0))
         for name, (dimension, values, attributes) in coordinates.items():
-            variable = self._file.create_variable(name, (dimension,), np.float64)
+            variable = self._file.create_variable(name, (dimension,), np.float64, **COMPRESSION)
             if values.size:
                 variable[...] = values
             variable.attrs.update(attributes)
         if self._lattice is not None:
-            spline_file.create(self._file, self._lattice, self._compression)
+            spline_file.create(self._file, self._lattice)
             return
         for name in self._units:
             self._create_field(name)
@@ -344,7 +336,7 @@ class SceneWriter:
             ("time", "y", "x"),
             packing.dtype,
             chunks=(1, *self.raster.shape),
-            **self._compression,
+            **COMPRESSION,
         )
         variable.attrs.update(
             units=self._units[name], long_name=_LONG_NAMES[name], **packing.attributes
@@ -384,7 +376,6 @@ class StoredScene(Scene):
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        check_own_data(path)
         self._file = h5py.File(path, "r")
         names = (*PACKING, *spline_file.CHUNKED)
         self._datasets = {name: self._file[name] for name in names if name in self._file}
@@ -532,13 +523,14 @@ def open_scene(path: str | os.PathLike[str]) -> StoredScene:
     FileNotFoundError
         If there is no such file.
     SceneError
-        If the file is cut short, not a scene, or breaks the contract of a scene; the message
+        If the file is damaged, not a scene, or breaks the contract of a scene; the message
         names the file.
     """
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such file, expected a scene")
     try:
+        check_file(path)
         return StoredScene(path)
     except SceneError as error:
         raise SceneError(f"{path}: {error}") from error
@@ -553,7 +545,7 @@ def is_scene(path: str | os.PathLike[str]) -> bool:
     return holds(path, ("temperature",)) or holds(path, (spline_file.SPLINES,))
 
 
-def write_scene(scene: Scene, path: str | os.PathLike[str], *, portable: bool = False) -> None:
+def write_scene(scene: Scene, path: str | os.PathLike[str], *, samples: bool = False) -> None:
     """Write a whole scene to a file: fields, tool, attributes and forces.
 
     Parameters
@@ -562,8 +554,8 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, portable: bool = 
         What to write; read and written frame by frame.
     path : path-like
         The file to write; one that is there is replaced at the end.
-    portable : bool
-        As for `SceneWriter`; of a cut's scene, the samples instead of its splines.
+    samples : bool
+        Write the samples of a cut's scene instead of its splines, for other programs.
     """
     stored = scene if isinstance(scene, StoredScene) else None
     with SceneWriter(
@@ -573,8 +565,7 @@ def write_scene(scene: Scene, path: str | os.PathLike[str], *, portable: bool = 
         fields=scene.fields,
         hottest=stored.hottest if stored is not None else HOTTEST_PLAUSIBLE,
         packing=stored.packing if stored is not None else PACKING,
-        portable=portable,
-        lattice=stored.lattice if stored is not None and not portable else None,
+        lattice=stored.lattice if stored is not None and not samples else None,
     ) as writer:
         for frame in scene.frames():
             writer.append(frame)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
+from chipglow.io.packing import COMPRESSION
 from chipglow.scene import FIELD_UNITS, MATERIAL_COORDINATE_UNITS, SceneError
 from chipglow.scene.scene import raster_of
 from chipglow.scene.splines import FILLED_SPLINE, SPLINE_FIELDS, Lattice, SplineFrame
@@ -46,7 +47,7 @@ Read: TypeAlias = Callable[[str, int], NDArray[Any]]
 UNITS: Final[Mapping[str, str]] = {**FIELD_UNITS, **MATERIAL_COORDINATE_UNITS}
 
 
-def create(file: h5netcdf.File, lattice: Lattice, compression: Mapping[str, Any]) -> None:
+def create(file: h5netcdf.File, lattice: Lattice) -> None:
     """Create the variables that hold splines, and those that say where their nodes are."""
     fields, rows, columns = lattice.shape
     file.dimensions.update(spline=fields, node_y=rows, node_x=columns)
@@ -55,19 +56,23 @@ def create(file: h5netcdf.File, lattice: Lattice, compression: Mapping[str, Any]
         ("node_x", lattice.left + lattice.cell * np.arange(columns)),
         ("node_y", lattice.top - lattice.cell * np.arange(rows)),
     ):
-        file.create_variable(name, (name,), data=values).attrs["units"] = "m"
+        file.create_variable(name, (name,), data=values, **COMPRESSION).attrs["units"] = "m"
     file.create_variable(
-        "in_tool", ("y", "x"), data=lattice.in_tool.astype(np.uint8), **compression
+        "in_tool", ("y", "x"), data=lattice.in_tool.astype(np.uint8), **COMPRESSION
     )
     dimensions = ("time", "spline", "node_y", "node_x")
     splines = file.create_variable(
-        SPLINES, dimensions, np.float32, chunks=(1, *lattice.shape), **compression
+        SPLINES, dimensions, np.float32, chunks=(1, *lattice.shape), **COMPRESSION
     )
     splines.attrs["long_name"] = "coefficients of quadratic B-splines"
     splines.attrs["fields"] = " ".join(SPLINE_FIELDS)
     splines.attrs["ambient"] = lattice.ambient
     limits = file.create_variable(
-        LIMITS, ("time", "limited", "side"), np.float32, chunks=(1, FILLED_SPLINE, 2)
+        LIMITS,
+        ("time", "limited", "side"),
+        np.float32,
+        chunks=(1, FILLED_SPLINE, 2),
+        **COMPRESSION,
     )
     limits.attrs["long_name"] = "least and greatest value of a sample of the workpiece"
 

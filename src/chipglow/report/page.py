@@ -13,6 +13,7 @@ from pydantic import BaseModel
 
 from chipglow import __version__
 from chipglow.drawing.drawing import FigureFile
+from chipglow.io import write_dataset
 from chipglow.text import json_schema
 
 
@@ -267,12 +268,7 @@ def write_files(
     OSError
         If something can't be written.
     """
-    packed = {
-        str(name): {"zlib": True, "complevel": 4}
-        for name, values in data.data_vars.items()
-        if values.ndim > 1
-    }
-    data.to_netcdf(folder / "results.nc", engine="h5netcdf", encoding=packed)
+    write_dataset(data, folder / "results.nc")
     text = numbers.model_dump_json(indent=2, exclude_defaults=True)
     (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     schema = json_schema(type(numbers))

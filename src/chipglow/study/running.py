@@ -26,6 +26,7 @@ from chipglow.cutting import (
     WorkpieceMaterial,
 )
 from chipglow.io import SCENE_FORMAT, SceneWriter, open_scene, unfinished_scenes
+from chipglow.io.digest import is_intact
 from chipglow.io.interrupts import uninterrupted
 from chipglow.laboratory.chip import NoContactError, NoShearBandError
 from chipglow.scene import Frame, Scene, SceneError, ToolOutline
@@ -90,6 +91,12 @@ def cut(
 def is_cut(study: Study) -> bool:
     """Whether the study's scene is in the cache."""
     return _is_whole(scene_path(_inputs(study)))
+
+
+def is_damaged(study: Study) -> bool:
+    """Whether the study's scene in the cache is damaged; `cut` computes it again."""
+    path = scene_path(_inputs(study))
+    return path.exists() and not _is_whole(path)
 
 
 def kept_progress(study: Study) -> float:
@@ -287,13 +294,7 @@ def _numbers(material: WorkpieceMaterial | ToolMaterial) -> dict[str, Any]:
 
 
 def _is_whole(path: Path) -> bool:
-    if not path.exists():
-        return False
-    try:
-        open_scene(path).data.close()
-    except (SceneError, OSError):
-        return False
-    return True
+    return path.is_file() and bool(is_intact(path))
 
 
 def _show(

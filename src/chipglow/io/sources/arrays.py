@@ -294,7 +294,6 @@ def _part(read: Callable[[Key], NDArray[Any]], name: str, key: Key) -> NDArray[A
 
 def _hdf5(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
     import h5py
-    import hdf5plugin  # noqa: F401  registers the filters
 
     with naming(path):
         check_own_data(path)
@@ -303,6 +302,8 @@ def _hdf5(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
 
     def visit(name: str, item: Any) -> bool | None:
         if isinstance(item, h5py.Dataset):
+            if not all(map(h5py.h5z.filter_avail, _hdf5_filters(item))):
+                required("hdf5plugin", path, "grid")
             array = _hdf5_array(name, item)
             if array is not None:
                 found.append(array)
@@ -310,6 +311,11 @@ def _hdf5(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
 
     file.visititems(visit)
     yield from found
+
+
+def _hdf5_filters(item: Any) -> list[int]:
+    settings = item.id.get_create_plist()
+    return [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
 
 
 def _hdf5_array(name: str, item: Any) -> StoredArray | None:

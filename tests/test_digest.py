@@ -1,0 +1,99 @@
+"""A damaged file is refused, or computed again, before HDF5 reads it."""
+
+import sys
+from contextlib import ExitStack
+
+import h5py
+import numpy as np
+import pytest
+from test_io import a_file, a_measurement
+
+from chipglow.io import digest, open_scene, read_measurement, write_measurement
+from chipglow.io.digest import is_intact
+from chipglow.io.sources import SourceError
+from chipglow.io.sources.arrays import open_arrays
+
+
+def flip(path, place, bit=0):
+    content = bytearray(path.read_bytes())
+    content[place] ^= 1 << bit
+    path.write_bytes(content)
+
+
+def without_digest(path):
+    """The same data in a file that another program wrote."""
+    with h5py.File(path, "r+") as file:
+        file.attrs["note"] = "changed"
+    assert is_intact(path) is None
+    return path
+
+
+def place_of(path, name):
+    with h5py.File(path) as file:
+        return file[name].id.get_chunk_info(0).byte_offset + 12
+
+
+@pytest.mark.parametrize("write", [a_file, None], ids=["scene", "measurement"])
+def test_every_flipped_bit_is_found(tmp_path, write):
+    path = write(tmp_path) if write else tmp_path / "m.nc"
+    if write is None:
+        write_measurement(a_measurement(), path)
+    assert is_intact(path)
+    whole = path.read_bytes()
+    for place in np.random.default_rng(1).integers(0, len(whole), 100):
+        flip(path, place, place % 8)
+        assert not is_intact(path)
+        path.write_bytes(whole)
+    path.write_bytes(whole[:20])
+    assert is_intact(path) is None
+
+
+@pytest.mark.parametrize("name", ["plastic_strain", "x", "time", "force_time"])
+def test_the_damaged_dataset_is_named(tmp_path, name):
+    path = a_file(tmp_path)
+    flip(path, place_of(path, name))
+    with pytest.raises(ValueError, match=rf"scene\.nc: .*'{name}' is damaged"):
+        open_scene(path)
+
+
+def test_damage_that_hdf5_does_not_see_is_found(tmp_path):
+    path = a_file(tmp_path)
+    flip(path, path.read_bytes().index(b"true temperature"))
+    with pytest.raises(ValueError, match=r"scene\.nc: .* damaged: its digest does not match"):
+        open_scene(path)
+
+
+def test_a_damaged_measurement_is_refused(tmp_path):
+    path = tmp_path / "m.nc"
+    write_measurement(a_measurement(), path)
+    flip(path, place_of(path, "radiance"))
+    with pytest.raises(ValueError, match=r"m\.nc: .*'radiance' is damaged"):
+        read_measurement(path)
+
+
+def test_a_file_of_another_program_is_read_and_its_damage_named(tmp_path):
+    path = without_digest(a_file(tmp_path))
+    assert len(open_scene(path)) == 3
+    flip(path, place_of(path, "temperature"))
+    with pytest.raises(ValueError, match=r"scene\.nc: 'temperature' of frame 0 cannot be read"):
+        open_scene(path).frame(0)
+
+
+def test_a_file_at_which_hdf5_loops_is_given_up(tmp_path, monkeypatch):
+    path = without_digest(a_file(tmp_path))
+    monkeypatch.setattr(digest, "PATIENCE", 0.0)
+    with pytest.raises(ValueError, match=r"scene\.nc: .*HDF5 had not read the file after 0 s"):
+        open_scene(path)
+
+
+def test_a_compression_that_needs_a_plugin_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "hdf5plugin", None)
+    settings = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    settings.set_chunk((4,))
+    settings.set_filter(32015, h5py.h5z.FLAG_OPTIONAL, (1,))  # Zstandard
+    with h5py.File(tmp_path / "T.h5", "w") as file:
+        space = h5py.h5s.create_simple((4,))
+        h5py.h5d.create(file.id, b"T", h5py.h5t.IEEE_F32LE, space, settings)
+    with pytest.raises(SourceError, match=r"T\.h5: needs hdf5plugin, .*chipglow\[grid\]"):  # noqa: SIM117
+        with ExitStack() as stack:
+            open_arrays(str(tmp_path / "T.h5"), stack)
