@@ -105,7 +105,7 @@ def with_pitch(camera: Mapping[str, Any]) -> dict[str, Any]:
         raise ValueError("magnification: is missing, expected it with detector_pitch")
     if not magnification > 0:
         raise ValueError(f"magnification: {magnification:g}, expected over 0")
-    pitch = LENGTH.parse(detector) / magnification
+    pitch = LENGTH.si(detector) / magnification
     given = _value(camera, "pitch", LENGTH) if "pitch" in camera else pitch
     if given is None or abs(given - pitch) > 1e-6 * pitch:
         raise ValueError(
@@ -128,6 +128,6 @@ def _value(section: Mapping[str, Any], name: str, quantity: Quantity) -> float |
     if name not in section:
         return _PAPERS.get(name)
     try:
-        return quantity.parse(section[name])
+        return quantity.si(section[name])
     except ValueError:
         return None
