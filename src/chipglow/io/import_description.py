@@ -431,7 +431,7 @@ class ImportDescription(Section):
 
     def _notes(self) -> dict[str, str]:
         """What has to be assumed of a field if the source has it."""
-        notes: dict[str, str] = Field(default_factory=dict)
+        notes: dict[str, str] = {}
         units = self.units
         if units.velocity is None and (units.length, units.time) != ("m", "s"):
             text = f"velocities are in {units.length}/{units.time}, made of units.length and time"

@@ -94,7 +94,7 @@ class Section(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, data: object) -> object:
-        return data if isinstance(data, Section) else known_keys(data, cls.model_fields)
+        return known_keys(data, cls.model_fields)
 
 
 class Settings(Section, Generic[Built]):

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Final, Literal
 
-from pydantic import model_validator
+from pydantic import ValidationInfo, model_validator
 
 from chipglow.camera import (
     BLURS,
@@ -149,18 +149,18 @@ class CameraSection(Settings[Camera]):
         Parameter(
             "Electrons, noise and counts of the detector, and the camera's own calibration; none: "
             "the radiance is read as it is.",
-            allowed="none, or such as {response: {kind: photon, quantum_efficiency: 0.8, element: "
-            "15 um, f_number: 2.5}, full_well: 7e6, bits: 14, terms: [{kind: "
-            "shot-noise}]}",
+            allowed="none, or such as\n"
+            "{response: {kind: photon, quantum_efficiency: 0.8, element: 15 um, f_number: 2.5},\n"
+            "full_well: 7e6, bits: 14, terms: [{kind: shot-noise}]}",
         ),
     ] = None
 
     @model_validator(mode="before")
     @classmethod
-    def _pitch_on_the_scene(cls, data: object) -> object:
+    def _pitch_on_the_scene(cls, data: object, info: ValidationInfo) -> object:
         if not isinstance(data, Mapping):
             return data
-        camera = with_pitch(with_preset(data))
+        camera = with_pitch(with_preset(data), bool(info.context))
         if camera.get("detector") not in (None, "none"):
             return {"lower_limit": "detector", **camera}
         return camera

@@ -98,7 +98,7 @@ class CuttingSection(CuttingConditions):
         AfterValidator(_known),
         Parameter(
             "Material of the workpiece. The command chipglow materials shows them.",
-            allowed=f"{', '.join(material_names('workpiece'))}; with one of its sets of the\n"
+            allowed=f"{', '.join(material_names('workpiece'))}; with one of its sets of the "
             "flow stress after a slash (aisi-1045/ozel); or a file of your own (steel.yaml)",
         ),
     ] = "aisi-1045"

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from chipglow.errors import Plan
 from chipglow.quantities import FileBeside, Parameter, Section, changed
@@ -117,8 +117,8 @@ class Study(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _scaled(cls, data: object) -> object:
-        return scaled(data) if isinstance(data, Mapping) else data
+    def _scaled(cls, data: object, info: ValidationInfo) -> object:
+        return scaled(data, bool(info.context)) if isinstance(data, Mapping) else data
 
     @field_validator("surface", mode="before")
     @classmethod

@@ -73,7 +73,8 @@ class ChipSection(Section):
             return data
         if data not in CHIPS:
             raise ValueError(f"{data!r} is unknown, expected one of {', '.join(CHIPS)}")
-        return cls.of(CHIPS[data])
+        chip = CHIPS[data]
+        return {"body": chip.chip, "shear_band": chip.shear_band}
 
     @classmethod
     def of(cls, surface: FeatureSurface) -> Self:
