@@ -95,7 +95,7 @@ class FeaturesSection(Section):
             "Chips by name, each laid on the same scene. A chip is chip-1 or chip-2 (the paper's "
             "Table 1), or the numbers of its body and shear bands."
         ),
-    ] = Field({"chip 1": ChipSection.of(CHIP_1), "chip 2": ChipSection.of(CHIP_2)})
+    ] = Field(default={"chip 1": ChipSection.of(CHIP_1), "chip 2": ChipSection.of(CHIP_2)})
     maps: Annotated[
         dict[str, FileBeside],
         Parameter(

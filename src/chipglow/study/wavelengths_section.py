@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from chipglow.errors import WavelengthPlan
+from chipglow.analysis import WavelengthPlan
 from chipglow.quantities import Parameter, Settings
 from chipglow.quantities.units import INSTANT, POSITION, WavelengthRange
 from chipglow.radiometry import Band
