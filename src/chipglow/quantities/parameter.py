@@ -6,7 +6,7 @@ from functools import cache
 from math import isfinite
 from numbers import Integral, Real
 from types import NoneType, UnionType
-from typing import Any, Final, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 from pydantic import (
     GetCoreSchemaHandler,
@@ -20,6 +20,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from chipglow.quantities.units import Quantity, is_bare_number
 
+_NUMBERS: Final[dict[Any, type]] = {float: Real, int: Integral}
 NONE: Final = "none"
 """How descriptions write None."""
 
@@ -83,7 +84,7 @@ class Parameter:
 
     def refusal(self, name: str, value: object, kind: Any = float) -> ValueError:
         """The error for a value that is not allowed, in SI units."""
-        expected = "" if self.is_limited else self.allowed or _names(kind)
+        expected = "" if self.is_limited else self.allowed or _expected(kind)
         expected = expected or self._limits(self._si_text)
         return ValueError(f"{name}: {self._si_text(value)}, expected {expected}")
 
@@ -102,13 +103,7 @@ class Parameter:
 
     def allows(self, value: object, kind: Any) -> bool:
         """Whether a value is of the field's type, if that can be checked, and within the limits."""
-        classes, words = _members(kind)
-        if not classes and not words:
-            return self.holds(value)
-        if isinstance(value, str | int | NoneType) and value in words:
-            return True
-        is_class = isinstance(value, classes) and (bool in classes or not isinstance(value, bool))
-        return is_class and self.holds(value)
+        return _check(kind)(value) and self.holds(value)
 
     def words(self, kind: Any) -> str:
         """Which values are allowed, in words; empty if anything of the field's type is."""
@@ -218,25 +213,44 @@ def _or_words(schema: CoreSchema, words: dict[str, Any]) -> CoreSchema:
 
 
 @cache
-def _members(kind: Any) -> tuple[tuple[type, ...], tuple[Any, ...]]:
-    """Classes and words of which a value is one; none of either for what is not checked here."""
-    members = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
-    words: list[Any] = []
-    classes: list[type] = []
-    for one in members:
-        if one is NoneType:
-            words.append(None)
-        elif get_origin(one) is Literal:
-            words.extend(get_args(one))
-        elif isinstance(one, type):
-            classes.append({float: Real, int: Integral}.get(one, one))
-        else:
-            return (), ()
-    return tuple(classes), tuple(words)
+def _check(kind: Any) -> Callable[[object], bool]:
+    """Whether a value is of a type: numbers, words and classes are told, all else passes."""
+    if kind in _NUMBERS:
+        number = _NUMBERS[kind]
+        return lambda value: isinstance(value, number) and not isinstance(value, bool)
+    if isinstance(kind, type) and get_origin(kind) is None:
+        return lambda value: isinstance(value, kind)
+    origin, members = get_origin(kind), get_args(kind)
+    if origin is Literal:
+        return lambda value: isinstance(value, str | int) and value in members
+    if origin is Annotated:
+        return _check(members[0])
+    if origin in (Union, UnionType):
+        checks = [_check(one) for one in members]
+        return lambda value: any(check(value) for check in checks)
+    if origin is tuple and members[0] not in _NUMBERS and _class_name(members[0]):
+        check = _check(members[0])
+        return lambda value: isinstance(value, tuple) and all(check(one) for one in value)
+    return lambda value: True
 
 
-def _names(kind: Any) -> str:
-    """The classes and words that a type allows, but for numbers."""
-    classes, words = _members(kind)
-    names = [one.__name__ for one in classes if one not in (Real, Integral)]
-    return " or ".join([*names, *map(str, words)]) if names or words else ""
+def _expected(kind: Any) -> str:
+    """What a type allows, in words."""
+    origin, members = get_origin(kind), get_args(kind)
+    if origin is tuple:
+        return f"a tuple of {_class_name(members[0])}"
+    if origin is Literal:
+        names = [str(one) for one in members]
+    else:
+        names = [_class_name(one) for one in (members if origin else (kind,))]
+        names = [*filter(None, names), *(["None"] if NoneType in members else [])]
+    return " or ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+
+
+def _class_name(kind: Any) -> str:
+    """What a class of the library, or a number, is called; empty for all else."""
+    kind = get_args(kind)[0] if get_origin(kind) is Annotated else kind
+    if kind in _NUMBERS:
+        return "a finite number" if kind is float else "a whole number"
+    own = isinstance(kind, type) and kind.__module__ != "builtins" and kind is not NoneType
+    return kind.__name__ if own else ""

@@ -88,6 +88,7 @@ class Section(BaseModel):
                     annotation=one.annotation,
                 )
                 for name, one in cls.model_fields.items()
+                if name.isidentifier()
             ]
         )
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Final, Literal, TypeAlias, get_args
+from typing import Annotated, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,21 +88,6 @@ class Detector(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not isinstance(self.response, DetectorResponse):
-            raise ValueError(
-                f"Detector.response: {self.response!r}, expected one such as EnergyResponse(1e4)"
-            )
-        if self.correction not in get_args(Correction):
-            raise ValueError(
-                f"Detector.correction: {self.correction!r}, expected one of "
-                f"{', '.join(get_args(Correction))}"
-            )
-        if not (
-            isinstance(self.terms, tuple) and all(isinstance(t, DetectorTerm) for t in self.terms)
-        ):
-            raise ValueError(
-                f"Detector.terms: {self.terms!r}, expected a tuple of terms such as ShotNoise()"
-            )
         kinds = [term.kind for term in self.terms]
         for kind in kinds:
             if kinds.count(kind) > 1:
