@@ -350,7 +350,7 @@ def test_a_recording_knows_the_camera():
         ({"full_well": -1.0}, "Detector.full_well: -1, expected over 0"),
         (
             {"correction": "three-point"},
-            "Detector.correction: 'three-point', expected two-point, one-",
+            "Detector.correction: 'three-point', expected two-point",
         ),
         ({"response": 3.0}, "Detector.response: 3, expected DetectorResponse"),
         ({"terms": [ShotNoise()]}, r"Detector.terms: \[ShotNoise\(\)\], expected a tuple"),
