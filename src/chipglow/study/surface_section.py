@@ -272,7 +272,7 @@ def surfaces_of(section: FeaturesSection | SurfaceChoice, seed: int) -> dict[str
 
     Parameters
     ----------
-    section : FeaturesSection or Declared
+    section : FeaturesSection or SurfaceChoice
         The section.
     seed : int
         Seed of the textures.
