@@ -29,6 +29,7 @@ from chipglow.io import SCENE_FORMAT, SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.digest import is_intact
 from chipglow.io.interrupts import uninterrupted
 from chipglow.laboratory.chip import NoContactError, NoShearBandError
+from chipglow.quantities import adapter
 from chipglow.scene import Frame, Scene, SceneError, ToolOutline
 from chipglow.study.assumed import left_to_the_paper
 from chipglow.study.cache import scene_path
@@ -278,7 +279,9 @@ def _inputs(study: Study) -> dict[str, Any]:
     simulation = study.cutting.simulation()
     tool = simulation.tool
     return {
-        "cutting": study.cutting.model_dump(exclude={"tool": {"outline"}}),
+        "cutting": adapter(type(study.cutting)).dump_python(
+            study.cutting, exclude={"tool": {"outline"}}
+        ),
         "outline": tool.points if isinstance(tool, ToolOutline) else None,
         "workpiece": _numbers(simulation.workpiece),
         "law": type(simulation.workpiece.flow_stress).__qualname__,
@@ -337,7 +340,7 @@ def _compute(
             keeper.note_kept(state, start.checkpoint)
         try:
             history = simulation.run(
-                cutting.window.build(),
+                cutting.window,
                 raster,
                 writer.append,
                 (lambda fraction: progress(CUTTING_STEP, fraction)) if progress else None,
