@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from chipglow.app.interim import MISSING as _MISSING
-from chipglow.app.interim import changed, parameter, step
+from chipglow.app.paths import MISSING, changed, held, parameter
 from chipglow.quantities.units import INSTANT, POSITION, Quantity
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study
@@ -211,11 +210,11 @@ class Controls:
         """Return the controls of a scene; one exposure lasts `duration`."""
         options = _options(study, scene)
         studies = [
-            changed(study, one.changes) for words in options.values() for one in words.values()
+            _with(study, one.changes) for words in options.values() for one in words.values()
         ]
         side = 1e6 * scene.raster.spacing * min(scene.raster.shape)
         longest = 5e6 * study.camera.integration_time
-        ranges = {
+        ranges: dict[str, dict[str, Any]] = {
             "start": {"stops": tuple(_starts(scene, duration))},
             "camera.pitch": {"high": min(30.0, side)},
             "camera.integration_time": {
@@ -226,7 +225,7 @@ class Controls:
         for row in TABLE:
             made = replace(row, options=options.get(row.path, {}), **ranges.get(row.path, {}))
             if row.path not in options and row.path not in _VIEW:
-                having = [one for one in studies if _held(one, row.path) is not _MISSING]
+                having = [one for one in studies if held(one, row.path) is not MISSING]
                 if not having:
                     continue
                 made = replace(made, **parameter(having[0], row.path))
@@ -234,9 +233,7 @@ class Controls:
         return cls(study, start, scene.raster.extent, tuple(rows))
 
     @classmethod
-    def of_measurement(
-        cls, study: Study, times: NDArray[np.float64], raster: Raster
-    ) -> "Controls":
+    def of_measurement(cls, study: Study, times: NDArray[np.float64], raster: Raster) -> "Controls":
         """Return the only control of a measurement: which of its frames is shown."""
         row = replace(TABLE[0], label="Frame began", stops=tuple(map(rounded, times)))
         return cls(study, row.stops[0], raster.extent, (row,))
@@ -261,16 +258,16 @@ class Controls:
 
     def is_shown(self, row: Control, state: State) -> bool:
         """Whether the study has the setting of a control."""
-        return row.path in _VIEW or _held(state.study, row.path) is not _MISSING
+        return row.path in _VIEW or held(state.study, row.path) is not MISSING
 
     def value(self, row: Control, state: State) -> Any:
         """Return the value of a control: a word, or a number in SI."""
         if row.options:
             return state.texts.get(row.path, next(iter(row.options)))
-        held = state.start if row.path == "start" else _held(state.study, row.path)
-        if held is _MISSING:
-            return None
-        return self._lower_limit(state) if row.path == "camera.lower_limit" else held
+        if row.path == "camera.lower_limit":
+            return state.study.camera.build().lower_limit
+        value = state.start if row.path == "start" else held(state.study, row.path)
+        return None if value is MISSING else value
 
     def values(self, state: State) -> dict[str, str]:
         """Return the texts of all controls and places as the page shows them."""
@@ -317,15 +314,15 @@ class Controls:
         study = self.study
         for row in self.rows:
             if row.options and row.options[words[row.path]].changes:
-                study = changed(study, row.options[words[row.path]].changes)
+                study = _with(study, row.options[words[row.path]].changes)
         numbers = {
             path: row.value(texts[path])
             for path, row in self._by_path.items()
             if path in texts and not row.options and path not in _VIEW
-            and _held(study, path) is not _MISSING
+            and held(study, path) is not MISSING
         }  # fmt: skip
         if numbers:
-            study = changed(study, numbers)
+            study = _with(study, numbers)
         start = self.row("start").value(texts["start"]) if "start" in texts else self.start
         return State(
             texts,
@@ -344,9 +341,6 @@ class Controls:
             for name, title in LINES.items()
         }
         return given.model_copy(update={"points": {CURSOR: cursor}, "lines": lines})
-
-    def _lower_limit(self, state: State) -> float | None:
-        return state.study.camera.build().lower_limit
 
     def _first_text(self, path: str) -> str:
         if path in (CURSOR, *LINES):
@@ -397,19 +391,26 @@ def _places(text: str) -> Any:
     )
 
 
-def _held(study: Study, path: str) -> Any:
-    """Return the value of a setting; `_MISSING` if the study has no such setting."""
-    held: Any = study
-    for key in path.split("."):
-        held = step(held, key)
-    return held
+def _with(study: Study, changes: Mapping[str, object]) -> Study:
+    """Return a study with other settings; its cut need not suit them, as the scene is there."""
+    update = {path: value for path, value in changes.items() if "." not in path}
+    for name in dict.fromkeys(path.partition(".")[0] for path in changes if "." in path):
+        inner = {
+            path.removeprefix(f"{name}."): value
+            for path, value in changes.items()
+            if path.startswith(f"{name}.")
+        }
+        update[name] = changed(update.get(name, getattr(study, name)), inner)
+    return study.model_copy(update=update)
 
 
 def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
     """Return the words of the controls that have some, the study's own one first."""
     camera, psf = study.camera, study.camera.psf
     psfs = {
-        "annular-aperture": Option("Annular aperture", {"camera.psf": {"kind": "annular-aperture"}}),
+        "annular-aperture": Option(
+            "Annular aperture", {"camera.psf": {"kind": "annular-aperture"}}
+        ),
         "gaussian": Option("Gaussian", {"camera.psf": {"kind": "gaussian", "fwhm": "8 um"}}),
         "none": Option("None (ideal)", {"camera.psf": "none", "camera.blur": []}),
     }
@@ -445,17 +446,20 @@ def _first(word: str, options: dict[str, Option]) -> dict[str, Option]:
 
 def _surfaces(study: Study) -> dict[str, Option]:
     section = study.surface
-    uniform = {"uniform": Option("Uniform", {"surface": {"kind": "uniform", "emissivity": 0.5}})}
+    uniform_section = Study(surface={"kind": "uniform", "emissivity": 0.5}).surface  # type: ignore[arg-type]
+    uniform = {"uniform": Option("Uniform", {"surface": uniform_section})}
     if not isinstance(section, FeaturesSection):
         return _first(section.kind, uniform | {section.kind: Option(section.kind.capitalize())})
     own = changed(section, {"chips": {OWN: "chip-1"}, "maps": {}, "measured": {}})
     kinds = {kind: getattr(section, kind) for kind in ("chips", "maps", "measured")}
     found = {}
     for name in (*surface_names(section), OWN):
-        one = {kind: {key: held[key] for key in held if key == name} for kind, held in kinds.items()}
+        one = {
+            kind: {key: held[key] for key in held if key == name} for kind, held in kinds.items()
+        }
         surface = own if name == OWN else section.model_copy(update=one)
-        read = {"analysis.rake_chip": name, "analysis.band_chip": name}
-        found[name] = Option(name.capitalize(), {"surface": surface, **read})
+        analysis = changed(study.analysis, {"rake_chip": name, "band_chip": name})
+        found[name] = Option(name.capitalize(), {"surface": surface, "analysis": analysis})
     return found | uniform
 
 
@@ -469,8 +473,11 @@ def _starts(scene: Scene, duration: float) -> Iterator[float]:
     times, spacing = scene.times, scene.frame_spacing
     for block in scene.blocks:
         end = times[block[-1]] + spacing * (1 + 1e-6)
-        yield from (rounded(times[i]) for i in block if len(times) == 1 or times[i] + duration <= end)
+        yield from (
+            rounded(times[i]) for i in block if len(times) == 1 or times[i] + duration <= end
+        )
 
 
 def rounded(time: float) -> float:
+    """Return a time to the precision of links."""
     return float(f"{time:.9g}")

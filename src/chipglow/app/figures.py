@@ -59,10 +59,10 @@ return text.replace("-", "−") + (middle && unit ? " " + unit : "");
 
 _VALUE: Final = """
 // The value under the pointer with the unit in the title of the image.
-const value = source.data.image[0][special_vars.image_index?.flat_index];
-if (!Number.isFinite(value)) return missing;
+const shown = source.data.image[0][special_vars.image_index?.flat_index];
+if (!Number.isFinite(shown)) return missing;
 const unit = (title.text.split(" / ")[1] ?? "").replace(/[()]/g, "");
-return `${Number(value.toPrecision(4))} ${unit}`.replace("-", "−");
+return `${Number(shown.toPrecision(4))} ${unit}`.replace("-", "−");
 """
 
 
@@ -133,8 +133,8 @@ class Line:
         if not with_reference:
             title = "Temperature along the line"
         self.figure = one = _figure(name, title, 150)
-        curves = {"along": [], "measured": [], "reference": []}
-        source = ColumnDataSource(curves, name=f"{name}_values")
+        empty: dict[str, list[float]] = {"along": [], "measured": [], "reference": []}
+        source = ColumnDataSource(empty, name=f"{name}_values")
         self.band = ColumnDataSource({"along": [], "low": [], "high": []})
         self.under_range = BoxAnnotation(level="underlay", line_color=None, visible=False)
         colour = LINE_COLOURS[name]

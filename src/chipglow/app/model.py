@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, nan
 from threading import Lock
-from typing import Any, Final, TypeAlias
+from typing import Final, Generic, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,13 @@ from chipglow.analysis import (
 from chipglow.analysis.draws import pixel_phases
 from chipglow.analysis.error_images import Unblurred
 from chipglow.app.controls import LINES, SCENE_IMAGES, Controls, Stage, State
-from chipglow.app.opening import QUICK_SAMPLES, OpenedMeasurement, OpenedScene, with_samples
+from chipglow.app.opening import (
+    QUICK_SAMPLES,
+    Opened,
+    OpenedMeasurement,
+    OpenedScene,
+    with_samples,
+)
 from chipglow.camera import Camera, Exposure
 from chipglow.camera.exposure import frame_weights
 from chipglow.camera.sweep import Check
@@ -37,6 +43,8 @@ from chipglow.study import fit
 from chipglow.surface import EmissivityField, Surface
 
 Array: TypeAlias = NDArray[np.float64]
+
+_Result = TypeVar("_Result")
 
 DISPLAYED: Final = 100_000
 """Samples of the image of the scene on the page."""
@@ -119,18 +127,18 @@ class Drawn:
     error: Distribution | None
 
 
-class _Cache:
+class _Cache(Generic[_Result]):
     """The results of the last few keys; threads may share them."""
 
     def __init__(self, size: int) -> None:
         self._size = size
-        self._results: OrderedDict[Hashable, Any] = OrderedDict()
+        self._results: OrderedDict[Hashable, _Result] = OrderedDict()
         self._lock = Lock()
 
     def __contains__(self, key: Hashable) -> bool:
         return key in self._results
 
-    def get(self, key: Hashable, make: Callable[[], Any]) -> Any:
+    def get(self, key: Hashable, make: Callable[[], _Result]) -> _Result:
         """Return the result of a key, which is made if it is not there."""
         with self._lock:
             if key not in self._results:
@@ -147,10 +155,17 @@ class SceneModel:
     def __init__(self, opened: OpenedScene) -> None:
         self.opened = opened
         self.controls: Controls = opened.controls
-        self._bands, self._fitted, self._fields, self._images = (_Cache(4) for _ in range(4))
-        self._exposures, self._quick_exposures = _Cache(2), _Cache(24)
-        self._unblurred, self._formed, self._errors = (_Cache(8) for _ in range(3))
-        self._parts, self._frames = _Cache(2), _Cache(1)
+        self._bands: _Cache[Band] = _Cache(4)
+        self._fitted: _Cache[tuple[Scene, Surface]] = _Cache(4)
+        self._fields: _Cache[list[EmissivityField]] = _Cache(4)
+        self._exposures: _Cache[tuple[Exposure, ...]] = _Cache(2)
+        self._quick_exposures: _Cache[tuple[Exposure, ...]] = _Cache(24)
+        self._unblurred: _Cache[Unblurred] = _Cache(8)
+        self._formed: _Cache[Array] = _Cache(8)
+        self._errors: _Cache[ErrorImages] = _Cache(8)
+        self._parts: _Cache[ErrorParts] = _Cache(2)
+        self._images: _Cache[SceneImage] = _Cache(4)
+        self._frames: _Cache[list[NDArray[np.float32]]] = _Cache(1)
         self._displayed = with_samples(opened.scene, DISPLAYED)
         self._displayed_quick = with_samples(opened.scene, QUICK_SAMPLES)
 
@@ -219,11 +234,10 @@ class SceneModel:
         assert picture.camera is not None
         camera, (exposure, *others) = picture.camera, picture.exposures
         reference, plain = picture.state.study.analysis.reference, others[0] if others else None
-        result: ErrorParts = self._parts.get(
+        return self._parts.get(
             (self._key(picture.state, "reading"), picture.quick, len(picture.exposures)),
             lambda: error_parts(camera, exposure, reference, plain),
         )
-        return result
 
     def readout(self, picture: Picture) -> Readout:
         """Return the numbers at the cursor of a picture."""
@@ -248,7 +262,7 @@ class SceneModel:
     def drawn(
         self, state: State, phases: int, textures: int, progress: Callable[[float], None]
     ) -> Drawn:
-        """Return lines and error at the cursor at phases of the pixels along each axis and textures.
+        """Return lines and error at the cursor at `phases`² positions of the pixels and textures.
 
         `progress` takes the finished fraction and may raise.
         """
@@ -298,10 +312,7 @@ class SceneModel:
             (surface,) = fitted.surfaces.values()
             return fitted.scene, surface
 
-        result: tuple[Scene, Surface] = self._fitted.get(
-            (self._key(state, "surface"), quick), make
-        )
-        return result
+        return self._fitted.get((self._key(state, "surface"), quick), make)
 
     def _camera(self, state: State, scene: Scene, quick: bool = False) -> Camera:
         """Return the study's camera; if quick, with no pixels finer than the scene's samples.
@@ -346,10 +357,9 @@ class SceneModel:
             )
 
         key = self._exposure_key(state)
-        result: tuple[Exposure, ...] = (
-            self._quick_exposures.get((key, both), make) if quick else self._exposures.get(key, make)
-        )
-        return result
+        if quick:
+            return self._quick_exposures.get((key, both), make)
+        return self._exposures.get(key, make)
 
     def _error_images(
         self, camera: Camera, exposure: Exposure, state: State, quick: bool
@@ -363,11 +373,10 @@ class SceneModel:
             (self._key(state, "optics"), quick),
             lambda: camera.form_image(exposure.mean_radiance, exposure.raster),
         )
-        result: ErrorImages = self._errors.get(
+        return self._errors.get(
             (self._key(state, "reading"), quick),
             lambda: replace(unblurred, camera=camera).errors(formed),
         )
-        return result
 
     def _scene_image(self, state: State, exposure: Exposure, quick: bool) -> SceneImage:
         """Return the image of the scene in the middle of the exposure."""
@@ -384,8 +393,7 @@ class SceneModel:
             values = np.where(void, np.nan, values).astype(np.float32)
             return SceneImage(name, values, scene.raster)
 
-        result: SceneImage = self._images.get(coarser if few else exact, make)
-        return result
+        return self._images.get(coarser if few else exact, make)
 
     def _scene_values(
         self, state: State, exposure: Exposure, scene: Scene, index: int
@@ -401,24 +409,19 @@ class SceneModel:
             return np.asarray(self._camera(state, scene).band.temperature(radiance))
         return scene.field(state.scene_image, index)
 
-    def _middle(self, state: State) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def _middle(self, state: State) -> list[NDArray[np.float32]]:
         """Return temperature and emissivity in the middle of the exposure; NaN without material."""
         scene, surface = self._on(state, quick=False)
         index = _middle_frame(scene, state)
 
-        def make() -> tuple[NDArray[np.float32], ...]:
+        def make() -> list[NDArray[np.float32]]:
             frame = scene.frame(index)
             emissivity = self._camera(state, scene).lay(surface, scene).emissivity(frame)
             void = frame.material == Material.VOID
-            return tuple(
-                np.where(void, np.float32(nan), values)
-                for values in (frame.temperature, emissivity)
-            )
+            fields = (frame.temperature, emissivity)
+            return [np.where(void, np.float32(nan), values) for values in fields]
 
-        result: tuple[NDArray[np.float32], NDArray[np.float32]] = self._frames.get(
-            (index, self._exposure_key(state)), make
-        )
-        return result
+        return self._frames.get((index, self._exposure_key(state)), make)
 
 
 class MeasurementModel:
@@ -468,7 +471,7 @@ class MeasurementModel:
 Model: TypeAlias = SceneModel | MeasurementModel
 
 
-def model_of(opened: OpenedScene | OpenedMeasurement) -> Model:
+def model_of(opened: Opened) -> Model:
     """Return the model of what is open."""
     if isinstance(opened, OpenedMeasurement):
         return MeasurementModel(opened)

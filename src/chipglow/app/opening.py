@@ -91,9 +91,10 @@ class OpenedMeasurement:
         return Controls.of_measurement(_with_places(Study(), places), measurement.times, raster)
 
 
-def open_any(
-    path: str | Path | None, study: Study | None = None
-) -> OpenedScene | OpenedMeasurement:
+Opened: TypeAlias = OpenedScene | OpenedMeasurement
+
+
+def open_any(path: str | Path | None, study: Study | None = None) -> Opened:
     """Open a scene, a measurement or a folder of results; without a path the bundled scene.
 
     Raises
@@ -113,7 +114,7 @@ def open_any(
     return OpenedScene.of(open_scene(path), study or Study(), path.name, from_file=True)
 
 
-def open_uploaded(path: Path, name: str) -> OpenedScene | OpenedMeasurement:
+def open_uploaded(path: Path, name: str) -> Opened:
     """Open an uploaded file by the name that its owner gave it: first in a subprocess.
 
     Raises

@@ -35,20 +35,20 @@ export function render({ view, model, el }) {
   // Messages to Python. A moving control sends once per frame of the screen at most.
 
   let sent = 0, waiting = null;
-  function send(message) {
+  function send(kind, content = null) {
     sent += 1;
-    model.send_msg({ n: sent, ...message });
+    model.send_msg({ n: sent, kind, content });
     return sent;
   }
   function change(path, text, final) {
     const entry = controls.get(path);
     const asked = waiting !== null;
     waiting = final ? null : { [path]: text };
-    entry.sent = final ? send({ change: { [path]: text }, final }) : Infinity;
+    entry.sent = final ? send("change", { [path]: text }) : Infinity;
     if (final || asked) return;
     requestAnimationFrame(() => {
       if (waiting === null) return;
-      const n = send({ change: waiting, final: false });
+      const n = send("move", waiting);
       for (const one of Object.keys(waiting)) controls.get(one).sent = n;
       waiting = null;
     });
@@ -66,11 +66,11 @@ export function render({ view, model, el }) {
       actions.append(file, button("Open…", () => file.click(), { title: "A scene or a measurement, NetCDF" }));
     }
     for (const [name, text, title] of spec.saves) {
-      actions.append(button(text, () => send({ save: name }), { title }));
+      actions.append(button(text, () => send("save", name), { title }));
     }
     actions.append(
-      button("Undo", () => send({ do: "undo" }), { id: "undo", title: "Ctrl+Z" }),
-      button("Redo", () => send({ do: "redo" }), { id: "redo", title: "Ctrl+Y" }));
+      button("Undo", () => send("undo"), { id: "undo", title: "Ctrl+Z" }),
+      button("Redo", () => send("redo"), { id: "redo", title: "Ctrl+Y" }));
     if (!spec.embedded) {
       actions.append(button("Copy link", copyLink, { title: "A link that restores this state" }));
     }
@@ -189,8 +189,8 @@ export function render({ view, model, el }) {
       element("progress", { id: "progress", max: 1, hidden: true, "aria-label": "Progress" }));
     if (spec.draws) {
       status.append(
-        button("Draw phases and textures", () => send({ do: "draw" }), { id: "draw", title: spec.draws }),
-        button("Cancel", () => send({ do: "cancel" }), { id: "cancel", hidden: true }));
+        button("Draw phases and textures", () => send("draw"), { id: "draw", title: spec.draws }),
+        button("Cancel", () => send("cancel"), { id: "cancel", hidden: true }));
     }
     return element("main", {}, views, images, below, status);
   }
@@ -343,7 +343,7 @@ export function render({ view, model, el }) {
   // lines, and the next picture.
   function showPicture({ number, lines }) {
     requestAnimationFrame(() => setTimeout(() => {
-      send({ painted: number });
+      send("painted", number);
       find(".numbers").classList.add("old"); // until those of this picture come
       for (const [name, data] of Object.entries(lines)) named(name).setv({ data }, { sync: false });
       const left = 80 - (performance.now() - stepped);
@@ -385,7 +385,7 @@ export function render({ view, model, el }) {
       document.body.style.margin = "0";
     }
     find("#theme").textContent = theme === "dark" ? "Light" : "Dark";
-    send({ theme });
+    send("theme", theme);
   }
 
   // Figures fit their places, in CSS pixels. All change at once: each change lays the page out.
@@ -416,7 +416,7 @@ export function render({ view, model, el }) {
     const typing = event.target.type === "text", key = event.key.toLowerCase();
     if ((event.ctrlKey || event.metaKey) && "zy".includes(key) && !typing) {
       event.preventDefault();
-      send({ do: key === "y" || event.shiftKey ? "redo" : "undo" });
+      send(key === "y" || event.shiftKey ? "redo" : "undo");
     } else if (key === "enter" && typing) {
       event.preventDefault(); // a notebook would make no change of it
       event.target.dispatchEvent(new Event("change"));
@@ -432,7 +432,7 @@ export function render({ view, model, el }) {
   model.on("msg:custom", ({ kind, content }) => shows[kind](content));
   const watcher = new ResizeObserver(refit);
   model.on("after_render", () => {
-    send({ do: "ready" });
+    send("ready");
     setTheme(theme);
     refit();
     watcher.observe(find("main"));

@@ -6,13 +6,12 @@ for an older one ends at the next opportunity. Draws have a thread of their own.
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from threading import Condition, Thread
-from typing import Final, Generic, TypeVar
+from typing import Final, Generic, TypeAlias, TypeVar
 
 from chipglow.app.controls import State
-from chipglow.app.model import Drawn, Picture, Readout, SceneModel, model_of
-from chipglow.app.opening import OpenedMeasurement, OpenedScene
+from chipglow.app.model import Picture, SceneModel, model_of
+from chipglow.app.opening import Opened
 
 PAUSE: Final = 0.15
 """Seconds without a newer state after a quick look before the exact picture is begun."""
@@ -31,10 +30,10 @@ class SupersededError(Exception):
 
 
 class Newest(Generic[_Job]):
-    """A thread that does only the newest job; `failed` takes the message of an error."""
+    """A thread that does only the newest job; `notify` takes the message of an error."""
 
-    def __init__(self, work: Callable[[_Job], None], failed: Callable[[str], None]) -> None:
-        self._work, self._failed = work, failed
+    def __init__(self, work: Callable[[_Job], None], notify: Callable[[str, str], None]) -> None:
+        self._work, self._notify = work, notify
         self._news = Condition()
         self._job: _Job | None = None
         self._busy = self._ended = self._cancelled = False
@@ -107,40 +106,28 @@ class Newest(Generic[_Job]):
             except SupersededError:
                 continue
             except (ValueError, OSError) as error:
-                self._failed(str(error))
+                self._notify("failed", str(error))
             except Exception as error:  # a defect: it must not end the session's thread
                 _log.exception("chipglow app")
-                self._failed(f"defect: {type(error).__name__}: {error}")
+                self._notify("failed", f"defect: {type(error).__name__}: {error}")
 
 
-@dataclass(frozen=True)
-class Listener:
-    """Receives the results of a session; called from its threads."""
-
-    picture: Callable[[int, Picture], None]
-    readout: Callable[[Picture, Readout], None]
-    drawn: Callable[[Drawn], None]
-    progress: Callable[[float], None]
-    failed: Callable[[str], None]
+Notify: TypeAlias = Callable[..., None]
+"""Takes the kind of a result and the result; called from the threads of a session."""
 
 
 class Session:
     """The state of one user, by default that of the study."""
 
-    def __init__(
-        self,
-        opened: OpenedScene | OpenedMeasurement,
-        listener: Listener,
-        state: State | None = None,
-    ) -> None:
+    def __init__(self, opened: Opened, notify: Notify) -> None:
         self.model = model_of(opened)
-        self.state = state or self.model.controls.initial
+        self.state = self.model.controls.initial
         self._settled = [self.state]
         self._at = 0
-        self._listener = listener
+        self._notify = notify
         self._sent = self._painted = 0
-        self._pictures = Newest(self._picture, listener.failed)
-        self._draws: Newest[tuple[State, int, int]] = Newest(self._draw, listener.failed)
+        self._pictures = Newest(self._picture, notify)
+        self._draws: Newest[tuple[State, int, int]] = Newest(self._draw, notify)
 
     def show(self) -> None:
         """Compute the picture of the state."""
@@ -227,21 +214,21 @@ class Session:
             self._send(picture)
             # The numbers of a large scene take longer than its picture: a newer state goes first.
             work.pause(PAUSE if model.has_quick_look else 0.0)
-        self._listener.readout(picture, self.model.readout(picture))
+        self._notify("readout", picture, self.model.readout(picture))
 
     def _send(self, picture: Picture) -> None:
         """Send a picture as soon as the page has painted the one before."""
         last = self._sent
         self._pictures.wait_for(lambda: self._painted >= last, _PAINT_TIMEOUT)
         self._sent += 1
-        self._listener.picture(self._sent, picture)
+        self._notify("picture", self._sent, picture)
 
     def _draw(self, job: tuple[State, int, int]) -> None:
         state, phases, textures = job
 
         def progress(done: float) -> None:
             self._draws.check()
-            self._listener.progress(done)
+            self._notify("progress", done)
 
         assert isinstance(self.model, SceneModel)
-        self._listener.drawn(self.model.drawn(state, phases, textures, progress))
+        self._notify("drawn", self.model.drawn(state, phases, textures, progress))

@@ -20,8 +20,8 @@ from panel.io import unlocked
 from chipglow.app.controls import CURSOR, Control
 from chipglow.app.figures import TITLES, Figures, line_data
 from chipglow.app.model import Drawn, Picture, Readout, SceneModel
-from chipglow.app.opening import OpenedMeasurement, OpenedScene
-from chipglow.app.session import Listener, Session
+from chipglow.app.opening import Opened, OpenedScene
+from chipglow.app.session import Session
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import rounded_text
 from chipglow.scene.lines import nearest
@@ -76,7 +76,7 @@ class View:
 
     Parameters
     ----------
-    opened : OpenedScene or OpenedMeasurement
+    opened : Opened
         Shown on the page.
     texts : mapping, optional
         Values of controls that a link gives.
@@ -90,21 +90,14 @@ class View:
 
     def __init__(
         self,
-        opened: OpenedScene | OpenedMeasurement,
+        opened: Opened,
         texts: Mapping[str, str] | None = None,
         link: Mapping[str, str] | None = None,
         uploads: str = "",
         embedded: bool = False,
     ) -> None:
         self._link, self._embedded = link or {}, embedded
-        listener = Listener(
-            picture=lambda number, picture: self._later(lambda: self._show(number, picture)),
-            readout=lambda picture, found: self._later(lambda: self._show_readout(picture, found)),
-            drawn=lambda drawn: self._later(lambda: self._show_drawn(drawn)),
-            progress=self._show_progress,
-            failed=lambda text: self._later(lambda: self._say(text, "error")),
-        )
-        self.session = Session(opened, listener)
+        self.session = Session(opened, self._notified)
         self._refused = self._restore(texts or {})
         source = opened.scene if isinstance(opened, OpenedScene) else opened.measurement
         images = tuple(TITLES) if isinstance(opened, OpenedScene) else ("measured",)
@@ -143,37 +136,24 @@ class View:
         return refused
 
     def _receive(self, event: Any) -> None:
-        with unlocked():  # one answer, that the browser draws once
-            self._answer(event.data)
-
-    def _answer(self, message: dict[str, Any]) -> None:
+        """Answer a message of the page."""
+        message = event.data
         self._handled = int(message["n"])
-        if "change" in message:
-            self._change(message["change"], bool(message["final"]))
-        elif "painted" in message:
-            self.session.painted(int(message["painted"]))
-        elif "theme" in message:
-            self.figures.set_theme(str(message["theme"]))
-        elif "save" in message:
-            self._save(str(message["save"]))
-        else:
-            actions = {
-                "ready": self._fill,
-                "undo": self._undo,
-                "redo": self._redo,
-                "draw": self._draw,
-                "cancel": self._cancel,
-            }
-            actions[message["do"]]()
+        with unlocked():  # one answer, that the browser draws once
+            getattr(self, f"_on_{message['kind']}")(message.get("content"))
 
-    def _fill(self) -> None:
+    def _notified(self, kind: str, *content: Any) -> None:
+        """Show a result of another thread."""
+        self._later(lambda: getattr(self, f"_show_{kind}")(*content))
+
+    def _on_ready(self, _: None) -> None:
         """Fill a page that has just been rendered, and compute its picture."""
         self._put_values()
         text = self._refused or "Computing the first picture."
         self._say(text, "error" if self._refused else "busy")
         self.session.show()
 
-    def _change(self, texts: dict[str, str], final: bool) -> None:
+    def _on_change(self, texts: dict[str, str], final: bool = True) -> None:
         try:
             self.session.change(texts, final)
         except ValueError as error:
@@ -181,11 +161,14 @@ class View:
             return
         self._changed()
 
-    def _undo(self) -> None:
+    def _on_move(self, texts: dict[str, str]) -> None:
+        self._on_change(texts, final=False)
+
+    def _on_undo(self, _: None) -> None:
         self.session.undo()
         self._changed()
 
-    def _redo(self) -> None:
+    def _on_redo(self, _: None) -> None:
         self.session.redo()
         self._changed()
 
@@ -194,15 +177,21 @@ class View:
         self._began = perf_counter()
         self._put_values()
 
-    def _draw(self) -> None:
+    def _on_painted(self, number: int) -> None:
+        self.session.painted(number)
+
+    def _on_theme(self, theme: str) -> None:
+        self.figures.set_theme(theme)
+
+    def _on_draw(self, _: None) -> None:
         self._show_progress(0.0)
         self.session.draw(PHASES, TEXTURES)
 
-    def _cancel(self) -> None:
+    def _on_cancel(self, _: None) -> None:
         self.session.cancel()
         self._say("The drawing was cancelled.", "")
 
-    def _save(self, kind: str) -> None:
+    def _on_save(self, kind: str) -> None:
         # Matplotlib is imported only to save something.
         from chipglow.app.files import figure_file, measurement_file, study_file
 
@@ -223,7 +212,7 @@ class View:
         self._send("download", content)
         self._say(f"{name} is saved.", "")
 
-    def _show(self, number: int, picture: Picture) -> None:
+    def _show_picture(self, number: int, picture: Picture) -> None:
         self._picture, self._drawn = picture, None
         self.figures.show(picture)
         self.figures.show_drawn(picture, None)
@@ -265,7 +254,13 @@ class View:
             value = float(nearest(image, picture.raster, picture.state.cursor))
             kelvin = value if isfinite(value) else None
             parts.append(
-                {"label": label, "kelvin": kelvin, "text": _kelvins(value), "tip": tip, "kind": kind}
+                {
+                    "label": label,
+                    "kelvin": kelvin,
+                    "text": _kelvins(value),
+                    "tip": tip,
+                    "kind": kind,
+                }
             )
         note = "They sum to the error; ± is the standard uncertainty (k = 1)."
         self._send("numbers", {"rows": rows, "parts": parts, "note": note})
@@ -281,14 +276,17 @@ class View:
         error = drawn.error
         low, high = map(_kelvins, error.range)
         self._say(
-            f"Error at the cursor over {error.draws} draws: {_kelvins(error.mean)}, sample standard "
-            f"deviation {error.standard_deviation:.1f} K, {low} to {high}. Shaded: the range along "
-            "the lines.",
+            f"Error at the cursor over {error.draws} draws: {_kelvins(error.mean)}, sample "
+            f"standard deviation {error.standard_deviation:.1f} K, {low} to {high}. Shaded: the "
+            "range along the lines.",
             "",
         )
 
     def _show_progress(self, done: float) -> None:
-        self._later(lambda: self._say("Drawing phases and textures.", "busy", done))
+        self._say("Drawing phases and textures.", "busy", done)
+
+    def _show_failed(self, text: str) -> None:
+        self._say(text, "error")
 
     def _send(self, kind: str, content: Any) -> None:
         self.page._send_msg({"kind": kind, "content": content})
@@ -311,7 +309,7 @@ class View:
         }
         self._send("values", content)
 
-    def _spec(self, opened: OpenedScene | OpenedMeasurement, uploads: str) -> dict[str, Any]:
+    def _spec(self, opened: Opened, uploads: str) -> dict[str, Any]:
         is_scene = isinstance(opened, OpenedScene)
         left, right, bottom, top = self.figures.extent
         views = {"whole": "Whole view", CURSOR: "Cursor"}
@@ -369,7 +367,7 @@ def _described(row: Control) -> dict[str, Any]:
 
 
 def _measured(found: Readout) -> str:
-    """Return the measured temperature to the second digit of its uncertainty, at least to 0.1 °C."""
+    """Return the measured temperature to two digits of its uncertainty, at least to 0.1 °C."""
     text = _celsius(found.measured)
     if isfinite(found.measured) and isfinite(found.uncertainty):
         size = floor(log10(found.uncertainty)) if found.uncertainty > 0 else 0

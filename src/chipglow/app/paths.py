@@ -1,4 +1,4 @@
-"""Stand-in for `settings` and `changed` of the quantities, until they are there."""
+"""Settings of a study by their paths, such as ``camera.psf.fwhm``."""
 
 from collections.abc import Mapping
 from typing import Any, get_args
@@ -8,9 +8,18 @@ from pydantic import BaseModel
 from chipglow.quantities.units import Quantity
 
 MISSING = object()
+"""Value of a setting that a study does not have."""
+
+
+def held(section: Any, path: str) -> Any:
+    """Return the value of a setting; `MISSING` if there is no such setting."""
+    for key in path.split("."):
+        section = step(section, key)
+    return section
 
 
 def step(held: Any, key: str) -> Any:
+    """Return the value of one key of a section, mapping or tuple."""
     if isinstance(held, Mapping):
         return held.get(key, MISSING)
     if isinstance(held, tuple):
@@ -29,11 +38,11 @@ def _find(annotation: Any) -> Any:
 
 
 def parameter(section: Any, path: str) -> dict[str, Any]:
+    """Return quantity, and whether a setting may be none or is a whole number."""
     quantity, optional, whole = None, False, False
-    held = section
     for key in path.split("."):
-        if isinstance(held, BaseModel):
-            field = type(held).model_fields[key]
+        if isinstance(section, BaseModel):
+            field = type(section).model_fields[key]
             quantity = next(
                 (
                     m if isinstance(m, Quantity) else m.quantity
@@ -45,7 +54,7 @@ def parameter(section: Any, path: str) -> dict[str, Any]:
             quantity = quantity or _find(field.annotation)
             optional = type(None) in get_args(field.annotation)
             whole = field.annotation is int
-        held = step(held, key)
+        section = step(section, key)
     return {"quantity": quantity, "optional": optional, "whole": whole}
 
 
@@ -58,6 +67,7 @@ def _text(quantity: Quantity | None, value: Any) -> Any:
 
 
 def changed(section: Any, changes: Mapping[str, object]) -> Any:
+    """Return a validated copy with other values in SI or as a study writes them."""
     own = {path: value for path, value in changes.items() if "." not in path}
     for name in dict.fromkeys(path.partition(".")[0] for path in changes if "." in path):
         inner = {p.partition(".")[2]: v for p, v in changes.items() if p.startswith(f"{name}.")}
