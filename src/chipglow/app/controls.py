@@ -2,19 +2,22 @@
 
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
+from types import NoneType
 from typing import Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from chipglow.app.paths import MISSING, changed, held, parameter
+from chipglow.quantities import changed, setting_at, value_at
 from chipglow.quantities.units import INSTANT, POSITION, Quantity
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study
 from chipglow.study.surface_section import FeaturesSection, surface_names
+from chipglow.surface import UniformEmissivity
 from chipglow.text.description import problem
 
 Point: TypeAlias = tuple[float, float]
@@ -101,7 +104,7 @@ class Control:
         if value is None:
             return "none"
         if self.quantity is not None:
-            return self.quantity.text(value)
+            return _quantity_text(self.quantity, value)
         return str(value) if self.options or self.whole else f"{value:.10g}"
 
     def number(self, value: Any) -> str:
@@ -225,10 +228,16 @@ class Controls:
         for row in TABLE:
             made = replace(row, options=options.get(row.path, {}), **ranges.get(row.path, {}))
             if row.path not in options and row.path not in _VIEW:
-                having = [one for one in studies if held(one, row.path) is not MISSING]
+                having = [one for one in studies if _has(one, row.path)]
                 if not having:
                     continue
-                made = replace(made, **parameter(having[0], row.path))
+                setting = setting_at(having[0], row.path)
+                made = replace(
+                    made,
+                    quantity=setting.parameter.quantity,
+                    optional=NoneType in get_args(setting.kind),
+                    whole=setting.kind is int,
+                )
             rows.append(made)
         return cls(study, start, scene.raster.extent, tuple(rows))
 
@@ -258,7 +267,7 @@ class Controls:
 
     def is_shown(self, row: Control, state: State) -> bool:
         """Whether the study has the setting of a control."""
-        return row.path in _VIEW or held(state.study, row.path) is not MISSING
+        return row.path in _VIEW or _has(state.study, row.path)
 
     def value(self, row: Control, state: State) -> Any:
         """Return the value of a control: a word, or a number in SI."""
@@ -266,8 +275,9 @@ class Controls:
             return state.texts.get(row.path, next(iter(row.options)))
         if row.path == "camera.lower_limit":
             return state.study.camera.build().lower_limit
-        value = state.start if row.path == "start" else held(state.study, row.path)
-        return None if value is MISSING else value
+        if row.path == "start":
+            return state.start
+        return value_at(state.study, row.path) if _has(state.study, row.path) else None
 
     def values(self, state: State) -> dict[str, str]:
         """Return the texts of all controls and places as the page shows them."""
@@ -319,7 +329,7 @@ class Controls:
             path: row.value(texts[path])
             for path, row in self._by_path.items()
             if path in texts and not row.options and path not in _VIEW
-            and held(study, path) is not MISSING
+            and _has(study, path)
         }  # fmt: skip
         if numbers:
             study = _with(study, numbers)
@@ -374,6 +384,12 @@ class Controls:
         return places_text(found)
 
 
+@lru_cache(1000)
+def _quantity_text(quantity: Quantity, value: float) -> str:
+    """Return the text of a value; most of them are the same at the next state."""
+    return quantity.text(value)
+
+
 def points(state: State, name: str) -> tuple[Point, ...]:
     """Return the cursor or the ends of a line by its name, in m."""
     return (state.cursor,) if name == CURSOR else state.line(name)
@@ -391,9 +407,16 @@ def _places(text: str) -> Any:
     )
 
 
+def _has(study: Study, path: str) -> bool:
+    with suppress(LookupError):
+        value_at(study, path)
+        return True
+    return False
+
+
 def _with(study: Study, changes: Mapping[str, object]) -> Study:
     """Return a study with other settings; its cut need not suit them, as the scene is there."""
-    update = {path: value for path, value in changes.items() if "." not in path}
+    update: dict[str, Any] = {path: value for path, value in changes.items() if "." not in path}
     for name in dict.fromkeys(path.partition(".")[0] for path in changes if "." in path):
         inner = {
             path.removeprefix(f"{name}."): value
@@ -446,8 +469,7 @@ def _first(word: str, options: dict[str, Option]) -> dict[str, Option]:
 
 def _surfaces(study: Study) -> dict[str, Option]:
     section = study.surface
-    uniform_section = Study(surface={"kind": "uniform", "emissivity": 0.5}).surface  # type: ignore[arg-type]
-    uniform = {"uniform": Option("Uniform", {"surface": uniform_section})}
+    uniform = {"uniform": Option("Uniform", {"surface": UniformEmissivity(0.5)})}
     if not isinstance(section, FeaturesSection):
         return _first(section.kind, uniform | {section.kind: Option(section.kind.capitalize())})
     own = changed(section, {"chips": {OWN: "chip-1"}, "maps": {}, "measured": {}})

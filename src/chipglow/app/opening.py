@@ -17,6 +17,7 @@ from chipglow.io.sandbox import Sandbox, patience_for
 from chipglow.laboratory.chip import Instant, contact_length
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study
+from chipglow.surface import UniformEmissivity
 
 BUNDLED: Final = "bundled scene"
 QUICK_SAMPLES: Final = 35_000
@@ -61,8 +62,7 @@ class OpenedScene:
             If the scene is shorter than the study's exposure.
         """
         if "plastic_strain" not in scene.fields and study.surface == Study().surface:
-            uniform = Study(surface={"kind": "uniform", "emissivity": 0.5})  # type: ignore[arg-type]
-            study = study.model_copy(update={"surface": uniform.surface})
+            study = study.model_copy(update={"surface": UniformEmissivity(0.5)})
         duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
         starts = spread_starts(scene, duration, 3)
         start = rounded(starts[len(starts) // 2])
