@@ -11,7 +11,6 @@ import numpy as np
 import scipy
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Strict
 from scipy.special import erf, erfinv, j1
 
 from chipglow.camera.optics.kernel import (
@@ -27,6 +26,7 @@ from chipglow.camera.optics.sampling import overlap_lengths
 from chipglow.quantities import Family, FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, WAVELENGTH
 from chipglow.radiometry import Band
+from chipglow.text import check_own_data
 from chipglow.uncertainty import Component, Estimate, from_xarray
 
 GAUSSIAN_ENERGY: Final = 1.0 - 1e-12
@@ -393,7 +393,7 @@ NumericalAperture = Annotated[
 FNumber = Annotated[
     float | None,
     Parameter(
-        "F-number of the lens, focused at infinity; with the camera's magnification m the\n"
+        "F-number of the lens, focused at infinity; with the camera's magnification m the "
         "numerical aperture is m / (2 f_number (1 + m)).",
         over=0.0,
     ),
@@ -493,9 +493,8 @@ class MeasuredPSFFile(PSFChoice):
 
     includes: Annotated[
         tuple[str, ...] | None,
-        Strict(False),
         Parameter(
-            "What it holds besides the optics, because it was measured through it: footprint for\n"
+            "What it holds besides the optics, because it was measured through it: footprint for "
             "the pixel's sensitive square, and kinds of blur; none: what a .nc says, or nothing."
         ),
     ] = None
@@ -559,6 +558,7 @@ def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:
     if not path.is_file():
         raise FileNotFoundError(ENOENT, "there is no such file", str(path))
     try:
+        check_own_data(path)
         with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as data:
             kernel = data["kernel"].attrs
             stated = tuple(str(kernel.get("includes", "")).split())
