@@ -64,8 +64,8 @@ _NOISE: Final = {
 """A detector with this noise and steps too fine to matter."""
 
 _BARE: Final = re.compile(r"[-+−]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE)
-_PLACE_STEP: Final = 1e-7
-"""Resolution of positions in m: a tenth of a micrometre."""
+_PLACE_STEP: Final = 0.1
+"""Resolution of positions in µm."""
 
 
 @dataclass(frozen=True)
@@ -174,12 +174,12 @@ _VIEW: Final = ("start", "scene_image", "error_image")
 """Controls of the page itself, which are no settings of a study."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class State:
     """The study and the view at some values of the controls; all that a picture depends on."""
 
     texts: Texts
-    study: Study
+    study: Study = field(compare=False)
     start: float
     scene_image: str
     error_image: str
@@ -193,10 +193,9 @@ class State:
         """Ends of one of `LINES` in m."""
         return self.study.analysis.lines[LINES[name]]  # type: ignore[return-value]
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, State) and self.texts == other.texts
-
-    __hash__ = None  # type: ignore[assignment]
+    def place(self, name: str) -> tuple[Point, ...]:
+        """The cursor or the ends of a line in m."""
+        return (self.cursor,) if name == CURSOR else self.line(name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,7 +282,7 @@ class Controls:
         """Return the texts of all controls and places as the page shows them."""
         places = (CURSOR, *LINES)
         texts = {row.path: row.number(self.value(row, state)) for row in self.rows}
-        return texts | {name: places_text(points(state, name), ", ", "; ") for name in places}
+        return texts | {name: places_text(state.place(name), ", ", "; ") for name in places}
 
     def changed(self, state: State, texts: Texts) -> State:
         """Return the state with some controls at other values.
@@ -314,9 +313,12 @@ class Controls:
 
     def named(self, texts: Texts) -> str:
         """Return controls and their new values as a message names them."""
-        labels = {row.path: row.label for row in self.rows} | {CURSOR: "Cursor"}
-        labels |= {name: f"Line {title}" for name, title in LINES.items()}
-        return ", ".join(f"{labels[path]} {text}" for path, text in texts.items())
+        return ", ".join(f"{self._label(path)} {text}" for path, text in texts.items())
+
+    def _label(self, path: str) -> str:
+        if path == CURSOR:
+            return "Cursor"
+        return f"Line {LINES[path]}" if path in LINES else self._by_path[path].label
 
     def state(self, texts: Texts) -> State:
         """Return the state at given values; the first ones where none is given."""
@@ -354,45 +356,35 @@ class Controls:
 
     def _first_text(self, path: str) -> str:
         if path in (CURSOR, *LINES):
-            return places_text(points(self.initial, path))
+            return places_text(self.initial.place(path))
         row = self._by_path[path]
         return row.text(self.value(row, self.initial)) if self.is_shown(row, self.initial) else ""
 
     def _place(self, name: str, text: str) -> str:
         """Return the text of points within the image."""
-        label = "Cursor" if name == CURSOR else f"Line {LINES[name]}"
-        count = 1 if name == CURSOR else 2
+        label, count = self._label(name), 1 if name == CURSOR else 2
         try:
-            found = _places(text)
+            places = tuple(dict.fromkeys(_places(text)))
         except ValueError:
-            raise ValueError(
-                f"{label}: {text!r}, expected positions such as -35,120 in µm"
-            ) from None
-        if len(found) != count or (count == 2 and found[0] == found[1]):
+            expected = "expected positions such as -35,120 in µm"
+            raise ValueError(f"{label}: {text!r}, {expected}") from None
+        if len(places) != count:
             raise ValueError(f"{label}: {text!r}, expected {count} different points")
-        left, right, bottom, top = self.extent
-        for x, y in found:
-            if not (
-                left - _PLACE_STEP <= x <= right + _PLACE_STEP
-                and bottom - _PLACE_STEP <= y <= top + _PLACE_STEP
-            ):
-                ends = [f"{1e6 * end:.1f}" for end in self.extent]
+        left, right, bottom, top = (1e6 * edge for edge in self.extent)
+        for x, y in places:
+            outside = max(left - 1e6 * x, 1e6 * x - right, bottom - 1e6 * y, 1e6 * y - top)
+            if outside > _PLACE_STEP:
                 raise ValueError(
-                    f"{label}: {text}, expected x from {ends[0]} to {ends[1]} µm and y from "
-                    f"{ends[2]} to {ends[3]} µm"
+                    f"{label}: {text}, expected x from {left:.1f} to {right:.1f} µm and y from "
+                    f"{bottom:.1f} to {top:.1f} µm"
                 )
-        return places_text(found)
+        return places_text(places)
 
 
 @lru_cache(1000)
 def _quantity_text(quantity: Quantity, value: float) -> str:
     """Return the text of a value; most of them are the same at the next state."""
     return quantity.text(value)
-
-
-def points(state: State, name: str) -> tuple[Point, ...]:
-    """Return the cursor or the ends of a line by its name, in m."""
-    return (state.cursor,) if name == CURSOR else state.line(name)
 
 
 def places_text(places: tuple[Point, ...], comma: str = ",", between: str = ";") -> str:
@@ -402,9 +394,7 @@ def places_text(places: tuple[Point, ...], comma: str = ",", between: str = ";")
 
 def _places(text: str) -> Any:
     pairs = (one.split(",") for one in text.split(";"))
-    return tuple(
-        (POSITION.parse(f"{x.strip()} um"), POSITION.parse(f"{y.strip()} um")) for x, y in pairs
-    )
+    return tuple(tuple(POSITION.parse(f"{one.strip()} um") for one in (x, y)) for x, y in pairs)
 
 
 def _has(study: Study, path: str) -> bool:
