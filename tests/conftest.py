@@ -1,4 +1,4 @@
-"""What several files of tests share: the quick study, computed once, and the registry of laws."""
+"""Shared by the tests: profiles of Hypothesis, the quick study, the registry of flow laws."""
 
 import os
 import subprocess
@@ -7,10 +7,17 @@ import time
 from typing import NamedTuple
 
 import pytest
+from hypothesis import settings
 
 from chipglow.cutting import FLOW_LAWS
 
 MOST_SECONDS = 1200
+
+# The same examples on every machine; --hypothesis-profile=search draws new ones. The first example
+# of a test may compile, so that no example has a time limit.
+settings.register_profile("fixed", derandomize=True, database=None, deadline=None)
+settings.register_profile("search", derandomize=False, deadline=None, print_blob=True)
+settings.load_profile("fixed")
 
 
 class QuickStudy(NamedTuple):

@@ -28,7 +28,7 @@ def valleys_of(force):
 
 
 @given(period=st.floats(50e-6, 200e-6), noise=st.floats(0.0, 8e3), seed=st.integers(0, 99))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_valleys_are_found_where_they_are(period, noise, seed):
     found = np.array(valleys_of(saw_tooth(period, 5, noise=noise, seed=seed))) * INTERVAL
     # The first whole fall ends with the first period; the last valley is left after 5 % of the
@@ -85,7 +85,7 @@ def test_parts_do_not_touch_even_if_bands_outlast_a_period():
 
 
 @given(done=st.integers(0, 3000))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_resumed_recording_goes_on_as_the_unbroken_one(done):
     force, window = saw_tooth(80e-6, 8, noise=3e3), OutputWindow(later_bands=2)
     whole = recorded(force, window)

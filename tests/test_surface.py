@@ -71,7 +71,7 @@ def test_the_kernel_is_that_of_keys():
 
 
 @given(st.floats(-500.0, 500.0), st.floats(-500.0, 500.0))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_enlarging_is_bicubic(u, v):
     map_ = texture(grain=1.0)
     # float32: 24 bits of values and weights below 1.
@@ -223,7 +223,7 @@ def test_shares_of_the_blends():
 
 
 @given(st.integers(0, 2**32))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_blend_against_plain_numpy(seed):
     generator = np.random.default_rng(seed)
     shape = (1, *RASTER.shape)

@@ -1,23 +1,23 @@
 """The virtual camera's error against its scene: images, places, distributions, causes."""
 
-from chipglow.errors.band_error import BandErrors, band_errors
-from chipglow.errors.cut_error import Plan, StudyResult, analyse
-from chipglow.errors.distribution import Distribution, VarianceComponent
-from chipglow.errors.draws import Draws, Headline, LineDraws
-from chipglow.errors.error_images import (
+from chipglow.analysis.band_error import BandErrors, band_errors
+from chipglow.analysis.cut_error import Plan, StudyResult, analyse
+from chipglow.analysis.distribution import Distribution, VarianceComponent
+from chipglow.analysis.draws import Draws, Headline, LineDraws
+from chipglow.analysis.error_images import (
     ErrorImages,
     ReferenceKind,
     error_images,
     reference_temperature,
 )
-from chipglow.errors.error_parts import ErrorParts, error_parts
-from chipglow.errors.local_error import LocalError
-from chipglow.errors.places import LinePlace, Place, PointPlace, RegionPlace
-from chipglow.errors.rake_error import RakeErrors, rake_errors
-from chipglow.errors.ratio_error import RATIO_CAUSES, RatioErrors, ratio_errors
-from chipglow.errors.scene_error import SceneErrors, ScenePlan, scene_errors
-from chipglow.errors.sensitivity import Sensitivity, sensitivity
-from chipglow.errors.wavelengths import (
+from chipglow.analysis.error_parts import ErrorParts, error_parts
+from chipglow.analysis.local_error import LocalError
+from chipglow.analysis.places import LinePlace, Place, PointPlace, RegionPlace
+from chipglow.analysis.rake_error import RakeErrors, rake_errors
+from chipglow.analysis.ratio_error import RATIO_CAUSES, RatioErrors, ratio_errors
+from chipglow.analysis.scene_error import SceneErrors, ScenePlan, scene_errors
+from chipglow.analysis.sensitivity import Sensitivity, sensitivity
+from chipglow.analysis.wavelengths import (
     Spot,
     WavelengthError,
     WavelengthErrors,

@@ -8,8 +8,8 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.errors.error_images import ErrorImages
-from chipglow.errors.rake_error import rake_errors
+from chipglow.analysis.error_images import ErrorImages
+from chipglow.analysis.rake_error import rake_errors
 from chipglow.scene import Line, Raster, Region, Tool, sample
 from chipglow.scene.lines import nearest
 from chipglow.scene.regions import Point
