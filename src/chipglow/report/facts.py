@@ -23,13 +23,14 @@ from chipglow.analysis import (
 from chipglow.drawing import drawing
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text
+from chipglow.report.paper import stands_beside
 from chipglow.scene import Material
 from chipglow.text.yaml_file import parse_yaml
 
 Array = NDArray[np.float64]
 
-_CAUSES: Final = 3
-"""Causes of scatter besides their interactions."""
+SCENE_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate", "emissivity")
+"""Fields that the figure of the scene shows, if it has them."""
 
 
 @cache
@@ -43,9 +44,13 @@ def texts() -> Mapping[str, Any]:
 class Facts:
     """Values of an analysis for the texts of its report; each method is a function of a text."""
 
-    def __init__(self, analysis: Analysis) -> None:
+    def __init__(self, analysis: Analysis, study: object = None) -> None:
         self.analysis, self.data = analysis, analysis.data
+        self.is_compared = stands_beside(study, analysis)
         camera, cut, data = analysis.camera, analysis.cut, analysis.data
+        self.starts = len(cut.one_segment) if cut else data.sizes["instant"]
+        read = dict.fromkeys(map(str, data.seen_surface.values))
+        self.read_surfaces = list(read) or list(analysis.measurements)
         self._context: dict[str, Any] = {
             "analysis": analysis,
             "camera": camera,
@@ -64,7 +69,8 @@ class Facts:
             "lines": list(data.line.values) if "line" in data else [],
             "flagged": float(data.flagged.mean()),
             "exposures": data.sizes["instant"],
-            "starts": len(cut.one_segment) if cut else data.sizes["instant"],
+            "starts": self.starts,
+            "scene_panels": [name.replace("_", " ") for name in SCENE_FIELDS if name in data],
             "hottest": _hottest(analysis),
             "band_width": self._segment_mean("band_width"),
             "widths": data.psf_width.values if "psf_width" in data else (),
@@ -80,6 +86,15 @@ class Facts:
         """Return a text with the values of the analysis and further ones, in one line."""
         made = _environment().from_string(texts()["macros"] + template)
         return " ".join(made.render(self._context | values).split())
+
+    def read_curves(self) -> list[Array]:
+        """Return where errors are read in the shown exposure: points in m, of shape (n, 2)."""
+        if self.analysis.cut is None:
+            outlines = (place.outline() for place in self.analysis.places)
+            return [points for points in outlines if points is not None]
+        lines = self.data.isel(exposure=0).sel(line=["rake", "band"])
+        points = np.stack([lines.line_x.values, lines.line_y.values], axis=-1)
+        return [one[np.isfinite(one).all(axis=1)] for one in points]
 
     def series(self, reading: str, unit: str) -> Array | None:
         """Return error in °C or fraction of the PSF in % over the PSF widths; None if unknown."""

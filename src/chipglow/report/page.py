@@ -38,6 +38,17 @@ class Table(NamedTuple):
     lines: Sequence[Line]
 
 
+class FigureFile(NamedTuple):
+    """A figure as written: file name without ending, heading, figure of the paper, texts, PNG."""
+
+    name: str
+    title: str
+    paper: str
+    caption: str
+    alt: str
+    png: Path
+
+
 class Terms(NamedTuple):
     """Words with their meanings, to which tables and sentences refer."""
 

@@ -1,7 +1,7 @@
-"""Images through time on the page, with one slider for all of them."""
+"""Images of all exposures on the page: reference, measurement and error, with one slider."""
 
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from math import floor, log10
@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from chipglow.drawing import drawing, scales
+from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text
+from chipglow.report.facts import Facts, texts, time_text
 from chipglow.scene import Raster, Tool
 
 _COLOURS: Final = 255
@@ -154,3 +156,60 @@ def _round_down(length: float) -> float:
     """Return the largest 1, 2 or 5 times a power of ten that is not over a length."""
     power = 10.0 ** floor(log10(length))
     return max(step * power for step in (1, 2, 5) if step * power <= length)
+
+
+def exposure_player(facts: Facts) -> Player:
+    """Return the images of an analysis: of the longest part of a cut, else of all exposures."""
+    analysis = facts.analysis
+    starts = analysis.data.instant.values[: facts.starts]
+    caption = facts.text(texts()["figures"]["player"]["caption"])
+    raster = next(iter(analysis.measurements.values())).raster
+    return Player(
+        title=texts()["figures"]["player"]["title"],
+        caption=caption,
+        views=list(_views(facts)),
+        times=[
+            f"Exposure {i + 1} of {len(starts)}: begins at {time_text(start, '.4g')}, lasts "
+            f"{time_text(analysis.camera.integration_time)}."
+            for i, start in enumerate(starts)
+        ],
+        still=int(analysis.data.attrs["shown_instant"]),
+        raster=raster,
+        tool=analysis.tool,
+        marks=list(_marks(facts)),
+    )
+
+
+def _marks(facts: Facts) -> Iterator[Mark]:
+    """Yield where the errors are read and, of a cut, the ridge of the band in every exposure."""
+    cut, still = facts.analysis.cut, int(facts.data.attrs["shown_instant"])
+    if cut:
+        for i, instant in enumerate(cut.one_segment):
+            if instant.band is not None:
+                yield Mark(instant.band.ridge.points, "ridge", i)
+    for points in facts.read_curves():
+        if len(points) > 1:
+            yield Mark(points, "line", still if cut else None)
+        else:
+            yield Mark(points.repeat(2, axis=0), "spot")
+
+
+def _views(facts: Facts) -> Iterator[View]:
+    """Yield three views for each surface that is read; colours are the same in all rows."""
+    data = facts.data.isel(instant=slice(facts.starts)).sel(surface=facts.read_surfaces)
+    reference, measured = data.reference_temperature - KELVIN, data.radiance_temperature - KELVIN
+    error = measured - reference
+    low, high = scales.ends(reference.values, 0.5, 99.9, 1.0)
+    if facts.analysis.camera.lower_limit is not None:
+        low = max(facts.analysis.camera.lower_limit - KELVIN - 50.0, low)
+    heat = (low, max(high, low + 1.0))
+    largest = scales.round_limit(error.values, 99.0, 10.0)
+    for name in facts.read_surfaces:
+        of = f", {name}" if len(facts.read_surfaces) > 1 else ""
+        for title, images, limits, colours, alt in (
+            ("Reference", reference, heat, scales.HEAT, "reference, sharp and mottled"),
+            ("Measured", measured, heat, scales.HEAT, "measured radiance temperature, blurred"),
+            ("Error", error, (-largest, largest), scales.SIGNED, "error, blue where negative"),
+        ):
+            frames = images.sel(surface=name).values.astype(np.float64)
+            yield View(f"{title}{of}", frames, limits, colours, f"Image of the {alt}{of}.")
