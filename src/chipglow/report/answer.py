@@ -1,6 +1,6 @@
 """The answer: the errors in sentences, each with its interval."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import isfinite
 
 from chipglow.analysis import Distribution, Headline, headlines
@@ -9,17 +9,21 @@ from chipglow.quantities.format import quantity_text
 from chipglow.report.facts import Facts, texts
 from chipglow.report.page import Answer, Term
 from chipglow.report.paper import PAPER
-from chipglow.report.rows import MAIN, slug, spread_text
+from chipglow.report.rows import MAIN, Row, draws_text, slug, spread_text
 
 _MAX_SENTENCES = 3
 """Number of sentences; the tables hold all errors."""
 
 
-def answer(facts: Facts) -> Answer:
-    """Return a sentence for each main error: of a cut at fixed places, else at the first ones."""
+def answer(facts: Facts, rows: Sequence[Row]) -> Answer:
+    """Return a sentence for each main error: of a cut at fixed places, else at the first ones.
+
+    Each refers to the explanation of its row.
+    """
+    links = {row.key: row.term.key for row in rows}
     found = dict(list(_main(facts))[:_MAX_SENTENCES])
     statements = [
-        Term(f"why-{slug(name)}_error_degC", name, _sentence(facts, name, one))
+        Term(links[f"{slug(name)}_error_degC"], name, _sentence(facts, name, one))
         for name, one in found.items()
     ]
     several = any(one.error.draws > 1 for one in found.values())
@@ -54,7 +58,7 @@ def _sentence(facts: Facts, name: str, found: Headline) -> str:
 def error_text(error: Distribution) -> str:
     """Return how far a reading is too low or too high, with its interval."""
     scale, way = (-1.0, "low") if error.mean < 0 else (1.0, "high")
-    text = f"{spread_text(scale * error.mean, error.standard_deviation, '°C', 0)} too {way}"
+    text = f"{draws_text(error, scale)} too {way}"
     if error.draws < 2:
         return f"{text} (a single draw)"
     ends = sorted(scale * end for end in error.interval)
@@ -62,6 +66,4 @@ def error_text(error: Distribution) -> str:
         return f"{text} ({error.draws} draws)"
     low, high = (quantity_text(end, "°C", 0) for end in ends)
     unknown = ", so its sign is not known" if ends[0] < 0 < ends[1] else ""
-    return (
-        f"{text} ({error.draws} draws; {COVERAGE * 100:.0f} % interval {low} to {high}{unknown})"
-    )
+    return f"{text} ({error.draws} draws; {COVERAGE * 100:.0f} % interval {low} to {high}{unknown})"

@@ -76,9 +76,10 @@ class Facts:
             "widths": data.psf_width.values if "psf_width" in data else (),
         }
         functions = (
-            "series", "largest_cause", "psf_fractions", "change", "steepest", "beside", "most_negative",
-            "contact_range", "contact_reaches_border", "middle_rate", "band_sweep", "highest_measured",
-        )  # fmt: skip
+            *("series", "largest_cause", "psf_fractions", "change", "steepest", "beside"),
+            *("contact_range", "contact_reaches_border", "middle_rate", "band_sweep"),
+            *("highest_measured", "most_negative"),
+        )
         self._context |= {name: getattr(self, name) for name in functions}
         self._context["definition"] = self.text(texts()["definition"])
 
@@ -113,11 +114,15 @@ class Facts:
         if found is None or found.error.draws < 2:
             return "", nan
         name, part = max(found.error.parts.items(), key=lambda item: item[1].fraction)
-        return name, part.fraction
+        return (name, part.fraction) if part.fraction > 0 else ("", nan)
 
     def psf_fractions(self, reading: str) -> tuple[float | None, float | None]:
         """Return the contribution of the camera's PSF, and of a Gaussian of the same width."""
-        psf, found, values = self.analysis.camera.psf, headline(self.data, reading), self.series(reading, "%")
+        psf, found, values = (
+            self.analysis.camera.psf,
+            headline(self.data, reading),
+            self.series(reading, "%"),
+        )
         fraction = found.psf_fraction if found else None
         if psf is None or fraction is None or values is None:
             return None, None
@@ -151,7 +156,10 @@ class Facts:
     def contact_reaches_border(self) -> bool:
         """Whether the contact ends at the border of the view."""
         contact = self.data.sel(line="contact").isel(exposure=0)
-        x, y = (values[np.isfinite(values)][-1] for values in (contact.line_x.values, contact.line_y.values))
+        x, y = (
+            values[np.isfinite(values)][-1]
+            for values in (contact.line_x.values, contact.line_y.values)
+        )
         left, _, _, top = self.analysis.raster.extent
         margin = 3 * self.analysis.raster.spacing
         return bool(y > top - margin or x < left + margin)

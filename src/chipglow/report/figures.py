@@ -106,9 +106,7 @@ def measurement(facts: Facts) -> Figure:
         limits = _heat_limits(facts, truth)
         pixels = analysis.measurements[name].raster
         drawing.show_image(axes[0], truth, analysis.raster, analysis.tool, scales.HEAT, limits)
-        picture = drawing.show_image(
-            axes[1], measured, pixels, analysis.tool, scales.HEAT, limits
-        )
+        picture = drawing.show_image(axes[1], measured, pixels, analysis.tool, scales.HEAT, limits)
         axes[0].set_title(_of(facts, "scene, one moment", name))
         axes[1].set_title("as measured")
         for one in axes:
@@ -153,27 +151,24 @@ def error_lines(facts: Facts) -> Figure | None:
     figure = drawing.new_figure(2.7 * len(names) + 0.8)
     rows = figure.subplots(len(names), 2, squeeze=False)
     for (left, right), name in zip(rows, names, strict=True):
-        line = facts.data.sel(line=name)
-        known = np.isfinite(line.line_distance.values[0])
-        at = line.line_distance.values[0][known] * factor
-        reference = line.line_reference - KELVIN
         error, portion = line_error(facts.data, name), line_psf_portion(facts.data, name)
+        known = {dim: slice(error.sizes[dim]) for dim in ("texture", "point")}
+        reference = facts.data.line_reference.sel(line=name).isel(known) - KELVIN
+        at = error.distance.values * factor
         for axes, values, colour, label in (
             (left, reference, GREY, "reference"),
             (left, reference + error, BLUE, "measured"),
             (right, error, BLUE, "error"),
             (right, portion, VERMILLION, "PSF contribution"),
         ):
-            drawing.draw_mean(axes, at, _draws(values.values[..., known]), colour, label)
+            drawing.draw_mean(axes, at, _draws(values.values), colour, label)
         if facts.is_compared:
             _draw_published(right, str(name))
         left.set(title=_line_title(facts, str(name)), ylabel="radiance temperature / °C")
         right.set_ylabel("error / °C")
         right.axhline(0.0, color=GREY, linewidth=0.6)
         for axes in (left, right):
-            axes.set_xlabel(
-                _LINE_LABELS[name] if facts.analysis.cut else f"distance / {unit}"
-            )
+            axes.set_xlabel(_LINE_LABELS[name] if facts.analysis.cut else f"distance / {unit}")
     _legend(figure, rows[:, 0], rows[:, 1], columns=4)
     return figure
 
@@ -241,7 +236,8 @@ def psf_sensitivity(facts: Facts) -> Figure | None:
             if psf is not None and mean is not None:
                 colour = _ORDERS[order][0]
                 _draw_point(axes, psf.fwhm * 1e6, scale * mean, colour, "PSF of this camera")
-            axes.set(title=f"{title}, {name}", ylabel="%" if scale == 100 else "°C")
+            place = data.place.sel(reading=name).item()
+            axes.set(title=f"{title}, {place}", ylabel="%" if scale == 100 else "°C")
     for axes in grid[-1]:
         axes.set_xlabel("PSF, full width at half maximum / µm")
     _legend(figure, grid.ravel(), columns=2)

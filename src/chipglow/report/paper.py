@@ -1,10 +1,16 @@
-"""What Heigel and Whitenton (2010) found and set: their figures, their Tables 1 and 2."""
+"""What Heigel and Whitenton (2010) published: values, figures, Tables 1 and 2."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import degrees
 from typing import Final
 
-from chipglow.analysis import StudyResult
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.analysis import Analysis, Distribution
+from chipglow.analysis.distribution import COVERAGE
+from chipglow.quantities.format import quantity_text
 from chipglow.study import Study
 from chipglow.surface import Emissivity
 
@@ -243,4 +249,3 @@ def table_2(study: Study) -> list[tuple[str, str, str]]:
         ("Method", "finite elements, remeshed", "material points"),
         ("Size of elements or cells", "not legible", f"{cutting.numerics.cell * 1e6:g} µm"),
     ]
-

@@ -127,7 +127,9 @@ class Player:
         factor = drawing.length_unit(self.raster)[0]
         return [
             Curve(
-                " ".join(f"{x:.1f},{-y:.1f}" for x, y in mark.points * factor), mark.kind, mark.frame
+                " ".join(f"{x:.1f},{-y:.1f}" for x, y in mark.points * factor),
+                mark.kind,
+                mark.frame,
             )
             for mark in (*tool, *self.marks)
         ]

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from chipglow import __version__
 from chipglow.analysis import Analysis, with_errors
+from chipglow.analysis.distribution import TOGETHER
 from chipglow.drawing import drawing
 from chipglow.report import cut_figures, figures, paper
 from chipglow.report.answer import answer
@@ -198,18 +199,18 @@ class _Report:
 
     def sections(self, folder: Path) -> list[Section]:
         """Return the sections of the page; figures are drawn into a folder."""
-        drawn = {name: block for name, block in self._draw(folder)}
+        drawn = dict(self._draw(folder))
         beside = {name: [drawn.pop(name)] if name in drawn else [] for name in _ELSEWHERE}
         player = self._attempt("Images of the exposures", lambda: exposure_player(self.facts))
         failed = [Failure(title, reason) for title, reason in self.analysis.failed.items()]
-        first = [answer(self.facts), player, *failed, Remarks(self.remarks)]
-        heading = "Comparison with the paper" if self.facts.is_compared else "The errors, and figures"
+        first = [answer(self.facts, self.errors), player, *failed, Remarks(self.remarks)]
+        heading = (
+            "Comparison with the paper" if self.facts.is_compared else "The errors, and figures"
+        )
         return [
             Section("answer", "The answer", [Part("", "", first)]),
             Section("causes", "Causes of the errors", list(self._causes(beside))),
-            Section(
-                "comparison", heading, [Part("", "", [self._comparison(), *drawn.values()])]
-            ),
+            Section("comparison", heading, [Part("", "", [self._comparison(), *drawn.values()])]),
             Section("tables", "Tables", list(self._tables(beside))),
             Section("repeat", "How to repeat it", list(self._repeat())),
         ]
@@ -225,7 +226,9 @@ class _Report:
         for name, draw in _FIGURES.items():
             if self.analysis.cut is None and draw.__module__ == cut_figures.__name__:
                 continue
-            block = self._attempt(name, lambda name=name, draw=draw: self._figure(name, draw, folder))
+            block = self._attempt(
+                name, lambda name=name, draw=draw: self._figure(name, draw, folder)
+            )
             if block is not None:
                 yield name, block
 
@@ -247,7 +250,7 @@ class _Report:
         return FigureFile(file, title, number, caption, alt, png)
 
     def _causes(self, beside: Mapping[str, Sequence[Any]]) -> Iterator[Part]:
-        explained = Terms([row.term for row in self.errors])
+        explained = Terms([row.term for row in self.errors if row.explanation])
         yield Part("", "", [self._parts(), explained])
         scatter = [self._scatter(), *beside["over-time"], *beside["psf-sensitivity"]]
         yield Part("scatter", "Sources of scatter", scatter)
@@ -264,7 +267,7 @@ class _Report:
             for name in ("psf", "motion", "footprint", "rest")
             if any(name in row.parts for row in rows)
         ]
-        heads = [Term("", "Error at"), *map(self._head, ("reference", "error", *names))]
+        heads = [Term("", "Quantity"), *map(self._head, ("reference", "error", *names))]
         lines = [
             Line(
                 (
@@ -274,7 +277,7 @@ class _Report:
                     *(draws_text(row.parts.get(name)) for name in names),
                 ),
                 "°C",
-                f"why-{row.key}",
+                row.link,
             )
             for row in rows
         ]
@@ -287,9 +290,10 @@ class _Report:
         if not rows:
             return Text("There is only one draw, so the scatter is not known.")
         *names, together = (f"{name} ({count})" for name, count, _, _ in rows[0].causes)
-        heads = [Term("", "Error at"), *(Term("causes-of-scatter", name) for name in names)]
+        together = together.replace(TOGETHER, "interactions")
+        heads = [Term("", "Quantity"), *(Term("causes-of-scatter", name) for name in names)]
         heads.append(Term("together", together))
-        lines = [Line((row.quantity, *row.cells), row.unit, f"why-{row.key}") for row in rows]
+        lines = [Line((row.quantity, *row.cells), row.unit, row.link) for row in rows]
         text = (
             "Scatter of the errors due to each cause alone, as a standard deviation with its "
             "fraction of the sum of squares. The headings state the number of values."
@@ -346,7 +350,11 @@ class _Report:
 
     def _emissivity(self) -> Table | None:
         """Return the emissivities of the heated objects: published, put in and found."""
-        rows = [row for one in self.analysis.cut.heated for row in one.rows] if self.analysis.cut else []
+        rows = (
+            [row for one in self.analysis.cut.heated for row in one.rows]
+            if self.analysis.cut
+            else []
+        )
         compared = self.facts.is_compared
         if not rows:
             return None

@@ -128,8 +128,10 @@ class Row:
 
     @property
     def term(self) -> Term:
-        """The explanation with its id on the page."""
-        return Term(f"why-{self.key}", self.quantity, self.explanation)
+        """The explanation with its id on the page; without one the id of the word's meaning."""
+        general = "psf" if "_psf_" in self.key else "error"
+        key = f"why-{self.key}" if self.explanation else general
+        return Term(key, self.quantity, self.explanation)
 
 
 @dataclass(frozen=True)
@@ -140,6 +142,7 @@ class PartRow:
     quantity: str
     error: Distribution
     parts: Mapping[str, Distribution]
+    link: str
 
 
 @dataclass(frozen=True)
@@ -150,6 +153,7 @@ class CauseRow:
     quantity: str
     unit: str
     causes: tuple[tuple[str, int, float | None, float], ...]
+    link: str
 
     @property
     def cells(self) -> tuple[str, ...]:
@@ -241,7 +245,7 @@ def part_rows(analysis: Analysis) -> list[PartRow]:
         else:
             parts["rest"] = Distribution(rest, psf.causes)
         error = maker.reading(name)[0]
-        rows.append(PartRow(error.key, error.quantity, found.error, parts))
+        rows.append(PartRow(error.key, error.quantity, found.error, parts, error.term.key))
     return rows
 
 
@@ -256,6 +260,7 @@ def cause_rows(rows: list[Row]) -> list[CauseRow]:
                 (name, part.draws, known(part.standard_deviation), 100 * part.fraction)
                 for name, part in row.draws.parts.items()
             ),
+            row.term.key,
         )
         for row in rows
         if row.draws is not None and row.draws.draws > 1
@@ -300,7 +305,11 @@ class _Maker:
         """Return the rows of an error and of the contribution of the PSF to it."""
         data = self.analysis.data
         found, one = headline(data, name), one_draw(data, name)
-        names = {"id": name, "name": name, "surface": str(data.seen_surface.sel(reading=name).item())}
+        names = {
+            "id": name,
+            "name": name,
+            "surface": str(data.seen_surface.sel(reading=name).item()),
+        }
         stem = slug(name)
         error = self.row(
             f"{stem}_error_degC",
@@ -347,13 +356,13 @@ def known(value: float) -> float | None:
     return float(value) if isfinite(value) else None
 
 
-def draws_text(draws: Distribution | None, unit: str = "°C", sign: str = "") -> str:
-    """Return mean and standard deviation of draws, with a decimal for small numbers."""
+def draws_text(draws: Distribution | None, scale: float = 1.0) -> str:
+    """Return mean and standard deviation of draws in °C, with a decimal for small numbers."""
     if draws is None:
         return "–"
     deviation = draws.standard_deviation
     size = max(abs(draws.mean), deviation if isfinite(deviation) else 0.0)
-    return spread_text(draws.mean, deviation, unit, 0 if size >= 9.95 else 1, sign)
+    return spread_text(scale * draws.mean, deviation, "°C", 0 if size >= 9.95 else 1)
 
 
 def spread_text(
@@ -364,6 +373,7 @@ def spread_text(
         return "–"
     if spread is None or not isfinite(spread):
         return quantity_text(value, unit, decimals, sign)
+    value = round(value, decimals) + 0.0  # no negative zero
     number = quantity_text(value, "", decimals, sign)
     return f"{number} ± {quantity_text(spread, unit, decimals)}"
 

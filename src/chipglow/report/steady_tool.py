@@ -90,7 +90,9 @@ def _values(analysis: Analysis) -> Mapping[str, Spread]:
     ]
     chip, tool = (_spread(kelvins) for kelvins in zip(*contacts, strict=True))
     forces = analysis.cut.forces
-    peaks = {f"rake_peak_{slug(name)}_degC": _peak(analysis, name) for name in analysis.measurements}
+    peaks = {
+        f"rake_peak_{slug(name)}_degC": _peak(analysis, name) for name in analysis.measurements
+    }
     return {
         "rake_chip_degC": (chip[0] - KELVIN, chip[1]),
         "rake_tool_degC": (tool[0] - KELVIN, tool[1]),
