@@ -239,11 +239,9 @@ def draw_mean(
         Colour of the curves and their name in the legend.
     """
     mean, deviation = draws.mean(axis=0), draws.std(axis=0)
-    axes.plot(along, mean, color=colour, label=f"{name}, mean")
-    if len(draws) > 1:
-        shade(axes, along, mean, deviation, colour, 0.2, f"{name}, ± 1 sd")
-        one = {"linewidth": 0.9, "linestyle": ":", "label": f"{name}, one draw"}
-        axes.plot(along, draws[0], color=colour, **one)
+    axes.plot(along, mean, color=colour, label=name)
+    shade(axes, along, mean, deviation, colour, 0.2)
+    axes.plot(along, draws[0], color=colour, linewidth=0.9, linestyle=":")
 
 
 def shade(

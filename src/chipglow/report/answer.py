@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from math import isfinite
 
-from chipglow.analysis import Distribution, Headline, headlines
+from chipglow.analysis import Distribution, Headline
 from chipglow.analysis.distribution import COVERAGE
 from chipglow.quantities.format import quantity_text
 from chipglow.report.facts import Facts, texts
@@ -33,7 +33,7 @@ def answer(facts: Facts, rows: Sequence[Row]) -> Answer:
 def _main(facts: Facts) -> Iterator[tuple[str, Headline]]:
     """Yield the first error at every place with every surface; of a cut its main ones."""
     places = set()
-    for name, found in headlines(facts.data).items():
+    for name, found in facts.headlines.items():
         place = (found.place, found.surface)
         if name in MAIN if facts.analysis.cut is not None else place not in places:
             places.add(place)

@@ -1,7 +1,7 @@
 """Values of an analysis that the report's texts show, and the texts with these values."""
 
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, cached_property
 from importlib.resources import files
 from math import isfinite, nan
 from typing import Any, Final
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from chipglow.analysis import (
     Analysis,
-    headline,
+    Headline,
+    headlines,
     image_error,
     line_change,
     line_error,
@@ -49,8 +50,8 @@ class Facts:
         self.is_compared = stands_beside(study, analysis)
         camera, cut, data = analysis.camera, analysis.cut, analysis.data
         self.starts = len(cut.one_segment) if cut else data.sizes["instant"]
-        read = dict.fromkeys(map(str, data.seen_surface.values))
-        self.read_surfaces = list(read) or list(analysis.measurements)
+        names = list(analysis.measurements)
+        self.read_surfaces = [name for name in names if name in data.seen_surface.values] or names
         self._context: dict[str, Any] = {
             "analysis": analysis,
             "camera": camera,
@@ -83,6 +84,11 @@ class Facts:
         self._context |= {name: getattr(self, name) for name in functions}
         self._context["definition"] = self.text(texts()["definition"])
 
+    @cached_property
+    def headlines(self) -> Mapping[str, Headline]:
+        """The readings that are known in every draw."""
+        return headlines(self.data)
+
     def text(self, template: str, **values: Any) -> str:
         """Return a text with the values of the analysis and further ones, in one line."""
         made = _environment().from_string(texts()["macros"] + template)
@@ -110,7 +116,7 @@ class Facts:
 
     def largest_cause(self, reading: str) -> tuple[str, float]:
         """Return the cause that contributes most to the variance, and its fraction."""
-        found = headline(self.data, reading)
+        found = self.headlines.get(reading)
         if found is None or found.error.draws < 2:
             return "", nan
         name, part = max(found.error.parts.items(), key=lambda item: item[1].fraction)
@@ -120,7 +126,7 @@ class Facts:
         """Return the contribution of the camera's PSF, and of a Gaussian of the same width."""
         psf, found, values = (
             self.analysis.camera.psf,
-            headline(self.data, reading),
+            self.headlines.get(reading),
             self.series(reading, "%"),
         )
         fraction = found.psf_fraction if found else None

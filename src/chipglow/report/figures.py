@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from chipglow.analysis import (
     Headline,
-    headlines,
     image_error,
     image_psf_portion,
     line_error,
@@ -120,7 +119,7 @@ def error_images(facts: Facts) -> Figure:
     analysis, names = facts.analysis, facts.read_surfaces
     flagged = facts.data.flagged.sel(surface=names)
     seen = flagged if bool(flagged.all()) else ~flagged
-    figure = drawing.image_figure(analysis.raster, 2.8, rows=len(names))
+    figure = drawing.image_figure(analysis.raster, 2.5, rows=len(names))
     rows = figure.subplots(len(names), 2, sharex=True, sharey=True, squeeze=False)
     for column, (title, images) in enumerate(
         (("error", image_error(facts.data)), ("PSF contribution", image_psf_portion(facts.data)))
@@ -179,7 +178,7 @@ def over_time(facts: Facts) -> Figure | None:
     if len(starts) < 2:
         return None
     first: dict[tuple[str, str], tuple[str, Headline]] = {}
-    for name, found in headlines(facts.data).items():
+    for name, found in facts.headlines.items():
         if facts.analysis.cut is None or name in MAIN:
             key = (found.surface, found.place if facts.analysis.cut is None else name)
             first.setdefault(key, (f"{found.place}: {found.quantity}", found))
@@ -207,7 +206,7 @@ def psf_sensitivity(facts: Facts) -> Figure | None:
     data, psf = facts.data, facts.analysis.camera.psf
     if "psf_width" not in data:
         return None
-    found = headlines(data)
+    found = facts.headlines
     names = [name for name in MAIN[:2] if name in data.reading]
     figure = drawing.new_figure(5.2)
     grid = figure.subplots(2, len(names), sharex=True, squeeze=False)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -156,22 +156,22 @@ class _Report:
     @cached_property
     def errors(self) -> list[Row]:
         """Rows of the errors."""
-        return error_rows(self.analysis, self.study)
+        return error_rows(self.facts)
 
     @cached_property
     def cut(self) -> list[Row]:
         """Rows of the cut."""
-        return cut_rows(self.analysis, self.study)
+        return cut_rows(self.facts)
 
     @cached_property
     def chip(self) -> list[Row]:
         """Rows of the chip."""
-        return chip_rows(self.analysis)
+        return chip_rows(self.facts)
 
     @cached_property
     def camera(self) -> list[Row]:
         """Rows of the camera."""
-        return camera_rows(self.analysis)
+        return camera_rows(self.facts)
 
     @cached_property
     def tool(self) -> list[Any]:
@@ -184,7 +184,7 @@ class _Report:
         numbers = summary(
             rows,
             cause_rows(self.errors),
-            part_rows(self.analysis),
+            part_rows(self.facts, self.errors),
             self.chip,
             self.camera,
             self.tool,
@@ -204,9 +204,7 @@ class _Report:
         player = self._attempt("Images of the exposures", lambda: exposure_player(self.facts))
         failed = [Failure(title, reason) for title, reason in self.analysis.failed.items()]
         first = [answer(self.facts, self.errors), player, *failed, Remarks(self.remarks)]
-        heading = (
-            "Comparison with the paper" if self.facts.is_compared else "The errors, and figures"
-        )
+        heading = "Comparison with the paper" if self.facts.is_compared else "The errors"
         return [
             Section("answer", "The answer", [Part("", "", first)]),
             Section("causes", "Causes of the errors", list(self._causes(beside))),
@@ -226,14 +224,13 @@ class _Report:
         for name, draw in _FIGURES.items():
             if self.analysis.cut is None and draw.__module__ == cut_figures.__name__:
                 continue
-            block = self._attempt(
-                name, lambda name=name, draw=draw: self._figure(name, draw, folder)
-            )
+            title = self.facts.text(texts()["figures"][name]["title"])
+            block = self._attempt(title, partial(self._figure, name, title, draw, folder))
             if block is not None:
                 yield name, block
 
     def _figure(
-        self, name: str, draw: Callable[[Facts], Figure | None], folder: Path
+        self, name: str, title: str, draw: Callable[[Facts], Figure | None], folder: Path
     ) -> FigureFile | None:
         with drawing.style():
             figure = draw(self.facts)
@@ -243,9 +240,7 @@ class _Report:
             number = published.number if published else ""
             file = f"{number.lower().replace(' ', '-')}-{name}".lstrip("-")
             png, _ = drawing.save(figure, folder, file)
-        title, caption, alt = (
-            self.facts.text(texts()["figures"][name][part]) for part in ("title", "caption", "alt")
-        )
+        caption, alt = (self.facts.text(texts()["figures"][name][key]) for key in ("caption", "alt"))
         caption = f"{caption} {published.text}" if published else caption
         return FigureFile(file, title, number, caption, alt, png)
 
@@ -260,14 +255,15 @@ class _Report:
 
     def _parts(self) -> Table:
         """Return the contributions to each error."""
-        rows = part_rows(self.analysis)
+        rows = part_rows(self.facts, self.errors)
         references = {row.key: row.reference_text for row in self.errors}
         names = [
             name
             for name in ("psf", "motion", "footprint", "rest")
             if any(name in row.parts for row in rows)
         ]
-        heads = [Term("", "Quantity"), *map(self._head, ("reference", "error", *names))]
+        words = ("psf-contribution" if name == "psf" else name for name in names)
+        heads = [Term("", "Quantity"), *map(self._head, ("reference", "error", *words))]
         lines = [
             Line(
                 (
@@ -286,7 +282,7 @@ class _Report:
 
     def _scatter(self) -> Table | Text:
         """Return the causes of the scatter of each error."""
-        rows = [row for row in cause_rows(self.errors) if row.unit == "°C"]
+        rows = [row for row in cause_rows(self.errors) if row.key.endswith("_error_degC")]
         if not rows:
             return Text("There is only one draw, so the scatter is not known.")
         *names, together = (f"{name} ({count})" for name, count, _, _ in rows[0].causes)

@@ -4,13 +4,13 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import degrees, isfinite, nan
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.analysis import Analysis, Distribution, headline, headlines, one_draw
+from chipglow.analysis import Analysis, Cut, CuttingForces, Distribution, Headline, one_draw
 from chipglow.camera import Camera
 from chipglow.drawing.scales import KELVIN
 from chipglow.laboratory.chip import ChipMetrics
@@ -129,7 +129,7 @@ class Row:
     @property
     def term(self) -> Term:
         """The explanation with its id on the page; without one the id of the word's meaning."""
-        general = "psf" if "_psf_" in self.key else "error"
+        general = "psf-contribution" if "_psf_" in self.key else "error"
         key = f"why-{self.key}" if self.explanation else general
         return Term(key, self.quantity, self.explanation)
 
@@ -174,7 +174,8 @@ def result_rows(analysis: Analysis, study: object = None) -> list[Row]:
     study : Study, optional
         Its study; published values are included if it is the paper's.
     """
-    return [*error_rows(analysis, study), *cut_rows(analysis, study)]
+    facts = Facts(analysis, study)
+    return [*error_rows(facts), *cut_rows(facts)]
 
 
 def results_frame(analysis: Analysis, study: object = None) -> pd.DataFrame:
@@ -195,58 +196,56 @@ def results_frame(analysis: Analysis, study: object = None) -> pd.DataFrame:
     return frame.join(scatter).set_index(pd.Index([row.key for row in rows], name="key"))
 
 
-def error_rows(analysis: Analysis, study: object = None) -> list[Row]:
+def error_rows(facts: Facts) -> list[Row]:
     """Return each error and the contribution of the point spread function to it."""
-    maker = _Maker(analysis, study)
     rows: list[Row] = []
-    for name in analysis.data.reading.values:
-        found = headline(analysis.data, name)
-        if found is not None or analysis.cut is not None:
-            rows += maker.reading(str(name))
+    for name in map(str, facts.data.reading.values):
+        if name in facts.headlines or facts.analysis.cut is not None:
+            rows += _reading(facts, name)
     return rows
 
 
-def cut_rows(analysis: Analysis, study: object = None) -> list[Row]:
+def cut_rows(facts: Facts) -> list[Row]:
     """Return the results of a cut without a camera: period, forces, contact, shear band."""
-    if analysis.cut is None:
+    cut = facts.analysis.cut
+    if cut is None:
         return []
-    maker = _Maker(analysis, study)
-    return [*maker.rows(_force_values(analysis)), *maker.segments(_segment_values(analysis))]
+    forces = _rows(facts, _force_values(cut.forces)) if cut.forces else []
+    return [*forces, *_segment_rows(facts, _segment_values(cut))]
 
 
-def chip_rows(analysis: Analysis) -> list[Row]:
+def chip_rows(facts: Facts) -> list[Row]:
     """Return the metrics of a cut's chip."""
-    if analysis.cut is None or analysis.cut.chip is None:
-        return []
-    return list(_Maker(analysis).rows(_chip_values(analysis.cut.chip)))
+    cut = facts.analysis.cut
+    return _rows(facts, _chip_values(cut.chip)) if cut and cut.chip else []
 
 
-def camera_rows(analysis: Analysis) -> list[Row]:
+def camera_rows(facts: Facts) -> list[Row]:
     """Return NETD and range of the camera; none without a detector."""
-    return list(_Maker(analysis).rows(camera_values(analysis.camera, analysis.raster)))
+    return _rows(facts, _camera_values(facts.analysis.camera, facts.analysis.raster))
 
 
-def part_rows(analysis: Analysis) -> list[PartRow]:
+def part_rows(facts: Facts, errors: list[Row]) -> list[PartRow]:
     """Return the contributions to the errors: of a cut those of the answer, else all."""
-    maker, data = _Maker(analysis), analysis.data
-    rows = []
-    for name, found in headlines(data).items():
-        if analysis.cut is not None and name not in MAIN:
-            continue
-        psf, rest = found.psf_portion, found.error.values - found.psf_portion.values
-        parts = {"psf": psf}
-        motion = np.array(nan)
-        if name in _ACROSS and analysis.cut is not None and analysis.plan.reference == "maximum":
-            motion = data.line_motion.sel(line=name).values[:, : rest.shape[1], None]
+    rows, by_key = [], {row.key: row for row in errors}
+    for name, found in facts.headlines.items():
+        if facts.analysis.cut is None or name in MAIN:
+            row = by_key[f"{slug(name)}_error_degC"]
+            parts = _parts(facts, name, found)
+            rows.append(PartRow(row.key, row.quantity, found.error, parts, row.term.key))
+    return rows
+
+
+def _parts(facts: Facts, name: str, found: Headline) -> Mapping[str, Distribution]:
+    psf, rest = found.psf_portion, found.error.values - found.psf_portion.values
+    # Motion is known where a cut's line crosses face or ridge, and against the peak only.
+    if name in _ACROSS and facts.analysis.cut and facts.analysis.plan.reference == "maximum":
+        motion = facts.data.line_motion.sel(line=name).values[:, : rest.shape[1], None]
         if np.isfinite(motion).all():
             moved = np.broadcast_to(motion, rest.shape)
-            parts["motion"] = Distribution(moved, psf.causes)
-            parts["footprint"] = Distribution(rest - moved, psf.causes)
-        else:
-            parts["rest"] = Distribution(rest, psf.causes)
-        error = maker.reading(name)[0]
-        rows.append(PartRow(error.key, error.quantity, found.error, parts, error.term.key))
-    return rows
+            motion, footprint = (Distribution(one, psf.causes) for one in (moved, rest - moved))
+            return {"psf": psf, "motion": motion, "footprint": footprint}
+    return {"psf": psf, "rest": Distribution(rest, psf.causes)}
 
 
 def cause_rows(rows: list[Row]) -> list[CauseRow]:
@@ -267,83 +266,73 @@ def cause_rows(rows: list[Row]) -> list[CauseRow]:
     ]
 
 
-class _Maker:
-    """Makes rows of values with the texts of the report."""
+def _row(facts: Facts, key: str, here: float, kind: str = "", **more: Any) -> Row:
+    """Return a row; `kind` names its texts if the key has none of its own."""
+    template = texts()["rows"].get(key) or texts()["rows"][kind]
+    names = {name: more.pop(name) for name in ("id", "name", "surface") if name in more}
+    row = Row(
+        key,
+        facts.text(template["quantity"], **names),
+        template["unit"],
+        known(here),
+        template.get("decimals", 0),
+        facts.text(template["text"], **names),
+        **more,
+    )
+    return _compared(facts, row, names.get("id", "")) if facts.is_compared else row
 
-    def __init__(self, analysis: Analysis, study: object = None) -> None:
-        self.analysis, self.facts = analysis, Facts(analysis, study)
 
-    def row(self, key: str, here: float, kind: str = "", **more: object) -> Row:
-        """Return a row; `kind` names its texts where the key has none of its own."""
-        template = texts()["rows"].get(key) or texts()["rows"][kind]
-        names = {name: more.pop(name) for name in ("id", "name", "surface") if name in more}
-        row = Row(
-            key,
-            self.facts.text(template["quantity"], **names),
-            template["unit"],
-            known(here),
-            template.get("decimals", 0),
-            self.facts.text(template["text"], **names),
-            **more,  # type: ignore[arg-type]
-        )
-        return self._compared(row, str(names.get("id", ""))) if self.facts.is_compared else row
+def _compared(facts: Facts, row: Row, reading: str) -> Row:
+    """Return a row with the published value and its comparison."""
+    series = facts.series(reading, row.unit) if reading in MAIN else None
+    widths = facts.data.psf_width.values if series is not None else np.empty(0)
+    more = paper.comparison(row.key, row.draws, row.unit, widths, series)
+    explanation = f"{row.explanation} {more}".strip()
+    return replace(row, explanation=explanation, published=PAPER.get(row.key))
 
-    def rows(self, values: Values) -> Iterator[Row]:
-        """Return rows of values that were not drawn."""
-        for key, (here, uncertainty) in values.items():
-            yield self.row(key, here, uncertainty=known(uncertainty))
 
-    def segments(self, values: Mapping[str, NDArray[np.float64]]) -> Iterator[Row]:
-        """Return rows of values of every segment; the first is that of the one draw."""
-        for key, every in values.items():
-            finite = every[np.isfinite(every)]
-            draws = Distribution(finite, ("segment",)) if finite.size else None
-            mean = draws.mean if draws else nan
-            yield self.row(key, mean, draws=draws, one_draw=known(float(every[0])))
+def _rows(facts: Facts, values: Values) -> list[Row]:
+    """Return rows of values that were not drawn."""
+    return [
+        _row(facts, key, here, uncertainty=known(uncertainty))
+        for key, (here, uncertainty) in values.items()
+    ]
 
-    def reading(self, name: str) -> tuple[Row, Row]:
-        """Return the rows of an error and of the contribution of the PSF to it."""
-        data = self.analysis.data
-        found, one = headline(data, name), one_draw(data, name)
-        names = {
-            "id": name,
-            "name": name,
-            "surface": str(data.seen_surface.sel(reading=name).item()),
-        }
-        stem = slug(name)
-        error = self.row(
-            f"{stem}_error_degC",
-            found.error.mean if found else nan,
-            "error_degC",
-            draws=found.error if found else None,
-            one_draw=known(one.error),
-            reference=_celsius(found.reference) if found else None,
-            **names,
-        )
-        fraction = found.psf_fraction if found else None
-        if found and fraction is None and self.analysis.cut is None:
-            portion = found.psf_portion
-            key, kind = f"{stem}_psf_portion_degC", "psf_portion_degC"
-            draw = known(one.psf_portion)
-            return error, self.row(key, portion.mean, kind, draws=portion, one_draw=draw, **names)
-        percent = _scaled(fraction, 100.0) if fraction else None
-        return error, self.row(
-            f"{stem}_psf_fraction_percent",
-            percent.mean if percent else nan,
-            "psf_fraction_percent",
-            draws=percent,
-            one_draw=known(100 * one.psf_fraction),
-            **names,
-        )
 
-    def _compared(self, row: Row, reading: str) -> Row:
-        """Return a row with the published value and its comparison."""
-        series = self.facts.series(reading, row.unit) if reading in MAIN else None
-        widths = self.analysis.data.psf_width.values if series is not None else np.empty(0)
-        more = paper.comparison(row.key, row.draws, row.unit, widths, series)
-        explanation = f"{row.explanation} {more}".strip()
-        published = PAPER.get(row.key)
-        return replace(row, explanation=explanation, published=published)
+def _segment_rows(facts: Facts, values: Mapping[str, NDArray[np.float64]]) -> Iterator[Row]:
+    """Yield rows of values of every segment; the first is that of the one draw."""
+    for key, every in values.items():
+        finite = every[np.isfinite(every)]
+        draws = Distribution(finite, ("segment",)) if finite.size else None
+        mean = draws.mean if draws else nan
+        yield _row(facts, key, mean, draws=draws, one_draw=known(float(every[0])))
+
+
+def _reading(facts: Facts, name: str) -> tuple[Row, Row]:
+    """Return the rows of an error and of the contribution of the PSF to it."""
+    found, one = facts.headlines.get(name), one_draw(facts.data, name)
+    surface = str(facts.data.seen_surface.sel(reading=name).item())
+    names, stem = {"id": name, "name": name, "surface": surface}, slug(name)
+    error = _row(
+        facts,
+        f"{stem}_error_degC",
+        found.error.mean if found else nan,
+        "error_degC",
+        draws=found.error if found else None,
+        one_draw=known(one.error),
+        reference=_shifted(found.reference, -KELVIN) if found else None,
+        **names,
+    )
+    if found is None:
+        error = replace(error, explanation=texts()["unread"])
+    key, draws, one_psf = "psf_fraction_percent", None, 100 * one.psf_fraction
+    if found and (fraction := found.psf_fraction):
+        draws = Distribution(100.0 * fraction.values, fraction.causes)
+    elif found and facts.analysis.cut is None:
+        key, draws, one_psf = "psf_portion_degC", found.psf_portion, one.psf_portion
+    mean = draws.mean if draws else nan
+    part = _row(facts, f"{stem}_{key}", mean, key, draws=draws, one_draw=known(one_psf), **names)
+    return error, part
 
 
 def slug(name: str) -> str:
@@ -373,24 +362,15 @@ def spread_text(
         return "–"
     if spread is None or not isfinite(spread):
         return quantity_text(value, unit, decimals, sign)
-    value = round(value, decimals) + 0.0  # no negative zero
     number = quantity_text(value, "", decimals, sign)
     return f"{number} ± {quantity_text(spread, unit, decimals)}"
 
 
-def _scaled(draws: Distribution, scale: float) -> Distribution:
-    return Distribution(scale * draws.values, draws.causes)
+def _shifted(draws: Distribution, offset: float) -> Distribution:
+    return Distribution(draws.values + offset, draws.causes)
 
 
-def _celsius(draws: Distribution) -> Distribution:
-    return Distribution(draws.values - KELVIN, draws.causes)
-
-
-def _force_values(analysis: Analysis) -> Values:
-    assert analysis.cut is not None
-    forces = analysis.cut.forces
-    if forces is None:
-        return {}
+def _force_values(forces: CuttingForces) -> Values:
     of, inertia = forces.segmentation, forces.inertia
     return {
         "segment_period_us": (1e6 * of.period, 1e6 * of.period_uncertainty),
@@ -404,9 +384,8 @@ def _force_values(analysis: Analysis) -> Values:
     }
 
 
-def _segment_values(analysis: Analysis) -> Mapping[str, NDArray[np.float64]]:
-    assert analysis.cut is not None
-    segments = analysis.cut.segments
+def _segment_values(cut: Cut) -> Mapping[str, NDArray[np.float64]]:
+    segments = cut.segments
     return {
         "contact_length_um": np.array([1e6 * one.contact_length for one in segments]),
         "band_width_um": np.array([1e6 * one.band_width for one in segments]),
@@ -439,7 +418,7 @@ def _chip_values(chip: ChipMetrics) -> Values:
     }
 
 
-def camera_values(camera: Camera, scene: Raster) -> Values:
+def _camera_values(camera: Camera, scene: Raster) -> Values:
     """Return NETD and range of a camera that observes a scene; empty without a detector."""
     calibration = camera.calibration(camera.pixels(scene).shape)
     if calibration is None:
