@@ -15,8 +15,9 @@ import xarray as xr
 from analytic_chip import AnalyticChip
 from PIL import Image
 
-from chipglow.analysis import Distribution, Plan, analyse, analysis_of, one_draw, with_errors
-from chipglow.analysis.draws import CAUSES
+from chipglow.analysis import Distribution, one_draw, with_errors
+from chipglow.analysis.analyse import analyse
+from chipglow.analysis.plan import Plan
 from chipglow.camera import Camera
 from chipglow.laboratory.chip import Inertia
 from chipglow.report import Row, result_rows, results_frame, write_report
@@ -48,18 +49,17 @@ PAPER_FIGURES = {
 }
 FIGURES = {*PAPER_FIGURES, "psf-sensitivity", "forces", "chip-thickness"}
 PAPERS = Study()
+CAUSES = ("segment", "texture", "pixel phase")
 SETTINGS = table_2(PAPERS)
 
 
 @pytest.fixture(scope="module")
 def result():
-    return analysis_of(
-        analyse(
-            AnalyticChip(frames=60).scene(),
-            {"chip 1": CHIP_1, "chip 2": CHIP_2},
-            Camera(psf_order="detector"),
-            Plan(exposures=3, phases=2, textures=2, psf_widths=(4e-6, 12e-6, 20e-6)),
-        )
+    return analyse(
+        AnalyticChip(frames=60).scene(),
+        {"chip 1": CHIP_1, "chip 2": CHIP_2},
+        Camera(psf_order="detector"),
+        Plan(exposures=3, phases=2, textures=2, psf_widths=(4e-6, 12e-6, 20e-6)),
     )
 
 

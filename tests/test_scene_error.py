@@ -221,20 +221,22 @@ def test_the_command_reports_without_a_word_of_cutting(folder):
     assert not re.search(r"\b(chip|rake|shear|cut|cutting|tool|workpiece|paper)\b", told, re.I)
     assert "Measurement error of plate.nc" in told
     sections = re.findall(r'<section id="(\w+)">', page)
-    assert sections == ["answer", "causes", "tables", "repeat"]
+    assert sections == ["answer", "causes", "comparison", "repeat"]
     assert set(re.findall(r'href="#([^"]+)"', page)) <= set(re.findall(r' id="([^"]+)"', page))
     # Two exposures of three views, and a scale of colours each.
     assert page.count("<img data-frame=") == 6 and page.count('<div class="scale">') == 3
     summary = json.loads((folder / "out" / "summary.json").read_text())
     schema = json.loads((folder / "out" / "summary.schema.json").read_text())
     jsonschema.validate(summary, schema)
-    results = summary["results"]["uniform"]
     errors = found(places=(MIDDLE, ACROSS))
     here = reading(errors, "across", "most negative").error.mean
+    key = "across_most_negative_error_degC"
     # The file's temperatures are rounded to 1/40 K.
-    assert results["across"]["most negative"]["error_degC"]["mean"] == pytest.approx(here, abs=0.1)
+    assert summary["results"][key] == pytest.approx(here, abs=0.1)
+    assert summary["draws"][key]["count"] == 8
+    assert summary["references"][key] == pytest.approx(518.0, abs=1.0)
     with xr.open_dataset(folder / "out" / "results.nc", engine="h5netcdf") as data:
-        assert data["profile_across_uniform"].shape[0] == 4
+        assert data["line_measured"].sel(line="across").sizes["pixel_phase"] == 4
         assert all(data[name].attrs.get("units") for name in data.data_vars)
 
 

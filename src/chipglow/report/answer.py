@@ -3,8 +3,9 @@
 from collections.abc import Iterator, Sequence
 from math import isfinite
 
-from chipglow.analysis import Distribution, Headline
+from chipglow.analysis import Distribution
 from chipglow.analysis.distribution import COVERAGE
+from chipglow.analysis.reductions import Headline
 from chipglow.quantities.format import quantity_text
 from chipglow.report.facts import Facts, texts
 from chipglow.report.page import Answer, Term

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from chipglow.analysis import (
     Analysis,
-    Headline,
     headlines,
     image_error,
     line_change,
@@ -21,6 +20,7 @@ from chipglow.analysis import (
     sensitivity_error,
     sensitivity_psf_fraction,
 )
+from chipglow.analysis.reductions import Headline
 from chipglow.drawing import drawing
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text

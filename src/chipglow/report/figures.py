@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.analysis import (
-    Headline,
     image_error,
     image_psf_portion,
     line_error,
@@ -18,6 +17,7 @@ from chipglow.analysis import (
     sensitivity_error,
     sensitivity_psf_fraction,
 )
+from chipglow.analysis.reductions import Headline
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import ImagePanel
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
@@ -143,7 +143,7 @@ def error_images(facts: Facts) -> Figure:
 def error_lines(facts: Facts) -> Figure | None:
     """Draw temperatures and errors along every line across a place."""
     names = [] if "line" not in facts.data else list(facts.data.line.values)
-    names = [name for name in names if name != "contact" or facts.analysis.cut is None]
+    names = [name for name in names if name != "contact"]
     if not names:
         return None
     factor, unit = drawing.length_unit(facts.analysis.raster)
@@ -167,7 +167,7 @@ def error_lines(facts: Facts) -> Figure | None:
         right.set_ylabel("error / °C")
         right.axhline(0.0, color=GREY, linewidth=0.6)
         for axes in (left, right):
-            axes.set_xlabel(_LINE_LABELS[name] if facts.analysis.cut else f"distance / {unit}")
+            axes.set_xlabel(_LINE_LABELS.get(name, f"distance / {unit}"))
     _legend(figure, rows[:, 0], rows[:, 1], columns=4)
     return figure
 
@@ -249,10 +249,8 @@ def _of(facts: Facts, title: str, surface: str) -> str:
 
 
 def _line_title(facts: Facts, line: str) -> str:
-    if facts.analysis.cut is None:
-        return line
-    surface = facts.data.line_surface.sel(line=line).item()
-    return {"rake": "across the rake face", "band": "across the shear band"}[line] + f", {surface}"
+    title = {"rake": "across the rake face", "band": "across the shear band"}.get(line, line)
+    return _of(facts, title, str(facts.data.line_surface.sel(line=line).item()))
 
 
 def _heat_limits(facts: Facts, truth: Array) -> tuple[float, float]:

@@ -240,7 +240,9 @@ class _Report:
             number = published.number if published else ""
             file = f"{number.lower().replace(' ', '-')}-{name}".lstrip("-")
             png, _ = drawing.save(figure, folder, file)
-        caption, alt = (self.facts.text(texts()["figures"][name][key]) for key in ("caption", "alt"))
+        caption, alt = (
+            self.facts.text(texts()["figures"][name][key]) for key in ("caption", "alt")
+        )
         caption = f"{caption} {published.text}" if published else caption
         return FigureFile(file, title, number, caption, alt, png)
 
@@ -392,11 +394,9 @@ class _Report:
         yield Part("terms", "Glossary and methods", [Terms(terms)])
         yield Part("study", "The study as run", [Text(code=self.study_text)])
         yield Part("versions", "Versions", [Pairs(list(self.provenance.items()))])
-        own = f"chipglow {__version__}: a virtual infrared camera for metal cutting."
-        cite = [Text(f"This program: {own} State the version and attach the study above.")]
         if self.analysis.cut is not None:
-            cite.append(Text(f"The method: {paper.CITATION}"))
-        yield Part("cite", "How to cite", cite)
+            own = f"This program: chipglow {__version__}. State the version and attach the study."
+            yield Part("cite", "How to cite", [Text(own), Text(f"The method: {paper.CITATION}")])
 
     @property
     def _command(self) -> str:

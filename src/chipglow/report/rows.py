@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.analysis import Analysis, Cut, CuttingForces, Distribution, Headline, one_draw
+from chipglow.analysis import Analysis, Cut, CuttingForces, Distribution, one_draw
+from chipglow.analysis.reductions import Headline
 from chipglow.camera import Camera
 from chipglow.drawing.scales import KELVIN
 from chipglow.laboratory.chip import ChipMetrics
