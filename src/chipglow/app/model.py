@@ -22,8 +22,8 @@ from chipglow.analysis import (
     error_images,
     error_parts,
 )
-from chipglow.analysis.draws import pixel_phases
-from chipglow.analysis.error_images import Unblurred
+from chipglow.analysis import pixel_phases
+from chipglow.analysis import Unblurred
 from chipglow.app.knobs import LINES, ControlPanel, Knobs
 from chipglow.app.opening import QUICK_SAMPLES, OpenedMeasurement, OpenedScene, with_samples
 from chipglow.app.picture import (
