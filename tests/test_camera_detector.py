@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 from typer.testing import CliRunner
 
-from chipglow.analysis import Plan, analyse, analysis_of
+from chipglow.analysis import Plan, analyse
 from chipglow.analysis.error_images import error_images
 from chipglow.camera import (
     UNUSABLE,
@@ -431,7 +431,6 @@ def test_the_errors_of_a_scene_have_the_noise_of_each_draw(tmp_path):
     np.testing.assert_allclose(
         shown.errors.measured, shown.measurement.radiance_temperature()[0], rtol=1e-12
     )
-    noisy, quiet = analysis_of(noisy), analysis_of(quiet)
     rows = {row.key: row.here for row in camera_rows(Facts(noisy))}
     assert rows["netd_half_K"] == calibration.half_netd
     assert camera_rows(Facts(quiet)) == []

@@ -8,9 +8,7 @@ import pytest
 import typer
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis import Distribution
-from chipglow.analysis.analyse import analyse
-from chipglow.analysis.plan import Plan
+from chipglow.analysis import Distribution, Plan, analyse
 from chipglow.analysis.reductions import Headline
 from chipglow.camera import AnnularAperturePSF, Camera
 from chipglow.cli import progress

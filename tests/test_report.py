@@ -15,9 +15,7 @@ import xarray as xr
 from analytic_chip import AnalyticChip
 from PIL import Image
 
-from chipglow.analysis import Distribution, one_draw, with_errors
-from chipglow.analysis.analyse import analyse
-from chipglow.analysis.plan import Plan
+from chipglow.analysis import Distribution, Plan, analyse, one_draw, with_errors
 from chipglow.camera import Camera
 from chipglow.laboratory.chip import Inertia
 from chipglow.report import Row, result_rows, results_frame, write_report

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis.analyse import analyse
-from chipglow.analysis.plan import Plan
+from chipglow.analysis import Plan, analyse
 from chipglow.camera import Camera
 from chipglow.laboratory.chip import contact_temperatures
 from chipglow.report import write_report

@@ -22,7 +22,6 @@ from tempfile import TemporaryDirectory
 import sample_files
 
 import chipglow
-from chipglow.analysis import analysis_of
 from chipglow.drawing.drawing import style
 from chipglow.report.facts import Facts
 from chipglow.report.figures import error_images, error_lines
@@ -42,7 +41,7 @@ def looked_at(source, settings, study):
     with TemporaryDirectory() as folder:
         scene = Path(folder) / "scene.nc"
         chipglow.import_scene(chipglow.load_import(str(files / source), settings).build(), scene)
-        return Facts(analysis_of(errors(chipglow.load_study(files / study, scene))))
+        return Facts(errors(chipglow.load_study(files / study, scene)))
 
 
 # %%

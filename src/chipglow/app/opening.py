@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis.starts import spread_starts
+from chipglow.analysis import spread_starts
 from chipglow.app.knobs import ControlPanel, Ends, Point, knobs_of
 from chipglow.app.probing import probed
 from chipglow.camera import Measurement
