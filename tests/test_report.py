@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 import xarray as xr
 from analytic_chip import AnalyticChip
+from chipglow.analysis.draws import CAUSES
 from PIL import Image
 
-from chipglow.analysis import Distribution, Plan, analyse, analysis_of, one_draw, with_errors
-from chipglow.analysis.draws import CAUSES
+from chipglow.analysis import Distribution, Plan, analyse, one_draw, with_errors
 from chipglow.camera import Camera
 from chipglow.laboratory.chip import Inertia
 from chipglow.report import Row, result_rows, results_frame, write_report
@@ -53,13 +53,11 @@ SETTINGS = table_2(PAPERS)
 
 @pytest.fixture(scope="module")
 def result():
-    return analysis_of(
-        analyse(
-            AnalyticChip(frames=60).scene(),
-            {"chip 1": CHIP_1, "chip 2": CHIP_2},
-            Camera(psf_order="detector"),
-            Plan(exposures=3, phases=2, textures=2, psf_widths=(4e-6, 12e-6, 20e-6)),
-        )
+    return analyse(
+        AnalyticChip(frames=60).scene(),
+        {"chip 1": CHIP_1, "chip 2": CHIP_2},
+        Camera(psf_order="detector"),
+        Plan(exposures=3, phases=2, textures=2, psf_widths=(4e-6, 12e-6, 20e-6)),
     )
 
 

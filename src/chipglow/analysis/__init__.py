@@ -1,8 +1,8 @@
 """The virtual camera's error against its scene: images, places, distributions, causes."""
 
-from chipglow.analysis.engine import HEADLINES, analyse
 from chipglow.analysis.cut import lacking, spread_starts
 from chipglow.analysis.distribution import Distribution, VarianceComponent
+from chipglow.analysis.engine import HEADLINES, analyse
 from chipglow.analysis.error_images import (
     ErrorImages,
     ReferenceKind,

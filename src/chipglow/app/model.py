@@ -19,11 +19,11 @@ from chipglow.analysis import (
     ErrorImages,
     ErrorParts,
     LinePlace,
+    Unblurred,
     error_images,
     error_parts,
+    pixel_phases,
 )
-from chipglow.analysis import pixel_phases
-from chipglow.analysis import Unblurred
 from chipglow.app.knobs import LINES, ControlPanel, Knobs
 from chipglow.app.opening import QUICK_SAMPLES, OpenedMeasurement, OpenedScene, with_samples
 from chipglow.app.picture import (

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from chipglow.analysis import Analysis, analysis_of
+from chipglow.analysis import Analysis
 from chipglow.cli.inertia import say_of_cut
 from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.cli.screen import current
@@ -80,7 +80,7 @@ def _write(
             say_where_it_starts(beside, resume, agreed)
         assumed: list[str] = []
         with progress_bars() as progress:
-            analysis = analysis_of(compute(study, progress, resume, assumed.append))
+            analysis = compute(study, progress, resume, assumed.append)
             steady, failed = _steady(beside, progress, resume)
             analysis = replace(analysis, failed={**analysis.failed, **failed})
             progress("report", 0.0)
@@ -120,10 +120,9 @@ def _steady(
     if beside is None:
         return None, {}
     try:
-        found = run(beside, lambda step, done: progress(f"{step}, steady tool", done), resume)
+        analysis = run(beside, lambda step, done: progress(f"{step}, steady tool", done), resume)
     except ValueError as error:
         return None, {"steady tool": str(error)}
-    analysis = analysis_of(found)
     if analysis.cut is None:
         return None, {"steady tool": " ".join(analysis.missing)}
     return analysis, {}

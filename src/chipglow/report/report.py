@@ -240,7 +240,9 @@ class _Report:
             number = published.number if published else ""
             file = f"{number.lower().replace(' ', '-')}-{name}".lstrip("-")
             png, _ = drawing.save(figure, folder, file)
-        caption, alt = (self.facts.text(texts()["figures"][name][key]) for key in ("caption", "alt"))
+        caption, alt = (
+            self.facts.text(texts()["figures"][name][key]) for key in ("caption", "alt")
+        )
         caption = f"{caption} {published.text}" if published else caption
         return FigureFile(file, title, number, caption, alt, png)
 
