@@ -13,6 +13,7 @@ import xarray as xr
 
 import chipglow
 from chipglow.analysis import RatioErrors, ratio_errors, wavelengths_frame
+from chipglow.analysis.wavelengths import band_name
 from chipglow.camera import RatioCamera
 from chipglow.drawing import drawing
 from chipglow.drawing.scales import HEAT, KELVIN, SIGNED
