@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.error_images import ErrorImages
 from chipglow.laboratory.chip import ShearBand
-from chipglow.scene import Line, Raster, Region, Tool, straight_line
+from chipglow.scene import Line, Raster, Region, Tool, sample, straight_line
 from chipglow.scene.lines import nearest
 from chipglow.scene.regions import Point
 

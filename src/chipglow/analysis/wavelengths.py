@@ -246,19 +246,11 @@ def _has_room(scene: Scene, camera: Camera, start: float, delay: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Readings:
-    """What is read at one place.
+    """What is read at one place, in K and W/(m² sr).
 
-    Parameters
-    ----------
-    weights : ndarray
-        Of the four samples around the pixel's centre, shape (sample, draw).
-    truth : ndarray
-        Their true temperatures in K, of the same shape.
-    local : ndarray
-        Their radiance in W/(m² sr) in the middle of the exposure and on average, shape (band, 2,
-        sample, draw).
-    pixel : ndarray
-        Radiance of the pixel, shape (band, step, draw): `_FOOTPRINT` to `_SHIFTED` and on.
+    `weights` and `truth` are those of the four samples around the pixel's centre, shape (sample,
+    draw), and `local` their radiance in the middle of the exposure and on average, shape (band, 2,
+    sample, draw). `pixel` is the pixel's radiance, shape (band, step, draw).
     """
 
     weights: Array
