@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from analytic_chip import AnalyticChip
-from chipglow.analysis.draws import CAUSES
 from PIL import Image
 
 from chipglow.analysis import Distribution, Plan, analyse, one_draw, with_errors

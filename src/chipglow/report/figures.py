@@ -1,15 +1,17 @@
 """Figures of any analysis: scene, measurement, errors as images, along lines and over time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable
 from itertools import groupby
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chipglow.analysis import (
+    Distribution,
     image_error,
     image_psf_portion,
     line_error,
@@ -32,6 +34,8 @@ _ORDERS: Final = {
     "detector": (BLUE, "Gaussian, on the pixel image"),
     "optics": (VERMILLION, "Gaussian, before the pixels"),
 }
+_Series: TypeAlias = Callable[[xr.Dataset, str, str], Array]
+
 _MAX_CURVES: Final = 6
 _LINE_LABELS: Final = {
     "rake": "distance from the rake face / µm\n← tool      chip →",
@@ -168,7 +172,7 @@ def error_lines(facts: Facts) -> Figure | None:
         right.axhline(0.0, color=GREY, linewidth=0.6)
         for axes in (left, right):
             axes.set_xlabel(_LINE_LABELS.get(name, f"distance / {unit}"))
-    _legend(figure, rows[:, 0], rows[:, 1], columns=4)
+    _legend(figure, rows.T.flat, columns=4)
     return figure
 
 
@@ -197,7 +201,7 @@ def over_time(facts: Facts) -> Figure | None:
         axes.axhline(0.0, color=GREY, linewidth=0.6)
         axes.set(title=_of(facts, "error", surface), xlabel=f"start of the exposure / {unit}")
     panels[0].set_ylabel("error / °C")
-    _legend(figure, panels, columns=2)
+    _legend(figure, list(panels), columns=2)
     return figure
 
 
@@ -214,32 +218,25 @@ def psf_sensitivity(facts: Facts) -> Figure | None:
     for column, name in enumerate(names):
         own = found.get(name)
         fraction = own.psf_fraction if own else None
-        for row, (title, values, scale, mean, key) in enumerate(
-            (
-                ("error", sensitivity_error, 1, own and own.error.mean, f"{name}_error_degC"),
-                (
-                    "PSF contribution",
-                    sensitivity_psf_fraction,
-                    100,
-                    fraction and fraction.mean,
-                    f"{name}_psf_fraction_percent",
-                ),
-            )
-        ):
-            axes = grid[row, column]
+        panels: tuple[tuple[str, _Series, int, Distribution | None, str], ...] = (
+            ("error", sensitivity_error, 1, own.error if own else None, "error_degC"),
+            ("PSF contribution", sensitivity_psf_fraction, 100, fraction, "psf_fraction_percent"),
+        )
+        for axes, (title, values, scale, draws, key) in zip(grid[:, column], panels, strict=True):
             for one, (colour, label) in _ORDERS.items():
                 line: Any = {"color": colour, "marker": "o", "markersize": 3.0, "label": label}
                 axes.plot(widths, scale * values(data, one, name), **line)
             if facts.is_compared:
-                axes.axhline(PAPER[key].value, color="black", linestyle="--", label="paper")
-            if psf is not None and mean is not None:
-                colour = _ORDERS[order][0]
-                _draw_point(axes, psf.fwhm * 1e6, scale * mean, colour, "PSF of this camera")
+                level = PAPER[f"{name}_{key}"].value
+                axes.axhline(level, color="black", linestyle="--", label="paper")
+            if psf is not None and draws is not None:
+                own_width, colour = psf.fwhm * 1e6, _ORDERS[order][0]
+                _draw_point(axes, own_width, scale * draws.mean, colour, "PSF of this camera")
             place = data.place.sel(reading=name).item()
             axes.set(title=f"{title}, {place}", ylabel="%" if scale == 100 else "°C")
     for axes in grid[-1]:
         axes.set_xlabel("PSF, full width at half maximum / µm")
-    _legend(figure, grid.ravel(), columns=2)
+    _legend(figure, grid.flat, columns=2)
     return figure
 
 
@@ -297,10 +294,10 @@ def _draw_point(axes: Axes, at: float, value: float, colour: str, label: str) ->
     axes.plot(at, value, color=colour, label=label, **look)
 
 
-def _legend(figure: Figure, *panels: Sequence[Axes], columns: int) -> None:
+def _legend(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
     """Add one legend below all panels, each label once."""
     handles: dict[str, Any] = {}
-    for axes in (one for row in panels for one in row):
+    for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns)

@@ -369,7 +369,7 @@ class _Report:
             several = row.means.size > 1
             cells += [
                 spread_text(row.true.mean, row.true.standard_deviation, "", 2),
-                spread_text(row.found.mean, row.found.estimate.standard_uncertainty, "", 3),
+                spread_text(row.found.mean, float(row.found.estimate.standard_uncertainty), "", 3),
                 f"{row.found.standard_deviation:.3f}",
                 spread_text(float(row.means.mean()), float(row.means.std(ddof=1)), "", 3)
                 if several

@@ -1,6 +1,6 @@
 """The numbers of a report for scripts: summary.json and its schema, from one declaration."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
@@ -147,7 +147,7 @@ def summary(
     )
 
 
-def _causes(row: CauseRow) -> Mapping[str, Cause]:
+def _causes(row: CauseRow) -> dict[str, Cause]:
     return {
         name: Cause(count=count, standard_deviation=deviation, fraction_percent=fraction)
         for name, count, deviation, fraction in row.causes
