@@ -1,12 +1,13 @@
 """The analysis: which images are taken of a scene, where they are read, and the Dataset of it."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import isfinite
 from typing import Any, Final, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chipglow.analysis.cut import (
     Progress,
@@ -129,15 +130,19 @@ def analyse(
     """
     tell = progress or (lambda label, part: None)
     task = _Task(scene, surfaces, camera, plan, tell, effects)
+    fields = {name: camera.lay(surface, scene) for name, surface in surfaces.items()}
     found, missing = _segments(task)
     schedule, frame = _scene_schedule(task) if found is None else _cut_schedule(task, found)
-    looked = look(scene, surfaces, camera, schedule, lambda part: task.tell("camera", part))
+    looked = look(scene, surfaces, fields, camera, schedule, lambda part: tell("camera", part))
     measurements = {
         name: camera.redrawn(number).measurement(np.stack(images), schedule.starts, scene.raster)
         for number, (name, images) in enumerate(looked.images.items())
     }
     cut = None if found is None else _cut(task, found)
-    variables = _variables(task, schedule, looked, frame, measurements, found is not None)
+    emissivities = [field.emissivity(frame) for field in fields.values()]
+    variables = _variables(
+        task, schedule, looked, frame, measurements, emissivities, found is not None
+    )
     attributes: dict[str, Any] = {
         "shown_instant": schedule.shown,
         "error_reference": plan.reference,
@@ -296,6 +301,7 @@ def _variables(
     looked: Looked,
     frame: Frame,
     measurements: Mapping[str, Measurement],
+    emissivities: Sequence[NDArray[np.float32]],
     is_cut: bool,
 ) -> dict[str, Any]:
     camera, names = task.camera, list(task.surfaces)
@@ -308,7 +314,7 @@ def _variables(
         **scene_variables(
             frame,
             task.scene.raster,
-            [looked.fields[name].emissivity(frame) for name in names],
+            emissivities,
             [np.asarray(camera.band.temperature(one.centre_radiance)) for one in exposures],
         ),
         **image_variables(

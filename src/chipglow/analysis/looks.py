@@ -4,7 +4,7 @@ Images that agree up to a stage share it: frames are read once for all surfaces 
 exposure, an exposure is formed by all cameras, and blurred radiance serves all pixel phases.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor
 from typing import Final, TypeAlias
@@ -106,7 +106,6 @@ class Looked:
     images: Mapping[str, list[Array]]
     references: Mapping[str, list[Array]]
     shown: dict[str, tuple[Exposure, Stack]]
-    fields: Mapping[str, EmissivityField]
     readings: Table
     varied: Table
     lines: Table
@@ -186,12 +185,15 @@ def pixel_phases(camera: Camera, count: int) -> list[Camera]:
 def look(
     scene: Scene,
     surfaces: Mapping[str, Surface],
+    first: Mapping[str, EmissivityField],
     camera: Camera,
     schedule: Schedule,
     progress: Callable[[float], None],
 ) -> Looked:
-    """Take the images of a schedule and read them; `progress` is told the fraction done."""
-    first = {name: camera.lay(surface, scene) for name, surface in surfaces.items()}
+    """Take the images of a schedule and read them; `progress` is told the fraction done.
+
+    `first` are the surfaces with their first texture on the scene.
+    """
     others = {
         (view.surface, number): camera.lay(surfaces[view.surface].redrawn(number), scene)
         for view in schedule.views
@@ -224,7 +226,7 @@ def look(
     return looked
 
 
-def _empty(schedule: Schedule, fields: Mapping[str, EmissivityField], pitch: float) -> Looked:
+def _empty(schedule: Schedule, surfaces: Iterable[str], pitch: float) -> Looked:
     exposures, phases = len(schedule.drawn), schedule.phases**2
     textures = max((view.textures for view in schedule.views), default=1)
     rows = 1 + len(schedule.effects)
@@ -232,10 +234,9 @@ def _empty(schedule: Schedule, fields: Mapping[str, EmissivityField], pitch: flo
     sizes = [line.distance.size for place in places for line in place.lines(pitch).values()]
     points = max(sizes, default=0)
     return Looked(
-        images={name: [] for name in fields},
-        references={name: [] for name in fields},
+        images={name: [] for name in surfaces},
+        references={name: [] for name in surfaces},
         shown={},
-        fields=fields,
         readings=Table(exposures, textures, phases, rows),
         varied=Table(len(schedule.vary), exposures, phases, rows),
         lines=Table(exposures, textures, phases, rows, points),
