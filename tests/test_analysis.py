@@ -12,6 +12,7 @@ from measured_band import BandImage
 from scipy.interpolate import RegularGridInterpolator
 
 from chipglow.analysis import (
+    CASES,
     BandPlace,
     Plan,
     PointPlace,
@@ -28,7 +29,6 @@ from chipglow.analysis import (
     sensitivity_psf_fraction,
 )
 from chipglow.analysis.error_images import LEAST_COVERED
-from chipglow.analysis.looks import CASES, Schedule, View, look
 from chipglow.camera import Camera, Detector, EnergyResponse, Exposure, GaussianPSF, ReadNoise
 from chipglow.laboratory.chip import NoShearBandError, contact_length, find_shear_band, segmentation
 from chipglow.radiometry import Band
@@ -658,32 +658,23 @@ def exposure_at(study, name):
 
 
 def test_an_effect_switched_off_is_one_more_row(chip):
-    """The loop takes any effects: without motion a still scene's error is that of the middle."""
+    """Without motion the camera sees what radiates in the middle of the exposure."""
     scene = chip.scene()
-    start = float(scene.times[20])
 
     def still(camera, exposure):
         return camera, replace(exposure, mean_radiance=exposure.centre_radiance)
 
     place = PointPlace("here", (-60e-6, 80e-6))
-    schedule = Schedule(
-        starts=np.array([start]),
-        drawn=(0,),
-        shown=0,
-        views=(View("chip 1", [[place]], 1, 0, (0, 0, 0)),),
-        phases=1,
-        reference="maximum",
-        effects={**CASES, "without motion": still},
-    )
-    looked = look(scene, {"chip 1": CHIP_1}, CAMERA, schedule, lambda part: None)
-    (row,) = looked.readings.rows.values()
-    exposure = CAMERA.expose(scene, CHIP_1, start)
-    _, frozen = still(CAMERA, exposure)
-    for i, seen in ((1, exposure), (3, frozen)):
+    plan = Plan(exposures=1, phases=1, textures=1, places=(place,))
+    effects = {**CASES, "without motion": still}
+    result = analyse(scene, {"chip 1": CHIP_1}, CAMERA, plan, effects=effects)
+    row = result.data.measured.sel(reading="here, pixel").isel(exposure=0, texture=0, pixel_phase=0)
+    exposure = CAMERA.expose(scene, CHIP_1, float(result.data.exposure[0]))
+    for effect, seen in (("all", exposure), ("without motion", still(CAMERA, exposure)[1])):
         errors = error_images(CAMERA, seen)
         expected = nearest(errors.measured, errors.raster, place.point)
-        assert row[0, 0, 0, i] == pytest.approx(float(expected), abs=1e-9)
-    assert row[0, 0, 0, 1] != row[0, 0, 0, 3]
+        assert row.sel(effects=effect) == pytest.approx(float(expected), abs=1e-9)
+    assert row.sel(effects="all") != row.sel(effects="without motion")
 
 
 def test_other_noise_is_in_every_draw(chip):

@@ -11,7 +11,7 @@ from chipglow.analysis.error_images import (
     reference_temperature,
 )
 from chipglow.analysis.error_parts import ErrorParts, error_parts
-from chipglow.analysis.looks import pixel_phases
+from chipglow.analysis.looks import CASES, Effect, pixel_phases
 from chipglow.analysis.places import (
     BandPlace,
     HottestPlace,
@@ -51,6 +51,7 @@ from chipglow.analysis.wavelengths import (
 )
 
 __all__ = [
+    "CASES",
     "HEADLINES",
     "RATIO_CAUSES",
     "Analysis",
@@ -58,6 +59,7 @@ __all__ = [
     "Cut",
     "CuttingForces",
     "Distribution",
+    "Effect",
     "ErrorImages",
     "ErrorParts",
     "Headline",

@@ -5,7 +5,7 @@ exposure, an exposure is formed by all cameras, and blurred radiance serves all 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import ceil, floor
 from typing import Final, TypeAlias
 
@@ -74,7 +74,7 @@ class Schedule:
     views: tuple[View, ...]
     phases: int
     reference: ReferenceKind
-    effects: Mapping[str, Effect] = field(default_factory=lambda: CASES)
+    effects: Mapping[str, Effect]
     vary: Sequence[Callable[[Camera], Camera]] = ()
 
 

@@ -1,12 +1,14 @@
 """Where errors become one line and an exit code."""
 
 import sys
+from collections.abc import Callable
 from typing import Annotated, Any, Final
 
 import typer
 from typer.core import TyperGroup
 
 from chipglow.cli import screen
+from chipglow.cli.options import check_outputs
 
 BAD_INPUT: Final = 2
 FAILED: Final = 1
@@ -16,7 +18,8 @@ INTERRUPTED: Final = 130
 class Boundary(TyperGroup):
     """Commands that end in one line and an exit code, never in a traceback, if they fail.
 
-    Each has an option ``--json``: its results as one object on stdout, if it does not fail.
+    Each has an option ``--json``: its results as one object on stdout, if it does not fail. What a
+    command writes is checked before it begins.
 
     2 for what the user can put right (input, files, disk), 1 for a simulation that went wrong,
     130 after Ctrl-C. Anything else is a defect of the program and keeps its traceback.
@@ -24,7 +27,7 @@ class Boundary(TyperGroup):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        _give_json(self)
+        _complete(self)
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command."""
@@ -60,13 +63,22 @@ def _one_line(error: Exception) -> str:
     return " ".join(text.split())
 
 
-def _give_json(group: TyperGroup) -> None:
-    """The option for programs, on every command of a group."""
+def _complete(group: TyperGroup) -> None:
+    """Give every command of a group the option for programs and the check of its outputs."""
     for command in group.commands.values():
         if isinstance(command, TyperGroup):
-            _give_json(command)
+            _complete(command)
         else:
+            command.callback = _checked(command.callback)
             command.params.extend(typer.main.get_command(_JSON).params)
+
+
+def _checked(run: Any) -> Callable[..., Any]:
+    def checked(**values: Any) -> Any:
+        check_outputs(run, values)
+        return run(**values)
+
+    return checked
 
 
 _JSON: Final = typer.Typer(add_completion=False)

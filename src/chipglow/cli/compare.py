@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chipglow.cli.options import Settings, ToolChoice, picture_option
+from chipglow.cli.options import Force, Settings, ToolChoice, folder_option, picture_option
 
 if TYPE_CHECKING:
     from chipglow.cli.screen import Screen
@@ -64,11 +64,11 @@ def compare(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Folder of the results: comparison.csv, summary.json, comparison.png and .svg.",
+        folder_option(
+            "Folder of the results: comparison.csv, summary.json, comparison.png and .svg."
         ),
     ] = None,
+    force: Force = False,
     plot: Annotated[Path | None, picture_option("Draw the comparison")] = None,
     settings: Settings = None,
 ) -> None:
@@ -108,7 +108,7 @@ def compare(
     screen.heading()
     screen.say(result.statement)
     if out is not None:
-        _write(result, out)
+        _write(result, out, force)
         screen.file(out)
     if plot is not None:
         write_picture(draw_comparison(result), plot)
@@ -149,12 +149,12 @@ def _print(screen: "Screen", result: "Comparison") -> None:
     )
 
 
-def _write(result: "Comparison", out: Path) -> None:
+def _write(result: "Comparison", out: Path, force: bool) -> None:
     from chipglow.drawing import drawing
     from chipglow.io import atomic_folder
     from chipglow.laboratory.comparison import write_comparison
     from chipglow.laboratory.comparison.figure import draw_comparison
 
-    with atomic_folder(out) as folder:
+    with atomic_folder(out, force) as folder:
         write_comparison(result, folder)
         drawing.save(draw_comparison(result), folder, "comparison")

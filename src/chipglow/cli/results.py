@@ -24,6 +24,7 @@ from chipglow.study import Progress, Study, errors, run, study_text
 def write_results(
     study: Study,
     folder: Path,
+    force: bool,
     resume: bool,
     agreed: bool,
     remarks: Sequence[str] = (),
@@ -36,8 +37,10 @@ def write_results(
     study : Study
         The study.
     folder : Path
-        Folder of the results; it appears when they are complete. A folder with other contents is
-        refused before anything is computed.
+        Folder of the results; it appears when they are complete.
+    force : bool
+        Whether to keep files in the folder that chipglow did not write. By default such a folder
+        is refused before anything is computed.
     resume : bool
         Whether to resume a cut that an earlier run left unfinished.
     agreed : bool
@@ -48,32 +51,33 @@ def write_results(
         Whether to compare with the same study with a tool at steady-state temperature.
     """
     beside = study.with_steady_tool() if steady_tool else None
-    _write(study, folder, resume, agreed, remarks, run, beside)
+    _write(study, folder, force, resume, agreed, remarks, run, beside)
 
 
-def write_errors(study: Study, folder: Path) -> None:
+def write_errors(study: Study, folder: Path, force: bool) -> None:
     """Write and print the measurement error of a study's scene, of a cut or not.
 
     Parameters
     ----------
     study : Study
         The study.
-    folder : Path
+    folder, force
         As for `write_results`.
     """
-    _write(study, folder, False, True, (), errors)
+    _write(study, folder, force, False, True, (), errors)
 
 
 def _write(
     study: Study,
     folder: Path,
+    force: bool,
     resume: bool,
     agreed: bool,
     remarks: Sequence[str],
     compute: Callable[..., Analysis],
     beside: Study | None = None,
 ) -> None:
-    with atomic_folder(folder) as temporary:
+    with atomic_folder(folder, force) as temporary:
         if study.scene is None:
             say_where_it_starts(study, resume, agreed)
         if beside is not None:
