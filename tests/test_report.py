@@ -294,7 +294,8 @@ def test_the_summary_is_strict_json(folder, result, facts):
         assert summary["draws"][key]["standard_deviation"] == error.standard_deviation
         assert summary["draws"][key]["count"] == 8
         assert summary["one_draw"][key] == one_draw(result.data, name).error
-        assert summary["references"][key] == facts.headlines[name].reference.mean - 273.15
+        celsius = facts.headlines[name].reference.mean - 273.15
+        assert summary["references"][key] == pytest.approx(celsius, abs=1e-9)
         parts = summary["causes"][key]
         assert list(parts) == ["segment", "texture", "pixel phase", "causes together"]
         assert sum(part["fraction_percent"] for part in parts.values()) == pytest.approx(100.0)
