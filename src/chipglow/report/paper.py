@@ -216,7 +216,7 @@ QUICK: Final = (
 def table_2(study: Study) -> list[tuple[str, str, str]]:
     """Return the settings of the cutting simulation: name, the paper's value, the study's."""
     cutting, tool = study.cutting, study.cutting.tool
-    region, window = cutting.numerics.build(), cutting.window
+    region, window = cutting.numerics, cutting.window
     depth = f"{region.depth * 1e3:g} mm simulated"
     if tool.outline:
         angles = ("from a file", "from a file", "from a file")
