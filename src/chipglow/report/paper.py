@@ -133,18 +133,9 @@ def stands_beside(study: object, analysis: Analysis) -> bool:
 def comparison(
     key: str, draws: Distribution | None, unit: str, widths: Array, series: Array | None
 ) -> str:
-    """Return how a result of the report compares with the paper, as sentences.
+    """Return how a row of the report compares with the paper, as sentences.
 
-    Parameters
-    ----------
-    key : str
-        The report's row.
-    draws : Distribution or None
-        Draws of the row in its unit.
-    unit : str
-        The unit.
-    widths, series : ndarray
-        Widths of Gaussian PSFs in m and the result with them; None if unknown.
+    `series` are its values with Gaussian PSFs of the widths in m; None if unknown.
     """
     sentences = [ROW_TEXTS.get(key, "")]
     paper = PAPER.get(key)

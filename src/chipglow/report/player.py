@@ -85,24 +85,9 @@ class View:
 
 @dataclass(frozen=True)
 class Player:
-    """Views of the same frames, three in a row.
+    """Views of the same frames; `still` is shown first, without script and in print.
 
-    Parameters
-    ----------
-    title, caption : str
-        Heading and caption.
-    views : sequence of View
-        The views.
-    times : sequence of str
-        What each frame shows, with units.
-    still : int
-        Frame that is shown first, without script and in print.
-    raster : Raster
-        Position of the values.
-    tool : Tool, optional
-        Drawn on the views.
-    marks : sequence of Mark
-        Drawn on the views.
+    Tool and marks are drawn on all views; `times` are the captions of the frames.
     """
 
     title: str

@@ -34,31 +34,11 @@ _ACROSS: Final = ("rake", "band")
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity of the report, and the published value if there is one.
+    """One quantity of the report, in its unit, and the published value if there is one.
 
-    Parameters
-    ----------
-    key : str
-        Name in ``summary.json``, with the unit at its end.
-    quantity, unit : str
-        Name and unit as printed.
-    here : float or None
-        The result; the mean if it was drawn, None if it is unknown.
-    decimals : int
-        Decimals worth printing.
-    explanation : str
-        How it is determined, and what causes it.
-    draws : Distribution or None
-        The draws of which `here` is the mean, in the same unit.
-    one_draw : float or None
-        Result of a single frame, the paper's procedure.
-    uncertainty : float or None
-        Standard uncertainty of `here` if it was not drawn, or its standard deviation over time or
-        segments.
-    reference : Distribution or None
-        Reading of a camera without error in °C, for an error.
-    published : PaperValue or None
-        The published value.
+    `here` is the result (the mean of its `draws`), `one_draw` that of a single frame. Without draws
+    `uncertainty` is its standard uncertainty or its standard deviation over time or segments.
+    `reference` belongs to an error: the reading of a camera without error in °C.
     """
 
     key: str
