@@ -19,11 +19,11 @@ from chipglow.analysis import (
     ErrorImages,
     ErrorParts,
     LinePlace,
+    Unblurred,
     error_images,
     error_parts,
+    pixel_phases,
 )
-from chipglow.analysis.draws import pixel_phases
-from chipglow.analysis.error_images import Unblurred
 from chipglow.app.controls import LINES, SCENE_IMAGES, Controls, Stage, State
 from chipglow.app.opening import (
     QUICK_SAMPLES,

@@ -8,7 +8,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from chipglow.analysis.starts import spread_starts
+from chipglow.analysis import spread_starts
 from chipglow.app.controls import CURSOR, LINES, Controls, Corners, Point, rounded
 from chipglow.app.probing import probed
 from chipglow.camera import Measurement
