@@ -297,17 +297,6 @@ def test_a_foreign_file_is_named(tmp_path):
         open_scene(path)
 
 
-def test_a_damaged_frame_is_named(tmp_path):
-    path = a_file(tmp_path)
-    with h5py.File(path) as file:
-        at = file["temperature"].id.get_chunk_info(1)
-    damaged = bytearray(path.read_bytes())
-    damaged[at.byte_offset : at.byte_offset + at.size] = bytes(at.size)
-    path.write_bytes(damaged)
-    with pytest.raises(SceneError, match=r"scene\.nc: 'temperature' of frame 1 cannot be read"):
-        open_scene(path).frame(1)
-
-
 def test_an_interrupted_writer_leaves_what_was_there(tmp_path):
     path = a_file(tmp_path)
     before = path.read_bytes()
