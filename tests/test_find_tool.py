@@ -82,7 +82,9 @@ def test_the_shape_says_where_to_look_and_what_the_edge_is(seen):
     assert degrees(found.rake_angle) == pytest.approx(-7.0, abs=4.0)  # as stated above
     assert (found.clearance_angle, found.edge_radius) == (radians(10.0), 8e-6)
     elsewhere = find_tool(measurement, ToolGeometry(radians(30.0)))
-    assert any("at the end of what was looked for" in warning for warning in elsewhere.warnings)
+    assert any(
+        "at the limit of the search range" in warning for warning in elsewhere.notes.warnings
+    )
 
 
 def test_a_found_tool_moves_with_the_image(seen):
@@ -108,9 +110,9 @@ def test_a_weak_edge_is_doubtful():
     image = np.where(x + 0.12 * y < 0.0, 106.5, 100.0)
     image = image + np.random.default_rng(0).normal(0.0, 2.0, image.shape)
     measurement = Measurement.from_radiance(image[None], BAND, np.zeros(1), raster)
-    warnings = find_tool(measurement).warnings
+    warnings = find_tool(measurement).notes.warnings
     assert any("hardly stands out" in warning for warning in warnings)
-    assert any("the tip is not in the image" in warning for warning in warnings)
+    assert any("The tip is not in the image" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("noise", [0.0, 3.0])
@@ -185,7 +187,7 @@ def test_a_given_and_a_found_tool(folder):
     assert code == 0
     angle = degrees(find_tool(read_measurement(folder / "real.nc")).tool.rake_angle)
     assert f"Found: rake angle {angle:.1f} deg, tip at x " in found
-    assert "Assumed: clearance angle 7 deg, edge radius 20 um." in assumed
+    assert "Assumed: The clearance angle is 7 deg, the edge radius 20 um." in assumed
 
 
 def test_a_tool_that_the_image_shows_elsewhere_is_doubted(folder):
@@ -196,9 +198,9 @@ def test_a_tool_that_the_image_shows_elsewhere_is_doubted(folder):
         ("rake_angle: 7 deg\ntip: [0 um, 0 um]\n", True),
     ):
         (folder / "tool.yaml").write_text(text)
-        code, said, _ = command("real.nc", "--tool", "tool.yaml")
+        code, _, said = command("real.nc", "--tool", "tool.yaml")
         assert code == 0
-        assert ("Warning: the rake face that shows in the image is" in said) is doubted
+        assert ("Warning: The rake face that shows in the image is" in said) is doubted
 
 
 @pytest.mark.parametrize(

@@ -262,7 +262,6 @@ def measure(
     from chipglow.study import load_study
 
     measure_scene(scene, load_study(study), out, start, chip)
-    current().file(out)
 
 
 app.command()(wavelengths)

@@ -1,6 +1,7 @@
 """The command ``chipglow calibrate``: counts of blackbodies to a calibration."""
 
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -76,8 +77,10 @@ def calibrate(
     It holds between the coldest and the hottest blackbody: what is outside is flagged later.
     """
     from chipglow.camera import MODELS
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.laboratory.measurement import calibrate_blackbodies, write_calibration
+    from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
     from chipglow.laboratory.measurement.description import band_of
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import TEMPERATURE, TEMPERATURE_DIFFERENCE, TIME
@@ -105,16 +108,11 @@ def calibrate(
         _print_fit(screen, found, name)
     if len(found.fits) > 1:
         _print_comparison(screen, found)
-    screen.assumed(found.assumptions)
-    screen.warnings(found.warnings)
-    if out is not None:
-        write_calibration(found.fits[found.preferred], out)
-        screen.file(out)
-    if plot is not None:
-        from chipglow.cli.pictures import write_picture
-        from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
-
-        write_picture(draw_calibrations(found.fits), plot)
+    finish(
+        found.notes,
+        (out, partial(write_calibration, found.fits[found.preferred])),
+        (plot, figure(draw_calibrations, found.fits)),
+    )
 
 
 def _print_fit(screen: "Screen", found: "BlackbodyCalibration", name: str) -> None:

@@ -1,5 +1,6 @@
 """The command ``chipglow compare``: a measurement beside simulations."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -75,8 +76,7 @@ def compare(
     """Lay a measurement and simulations over each other and say which fits where."""
     from dataclasses import replace
 
-    from chipglow.cli.assumed import say_of_measurements
-    from chipglow.cli.pictures import write_picture
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.cli.times import frame_at
     from chipglow.laboratory.chip import chosen_tool, read_curve
@@ -97,21 +97,17 @@ def compare(
     )
     screen = current()
     _print(screen, result)
-    for sentence in chosen.found:
-        screen.say(sentence)
-    say_of_measurements(whole)
-    screen.assumed((*chosen.assumptions, *result.assumptions))
-    screen.warnings((*chosen.warnings, *result.warnings))
+    screen.remarks(chosen.notes)
     screen.heading()
     for place in result.places:
         screen.say(place.sentence)
     screen.heading()
     screen.say(result.statement)
-    if out is not None:
-        _write(result, out)
-        screen.file(out)
-    if plot is not None:
-        write_picture(draw_comparison(result), plot)
+    finish(
+        whole.notes + chosen.notes + result.notes,
+        (out, partial(_write, result)),
+        (plot, figure(draw_comparison, result)),
+    )
 
 
 def _stated(

@@ -1,6 +1,7 @@
 """The command ``chipglow convert``: a camera's file to a measurement."""
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -26,6 +27,7 @@ def convert(
     settings: Settings = None,
 ) -> None:
     """Make a measurement of a camera's file."""
+    from chipglow.cli.finish import finish
     from chipglow.cli.screen import current
     from chipglow.cli.showing_measurement import say_measurement
     from chipglow.io import is_measurement, write_measurement
@@ -46,14 +48,11 @@ def convert(
             raise
         screen.heading()
         screen.say(f"It is no measurement yet. {error}")
-        screen.assumed(recording.assumptions)
-        screen.warnings(recording.warnings)
+        screen.notes(recording.notes)
         return
     screen.heading("\nThe measurement:")
     say_measurement(measurement)
-    if out is not None:
-        write_measurement(measurement, out)
-        screen.file(out)
+    finish(measurement.notes, (out, partial(write_measurement, measurement)))
 
 
 def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:
@@ -82,5 +81,5 @@ def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:
         yield "reflected", f"{stated.reflected - 273.15:.2f} °C"
         yield "transmittance", f"{stated.transmittance:g}"
         yield "atmosphere", f"{stated.atmosphere - 273.15:.2f} °C"
-    for note in recording.notes:
-        yield "note", note
+    for remark in recording.notes.remarks:
+        yield "note", remark

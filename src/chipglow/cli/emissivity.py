@@ -1,5 +1,6 @@
 """The command ``chipglow emissivity``: emissivity from images of heated objects."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -64,10 +65,16 @@ def emissivity(
     settings: Settings = None,
 ) -> None:
     """Determine emissivity from images of an object of known temperature."""
-    from chipglow.cli.assumed import say_of_measurements
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
-    from chipglow.laboratory.emissivity import determine_emissivities, load_regions
+    from chipglow.laboratory.emissivity import (
+        determine_emissivities,
+        load_regions,
+        write_emissivity,
+    )
+    from chipglow.laboratory.emissivity.figure import draw_emissivity
     from chipglow.laboratory.measurement import load_measurement
+    from chipglow.laboratory.result_file import write_frame
 
     heatings = _heatings(
         images, reference, reflected, reference_uncertainty, reflected_uncertainty,
@@ -79,18 +86,15 @@ def emissivity(
     screen = current()
     _print_tables(screen, found)
     screen.heading()
-    say_of_measurements(*measurements)
-    screen.assumed(found.assumptions)
-    screen.warnings(found.warnings)
     _print_study(screen, found, out)
-    _write(screen, found, out, table)
-    if plot is not None:
-        from chipglow.cli.pictures import write_picture
-        from chipglow.laboratory.emissivity.figure import draw_emissivity
-
-        whole = {row.name for row in found.rows[0] if row.whole}
-        lines = [line for line in found.lines if line.name in whole]
-        write_picture(draw_emissivity(found.maps[0], named, lines), plot)
+    whole = {row.name for row in found.rows[0] if row.whole}
+    lines = [line for line in found.lines if line.name in whole]
+    finish(
+        sum((one.notes for one in measurements), found.notes),
+        (out, partial(write_emissivity, found)),
+        (table, partial(write_frame, found.to_frame())),
+        (plot, figure(draw_emissivity, found.maps[0], named, lines)),
+    )
 
 
 def _heatings(
@@ -174,17 +178,3 @@ def _print_study(screen: "Screen", found: "RegionEmissivities", out: Path | None
 def _print_yaml(screen: "Screen", head: str, text: str) -> None:
     screen.heading(f"\n{head}:\n\n{text}")
     screen.values({"study": text})
-
-
-def _write(
-    screen: "Screen", found: "RegionEmissivities", out: Path | None, table: Path | None
-) -> None:
-    from chipglow.laboratory.emissivity import write_emissivity
-    from chipglow.laboratory.result_file import write_frame
-
-    if out is not None:
-        write_emissivity(found, out)
-        screen.file(out)
-    if table is not None:
-        write_frame(found.to_frame(), table)
-        screen.file(table)

@@ -76,6 +76,5 @@ def _say(looked: Prospect) -> None:
             "extent_um": [left, right, bottom, top],
         },
     )
-    for sentence in survey.from_file:
-        screen.say(f"From the file: {sentence}")
-    screen.assumed(looked.assumed)
+    screen.remarks(looked.notes)
+    screen.notes(looked.notes)

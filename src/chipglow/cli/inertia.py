@@ -5,6 +5,7 @@ from math import isfinite
 
 from chipglow.cli.screen import current
 from chipglow.laboratory.chip import Inertia
+from chipglow.text import Notes
 
 
 def say_of_cut(inertia: Inertia | None, warnings: Iterable[str] = ()) -> None:
@@ -24,7 +25,7 @@ def say_of_cut(inertia: Inertia | None, warnings: Iterable[str] = ()) -> None:
             {name: number for name, (_, number) in parts.items()},
         )
     own = [inertia.warning] if inertia and inertia.warning else []
-    current().warnings((*own, *warnings), aside=True)
+    current().notes(Notes(warnings=[*own, *warnings]))
 
 
 def _known(inertia: Inertia) -> dict[str, tuple[str, float]]:

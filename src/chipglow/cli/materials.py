@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from chipglow.cli.pictures import write_picture
+from chipglow.cli.finish import figure, finish
 from chipglow.cli.screen import current
 from chipglow.cutting import material_file, material_names
+from chipglow.text import Notes
 
 
 def list_materials() -> None:
@@ -59,4 +60,4 @@ def plot_material(name: str, path: Path) -> None:
     """Draw a material to a picture whose kind is that of the file's name."""
     from chipglow.report.materials import material_figure
 
-    write_picture(material_figure(material_file(name)), path)
+    finish(Notes(), (path, figure(material_figure, material_file(name))))

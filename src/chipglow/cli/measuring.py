@@ -1,12 +1,12 @@
 """The camera alone, from a scene's file to a measurement's."""
 
+from functools import partial
 from math import floor
 from pathlib import Path
 
 from chipglow.camera import Measurement
-from chipglow.cli.assumed import say_of_measurements
+from chipglow.cli.finish import finish
 from chipglow.cli.progress import progress_bars
-from chipglow.cli.screen import current
 from chipglow.cli.times import parse_instant
 from chipglow.io import open_scene, write_measurement
 from chipglow.study import Study, fit
@@ -43,7 +43,6 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
     name = next(iter(surfaces)) if chip is None else chip
     if name not in surfaces:
         raise ValueError(f"--chip: {name!r} is unknown, expected one of {', '.join(surfaces)}")
-    current().assumed(fitted.assumed)
     first = float(scene.times[0]) if start is None else parse_instant("--start", start)
     duration = camera.frame_duration(scene.raster)
     left = float(scene.times[-1]) + scene.frame_spacing - first - duration
@@ -57,5 +56,4 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
             raise ValueError(f"{path}: {error}") from None
         progress("measurement", 1.0)
     measurement = Measurement(measured)
-    say_of_measurements(measurement)
-    write_measurement(measurement, out)
+    finish(fitted.notes + measurement.notes, (out, partial(write_measurement, measurement)))

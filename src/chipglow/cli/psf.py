@@ -52,7 +52,7 @@ def psf(
     settings: Settings = None,
 ) -> None:
     """Determine a camera's point spread function and MTF from images of an edge."""
-    from chipglow.cli.pictures import write_picture
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.psf import (
@@ -61,7 +61,9 @@ def psf(
         load_apertures,
         load_edge,
         psf_kernel,
+        write_psf,
     )
+    from chipglow.laboratory.psf.figure import draw_knife_edge
 
     part = None if region is None else _region(region)
     given = settings or ()
@@ -72,17 +74,12 @@ def psf(
     ]
     found = knife_edge(images, holes)
     chosen = psf_kernel(found, model)
-    screen = current()
-    _print(screen, found)
-    if out is not None:
-        from chipglow.laboratory.psf import write_psf
-
-        write_psf(found, out, chosen)
-        screen.file(out)
-    if plot is not None:
-        from chipglow.laboratory.psf.figure import draw_knife_edge
-
-        write_picture(draw_knife_edge(found), plot)
+    _print(current(), found)
+    finish(
+        found.notes,
+        (out, lambda path: write_psf(found, path, chosen)),
+        (plot, figure(draw_knife_edge, found)),
+    )
 
 
 def _region(text: str) -> tuple[slice, slice]:
@@ -124,8 +121,6 @@ def _print(screen: "Screen", found: "KnifeEdge") -> None:
     screen.heading()
     for sentence in sentences(found):
         screen.say(sentence)
-    screen.assumed(found.assumptions)
-    screen.warnings(found.warnings)
 
 
 def _uncertain(value: str, uncertainty: str) -> "Cell":

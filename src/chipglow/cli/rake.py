@@ -1,5 +1,6 @@
 """The command ``chipglow rake``: the analysis grid on the rake face."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -44,8 +45,7 @@ def rake(
     settings: Settings = None,
 ) -> None:
     """Average radiance temperature in squares along the rake face, as the paper's Figure 7."""
-    from chipglow.cli.assumed import say_of_measurements
-    from chipglow.cli.pictures import write_picture
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.laboratory.chip import ToolUncertainty, chosen_tool, rake_grid
     from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
@@ -64,16 +64,12 @@ def rake(
     grid = rake_grid(measured, chosen.tool, pixels, reach, frames, given or chosen.uncertainty)
     _print(screen, grid)
     screen.budget("budget", grid.frame_estimate, "Standard uncertainty of the squares' means")
-    for sentence in (*chosen.found, *grid.notes):
-        screen.say(sentence)
-    say_of_measurements(measured)
-    screen.assumed(chosen.assumptions)
-    screen.warnings((*chosen.warnings, *grid.warnings))
-    if out is not None:
-        write_result(grid, out)
-        screen.file(out)
-    if plot is not None:
-        write_picture(draw_rake_grid(measured, grid), plot)
+    screen.remarks(chosen.notes + grid.notes)
+    finish(
+        measured.notes + chosen.notes + grid.notes,
+        (out, partial(write_result, grid)),
+        (plot, figure(draw_rake_grid, measured, grid)),
+    )
 
 
 def _frames(measurement: "Measurement", frame: str, at: str | None) -> list[int] | None:

@@ -1,6 +1,7 @@
 """The command ``chipglow register``: infrared images on visible pictures."""
 
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -111,8 +112,7 @@ def register(
     settings: Settings = None,
 ) -> None:
     """Find where each point of an infrared image is in a visible picture."""
-    from chipglow.cli.assumed import say_of_measurements
-    from chipglow.cli.pictures import write_picture
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.laboratory.chip import tool_of
     from chipglow.laboratory.measurement import load_measurement
@@ -154,25 +154,22 @@ def register(
         _print_fit(screen, fit)
         found = fit.registration
     _say(screen, found, measured)
-    say_of_measurements(measured)
-    screen.assumed(f"{visible}: {sentence}" for sentence in seen.assumptions)
-    screen.warnings(f"{visible}: {sentence}" for sentence in seen.warnings)
+    notes = found.notes + measured.notes + seen.notes.about(str(visible))
+    aligned = []
     if region is not None:
         clocks = align_recordings(found, measured, seen, region)
         _say_clocks(screen, clocks)
-        if pairs is not None:
-            write_frame(clocks.to_frame(), pairs)
-            screen.file(pairs)
-    if out is not None:
-        write_registration(found, out)
-        screen.file(out)
+        notes += clocks.notes
+        aligned = [(pairs, partial(write_frame, clocks.to_frame()))]
     temperature = measured.radiance_temperature()[frame]
     shown = found, temperature, measured.raster, picture, outline
-    if overlay is not None:
-        write_picture(draw_registration(*shown, _marked(fit)), overlay)
-    if blink is not None:
-        write_blink(blink_pictures(*shown), blink)
-        screen.file(blink)
+    finish(
+        notes,
+        *aligned,
+        (out, partial(write_registration, found)),
+        (overlay, figure(draw_registration, *shown, _marked(fit))),
+        (blink, lambda path: write_blink(blink_pictures(*shown), path)),
+    )
 
 
 def _marked(fit: "PointFit | DotFit | ImageFit | None") -> "Points | None":
@@ -252,8 +249,6 @@ def _print_fit(screen: "Screen", fit: "PointFit | DotFit | ImageFit") -> None:
                 f"radius of {dots.radius:.1f} {name.lower()} pixels; {match} match.",
                 {f"{name.lower()}_dots": len(dots.pixels), "matching_dots": match},
             )
-    if isinstance(fit, DotFit | ImageFit):
-        screen.assumed(fit.assumptions)
 
 
 def _print_points(screen: "Screen", fit: "PointFit") -> None:
@@ -291,11 +286,9 @@ def _say(screen: "Screen", found: "Registration", measured: "Measurement") -> No
         "at most.",
         {"position_uncertainty_um": 1e6 * typical, "greatest_position_uncertainty_um": 1e6 * worst},
     )
-    screen.warnings(f"{warning}." for warning in found.warnings)
 
 
 def _say_clocks(screen: "Screen", found: "RecordingAlignment") -> None:
-    screen.assumed(found.assumptions)
     unsure = float(found.clocks.covariance[0, 0]) ** 0.5
     screen.say(
         f"Visible clock = infrared clock + {1e6 * found.clocks.offset:.2f} us, standard "
@@ -306,7 +299,6 @@ def _say_clocks(screen: "Screen", found: "RecordingAlignment") -> None:
             "correlation": found.clocks.correlation,
         },
     )
-    screen.warnings(f"{warning}." for warning in found.clocks.warnings)
     empty = sum(numbers.size == 0 for numbers in found.visible_frames)
     if empty:
         screen.say(

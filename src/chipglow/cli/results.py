@@ -18,6 +18,7 @@ from chipglow.io import atomic_folder
 from chipglow.report import comparison_rows, place_rows, table_2, write_report, write_scene_report
 from chipglow.report.paper import CITATION, stands_beside
 from chipglow.study import Progress, Study, errors, run, study_text
+from chipglow.text import Notes
 
 
 def write_results(
@@ -86,11 +87,10 @@ def _write(
             report = _report(result, temporary, study, said, steady)
             progress("report", 1.0)
     screen = current()
-    screen.assumed(assumed)
     _print_table(result)
     for remark in remarks:
         screen.say(remark)
-    screen.warnings(_warnings(result))
+    screen.notes(Notes(assumed, _warnings(result)))
     if isinstance(result, StudyResult):
         say_of_cut(result.forces.inertia if result.forces else None)
     else:

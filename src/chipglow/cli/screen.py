@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from chipglow.cli.tables import Cell
+    from chipglow.text import Notes
     from chipglow.uncertainty import Estimate
 
 _PIPE_WIDTH: Final = 200
@@ -115,17 +116,19 @@ class Screen:
         if self._kept is not None:
             self._kept["values"].update(_plain(values))
 
-    def assumed(self, sentences: Iterable[str]) -> None:
-        """What had to be assumed, a sentence each, on stderr."""
-        self._remarks("assumed", "Assumed", sentences, sys.stderr)
+    def notes(self, notes: "Notes") -> None:
+        """Print assumptions and warnings on stderr."""
+        self._sentences("assumed", "Assumed", notes.assumed, sys.stderr)
+        self._sentences("warnings", "Warning", notes.warnings, sys.stderr)
 
-    def warnings(self, sentences: Iterable[str], aside: bool = False) -> None:
-        """Warnings of the results, a sentence each; aside, on stderr."""
-        self._remarks("warnings", "Warning", sentences, sys.stderr if aside else sys.stdout)
+    def remarks(self, notes: "Notes") -> None:
+        """Print the remarks among notes."""
+        for sentence in notes.remarks:
+            self.say(sentence)
 
     def missing(self, sentences: Iterable[str]) -> None:
-        """What is not among the results, and why, a sentence each."""
-        self._remarks("missing", "Missing", sentences, sys.stdout)
+        """Print which results are missing, and why."""
+        self._sentences("missing", "Missing", sentences, sys.stdout)
 
     def file(self, path: Path, what: str = "") -> None:
         """A file that was written."""
@@ -158,7 +161,7 @@ class Screen:
             console.print()
             console.print(facts_table(zip(heads, map(str, row), strict=True)))
 
-    def _remarks(self, key: str, head: str, sentences: Iterable[str], stream: Any) -> None:
+    def _sentences(self, key: str, head: str, sentences: Iterable[str], stream: Any) -> None:
         for sentence in sentences:
             if self._kept is None:
                 print(f"{head}: {sentence}", file=stream, flush=True)

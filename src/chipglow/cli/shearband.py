@@ -1,5 +1,6 @@
 """The command ``chipglow shearband``: the temperature along the shear band."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -60,8 +61,7 @@ def shearband(
     settings: Settings = None,
 ) -> None:
     """Read the radiance temperature along the shear band, as the paper's Figure 9."""
-    from chipglow.cli.assumed import say_of_measurements
-    from chipglow.cli.pictures import write_picture
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.cli.times import frame_at
     from chipglow.laboratory.chip import band_profile, chosen_tool, read_curve
@@ -87,16 +87,12 @@ def shearband(
     screen = current()
     _print(screen, profile)
     screen.budget("budget", profile.estimate, "Standard uncertainty of the points along the band")
-    for sentence in chosen.found:
-        screen.say(sentence)
-    say_of_measurements(measured)
-    screen.assumed((*chosen.assumptions, *profile.assumptions))
-    screen.warnings((*chosen.warnings, *profile.warnings))
-    if out is not None:
-        write_result(profile, out)
-        screen.file(out)
-    if plot is not None:
-        write_picture(draw_band_profile(measured, chosen.tool, profile), plot)
+    screen.remarks(chosen.notes)
+    finish(
+        measured.notes + chosen.notes + profile.notes,
+        (out, partial(write_result, profile)),
+        (plot, figure(draw_band_profile, measured, chosen.tool, profile)),
+    )
 
 
 def _print(screen: "Screen", profile: "BandProfile") -> None:

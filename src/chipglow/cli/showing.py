@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.cli.pictures import write_picture
+from chipglow.cli.finish import figure, finish
 from chipglow.cli.screen import current
 from chipglow.cli.tables import Cell
 from chipglow.cli.times import parse_instant
@@ -20,6 +20,7 @@ from chipglow.io.measurement_file import holds
 from chipglow.quantities.format import rounded_text
 from chipglow.report import SceneSummary, draw_scene, scene_summary
 from chipglow.scene import ENERGY_UNITS, Raster, Scene, Tool, ToolGeometry
+from chipglow.text import Notes
 
 _LONGEST: Final = 800
 _MOST_NUMBERS: Final = 8
@@ -51,8 +52,7 @@ def show_scene(path: Path, at: str | None, plot: Path | None) -> None:
     screen.values(raster_values(summary.raster, summary.times))
     screen.values({"at_us": 1e6 * summary.times[summary.index]})
     show_attributes(_other_attributes(scene))
-    if plot is not None:
-        write_picture(draw_scene(scene, time), plot)
+    finish(Notes(), (plot, figure(draw_scene, scene, time)))
     scene.data.close()
 
 

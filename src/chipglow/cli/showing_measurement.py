@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 
 from chipglow.camera import Flag, Measurement
-from chipglow.cli.assumed import say_of_measurements
-from chipglow.cli.pictures import write_picture
+from chipglow.cli.finish import figure, finish
 from chipglow.cli.screen import current
 from chipglow.cli.showing import microseconds, raster_values, show_attributes, where_and_when
 from chipglow.cli.times import parse_instant
@@ -46,8 +45,7 @@ def show_measurement(path: Path, at: str | None, plot: Path | None) -> None:
     measurement = read_measurement(path)
     time = None if at is None else parse_instant("--at", at)
     say_measurement(measurement, time)
-    if plot is not None:
-        write_picture(draw_measurement(measurement, time), plot)
+    finish(measurement.notes, (plot, figure(draw_measurement, measurement, time)))
 
 
 def say_measurement(measurement: Measurement, time: float | None = None) -> None:
@@ -78,7 +76,6 @@ def say_measurement(measurement: Measurement, time: float | None = None) -> None
         if not str(name).startswith(_SAID_APART) and name not in _IN_FACTS
     }
     show_attributes(attributes)
-    say_of_measurements(measurement)
 
 
 def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tuple[str, str]]:

@@ -1,5 +1,6 @@
 """The command ``chipglow temperature``: true temperature of regions of known emissivity."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -70,7 +71,7 @@ def temperature(
     settings: Settings = None,
 ) -> None:
     """Determine the true temperature of regions whose emissivity is known."""
-    from chipglow.cli.assumed import say_of_measurements
+    from chipglow.cli.finish import finish
     from chipglow.cli.screen import current
     from chipglow.laboratory.emissivity import load_regions, true_temperatures
     from chipglow.laboratory.measurement import load_calibration, load_measurement
@@ -83,14 +84,9 @@ def temperature(
     given = _emissivities(emissivity, emissivity_uncertainty)
     names = list(map(str, images))
     found = true_temperatures(measurements, named, given, surroundings, known, drift, names)
-    screen = current()
-    _print(screen, found)
-    say_of_measurements(*measurements)
-    screen.assumed(found.assumptions)
-    screen.warnings(found.warnings)
-    if table is not None:
-        write_frame(found.to_frame(), table)
-        screen.file(table)
+    _print(current(), found)
+    notes = sum((one.notes for one in measurements), found.notes)
+    finish(notes, (table, partial(write_frame, found.to_frame())))
 
 
 def _emissivities(

@@ -1,5 +1,6 @@
 """The command ``chipglow wavelengths``: which bands to measure with."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -28,12 +29,13 @@ def wavelengths(
     ] = False,
 ) -> None:
     """Compare bands, alone and as ratios of two: the error of the true temperature."""
-    from chipglow.cli.pictures import write_picture
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.progress import progress_bars, say_where_it_starts
     from chipglow.cli.screen import current
     from chipglow.laboratory.result_file import write_frame
     from chipglow.report.wavelength_figure import draw_wavelengths
     from chipglow.study import load_study, wavelengths as compare
+    from chipglow.text import Notes
 
     loaded, assumed = load_study(study), list[str]()
     if loaded.scene is None:
@@ -44,12 +46,11 @@ def wavelengths(
     for place in found.places:
         _print(screen, found, place)
         screen.heading()
-    screen.assumed(assumed)
-    if out is not None:
-        write_frame(found.to_frame(), out)
-        screen.file(out)
-    if plot is not None:
-        write_picture(draw_wavelengths(found), plot)
+    finish(
+        Notes(assumed),
+        (out, partial(write_frame, found.to_frame())),
+        (plot, figure(draw_wavelengths, found)),
+    )
 
 
 def _print(screen: "Screen", found: "WavelengthErrors", place: str) -> None:

@@ -478,7 +478,7 @@ def _measure(
             errors=errors,
             rake=site.rake_errors(errors),
             band=site.band_errors(errors),
-            warnings=tuple(looking.form_measurement(exposure).warnings),
+            warnings=tuple(looking.form_measurement(exposure).notes.warnings),
             curves=_curves(camera.band, measurement, instants),
         )
     return results

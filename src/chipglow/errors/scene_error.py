@@ -355,7 +355,7 @@ class _Collected:
                 )
                 for name, rows in self.profiles.items()
             ),
-            warnings=tuple(camera.form_measurement(exposure).warnings),
+            warnings=tuple(camera.form_measurement(exposure).notes.warnings),
         )
 
     def _distributions(self) -> list[PlaceErrors]:

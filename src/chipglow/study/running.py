@@ -245,7 +245,7 @@ def _look(
 def _fitted(study: Study, path: Path, assume: Callable[[str], None] | None) -> Fitted:
     fitted = fit(study, open_scene(path))
     if assume:
-        for sentence in (*left_to_the_paper(study), *fitted.assumed):
+        for sentence in (*left_to_the_paper(study), *fitted.notes.assumed):
             assume(sentence)
     return fitted
 

@@ -9,14 +9,14 @@ from chipglow.text.description import (
     read_description,
     validated,
 )
-from chipglow.text.remarks import Remarks
+from chipglow.text.notes import Notes
 from chipglow.text.small_file import read_small_text
 from chipglow.text.template import commented_yaml, json_schema
 from chipglow.text.yaml_file import parse_yaml, read_yaml
 
 __all__ = [
     "DescriptionError",
-    "Remarks",
+    "Notes",
     "commented_yaml",
     "described_by",
     "json_schema",

@@ -10,7 +10,7 @@ from pydantic import Strict
 from chipglow.io import atomic_path
 from chipglow.laboratory.registration.registration import Method, Model, Registration
 from chipglow.quantities import Settings, described
-from chipglow.text import DescriptionError, read_description, validated
+from chipglow.text import DescriptionError, Notes, read_description, validated
 
 _Row = Annotated[tuple[float, ...], Strict(False)]
 _Rows = Annotated[tuple[_Row, ...], Strict(False)]
@@ -30,7 +30,8 @@ class RegistrationDescription(Settings[Registration]):
     matrix: _Rows = described(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), "The map.")
     covariance: _Rows = described(((0.0,) * 9,) * 9, "Of the elements of the matrix.")
     degrees_of_freedom: float | None = described(None, "Of the covariance; none: infinite.")
-    warnings: Annotated[tuple[str, ...], Strict(False)] = described((), "Why it is not trusted.")
+    assumed: list[str] = described([], "Assumptions.")
+    warnings: list[str] = described([], "Reasons why it may be wrong.")
 
     def build(self) -> Registration:
         """The registration."""
@@ -43,7 +44,7 @@ class RegistrationDescription(Settings[Registration]):
             self.model,
             self.method,
             np.inf if self.degrees_of_freedom is None else self.degrees_of_freedom,
-            self.warnings,
+            Notes(self.assumed, self.warnings),
         )
 
 
@@ -62,7 +63,8 @@ def write_registration(registration: Registration, path: str | Path) -> None:
         "matrix": registration.matrix.tolist(),
         "covariance": registration.covariance.tolist(),
         "degrees_of_freedom": registration.degrees_of_freedom if finite else None,
-        "warnings": list(registration.warnings),
+        "assumed": registration.notes.assumed,
+        "warnings": registration.notes.warnings,
     }
     text = _HEAD + yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=100)
     with atomic_path(path) as temporary:
