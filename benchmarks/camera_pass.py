@@ -33,10 +33,10 @@ import numba
 import numpy as np
 from scipy.signal import fftconvolve
 
+from chipglow.analysis.starts import spread_starts
 from chipglow.camera import AnnularAperturePSF, Camera, GaussianPSF
 from chipglow.camera.detector import Detector, OperationPoint, PhotonResponse, ReadNoise, ShotNoise
 from chipglow.camera.optics.sampling import integrate
-from chipglow.errors.starts import spread_starts
 from chipglow.io import SceneWriter, open_scene
 from chipglow.radiometry import spectral_radiance
 from chipglow.scene import Raster, Scene, ToolGeometry

@@ -1,4 +1,4 @@
-"""What several files of tests share: the quick study, computed once, and the registry of laws."""
+"""Shared by the tests: profiles of Hypothesis, the quick study, the registry of flow laws."""
 
 import os
 import subprocess
@@ -7,10 +7,21 @@ import time
 from typing import NamedTuple
 
 import pytest
+from hypothesis import settings
 
 from chipglow.cutting import FLOW_LAWS
 
 MOST_SECONDS = 1200
+
+# Each process of pytest-xdist has a core: another thread of BLAS would spin while it waits for one.
+for library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+# The same examples on every machine; --hypothesis-profile=search draws new ones. The first example
+# of a test may compile, so that no example has a time limit.
+settings.register_profile("fixed", derandomize=True, database=None, deadline=None)
+settings.register_profile("search", derandomize=False, deadline=None, print_blob=True)
+settings.load_profile("fixed")
 
 
 class QuickStudy(NamedTuple):
@@ -21,25 +32,54 @@ class QuickStudy(NamedTuple):
     printed: str
 
 
+def pytest_collection_modifyitems(items):
+    """Begin with what needs the quick study: one process makes it while others have other tests."""
+    items.sort(key=lambda item: "quick_study" not in getattr(item, "fixturenames", ()))
+
+
 @pytest.fixture(scope="session")
-def quick_study(tmp_path_factory, worker_id):
-    """What ``chipglow reproduce --quick`` writes, as a user runs it: once for all processes."""
+def shared_folder(tmp_path_factory, worker_id):
+    """Function that fills a folder of some name once for all processes, and returns it."""
     base = tmp_path_factory.getbasetemp()
-    folder = (base if worker_id == "master" else base.parent) / "quick-study"
-    done = folder / "printed.txt"
-    try:
-        folder.mkdir()
-    except FileExistsError:
-        wait_for(done)
-    else:
-        printed = reproduce_quick(folder)
-        (folder / "printing").write_text(printed, encoding="utf-8")
-        (folder / "printing").rename(done)
-    return QuickStudy(folder / "run", folder / "cache", done.read_text(encoding="utf-8"))
+    base = base if worker_id == "master" else base.parent
+
+    def filled(name, fill):
+        folder, done, failed = (base / f"{name}{end}" for end in ("", ".done", ".failed"))
+        try:
+            folder.mkdir()
+        except FileExistsError:
+            wait_for(done, failed)
+            return folder
+        try:
+            fill(folder)
+        except BaseException:
+            failed.touch()
+            raise
+        done.touch()
+        return folder
+
+    return filled
+
+
+def wait_for(done, failed):
+    """Wait until another process has filled a folder."""
+    end = time.monotonic() + MOST_SECONDS
+    while not done.exists():
+        assert not failed.exists(), f"{failed}: another process failed to make it"
+        assert time.monotonic() < end, f"{done} did not come from another process"
+        time.sleep(0.2)
+
+
+@pytest.fixture(scope="session")
+def quick_study(shared_folder):
+    """What ``chipglow reproduce --quick`` writes, as a user runs it."""
+    folder = shared_folder("quick-study", reproduce_quick)
+    printed = (folder / "printed.txt").read_text(encoding="utf-8")
+    return QuickStudy(folder / "run", folder / "cache", printed)
 
 
 def reproduce_quick(folder):
-    """Run the command with its cache and its results in a folder; what it prints."""
+    """Run the command with its cache, its results and what it prints in a folder."""
     command = [sys.executable, "-c", "from chipglow.cli import main; main()"]
     run = subprocess.run(
         [*command, "reproduce", "--quick", "--out", str(folder / "run")],
@@ -49,15 +89,7 @@ def reproduce_quick(folder):
         timeout=MOST_SECONDS,
     )
     assert run.returncode == 0, run.stderr
-    return run.stdout
-
-
-def wait_for(file):
-    """Wait until another process has made a file."""
-    end = time.monotonic() + MOST_SECONDS
-    while not file.exists():
-        assert time.monotonic() < end, f"{file} did not come from another process"
-        time.sleep(0.2)
+    (folder / "printed.txt").write_text(run.stdout, encoding="utf-8")
 
 
 @pytest.fixture

@@ -11,15 +11,15 @@ from hypothesis import given, settings, strategies as st
 from measured_band import BandImage
 from scipy.interpolate import RegularGridInterpolator
 
-from chipglow.camera import Camera, Exposure, GaussianPSF
-from chipglow.errors import (
+from chipglow.analysis import (
     Plan,
     analyse,
     error_images,
     rake_errors,
     reference_temperature,
 )
-from chipglow.errors.error_images import LEAST_COVERED, ErrorImages
+from chipglow.analysis.error_images import LEAST_COVERED, ErrorImages
+from chipglow.camera import Camera, Exposure, GaussianPSF
 from chipglow.laboratory.chip import NoShearBandError, contact_length, find_shear_band, segmentation
 from chipglow.radiometry import Band
 from chipglow.scene import Material, Raster, Scene, ToolGeometry, sample, straight_line
@@ -61,7 +61,7 @@ def random_exposure(seed):
     gradient=st.tuples(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6)),
     angle=st.floats(0.0, 6.28),
 )
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_linear_field_is_read_exactly(gradient, angle):
     x, y = np.meshgrid(GRID.x, GRID.y)
     image = 500.0 + gradient[0] * x + gradient[1] * y
@@ -102,7 +102,7 @@ def test_the_portions_add_up_and_an_ideal_camera_is_all_portion_free():
     offset=st.floats(0.0, 9e-6),
     fill=st.floats(0.4, 1.0),
 )
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_nothing_is_measured_over_the_maximum_without_a_psf(seed, pitch, offset, fill):
     camera = Camera(band=BAND, pitch=pitch, offset=(offset, offset / 2), fill_factor=fill, psf=None)
     exposure = random_exposure(seed)
@@ -140,7 +140,7 @@ def test_the_maximum_of_a_ramp_is_that_of_the_pixels_own_samples(study, samples,
     phase=st.integers(0, 8),
     seed=st.integers(0, 99),
 )
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_rounded_pitch_adds_no_samples_to_a_pixel(rounding, phase, seed):
     raster = Raster(left=0.0, top=0.0, spacing=2e-6 / 3 * (1 + rounding), rows=189, columns=279)
     values = np.random.default_rng(seed).uniform(600.0, 1200.0, raster.shape)
@@ -350,7 +350,7 @@ def test_what_climbs_into_the_layer_is_not_the_bands(degrees):
 
 
 @given(length=st.floats(40e-6, 200e-6))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_contact_ends_where_the_chip_leaves(length):
     x, y = np.meshgrid(GRID.x, GRID.y)
     depth = TOOL.signed_distance(x, y)

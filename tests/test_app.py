@@ -12,13 +12,13 @@ import pytest
 from matplotlib.figure import Figure
 
 import chipglow
+from chipglow.analysis import LinePlace, error_images, error_parts
 from chipglow.app.files import figure_file, measurement_file, study_file
 from chipglow.app.knobs import OWN, UNIFORM
 from chipglow.app.model import MeasurementModel, SceneModel
 from chipglow.app.opening import open_any, open_uploaded
 from chipglow.app.session import Listener, Newest, Session, SupersededError
 from chipglow.camera import expose, expose_all
-from chipglow.errors import LinePlace, error_images, error_parts
 from chipglow.io import example_scene, is_measurement, open_scene
 from chipglow.io.sources import SourceError
 from chipglow.quantities.format import rounded_text

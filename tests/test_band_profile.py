@@ -201,7 +201,7 @@ def test_the_calibration_s_uncertainty_becomes_kelvins():
     np.testing.assert_allclose(profile.estimate.standard_uncertainty[0], expected, rtol=0.02)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(shift=st.sampled_from([0.0, 12e-6, 20e-6]), error=st.sampled_from([1e-6, 3e-6]))
 def test_the_position_s_uncertainty_is_that_of_curves_that_are_off(shift, error):
     """On the ridge, where the bend counts, and beside it, where the slope does."""

@@ -138,6 +138,7 @@ def test_every_program_is_run():
     assert {path.relative_to(FOLDER).as_posix() for path in scripts} == names
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_a_program_prints_its_table(program, tmp_path):
     for package in NEEDED.get(program, ()):

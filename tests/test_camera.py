@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from figure6 import figure_6
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.special import erf
 
 from chipglow.camera import (
@@ -94,7 +94,6 @@ def test_equals_the_loop_of_figure_6(psf):
     np.testing.assert_allclose(temperature_of(measured), expected, atol=ROUNDING, rtol=0)
 
 
-@settings(deadline=None)  # the first call compiles
 @given(
     temperature=st.floats(600, 1800),
     pitch=st.floats(0.5e-6, 20e-6),

@@ -12,6 +12,8 @@ from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 from typer.testing import CliRunner
 
+from chipglow.analysis import Plan, analyse
+from chipglow.analysis.error_images import error_images
 from chipglow.camera import (
     UNUSABLE,
     AnnularAperturePSF,
@@ -36,8 +38,6 @@ from chipglow.camera import (
     lower_range_limit,
 )
 from chipglow.cli.app import app
-from chipglow.errors import Plan, analyse
-from chipglow.errors.error_images import error_images
 from chipglow.io import read_measurement, write_measurement, write_scene
 from chipglow.radiometry import Band
 from chipglow.report.camera_rows import camera_rows
@@ -73,7 +73,7 @@ def exposure(start=0.0):
     return Exposure(start, 10e-6, SCENE, radiance, single, kelvins, radiance)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(radiance=arrays(np.float64, (90, 120), elements=st.floats(0.0, 900.0)))
 def test_without_a_detector_images_are_read_as_they_are(radiance):
     for psf in (None, AnnularAperturePSF()):

@@ -288,7 +288,7 @@ def test_calibrated_values_come_back_from_hcc_within_half_a_step(tmp_path, quant
     assert np.abs(recording.signal - values).max() <= 0.5 * step + 6.2e-5
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     low=st.floats(-1e6, 1e6),
     spread=st.one_of(st.just(0.0), st.floats(1e-30, 1e6)),

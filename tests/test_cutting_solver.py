@@ -6,7 +6,7 @@ from math import pi, sqrt
 import numba
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.integrate import solve_ivp
 from solver import DENSITY, Block
 
@@ -47,7 +47,6 @@ def test_rigid_rotation_makes_no_stress():
     assert np.abs(block.points["dxy"]).max() < 10e6
 
 
-@settings(deadline=None)
 @given(
     trial=st.floats(1e8, 3e9),
     strain=st.floats(1e-3, 5.0),

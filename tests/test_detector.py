@@ -285,7 +285,7 @@ every_term = st.sampled_from(
 )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     terms=st.lists(every_term, unique_by=lambda term: term.kind),
     radiance=st.floats(0.0, 1e5),
@@ -301,7 +301,7 @@ def test_counts_are_within_the_digitiser_and_follow_from_their_seed(terms, radia
     )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     terms=st.lists(every_term, unique_by=lambda term: term.kind),
     less=st.floats(0.0, 2e4),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from chipglow.errors.distribution import COVERAGE, TOGETHER, Distribution, ratio
+from chipglow.analysis.distribution import COVERAGE, TOGETHER, Distribution, ratio
 
 CAUSES = ("segment", "texture", "pixel phase")
 

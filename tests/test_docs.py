@@ -1,6 +1,5 @@
 """The documentation: its blocks of code run as a reader types them, and its pages are whole."""
 
-import json
 import os
 import re
 import subprocess
@@ -11,7 +10,6 @@ from urllib.parse import unquote, urlsplit
 
 import matplotlib
 import pytest
-from conftest import wait_for
 from documented import PAGES, PARTS, ROOT, Reader, blocks
 from matplotlib import pyplot as plt
 
@@ -43,6 +41,7 @@ def reader(tmp_path, quick_study, own_laws, monkeypatch):
     assert {scene.name for scene in cache.iterdir()} == known, "a page makes its reader wait"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", WITH_CODE, ids=page_id)
 def test_the_blocks_of_a_page_run(page, reader):
     from sample_files import SAMPLES, write_samples
@@ -113,31 +112,19 @@ class Page(HTMLParser):
 
 
 @pytest.fixture(scope="session")
-def site(tmp_path_factory, worker_id):
-    """The folder of the pages, built with warnings as errors: once for all processes."""
+def site(shared_folder):
+    """The folder of the pages, built with warnings as errors."""
     pytest.importorskip("sphinx_gallery", reason="no sphinx-gallery: pip install '.[docs]'")
-    base = tmp_path_factory.getbasetemp()
-    folder = (base if worker_id == "master" else base.parent) / "site"
-    done = folder / "done.json"
-    try:
-        folder.mkdir()
-    except FileExistsError:
-        wait_for(done)
-    else:
-        (folder / "building").write_text(json.dumps(build(folder / "html")), encoding="utf-8")
-        (folder / "building").rename(done)
-    code, errors = json.loads(done.read_text(encoding="utf-8"))
-    assert code == 0, errors
-    return folder / "html"
+    return shared_folder("site", build)
 
 
 def build(folder):
-    """Build the pages from stubs that are made anew; the exit code and what was said."""
+    """Build the pages from stubs that are made anew."""
     for stub in (ROOT / "docs" / "generated").glob("*.rst"):
         stub.unlink()
     command = [sys.executable, "-m", "sphinx", "-q", "-W", str(ROOT / "docs"), str(folder)]
     run = subprocess.run(command, capture_output=True, encoding="utf-8")
-    return run.returncode, run.stderr
+    assert run.returncode == 0, run.stderr
 
 
 @pytest.fixture(scope="module")
@@ -155,6 +142,7 @@ def html_name(page):
     return page.relative_to(ROOT / "docs").with_suffix(".html").as_posix()
 
 
+@pytest.mark.slow
 def test_every_page_leads_to_all_others(built):
     names = {html_name(page) for page in PAGES if page.name != "README.md"}
     assert len({name.split("/")[0] for name in names} & set(PARTS)) == len(PARTS)
@@ -162,6 +150,7 @@ def test_every_page_leads_to_all_others(built):
         assert names - {"index.html"} <= built[name].column, name
 
 
+@pytest.mark.slow
 def test_links_lead_somewhere(built, site):
     """Those within the site to a place in it; nobody asks the network for the others."""
     for page in built.values():
@@ -202,16 +191,19 @@ def test_examples_say_what_is_seen():
         assert f"sphx_glr_{example.stem}_001.png" in text.partition("\n\n")[2][:120], example
 
 
+@pytest.mark.slow
 def test_pages_need_no_network(built):
     assert not [source for page in built.values() for source in page.loaded if "//" in source]
 
 
+@pytest.mark.slow
 def test_the_search_needs_no_server(site):
     index = (site / "searchindex.js").read_text(encoding="utf-8")
     assert index.startswith("Search.setIndex(")
     assert "learn/tutorial" in index
 
 
+@pytest.mark.slow
 def test_equations_are_drawn_by_the_browser(built):
     shown = built["understand/physics.html"].words
     assert "∫" in shown

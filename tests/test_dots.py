@@ -71,7 +71,7 @@ def test_a_target_gives_the_map_within_its_uncertainty():
     sign=st.sampled_from([-1.0, 1.0]),
     slope=st.floats(-1e-3, 1e-3),
 )
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 def test_dots_of_either_sign_are_found_at_a_fraction_of_a_pixel(column, row, radius, sign, slope):
     """Discs drawn eight times finer, blurred, in light that falls off to one side."""
     finer, spacing = 8, 5 * radius
@@ -135,7 +135,7 @@ def test_the_skirts_of_blurred_neighbours_do_not_pull():
     scale=st.floats(0.6, 1.8),
     lost=st.integers(0, 3),
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_an_arrangement_is_recognised(seed, turn, scale, lost):
     """Dots without order: some are missing in each image, some are in one only."""
     generator = np.random.default_rng(seed)

@@ -58,7 +58,7 @@ def slopes(reference=TRUTH, reflected=293.0):
 
 
 @given(st.floats(0.02, 1.0), st.floats(500.0, 1500.0), st.floats(200.0, 350.0))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_equation_2_is_undone(emissivity, reference, reflected):
     small = Raster(0.0, 0.0, 6e-6, 2, 2)
     image = measured(np.full((2, 2), emissivity), reference, reflected, raster=small)

@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from numba import njit
 from solver import Block
 
@@ -172,7 +172,6 @@ def test_tanh_by_hand():
     assert law.at(1.0, 1e4, 1000.0) == pytest.approx(509.450e6, rel=2e-6)
 
 
-@settings(deadline=None)
 @given(
     rate=st.floats(0.1, 1e7), temperature=st.floats(298.0, 1700.0), sharpness=st.floats(0.5, 2.0)
 )
@@ -201,7 +200,6 @@ def test_tanh_refuses(field, value):
         replace(TITANIUM, **{field: value})
 
 
-@settings(deadline=None)
 @given(
     strain=st.floats(1e-3, 5.0),
     rate=st.floats(1.1, 1e8),

@@ -49,7 +49,7 @@ def a_cloud(places, values=None, material=None, spacing=A):
 # Sampling
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.floats(0.0, 0.4), st.floats(0.0, 1.6), st.floats(0.2, 2.5), st.integers(0, 1000))
 def test_linear_fields_are_exact_on_any_lattice(jitter, angle, spacing, seed):
     places = rotated(lattice(jitter=jitter, seed=seed), angle)
@@ -127,7 +127,7 @@ def test_tool_and_workpiece_share_the_seam_and_keep_their_values():
     np.testing.assert_allclose(found[0], np.where(expected == 1, 300.0, 900.0), rtol=1e-6)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(1, 60), st.integers(0, 10_000))
 def test_any_few_points_stay_within_their_range(count, seed):
     generator = np.random.default_rng(seed)

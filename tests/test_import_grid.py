@@ -233,7 +233,7 @@ def test_interpolation_is_of_second_order():
     assert 3.5 < error(32) / error(64) < 4.5
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.integers(2, 9), st.integers(2, 9), st.floats(0.2, 5.0), st.floats(-3.0, 3.0),
     st.integers(0, 2**32),

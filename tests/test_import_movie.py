@@ -88,7 +88,7 @@ def test_every_colour_of_a_scale_is_read_back(name):
     assert distance.max() < 1.0
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["jet", "rainbow", "viridis"]), st.booleans())
 def test_the_nearest_place_is_found(seed, name, banded):
     scale = ColourScale.named(name, ENDS, 16 if banded else 0)
@@ -327,7 +327,7 @@ def test_means_are_of_values_not_of_colours():
     assert coarse[0, 0] == pytest.approx((1 + 4 + 5) / 3)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.floats(0.15, 0.99), st.floats(-0.4, 3.0), st.floats(-2.0, 0.4), st.floats(-5, 5),
     st.floats(-5, 5),
@@ -469,7 +469,7 @@ def test_a_coloured_tool_keeps_its_values(tmp_path):
     assert np.abs(error).max() < LEVEL
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.6))
 def test_the_nearest_known_pixel_is_found(seed, fraction):
     known = np.random.default_rng(seed).random((23, 31)) < fraction
@@ -584,9 +584,7 @@ def test_a_picture_without_a_colour_of_the_scale_is_refused(tmp_path):
         list(source.frames(Raster(0.0, 1e-4, PIXEL, 10, 10)))
 
 
-@settings(
-    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.sampled_from([".avi", ".mp4", ".mkv", ".gif"]), st.integers(0, 2**32 - 1))
 @example(".avi", 0)
 def test_a_damaged_movie_is_read_or_refused(tmp_path, suffix, seed):

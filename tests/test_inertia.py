@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
 
+from chipglow.analysis.cut_error import _unaccounted
 from chipglow.cli.inertia import say_of_cut
 from chipglow.cli.screen import begin
 from chipglow.cutting import (
@@ -16,7 +17,6 @@ from chipglow.cutting import (
     FlowStress,
     Numerics,
 )
-from chipglow.errors.cut_error import _unaccounted
 from chipglow.laboratory.chip import Inertia, inertia
 from chipglow.scene import ENERGY_UNITS, Scene
 

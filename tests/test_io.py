@@ -128,9 +128,7 @@ def test_frames_are_chunks_and_are_read_lazily(tmp_path):
     assert not isinstance(variable._data, np.ndarray)
 
 
-@settings(
-    max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     temperature=arrays(np.float32, (2, 3), elements=st.floats(200.0, 1838.0, width=32)),
     strain=arrays(np.float32, (2, 3), elements=st.floats(0.0, 1e3, width=32)),

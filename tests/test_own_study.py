@@ -9,11 +9,11 @@ import pytest
 import typer
 from analytic_chip import AnalyticChip
 
+from chipglow.analysis import Distribution
+from chipglow.analysis.cut_error import Plan, analyse
+from chipglow.analysis.draws import Headline
 from chipglow.camera import AnnularAperturePSF, Camera
 from chipglow.cli import progress
-from chipglow.errors import Distribution
-from chipglow.errors.cut_error import Plan, analyse
-from chipglow.errors.draws import Headline
 from chipglow.radiometry import Band
 from chipglow.report import comparison_rows, write_report
 from chipglow.scene import Raster

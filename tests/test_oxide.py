@@ -41,7 +41,7 @@ def grown(made, index, surface=SURFACE):
 
 
 @given(st.floats(500.0, 1400.0), st.floats(1e-6, 1e-3), st.floats(0.0, 20e-9))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_at_one_temperature_it_is_the_root_of_time(kelvins, duration, initial):
     made = scene(np.linspace(0, duration, 4), lambda t, x, y: np.full(x.shape, kelvins))
     found = grown(made, 3, OxidisedSurface(UniformSurface(BARE), ParabolicOxide(initial)))

@@ -4,7 +4,7 @@ from math import acos, exp, pi, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import given, strategies as st
 from scipy.integrate import quad
 from scipy.special import j0
 
@@ -70,7 +70,6 @@ def test_transfer_of_a_clear_pupil():
         assert found[0] == pytest.approx(expected, abs=1e-5)
 
 
-@settings(deadline=None)  # quadrature, on a machine that may be busy
 @given(st.floats(0.0, 0.9))
 def test_transfer_of_an_annulus(obscuration):
     # The sum of all frequencies is the density in the middle: that of the open area.

@@ -45,7 +45,7 @@ def middles(grid):
     return np.moveaxis(grid.tool.rake_point(grid.along) + grid.depth[:, None, None] * normal, 2, 0)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     angle=st.floats(-25.0, 25.0),
     x=st.floats(-30e-6, 30e-6),

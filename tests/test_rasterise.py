@@ -33,7 +33,7 @@ def coverings(points, triangles):
     return np.sum(alone, axis=0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(meshes, st.integers(0, 10**6))
 def test_a_linear_field_is_exact_whatever_the_triangles(mesh, seed):
     points, triangles = mesh
@@ -46,7 +46,7 @@ def test_a_linear_field_is_exact_whatever_the_triangles(mesh, seed):
     assert np.isnan(sampled.fields[0][~inside]).all()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(meshes)
 def test_every_sample_of_the_hull_is_covered_once_and_none_outside(mesh):
     points, triangles = mesh

@@ -12,6 +12,15 @@ from scipy.integrate import simpson
 from scipy.optimize import brentq
 from typer.testing import CliRunner
 
+from chipglow.analysis import (
+    RATIO_CAUSES,
+    Plan,
+    Spot,
+    WavelengthPlan,
+    cut_spots,
+    ratio_errors,
+    wavelength_errors,
+)
 from chipglow.camera import (
     AnnularAperturePSF,
     BlurredPSF,
@@ -29,15 +38,6 @@ from chipglow.camera import (
     expose_views,
 )
 from chipglow.cli import app
-from chipglow.errors import (
-    RATIO_CAUSES,
-    Plan,
-    Spot,
-    WavelengthPlan,
-    cut_spots,
-    ratio_errors,
-    wavelength_errors,
-)
 from chipglow.io import write_scene
 from chipglow.radiometry import Band, RatioThermometer, spectral_radiance
 from chipglow.scene import Raster, Scene
@@ -91,7 +91,7 @@ def analytic_scene():
 # --- the thermometer
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(300.0, 3000.0), st.floats(0.01, 1.0), st.floats(0.5, 2.0))
 def test_the_ratio_gives_the_temperature_back_whatever_the_emissivity(kelvins, emissivity, ratio):
     thermometer = RatioThermometer(SHORT, LONG, ratio)

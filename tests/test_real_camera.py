@@ -244,7 +244,7 @@ def test_the_correction_makes_dead_sensors_known():
     atmosphere=st.floats(280.0, 310.0),
     kelvins=st.floats(600.0, 1500.0),
 )
-@settings(deadline=None, max_examples=50)  # the first call compiles
+@settings(max_examples=50)  # the first call compiles
 def test_what_the_camera_was_told_is_taken_back(
     emissivity, transmittance, reflected, atmosphere, kelvins
 ):

@@ -63,7 +63,7 @@ def test_view_factor_of_opposite_strips():
 
 
 @given(st.floats(0.3, 3.0), st.floats(0.1, 0.9), st.integers(2, 9))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_rows_have_the_sum_one_and_are_reciprocal(angle, radius, count):
     # A groove with a thin bar across its bisector, which hides a part of each wall.
     toward = np.array([np.cos(angle / 2), np.sin(angle / 2)])
@@ -94,7 +94,7 @@ def test_more_rays_are_more_exact():
     st.lists(st.floats(0.0, 1.0), min_size=16, max_size=16),
     st.floats(0.2, 3.0),
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_an_isothermal_room_is_a_blackbody(emissivity, mirror, angle):
     exchange = Exchange(*groove(angle, 8), rays=200)
     black = np.full(16, 7.0)
@@ -184,7 +184,7 @@ def test_a_cylinder_in_a_cylinder(mirror):
 
 
 @given(st.floats(0.05, 1.0), st.floats(0.05, 1.0), st.floats(0.3, 3.0), st.floats(0.0, 9.0))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_energy_is_conserved(first, second, angle, surroundings):
     # What the walls lose is what goes to the surroundings less what comes from them.
     exchange = Exchange(*groove(angle, 10))

@@ -12,7 +12,7 @@ RASTER = Raster(left=-120e-6, top=90e-6, spacing=6e-6, rows=30, columns=40)
 
 
 @given(st.integers(0, 39), st.integers(0, 29), st.integers(1, 20), st.integers(1, 20))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_a_rectangle_of_whole_pixels_is_a_slice(left, top, width, height):
     right, bottom = min(left + width, 40), min(top + height, 30)
     expected = np.zeros(RASTER.shape, bool)

@@ -65,7 +65,7 @@ def picked(count, seed):
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("model", ["similarity", "affine", "homography"])
 @given(seed=st.integers(0, 2**32))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_exact_points_give_the_exact_map(model, mirrored, seed):
     matrix, places = a_matrix(model, seed, mirrored), picked(9, seed)
     fit = fit_points(places, mapped(matrix, places), model, picked=False)

@@ -15,9 +15,9 @@ import xarray as xr
 from analytic_chip import AnalyticChip
 from PIL import Image
 
+from chipglow.analysis import Distribution, Plan, analyse
+from chipglow.analysis.draws import CAUSES
 from chipglow.camera import Camera
-from chipglow.errors import Distribution, Plan, analyse
-from chipglow.errors.draws import CAUSES
 from chipglow.laboratory.chip import Inertia, rake_grid
 from chipglow.report import Row, comparison_frame, comparison_rows, write_report
 from chipglow.report.chip_rows import chip_rows

@@ -11,6 +11,8 @@ from documented import ROOT
 
 from chipglow.report import QUICK
 
+pytestmark = pytest.mark.slow
+
 PAPER_ROWS = [
     "rake_error_degC",
     "rake_psf_fraction_percent",

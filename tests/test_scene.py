@@ -62,7 +62,7 @@ def test_raster_refuses(changed, message):
     rows=st.integers(2, 9),
     columns=st.integers(2, 9),
 )
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_scene_gives_its_raster_back(left, top, spacing, rows, columns):
     raster = Raster(left, top, spacing, rows, columns)
     values = {name: np.zeros((1, rows, columns)) for name in FIELD_UNITS}
@@ -228,7 +228,7 @@ def polyline_distance(points, line):
 
 
 @given(TOOLS, st.integers(0, 2**32))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_distance_is_that_to_the_outline(tool, seed):
     points = np.random.default_rng(seed).uniform(-150e-6, 150e-6, (200, 2))
     distance = tool.signed_distance(points[:, 0], points[:, 1])
@@ -246,7 +246,7 @@ def test_inside_is_negative():
 
 
 @given(TOOLS, st.floats(0.0, 1e-3))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_rake_points_lie_on_the_surface(tool, distance):
     x, y = tool.rake_point(distance)
     assert abs(tool.signed_distance(x, y)) < 1e-15
@@ -266,7 +266,7 @@ def test_a_negative_rake_leans_over_the_chip():
 
 
 @given(TOOLS)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_the_edge_touches_the_cut_surface_and_a_steep_rake_the_upright(tool):
     radius, outline = tool.edge_radius, tool.outline(1e-4)
     assert abs(tool.signed_distance(radius, 0.0)) < 1e-18

@@ -9,9 +9,9 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
+from chipglow.analysis import LinePlace, PointPlace, RegionPlace, ScenePlan, scene_errors
 from chipglow.camera import Camera, GaussianPSF
 from chipglow.cli import app
-from chipglow.errors import LinePlace, PointPlace, RegionPlace, ScenePlan, scene_errors
 from chipglow.io import open_scene, write_scene
 from chipglow.radiometry import Band
 from chipglow.scene import Raster, Scene, SceneError, ToolGeometry

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
 
+from chipglow.analysis import Plan, analyse
 from chipglow.camera import Camera
-from chipglow.errors import Plan, analyse
 from chipglow.laboratory.chip import contact_temperatures
 from chipglow.report import write_report
 from chipglow.report.steady_tool import tool_rows

@@ -10,9 +10,9 @@ from analytic_chip import AnalyticChip
 from hypothesis import HealthCheck, given, settings, strategies as st
 from pydantic import ValidationError
 
+from chipglow.analysis.cut_error import Plan
 from chipglow.camera import Camera, GaussianPSF, MeasuredPSF
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Friction, Numerics, OutputWindow
-from chipglow.errors.cut_error import Plan
 from chipglow.io import open_scene, read_tool_outline
 from chipglow.io.atomic import KeptErrorFile
 from chipglow.quantities import units
@@ -393,7 +393,7 @@ def test_bad_input_is_one_line_with_file_field_value_and_expectation(
 TEMPLATE = [line for line in study_text(Study()).splitlines() if line.strip()[:1] not in ("", "#")]
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     number=st.integers(0, len(TEMPLATE) - 1),
     text=st.text(max_size=12)

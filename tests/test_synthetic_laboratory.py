@@ -4,6 +4,7 @@ A hundred repeats: `python benchmarks/synthetic_laboratory.py`.
 """
 
 import csv
+import json
 from pathlib import Path
 
 import pytest
@@ -23,8 +24,13 @@ STACKED = [*DEVELOPED, "--set", "unit=counts", "--set", "interval=2 ms", "--set"
 
 
 @pytest.fixture(scope="module")
-def rows():
-    return [repeat(seed) for seed in range(REPEATS)]
+def rows(shared_folder):
+    return json.loads((shared_folder("laboratories", repeat_all) / "rows.json").read_text())
+
+
+def repeat_all(folder):
+    """Results of `REPEATS` laboratories."""
+    (folder / "rows.json").write_text(json.dumps([repeat(seed) for seed in range(REPEATS)]))
 
 
 @pytest.fixture
@@ -36,12 +42,14 @@ def experiment(tmp_path, monkeypatch):
     return laboratory
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUANTITIES)
 def test_the_truth_is_in_the_stated_interval(rows, name):
     """Of ten 95 % intervals, two or fewer miss with a probability of 0.989."""
     assert hits(rows, name) >= REPEATS - 2
 
 
+@pytest.mark.slow
 def test_all_truths_together_are_in_their_intervals(rows):
     """Of sixty, 57 are expected.
 
@@ -51,6 +59,7 @@ def test_all_truths_together_are_in_their_intervals(rows):
     assert sum(hits(rows, name) for name in QUANTITIES) >= 52
 
 
+@pytest.mark.slow
 def test_the_intervals_are_narrow(rows):
     """Intervals that are much too wide would hold the truth as well.
 

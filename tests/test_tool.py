@@ -84,7 +84,7 @@ HONED = st.builds(
     st.floats(0.15, 7.0),
 )
 TOOLS = st.one_of(chamfered(), HONED, outlines())
-FEW = settings(max_examples=60, deadline=None)
+FEW = settings(max_examples=60)
 
 
 def places(seed, count=300):

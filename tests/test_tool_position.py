@@ -47,7 +47,7 @@ def moved(tool, uncertainty, along, across, angle):
     return PlacedTool(turned, (float(tip[0]), float(tip[1])))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     kind=st.sampled_from([0, 1, 2]),
     angle=st.floats(-25.0, 25.0),

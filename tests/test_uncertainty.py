@@ -222,7 +222,7 @@ ESTIMATES = st.builds(
 
 
 @given(ESTIMATES)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_what_is_equal_has_no_difference(one):
     for difference in (one - one, one + one - 2 * one, one / one, one[::-1] - one[[3, 2, 1, 0]]):
         np.testing.assert_allclose(difference.standard_uncertainty, 0.0, atol=1e-9)
@@ -231,7 +231,7 @@ def test_what_is_equal_has_no_difference(one):
 
 
 @given(ESTIMATES, st.integers(0, 1000))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_linear_propagation_is_that_of_draws(one, seed):
     other = Estimate([1.0, 2.0]).with_component("calibration", [-3.0, 4.0])
     weights = np.array([[1.0, -2.0, 0.5, 0.0], [0.0, 1.0, 1.0, 1.0]])
@@ -417,7 +417,7 @@ def read_back(estimate, tmp_path):
 
 
 @given(ESTIMATES, st.booleans())
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_files_keep_all(tmp_path_factory, one, square):
     one = one.with_component("mean", 1.0, degrees_of_freedom=3, independent="common")
     one = one.with_warnings("It is far away.").with_unevaluated("drift", "noise")

@@ -11,11 +11,11 @@ import matplotlib
 import numpy as np
 
 import chipglow
+from chipglow.analysis import RatioErrors, WavelengthErrors, ratio_errors
+from chipglow.analysis.wavelengths import band_name
 from chipglow.camera import RatioCamera
 from chipglow.drawing import drawing
 from chipglow.drawing.scales import HEAT, KELVIN, SIGNED
-from chipglow.errors import RatioErrors, WavelengthErrors, ratio_errors
-from chipglow.errors.wavelengths import band_name
 from chipglow.radiometry import Band, RatioThermometer
 from chipglow.report.wavelength_figure import draw_wavelengths
 from chipglow.surface import CHIP_1

@@ -1,8 +1,8 @@
 from . import (
+    analysis as analysis,
     app as app,
     camera as camera,
     cutting as cutting,
-    errors as errors,
     io as io,
     laboratory as laboratory,
     radiometry as radiometry,
@@ -11,6 +11,14 @@ from . import (
     study as study,
     surface as surface,
     uncertainty as uncertainty,
+)
+from .analysis import (
+    Plan as Plan,
+    StudyResult as StudyResult,
+    analyse as analyse,
+    error_images as error_images,
+    error_parts as error_parts,
+    ratio_errors as ratio_errors,
 )
 from .app import explore as explore
 from .camera import (
@@ -36,14 +44,6 @@ from .cutting import (
     FLOW_LAWS as FLOW_LAWS,
     CuttingSimulation as CuttingSimulation,
     FlowStress as FlowStress,
-)
-from .errors import (
-    Plan as Plan,
-    StudyResult as StudyResult,
-    analyse as analyse,
-    error_images as error_images,
-    error_parts as error_parts,
-    ratio_errors as ratio_errors,
 )
 from .io import (
     example_scene as example_scene,

@@ -14,6 +14,16 @@ from typing import Final, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis import (
+    Distribution,
+    ErrorImages,
+    ErrorParts,
+    LinePlace,
+    error_images,
+    error_parts,
+)
+from chipglow.analysis.draws import pixel_phases
+from chipglow.analysis.error_images import Unblurred
 from chipglow.app.knobs import LINES, ControlPanel, Knobs
 from chipglow.app.opening import QUICK_SAMPLES, OpenedMeasurement, OpenedScene, with_samples
 from chipglow.app.picture import (
@@ -27,16 +37,6 @@ from chipglow.app.picture import (
 from chipglow.camera import Camera, Exposure
 from chipglow.camera.exposure import frame_weights
 from chipglow.camera.sweep import Check
-from chipglow.errors import (
-    Distribution,
-    ErrorImages,
-    ErrorParts,
-    LinePlace,
-    error_images,
-    error_parts,
-)
-from chipglow.errors.draws import pixel_phases
-from chipglow.errors.error_images import Unblurred
 from chipglow.radiometry import Band
 from chipglow.scene import Material, Scene, sample
 from chipglow.scene.lines import nearest

@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis.starts import spread_starts
 from chipglow.app.knobs import ControlPanel, Ends, Point, knobs_of
 from chipglow.app.probing import probed
 from chipglow.camera import Measurement
-from chipglow.errors.starts import spread_starts
 from chipglow.io import StoredScene, example_scene, is_measurement, open_scene, read_measurement
 from chipglow.io.sandbox import Sandbox, patience_for
 from chipglow.laboratory.chip import Instant, contact_length

@@ -6,10 +6,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis import Distribution, ErrorImages, ErrorParts
 from chipglow.app.knobs import SHOWN, Knobs
 from chipglow.camera import Camera, Exposure
 from chipglow.drawing.scales import KELVIN
-from chipglow.errors import Distribution, ErrorImages, ErrorParts
 from chipglow.scene import Raster
 
 

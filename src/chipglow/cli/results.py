@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pandas as pd
 
+from chipglow.analysis import SceneErrors, StudyResult
 from chipglow.cli.inertia import say_of_cut
 from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.cli.screen import current
 from chipglow.cutting import SOLVER_VERSION
-from chipglow.errors import SceneErrors, StudyResult
 from chipglow.io import atomic_folder
 from chipglow.report import comparison_rows, place_rows, table_2, write_report, write_scene_report
 from chipglow.report.paper import CITATION, stands_beside

@@ -9,8 +9,8 @@ import typer
 from chipglow.cli.options import file_option, picture_option
 
 if TYPE_CHECKING:
+    from chipglow.analysis import WavelengthErrors
     from chipglow.cli.screen import Screen
-    from chipglow.errors import WavelengthErrors
 
 
 def wavelengths(

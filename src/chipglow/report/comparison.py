@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.errors import Distribution, Headline, LocalError, StudyResult
+from chipglow.analysis import Distribution, Headline, LocalError, StudyResult
 from chipglow.quantities.format import quantity_text
 from chipglow.report import evidence
 from chipglow.report.page import Term

@@ -6,12 +6,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis import SceneErrors, StudyResult
+from chipglow.analysis.cut_error import SurfaceResult
+from chipglow.analysis.scene_error import SurfaceErrors
 from chipglow.camera import Camera
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import KELVIN
-from chipglow.errors import SceneErrors, StudyResult
-from chipglow.errors.cut_error import SurfaceResult
-from chipglow.errors.scene_error import SurfaceErrors
 from chipglow.report.evidence import definition_of
 from chipglow.report.player import Mark, Player, View
 from chipglow.scene import Tool

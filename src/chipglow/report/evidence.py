@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.errors import Distribution, Headline, ReferenceKind, Sensitivity, StudyResult
-from chipglow.errors.distribution import COVERAGE
+from chipglow.analysis import Distribution, Headline, ReferenceKind, Sensitivity, StudyResult
+from chipglow.analysis.distribution import COVERAGE
 from chipglow.laboratory.chip import Segmentation
 from chipglow.quantities.format import quantity_text
 from chipglow.report.page import Statement

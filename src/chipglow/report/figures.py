@@ -11,12 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from chipglow.analysis import LineDraws, Sensitivity, StudyResult
+from chipglow.analysis.cut_error import SurfaceResult
 from chipglow.camera import PointSpreadFunction
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import Drawing, FigureFile, ImagePanel
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
-from chipglow.errors import LineDraws, Sensitivity, StudyResult
-from chipglow.errors.cut_error import SurfaceResult
 from chipglow.report.evidence import beside, error_definition
 from chipglow.report.laboratory_figures import (
     dual_spectrum,

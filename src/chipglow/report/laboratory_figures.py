@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chipglow.analysis import StudyResult
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import BLUE, GREY, KELVIN, VERMILLION
-from chipglow.errors import StudyResult
 from chipglow.laboratory.chip import RakeGrid
 from chipglow.laboratory.emissivity import HeatedObject
 from chipglow.report.visible import visible_picture

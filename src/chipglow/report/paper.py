@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import degrees
 from typing import Final
 
-from chipglow.errors import StudyResult
+from chipglow.analysis import StudyResult
 from chipglow.study import Study
 from chipglow.surface import Emissivity
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Final
 
 from chipglow import __version__
+from chipglow.analysis import StudyResult
 from chipglow.drawing.drawing import FigureFile
-from chipglow.errors import StudyResult
 from chipglow.report.camera_rows import camera_rows
 from chipglow.report.chip_rows import chip_rows
 from chipglow.report.comparison import (

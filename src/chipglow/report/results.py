@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chipglow.errors import StudyResult
+from chipglow.analysis import StudyResult
 from chipglow.scene import FIELD_UNITS
 from chipglow.scene.tool_attributes import tool_attributes
 

@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from chipglow.analysis import SceneErrors
+from chipglow.analysis.scene_error import PlaceErrors, Profile, SurfaceErrors
 from chipglow.drawing import drawing, scales
 from chipglow.drawing.drawing import Drawing, FigureFile, ImagePanel
 from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
-from chipglow.errors import SceneErrors
-from chipglow.errors.scene_error import PlaceErrors, Profile, SurfaceErrors
 from chipglow.report.evidence import definition_of
 from chipglow.scene import Material
 

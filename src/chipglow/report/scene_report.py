@@ -8,9 +8,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import xarray as xr
 
+from chipglow.analysis import Distribution, SceneErrors
+from chipglow.analysis.distribution import TOGETHER
 from chipglow.drawing.scales import KELVIN
-from chipglow.errors import Distribution, SceneErrors
-from chipglow.errors.distribution import TOGETHER
 from chipglow.report.camera_rows import camera_rows
 from chipglow.report.error_player import scene_player
 from chipglow.report.evidence import answer_note, definition_of, error_text

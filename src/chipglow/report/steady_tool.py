@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from chipglow.errors import StudyResult
+from chipglow.analysis import StudyResult
 from chipglow.laboratory.chip import contact_temperatures
 from chipglow.quantities.format import quantity_text
 from chipglow.report.page import Line, Term, table_part

@@ -5,8 +5,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from chipglow.analysis import Distribution, SceneErrors
 from chipglow.drawing.scales import KELVIN
-from chipglow.errors import Distribution, SceneErrors
 from chipglow.report.comparison import CauseRow, PartRow, Row, known
 from chipglow.report.steady_tool import ToolRow
 

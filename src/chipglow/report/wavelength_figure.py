@@ -8,9 +8,9 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
+from chipglow.analysis import WavelengthError, WavelengthErrors
+from chipglow.analysis.wavelengths import band_name
 from chipglow.drawing import drawing, scales
-from chipglow.errors import WavelengthError, WavelengthErrors
-from chipglow.errors.wavelengths import band_name
 
 _BEST: Final = 3
 """Bands alone, and pairs, of which the parts of the error are drawn."""

@@ -4,8 +4,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Strict, field_validator, model_validator
 
-from chipglow.errors import LinePlace, Plan, PointPlace, RegionPlace, ScenePlan
-from chipglow.errors.places import Place
+from chipglow.analysis import LinePlace, Plan, PointPlace, RegionPlace, ScenePlan
+from chipglow.analysis.places import Place
 from chipglow.laboratory.emissivity import RegionSection
 from chipglow.quantities import Settings, described
 from chipglow.quantities.units import Length, Position

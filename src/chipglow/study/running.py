@@ -8,14 +8,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, Final, TypeAlias
 
-from chipglow.cutting import (
-    SOLVER_VERSION,
-    Checkpoint,
-    SolverError,
-    ToolMaterial,
-    WorkpieceMaterial,
-)
-from chipglow.errors import (
+from chipglow.analysis import (
     SceneErrors,
     StudyResult,
     WavelengthErrors,
@@ -24,6 +17,13 @@ from chipglow.errors import (
     point_spots,
     scene_errors,
     wavelength_errors,
+)
+from chipglow.cutting import (
+    SOLVER_VERSION,
+    Checkpoint,
+    SolverError,
+    ToolMaterial,
+    WorkpieceMaterial,
 )
 from chipglow.io import SCENE_FORMAT, SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.interrupts import uninterrupted

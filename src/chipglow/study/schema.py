@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import field_validator, model_validator
 
-from chipglow.errors import Plan
+from chipglow.analysis import Plan
 from chipglow.quantities import OR_NONE, FileBeside, Section, described
 from chipglow.study.analysis_section import AnalysisSection
 from chipglow.study.camera_section import CameraSection

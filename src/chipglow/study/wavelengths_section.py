@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Strict, model_validator
 
-from chipglow.errors import WavelengthPlan
+from chipglow.analysis import WavelengthPlan
 from chipglow.quantities import Settings, described
 from chipglow.quantities.units import INSTANT, Position, WavelengthRange
 from chipglow.radiometry import Band

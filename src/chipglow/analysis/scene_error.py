@@ -8,17 +8,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.camera import Camera, Exposure, Measurement
-from chipglow.errors.distribution import Distribution
-from chipglow.errors.draws import pixel_phases
-from chipglow.errors.error_images import (
+from chipglow.analysis.distribution import Distribution
+from chipglow.analysis.draws import pixel_phases
+from chipglow.analysis.error_images import (
     ErrorImages,
     ReferenceKind,
     error_images,
     reference_temperature,
 )
-from chipglow.errors.places import HottestPlace, LinePlace, Place, RakePlace, Reading
-from chipglow.errors.starts import spread_starts
+from chipglow.analysis.places import HottestPlace, LinePlace, Place, RakePlace, Reading
+from chipglow.analysis.starts import spread_starts
+from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.laboratory.chip import contact_length
 from chipglow.scene import Frame, Line, Material, Raster, Scene, Tool
 from chipglow.surface import EmissivityField, Surface

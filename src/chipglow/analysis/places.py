@@ -8,8 +8,9 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.errors.error_images import ErrorImages
-from chipglow.errors.rake_error import rake_errors
+from chipglow.analysis.error_images import ErrorImages
+from chipglow.analysis.rake_error import rake_errors
+from chipglow.laboratory.chip import ShearBand
 from chipglow.scene import Line, Raster, Region, Tool, sample
 from chipglow.scene.lines import nearest
 from chipglow.scene.regions import Point
@@ -262,6 +263,31 @@ class RakePlace(Place):
     def outline(self) -> NDArray[np.float64]:
         """See `Place.outline`."""
         return np.asarray(self.tool.rake_point(np.array([0.0, self.contact_length])))
+
+
+@dataclass(frozen=True)
+class BandPlace(Place):
+    """The shear band, read across its middle.
+
+    Parameters
+    ----------
+    band : ShearBand
+        The band.
+    half_length, step : float
+        Reach to either side of the line across it, and distance between its points, in m.
+    """
+
+    band: ShearBand
+    half_length: float
+    step: float
+
+    def read(self, errors: ErrorImages) -> Mapping[str, Reading]:
+        """See `Place.read`."""
+        raise NotImplementedError
+
+    def outline(self) -> NDArray[np.float64]:
+        """See `Place.outline`."""
+        return self.band.ridge.points
 
 
 def _mean_and_worst(values: NDArray[np.float64]) -> dict[str, Reading]:

@@ -8,10 +8,10 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis.draws import BAND_READINGS, RAKE_READINGS, Site, pixel_phases
+from chipglow.analysis.error_images import Unblurred
+from chipglow.analysis.local_error import LocalError
 from chipglow.camera import Camera, GaussianPSF, blur
-from chipglow.errors.draws import BAND_READINGS, RAKE_READINGS, Site, pixel_phases
-from chipglow.errors.error_images import Unblurred
-from chipglow.errors.local_error import LocalError
 
 PsfOrder: TypeAlias = Literal["detector", "optics"]
 PSF_ORDERS: Final[tuple[PsfOrder, ...]] = ("detector", "optics")

@@ -8,19 +8,19 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera import Camera, Exposure, Measurement
-from chipglow.cutting import EnergyHistory
-from chipglow.errors.band_error import BandErrors
-from chipglow.errors.draws import Draws, Site, draw_errors
-from chipglow.errors.error_images import (
+from chipglow.analysis.band_error import BandErrors
+from chipglow.analysis.draws import Draws, Site, draw_errors
+from chipglow.analysis.error_images import (
     ErrorImages,
     ReferenceKind,
     error_images,
     reference_temperature,
 )
-from chipglow.errors.rake_error import RakeErrors
-from chipglow.errors.sensitivity import Sensitivity, sensitivity
-from chipglow.errors.starts import other_starts, spread_starts
+from chipglow.analysis.rake_error import RakeErrors
+from chipglow.analysis.sensitivity import Sensitivity, sensitivity
+from chipglow.analysis.starts import other_starts, spread_starts
+from chipglow.camera import Camera, Exposure, Measurement
+from chipglow.cutting import EnergyHistory
 from chipglow.laboratory.chip import (
     ChipMetrics,
     Inertia,

@@ -13,12 +13,12 @@ from typing import Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis.band_error import BandErrors, band_errors
+from chipglow.analysis.distribution import Distribution, ratio
+from chipglow.analysis.error_images import ErrorImages, ReferenceKind, error_images
+from chipglow.analysis.local_error import LocalError
+from chipglow.analysis.rake_error import RakeErrors, rake_errors
 from chipglow.camera import Camera, Exposure
-from chipglow.errors.band_error import BandErrors, band_errors
-from chipglow.errors.distribution import Distribution, ratio
-from chipglow.errors.error_images import ErrorImages, ReferenceKind, error_images
-from chipglow.errors.local_error import LocalError
-from chipglow.errors.rake_error import RakeErrors, rake_errors
 from chipglow.laboratory.chip import ShearBand
 from chipglow.radiometry import Band
 from chipglow.scene import Line, Tool, sample

@@ -10,14 +10,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from chipglow.analysis.cut_error import Plan, find_segments
+from chipglow.analysis.draws import pixel_phases
+from chipglow.analysis.places import PointPlace
+from chipglow.analysis.ratio_error import ideal_image, true_temperature
+from chipglow.analysis.scene_error import ScenePlan
+from chipglow.analysis.starts import spread_starts
 from chipglow.camera import Camera, Exposure, expose_views, frame_weights
 from chipglow.camera.ratio_camera import views_of
-from chipglow.errors.cut_error import Plan, find_segments
-from chipglow.errors.draws import pixel_phases
-from chipglow.errors.places import PointPlace
-from chipglow.errors.ratio_error import ideal_image, true_temperature
-from chipglow.errors.scene_error import ScenePlan
-from chipglow.errors.starts import spread_starts
 from chipglow.radiometry import Band, RatioThermometer
 from chipglow.scene import Raster, Scene
 from chipglow.scene.lines import nearest

@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera import Camera, Exposure
-from chipglow.errors.error_images import (
+from chipglow.analysis.error_images import (
     ErrorImages,
     ReferenceKind,
     Unblurred,
     error_images,
     reference_temperature,
 )
+from chipglow.camera import Camera, Exposure
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.errors.error_images import ErrorImages
-from chipglow.errors.local_error import LocalError, lowest_near
+from chipglow.analysis.error_images import ErrorImages
+from chipglow.analysis.local_error import LocalError, lowest_near
 from chipglow.laboratory.chip import NoContactError
 from chipglow.scene import Line, Tool, sample, straight_line
 

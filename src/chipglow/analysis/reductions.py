@@ -1,0 +1,226 @@
+"""Errors, portions, means and scatter: reductions of an analysis' Dataset over its axes."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import nan
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+
+from chipglow.analysis.distribution import Distribution, ratio
+
+ALL = "all"
+WITHOUT_PSF = "without psf"
+_DRAWS = ("exposure", "texture", "pixel_phase")
+
+
+@dataclass(frozen=True, eq=False)
+class Headline:
+    """One reading over all draws, in K of radiance temperature.
+
+    `psf_portion` is the part of the error that the point spread function makes.
+    """
+
+    place: str
+    quantity: str
+    surface: str
+    reference: Distribution
+    error: Distribution
+    psf_portion: Distribution
+
+    @property
+    def psf_fraction(self) -> Distribution | None:
+        """The PSF's portion over the error, draw by draw; None if the error changes its sign."""
+        low, high = self.error.range
+        return None if low <= 0 <= high else ratio(self.psf_portion, self.error)
+
+
+@dataclass(frozen=True)
+class OneDraw:
+    """One reading of a single frame, in K of radiance temperature; NaN where it is unknown."""
+
+    error: float
+    psf_portion: float
+
+    @property
+    def psf_fraction(self) -> float:
+        """The PSF's portion over the error; NaN for no error."""
+        return self.psf_portion / self.error if self.error else nan
+
+
+def error(data: xr.Dataset) -> xr.DataArray:
+    """Error of every reading with all effects (the paper's case 1) in every draw."""
+    measured: xr.DataArray = data.measured.sel(effects=ALL, drop=True)
+    return measured - data.reference
+
+
+def psf_portion(data: xr.Dataset) -> xr.DataArray:
+    """What the point spread function adds to the error of every reading in every draw."""
+    return _portion(data.measured)
+
+
+def headline(data: xr.Dataset, reading: str) -> Headline | None:
+    """One reading over all draws; None unless it is finite in each of them."""
+    if reading not in data.reading.values:
+        return None
+    one = data[["reference", "measured"]].sel(reading=reading)
+    one = one.isel(texture=slice(int(one.textures)))
+    values = [
+        np.asarray(array.transpose(*_DRAWS).values, np.float64)
+        for array in (one.reference, error(one), psf_portion(one))
+    ]
+    if not np.isfinite(values).all():
+        return None
+    causes = (str(data.exposure.attrs["title"]), "texture", "pixel phase")
+    place, quantity, surface = (
+        str(one[name].item()) for name in ("place", "quantity", "seen_surface")
+    )
+    draws = (Distribution(array, causes) for array in values)
+    return Headline(place, quantity, surface, *draws)
+
+
+def headlines(data: xr.Dataset) -> dict[str, Headline]:
+    """All readings that are finite in every draw."""
+    found = {str(name): headline(data, str(name)) for name in data.reading.values}
+    return {name: one for name, one in found.items() if one is not None}
+
+
+def one_draw(data: xr.Dataset, reading: str) -> OneDraw:
+    """What a single frame gives: the first exposure, texture and pixel phase."""
+    one = data.sel(reading=reading).isel(dict.fromkeys(_DRAWS, 0))
+    return OneDraw(float(error(one)), float(psf_portion(one)))
+
+
+def line_error(data: xr.Dataset, line: str) -> xr.DataArray:
+    """Error along a line over exposure, texture, pixel phase and point."""
+    one = _line(data, line)
+    measured: xr.DataArray = one.line_measured.sel(effects=ALL, drop=True)
+    return measured - one.line_reference
+
+
+def line_psf_portion(data: xr.Dataset, line: str) -> xr.DataArray:
+    """The PSF's portion along a line over exposure, texture, pixel phase and point."""
+    return _portion(_line(data, line).line_measured)
+
+
+def line_change(data: xr.Dataset, line: str, near: float, far: float) -> float:
+    """Mean change of the scene's radiance temperature in K between two distances in m."""
+    ends = [np.interp([near, far], at, values) for at, values in _scene_lines(data, line)]
+    return float(np.mean([last - first for first, last in ends]))
+
+
+def line_steepest(data: xr.Dataset, line: str, length: float) -> float:
+    """Greatest change of the scene's radiance temperature in K over a length in m, as a mean."""
+    changes = [
+        np.nanmax(np.abs(np.interp(at + length, at, values) - values))
+        for at, values in _scene_lines(data, line)
+    ]
+    return float(np.mean(changes))
+
+
+def image_error(data: xr.Dataset, effects: str = ALL) -> xr.DataArray:
+    """Error of every pixel in the shown exposure."""
+    reference = data.reference_temperature.isel(instant=data.attrs["shown_instant"], drop=True)
+    measured: xr.DataArray = data.image_measured.sel(effects=effects, drop=True)
+    return measured - reference
+
+
+def image_psf_portion(data: xr.Dataset) -> xr.DataArray:
+    """The PSF's portion of the error of every pixel in the shown exposure."""
+    return _portion(data.image_measured)
+
+
+def sensitivity_error(data: xr.Dataset, order: str, reading: str) -> NDArray[np.float64]:
+    """Mean error over exposures and pixel phases, by the width of the PSF."""
+    return _by_width(_varied_error(data, order, reading))
+
+
+def sensitivity_psf_fraction(data: xr.Dataset, order: str, reading: str) -> NDArray[np.float64]:
+    """Mean of the PSF's portion over the error, by the width of the PSF."""
+    one = data.varied_measured.sel(psf_order=order, reading=reading)
+    return _by_width(_portion(one) / _varied_error(data, order, reading))
+
+
+def with_errors(data: xr.Dataset) -> xr.Dataset:
+    """The Dataset with the errors of the images and of the readings as variables."""
+    images = {
+        "error_case_1": image_error(data),
+        "error_case_2": image_error(data, WITHOUT_PSF),
+        "error_psf_portion": image_psf_portion(data),
+    }
+    whole, portion = error(data), psf_portion(data)
+    draws = {
+        f"draws_{_key(str(name))}_{part}": array.sel(reading=name, drop=True).drop_vars(
+            [coordinate for coordinate, one in data.coords.items() if one.dims == ("reading",)],
+            errors="ignore",
+        )
+        for name in data.reading.values
+        for part, array in (("error", whole), ("psf_portion", portion))
+    }
+    found = {name: array.assign_attrs(units="K") for name, array in (images | draws).items()}
+    return data.assign(found)
+
+
+def readings_frame(data: xr.Dataset) -> pd.DataFrame:
+    """Every reading at every place, a row each.
+
+    Columns ``surface``, ``place``, ``reading``, ``draws``, and the means over the draws
+    ``reference_degC``, ``error_K`` and ``psf_portion_K``; of the error also the
+    ``standard_deviation_K`` and the ``least_K`` and ``greatest_K``.
+    """
+    return pd.DataFrame(
+        {
+            "surface": one.surface,
+            "place": one.place,
+            "reading": one.quantity,
+            "draws": one.error.draws,
+            "reference_degC": one.reference.mean - 273.15,
+            "error_K": one.error.mean,
+            "standard_deviation_K": one.error.standard_deviation,
+            "least_K": one.error.range[0],
+            "greatest_K": one.error.range[1],
+            "psf_portion_K": one.psf_portion.mean,
+        }
+        for one in headlines(data).values()
+    )
+
+
+def _portion(measured: xr.DataArray) -> xr.DataArray:
+    with_psf, without = (measured.sel(effects=name, drop=True) for name in (ALL, WITHOUT_PSF))
+    return with_psf - without
+
+
+def _line(data: xr.Dataset, line: str) -> xr.Dataset:
+    """The variables of a line without the points beyond its end in the first exposure."""
+    names = [name for name in data.data_vars if str(name).startswith("line_")]
+    one = data[names].sel(line=line)
+    distance = one.line_distance.isel(exposure=0, drop=True)
+    one = one.isel(texture=slice(int(one.line_textures)))
+    return one.assign_coords(distance=distance).isel(point=np.isfinite(distance.values))
+
+
+def _scene_lines(
+    data: xr.Dataset, line: str
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    one = _line(data, line)
+    scene = one.line_scene.transpose("exposure", "texture", "point").values
+    for values in scene.reshape(-1, scene.shape[-1]):
+        yield one.distance.values, values
+
+
+def _varied_error(data: xr.Dataset, order: str, reading: str) -> xr.DataArray:
+    one = data[["varied_reference", "varied_measured"]].sel(psf_order=order, reading=reading)
+    measured: xr.DataArray = one.varied_measured.sel(effects=ALL, drop=True)
+    return measured - one.varied_reference
+
+
+def _by_width(values: xr.DataArray) -> NDArray[np.float64]:
+    mean = values.mean(("exposure", "pixel_phase"), skipna=False)
+    return np.asarray(mean.values, np.float64)
+
+
+def _key(name: str) -> str:
+    """A name for a variable of NetCDF."""
+    return "_".join("".join(c if c.isalnum() else " " for c in name).split())
