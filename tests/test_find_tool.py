@@ -13,6 +13,7 @@ from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import find_tool, rake_grid
 from chipglow.laboratory.comparison import normalised_error
+from chipglow.quantities import uncertain_text
 from chipglow.scene import PlacedTool, Raster, ToolGeometry
 from chipglow.surface import CHIP_1, CHIP_2
 from chipglow.uncertainty import Estimate
@@ -154,7 +155,7 @@ def test_the_command_writes_what_the_function_gives(folder, seen):
         assert data.attrs["tool_rake_angle"] == radians(-7.0)
     assert (folder / "grid.png").read_bytes().startswith(b"\x89PNG")
     value, spread = grid.frame_mean[0, 4] - 273.15, grid.frame_standard_deviation[0, 4]
-    assert f"{value:.1f} ± {spread:.1f}" in text
+    assert uncertain_text(value, spread) in text
     assert "squares are left out" in text
 
 

@@ -190,7 +190,7 @@ def test_units_that_follow_from_others_are_said(arrays, tmp_path):
     np.savez(tmp_path / "v.npz", T=np.full((4, 6), 300.0), vx=np.ones((4, 6)))
     settings = ["grid.spacing=5 um", "units={length: mm, time: us}"]
     looked = prospect(load_import(tmp_path / "v.npz", settings).build())
-    assert "Velocities are in mm/us, from units.length and units.time." in looked.notes.assumed
+    assert "Velocities are in mm/us, by units.length and units.time." in looked.notes.assumed
     given = load_import(tmp_path / "v.npz", [*settings, "units.velocity=m/s"])
     assert not any("Velocities" in said for said in prospect(given.build()).notes.assumed)
 

@@ -70,11 +70,25 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _use_json(wanted: bool) -> None:
+    if wanted:
+        current().for_programs()
+
+
 @app.callback()
 def _chipglow(
     version: Annotated[
         bool,
         typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
+    ] = False,
+    json: Annotated[
+        bool,
+        typer.Option(
+            "--json",
+            callback=_use_json,
+            expose_value=False,
+            help="Print the results as one JSON object.",
+        ),
     ] = False,
 ) -> None:
     pass

@@ -1,7 +1,7 @@
 """Where errors become one line and an exit code."""
 
 import sys
-from typing import Annotated, Any, Final
+from typing import Any, Final
 
 import typer
 from typer.core import TyperGroup
@@ -14,24 +14,27 @@ INTERRUPTED: Final = 130
 
 
 class Boundary(TyperGroup):
-    """Commands that end in one line and an exit code, never in a traceback, if they fail.
+    """Commands that end in one line and an exit code if they fail, never in a traceback.
 
-    Each has an option ``--json``: its results as one object on stdout, if it does not fail.
-
-    2 for what the user can put right (input, files, disk), 1 for a simulation that went wrong,
-    130 after Ctrl-C. Anything else is a defect of the program and keeps its traceback.
+    The code is 2 for what the user can put right (input, files, disk), 1 for a failed simulation
+    and 130 after Ctrl-C. Anything else is a defect of the program and keeps its traceback. Every
+    command has the program's option ``--json``.
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        _give_json(self)
+        _share(next(option for option in self.params if option.name == "json"), self)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments; options may choose what the screen shows."""
+        screen.begin()
+        return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command."""
-        shown = screen.begin()
         try:
             done = super().invoke(ctx)
-            shown.close()
+            screen.current().close()
             return done
         except BrokenPipeError:
             raise
@@ -60,34 +63,10 @@ def _one_line(error: Exception) -> str:
     return " ".join(text.split())
 
 
-def _give_json(group: TyperGroup) -> None:
-    """The option for programs, on every command of a group."""
+def _share(option: Any, group: TyperGroup) -> None:
+    """Add an option of the whole program to every command of a group."""
     for command in group.commands.values():
         if isinstance(command, TyperGroup):
-            _give_json(command)
+            _share(option, command)
         else:
-            command.params.extend(typer.main.get_command(_JSON).params)
-
-
-_JSON: Final = typer.Typer(add_completion=False)
-"""A command that has only that option, to take it from."""
-
-
-def _chosen(wanted: bool) -> None:
-    if wanted:
-        screen.current().for_programs()
-
-
-@_JSON.command()
-def _with_json(
-    json: Annotated[
-        bool,
-        typer.Option(
-            "--json",
-            callback=_chosen,
-            expose_value=False,
-            help="Print the results as one JSON object, for programs.",
-        ),
-    ] = False,
-) -> None:
-    pass
+            command.params.append(option)

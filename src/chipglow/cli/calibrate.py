@@ -121,21 +121,11 @@ def _print_fit(screen: "Screen", found: "BlackbodyCalibration", name: str) -> No
         f"\n{name}: {calibration.description}, {calibration.lowest - 273.15:.5g} °C to "
         f"{calibration.highest - 273.15:.5g} °C"
     )
-    cells = {
-        "parameter": "{parameter}",
-        "value": "{value:.7g}",
-        "standard uncertainty": "{standard_uncertainty:.2g}",
-        "unit": "{unit}",
-    }
-    screen.table("parameters", found.parameter_frame().query("model == @name"), cells)
-    cells = {
-        "blackbody / °C": "{temperature_degC:.2f}",
-        "counts": "{counts:.6g}",
-        "residual / counts": "{residual_counts:.3g}",
-        "residual / K": "{residual_K:.3g}",
-        "u / K": "{standard_uncertainty_K:.2g}",
-    }
-    screen.table("blackbodies", found.to_frame().query("model == @name"), cells)
+    parameters = found.parameter_frame().query("model == @name")
+    columns = ["parameter", "value ± standard_uncertainty", "unit"]
+    screen.table("parameters", parameters, columns)
+    points = found.to_frame().query("model == @name")
+    screen.table("blackbodies", points, list(points.columns.drop("model")))
     screen.say(_quality(found.fits[name]), {name: _numbers(found.fits[name])})
 
 

@@ -130,19 +130,10 @@ def _print(screen: "Screen", result: "Comparison") -> None:
 
     frame = result.fit_frame()
     frame["bias_expanded_K"] = COVERAGE * frame["bias_standard_uncertainty_K"]
-    frame["shown_place"] = frame["place"].mask(frame["place"].duplicated(), "")
-    screen.table(
-        "fits",
-        frame,
-        {
-            "place": "{shown_place}",
-            "simulation": "{simulation}",
-            "bias / K": "{bias_K:+.1f} ± {bias_expanded_K:.1f}",
-            "RMS / K": "{rms_K:.1f}",
-            "E_n up to 1": "{values_with_E_n_up_to_1} of {values}",
-        },
-        f"simulated less measured radiance temperature, ± expanded uncertainty (k = {COVERAGE:g})",
-    )
+    columns = ["place", "simulation", "bias_K ± bias_expanded_K", "rms_K"]
+    columns += ["values_with_E_n_up_to_1", "values"]
+    title = f"simulated minus measured radiance temperature, ± U (k = {COVERAGE:g})"
+    screen.table("fits", frame, columns, title)
 
 
 def _write(result: "Comparison", out: Path) -> None:

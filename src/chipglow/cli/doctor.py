@@ -38,11 +38,11 @@ def examine() -> None:
     screen.facts("machine", _machine())
     screen.heading()
     packages = _packages()
-    cells = {"package": "{package}", "here": "{installed}", "needed": "{needed}", "": "{state}"}
-    screen.table("packages", packages[packages["extra"] == ""], cells)
+    columns = ["package", "installed", "needed"]
+    screen.table("packages", packages[packages["extra"] == ""], [*columns, "state"])
     screen.heading("\nOptional parts")
     optional = packages[packages["extra"] != ""]
-    screen.table("optional", optional, {"part": "{extra}", **cells, "": "{advice}"})
+    screen.table("optional", optional, ["extra", *columns, "advice"])
     _say_differences(screen, packages)
 
 

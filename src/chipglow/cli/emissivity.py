@@ -134,33 +134,21 @@ def _heatings(
 
 
 def _print_tables(screen: "Screen", found: "RegionEmissivities") -> None:
-    from chipglow.cli.tables import part_cells
     from chipglow.laboratory.emissivity.emissivity import BUDGET
 
-    cells = {
-        "region": "{region}",
-        "pixels": "{pixels}",
-        "mean": "{mean:.4f}",
-        "sd of pixels": "{standard_deviation:u}",
-        "u": "{standard_uncertainty:u}",
-        "U 95 %": "{expanded_uncertainty:u}",
-        "k": "{coverage_factor:.2f}",
-    }
+    columns = ["region", "pixels", "mean", "standard_deviation", "standard_uncertainty"]
+    columns += ["expanded_uncertainty", "coverage_factor"]
+    parts = {"parts of u": "region"} | {cause: f"{cause}_uncertainty" for cause in BUDGET}
     for kelvins, rows in found.to_frame().groupby("reference_K", sort=False):
         screen.heading(f"\nObject at {kelvins - 273.15:.6g} °C")
-        screen.table("regions", rows, cells)
+        screen.table("regions", rows, columns)
         screen.heading()
-        screen.table(None, rows, {"parts of u": "{region}", **part_cells(BUDGET)})
+        screen.table(None, rows, parts)
     if found.lines:
         screen.heading("\nOver the temperature, with standard uncertainties")
-        cells = {
-            "region": "{region}",
-            "emissivity": "{emissivity:.4f} ± {emissivity_uncertainty:u}",
-            "at": "{temperature_degC:.6g} °C",
-            "change in 100 K": "{change_in_100_K:+.4f} ± {change_in_100_K_uncertainty:u}",
-            "sd about line": "{residual:u}",
-        }
-        screen.table("lines", found.line_frame(), cells)
+        columns = ["region", "emissivity ± emissivity_uncertainty", "temperature_degC"]
+        columns += ["change_in_100_K ± change_in_100_K_uncertainty", "residual"]
+        screen.table("lines", found.line_frame(), columns)
 
 
 def _print_study(screen: "Screen", found: "RegionEmissivities", out: Path | None) -> None:

@@ -62,7 +62,7 @@ def _say(looked: Prospect) -> None:
         {"kind": survey.kind, "frames": times.size, "from_us": times[0], "to_us": times[-1]},
     )
     fields = pd.DataFrame(survey.found.items(), columns=["field", "from"])
-    screen.table("fields", fields, {"field": "{field}", "from": "{from}"})
+    screen.table("fields", fields)
     if survey.unused:
         screen.say(f"Not used: {', '.join(survey.unused)}", {"unused": list(survey.unused)})
     left, right, bottom, top = (round(edge * 1e6, 6) + 0.0 for edge in raster.extent)

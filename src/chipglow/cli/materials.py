@@ -12,15 +12,9 @@ from chipglow.text import Notes
 
 def list_materials() -> None:
     """Print the library: names, sets of the flow stress, what they are."""
-    cells = {
-        "name": "{name}",
-        "kind": "{kind}",
-        "sets (the first is the default)": "{sets}",
-        "what": "{what}",
-    }
-    current().table(
-        "materials", pd.DataFrame(map(_row, material_names())), cells, unbroken=("name",)
-    )
+    title = "The first of several sets is the default."
+    frame = pd.DataFrame(map(_row, material_names()))
+    current().table("materials", frame, title=title, unbroken=("name",))
 
 
 def _row(name: str) -> dict[str, str]:
@@ -29,7 +23,7 @@ def _row(name: str) -> dict[str, str]:
         "name": name,
         "kind": "tool" if material.tool else "workpiece",
         "sets": ", ".join(material.workpieces),
-        "what": f"{material.name}: {material.description}",
+        "description": f"{material.name}: {material.description}",
     }
 
 
@@ -49,8 +43,7 @@ def show_material(name: str) -> None:
     screen = current()
     screen.say(f"{material.name}: {material.description}")
     screen.heading()
-    cells = {"field": "{field}", "value": "{value}", "source": "{note}"}
-    screen.table("properties", pd.DataFrame(rows), cells)
+    screen.table("properties", pd.DataFrame(rows), ["field", "value", "note"])
     screen.heading()
     for count, source in enumerate(sources, 1):
         screen.heading(f"({count}) {source}")

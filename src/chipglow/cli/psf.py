@@ -9,7 +9,6 @@ from chipglow.cli.options import Settings, file_option, picture_option
 
 if TYPE_CHECKING:
     from chipglow.cli.screen import Screen
-    from chipglow.cli.tables import Cell
     from chipglow.laboratory.psf import KnifeEdge
 
 
@@ -99,32 +98,13 @@ def _region(text: str) -> tuple[slice, slice]:
 def _print(screen: "Screen", found: "KnifeEdge") -> None:
     from chipglow.laboratory.psf.summary import sentences
 
-    models = {
-        "model": "{model}",
-        "FWHM / um": _uncertain("fwhm_um", "fwhm_uncertainty_um"),
-        "AICc": "{aicc:+.1f}",
-        "BIC": "{bic:+.1f}",
-        "weight": "{weight:.3f}",
-        "reduced chi²": "{reduced_chi_squared:.3g}",
-    }
-    edges = {
-        "image": "{image}",
-        "normal / deg": _uncertain("normal_deg", "normal_uncertainty_deg"),
-        "FWHM / um": _uncertain("fwhm_um", "fwhm_uncertainty_um"),
-        "LSF / um": "{line_fwhm_um:.4g}",
-        "step/noise": "{step_over_noise:.3g}",
-        "MTF(Nyquist)": _uncertain("mtf_at_nyquist", "mtf_at_nyquist_uncertainty"),
-    }
+    fwhm = "fwhm_um ± fwhm_uncertainty_um"
+    models = ["model", fwhm, "aicc", "bic", "weight", "reduced_chi_squared"]
+    edges = ["image", "normal_deg ± normal_uncertainty_deg", fwhm, "line_fwhm_um"]
+    edges += ["step_over_noise", "mtf_at_nyquist ± mtf_at_nyquist_uncertainty"]
     screen.table("models", found.to_frame(), models)
     screen.heading()
     screen.table("edges", found.edge_frame(), edges)
     screen.heading()
     for sentence in sentences(found):
         screen.say(sentence)
-
-
-def _uncertain(value: str, uncertainty: str) -> "Cell":
-    """Cell of a value with its uncertainty, by the names of their columns."""
-    from chipglow.laboratory.psf.summary import with_uncertainty
-
-    return lambda row: with_uncertainty(row[value], row[uncertainty])

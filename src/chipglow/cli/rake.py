@@ -95,10 +95,9 @@ def _print(screen: "Screen", grid: "RakeGrid") -> None:
     wide = squares.pivot(index="along_um", columns="depth_um")
     depths = wide["mean_degC"].columns
     wide.columns = [f"{name}_{depths.get_loc(depth)}" for name, depth in wide.columns]
-    cells = {
-        f"{depth:.4g} µm deep": f"{{mean_degC_{n}:.1f}} ± {{standard_deviation_K_{n}:.1f}}"
+    columns = {"along / µm": "along_um"} | {
+        f"{depth:.4g} µm deep": f"mean_degC_{n} ± standard_deviation_K_{n}"
         for n, depth in enumerate(depths)
     }
-    cells = {"along / µm": "{along_um:.4g}", **cells}
     title = f"radiance temperature / °C ± standard deviation {over}"
-    screen.table("squares", wide.reset_index(), cells, title, unbroken=cells)
+    screen.table("squares", wide.reset_index(), columns, title, columns.values())

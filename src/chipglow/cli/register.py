@@ -252,15 +252,8 @@ def _print_fit(screen: "Screen", fit: "PointFit | DotFit | ImageFit") -> None:
 
 
 def _print_points(screen: "Screen", fit: "PointFit") -> None:
-    cells = {
-        "point": "{point}",
-        "x / um": "{x_um:.1f}",
-        "y / um": "{y_um:.1f}",
-        "column": "{visible_column:.1f}",
-        "row": "{visible_row:.1f}",
-        "off by / pixel": "{residual:.2f}",
-    }
-    screen.table("points", fit.to_frame(), cells)
+    columns = ["point", "x_um", "y_um", "visible_column", "visible_row", "residual"]
+    screen.table("points", fit.to_frame(), columns)
     screen.say(
         f"Scatter of the points: {fit.scatter:.2f} visible pixels in column and in row, with "
         f"{fit.registration.degrees_of_freedom:.0f} degrees of freedom.",

@@ -171,4 +171,4 @@ def _print_table(result: StudyResult | SceneErrors) -> None:
     else:
         heads = ["place", "reference", "error", "95 % interval", "PSF's portion"]
         frame = pd.DataFrame(place_rows(result), columns=heads)
-    current().table("results", frame, {head: f"{{{head}}}" for head in frame.columns})
+    current().table("results", frame)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from chipglow.cli.tables import Cell
+    from chipglow.cli.tables import Columns
     from chipglow.text import Notes
     from chipglow.uncertainty import Estimate
 
@@ -60,7 +60,7 @@ class Screen:
         self,
         name: str | None,
         frame: "pd.DataFrame",
-        cells: Mapping[str, "Cell"],
+        columns: "Columns" = (),
         title: str | None = None,
         unbroken: Collection[str] = (),
     ) -> None:
@@ -69,17 +69,17 @@ class Screen:
         Without a name it is for people alone: what the program finds in another table.
         """
         if self._kept is None:
-            self._print(screen_table(frame, cells, title, unbroken))
+            self._print(screen_table(frame, columns, title, unbroken))
         elif name is not None:
             records = frame.to_dict("records")
             self._kept["tables"].setdefault(name, []).extend(map(_plain, records))
 
     def budget(self, name: str, estimate: "Estimate", title: str) -> None:
         """What makes values in K uncertain, below a title."""
-        from chipglow.cli.tables import BUDGET_CELLS, budget_frame
+        from chipglow.cli.tables import budget_frame
 
         self.heading(f"\n{title}")
-        self.table(name, budget_frame(estimate), BUDGET_CELLS)
+        self.table(name, budget_frame(estimate))
         self.heading()
 
     def facts(self, name: str, rows: Facts) -> None:

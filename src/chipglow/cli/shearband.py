@@ -99,16 +99,6 @@ def _print(screen: "Screen", profile: "BandProfile") -> None:
     screen.table(
         "stages",
         profile.stage_frame(),
-        {
-            "at / µs": "{time_us:.7g}",
-            "stage": "{stage}",
-            "offset / µm": "{offset_um:+.1f}",
-            "from / µm": "{from_um:.0f}",
-            "to / µm": "{to_um:.0f}",
-            "mean / °C": "{mean_degC:.1f}",
-            "most / °C": "{greatest_degC:.1f}",
-            "u / K": "{standard_uncertainty_K:.1f}",
-        },
-        f"radiance temperature along the band, over a width of {1e6 * profile.width:.4g} µm",
+        title=f"radiance temperature along the band, over a width of {1e6 * profile.width:.4g} µm",
         unbroken=("stage",),
     )

@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from chipglow.cli.finish import figure, finish
 from chipglow.cli.screen import current
-from chipglow.cli.tables import Cell
 from chipglow.cli.times import parse_instant
 from chipglow.drawing.frames import shown_frame
 from chipglow.io import StoredScene, is_scene, open_scene
 from chipglow.io.measurement_file import holds
-from chipglow.quantities.format import rounded_text
 from chipglow.report import SceneSummary, draw_scene, scene_summary
 from chipglow.scene import ENERGY_UNITS, Raster, Scene, Tool, ToolGeometry
 from chipglow.text import Notes
@@ -154,12 +152,8 @@ def raster_values(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:
 
 def _show_fields(summary: SceneSummary) -> None:
     everywhere = f"in {len(summary.sampled)} frames"
-    heads = {"least": "least", "median": "median", "greatest": "greatest", everywhere: "overall"}
-    cells: dict[str, Cell] = {
-        "over the material": "{field}",
-        "unit": "{unit}",
-        **{head: _number_cell(column) for head, column in heads.items()},
-    }
+    columns = {name: name for name in ("field", "unit", "least", "median", "greatest")}
+    columns[everywhere] = "overall"
     frame = pd.DataFrame(
         {
             "field": field.field.title,
@@ -169,16 +163,7 @@ def _show_fields(summary: SceneSummary) -> None:
         }
         for field in summary.fields
     )
-    current().table("fields", frame, cells, unbroken=("over the material",))
-
-
-def _number_cell(column: str) -> Cell:
-    def text(row: Mapping[str, Any]) -> str:
-        value = row[column]
-        numbers = value if isinstance(value, tuple) else (value,)
-        return " to ".join(rounded_text(one) for one in numbers if one == one) or "–"
-
-    return text
+    current().table("fields", frame, columns, "Over the material", unbroken=("field",))
 
 
 def show_attributes(attributes: Mapping[str, Any]) -> None:

@@ -121,23 +121,15 @@ def _surroundings(reflected: str | None, uncertainty: str | None) -> "ReflectedT
 
 
 def _print(screen: "Screen", found: "RegionTemperatures") -> None:
-    from chipglow.cli.tables import part_cells
     from chipglow.laboratory.emissivity.temperature import TEMPERATURE_BUDGET
 
     rows = found.to_frame()
     for name in ("radiance_temperature", "true_temperature"):
         rows[f"{name}_degC"] = rows[name] - 273.15
-    cells = {
-        "region": "{region}",
-        "pixels": "{pixels}",
-        "radiance temperature": "{radiance_temperature_degC:.2f} °C",
-        "emissivity": "{emissivity:.4f}",
-        "true temperature": "{true_temperature_degC:.2f} °C",
-        "u": "{standard_uncertainty:u} K",
-        "U 95 %": "{expanded_uncertainty:u} K",
-        "k": "{coverage_factor:.2f}",
-    }
-    screen.table("regions", rows, cells)
+    columns = ["region", "pixels", "radiance_temperature_degC", "emissivity"]
+    columns += ["true_temperature_degC ± standard_uncertainty"]
+    columns += ["expanded_uncertainty", "coverage_factor"]
+    screen.table("regions", rows, columns)
     screen.heading()
-    parts = {"parts of u / K": "{region}", **part_cells(TEMPERATURE_BUDGET)}
-    screen.table(None, rows, parts)
+    parts = {cause: f"{cause}_uncertainty" for cause in TEMPERATURE_BUDGET}
+    screen.table(None, rows, {"parts of u / K": "region"} | parts)

@@ -57,14 +57,7 @@ def _print(screen: "Screen", found: "WavelengthErrors", place: str) -> None:
     frame = found.to_frame()
     frame = frame[frame.place == place].sort_values("total_K")
     truth, draws = frame.truth_degC.iloc[0], frame.draws.iloc[0]
-    cells = {
-        "band / µm": "{first_um}",
-        "over / µm": "{second_um}",
-        "all / K": "{total_K:u}",
-        "error / K": "{error_K:+.1f} ± {standard_deviation_K:.1f}",
-        "shift / K": "{misregistration_K:.1f}",
-        "noise / K": "{noise_K:.1f}",
-        "u(ε) / K": "{emissivity_uncertainty_K:.1f}",
-    }
-    title = f"{place}: {truth:.0f} °C on average over {draws} draws; the least error first"
-    screen.table("bands", frame, cells, title, unbroken=("band / µm", "over / µm"))
+    columns = ["first_um", "second_um", "total_K", "error_K ± standard_deviation_K"]
+    columns += ["misregistration_K", "noise_K", "emissivity_uncertainty_K"]
+    title = f"{place}: {truth:.0f} °C on average over {draws} draws; the smallest total first"
+    screen.table("bands", frame, columns, title, unbroken=("first_um", "second_um"))

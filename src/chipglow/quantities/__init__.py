@@ -1,7 +1,7 @@
 """Units and their text, values as tables print them, and fields declared once."""
 
 from chipglow.quantities.field_tables import FieldEntry, field_entries, field_tables
-from chipglow.quantities.format import quantity_text, rounded_text
+from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
 from chipglow.quantities.part import (
     Declared,
     Family,
@@ -43,4 +43,5 @@ __all__ = [
     "of_other_packages",
     "quantity_text",
     "rounded_text",
+    "uncertain_text",
 ]
