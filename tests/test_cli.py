@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from chipglow.camera import Camera, Measurement
 from chipglow.cli import app
 from chipglow.cutting import CuttingSimulation, SolverError
-from chipglow.io import open_scene, read_measurement, write_scene
+from chipglow.io import atomic_folder, open_scene, read_measurement, write_scene
 from chipglow.laboratory.emissivity import (
     Heating,
     RegionEmissivities,
@@ -177,11 +177,10 @@ def test_run_writes_a_report_and_prints_the_comparison(folder, runs):
 def earlier_results(folder, runs):
     """Results of an earlier run, of which the cache holds the scene."""
     cut(load_study("study.yaml"))
-    results = folder / "results"
-    results.mkdir()
-    for name in ("summary.json", "report.html", "old.txt"):
-        (results / name).write_text("earlier")
-    return results
+    with atomic_folder("results") as results:
+        for name in ("summary.json", "report.html", "old.txt"):
+            (results / name).write_text("earlier")
+    return folder / "results"
 
 
 def test_a_second_run_finds_the_scene_and_replaces_the_results(earlier_results, runs, monkeypatch):
@@ -194,22 +193,22 @@ def test_a_second_run_finds_the_scene_and_replaces_the_results(earlier_results, 
     assert result.exit_code == 0, result.output
     assert "cache" in result.output
     assert len(runs) == 1
-    assert [path.name for path in earlier_results.iterdir()] == ["summary.json"]
+    assert {path.name for path in earlier_results.iterdir()} == {".chipglow-files", "summary.json"}
     assert load_study(earlier_results / "summary.json") == load_study("study.yaml")
 
 
 def test_reproduce_runs_the_papers_study(folder, monkeypatch):
     seen = []
 
-    def note(study, out, resume, agreed, remarks=(), steady_tool=False):
-        seen.append((study, str(out), resume, agreed, list(remarks), steady_tool))
+    def note(study, out, force, resume, agreed, remarks=(), steady_tool=False):
+        seen.append((study, str(out), force, resume, agreed, list(remarks), steady_tool))
 
     monkeypatch.setattr("chipglow.cli.results.write_results", note)
     assert chipglow("reproduce", "--steady-tool").exit_code == 0
     assert chipglow("reproduce", "--quick", "--out", "quick", "--resume", "--yes").exit_code == 0
     assert seen == [
-        (Study(), "chipglow-paper", False, False, [], True),
-        (Study.quick(), "quick", True, True, [QUICK], False),
+        (Study(), "chipglow-paper", False, False, False, [], True),
+        (Study.quick(), "quick", False, True, True, [QUICK], False),
     ]
 
 
@@ -439,7 +438,7 @@ def test_a_disk_that_fills_up_during_the_report_keeps_the_earlier_results(folder
         result = chipglow("run", "study.yaml", "--out", "results")
     assert_refused(result, "chipglow: results: File too large")
     assert (earlier_results / "report.html").read_text() == "earlier"
-    assert len(list(earlier_results.iterdir())) == 3
+    assert len(list(earlier_results.iterdir())) == 4
     assert sorted(path.name for path in folder.iterdir()) == ["results", "study.yaml"]
 
 

@@ -396,7 +396,7 @@ def test_the_command_writes_what_it_says(folder):
         ((*FILES, "--reference", "1 s"), "--reference: 1 s, expected 0 us to 20 us"),
         ((*FILES, "--plot", "a.txt"), "a.txt, expected a file that ends in .png"),
         (("measured.nc", "curve.csv"), "curve.csv: curve: unit: is missing"),
-        ((*FILES, *USUAL, "--out", "."), "holds something that is not a result"),
+        ((*FILES, *USUAL, "--out", "."), "which chipglow did not write"),
     ],
 )
 def test_what_the_command_cannot_do_is_one_line(folder, options, message):

@@ -52,6 +52,15 @@ def test_the_blocks_of_a_page_run(page, reader):
         reader.follow(block)
 
 
+def test_the_readme_shows_what_is_printed(quick_study, tmp_path, capsys):
+    """Its Python line by line; of `reproduce --quick` the rows, whose numbers depend on the CPU."""
+    _install, table, python, printed, *_ = blocks(ROOT / "README.md")
+    Reader(tmp_path).follow(python)
+    assert capsys.readouterr().out == printed.text
+    for row in table.text.splitlines():
+        assert row.strip().split("  ")[0] in quick_study.printed
+
+
 def test_few_blocks_are_not_run_and_each_says_why():
     left = [block for page in PAGES for block in blocks(page) if block.note == "not run"]
     assert all(len(block.about.split()) > 1 for block in left)

@@ -14,6 +14,7 @@ import scipy.io
 import xarray as xr
 from hypothesis import given, settings, strategies as st
 from PIL import Image
+from pointing import POINTING, point_elsewhere
 from refusals import PNG, refused_on
 
 from chipglow.io.sources import Placement, Units
@@ -548,13 +549,13 @@ def test_hdf5_that_claims_too_much(tmp_path, shape, chunks):
     refused(a_source(str(tmp_path / "T.h5")), "T.h5: T", "expected")
 
 
-def test_hdf5_that_points_to_other_files(tmp_path):
-    (tmp_path / "secret").write_bytes(bytes(4096))
+@pytest.mark.parametrize("kind", POINTING)
+def test_hdf5_that_points_to_other_files(tmp_path, kind):
     with h5py.File(tmp_path / "T.h5", "w") as file:
-        external = [(str(tmp_path / "secret"), 0, 4 * ROWS * COLUMNS)]
-        file.create_dataset("T", (1, ROWS, COLUMNS), "f4", external=external)
-        file["link"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "T")
-    refused(a_source(str(tmp_path / "T.h5")), "no array of numbers")
+        file["U"] = np.ones((1, ROWS, COLUMNS), np.float32)
+        file["T"] = np.ones((1, ROWS, COLUMNS), np.float32)
+    point_elsewhere(tmp_path / "T.h5", "T", kind)
+    refused(a_source(str(tmp_path / "T.h5")), "T.h5: 'T' is in another file, expected all data")
 
 
 def test_csv_with_a_very_long_line(tmp_path):

@@ -408,37 +408,6 @@ def test_atomic_path_leaves_nothing_after_an_error(tmp_path):
         pass
 
 
-def test_atomic_folder_replaces_results_at_the_end(tmp_path):
-    folder = tmp_path / "results"
-    for text in ("first", "second"):
-        with atomic_folder(folder) as temporary:
-            (temporary / "summary.json").write_text(text)
-            (temporary / f"{text}.txt").write_text(text)
-    assert leftovers(folder) == ["second.txt", "summary.json"]
-    assert leftovers(tmp_path) == ["results"]
-    with pytest.raises(KeyboardInterrupt), atomic_folder(folder) as temporary:
-        (temporary / "summary.json").write_text("third")
-        raise KeyboardInterrupt
-    assert (folder / "summary.json").read_text() == "second"
-    assert leftovers(tmp_path) == ["results"]
-
-
-def test_atomic_folder_replaces_nothing_else(tmp_path):
-    precious = tmp_path / "home"
-    precious.mkdir()
-    with atomic_folder(precious) as temporary:  # an empty folder may be replaced
-        (temporary / "letter.txt").write_text("dear")
-    with pytest.raises(FileExistsError, match="not a result of chipglow"), atomic_folder(precious):
-        pass
-    with (
-        pytest.raises(FileExistsError, match="not a result of chipglow"),
-        atomic_folder(precious / "letter.txt"),
-    ):
-        pass
-    assert (precious / "letter.txt").read_text() == "dear"
-    assert leftovers(tmp_path) == ["home"]
-
-
 def a_measurement():
     generator = np.random.default_rng(7)
     raster = Raster(0.0, 5e-4, 6e-6, 4, 5)

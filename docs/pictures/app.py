@@ -48,6 +48,7 @@ def take(browser, url, size, theme, file):
     page.goto(f"{url}&netd=0.5+K")
     page.locator("#status", has_text="Exact picture").wait_for()
     page.get_by_role("table", name="Parts of the error").wait_for()
+    page.locator(".numbers.old").wait_for(state="detached")
     page.wait_for_timeout(1000)
     page.screenshot(path=file)
     page.close()

@@ -13,7 +13,7 @@ from chipglow.analysis.error_images import (
 )
 from chipglow.analysis.error_parts import ErrorParts, error_parts
 from chipglow.analysis.local_error import LocalError
-from chipglow.analysis.places import LinePlace, Place, PointPlace, RegionPlace
+from chipglow.analysis.old_places import LinePlace, Place, PointPlace, RegionPlace
 from chipglow.analysis.rake_error import RakeErrors, rake_errors
 from chipglow.analysis.ratio_error import RATIO_CAUSES, RatioErrors, ratio_errors
 from chipglow.analysis.reductions import (

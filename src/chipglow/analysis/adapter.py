@@ -24,6 +24,8 @@ EFFECTS = ["all", "without psf"]
 
 def analysis_of(result):
     """Either result as an `Analysis`."""
+    if isinstance(result, Analysis):
+        return result
     return _of_cut(result) if isinstance(result, StudyResult) else _of_scene(result)
 
 

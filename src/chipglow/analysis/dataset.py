@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from chipglow.analysis.looks import Looked, Schedule
 from chipglow.analysis.result import CuttingForces
 from chipglow.camera import Measurement
 from chipglow.laboratory.chip import ChipMetrics, Instant
@@ -144,3 +145,62 @@ def assembled(variables: Variables, attributes: Mapping[str, Any]) -> xr.Dataset
     """The Dataset of all variables."""
     data = xr.Dataset(variables, attrs=dict(attributes))
     return data.set_coords([name for name in _COORDINATES if name in data])
+
+
+def drawn_variables(
+    looked: Looked, schedule: Schedule, names: Mapping[tuple[str, str], str], cause: str
+) -> Variables:
+    """Readings and lines over all draws.
+
+    `names` are those of readings by place and quantity, and `cause` says what an exposure is.
+    """
+    views = schedule.views
+    several = not names and len(views) > 1
+
+    def named(view: int, text: str) -> str:
+        return f"{text} ({views[view].surface})" if several else text
+
+    rows, lines = list(looked.readings.rows), list(looked.lines.rows)
+    readings, along, places = (
+        table.stacked() for table in (looked.readings, looked.lines, looked.line_places)
+    )
+    over = ("exposure", "texture", "pixel_phase")
+    kelvin, metre = {"units": "K"}, {"units": "m"}
+    starts = schedule.starts[list(schedule.drawn)]
+    variables: Variables = {
+        "effects": ("effects", list(schedule.effects)),
+        "exposure": ("exposure", starts, {"units": "s", "title": cause}),
+        "texture": ("texture", np.arange(readings.shape[2])),
+        "pixel_phase": ("pixel_phase", np.arange(readings.shape[3])),
+        "reading": (
+            "reading",
+            [names.get((p, q), named(v, f"{p}, {q}")) for v, p, q in rows],
+        ),
+        "place": ("reading", [place for _, place, _ in rows]),
+        "quantity": ("reading", [quantity for _, _, quantity in rows]),
+        "seen_surface": ("reading", [views[view].surface for view, _, _ in rows]),
+        "textures": ("reading", [views[view].textures for view, _, _ in rows]),
+        "reference": (("reading", *over), readings[..., 0], kelvin),
+        "measured": (("reading", *over, "effects"), readings[..., 1:], kelvin),
+    }
+    if lines:
+        variables |= {
+            "line": ("line", [named(view, line) for view, _, line in lines]),
+            "line_surface": ("line", [views[view].surface for view, _, _ in lines]),
+            "line_textures": ("line", [views[view].textures for view, _, _ in lines]),
+            **{
+                f"line_{name}": (("line", "exposure", "point"), places[:, :, i], metre)
+                for i, name in enumerate(("distance", "x", "y"))
+            },
+            "line_reference": (("line", *over, "point"), along[..., 0, :], kelvin),
+            "line_measured": (("line", *over, "effects", "point"), along[..., 1:, :], kelvin),
+            "line_scene": (("line", *over[:2], "point"), looked.line_scene.stacked(), kelvin),
+            "line_motion": (("line", *over[:2]), looked.line_motion.stacked()[..., 0], kelvin),
+        }
+    if schedule.vary:
+        varied = looked.varied.stacked()
+        varied = varied.reshape(len(rows), 2, -1, *varied.shape[2:])
+        dims = ("reading", "psf_order", "psf_width", "exposure", "pixel_phase")
+        variables["varied_reference"] = dims, varied[..., 0], kelvin
+        variables["varied_measured"] = (*dims, "effects"), varied[..., 1:], kelvin
+    return variables

@@ -130,8 +130,8 @@ class Unblurred:
             Radiance of its pixels, as `Camera.form_image` gives it.
         """
         lower_limit = self.camera.lower_limit
-        measured, unusable = self._read(radiance)
-        ideal, _ = self._read(self.ideal)
+        measured, unusable = read_temperature(self.camera, radiance, self.start)
+        ideal, _ = read_temperature(self.camera, self.ideal, self.start)
         return ErrorImages(
             raster=self.raster,
             reference=self.reference,
@@ -140,13 +140,14 @@ class Unblurred:
             flagged=~(measured >= (lower_limit or 0.0)) | unusable,
         )
 
-    def _read(
-        self, radiance: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_] | bool]:
-        """Temperatures that the camera reads, and which of them its detector marks as unusable."""
-        read, flags = self.camera.read(radiance[None], np.array([self.start]))
-        kelvins = np.asarray(self.camera.band.temperature(read[0]), dtype=np.float64)
-        return kelvins, False if flags is None else flags[0] & UNUSABLE != 0
+
+def read_temperature(
+    camera: Camera, radiance: NDArray[np.float64], start: float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_] | bool]:
+    """Temperatures that a camera reads of an image, and which its detector marks as unusable."""
+    read, flags = camera.read(radiance[None], np.array([start]))
+    kelvins = np.asarray(camera.band.temperature(read[0]), dtype=np.float64)
+    return kelvins, False if flags is None else flags[0] & UNUSABLE != 0
 
 
 def reference_temperature(

@@ -1,69 +1,48 @@
-"""Where the error is read: points, lines, regions, the rake face, the hottest pixel."""
+"""Where the error is read: points, lines, regions, the hottest pixel, rake face and shear band.
+
+A place reads a stack of images of one exposure, shape (row, y, x): the reference, then what is
+measured, with all effects first. Each reading is a vector of as many rows.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import nan
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis.error_images import ErrorImages
-from chipglow.analysis.rake_error import rake_errors
 from chipglow.laboratory.chip import ShearBand
-from chipglow.scene import Line, Raster, Region, Tool, sample
+from chipglow.scene import Line, Raster, Region, Tool, straight_line
 from chipglow.scene.lines import nearest
 from chipglow.scene.regions import Point
 
-
-@dataclass(frozen=True)
-class Reading:
-    """What is read from error images at a place, in K of radiance temperature.
-
-    Parameters
-    ----------
-    reference : float
-        What a camera without error would say.
-    error : float
-        With everything: the paper's case 1.
-    psf_portion : float
-        The part of it that the point spread function makes.
-    """
-
-    reference: float
-    error: float
-    psf_portion: float
+Stack = NDArray[np.float64]
+NEAR: Final = 2.0
+"""Distance in pixels within which an extremum of an image belongs to a place."""
 
 
 @dataclass(frozen=True)
 class Place(ABC):
-    """Somewhere in the images, with a name.
-
-    Parameters
-    ----------
-    name : str
-        What the user calls it.
-
-    Raises
-    ------
-    ValueError
-        If the name is empty.
-    """
+    """Somewhere in the images, with a name."""
 
     name: str
+    motion_samples: ClassVar[float] = 0.0
+    """Where motion is read on its lines: distance in samples of the scene."""
 
     def __post_init__(self) -> None:
         if not self.name.strip():
             raise ValueError("place: the name is empty, expected one such as melt pool")
 
-    @abstractmethod
-    def read(self, errors: ErrorImages) -> Mapping[str, Reading]:
-        """Readings by what they are; a number is NaN where the images show nothing.
+    def lines(self, pitch: float) -> Mapping[str, Line]:
+        """Lines along which the images are sampled, by name; `pitch` is that of the pixels in m."""
+        return {}
 
-        Parameters
-        ----------
-        errors : ErrorImages
-            Of one exposure.
+    @abstractmethod
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
+        """Readings by what they are; NaN where the images show nothing.
+
+        `lines` holds the images along `lines`, shape (row, point) each.
         """
 
     def outline(self) -> NDArray[np.float64] | None:
@@ -71,18 +50,7 @@ class Place(ABC):
         return None
 
     def check_within(self, raster: Raster) -> None:
-        """Refuse what the images do not hold.
-
-        Parameters
-        ----------
-        raster : Raster
-            The pixels.
-
-        Raises
-        ------
-        ValueError
-            If a part of the place is outside.
-        """
+        """Raise a ValueError if a part of the place is outside the pixels."""
         outline = self.outline()
         if outline is None:
             return
@@ -98,21 +66,13 @@ class Place(ABC):
 
 @dataclass(frozen=True)
 class PointPlace(Place):
-    """The pixel that holds a point.
-
-    Parameters
-    ----------
-    point : tuple
-        x and y in m.
-    """
+    """The pixel that holds a point, x and y in m."""
 
     point: Point
 
-    def read(self, errors: ErrorImages) -> Mapping[str, Reading]:
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
         """See `Place.read`."""
-        images = (errors.reference, errors.case_1, errors.psf_portion)
-        found = (float(nearest(image, errors.raster, self.point)) for image in images)
-        return {"pixel": Reading(*found)}
+        return {"pixel": np.array([float(nearest(one, pixels, self.point)) for one in images])}
 
     def outline(self) -> NDArray[np.float64]:
         """See `Place.outline`."""
@@ -121,18 +81,7 @@ class PointPlace(Place):
 
 @dataclass(frozen=True)
 class LinePlace(Place):
-    """A polyline, read every half pixel.
-
-    Parameters
-    ----------
-    corners : tuple of tuple
-        x and y in m, two or more.
-
-    Raises
-    ------
-    ValueError
-        If there are under two corners, or two that follow are the same.
-    """
+    """A polyline through two or more corners, x and y in m, read every half pixel."""
 
     corners: tuple[Point, ...]
 
@@ -144,28 +93,20 @@ class LinePlace(Place):
             raise ValueError(f"{self.name}: two corners are the same, expected a line")
 
     def line(self, pitch: float) -> Line:
-        """Points along it, the distance in m from its first corner.
-
-        Parameters
-        ----------
-        pitch : float
-            Distance between pixels in m.
-        """
+        """Points along it, the distance in m from its first corner."""
         corners = np.array(self.corners)
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
         distance = np.linspace(0.0, along[-1], max(round(2 * along[-1] / pitch), 1) + 1)
         points = [np.interp(distance, along, coordinate) for coordinate in corners.T]
         return Line(distance, np.stack(points, axis=1))
 
-    def profile(self, errors: ErrorImages) -> NDArray[np.float64]:
-        """Reference, error and the PSF's portion along it in K, shape (3, n); NaN off the image."""
-        points = self.line(errors.raster.spacing).points
-        images = (errors.reference, errors.case_1, errors.psf_portion)
-        return np.array([sample(image, errors.raster, points) for image in images])
+    def lines(self, pitch: float) -> Mapping[str, Line]:
+        """See `Place.lines`."""
+        return {self.name: self.line(pitch)}
 
-    def read(self, errors: ErrorImages) -> Mapping[str, Reading]:
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
         """See `Place.read`."""
-        return _mean_and_worst(self.profile(errors))
+        return _mean_and_extremes(lines[self.name])
 
     def outline(self) -> NDArray[np.float64]:
         """See `Place.outline`."""
@@ -174,18 +115,7 @@ class LinePlace(Place):
 
 @dataclass(frozen=True)
 class RegionPlace(Place):
-    """The pixels whose middle is in a region.
-
-    Parameters
-    ----------
-    region : Region
-        In m.
-
-    Raises
-    ------
-    ValueError
-        If the region is in pixels: which are they, on a scene?
-    """
+    """The pixels whose middle is in a region, which is in m."""
 
     region: Region
 
@@ -194,12 +124,10 @@ class RegionPlace(Place):
         if self.region.unit != "m":
             raise ValueError(f"{self.name}: is in pixels, expected lengths such as 120 um")
 
-    def read(self, errors: ErrorImages) -> Mapping[str, Reading]:
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
         """See `Place.read`."""
-        x, y = np.meshgrid(errors.raster.x, errors.raster.y)
-        inside = self.region.shape.holds(x, y)
-        images = (errors.reference, errors.case_1, errors.psf_portion)
-        return _mean_and_worst(np.array([image[inside] for image in images]))
+        inside = self.region.shape.holds(*np.meshgrid(pixels.x, pixels.y))
+        return _mean_and_extremes(images[:, inside])
 
     def outline(self) -> NDArray[np.float64]:
         """See `Place.outline`."""
@@ -209,55 +137,58 @@ class RegionPlace(Place):
 
 @dataclass(frozen=True)
 class HottestPlace(Place):
-    """The greatest temperature of the image, wherever it is: the error of a peak temperature."""
+    """The greatest temperature of each image, wherever it is: the error of a peak temperature."""
 
     name: str = "hottest pixel"
 
-    def read(self, errors: ErrorImages) -> Mapping[str, Reading]:
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
         """See `Place.read`."""
-        without_psf = errors.reference + errors.case_2
-        reference, measured, ideal = (
-            float(np.nanmax(image)) if np.isfinite(image).any() else nan
-            for image in (errors.reference, errors.measured, without_psf)
-        )
-        return {"peak": Reading(reference, measured - reference, measured - ideal)}
+        greatest = np.where(np.isnan(images), -np.inf, images).max(axis=(1, 2))
+        return {"peak": np.where(np.isfinite(greatest), greatest, np.nan)}
 
 
 @dataclass(frozen=True)
 class RakePlace(Place):
-    """The rake face, as far as the chip touches it.
+    """The rake face as far as the chip touches it, read across at mid-contact and along it.
 
     Parameters
     ----------
     tool : Tool
         The tool.
     contact_length : float
-        How far the chip touches it, in m.
+        Length of the contact in m, over 0.
     half_length, step : float
-        Reach to either side of the line across it, and distance between its points, in m.
+        Reach to either side of the line across it, and distance between points, in m.
     """
 
     tool: Tool
     contact_length: float
     half_length: float
     step: float
+    motion_samples: ClassVar[float] = 1.5  # from there on a sample shows the chip alone
 
-    def read(self, errors: ErrorImages) -> Mapping[str, Reading]:
-        """See `Place.read`."""
-        found = rake_errors(errors, self.contact_length, self.tool, self.half_length, self.step)
-        reference = sample(errors.reference, errors.raster, found.contact.points)
-        middle = float(
-            sample(errors.reference, errors.raster, found.line.points)[
-                int(np.argmin(np.abs(found.line.distance)))
-            ]
-        )
+    def lines(self, pitch: float) -> Mapping[str, Line]:
+        """The line across counts from the face into the chip, that along it from the edge."""
+        length = self.contact_length
+        along = np.linspace(0.0, length, max(round(length / self.step) + 1, 2))
+        distance = _to_both_sides(self.half_length, self.step)
+        middle = self.tool.rake_point(length / 2)
         return {
-            "mid-contact": Reading(middle, found.face.error, found.face.psf_portion),
-            "mean along the contact": Reading(
-                float(np.nanmean(reference)),
-                found.along_contact.error,
-                found.along_contact.psf_portion,
-            ),
+            "rake": straight_line(middle, self.tool.rake_normal, distance),
+            "contact": Line(along, self.tool.rake_point(along)),
+        }
+
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
+        """See `Place.read`."""
+        across, contact = lines["rake"], lines["contact"]
+        distance = _to_both_sides(self.half_length, self.step)
+        reference = np.nanmean(contact[0])
+        errors = np.nanmean(contact[1:] - contact[0], axis=1)
+        lowest = _lowest_near(distance, across[1] - across[0], pixels.spacing)
+        return {
+            "mid-contact": across[:, np.argmin(np.abs(distance))],
+            "most negative within two pixels": across[:, lowest],
+            "mean along the contact": np.array([reference, *(reference + errors)]),
         }
 
     def outline(self) -> NDArray[np.float64]:
@@ -274,31 +205,55 @@ class BandPlace(Place):
     band : ShearBand
         The band.
     half_length, step : float
-        Reach to either side of the line across it, and distance between its points, in m.
+        Reach to either side of the ridge of the strain rate, and distance between points, in m.
     """
 
     band: ShearBand
     half_length: float
     step: float
 
-    def read(self, errors: ErrorImages) -> Mapping[str, Reading]:
+    def lines(self, pitch: float) -> Mapping[str, Line]:
+        """The distance is 0 on the ridge, negative on the workpiece's side."""
+        return {"band": self.band.across(self.half_length, self.step)}
+
+    def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
         """See `Place.read`."""
-        raise NotImplementedError
+        across = lines["band"]
+        distance = self.band.across(self.half_length, self.step).distance
+        hottest = _lowest_near(distance, -across[1], pixels.spacing)
+        return {
+            "ridge of strain rate": across[:, np.argmin(np.abs(distance))],
+            # A camera shows no strain rate: the centre for somebody who has the image alone.
+            "ridge of measured temperature": across[:, hottest],
+            "most negative beside it": across[:, np.nanargmin(across[1] - across[0])],
+        }
 
     def outline(self) -> NDArray[np.float64]:
         """See `Place.outline`."""
         return self.band.ridge.points
 
 
-def _mean_and_worst(values: NDArray[np.float64]) -> dict[str, Reading]:
-    """Mean, and where the error is most negative and greatest, of three rows of numbers."""
+def _to_both_sides(half_length: float, step: float) -> NDArray[np.float64]:
+    count = round(half_length / step)
+    return step * np.arange(-count, count + 1, dtype=np.float64)
+
+
+def _lowest_near(distance: NDArray[np.float64], values: Stack, pitch: float) -> int:
+    """Number of the lowest value within `NEAR` pixels of where the distance is 0."""
+    near = np.abs(distance) <= NEAR * pitch
+    return int(np.argmin(np.where(near & np.isfinite(values), values, np.inf)))
+
+
+def _mean_and_extremes(values: Stack) -> dict[str, Stack]:
+    """Mean, and where the error is most negative and greatest, shape (row, n) of pixels."""
     known = values[:, np.isfinite(values).all(axis=0)]
     if known.shape[1] == 0:
-        return {"mean": Reading(nan, nan, nan)}
+        return {"mean": np.full(len(values), np.nan)}
+    errors = known[1] - known[0]
     return {
-        "mean": Reading(*map(float, known.mean(axis=1))),
-        "most negative": Reading(*map(float, known[:, known[1].argmin()])),
-        "greatest": Reading(*map(float, known[:, known[1].argmax()])),
+        "mean": known.mean(axis=1),
+        "most negative": known[:, errors.argmin()],
+        "greatest": known[:, errors.argmax()],
     }
 
 

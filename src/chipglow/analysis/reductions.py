@@ -10,9 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chipglow.analysis.distribution import Distribution, ratio
+from chipglow.analysis.looks import ALL, WITHOUT_PSF
 
-ALL = "all"
-WITHOUT_PSF = "without psf"
 _DRAWS = ("exposure", "texture", "pixel_phase")
 
 
@@ -52,8 +51,7 @@ class OneDraw:
 
 def error(data: xr.Dataset) -> xr.DataArray:
     """Error of every reading with all effects (the paper's case 1) in every draw."""
-    measured: xr.DataArray = data.measured.sel(effects=ALL, drop=True)
-    return measured - data.reference
+    return data["measured"].sel(effects=ALL, drop=True) - data["reference"]
 
 
 def psf_portion(data: xr.Dataset) -> xr.DataArray:
@@ -96,8 +94,7 @@ def one_draw(data: xr.Dataset, reading: str) -> OneDraw:
 def line_error(data: xr.Dataset, line: str) -> xr.DataArray:
     """Error along a line over exposure, texture, pixel phase and point."""
     one = _line(data, line)
-    measured: xr.DataArray = one.line_measured.sel(effects=ALL, drop=True)
-    return measured - one.line_reference
+    return one["line_measured"].sel(effects=ALL, drop=True) - one["line_reference"]
 
 
 def line_psf_portion(data: xr.Dataset, line: str) -> xr.DataArray:
@@ -122,9 +119,8 @@ def line_steepest(data: xr.Dataset, line: str, length: float) -> float:
 
 def image_error(data: xr.Dataset, effects: str = ALL) -> xr.DataArray:
     """Error of every pixel in the shown exposure."""
-    reference = data.reference_temperature.isel(instant=data.attrs["shown_instant"], drop=True)
-    measured: xr.DataArray = data.image_measured.sel(effects=effects, drop=True)
-    return measured - reference
+    reference = data["reference_temperature"].isel(instant=data.attrs["shown_instant"], drop=True)
+    return data["image_measured"].sel(effects=effects, drop=True) - reference
 
 
 def image_psf_portion(data: xr.Dataset) -> xr.DataArray:
@@ -212,8 +208,7 @@ def _scene_lines(
 
 def _varied_error(data: xr.Dataset, order: str, reading: str) -> xr.DataArray:
     one = data[["varied_reference", "varied_measured"]].sel(psf_order=order, reading=reading)
-    measured: xr.DataArray = one.varied_measured.sel(effects=ALL, drop=True)
-    return measured - one.varied_reference
+    return one["varied_measured"].sel(effects=ALL, drop=True) - one["varied_reference"]
 
 
 def _by_width(values: xr.DataArray) -> NDArray[np.float64]:

@@ -21,8 +21,8 @@ from chipglow.laboratory.emissivity import HeatedObject
 from chipglow.scene import Frame, Raster, Tool
 
 if TYPE_CHECKING:
-    from chipglow.analysis.cut_error import Plan
     from chipglow.analysis.places import Place
+    from chipglow.analysis.plan import Plan
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from chipglow.analysis.error_images import (
     error_images,
     reference_temperature,
 )
-from chipglow.analysis.places import HottestPlace, LinePlace, Place, RakePlace, Reading
+from chipglow.analysis.old_places import HottestPlace, LinePlace, Place, RakePlace, Reading
 from chipglow.analysis.starts import spread_starts
 from chipglow.camera import Camera, Exposure, Measurement
 from chipglow.laboratory.chip import contact_length

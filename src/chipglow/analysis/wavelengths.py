@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chipglow.analysis.cut_error import Plan, find_segments
 from chipglow.analysis.draws import pixel_phases
-from chipglow.analysis.places import PointPlace
+from chipglow.analysis.old_places import PointPlace
 from chipglow.analysis.ratio_error import ideal_image, true_temperature
 from chipglow.analysis.scene_error import ScenePlan
 from chipglow.analysis.starts import spread_starts

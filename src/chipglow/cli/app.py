@@ -14,7 +14,7 @@ from chipglow.cli.calibrate import calibrate
 from chipglow.cli.compare import compare
 from chipglow.cli.convert import convert
 from chipglow.cli.emissivity import emissivity
-from chipglow.cli.options import file_option, picture_option
+from chipglow.cli.options import Force, file_option, folder_option, picture_option
 from chipglow.cli.psf import psf
 from chipglow.cli.rake import rake
 from chipglow.cli.register import register
@@ -38,7 +38,7 @@ app.add_typer(cache_app, name="cache")
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="The study, a YAML file.")]
 ResultFolder = Annotated[
-    Path, typer.Option(metavar="DIR", help="Folder of the results; earlier results are replaced.")
+    Path, folder_option("Folder of the results; earlier results are replaced.")
 ]
 Yes = Annotated[
     bool, typer.Option("--yes", help="Do not ask before a cut of many minutes or gigabytes.")
@@ -57,8 +57,11 @@ def main() -> None:
         if isinstance(stream, TextIOWrapper):
             # A terminal that knows no µ or − shall show a question mark, not end the command.
             stream.reconfigure(errors="replace")
-    # A job that is ended from outside tidies up as after Ctrl-C.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # A job that is ended from outside tidies up as after Ctrl-C, unless nohup keeps it running.
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, signal.SIGTERM)
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler)
     app()
 
 
@@ -107,6 +110,7 @@ def reproduce(
         ),
     ] = False,
     out: ResultFolder = PAPER_FOLDER,
+    force: Force = False,
     resume: Resume = False,
     yes: Yes = False,
 ) -> None:
@@ -116,16 +120,16 @@ def reproduce(
     from chipglow.study import Study
 
     if quick:
-        write_results(Study.quick(), out, resume, yes, [QUICK], steady_tool)
+        write_results(Study.quick(), out, force, resume, yes, [QUICK], steady_tool)
     else:
-        write_results(Study(), out, resume, yes, steady_tool=steady_tool)
+        write_results(Study(), out, force, resume, yes, steady_tool=steady_tool)
 
 
 @app.command()
 def init(
-    path: Annotated[Path, typer.Argument(metavar="STUDY", help="The file to write.")] = Path(
-        "study.yaml"
-    ),
+    path: Annotated[
+        Path, typer.Argument(metavar="STUDY", help="The file to write.", writable=True)
+    ] = Path("study.yaml"),
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
     of_import: Annotated[
         bool, typer.Option("--import", help="Write the description of an import instead.")
@@ -163,12 +167,18 @@ def init(
 
 
 @app.command()
-def run(study: StudyFile, out: ResultFolder, resume: Resume = False, yes: Yes = False) -> None:
+def run(
+    study: StudyFile,
+    out: ResultFolder,
+    force: Force = False,
+    resume: Resume = False,
+    yes: Yes = False,
+) -> None:
     """Run a study: cut, look, analyse, report."""
     from chipglow.cli.results import write_results
     from chipglow.study import load_study
 
-    write_results(load_study(study), out, resume, yes)
+    write_results(load_study(study), out, force, resume, yes)
 
 
 @app.command()
@@ -186,12 +196,13 @@ def error(
         typer.Option(metavar="NUMBER", help="One emissivity, in the place of the study's surface."),
     ] = None,
     out: ResultFolder = ERROR_FOLDER,
+    force: Force = False,
 ) -> None:
     """Give a camera's error on any scene: of a cut, a weld, a melt pool, a plate."""
     from chipglow.cli.results import write_errors
     from chipglow.cli.scene_error import study_of
 
-    write_errors(study_of(scene, study, emissivity), out)
+    write_errors(study_of(scene, study, emissivity), out, force)
 
 
 @app.command()
@@ -202,6 +213,7 @@ def cut(
         Path | None,
         typer.Option(
             metavar="FILE",
+            writable=True,
             help="A movie to write, .mp4 or .gif: temperature, plastic strain and strain rate of "
             "the whole cut; with --resume, of what is still to come; of a cut that was computed "
             "before, the part that was recorded.",

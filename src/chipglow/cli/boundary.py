@@ -1,12 +1,14 @@
 """Where errors become one line and an exit code."""
 
 import sys
+from collections.abc import Callable
 from typing import Any, Final
 
 import typer
 from typer.core import TyperGroup
 
 from chipglow.cli import screen
+from chipglow.cli.options import check_outputs
 
 BAD_INPUT: Final = 2
 FAILED: Final = 1
@@ -16,14 +18,16 @@ INTERRUPTED: Final = 130
 class Boundary(TyperGroup):
     """Commands that end in one line and an exit code if they fail, never in a traceback.
 
+    Every command has the program's option ``--json``, and what it writes is checked before it
+    begins.
+
     The code is 2 for what the user can put right (input, files, disk), 1 for a failed simulation
-    and 130 after Ctrl-C. Anything else is a defect of the program and keeps its traceback. Every
-    command has the program's option ``--json``.
+    and 130 after Ctrl-C. Anything else is a defect of the program and keeps its traceback.
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        _share(next(option for option in self.params if option.name == "json"), self)
+        _complete(self, next(option for option in self.params if option.name == "json"))
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the arguments; options may choose what the screen shows."""
@@ -63,10 +67,19 @@ def _one_line(error: Exception) -> str:
     return " ".join(text.split())
 
 
-def _share(option: Any, group: TyperGroup) -> None:
-    """Add an option of the whole program to every command of a group."""
+def _complete(group: TyperGroup, option: Any) -> None:
+    """Add the program's option and the check of its outputs to every command of a group."""
     for command in group.commands.values():
         if isinstance(command, TyperGroup):
-            _share(option, command)
+            _complete(command, option)
         else:
+            command.callback = _checked(command.callback)
             command.params.append(option)
+
+
+def _checked(run: Any) -> Callable[..., Any]:
+    def checked(**values: Any) -> Any:
+        check_outputs(run, values)
+        return run(**values)
+
+    return checked

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chipglow.cli.options import Settings, ToolChoice, picture_option
+from chipglow.cli.options import Force, Settings, ToolChoice, folder_option, picture_option
 
 if TYPE_CHECKING:
     from chipglow.cli.screen import Screen
@@ -65,11 +65,11 @@ def compare(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Folder of the results: comparison.csv, summary.json, comparison.png and .svg.",
+        folder_option(
+            "Folder of the results: comparison.csv, summary.json, comparison.png and .svg."
         ),
     ] = None,
+    force: Force = False,
     plot: Annotated[Path | None, picture_option("Draw the comparison")] = None,
     settings: Settings = None,
 ) -> None:
@@ -105,7 +105,7 @@ def compare(
     screen.say(result.statement)
     finish(
         whole.notes + chosen.notes + result.notes,
-        (out, partial(_write, result)),
+        (out, partial(_write, result, force)),
         (plot, figure(draw_comparison, result)),
     )
 
@@ -136,12 +136,12 @@ def _print(screen: "Screen", result: "Comparison") -> None:
     screen.table("fits", frame, columns, title)
 
 
-def _write(result: "Comparison", out: Path) -> None:
+def _write(result: "Comparison", force: bool, out: Path) -> None:
     from chipglow.drawing import drawing
     from chipglow.io import atomic_folder
     from chipglow.laboratory.comparison import write_comparison
     from chipglow.laboratory.comparison.figure import draw_comparison
 
-    with atomic_folder(out) as folder:
+    with atomic_folder(out, force) as folder:
         write_comparison(result, folder)
         drawing.save(draw_comparison(result), folder, "comparison")

@@ -1,11 +1,13 @@
 """Arguments and options that several commands have.
 
-Files to write are checked before a command does anything: their folder, and how they end.
+What a command writes is checked before it does anything: see `check_outputs`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from inspect import signature
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, TypeAlias, get_args
 
 import typer
 
@@ -52,33 +54,116 @@ def file_option(what: str, *endings: str) -> Any:
     def check(option: str, path: Path) -> None:
         if endings and path.suffix.lower() not in endings:
             raise ValueError(f"{option}: {path}, expected a file that ends in {endings[0]}")
-        _check_folder(path)
 
     return _output(what, check)
+
+
+def folder_option(what: str) -> Any:
+    """Option of a folder of results to write: what it is, for the help."""
+    return typer.Option(metavar="DIR", help=what, file_okay=False, writable=True)
+
+
+Force: TypeAlias = Annotated[
+    bool, typer.Option("--force", help="Keep files in the folder that chipglow did not write.")
+]
+
+
+def check_outputs(command: Callable[..., Any], values: Mapping[str, Any]) -> None:
+    """Check everything that a command writes before it does anything.
+
+    Parameters
+    ----------
+    command : callable
+        The command's function. Its options of writable paths are outputs, all others may be inputs.
+    values : mapping
+        Its arguments by name.
+
+    Raises
+    ------
+    OSError
+        As `check_output` and `check_output_folder`.
+    ValueError
+        If an output is also an input, or a folder of results holds an input that chipglow did not
+        write.
+    """
+    outputs = _outputs(command)
+    inputs = list(_inputs([value for name, value in values.items() if name not in outputs]))
+    for name, option in outputs.items():
+        if values[name] is None:
+            continue
+        if option.file_okay:
+            _check_file(Path(values[name]), inputs)
+        else:
+            _check_folder(Path(values[name]), inputs, values.get("force", False))
+
+
+def _outputs(command: Callable[..., Any]) -> dict[str, Any]:
+    parameters = signature(command).parameters
+    options = {name: (*get_args(one.annotation), None)[1] for name, one in parameters.items()}
+    return {name: one for name, one in options.items() if getattr(one, "writable", False)}
+
+
+def _inputs(value: Any) -> Iterator[Path]:
+    """Existing files that values of parameters name, and those that these name if they are YAML."""
+    from chipglow.text import read_yaml
+
+    for path in _existing(value, Path()):
+        yield path
+        if path.suffix.lower() in (".yaml", ".yml"):
+            with suppress(OSError, ValueError):  # the command refuses it
+                yield from _existing(read_yaml(path), path.parent)
+
+
+def _existing(value: Any, folder: Path) -> Iterator[Path]:
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list | tuple):
+        for one in value:
+            yield from _existing(one, folder)
+    elif isinstance(value, str | Path):
+        with suppress(OSError, ValueError):  # text that cannot be a name
+            if (folder / value).exists():
+                yield folder / value
+
+
+def _check_file(path: Path, inputs: Iterable[Path]) -> None:
+    from chipglow.io.atomic import check_output
+
+    target = check_output(path)
+    for other in inputs:
+        if target.exists() and target.samefile(other):
+            raise ValueError(f"{path}: is also an input ({other}), expected another file")
+
+
+def _check_folder(path: Path, inputs: Iterable[Path], force: bool) -> None:
+    from chipglow.io.atomic import check_output_folder, written_files
+
+    target = check_output_folder(path, force).resolve()
+    ours = {target / name for name in written_files(target)}
+    for other in inputs:
+        place = other.resolve()
+        if place.is_relative_to(target) and place not in ours:
+            raise ValueError(f"{path}: holds the input {other}, expected another folder")
 
 
 def _output(help_text: str, check: Callable[[str, Path], None]) -> Any:
     def checked(option: typer.CallbackParam, path: Path | None) -> Path | None:
         if path is not None:
+            from chipglow.io.atomic import check_output
+
             check(option.opts[0], path)
+            check_output(path)
         return path
 
-    return typer.Option(metavar="FILE", help=help_text, callback=checked)
+    return typer.Option(metavar="FILE", help=help_text, callback=checked, writable=True)
 
 
 def _check_picture(option: str, path: Path) -> None:
     if path.suffix.lower() not in (".png", ".pdf", ".svg"):
         raise ValueError(f"{option}: {path}, expected a file that ends in .png, .pdf or .svg")
-    _check_folder(path)
 
 
 def _check_table(_: str, path: Path) -> None:
     from chipglow.io import check_table_path
 
     check_table_path(path)
-
-
-def _check_folder(path: Path) -> None:
-    from chipglow.io.atomic import check_folder
-
-    check_folder(path)

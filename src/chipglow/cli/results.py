@@ -24,6 +24,7 @@ from chipglow.text import Notes
 def write_results(
     study: Study,
     folder: Path,
+    force: bool,
     resume: bool,
     agreed: bool,
     remarks: Sequence[str] = (),
@@ -36,8 +37,10 @@ def write_results(
     study : Study
         What to do.
     folder : Path
-        Folder of the results; appears when they are complete. One with other contents is refused
-        before anything is computed.
+        Folder of the results; appears when they are complete.
+    force : bool
+        Whether to keep files in the folder that chipglow did not write. By default such a folder
+        is refused before anything is computed.
     resume : bool
         Whether to go on with a cut that an earlier run left unfinished.
     agreed : bool
@@ -48,32 +51,33 @@ def write_results(
         Whether the same study with a tool that has been cutting for long stands beside it.
     """
     beside = study.with_steady_tool() if steady_tool else None
-    _write(study, folder, resume, agreed, remarks, run, beside)
+    _write(study, folder, force, resume, agreed, remarks, run, beside)
 
 
-def write_errors(study: Study, folder: Path) -> None:
+def write_errors(study: Study, folder: Path, force: bool) -> None:
     """Write and print the measurement error of a study's scene, whatever it shows.
 
     Parameters
     ----------
     study : Study
         What to do.
-    folder : Path
+    folder, force
         As for `write_results`.
     """
-    _write(study, folder, False, True, (), errors)
+    _write(study, folder, force, False, True, (), errors)
 
 
 def _write(
     study: Study,
     folder: Path,
+    force: bool,
     resume: bool,
     agreed: bool,
     remarks: Sequence[str],
     compute: Callable[..., StudyResult | SceneErrors],
     beside: Study | None = None,
 ) -> None:
-    with atomic_folder(folder) as temporary:
+    with atomic_folder(folder, force) as temporary:
         if study.scene is None:
             say_where_it_starts(study, resume, agreed)
         if beside is not None:

@@ -1,21 +1,28 @@
 """Output that is there whole or not at all."""
 
+import ctypes
 import errno
 import io
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 from typing import Any, Final
 
+from chipglow.io.interrupts import uninterrupted
 from chipglow.io.unfinished import hold
 
-RESULT_MARK: Final = "summary.json"
-"""The file by which a folder of results is known."""
+MANIFEST: Final = ".chipglow-files"
+"""File in a folder of results that lists the files that chipglow wrote there, one a line."""
 
+_OF_THE_SYSTEM: Final = {MANIFEST, ".DS_Store", "Thumbs.db", "desktop.ini"}
 _NO_ROOM: Final = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+_AT_FDCWD: Final = -100
+_RENAME_EXCHANGE: Final = 2
 
 
 @contextmanager
@@ -27,7 +34,7 @@ def atomic_path(
     Parameters
     ----------
     path : path-like
-        The file to write; one that is there is replaced.
+        The file to write; an existing file is replaced. Of a symbolic link its target is written.
     keep : callable, optional
         Told the temporary name if the block raises: whether to leave that file where it is.
 
@@ -39,16 +46,10 @@ def atomic_path(
 
     Raises
     ------
-    FileNotFoundError
-        If the folder does not exist.
-    IsADirectoryError
-        If `path` is a folder.
     OSError
-        If nothing can be written there; the message names `path`.
+        As `check_output`; or if nothing can be written there; the message names `path`.
     """
-    path = Path(path)
-    if path.is_dir():
-        raise IsADirectoryError(f"{path}: is a folder, expected the name of a file")
+    path = check_output(Path(path))
     temporary = _temporary_beside(path)
     try:
         with _errors_name(path, temporary):
@@ -60,13 +61,17 @@ def atomic_path(
 
 
 @contextmanager
-def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_folder(path: str | os.PathLike[str], force: bool = False) -> Iterator[Path]:
     """Fill a folder of results under a temporary name; move it into place at the end.
+
+    Temporary folders of the same results whose process was killed are removed first.
 
     Parameters
     ----------
     path : path-like
-        The folder to write. One that is there is replaced if it is empty or holds earlier results.
+        The folder to write. Files that chipglow wrote there earlier are replaced.
+    force : bool
+        Keep other files that the folder holds. By default such a folder is refused.
 
     Yields
     ------
@@ -75,24 +80,26 @@ def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     Raises
     ------
-    FileNotFoundError
-        If the folder in which it shall be does not exist.
-    FileExistsError
-        If `path` is there and is neither empty nor a folder of results.
     OSError
-        If nothing can be written there; the message names `path`.
+        As `check_output_folder`; or if nothing can be written there; the message names `path`.
     """
-    path = Path(path)
-    _check_replaceable(path)
+    path = check_output_folder(Path(path), force)
+    _remove_abandoned(path)
     temporary = _temporary_beside(path)
+    lock = None
     try:
         with _errors_name(path, temporary):
             temporary.mkdir()
+            lock = _lock(temporary)
             yield temporary
-        _check_replaceable(path)
-        _replace_folder(temporary, path)
+            _write_manifest(temporary, _files(temporary))
+        check_output_folder(path, force)
+        with uninterrupted():
+            _replace_folder(temporary, path)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
 
 
 class KeptErrorFile(io.FileIO):
@@ -106,7 +113,7 @@ class KeptErrorFile(io.FileIO):
     def __init__(self, path: str | os.PathLike[str]) -> None:
         super().__init__(path, "w+")
         self._error: OSError | None = None
-        hold(self)
+        hold(self.fileno())
 
     def write(self, data: Any) -> int:
         """Write all the data, or keep the error; after an error write nothing more."""
@@ -133,10 +140,77 @@ class KeptErrorFile(io.FileIO):
             raise OSError(f"{path}: could not be written: {self._error.strerror}") from self._error
 
 
-def check_folder(path: Path) -> None:
-    """Raise FileNotFoundError unless the folder is there in which a file shall be written."""
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"{path}: there is no folder {path.parent}")
+def check_output(path: Path) -> Path:
+    """Check that a file can be written; return it or, if it is a symbolic link, its target.
+
+    Raises
+    ------
+    FileNotFoundError
+        If its folder does not exist.
+    IsADirectoryError
+        If it is a folder.
+    PermissionError
+        If its folder is not writable.
+    OSError
+        If it is a device or another special file.
+    """
+    target = _checked_target(path)
+    if target.is_dir():
+        raise IsADirectoryError(f"{path}: is a folder, expected the name of a file")
+    if target.exists() and not target.is_file():
+        raise OSError(f"{path}: is a device or another special file, expected a regular file")
+    return target
+
+
+def check_output_folder(path: Path, force: bool = False) -> Path:
+    """Check that a folder of results can be written; return it or, of a link, its target.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the folder in which it would be does not exist.
+    NotADirectoryError
+        If it exists and is not a folder.
+    FileExistsError
+        If it holds a file that chipglow did not write, unless `force`.
+    PermissionError
+        If it is not writable.
+    """
+    target = _checked_target(path)
+    if not target.exists():
+        return target
+    if not target.is_dir():
+        raise NotADirectoryError(f"{path}: is not a folder")
+    _check_writable(path, target)
+    foreign = sorted(_files(target) - written_files(target))
+    if foreign and not force:
+        raise FileExistsError(
+            f"{path}: holds {foreign[0]}, which chipglow did not write; choose a new or empty "
+            "folder, or pass --force to keep it there"
+        )
+    return target
+
+
+def written_files(folder: Path) -> set[str]:
+    """Files in a folder that chipglow wrote, relative to it."""
+    try:
+        listed = (folder / MANIFEST).read_text(encoding="utf-8").splitlines()
+    except (OSError, ValueError):
+        return set()
+    return _files(folder).intersection(listed)
+
+
+def _checked_target(path: Path) -> Path:
+    target = Path(os.path.realpath(path)) if path.is_symlink() else path
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"{path}: there is no folder {target.parent}")
+    _check_writable(path, target.parent)
+    return target
+
+
+def _check_writable(path: Path, folder: Path) -> None:
+    if not os.access(folder, os.W_OK):
+        raise PermissionError(f"{path}: the folder {folder} is not writable")
 
 
 @contextmanager
@@ -156,29 +230,79 @@ def _errors_name(path: Path, temporary: Path) -> Iterator[None]:
 
 
 def _temporary_beside(path: Path) -> Path:
-    check_folder(path)
+    path = path.absolute()  # "." has no name
     return path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
 
 
-def _check_replaceable(path: Path) -> None:
-    if not path.exists() or (path.is_dir() and (path / RESULT_MARK).is_file()):
-        return
-    if not path.is_dir() or any(path.iterdir()):
-        raise FileExistsError(
-            f"{path}: holds something that is not a result of chipglow (no {RESULT_MARK}), "
-            "expected a new or empty folder or earlier results"
-        )
+def _remove_abandoned(path: Path) -> None:
+    """Remove temporary folders of `path` that no process holds any more."""
+    path = path.absolute()
+    name = f".{escape(path.stem)}.{'[0-9a-f]' * 8}.part{escape(path.suffix)}"
+    for folder in path.parent.glob(name):
+        lock = _lock(folder)
+        if lock is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+            os.close(lock)
+
+
+def _lock(folder: Path) -> int | None:
+    """Hold a folder until the descriptor is closed; None if that is not possible."""
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError:  # Windows opens no folders
+        return None
+    if hold(descriptor):
+        return descriptor
+    os.close(descriptor)
+    return None
+
+
+def _files(folder: Path) -> set[str]:
+    """All files and links in a folder, relative to it."""
+    found = (entry for entry in folder.rglob("*") if entry.is_symlink() or not entry.is_dir())
+    return {
+        entry.relative_to(folder).as_posix() for entry in found if entry.name not in _OF_THE_SYSTEM
+    }
+
+
+def _write_manifest(folder: Path, names: Iterable[str]) -> None:
+    text = "".join(f"{name}\n" for name in sorted(names))
+    (folder / MANIFEST).write_text(text, encoding="utf-8")
 
 
 def _replace_folder(new: Path, path: Path) -> None:
+    """Move new results to their place; `path` holds results, the old or the new, at any time."""
     if not path.exists():
         new.replace(path)
         return
-    old = _temporary_beside(path)
-    path.replace(old)
+    only_ours = _files(path) == written_files(path)
+    # A process in an exchanged folder would stay in the old one.
+    around_us = Path.cwd().is_relative_to(path.resolve())
+    if not only_ours or around_us or not _exchange(new, path):
+        _replace_files(new, path)
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    """Exchange two folders in one step; False where the system cannot."""
+    if sys.platform != "linux":
+        return False
     try:
-        new.replace(path)
-    except BaseException:
-        old.replace(path)
-        raise
-    shutil.rmtree(old)
+        rename = ctypes.CDLL(None).renameat2
+    except (OSError, AttributeError):
+        return False
+    names = (_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other))
+    return bool(rename(*names, _RENAME_EXCHANGE) == 0)
+
+
+def _replace_files(new: Path, path: Path) -> None:
+    """Move new results to their place file by file; other files stay."""
+    before, names = written_files(path), _files(new)
+    if taken := names & (_files(path) - before):
+        raise FileExistsError(f"{path}: holds {min(taken)}, which chipglow did not write")
+    _write_manifest(path, before | names)
+    for name in names:
+        (path / name).parent.mkdir(parents=True, exist_ok=True)
+        (new / name).replace(path / name)
+    for name in before - names:
+        (path / name).unlink()
+    _write_manifest(path, names)

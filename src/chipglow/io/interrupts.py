@@ -19,7 +19,7 @@ def uninterrupted() -> Iterator[None]:
     held: list[int] = []
     handlers = {
         number: signal.getsignal(number)
-        for number in (signal.SIGINT, signal.SIGTERM)
+        for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
         if callable(signal.getsignal(number))
     }
     for number in handlers:

@@ -12,6 +12,7 @@ import xarray as xr
 from chipglow.camera import Measurement
 from chipglow.camera.measurement import MEASUREMENT_UNITS
 from chipglow.io.atomic import KeptErrorFile, atomic_path
+from chipglow.text import check_own_data
 
 Made = TypeVar("Made")
 
@@ -96,6 +97,7 @@ def read_dataset(path: Path, made_of: Callable[[xr.Dataset], Made], what: str, k
     if not path.is_file():
         raise FileNotFoundError(f"{path}: there is no such file, expected {what}")
     try:
+        check_own_data(path)
         data = xr.load_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="access")
         return made_of(data)
     except (OSError, ValueError, KeyError, RuntimeError) as error:
@@ -110,6 +112,6 @@ def holds(path: str | os.PathLike[str], names: Iterable[str]) -> bool:
         return False
     try:
         with h5py.File(path, "r") as file:
-            return all(name in file for name in names)
+            return set(names) <= set(file)
     except OSError:
         return False

@@ -47,6 +47,7 @@ from chipglow.scene.scene import (
 )
 from chipglow.scene.splines import Lattice, SplineFrame
 from chipglow.scene.tool_attributes import tool_attributes
+from chipglow.text import check_own_data
 
 SCENE_FORMAT: Final = 4
 """Changes when the same scene is written to a file in another way."""
@@ -383,6 +384,7 @@ class StoredScene(Scene):
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        check_own_data(path)
         self._file = h5py.File(path, "r")
         names = (*PACKING, *spline_file.CHUNKED)
         self._datasets = {name: self._file[name] for name in names if name in self._file}

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import xarray as xr
 
-from chipglow.io.atomic import atomic_path, check_folder
+from chipglow.io.atomic import atomic_path, check_output
 from chipglow.io.measurement_file import write_dataset
 
 _KINDS: Final = (".csv", ".nc")
@@ -20,12 +20,12 @@ def check_table_path(path: Path) -> None:
     ------
     ValueError
         If it ends in something else than .csv or .nc.
-    FileNotFoundError
-        If the folder in which it shall be does not exist.
+    OSError
+        As `check_output`.
     """
     if path.suffix.lower() not in _KINDS:
         raise ValueError(f"{path}: expected a file that ends in {' or '.join(_KINDS)}")
-    check_folder(path)
+    check_output(path)
 
 
 def write_table_or_dataset(

@@ -132,21 +132,21 @@ def _is_abandoned(part: Path) -> bool:
     """Whether no writer holds the part any more; a writer that just begins has an empty one."""
     try:
         with FileIO(part, "r+") as file:
-            return os.fstat(file.fileno()).st_size > 0 and hold(file)
+            return os.fstat(file.fileno()).st_size > 0 and hold(file.fileno())
     except FileNotFoundError:
         return True
     except OSError:
         return False
 
 
-def hold(file: FileIO) -> bool:
+def hold(descriptor: int) -> bool:
     """Lock a file until it is closed or the process ends; False if someone else holds it."""
     if sys.platform == "win32":  # which keeps an open file from being deleted by itself
         return True
     import fcntl
 
     try:
-        fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
         return False
     return True

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Strict, field_validator, model_validator
 
 from chipglow.analysis import LinePlace, Plan, PointPlace, RegionPlace, ScenePlan
-from chipglow.analysis.places import Place
+from chipglow.analysis.old_places import Place
 from chipglow.laboratory.emissivity import RegionSection
 from chipglow.quantities import Settings, described
 from chipglow.quantities.units import Length, Position

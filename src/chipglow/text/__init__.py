@@ -1,4 +1,4 @@
-"""Small text files that people write: their limits, YAML, and what a YAML file describes."""
+"""Files from outside: small text files, YAML and what it describes, HDF5 without links."""
 
 from chipglow.text.description import (
     DescriptionError,
@@ -10,6 +10,7 @@ from chipglow.text.description import (
     validated,
 )
 from chipglow.text.notes import Notes
+from chipglow.text.own_data import check_own_data
 from chipglow.text.small_file import read_small_text
 from chipglow.text.template import commented_yaml, json_schema
 from chipglow.text.yaml_file import parse_yaml, read_yaml
@@ -17,6 +18,7 @@ from chipglow.text.yaml_file import parse_yaml, read_yaml
 __all__ = [
     "DescriptionError",
     "Notes",
+    "check_own_data",
     "commented_yaml",
     "described_by",
     "json_schema",

@@ -27,6 +27,7 @@ from chipglow.camera.optics.sampling import overlap_lengths
 from chipglow.quantities import Family, FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, WAVELENGTH
 from chipglow.radiometry import Band
+from chipglow.text import check_own_data
 from chipglow.uncertainty import Component, Estimate, from_xarray
 
 GAUSSIAN_ENERGY: Final = 1.0 - 1e-12
@@ -559,6 +560,7 @@ def _read_netcdf(path: Path) -> tuple[Estimate, float, tuple[str, ...]]:
     if not path.is_file():
         raise FileNotFoundError(ENOENT, "there is no such file", str(path))
     try:
+        check_own_data(path)
         with xr.open_dataset(path, engine="h5netcdf", phony_dims="access") as data:
             kernel = data["kernel"].attrs
             stated = tuple(str(kernel.get("includes", "")).split())

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.file_order import files_of
-from chipglow.io.sources.source import SourceError, damaged, required
+from chipglow.io.sources.source import SourceError, damaged, naming, required
 from chipglow.io.sources.text_table import TextTable, lines_of_text
+from chipglow.text import check_own_data
 
 MOST_SAMPLES: Final = 100_000_000
 """Most samples that are read at once."""
@@ -295,12 +296,13 @@ def _hdf5(path: Path, stack: ExitStack) -> Iterator[StoredArray]:
     import h5py
     import hdf5plugin  # noqa: F401  registers the filters
 
+    with naming(path):
+        check_own_data(path)
     file = stack.enter_context(h5py.File(path, "r"))
     found: list[StoredArray] = []
 
     def visit(name: str, item: Any) -> bool | None:
-        # A set of data whose values lie in other files could show any file of this computer.
-        if isinstance(item, h5py.Dataset) and not (item.external or item.is_virtual):
+        if isinstance(item, h5py.Dataset):
             array = _hdf5_array(name, item)
             if array is not None:
                 found.append(array)

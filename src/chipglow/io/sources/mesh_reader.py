@@ -7,6 +7,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 from chipglow.io.sources.mesh_block import Block
+from chipglow.io.sources.source import naming
+from chipglow.text import check_own_data
 
 
 class MeshReader(ABC):
@@ -45,6 +47,8 @@ class MeshReader(ABC):
         for file in files:
             if not file.is_file():
                 raise FileNotFoundError(ENOENT, "there is no such file", str(file))
+            with naming(file):
+                check_own_data(file)
         self.files = files
         self.count = len(files)
         self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of {kind}"

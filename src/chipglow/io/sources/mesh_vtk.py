@@ -9,7 +9,8 @@ from xml.parsers.expat import ExpatError, ParserCreate
 
 from chipglow.io.sources.mesh_block import Block
 from chipglow.io.sources.mesh_reader import MeshReader
-from chipglow.io.sources.source import SourceError
+from chipglow.io.sources.source import SourceError, naming
+from chipglow.text import check_own_data
 
 KINDS: Final[Mapping[str, str]] = {
     ".vtu": "VTK XML",
@@ -187,6 +188,8 @@ def _check_references(file: Path) -> None:
         heavy = file.parent / name.decode(errors="replace").strip()
         if not heavy.is_file():
             raise SourceError(f"{file}: its data should be in {heavy.name}, which is not there")
+        with naming(heavy):
+            check_own_data(heavy)
 
 
 def _opened_xdmf(file: Path) -> Any:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from chipglow.camera import Measurement
-from chipglow.io.atomic import RESULT_MARK
 from chipglow.laboratory.comparison.comparison import Comparison
 from chipglow.laboratory.measurement import load_measurement
 from chipglow.laboratory.result_file import write_frame
@@ -60,7 +59,7 @@ def write_comparison(comparison: Comparison, folder: Path) -> None:
         "warnings": comparison.notes.warnings,
     }
     text = json.dumps(summary, indent=1, ensure_ascii=False)
-    (folder / RESULT_MARK).write_text(f"{text}\n", encoding="utf-8")
+    (folder / "summary.json").write_text(f"{text}\n", encoding="utf-8")
 
 
 def _place(comparison: Comparison, number: int) -> dict[str, Any]:

@@ -1,0 +1,180 @@
+"""What an analysis needs to know of a cut: its shear bands, segments, forces and chip."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import nan
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.analysis.result import CuttingForces
+from chipglow.cutting import EnergyHistory
+from chipglow.laboratory.chip import (
+    Instant,
+    NoContactError,
+    NoShearBandError,
+    Segment,
+    inertia,
+    segmentation,
+)
+from chipglow.scene import ENERGY_UNITS, Frame, Scene
+
+Progress: TypeAlias = Callable[[str, float], None]
+"""Told what is being done and which fraction of it, 0 to 1, is done."""
+
+_DEVELOPED: Final = 0.95
+"""Rise of a developed band's mean temperature, as a fraction of the greatest."""
+
+_AROUND: Final = 2
+"""Instants from the developed band to the one that still develops, and to the one that moved."""
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Shear bands of a cut over time: those of the longest part first, then of `other_parts`.
+
+    `segments` are those with a developed band: that of the instant `developed`, then one for each
+    other part with band and contact, whose instants are `drawn`.
+    """
+
+    instants: tuple[Instant, ...]
+    other_parts: int
+    developed: int
+    drawn: tuple[int, ...]
+    segments: tuple[Segment, ...]
+
+
+def lacking(scene: Scene) -> Iterator[str]:
+    """What the scene lacks for the analysis of a cut, a sentence each."""
+    if scene.tool is None:
+        yield (
+            "No rake face is read: the scene has no tool (the section cutting.tool of the study "
+            "gives it one)."
+        )
+    for name, title, why in (
+        ("plastic_strain", "plastic strain", "no chip is told from the workpiece"),
+        ("plastic_strain_rate", "plastic strain rate", "no shear band is looked for"),
+        ("velocity_x", "velocity", "the chip's speed and shape are not measured"),
+    ):
+        if name not in scene.fields:
+            yield f"The scene has no {title}: {why}."
+
+
+def find_segments(
+    scene: Scene, duration: float, exposures: int, touching: float, tell: Progress
+) -> Segments:
+    """Segments of a cut's chip with a developed shear band: one for each part of the scene.
+
+    `duration` is that of an exposure in s; see `Plan` for `exposures` and `touching`.
+
+    Raises
+    ------
+    ValueError
+        If the scene is shorter than an exposure or has no shear band or no contact at the rake
+        face.
+    """
+    starts = spread_starts(scene, duration, exposures)
+    others = other_starts(scene, duration)
+    instants = []
+    for i, start in enumerate((*starts, *others)):
+        tell("shear band", i / (len(starts) + len(others)))
+        instants.append(Instant.at(scene, float(start), duration))
+    tell("shear band", 1.0)
+    developed = _developed(scene, instants[: len(starts)])
+    found = {
+        i: Segment.of(scene, instants[i], duration, touching)
+        for i in (developed, *range(len(starts), len(instants)))
+        if instants[i].band is not None
+    }
+    if not found[developed].contact_length > 0:
+        raise NoContactError("rake face: the chip does not touch it in the developed instant")
+    found = {i: segment for i, segment in found.items() if segment.contact_length > 0}
+    return Segments(tuple(instants), len(others), developed, tuple(found), tuple(found.values()))
+
+
+def moments(scene: Scene, duration: float, found: Segments) -> tuple[Frame, ...]:
+    """Frames in the middle of instants: the band develops, is developed, has moved on."""
+    last = len(found.instants) - found.other_parts - 1
+    around = (found.developed - _AROUND, found.developed, found.developed + _AROUND)
+    chosen = sorted({min(max(number, 0), last) for number in around})
+    return tuple(
+        scene.frame(middle_frame(scene, found.instants[i].start, duration)) for i in chosen
+    )
+
+
+def cutting_forces(scene: Scene) -> CuttingForces | None:
+    """The forces of a cut and their segments, if the scene has them."""
+    if "cutting_force" not in scene.data:
+        return None
+    time, cutting, thrust = (
+        np.asarray(scene.data[name].values, dtype=np.float64)
+        for name in ("force_time", "cutting_force", "thrust_force")
+    )
+    inert = inertia(scene)
+    assert inert is not None
+    segments = segmentation(time, cutting, thrust)
+    return CuttingForces(time, cutting, thrust, segments, _unaccounted(scene), inert)
+
+
+def middle_frame(scene: Scene, start: float, duration: float) -> int:
+    """Number of the frame in the middle of an exposure."""
+    after = np.searchsorted(scene.times, start + duration / 2 + 1e-6 * scene.frame_spacing)
+    return max(int(after) - 1, 0)
+
+
+def spread_starts(scene: Scene, duration: float, count: int) -> NDArray[np.float64]:
+    """Beginnings of exposures spread over the longest part of the scene, each at a frame of it.
+
+    `duration` is that of an exposure in s. There are fewer than `count` if the scene has not as
+    many frames for them, and one of a scene of a single frame.
+
+    Raises
+    ------
+    ValueError
+        If no part of the scene is as long as an exposure.
+    """
+    times, spacing = scene.times[scene.longest_block], scene.frame_spacing
+    if len(scene.times) == 1:
+        return times
+    last = times[-1] + spacing - duration
+    if last < times[0] - 1e-6 * duration:
+        raise ValueError(
+            f"scene: it lasts {times[-1] + spacing - times[0]:.4g} s, "
+            f"expected an exposure's {duration:.4g} s or more"
+        )
+    wanted = np.linspace(times[0], max(last, times[0]), count) if count > 1 else times[:1]
+    nearest_frame = np.searchsorted(times, wanted + 1e-6 * spacing, side="right") - 1
+    return np.asarray(np.unique(times[nearest_frame]), dtype=np.float64)
+
+
+def other_starts(scene: Scene, duration: float) -> list[float]:
+    """Beginnings of the scene's other parts that are as long as an exposure."""
+    starts = []
+    for block in scene.blocks:
+        first, last = scene.times[block[0]], scene.times[block[-1]]
+        lasts = last - first + scene.frame_spacing
+        if block != scene.longest_block and lasts >= duration * (1 - 1e-6):
+            starts.append(float(first))
+    return starts
+
+
+def _developed(scene: Scene, instants: list[Instant]) -> int:
+    """Number of the first instant whose band has come near the greatest rise of its temperature.
+
+    From then on the band's temperature hardly changes, but the chip carries it away from the edge:
+    the paper takes bands that are "fully developed but not moved".
+    """
+    means = np.array([instant.mean_temperature for instant in instants])
+    if np.isnan(means).all():
+        raise NoShearBandError("shear band: none is found in any of the exposures")
+    rise = means - float(scene.field("temperature", scene.longest_block[0]).min())
+    return int(np.argmax(np.nan_to_num(rise) >= _DEVELOPED * np.nanmax(rise)))
+
+
+def _unaccounted(scene: Scene) -> float:
+    """Fraction of the drive's work that the energy balance does not account for at the end."""
+    if "drive_work" not in scene.data:
+        return nan
+    account = {name: np.asarray(scene.data[name].values, dtype=np.float64) for name in ENERGY_UNITS}
+    return float(EnergyHistory(**account).closing_error[-1])

@@ -1,0 +1,370 @@
+"""The one loop of an analysis: images of a scene over exposures, textures and pixel phases.
+
+Images that agree up to a stage share it: frames are read once for all surfaces and textures of an
+exposure, an exposure is formed by all cameras, and blurred radiance serves all pixel phases.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import ceil, floor
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chipglow.analysis.error_images import ReferenceKind, read_temperature, reference_temperature
+from chipglow.analysis.places import Place, Stack
+from chipglow.camera import Camera, Exposure, PointSpreadFunction, blur
+from chipglow.radiometry import Band
+from chipglow.scene import Line, Raster, Scene, sample
+from chipglow.scene.lines import nearest
+from chipglow.surface import EmissivityField, Surface
+
+Array: TypeAlias = NDArray[np.float64]
+Effect: TypeAlias = Callable[[Camera, Exposure], tuple[Camera, Exposure]]
+"""Changes the camera or what reaches it, such as to switch an effect off."""
+
+ALL: Final = "all"
+WITHOUT_PSF: Final = "without psf"
+
+
+def _without_psf(camera: Camera, exposure: Exposure) -> tuple[Camera, Exposure]:
+    # Without a PSF its order does not matter; one value lets cameras share the image.
+    return replace(camera, psf=None, psf_order="optics"), exposure
+
+
+CASES: Final[Mapping[str, Effect]] = {
+    ALL: lambda camera, exposure: (camera, exposure),
+    WITHOUT_PSF: _without_psf,
+}
+"""The paper's case 1 and case 2."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A surface, and the places that are read on it.
+
+    Parameters
+    ----------
+    surface : str
+        The surface's name.
+    places : sequence of sequence of Place
+        The places in each drawn exposure.
+    textures : int
+        How many textures are drawn.
+    first : int
+        Number of the first draw: each has other noise of the detector.
+    strides : tuple of int
+        By how much the number grows from one exposure, texture and pixel phase to the next.
+    """
+
+    surface: str
+    places: Sequence[Sequence[Place]]
+    textures: int
+    first: int
+    strides: tuple[int, int, int]
+
+    def number(self, *index: int) -> int:
+        """Number of the draw of an exposure, texture and pixel phase."""
+        return self.first + sum(i * step for i, step in zip(index, self.strides, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule:
+    """Which images are taken.
+
+    Parameters
+    ----------
+    starts : ndarray
+        When the exposures begin in s.
+    drawn : tuple of int
+        Numbers of the exposures that are drawn for all textures and pixel phases.
+    shown : int
+        Number of the exposure that images show.
+    views : tuple of View
+        What is read.
+    phases : int
+        Positions of the pixels along each axis.
+    reference : ReferenceKind
+        What the measured temperatures are compared with.
+    effects : mapping
+        By name; with all effects first.
+    vary : sequence of callable
+        Other cameras made of the camera, for the first texture.
+    """
+
+    starts: Array
+    drawn: tuple[int, ...]
+    shown: int
+    views: tuple[View, ...]
+    phases: int
+    reference: ReferenceKind
+    effects: Mapping[str, Effect] = field(default_factory=lambda: CASES)
+    vary: Sequence[Callable[[Camera], Camera]] = ()
+
+
+class Table:
+    """Arrays of one shape by key, NaN where nothing was put."""
+
+    def __init__(self, *shape: int) -> None:
+        self.shape = shape
+        self.rows: dict[tuple[int, str, str], Array] = {}
+
+    def put(self, key: tuple[int, str, str], index: tuple[int, ...], values: Array) -> None:
+        """Put values at an index of the first axes, and from the beginning of the last."""
+        row = self.rows.setdefault(key, np.full(self.shape, np.nan))
+        row[index][..., : values.shape[-1]] = values
+
+    def stacked(self) -> Array:
+        """All rows; the first axis is the keys'."""
+        return np.stack(list(self.rows.values())) if self.rows else np.empty((0, *self.shape))
+
+
+@dataclass(frozen=True, eq=False)
+class Looked:
+    """What was read and seen. Keys of the tables are number of the view, place and quantity.
+
+    `images` (radiance) and `references` are by surface and exposure, `shown` by surface: the
+    exposure, and what is measured with each of the effects, NaN where the reference is.
+    """
+
+    images: Mapping[str, list[Array]]
+    references: Mapping[str, list[Array]]
+    shown: dict[str, tuple[Exposure, Stack]]
+    fields: Mapping[str, EmissivityField]
+    readings: Table
+    varied: Table
+    lines: Table
+    line_places: Table
+    line_scene: Table
+    line_motion: Table
+
+
+class ExposureImages:
+    """Images of one exposure by cameras that differ in pixels, PSF or noise."""
+
+    def __init__(self, exposure: Exposure, reference: ReferenceKind) -> None:
+        self.exposure, self._kind = exposure, reference
+        self._references: dict[tuple[object, ...], Array] = {}
+        self._measured: dict[Camera, Array] = {}
+        self._blurred: tuple[PointSpreadFunction | None, Array] = None, np.zeros(0)
+
+    def stack(self, camera: Camera, effects: Mapping[str, Effect], keep: bool = True) -> Stack:
+        """Reference, then what is measured with each of the effects, shape (row, y, x).
+
+        `keep` says whether the images are kept for cameras that are equal under an effect.
+        """
+        reference = self._reference(camera)
+        rows = [reference]
+        for effect in effects.values():
+            changed, exposure = effect(camera, self.exposure)
+            if exposure is not self.exposure:
+                measured = ExposureImages(exposure, self._kind)._measure(changed)
+            elif (known := self._measured.get(changed)) is not None:
+                measured = known
+            else:
+                measured = self._measure(changed)
+                if keep:
+                    self._measured[changed] = measured
+            rows.append(np.where(np.isnan(reference), np.nan, measured))
+        return np.stack(rows)
+
+    def _reference(self, camera: Camera) -> Array:
+        key = (camera.pitch, camera.offset, camera.shape, camera.fill_factor)
+        if key not in self._references:
+            self._references[key] = reference_temperature(camera, self.exposure, self._kind)
+        return self._references[key]
+
+    def _measure(self, camera: Camera) -> Array:
+        radiance, psf = self.exposure.mean_radiance, camera.psf
+        if psf is not None and camera.psf_order == "optics" and "footprint" not in psf.includes:
+            radiance = self._blur(psf)
+            optical = replace(camera, psf=None)
+        else:
+            optical = camera
+        image = optical.form_image(radiance, self.exposure.raster)
+        return read_temperature(camera, image, self.exposure.start)[0]
+
+    def _blur(self, psf: PointSpreadFunction) -> Array:
+        """The radiance of the samples behind the optics; that of the last PSF is kept."""
+        if self._blurred[0] != psf:
+            exposure = self.exposure
+            self._blurred = psf, blur(exposure.mean_radiance, psf, exposure.raster.spacing)
+        return self._blurred[1]
+
+
+def pixel_phases(camera: Camera, count: int) -> list[Camera]:
+    """The camera with its pixels at other places of the scene, spread evenly over a pixel.
+
+    `count` is the number of places along each axis: `count`² cameras, each with as many whole
+    pixels as fit the scene. The first phase is the camera's own.
+    """
+    right, down = camera.offset
+    steps = camera.pitch * np.arange(count) / count
+    return [
+        replace(camera, shape=None, offset=(right + float(x), down + float(y)))
+        for y in steps
+        for x in steps
+    ]
+
+
+def look(
+    scene: Scene,
+    surfaces: Mapping[str, Surface],
+    camera: Camera,
+    schedule: Schedule,
+    progress: Callable[[float], None],
+) -> Looked:
+    """Take the images of a schedule and read them; `progress` is told the fraction done."""
+    first = {name: camera.lay(surface, scene) for name, surface in surfaces.items()}
+    others = {
+        (view.surface, number): camera.lay(surfaces[view.surface].redrawn(number), scene)
+        for view in schedule.views
+        for number in range(1, view.textures)
+    }
+    looked = _empty(schedule, first, camera.pitch)
+    cameras = pixel_phases(camera, schedule.phases)
+    share = 1 / (len(schedule.starts) + len(schedule.drawn))
+    for i, start in enumerate(schedule.starts):
+        progress(share * (i + sum(number < i for number in schedule.drawn)))
+        drawn = schedule.drawn.index(i) if i in schedule.drawn else None
+        fields = [*first.values(), *(others.values() if drawn is not None else ())]
+        exposed = camera.expose_fields(scene, fields, float(start))
+        textures = dict(zip(first, exposed, strict=False))
+        for name, exposure in textures.items():
+            image = camera.form_image(exposure.mean_radiance, scene.raster)
+            looked.images[name].append(image)
+            reference = reference_temperature(camera, exposure, schedule.reference)
+            looked.references[name].append(reference)
+        seen = {(name, 0): exposure for name, exposure in textures.items()}
+        seen |= dict(zip(others, exposed[len(first) :], strict=drawn is not None))
+        if i == schedule.shown:
+            for number, (name, exposure) in enumerate(textures.items()):
+                images = ExposureImages(exposure, schedule.reference)
+                stack = images.stack(camera.redrawn(number), schedule.effects)
+                looked.shown[name] = exposure, stack[1:]
+        if drawn is not None:
+            _draw(looked, schedule, drawn, seen, cameras)
+    progress(1.0)
+    return looked
+
+
+def _empty(schedule: Schedule, fields: Mapping[str, EmissivityField], pitch: float) -> Looked:
+    exposures, phases = len(schedule.drawn), schedule.phases**2
+    textures = max((view.textures for view in schedule.views), default=1)
+    rows = 1 + len(schedule.effects)
+    places = [p for view in schedule.views for places in view.places for p in places]
+    sizes = [line.distance.size for place in places for line in place.lines(pitch).values()]
+    points = max(sizes, default=0)
+    return Looked(
+        images={name: [] for name in fields},
+        references={name: [] for name in fields},
+        shown={},
+        fields=fields,
+        readings=Table(exposures, textures, phases, rows),
+        varied=Table(len(schedule.vary), exposures, phases, rows),
+        lines=Table(exposures, textures, phases, rows, points),
+        line_places=Table(exposures, 3, points),
+        line_scene=Table(exposures, textures, points),
+        line_motion=Table(exposures, textures, 1),
+    )
+
+
+def _draw(
+    looked: Looked,
+    schedule: Schedule,
+    exposure: int,
+    seen: Mapping[tuple[str, int], Exposure],
+    cameras: Sequence[Camera],
+) -> None:
+    """Read every view of one exposure, for all textures, pixel phases and other cameras."""
+    for number, view in enumerate(schedule.views):
+        places = view.places[exposure]
+        for texture in range(view.textures):
+            images = ExposureImages(seen[view.surface, texture], schedule.reference)
+            _read_lines(looked, number, places, exposure, texture, images.exposure, cameras[0])
+            noisy = [c.redrawn(view.number(exposure, texture, p)) for p, c in enumerate(cameras)]
+            for phase, camera in enumerate(noisy):
+                stack = images.stack(camera, schedule.effects)
+                index = exposure, texture, phase
+                pixels = camera.pixels(images.exposure.raster)
+                _read(looked, number, places, stack, pixels, looked.readings, index)
+            if texture == 0:
+                for other, (change, phase, camera) in _varied(schedule, noisy):
+                    changed = change(camera)
+                    stack = images.stack(changed, schedule.effects, keep=False)
+                    index = other, exposure, phase
+                    pixels = camera.pixels(images.exposure.raster)
+                    _read(looked, number, places, stack, pixels, looked.varied, index)
+
+
+def _varied(
+    schedule: Schedule, cameras: Sequence[Camera]
+) -> Iterator[tuple[int, tuple[Callable[[Camera], Camera], int, Camera]]]:
+    for other, change in enumerate(schedule.vary):
+        for phase, camera in enumerate(cameras):
+            yield other, (change, phase, camera)
+
+
+def _read(
+    looked: Looked,
+    view: int,
+    places: Sequence[Place],
+    images: Stack,
+    pixels: Raster,
+    table: Table,
+    index: tuple[int, ...],
+) -> None:
+    for place in places:
+        lines = {
+            name: np.array([sample(image, pixels, line.points) for image in images])
+            for name, line in place.lines(pixels.spacing).items()
+        }
+        for quantity, values in place.read(images, pixels, lines).items():
+            table.put((view, place.name, quantity), index, values)
+        if table is looked.readings:
+            for name, values in lines.items():
+                looked.lines.put((view, place.name, name), index, values)
+
+
+def _read_lines(
+    looked: Looked,
+    view: int,
+    places: Sequence[Place],
+    exposure: int,
+    texture: int,
+    seen: Exposure,
+    camera: Camera,
+) -> None:
+    """Where the lines lie, and what the scene's samples show there, without a camera."""
+    for place in places:
+        for name, line in place.lines(camera.pitch).items():
+            key = view, place.name, name
+            at = place.motion_samples * seen.raster.spacing
+            scene = _scene_along(camera.band, seen, line)
+            motion = np.array([_motion(camera.band, seen, line, at)])
+            looked.line_places.put(key, (exposure,), np.stack([line.distance, *line.points.T]))
+            looked.line_scene.put(key, (exposure, texture), scene)
+            looked.line_motion.put(key, (exposure, texture), motion)
+
+
+def _scene_along(band: Band, exposure: Exposure, line: Line) -> Array:
+    """Radiance temperature of the samples in the middle of the exposure along a line."""
+    grid = exposure.raster
+    columns, rows = ((line.points - [grid.left, grid.top]) * [1, -1] / grid.spacing).T
+    above, left = (
+        min(max(floor(places.min()) - 2, 0), count - 1)
+        for places, count in zip((rows, columns), grid.shape, strict=True)
+    )
+    below, right = (max(ceil(places.max()) + 2, 1) for places in (rows, columns))
+    part = exposure.centre_radiance[above : max(below, above + 1), left : max(right, left + 1)]
+    corner = grid.left + left * grid.spacing, grid.top - above * grid.spacing
+    return sample(band.temperature(part), Raster(*corner, grid.spacing, *part.shape), line.points)
+
+
+def _motion(band: Band, exposure: Exposure, line: Line, place: float) -> float:
+    """Mean over the exposure less its peak, as radiance temperatures, at one sample."""
+    point = line.points[np.argmin(np.abs(line.distance - place))]
+    mean = nearest(exposure.mean_radiance, exposure.raster, point)
+    peak = nearest(exposure.peak_radiance, exposure.raster, point)
+    return float(band.temperature(mean)) - float(band.temperature(peak))
