@@ -143,7 +143,7 @@ def test_help_imports_none_of_the_heavy_libraries():
 def test_init_writes_the_papers_study_and_keeps_what_is_there(folder):
     assert chipglow("init", "paper.yaml").exit_code == 0
     assert load_study("paper.yaml") == Study()
-    assert_refused(chipglow("init", "study.yaml"), "study.yaml", "is there already", "--force")
+    assert_refused(chipglow("init", "study.yaml"), "study.yaml", "already exists", "--force")
     assert (folder / "study.yaml").read_text() == STUDY
     assert chipglow("init", "study.yaml", "--force").exit_code == 0
     assert load_study("study.yaml") == Study()

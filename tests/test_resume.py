@@ -160,7 +160,7 @@ def test_a_cut_that_is_killed_again_and_again_ends_with_the_same_bits(cache, unb
     with start("--resume") as process:
         _, errors = process.communicate(timeout=120)
     assert process.returncode == 0, errors
-    assert f"The cut goes on at {reached[2]:.0%}" in errors
+    assert f"Resuming the cut at {reached[2]:.0%}" in errors
     assert_same_scene("scene.nc", unbroken)
     assert [path.suffix for path in cache.iterdir()] == [".nc"]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chipglow.cli.options import Settings, file_option, picture_option
+from chipglow.cli.options import Settings, argument, file_option, option, picture_option
 
 if TYPE_CHECKING:
     from chipglow.camera import CalibrationFit, FittedCalibration
@@ -26,55 +26,48 @@ class Model(StrEnum):
 def calibrate(
     points: Annotated[
         Path,
-        typer.Argument(
-            metavar="POINTS.csv",
-            help="Blackbodies: columns temperature_degC (or _K), counts (or file, a recording of "
-            "each) and, if known, their standard uncertainties count_uncertainty and "
+        argument(
+            "POINTS.csv",
+            "Blackbody points: columns temperature_degC (or _K), counts (or file, a recording of "
+            "each) and optionally the standard uncertainties count_uncertainty and "
             "temperature_uncertainty_K.",
         ),
     ],
     band: Annotated[
-        str,
-        typer.Option(
-            metavar="BAND", help="The camera's band, such as '3.8-5.1 um', or its response, a .csv."
-        ),
+        str, option("BAND", "Camera band, e.g. '3.8-5.1 um', or a .csv file of its response.")
     ],
-    model: Annotated[Model, typer.Option(help="Which form to fit.")] = Model.LINEAR,
-    out: Annotated[Path | None, file_option("The calibration to write, YAML.")] = None,
+    model: Annotated[Model, typer.Option(help="Model to fit.")] = Model.LINEAR,
+    out: Annotated[Path | None, file_option("Calibration to write, YAML.")] = None,
     plot: Annotated[Path | None, picture_option("Draw fits and residuals")] = None,
     common_uncertainty: Annotated[
         str | None,
-        typer.Option(
-            metavar="KELVINS",
-            help="Standard uncertainty of the blackbody's temperature that all points have in "
-            "common, such as '0.5 K': that of its certificate.",
+        option(
+            "KELVINS",
+            "Standard uncertainty common to all blackbody temperatures, e.g. '0.5 K' from the "
+            "certificate.",
         ),
     ] = None,
     emissivity: Annotated[
-        float | None,
-        typer.Option(metavar="NUMBER", help="Emissivity of the blackbody; 1 is assumed."),
+        float | None, option("NUMBER", "Emissivity of the blackbody. Default: 1.")
     ] = None,
     emissivity_uncertainty: Annotated[
-        float, typer.Option(metavar="NUMBER", help="Standard uncertainty of that emissivity.")
+        float, option("NUMBER", "Standard uncertainty of the emissivity.")
     ] = 0.0,
     surroundings: Annotated[
         str | None,
-        typer.Option(
-            metavar="TEMPERATURE",
-            help="What a blackbody of less than 1 reflects, such as '23 degC'; 20 degC is assumed.",
-        ),
+        option("TEMPERATURE", "Temperature that the blackbody reflects. Default: 20 degC."),
     ] = None,
     integration_time: Annotated[
-        str | None, typer.Option(metavar="TIME", help="Integration time, such as '10 us'.")
+        str | None, option("TIME", "Integration time, e.g. '10 us'.")
     ] = None,
     range_name: Annotated[
-        str | None, typer.Option("--range", metavar="NAME", help="The camera's measuring range.")
+        str | None, option("NAME", "Measuring range of the camera.", "--range")
     ] = None,
     settings: Settings = None,
 ) -> None:
-    """Fit a calibration of a camera's counts to blackbodies.
+    """Fit a calibration of camera counts to blackbody measurements.
 
-    It holds between the coldest and the hottest blackbody: what is outside is flagged later.
+    It is valid between the coldest and the hottest blackbody. Pixels outside are flagged.
     """
     from chipglow.camera import MODELS
     from chipglow.cli.finish import figure, finish
@@ -130,7 +123,7 @@ def _print_fit(screen: "Screen", found: "BlackbodyCalibration", name: str) -> No
 
 
 def _numbers(fit: "CalibrationFit[FittedCalibration]") -> dict[str, float | None]:
-    """What `_quality` says, for programs."""
+    """Return the numbers in `_quality`."""
     return {
         "rms_residual_K": _scatter(fit),
         "chi_squared": fit.chi_squared,
@@ -149,12 +142,12 @@ def _scatter(fit: "CalibrationFit[FittedCalibration]") -> float:
 def _quality(fit: "CalibrationFit[FittedCalibration]") -> str:
     text = f"Residuals: {_scatter(fit):.3g} K (root mean square)"
     if not fit.stated:
-        return f"{text}; the uncertainties are from their scatter, as none are stated."
+        return f"{text}; the uncertainties follow from the scatter, as none are stated."
     if fit.probability is None:
-        return f"{text}; as many points as parameters, which prove nothing."
+        return f"{text}; there are as many points as parameters, so the fit cannot be tested."
     return (
         f"{text}, chi² {fit.chi_squared:.3g} with {fit.degrees_of_freedom} degrees of freedom "
-        f"(probability of as much or more: {100 * fit.probability:.3g} %)."
+        f"(probability of a larger value: {100 * fit.probability:.3g} %)."
     )
 
 
@@ -165,5 +158,6 @@ def _print_comparison(screen: "Screen", found: "BlackbodyCalibration") -> None:
     screen.heading()
     screen.say(f"Information criterion (Akaike's, corrected): {criteria}.")
     screen.say(
-        f"Preferred: {found.preferred}, which has the least.", {"preferred": found.preferred}
+        f"Preferred: {found.preferred}, the model with the smallest criterion.",
+        {"preferred": found.preferred},
     )

@@ -5,28 +5,20 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from chipglow.cli.options import Settings, file_option
+from chipglow.cli.options import Settings, argument, file_option
 
 if TYPE_CHECKING:
     from chipglow.camera import Recording
 
 
 def convert(
-    source: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SOURCE", help="A camera's file, or a YAML file that describes one."
-        ),
-    ],
+    source: Annotated[Path, argument("SOURCE", "Camera file, or YAML file describing one.")],
     out: Annotated[
-        Path | None,
-        file_option("The measurement to write, NetCDF; without it, only say what is there."),
+        Path | None, file_option("Measurement to write, NetCDF. Omit it to only inspect the file.")
     ] = None,
     settings: Settings = None,
 ) -> None:
-    """Make a measurement of a camera's file."""
+    """Convert a camera file to a measurement."""
     from chipglow.cli.finish import finish
     from chipglow.cli.screen import current
     from chipglow.cli.showing_measurement import say_measurement

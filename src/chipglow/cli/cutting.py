@@ -16,22 +16,7 @@ from chipglow.study import Study, cut, is_cut, kept_progress, preview_raster
 
 
 def cut_study(study: Study, out: Path, preview: Path | None, resume: bool, agreed: bool) -> None:
-    """Cut, or find what was cut before, and write the scene.
-
-    Parameters
-    ----------
-    study : Study
-        What to cut.
-    out : Path
-        The scene's file.
-    preview : Path, optional
-        File of a movie: of the whole cut, of what is still to come of a cut that goes on, or of
-        a scene that was found.
-    resume : bool
-        Whether to go on with a cut that an earlier run left unfinished.
-    agreed : bool
-        Whether the user agreed beforehand to what it costs.
-    """
+    """Cut, or find what was cut before, and write the scene."""
     with atomic_path(out) as temporary, _movie(study, preview) as on_preview:
         say_where_it_starts(study, resume, agreed)
         if on_preview:

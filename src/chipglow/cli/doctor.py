@@ -26,14 +26,7 @@ _TOLERANCE: Final = 1e-6
 
 
 def examine() -> None:
-    """Print versions, optional parts, threads, cache and GPU, and what is wrong.
-
-    Raises
-    ------
-    ValueError
-        If a package that every command needs is missing or too old, or if the compiled radiometry
-        differs from its equation.
-    """
+    """Print versions, optional parts, threads, cache and GPU, and what is wrong."""
     screen = current()
     screen.facts("machine", _machine())
     screen.heading()

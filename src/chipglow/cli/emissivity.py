@@ -4,9 +4,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from chipglow.cli.options import Settings, file_option, picture_option
+from chipglow.cli.options import Settings, argument, file_option, option, picture_option
 
 if TYPE_CHECKING:
     from chipglow.cli.screen import Screen
@@ -14,49 +12,39 @@ if TYPE_CHECKING:
 
 
 def emissivity(
-    images: Annotated[
-        list[Path],
-        typer.Argument(metavar="IMAGE...", help="Measurements of the heated object."),
-    ],
+    images: Annotated[list[Path], argument("IMAGE...", "Measurements of the heated object.")],
     reference: Annotated[
         list[str],
-        typer.Option(
-            metavar="TEMPERATURE",
-            help="True temperature of the object, such as 391degC: once for all images, or once "
-            "for each in their order. Images at one temperature are repetitions.",
+        option(
+            "TEMPERATURE",
+            "True temperature of the object, e.g. 391degC: once for all images, or once per image. "
+            "Images at one temperature are repetitions.",
         ),
     ],
-    regions: Annotated[
-        Path, typer.Option(metavar="FILE", help="The regions of the image, a YAML file.")
-    ],
+    regions: Annotated[Path, option("FILE", "Regions of the image, a YAML file.")],
     reflected: Annotated[
-        str,
-        typer.Option(
-            metavar="TEMPERATURE", help="Temperature of the surroundings that the object reflects."
-        ),
+        str, option("TEMPERATURE", "Temperature of the surroundings that the object reflects.")
     ] = "293 K",
     reference_uncertainty: Annotated[
-        str | None,
-        typer.Option(metavar="KELVINS", help="Its standard uncertainty, such as '2 K'."),
+        str | None, option("KELVINS", "Standard uncertainty of the true temperature, e.g. '2 K'.")
     ] = None,
     reflected_uncertainty: Annotated[
-        str | None,
-        typer.Option(metavar="KELVINS", help="Standard uncertainty of the surroundings'."),
+        str | None, option("KELVINS", "Standard uncertainty of the reflected temperature.")
     ] = None,
     camera_uncertainty: Annotated[
         str | None,
-        typer.Option(
-            metavar="KELVINS",
-            help="Standard uncertainty of radiance temperatures from the camera's calibration; "
-            "by default that which the measurement states.",
+        option(
+            "KELVINS",
+            "Standard uncertainty of the radiance temperatures by the calibration. Default: as "
+            "the measurement states.",
         ),
     ] = None,
     drift: Annotated[
         float | None,
-        typer.Option(
-            metavar="NUMBER",
-            help="Relative standard uncertainty of the radiance from one recording to the next, "
-            "such as 0.01; by default what several images at one temperature show.",
+        option(
+            "NUMBER",
+            "Relative standard uncertainty of the radiance between recordings, e.g. 0.01. "
+            "Default: from several images at one temperature.",
         ),
     ] = None,
     out: Annotated[Path | None, file_option("Write maps and regions, NetCDF.")] = None,

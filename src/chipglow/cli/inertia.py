@@ -9,15 +9,7 @@ from chipglow.text import Notes
 
 
 def say_of_cut(inertia: Inertia | None, warnings: Iterable[str] = ()) -> None:
-    """Say on stderr what kinetic energy and momentum the scaled mass has; warn if too much.
-
-    Parameters
-    ----------
-    inertia : Inertia, optional
-        That of the cut, with a warning of its own.
-    warnings : iterable of str, optional
-        The cut's other warnings, a sentence each.
-    """
+    """Say on stderr what kinetic energy and momentum the scaled mass has; warn if too much."""
     parts = _known(inertia) if inertia else {}
     if parts:
         current().aside(

@@ -13,30 +13,7 @@ from chipglow.study import Study, fit
 
 
 def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: str | None) -> None:
-    """Look at a scene with a study's camera and write the measurement.
-
-    Parameters
-    ----------
-    path : Path
-        The scene's file.
-    study : Study
-        Says surface and camera.
-    out : Path
-        The measurement's file.
-    start : str, optional
-        When the first exposure starts, in the scene's time, with its unit; frames follow at the
-        camera's rate to the end of the scene.
-    chip : str, optional
-        Name of one of the study's chips; the first by default.
-
-    A scene without material coordinates, as imports often are, is looked at with textures that move
-    by the mean velocities, as the paper's did; that is said.
-
-    Raises
-    ------
-    ValueError
-        If there is no such chip, or no exposure fits into the scene.
-    """
+    """Look at a scene with a study's camera and write the measurement."""
     fitted = fit(study, open_scene(path))
     camera = study.camera.on(fitted.scene.raster, study.seed)
     scene, surfaces = fitted.scene, fitted.surfaces

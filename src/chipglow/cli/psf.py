@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from chipglow.cli.options import Settings, file_option, picture_option
+from chipglow.cli.options import Settings, argument, file_option, option, picture_option
 
 if TYPE_CHECKING:
     from chipglow.cli.screen import Screen
@@ -15,42 +13,35 @@ if TYPE_CHECKING:
 def psf(
     edges: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="EDGE...", help="Images of a straight edge, best of several orientations."
-        ),
+        argument("EDGE...", "Images of a straight edge, preferably in several orientations."),
     ],
     apertures: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="A YAML file that lists images of round apertures with their diameters, which "
-            "show the tails.",
+        option(
+            "FILE",
+            "YAML file that lists images of round apertures with their diameters, to determine "
+            "the tails.",
         ),
     ] = None,
     region: Annotated[
         str | None,
-        typer.Option(
-            metavar="ROWS,COLUMNS",
-            help="Part of the images that shows only the edge, such as 10:70,20:90.",
-        ),
+        option("ROWS,COLUMNS", "Part of the images with only the edge, e.g. 10:70,20:90."),
     ] = None,
     model: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME",
-            help="What to write: gaussian, 'gaussian with tail', moffat, 'defocused disc', "
-            "'annular aperture', 'elliptical gaussian' or radial; by default the model that fits "
-            "best.",
+        option(
+            "NAME",
+            "Model to write: gaussian, 'gaussian with tail', moffat, 'defocused disc', "
+            "'annular aperture', 'elliptical gaussian' or radial. Default: the best fit.",
         ),
     ] = None,
     out: Annotated[
-        Path | None,
-        file_option("The point spread function to write, NetCDF (.nc).", ".nc"),
+        Path | None, file_option("Point spread function to write, NetCDF (.nc).", ".nc")
     ] = None,
     plot: Annotated[Path | None, picture_option("Draw edges, spread and MTF")] = None,
     settings: Settings = None,
 ) -> None:
-    """Determine a camera's point spread function and MTF from images of an edge."""
+    """Determine the point spread function and MTF of a camera from images of an edge."""
     from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.laboratory.measurement import load_measurement

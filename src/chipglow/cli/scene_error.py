@@ -9,22 +9,7 @@ from chipglow.text import DescriptionError
 
 
 def study_of(scene: Path, study: Path | None, emissivity: float | None) -> Study:
-    """The study, or the defaults, with a scene and perhaps one emissivity.
-
-    Parameters
-    ----------
-    scene : Path
-        The scene's file.
-    study : Path, optional
-        The study's file.
-    emissivity : float, optional
-        In the place of the study's surface.
-
-    Raises
-    ------
-    DescriptionError
-        If the emissivity is not from 0 to 1.
-    """
+    """The study, or the defaults, with a scene and perhaps one emissivity."""
     if not scene.is_file():
         raise DescriptionError(f"{scene}: there is no such file, expected a scene")
     known = Study(scene=str(scene.resolve())) if study is None else load_study(study, scene)

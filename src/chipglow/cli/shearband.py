@@ -4,9 +4,15 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from chipglow.cli.options import MeasurementFile, Settings, ToolChoice, picture_option, table_option
+from chipglow.cli.options import (
+    MeasurementFile,
+    ReferenceFrame,
+    Settings,
+    ToolChoice,
+    option,
+    picture_option,
+    table_option,
+)
 
 if TYPE_CHECKING:
     from chipglow.cli.screen import Screen
@@ -17,41 +23,27 @@ def shearband(
     measurement: MeasurementFile,
     curve: Annotated[
         str,
-        typer.Option(
-            metavar="FILE|found",
-            help="Where to read: a CSV file whose first line is x_um,y_um, from the cutting edge "
-            "outward; or 'found', the ridge of the radiance temperature in each frame.",
+        option(
+            "FILE|found",
+            "Curve to read along: a CSV file with header x_um,y_um, from the cutting edge outward; "
+            "or 'found', the ridge of the radiance temperature in each frame.",
         ),
     ] = "found",
     at: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="TIME",
-            help="The frame nearest to this time, such as '400 us'; may be repeated; by default "
-            "all frames.",
-        ),
+        option("TIME", "Frame nearest to this time, e.g. '400 us'. Repeatable. Default: all."),
     ] = None,
     tool: ToolChoice = None,
-    reference: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TIME",
-            help="The frame whose band is fully developed; by default the given curve is its "
-            "place, or the hottest and longest found band that begins near the cutting edge.",
-        ),
-    ] = None,
+    reference: ReferenceFrame = None,
     width: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LENGTH", help="Width across the curve of the mean; by default a pixel."
-        ),
+        str | None, option("LENGTH", "Averaging width across the curve. Default: one pixel.")
     ] = None,
     position: Annotated[
         str | None,
-        typer.Option(
-            metavar="LENGTH",
-            help="Standard uncertainty of the curve's position; by default that of a pixel, its "
-            "side over the root of 12, and that of the edge, where the tool is found.",
+        option(
+            "LENGTH",
+            "Standard uncertainty of the curve's position. Default: that of a pixel, its side / "
+            "√12, and that of the edge of a found tool.",
         ),
     ] = None,
     out: Annotated[Path | None, table_option("Write the temperatures along the band")] = None,
@@ -60,7 +52,7 @@ def shearband(
     ] = None,
     settings: Settings = None,
 ) -> None:
-    """Read the radiance temperature along the shear band, as the paper's Figure 9."""
+    """Read the radiance temperature along the shear band (the paper's Figure 9)."""
     from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.cli.times import frame_at

@@ -27,17 +27,7 @@ _Rows: TypeAlias = Iterator[tuple[str, str]]
 
 
 def show_scene(path: Path, at: str | None, plot: Path | None) -> None:
-    """Print what is in a scene, and draw it if a picture is wanted.
-
-    Parameters
-    ----------
-    path : Path
-        The scene's file.
-    at : str, optional
-        Time of the frame to look at, with its unit; the middle one by default.
-    plot : Path, optional
-        The picture to write, .png, .pdf or .svg.
-    """
+    """Print what is in a scene, and draw it if a picture is wanted."""
     scene = open_scene(path)
     time = None if at is None else _time_in(scene, at)
     summary = scene_summary(scene, time)
@@ -55,13 +45,7 @@ def show_scene(path: Path, at: str | None, plot: Path | None) -> None:
 
 
 def check_shown(path: Path) -> None:
-    """Refuse files of other kinds than those that can be shown.
-
-    Raises
-    ------
-    ValueError
-        If it is no scene, nor like one.
-    """
+    """Refuse files of other kinds than those that can be shown."""
     if path.is_file() and not holds(path, ()):
         raise ValueError(
             f"{path}: is no NetCDF-4 file, or cut short, expected a scene or a measurement "

@@ -31,17 +31,7 @@ _IN_FACTS: Final = ("integration_time", "lower_limit", "netd", "netd_temperature
 
 
 def show_measurement(path: Path, at: str | None, plot: Path | None) -> None:
-    """Print what is in a measurement, and draw it if a picture is wanted.
-
-    Parameters
-    ----------
-    path : Path
-        The measurement's file.
-    at : str, optional
-        Time of the frame to look at, with its unit; the middle one by default.
-    plot : Path, optional
-        The picture to write, .png, .pdf or .svg.
-    """
+    """Print what is in a measurement, and draw it if a picture is wanted."""
     measurement = read_measurement(path)
     time = None if at is None else parse_instant("--at", at)
     say_measurement(measurement, time)
@@ -49,20 +39,7 @@ def show_measurement(path: Path, at: str | None, plot: Path | None) -> None:
 
 
 def say_measurement(measurement: Measurement, time: float | None = None) -> None:
-    """Print what is in a measurement.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        Any measurement.
-    time : float, optional
-        Time in s of the frame whose temperatures are printed; the middle one by default.
-
-    Raises
-    ------
-    ValueError
-        If the time is not in the measurement.
-    """
+    """Print what is in a measurement."""
     try:
         summary = measurement_summary(measurement, time)
     except ValueError as error:

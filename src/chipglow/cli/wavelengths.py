@@ -4,9 +4,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from chipglow.cli.options import file_option, picture_option
+from chipglow.cli.options import Resume, StudyFile, Yes, file_option, picture_option
 
 if TYPE_CHECKING:
     from chipglow.analysis import WavelengthErrors
@@ -14,21 +12,17 @@ if TYPE_CHECKING:
 
 
 def wavelengths(
-    study: Annotated[Path, typer.Argument(metavar="STUDY", help="The study, a YAML file.")],
+    study: StudyFile,
     out: Annotated[
         Path | None, file_option("Write every band and pair at every place, .csv.", ".csv")
     ] = None,
     plot: Annotated[
         Path | None, picture_option("Draw the error of all bands and pairs, and its causes")
     ] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the same cut where an earlier run ended.")
-    ] = False,
-    yes: Annotated[
-        bool, typer.Option("--yes", help="Do not ask before a cut of many minutes or gigabytes.")
-    ] = False,
+    resume: Resume = False,
+    yes: Yes = False,
 ) -> None:
-    """Compare bands, alone and as ratios of two: the error of the true temperature."""
+    """Compare spectral bands and two-band ratios: the error of the true temperature."""
     from chipglow.cli.finish import figure, finish
     from chipglow.cli.progress import progress_bars, say_where_it_starts
     from chipglow.cli.screen import current

@@ -16,15 +16,7 @@ class DescriptionError(ValueError):
 
 
 def read_description(path: Path) -> Any:
-    """What a YAML file holds.
-
-    Raises
-    ------
-    DescriptionError
-        If it is too large or no YAML; the message names the file.
-    OSError
-        If it cannot be read.
-    """
+    """What a YAML file holds."""
     try:
         return read_yaml(path)
     except ValueError as error:
@@ -32,24 +24,7 @@ def read_description(path: Path) -> Any:
 
 
 def validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
-    """What a YAML file holds, as the section that it should be.
-
-    Parameters
-    ----------
-    kind : type
-        The section.
-    data : object
-        As `read_description` gives it.
-    name : str
-        The file, as errors call it.
-    folder : Path
-        Where files that it names are looked up.
-
-    Raises
-    ------
-    DescriptionError
-        If a field is not possible; the message names it, its value and what was expected.
-    """
+    """What a YAML file holds, as the section that it should be."""
     try:
         return kind.model_validate(data, context={"folder": folder.resolve()})
     except ValidationError as error:
@@ -57,47 +32,13 @@ def validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
 
 
 def load_described(kind: type[Kind], path: str | Path) -> Kind:
-    """What a YAML file holds, as the section that it should be.
-
-    Parameters
-    ----------
-    kind : type
-        The section.
-    path : str or Path
-        The file. Files that it names are looked up beside it.
-
-    Raises
-    ------
-    DescriptionError
-        If the file is no YAML or the section is not possible.
-    OSError
-        If the file cannot be read.
-    """
+    """What a YAML file holds, as the section that it should be."""
     path = Path(path)
     return validated(kind, read_description(path), path.name, path.parent)
 
 
 def described_by(kind: type[Kind], path: Path, field: str, settings: Iterable[str]) -> Kind:
-    """What a YAML file describes, or what another file alone, named by a field, means.
-
-    Parameters
-    ----------
-    kind : type
-        The section that describes it.
-    path : Path
-        A YAML file (.yaml, .yml), or the other file.
-    field : str
-        Key of the description that names the other file.
-    settings : iterable of str
-        Fields that come before those of the file: ``units.length=mm``.
-
-    Raises
-    ------
-    DescriptionError
-        If the file is no YAML or the description is not possible.
-    OSError
-        If the file cannot be read.
-    """
+    """What a YAML file describes, or what another file alone, named by a field, means."""
     described = path.suffix.lower() in (".yaml", ".yml")
     data = read_description(path) if described else {field: path.name}
     for setting in settings:

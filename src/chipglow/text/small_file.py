@@ -7,15 +7,7 @@ _LARGEST_FILE: Final = 1_000_000
 
 
 def read_small_text(path: Path) -> str:
-    """Text of a file in UTF-8, with or without a mark of its order of bytes.
-
-    Raises
-    ------
-    ValueError
-        If it is too large or no text; the message names the file.
-    OSError
-        If it cannot be read.
-    """
+    """Text of a file in UTF-8, with or without a mark of its order of bytes."""
     if path.stat().st_size > _LARGEST_FILE:
         raise ValueError(f"{path}: expected a file of up to {_LARGEST_FILE // 1000} kB")
     try:

@@ -11,29 +11,13 @@ from chipglow.quantities import Section, allowed
 
 
 def commented_yaml(header: str, section: Section, unused: Collection[str] = ()) -> str:
-    """A section as YAML, every field with a comment.
-
-    Parameters
-    ----------
-    header : str
-        Lines of comment that come first.
-    section : Section
-        The section.
-    unused : collection of str
-        Fields that are left out.
-    """
+    """A section as YAML, every field with a comment."""
     values = section.model_dump(mode="json")
     return "\n".join([header, *_section_lines(section, values, "", unused)]) + "\n"
 
 
 def json_schema(model: type[BaseModel]) -> str:
-    """JSON schema of a model, by which editors check and complete YAML.
-
-    Parameters
-    ----------
-    model : type
-        The model, such as a section of a description.
-    """
+    """JSON schema of a model, by which editors check and complete YAML."""
     dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     return json.dumps(dialect | model.model_json_schema(), indent=1) + "\n"
 

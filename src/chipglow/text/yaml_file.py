@@ -13,15 +13,7 @@ _FRACTION: Final = "tag:yaml.org,2002:float"
 
 
 def read_yaml(path: Path) -> Any:
-    """What a YAML file holds.
-
-    Raises
-    ------
-    ValueError
-        If it is too large or no YAML; the message names the file.
-    OSError
-        If it cannot be read.
-    """
+    """What a YAML file holds."""
     text = read_small_text(path)
     try:
         return parse_yaml(text)
@@ -30,13 +22,7 @@ def read_yaml(path: Path) -> Any:
 
 
 def parse_yaml(text: str) -> Any:
-    """What a text in YAML holds, read with the safe loader.
-
-    Raises
-    ------
-    ValueError
-        If it is no YAML; the message names line and column.
-    """
+    """What a text in YAML holds, read with the safe loader."""
     try:
         return yaml.load(text, Loader=_Loader)
     except ValueError as error:  # Such as an impossible date.
