@@ -348,8 +348,11 @@ def test_a_recording_knows_the_camera():
         ({"offset": 5000.0}, "Detector.offset: 5000, expected under the 4095 of 12 bits"),
         ({"bits": 0}, "Detector.bits: 0, expected 1 to 32"),
         ({"full_well": -1.0}, "Detector.full_well: -1, expected over 0"),
-        ({"correction": "three-point"}, "Detector.correction: 'three-point', expected one of two-"),
-        ({"response": 3.0}, "Detector.response: 3.0, expected one such as EnergyResponse"),
+        (
+            {"correction": "three-point"},
+            "Detector.correction: 'three-point', expected two-point",
+        ),
+        ({"response": 3.0}, "Detector.response: 3, expected DetectorResponse"),
         ({"terms": [ShotNoise()]}, r"Detector.terms: \[ShotNoise\(\)\], expected a tuple"),
         ({"terms": (ReadNoise(1.0),) * 2}, "two are of kind 'read-noise', expected one of each"),
         ({"cold": 900.0, "hot": 800.0}, "Detector.hot: 800 K, expected over the 900 K of cold"),

@@ -215,7 +215,7 @@ def test_temperatures_that_are_none_are_refused(tmp_path, values, wrong):
 def test_corners_of_the_chip_are_read_and_written_as_they_are(arrays, tmp_path):
     chip = "completion.chip=[[-300 um, 0 um], [-50 um, 0 um], [-50 um, 400 um]]"
     described = load_import(arrays, [*SETTINGS, chip])
-    assert described.completion.build().chip == ((-3e-4, 0.0), (-5e-5, 0.0), (-5e-5, 4e-4))
+    assert described.completion.chip == ((-3e-4, 0.0), (-5e-5, 0.0), (-5e-5, 4e-4))
     (tmp_path / "again.yaml").write_text(import_text(described))
     assert load_import(tmp_path / "again.yaml").completion == described.completion
 

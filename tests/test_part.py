@@ -1,5 +1,6 @@
 """Parts: one declaration makes check, section, comment, error, JSON schema and documentation."""
 
+import inspect
 import json
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint
@@ -17,7 +18,7 @@ from chipglow.camera.optics import psf
 from chipglow.cli import main
 from chipglow.io import ImportDescription, import_text
 from chipglow.laboratory.measurement import MeasurementDescription, measurement_text
-from chipglow.quantities import Declared, Family, Parameter, Part
+from chipglow.quantities import Family, Parameter, Part, adapter, changed, settings
 from chipglow.quantities.units import LENGTH, TEMPERATURE
 from chipglow.scene import Raster
 from chipglow.study import Study, study_text
@@ -52,37 +53,75 @@ def test_a_wrong_value_is_refused_in_python_with_its_limits():
         assert str(caught.value) == message
 
 
-def test_its_section_takes_text_with_units_and_builds_it():
-    section = Declared[Shelf].model_validate({"width": "20 cm", "warmth": "20 degC"})
-    assert section.build() == Shelf(0.2, 3, 293.15)
-    assert section.model_dump(mode="json") == {
+def read(data):
+    return adapter(Shelf).validate_python(data)
+
+
+def read_from_file(data):
+    return adapter(Shelf).validate_python(data, context={"folder": "."})
+
+
+def test_a_description_gives_text_with_units_and_makes_the_part():
+    shelf = read({"width": "20 cm", "warmth": "20 degC"})
+    assert shelf == Shelf(0.2, 3, 293.15)
+    assert adapter(Shelf).dump_python(shelf, mode="json") == {
         "width": "200000 um",
         "boards": 3,
         "warmth": "20 degC",
     }
-    assert Declared[Shelf].model_validate({"width": "1 m", "warmth": "none"}).warmth is None
-    assert Declared[Shelf] is Declared[Shelf]
+    assert read({"width": "1 m", "warmth": "none"}).warmth is None
     for values, message in (
         ({"width": "3 m"}, "3000000 um, expected over 0 um, up to 2000000 um"),
         ({"width": "1 m", "boards": 0}, "0, expected 1 or more"),
         ({"width": "1 m", "boards": 2.0}, "valid integer"),
         ({"width": "1 m", "warmth": "-1 degC"}, "-1 degC, expected 0 degC or more"),
         ({"width": "1 m", "hidden": "x"}, "unknown key 'hidden'"),
-        ({"width": 1.0}, "has no unit"),
         ({}, "Field required"),
     ):
         with pytest.raises(ValidationError) as caught:
-            Declared[Shelf].model_validate(values)
+            read(values)
         assert message in str(caught.value)
 
 
+def test_si_numbers_pass_from_python_only():
+    assert read({"width": 1.5}) == Shelf(1.5)
+    with pytest.raises(ValidationError, match="3000000 um, expected over 0 um"):
+        read({"width": 3.0})
+    with pytest.raises(ValidationError, match="has no unit"):
+        read_from_file({"width": 1.5})
+    assert read_from_file({"width": "1.5 m"}) == Shelf(1.5)
+
+
+def test_help_shows_plain_types():
+    signature = str(inspect.signature(Shelf))
+    assert signature.startswith("(width: float, boards: int = 3, warmth: float | None = None,")
+    assert "title: str = " in str(inspect.signature(Study))
+
+
+def test_settings_are_listed_by_path_and_changed_by_path():
+    study = Study(camera={"psf": {"kind": "gaussian", "fwhm": "8 um"}})
+    found = settings(study)
+    one = found["camera.psf.fwhm"]
+    assert (one.value, one.plain, one.unit) == (8e-6, "8 um", "um")
+    assert (one.meaning, one.parameter.most) == ("Full width at half maximum.", 0.1)
+    assert found["camera.pitch"].default == 6e-6
+    assert "{kind: gaussian" in found["camera.psf"].examples
+    changes = {"camera.psf.fwhm": 9e-6, "camera.pitch": "5 um", "cutting.friction.coefficient": 0.4}
+    other = changed(study, changes)
+    assert other.camera.psf == GaussianPSF(9e-6)
+    assert other.camera.pitch == 5e-6
+    assert other.cutting.friction.coefficient == 0.4
+    assert study.camera.psf == GaussianPSF(8e-6)
+    with pytest.raises(ValueError, match="fwhm"):
+        changed(study, {"camera.psf.fwhm": -1.0})
+
+
 def test_comment_schema_and_documentation_say_the_same():
-    section = Declared[Shelf].model_validate({"width": "1 m"})
-    text = commented_yaml("# head", section)
+    text = commented_yaml("# head", Shelf(1.0))
     assert "# Of the board.\n# Allowed: over 0 um, up to 2000000 um.\nwidth: 1000000 um\n" in text
     assert "# How many.\n# Allowed: 1 or more.\nboards: 3\n" in text
     assert "# Of the room.\n# Allowed: none, or 0 degC or more.\nwarmth: none\n" in text
-    schema = json.loads(json_schema(Declared[Shelf]))
+    schema = json.loads(json_schema(Shelf))
     assert schema["properties"]["boards"]["minimum"] == 1
     assert schema["properties"]["width"]["description"] == "Of the board."
     assert schema["required"] == ["width"]
@@ -175,11 +214,3 @@ def test_the_command_writes_the_schema(tmp_path, monkeypatch):
         main()
     assert ended.value.code in (0, None)
     assert json.loads((tmp_path / "s.json").read_text())["title"] == "Study"
-
-
-def test_a_copy_of_a_section_builds_what_it_says():
-    """Not the part of the section that it was copied from."""
-    numerics = Study.quick().cutting.numerics
-    assert numerics.build().cell == 20e-6
-    assert numerics.model_copy(update={"cell": 10e-6}).build().cell == 10e-6
-    assert numerics.build().cell == 20e-6

@@ -117,4 +117,4 @@ def test_impossible_tables_are_refused(rows, message):
 )
 def test_a_study_chooses_them(section, expected):
     study = Study.model_validate({"surface": section})
-    assert study.surface.build() == expected
+    assert study.surface == expected

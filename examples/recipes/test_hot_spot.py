@@ -5,7 +5,7 @@ import pytest
 from hot_spot import HotSpot
 
 from chipglow import Band, Measurement, Raster
-from chipglow.quantities import Declared
+from chipglow.quantities import adapter
 
 BAND, FRAMES = Band(3.8e-6, 5.1e-6), 30
 
@@ -37,7 +37,8 @@ def test_the_budget_names_both_components():
 
 
 def test_its_settings_are_a_section():
-    section = Declared[HotSpot].model_validate({"pixels": 3, "calibration": "1.5 K"})
-    assert section.build() == HotSpot(3, 1.5)
+    assert adapter(HotSpot).validate_python({"pixels": 3, "calibration": "1.5 K"}) == HotSpot(
+        3, 1.5
+    )
     with pytest.raises(ValueError, match="1 or more"):
-        Declared[HotSpot].model_validate({"pixels": 0})
+        adapter(HotSpot).validate_python({"pixels": 0})

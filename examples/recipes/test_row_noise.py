@@ -5,7 +5,7 @@ import pytest
 from row_noise import RowNoise
 
 from chipglow.camera import DETECTOR_TERMS, Detector, EnergyResponse
-from chipglow.quantities import Declared
+from chipglow.quantities import adapter
 
 
 def test_rows_differ_and_elements_of_a_row_do_not():
@@ -20,7 +20,6 @@ def test_rows_differ_and_elements_of_a_row_do_not():
 
 def test_descriptions_choose_it_by_its_kind():
     assert DETECTOR_TERMS.parts["row-noise"] is RowNoise
-    section = Declared[RowNoise].model_validate({"standard_deviation": 100.0})
-    assert section.build() == RowNoise(100.0)
+    assert adapter(RowNoise).validate_python({"standard_deviation": 100.0}) == RowNoise(100.0)
     with pytest.raises(ValueError, match="expected 0 or more"):
         RowNoise(-1.0)

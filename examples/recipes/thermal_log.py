@@ -11,14 +11,14 @@ The source is read in a subprocess, which imports the module: a class of a noteb
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io import ImportDescription, SourceSection
 from chipglow.io.sources import Source, SourceError, Survey
-from chipglow.quantities import described
+from chipglow.quantities import Parameter
 from chipglow.scene import Material, Raster, SampledFrame
 
 
@@ -28,7 +28,7 @@ class ThermalLogSection(SourceSection):
     kind: ClassVar[str] = "thermal-log"
     title: ClassVar[str] = "a thermal log"
     endings: ClassVar[tuple[str, ...]] = (".tlog",)
-    offset: float = described(0.0, "Added to the temperatures, in K.")
+    offset: Annotated[float, Parameter("Added to the temperatures, in K.")] = 0.0
 
     def source(self, whole: ImportDescription) -> Source:
         """The source that the whole describes."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from chipglow.quantities import Declared
+from chipglow.camera import EquivalentNoise, GaussianPSF
 from chipglow.quantities.units import (
     INSTANT,
     LENGTH,
@@ -246,7 +246,7 @@ def knobs_of(study: Study, start: float, cursor: Point, rake: Ends, band: Ends) 
         offset_down=camera.offset_down,
         psf=kind if kind in own or psf is None else STUDYS,
         numerical_aperture=getattr(psf, "numerical_aperture", 0.28),
-        fwhm=psf.fwhm if kind == "gaussian" and psf is not None else 8e-6,
+        fwhm=psf.fwhm if isinstance(psf, GaussianPSF) else 8e-6,
         psf_order=camera.psf_order,
         netd=_netd(camera),
         lower_limit=camera.build().lower_limit,
@@ -269,8 +269,9 @@ def _netd(camera: CameraSection) -> float:
     if camera.detector is None:
         return 0.0
     terms = camera.detector.terms
-    netd = float(terms[0].netd) if len(terms) == 1 and terms[0].kind == "netd" else -1.0
-    return netd if netd > 0 and camera.detector.build() == _noisy(netd).build() else -1.0
+    (only,) = terms if len(terms) == 1 else (None,)
+    netd = only.netd if isinstance(only, EquivalentNoise) else -1.0
+    return netd if netd > 0 and camera.detector == _noisy(netd) else -1.0
 
 
 def _noisy(netd: float) -> Any:
@@ -491,9 +492,7 @@ class ControlPanel:
     def _surface(self, knobs: Knobs) -> Any:
         section = self.study.surface
         if knobs.surface == UNIFORM:
-            return Declared[UniformEmissivity].model_validate(
-                {"kind": "uniform", "emissivity": knobs.emissivity}
-            )
+            return UniformEmissivity(knobs.emissivity)
         if not isinstance(section, FeaturesSection):
             return section
         if knobs.surface != OWN:

@@ -16,7 +16,6 @@ from chipglow.camera import Measurement
 from chipglow.io import StoredScene, example_scene, is_measurement, open_scene, read_measurement
 from chipglow.io.sandbox import Sandbox, patience_for
 from chipglow.laboratory.chip import Instant, contact_length
-from chipglow.quantities import Declared
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study
 from chipglow.surface import UniformEmissivity
@@ -73,10 +72,7 @@ class OpenedScene:
             If the scene is shorter than the study's exposure.
         """
         if "plastic_strain" not in scene.fields and study.surface == Study().surface:
-            surface = {"kind": "uniform", "emissivity": 0.5}
-            study = study.model_copy(
-                update={"surface": Declared[UniformEmissivity].model_validate(surface)}
-            )
+            study = study.model_copy(update={"surface": UniformEmissivity(0.5)})
         duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
         start = _start(scene, duration)
         place = _places(scene, start, study.camera.integration_time)

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from chipglow.quantities import Declared
 from chipglow.study import Study, load_study
 from chipglow.surface import UniformEmissivity
 from chipglow.text import DescriptionError
@@ -17,8 +16,4 @@ def study_of(scene: Path, study: Path | None, emissivity: float | None) -> Study
         return known
     if not 0 <= emissivity <= 1:
         raise DescriptionError(f"--emissivity: {emissivity:g}, expected 0 to 1")
-    return known.model_copy(update={"surface": _uniform(emissivity)})
-
-
-def _uniform(emissivity: float) -> Declared[UniformEmissivity]:
-    return Declared[UniformEmissivity].model_validate({"emissivity": emissivity})
+    return known.model_copy(update={"surface": UniformEmissivity(emissivity)})

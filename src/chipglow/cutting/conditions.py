@@ -32,7 +32,7 @@ class CuttingConditions(Part):
     cutting_length: Annotated[
         float,
         Parameter(
-            "Cutting length, from the first contact. The paper's window ends at 1.958 mm;\n"
+            "Cutting length, from the first contact. The paper's window ends at 1.958 mm; "
             "segments after it make the scatter of the headlines known.",
             CUT_LENGTH,
             over=0.0,
@@ -66,7 +66,7 @@ class Friction(Part):
     thermal_exponent: Annotated[
         float | None,
         Parameter(
-            "Exponent q of a coefficient that falls with the temperature T of the chip's surface,\n"
+            "Exponent q of a coefficient that falls with the temperature T of the chip's surface, "
             "coefficient * (1 - (T / T_melt)^q) with both in K (Moufki et al. 1998).",
             over=0.0,
             most=100.0,
@@ -135,8 +135,8 @@ class OutputWindow(Part):
     later_bands: Annotated[
         int,
         Parameter(
-            "Segments after the window of which one exposure is kept, when the shear band is\n"
-            "developed, so that the headlines are drawn from several segments; as many as\n"
+            "Segments after the window of which one exposure is kept, when the shear band is "
+            "developed, so that the headlines are drawn from several segments; as many as "
             "cutting_length leaves room for.",
             least=0,
             most=1000,
@@ -145,7 +145,7 @@ class OutputWindow(Part):
     band_delay: Annotated[
         float,
         Parameter(
-            "When the band is developed: this part of the time between the last two valleys of\n"
+            "When the band is developed: this part of the time between the last two valleys of "
             "the cutting force after the later one.",
             least=0.0,
             most=1.0,
@@ -189,8 +189,8 @@ class Numerics(Part):
     mass_scaling: Annotated[
         float | None,
         Parameter(
-            "Factor on the density in the equation of motion, for longer time steps; none: by\n"
-            "the speed, so that the scaled mass makes less than 0.5 % of the cutting force.",
+            "Factor on the density in the equation of motion, for longer time steps; none: by the "
+            "speed, so that the scaled mass makes less than 0.5 % of the cutting force.",
             least=1.0,
             most=1e4,
         ),

@@ -48,7 +48,7 @@ class JohnsonCookDamage(Part):
     loss: Annotated[
         float,
         Parameter(
-            "Fraction of the flow stress that is lost in the end: cracks that are pressed shut\n"
+            "Fraction of the flow stress that is lost in the end: cracks that are pressed shut "
             "still rub.",
             least=0.0,
             under=1.0,

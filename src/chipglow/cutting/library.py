@@ -13,7 +13,6 @@ from chipglow.cutting.flow_stress import FLOW_LAWS
 from chipglow.cutting.material import RateTable, TemperatureTable, ToolMaterial, WorkpieceMaterial
 from chipglow.cutting.nonlocal_viscosity import NonlocalViscosity
 from chipglow.quantities import Parameter, of_other_packages
-from chipglow.quantities.part import parameters
 from chipglow.quantities.units import KELVINS, STRAIN_RATE
 from chipglow.text import read_yaml
 
@@ -187,6 +186,11 @@ def _in_library(name: str) -> MaterialFile | None:
     own = {name: path for paths in _OWN.values() for name, path in paths.items()}
     path = own.get(name) or of_other_packages(_GROUP).get(name)
     return None if path is None else read_material(Path(path))
+
+
+def parameters(part: Any) -> dict[str, Parameter]:
+    """What a part's fields declare, by their names."""
+    return {name: one.parameter for name, one in part.declared.items()}
 
 
 def _kind(material: MaterialFile) -> str:

@@ -10,7 +10,6 @@ from chipglow.cutting.damage import BAND_CELLS, BAND_LENGTHS, FittedDamage, John
 from chipglow.cutting.flow_stress import FlowStress
 from chipglow.cutting.nonlocal_viscosity import NonlocalViscosity
 from chipglow.quantities import Parameter, Part
-from chipglow.quantities.part import parameters
 from chipglow.quantities.units import CONDUCTIVITY, DENSITY, HEAT_CAPACITY, STRESS
 
 TABLE_COLDEST: Final = 200.0
@@ -136,7 +135,7 @@ class WorkpieceMaterial(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name, parameter in parameters(type(self)).items():
+        for name, (_, _, parameter) in self.declared.items():
             for value in getattr(getattr(self, name), "values", ()):
                 if not parameter.holds(value):
                     raise parameter.refusal(f"{type(self).__name__}.{name}", value)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from pydantic import create_model, model_validator
+from pydantic import Field, create_model, model_validator
 
 from chipglow.io.importing import Import, View
 from chipglow.io.sandbox import Isolated
@@ -28,16 +28,20 @@ from chipglow.io.sources.movie import (
 from chipglow.io.sources.overlays import Box
 from chipglow.io.tool_section import ToolSection
 from chipglow.quantities import (
-    OR_NONE,
-    Declared,
     Family,
     FileBeside,
+    Parameter,
     Parameters,
     Section,
     Settings,
-    described,
 )
-from chipglow.quantities.units import Length, Position, Time, Unit, parse_unit
+from chipglow.quantities.units import (
+    LENGTH,
+    POSITION,
+    TIME,
+    Unit,
+    parse_unit,
+)
 from chipglow.scene.completion import Completion
 from chipglow.text import commented_yaml, described_by
 
@@ -48,15 +52,22 @@ IMPORT_SOURCES: Final = Family("import_source")
 class UnitsSection(Settings[Units]):
     """Units of the source."""
 
-    length: str = described("m", "Unit of positions and lengths.", "m, mm, um, in, ...")
-    time: str = described("s", "Unit of times.", "s, ms, us, ...")
-    temperature: str = described("K", "Unit of temperatures.", "K, degC, degF")
-    velocity: Annotated[str | None, OR_NONE] = described(
-        "none", "Unit of velocities; none: made of length and time.", "none, m/s, mm/s, m/min, ..."
-    )
-    strain_rate: Annotated[str | None, OR_NONE] = described(
-        "none", "Unit of strain rates; none: made of the time.", "none, 1/s, 1/ms, ..."
-    )
+    length: Annotated[
+        str, Parameter("Unit of positions and lengths.", allowed="m, mm, um, in, ...")
+    ] = "m"
+    time: Annotated[str, Parameter("Unit of times.", allowed="s, ms, us, ...")] = "s"
+    temperature: Annotated[str, Parameter("Unit of temperatures.", allowed="K, degC, degF")] = "K"
+    velocity: Annotated[
+        str | None,
+        Parameter(
+            "Unit of velocities; none: made of length and time.",
+            allowed="none, m/s, mm/s, m/min, ...",
+        ),
+    ] = None
+    strain_rate: Annotated[
+        str | None,
+        Parameter("Unit of strain rates; none: made of the time.", allowed="none, 1/s, 1/ms, ..."),
+    ] = None
 
     def build(self) -> Units:
         """The units."""
@@ -78,18 +89,27 @@ class UnitsSection(Settings[Units]):
 class PlacementSection(Settings[Placement]):
     """How the source's axes lie in the scene, whose x runs along the cut and whose y goes up."""
 
-    horizontal: str = described(
-        "x",
-        "The source's axis along the workpiece's motion toward the tool.",
-        "x, y, z, -x, -y, -z",
-    )
-    vertical: str = described(
-        "y", "The source's axis from the cut surface into the chip.", "x, y, z, -x, -y, -z"
-    )
-    origin_horizontal: Position = described(
-        "0 um", "Where the tip of the tool is on the horizontal axis, in the source's coordinates."
-    )
-    origin_vertical: Position = described("0 um", "The same on the vertical axis.")
+    horizontal: Annotated[
+        str,
+        Parameter(
+            "The source's axis along the workpiece's motion toward the tool.",
+            allowed="x, y, z, -x, -y, -z",
+        ),
+    ] = "x"
+    vertical: Annotated[
+        str,
+        Parameter(
+            "The source's axis from the cut surface into the chip.", allowed="x, y, z, -x, -y, -z"
+        ),
+    ] = "y"
+    origin_horizontal: Annotated[
+        float,
+        Parameter(
+            "Where the tip of the tool is on the horizontal axis, in the source's coordinates.",
+            POSITION,
+        ),
+    ] = 0.0
+    origin_vertical: Annotated[float, Parameter("The same on the vertical axis.", POSITION)] = 0.0
 
     def build(self) -> Placement:
         """The placement."""
@@ -122,43 +142,57 @@ class SourceSection(Section):
 class FieldMovieSection(Section):
     """A movie of one field."""
 
-    file: Annotated[FileBeside | None, OR_NONE] = described("none", "The movie.")
-    first: str | int | float = described(
-        "", "Value of the first colour, or at the bottom or left of the legend."
-    )
-    last: str | int | float = described(
-        "", "Value of the last colour, or at the top or right of the legend."
-    )
-    colours: Annotated[str | None, OR_NONE] = described(
-        "none",
-        "Name of the colour map; none: the legend in the picture is read.",
-        "none, rainbow, jet, viridis, ... of matplotlib",
-    )
-    bands: int = described(0, "Number of the map's bands; 0: it runs without steps.", "0, 2 to 256")
-    legend: Annotated[Box | None, OR_NONE] = described(
-        "none",
-        "Left, top, right and bottom pixel of the legend's colours; none: it is looked for.",
-        "none, or [600, 40, 620, 400]",
-    )
+    file: Annotated[FileBeside | None, Parameter("The movie.")] = None
+    first: Annotated[
+        str | int | float,
+        Parameter("Value of the first colour, or at the bottom or left of the legend."),
+    ] = ""
+    last: Annotated[
+        str | int | float,
+        Parameter("Value of the last colour, or at the top or right of the legend."),
+    ] = ""
+    colours: Annotated[
+        str | None,
+        Parameter(
+            "Name of the colour map; none: the legend in the picture is read.",
+            allowed="none, rainbow, jet, viridis, ... of matplotlib",
+        ),
+    ] = None
+    bands: Annotated[
+        int,
+        Parameter("Number of the map's bands; 0: it runs without steps.", allowed="0, 2 to 256"),
+    ] = 0
+    legend: Annotated[
+        Box | None,
+        Parameter(
+            "Left, top, right and bottom pixel of the legend's colours; none: it is looked for.",
+            allowed="none, or [600, 40, 620, 400]",
+        ),
+    ] = None
 
 
 class MoviesSection(Section):
     """Movies by their field, and how large their pixels are."""
 
-    temperature: FieldMovieSection = described({}, "The movie of the temperature.")
-    plastic_strain: Annotated[FieldMovieSection | None, OR_NONE] = described(
-        "none", "The movie of the plastic strain."
+    temperature: Annotated[FieldMovieSection, Parameter("The movie of the temperature.")] = Field(
+        default_factory=FieldMovieSection
     )
-    plastic_strain_rate: Annotated[FieldMovieSection | None, OR_NONE] = described(
-        "none", "The movie of the plastic strain rate."
-    )
-    pixel: Annotated[Length | None, OR_NONE] = described("none", "Side of a pixel.")
-    scale_from: Annotated[Pixel | None, OR_NONE] = described(
-        "none", "A point whose distance from another is known, in pixels right and down.",
-        "none, or [120, 400]",
-    )  # fmt: skip
-    scale_to: Annotated[Pixel | None, OR_NONE] = described("none", "The other point.")
-    scale_length: Annotated[Length | None, OR_NONE] = described("none", "Their distance.")
+    plastic_strain: Annotated[
+        FieldMovieSection | None, Parameter("The movie of the plastic strain.")
+    ] = None
+    plastic_strain_rate: Annotated[
+        FieldMovieSection | None, Parameter("The movie of the plastic strain rate.")
+    ] = None
+    pixel: Annotated[float | None, Parameter("Side of a pixel.", LENGTH)] = None
+    scale_from: Annotated[
+        Pixel | None,
+        Parameter(
+            "A point whose distance from another is known, in pixels right and down.",
+            allowed="none, or [120, 400]",
+        ),
+    ] = None
+    scale_to: Annotated[Pixel | None, Parameter("The other point.")] = None
+    scale_length: Annotated[float | None, Parameter("Their distance.", LENGTH)] = None
 
 
 @IMPORT_SOURCES.part
@@ -290,11 +324,13 @@ class GridSection(SourceSection, Parameters[GridSource]):
     title: ClassVar[str] = "a grid"
     endings: ClassVar[tuple[str, ...]] = tuple(ARRAY_READERS)
 
-    files: Annotated[dict[str, FileBeside] | None, OR_NONE] = described(
-        "none",
-        "Files by the names of fields, in the place of source.",
-        "none, or {temperature: T.npy, plastic_strain: strain.npy}",
-    )
+    files: Annotated[
+        dict[str, FileBeside] | None,
+        Parameter(
+            "Files by the names of fields, in the place of source.",
+            allowed="none, or {temperature: T.npy, plastic_strain: strain.npy}",
+        ),
+    ] = None
 
     def source(self, whole: "ImportDescription") -> GridSource:
         """The source that this section describes."""
@@ -311,31 +347,49 @@ class GridSection(SourceSection, Parameters[GridSource]):
 class ImportDescription(Section):
     """An import: which source, what its fields mean, where they are sampled."""
 
-    source: Annotated[FileBeside | None, OR_NONE] = described(
-        "none", "The file, or a pattern for several: chip_*.vtu."
+    source: Annotated[
+        FileBeside | None, Parameter("The file, or a pattern for several: chip_*.vtu.")
+    ] = None
+    kind: Annotated[
+        Literal["movie", "mesh", "points", "grid"] | None,
+        Parameter(
+            "What the source is; none: the file's name says it.",
+            allowed="movie, mesh, points, grid",
+        ),
+    ] = None
+    fields: Annotated[
+        dict[str, str],
+        Parameter(
+            "Names in the source by names of a scene; the usual names are known.",
+            allowed="{temperature: NT11, plastic_strain: PEEQ, plastic_strain_rate: ..., "
+            "velocity: V}",
+        ),
+    ] = Field(default_factory=dict)
+    units: Annotated[UnitsSection, Parameter("Units of the source: SI if nothing is said.")] = (
+        Field(default_factory=UnitsSection)
     )
-    kind: Annotated[Literal["movie", "mesh", "points", "grid"] | None, OR_NONE] = described(
-        "none", "What the source is; none: the file's name says it.", "movie, mesh, points, grid"
+    interval: Annotated[
+        float | None, Parameter("Time from frame to frame; none: as the source says.", TIME)
+    ] = None
+    placement: Annotated[PlacementSection, Parameter("How the source's axes lie in the scene.")] = (
+        Field(default_factory=PlacementSection)
     )
-    fields: dict[str, str] = described(
-        {},
-        "Names in the source by names of a scene; the usual names are known.",
-        "{temperature: NT11, plastic_strain: PEEQ, plastic_strain_rate: ..., velocity: V}",
+    field_of_view: Annotated[View, Parameter("Where the scene is sampled.")] = View()
+    tool: Annotated[
+        ToolSection | None,
+        Parameter("The tool's outline with its tip at the origin: what is in it is tool."),
+    ] = None
+    completion: Annotated[Completion, Parameter("What stands in for what the source lacks.")] = (
+        Completion()
     )
-    units: UnitsSection = described({}, "Units of the source: SI if nothing is said.")
-    interval: Annotated[Time | None, OR_NONE] = described(
-        "none", "Time from frame to frame; none: as the source says."
+    mesh: Annotated[MeshSection, Parameter("More of a mesh.")] = Field(default_factory=MeshSection)
+    movie: Annotated[MovieSection, Parameter("More of a movie.")] = Field(
+        default_factory=MovieSection
     )
-    placement: PlacementSection = described({}, "How the source's axes lie in the scene.")
-    field_of_view: Declared[View] = described({}, "Where the scene is sampled.")
-    tool: Annotated[ToolSection | None, OR_NONE] = described(
-        "none", "The tool's outline with its tip at the origin: what is in it is tool."
+    points: Annotated[PointsSection, Parameter("More of points.")] = Field(
+        default_factory=PointsSection
     )
-    completion: Declared[Completion] = described({}, "What stands in for what the source lacks.")
-    mesh: MeshSection = described({}, "More of a mesh.")
-    movie: MovieSection = described({}, "More of a movie.")
-    points: PointsSection = described({}, "More of points.")
-    grid: GridSection = described({}, "More of a grid.")
+    grid: Annotated[GridSection, Parameter("More of a grid.")] = Field(default_factory=GridSection)
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -365,11 +419,11 @@ class ImportDescription(Section):
     def build(self) -> Import:
         """The import that is described."""
         section: SourceSection = getattr(self, self.kind_of_source())
-        completion = self.completion.build()
+        completion = self.completion
         tool = self.tool.build() if self.tool else None
         return Import(
             Isolated(section.source(self), Path(self.source or "movie").name),
-            self.field_of_view.build(),
+            self.field_of_view,
             replace(completion, tool=tool),
             self.model_dump(mode="json"),
             self._assumptions(),
@@ -402,10 +456,13 @@ def import_description() -> type[ImportDescription]:
     }
     if not added:
         return ImportDescription
-    kinds = Annotated[Literal[*parts] | None, OR_NONE]  # type: ignore[valid-type]
-    sections = {k: (part, described({}, f"More of {part.title}.")) for k, part in added.items()}
-    said = described("none", "What the source is; none: the file's name says it.", ", ".join(parts))
-    fields: Any = {"kind": (kinds, said), **sections}
+    known = Parameter(
+        "What the source is; none: the file's name says it.", allowed=", ".join(parts)
+    )
+    fields: Any = {"kind": (Annotated[Literal[*parts] | None, known], None)}
+    for kind, part in added.items():
+        more = Parameter(f"More of {part.title}.")
+        fields[kind] = (Annotated[part, more], Field(default_factory=part))
     return create_model("ImportDescription", __base__=ImportDescription, **fields)
 
 

@@ -1,6 +1,7 @@
 """The cutting tool as a section of YAML files, and its outline as a file."""
 
 import os
+from math import radians
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -8,45 +9,59 @@ from pydantic import field_validator, model_validator
 
 from chipglow.cutting import material_names, tool_material
 from chipglow.io.column_file import read_polyline
-from chipglow.quantities import OR_NONE, Declared, FileBeside, Settings, described
-from chipglow.quantities.units import Angle, Length
+from chipglow.quantities import FileBeside, Parameter, Settings
+from chipglow.quantities.units import ANGLE, LENGTH
 from chipglow.scene import Chamfer, Hone, Tool, ToolGeometry, ToolOutline, ToolOutlineError
 
 
 class ToolSection(Settings[Tool]):
     """The cutting tool."""
 
-    rake_angle: Angle = described(
-        "-7 deg",
-        "Rake angle; negative: the rake face leans over the chip.",
-        "over -60 deg, under 60 deg; a wedge of 5 deg or more must be left",
-    )
-    clearance_angle: Angle = described(
-        "7 deg",
-        "Angle between the tool's flank and the cut surface.",
-        "over 0 deg, under 45 deg",
-    )
-    edge_radius: Length = described(
-        "20 um", "Radius of the cutting edge, or of a chamfer's corners.", "over 0 um"
-    )
-    chamfer: Annotated[Declared[Chamfer] | None, OR_NONE] = described(
-        "none",
-        "Chamfer of the edge: the width between sharp corners, the angle from the rake face.",
-        "none, or {width: 100 um, angle: 20 deg}",
-    )
-    hone: Annotated[Declared[Hone] | None, OR_NONE] = described(
-        "none",
-        "Hone in the place of the edge's radius: how far from the sharp edge it begins on\n"
-        "either face.",
-        "none, or {rake: 40 um, clearance: 20 um}",
-    )
-    outline: Annotated[FileBeside | None, OR_NONE] = described(
-        "none",
-        "File of an outline in the place of all these: its first line x_um,y_um, then a point a\n"
-        "line, from the rake face round the edge to the flank face.",
-        "none, or a file such as edge.csv",
-    )
-    material: str = described("carbide", "Material of the tool.", ", ".join(material_names("tool")))
+    rake_angle: Annotated[
+        float,
+        Parameter(
+            "Rake angle; negative: the rake face leans over the chip.",
+            ANGLE,
+            allowed="over -60 deg, under 60 deg; a wedge of 5 deg or more must be left",
+        ),
+    ] = radians(-7.0)
+    clearance_angle: Annotated[
+        float,
+        Parameter(
+            "Angle between the tool's flank and the cut surface.",
+            ANGLE,
+            allowed="over 0 deg, under 45 deg",
+        ),
+    ] = radians(7.0)
+    edge_radius: Annotated[
+        float, Parameter("Radius of the cutting edge, or of a chamfer's corners.", LENGTH, over=0.0)
+    ] = 20e-6
+    chamfer: Annotated[
+        Chamfer | None,
+        Parameter(
+            "Chamfer of the edge: the width between sharp corners, the angle from the rake face.",
+            allowed="none, or {width: 100 um, angle: 20 deg}",
+        ),
+    ] = None
+    hone: Annotated[
+        Hone | None,
+        Parameter(
+            "Hone in the place of the edge's radius: how far from the sharp edge it begins on "
+            "either face.",
+            allowed="none, or {rake: 40 um, clearance: 20 um}",
+        ),
+    ] = None
+    outline: Annotated[
+        FileBeside | None,
+        Parameter(
+            "File of an outline in the place of all these: its first line x_um,y_um, then a point "
+            "a line, from the rake face round the edge to the flank face.",
+            allowed="none, or a file such as edge.csv",
+        ),
+    ] = None
+    material: Annotated[
+        str, Parameter("Material of the tool.", allowed=", ".join(material_names("tool")))
+    ] = "carbide"
 
     @field_validator("material")
     @classmethod
@@ -79,8 +94,8 @@ class ToolSection(Settings[Tool]):
             self.rake_angle,
             self.clearance_angle,
             self.edge_radius,
-            self.chamfer.build() if self.chamfer else None,
-            self.hone.build() if self.hone else None,
+            self.chamfer,
+            self.hone,
         )
 
 

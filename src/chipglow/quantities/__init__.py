@@ -1,47 +1,38 @@
-"""Units and their text, values as tables print them, and fields declared once."""
+"""Units and their text, values as tables print them, and settings declared once."""
 
-from chipglow.quantities.field_tables import FieldEntry, field_entries, field_tables
 from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
-from chipglow.quantities.part import (
-    Declared,
-    Family,
-    Parameter,
-    Parameters,
-    Part,
-    Settings,
-    of_other_packages,
-)
-from chipglow.quantities.section import (
-    OR_NONE,
-    FileBeside,
-    OrWord,
-    Section,
-    allowed,
-    beside_the_study,
-    described,
+from chipglow.quantities.parameter import Parameter
+from chipglow.quantities.part import Family, Parameters, Part, adapter, of_other_packages
+from chipglow.quantities.section import FileBeside, Section, Settings, beside_the_study
+from chipglow.quantities.settings import (
+    Setting,
+    changed,
+    field_tables,
+    given,
+    own_settings,
+    settings,
 )
 from chipglow.quantities.units import Quantity
 
 __all__ = [
-    "OR_NONE",
-    "Declared",
     "Family",
-    "FieldEntry",
     "FileBeside",
-    "OrWord",
     "Parameter",
     "Parameters",
     "Part",
     "Quantity",
     "Section",
+    "Setting",
     "Settings",
-    "allowed",
+    "adapter",
     "beside_the_study",
-    "described",
-    "field_entries",
+    "changed",
     "field_tables",
+    "given",
     "of_other_packages",
+    "own_settings",
     "quantity_text",
     "rounded_text",
+    "settings",
     "uncertain_text",
 ]

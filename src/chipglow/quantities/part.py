@@ -1,174 +1,48 @@
-"""Parts that a description can choose: parameters declared once, kinds found by their name."""
+"""Parts: objects of the library whose settings are declared once, for Python and descriptions."""
 
 import inspect
-import re
 import reprlib
-from abc import abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, dataclass, fields
-from functools import cache, cached_property
+from dataclasses import MISSING, fields as dataclass_fields
+from functools import cache
 from importlib.metadata import entry_points
-from math import isfinite
-from numbers import Integral, Real
-from types import NoneType, UnionType
-from typing import (
-    TYPE_CHECKING,
-    Any,
-    ClassVar,
-    Final,
-    Generic,
-    Literal,
-    Self,
-    TypeVar,
-    Union,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from inspect import isabstract
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, NamedTuple, TypeVar
 from warnings import warn
 
-import pydantic
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, create_model, model_validator
+from pydantic import (
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    SerializationInfo,
+    SerializerFunctionWrapHandler,
+    TypeAdapter,
+    ValidatorFunctionWrapHandler,
+    create_model,
+)
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from chipglow.quantities.section import OR_NONE, Section, described, or_the_word, or_word
-from chipglow.quantities.units import Quantity, is_bare_number
+from chipglow.quantities.parameter import Parameter
+from chipglow.quantities.section import STRICT, Section, known_keys, naming_file
 
-Built = TypeVar("Built")
-PartType = TypeVar("PartType", bound="type[Part | Section]")
+Class = TypeVar("Class", bound=type)
+PartType = TypeVar("PartType")
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """What a parameter means, how descriptions write it and which values it may have.
+class Declaration(NamedTuple):
+    """A field of a part that descriptions have: annotation, type and parameter."""
 
-    An annotation of a part's field. Limits are numbers in SI; those of a range or of a text are
-    its type's own.
-
-    Parameters
-    ----------
-    meaning : str
-        A sentence.
-    quantity : Quantity, optional
-        How a description writes it; without one it is a plain number, word or file.
-    over, least, under, most : float, optional
-        Limits: `over` and `under` are not reached, `least` and `most` are.
-    """
-
-    meaning: str
-    quantity: Quantity | None = None
-    over: float | None = None
-    least: float | None = None
-    under: float | None = None
-    most: float | None = None
-
-    @property
-    def limits(self) -> str:
-        """The values it may have, in words and in the unit of descriptions."""
-        return self._limits(self.text)
-
-    @property
-    def si_limits(self) -> str:
-        """The same in SI units."""
-        return self._limits(self.si_text)
-
-    @property
-    def is_limited(self) -> bool:
-        """Whether it has limits."""
-        return any(one is not None for one in (self.over, self.least, self.under, self.most))
-
-    def text(self, value: float) -> str:
-        """A value as descriptions write it."""
-        return f"{value:g}" if self.quantity is None else self.quantity.text(value)
-
-    def si_text(self, value: object) -> str:
-        """A value in SI units."""
-        if not isinstance(value, Real) or isinstance(value, bool):
-            return repr(value)
-        return f"{float(value):g} {self.quantity.base if self.quantity else ''}".strip()
-
-    def number(self, value: object) -> float:
-        """SI number of a value as descriptions write it, with its unit if it has one.
-
-        Raises
-        ------
-        ValueError
-            If it is no such number, or outside the limits.
-        """
-        if self.quantity is not None:
-            number = self.quantity.parse(value)
-        elif is_bare_number(value):
-            number = float(str(value).replace("−", "-"))
-        else:
-            raise ValueError(f"{value!r}, expected a number without a unit")
-        return float(self._within(number))
-
-    def refusal(self, name: str, value: object) -> ValueError:
-        """The error for a value that it may not have, in SI units."""
-        return ValueError(f"{name}: {self.si_text(value)}, expected {self.si_limits}")
-
-    def _limits(self, text: Callable[[float], str]) -> str:
-        if self.least is not None and self.most is not None:
-            return f"{text(self.least)} to {text(self.most)}"
-        words = (
-            "" if self.over is None else f"over {text(self.over)}",
-            "" if self.least is None else f"{text(self.least)} or more",
-            "" if self.under is None else f"under {text(self.under)}",
-            "" if self.most is None else f"up to {text(self.most)}",
-        )
-        return ", ".join(word for word in words if word) or "a finite number"
-
-    def holds(self, value: object) -> bool:
-        """Whether a value is within the limits; what is no number has none."""
-        if not isinstance(value, Real) or isinstance(value, bool):
-            return True
-        number = float(value)
-        return (
-            isfinite(number)
-            and (self.over is None or number > self.over)
-            and (self.least is None or number >= self.least)
-            and (self.under is None or number < self.under)
-            and (self.most is None or number <= self.most)
-        )
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Schema of a description's field: text with a unit or a plain value, within the limits."""
-        plain, optional = _without_none(source)
-        if self.quantity is None:
-            schema = handler(source)
-        else:
-            schema = self.quantity.__get_pydantic_core_schema__(plain, handler)
-        schema = core_schema.no_info_after_validator_function(self._within, schema)
-        return or_word(schema, OR_NONE.word, OR_NONE.value) if optional else schema
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        """JSON schema: a text with a unit, or a plain value with its limits."""
-        text = {"type": "string", "examples": [self.quantity.example]} if self.quantity else None
-        json: JsonSchemaValue = text or handler(schema)
-        if json.get("type") in ("number", "integer"):
-            names = ("exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
-            limits = (self.over, self.least, self.under, self.most)
-            json |= {k: v for k, v in zip(names, limits, strict=True) if v is not None}
-        optional = schema["type"] == "function-wrap"  # `or_word` made it
-        return or_the_word(json, OR_NONE.word) if optional else json
-
-    def _within(self, value: Any) -> Any:
-        if not self.holds(value):
-            raise ValueError(f"{self.text(value)}, expected {self.limits}")
-        return value
+    annotation: Any
+    kind: Any
+    parameter: Parameter
 
 
 class Part:
     """A frozen dataclass whose fields declare their `Parameter`.
 
     From this one declaration come the check of the values, the section of descriptions with its
-    comments, errors and JSON schema (`Declared`), and the parameters in the documentation. Fields
-    without a `Parameter` are not for descriptions.
+    comments, errors and JSON schema, and the parameters in the documentation. Fields without a
+    `Parameter` are not for descriptions.
 
     Attributes
     ----------
@@ -185,48 +59,88 @@ class Part:
 
     kind: ClassVar[str] = ""
     example: ClassVar[str] = ""
+    declared: ClassVar[Mapping[str, Declaration]] = {}
+    """What the fields declare, by their names."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def __init_subclass__(cls, **arguments: Any) -> None:
         super().__init_subclass__(**arguments)
-        own = inspect.cleandoc(cls.__dict__.get("__doc__") or "")
-        if own and (rows := _documented(cls)):
-            cls.__doc__ = _with_parameters(own, rows)
+        own = inspect.get_annotations(cls)
+        if any(isinstance(annotation, str) for annotation in own.values()):
+            own = inspect.get_annotations(cls, eval_str=True)
+        inherited = [vars(base).get("declared", {}) for base in reversed(cls.__mro__[1:])]
+        declared = {name: one for each in inherited for name, one in each.items()}
+        for name, annotation in own.items():
+            metadata = getattr(annotation, "__metadata__", ())
+            parameter = next((one for one in metadata if isinstance(one, Parameter)), None)
+            if parameter is None:
+                declared.pop(name, None)
+                continue
+            declared[name] = Declaration(annotation, annotation.__origin__, parameter)
+            # The dataclass, `help` and signatures see the plain type.
+            cls.__annotations__[name] = annotation.__origin__
+        cls.declared = declared
+        if "__doc__" in vars(cls) and cls.__doc__ and declared:
+            cls.__doc__ = _with_parameters(inspect.cleandoc(cls.__doc__), declared)
 
     def __post_init__(self) -> None:
-        part: Any = type(self)
-        for name, (parameter, annotation) in _declared(part).items():
+        for name, (_, kind, parameter) in self.declared.items():
             value = getattr(self, name)
-            if not (_is_of(value, annotation) and parameter.holds(value)):
-                raise parameter.refusal(f"{type(self).__name__}.{name}", value)
+            if not parameter.allows(value, kind):
+                raise parameter.refusal(f"{type(self).__name__}.{name}", value, kind)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Schema of a section of a description that has the declared fields."""
+        if isabstract(cls) or "__dataclass_fields__" not in vars(cls):
+            return core_schema.is_instance_schema(cls)
+        fields = {
+            one.name: core_schema.typed_dict_field(
+                handler.generate_schema(cls.declared[one.name].annotation),
+                required=one.default is MISSING and one.default_factory is MISSING,
+            )
+            for one in dataclass_fields(cls)
+            if one.name in cls.declared
+        }
+        if cls.kind:
+            kind = core_schema.typed_dict_field(
+                core_schema.literal_schema([cls.kind]), required=False
+            )
+            fields = {"kind": kind, **fields}
+        section = core_schema.typed_dict_schema(fields, extra_behavior="forbid", config=STRICT)
+
+        def read(data: object, rest: ValidatorFunctionWrapHandler) -> Part:
+            if isinstance(data, cls):
+                return data
+            values = rest(known_keys(data, fields))
+            values.pop("kind", None)
+            with naming_file(values):
+                part = cls(**values)
+            object.__setattr__(part, "given", frozenset(values))
+            return part
+
+        def written(part: Part, rest: SerializerFunctionWrapHandler) -> Any:
+            return rest({name: getattr(part, name) for name in fields})
+
+        return core_schema.no_info_wrap_validator_function(
+            read,
+            section,
+            serialization=core_schema.wrap_serializer_function_ser_schema(written, schema=section),
+        )
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """JSON schema of the section."""
+        return handler(schema) | {"title": cls.__name__, "description": first_sentence(cls)}
 
 
-def parameters(part: Any) -> dict[str, Parameter]:
-    """What a part's fields declare, by their names."""
-    return {name: found for name, (found, _) in _declared(part).items()}
+class Parameters(Section, Generic[PartType]):
+    """A section with the declared fields of a part: ``Parameters[MeshSource]``."""
 
-
-class Settings(Section, Generic[Built]):
-    """A section that describes one object of the library, which says what is possible."""
-
-    @abstractmethod
-    def build(self) -> Built:
-        """The object that this section describes."""
-
-    @model_validator(mode="after")
-    def _possible(self) -> Self:
-        try:
-            self.build()
-        except OSError as error:
-            named = [name for name, value in self if str(value) == str(error.filename)]
-            place = ": ".join([*named, str(error.filename)])
-            raise ValueError(f"{place}: {error.strerror}, expected a file") from None
-        return self
-
-
-class Parameters(Section, Generic[Built]):
-    """The parameters of a part, as the fields of a section: ``Parameters[MeshSource]``."""
-
-    part: ClassVar[type[Part]]
+    part: ClassVar[Any]
 
     if TYPE_CHECKING:
 
@@ -234,34 +148,21 @@ class Parameters(Section, Generic[Built]):
 
     @classmethod
     def __class_getitem__(cls, part: Any) -> Any:
-        """Section of a part; of one that is abstract this class."""
+        """Section of a part."""
         if isinstance(part, TypeVar):
             return super().__class_getitem__(part)
-        return _section(part, cls) if hasattr(part, "__dataclass_fields__") else cls
+        defaults = {one.name: one.default for one in dataclass_fields(part)}
+        fields: dict[str, Any] = {
+            name: (one.annotation, defaults[name]) for name, one in part.declared.items()
+        }
+        made = create_model(f"{part.__name__}Section", __base__=cls, **fields)
+        made.part = part
+        return made
 
     @property
     def values(self) -> dict[str, Any]:
         """What the parameters are, by their names."""
-        return {name: getattr(self, name) for name in parameters(self.part)}
-
-
-class Declared(Parameters[Built], Settings[Built]):
-    """The section of a part: ``Declared[Friction]`` has its parameters, and builds it."""
-
-    def build(self) -> Built:
-        """The part; a file that it names is read once."""
-        return self._built
-
-    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy with other values; its part is built from them."""
-        copied = super().model_copy(update=update, deep=deep)
-        copied.__dict__.pop("_built", None)
-        return copied
-
-    @cached_property
-    def _built(self) -> Built:
-        built: Any = self.part(**self.values)
-        return built  # type: ignore[no-any-return]
+        return {name: getattr(self, name) for name in self.part.declared}
 
 
 class Family:
@@ -280,15 +181,15 @@ class Family:
         self.name: Final = name
         self._own: dict[str, Any] = {}
 
-    def part(self, part: PartType) -> PartType:
-        """Add a part, or a section that is written by hand, by its `kind`; a decorator."""
-        self.add(part.kind, part)  # type: ignore[union-attr]
+    def part(self, part: Class) -> Class:
+        """Add a part by its `kind`; a decorator."""
+        self.add(part.kind, part)  # type: ignore[attr-defined]
         return part
 
-    def add(self, kind: str, part: "type[Part | Section]") -> None:
-        """Add a part, or a section of descriptions that is written by hand.
+    def add(self, kind: str, part: Any) -> None:
+        """Add a part, or a section that is written by hand.
 
-        A class that is defined anew, as by a notebook's cell, takes the place of the one before.
+        A class that is defined again, as by a notebook's cell, replaces the one before.
 
         Raises
         ------
@@ -296,7 +197,8 @@ class Family:
             If the kind is empty or that of another class.
         """
         taken = self._own.get(kind, part)
-        if not kind or _place(taken) != _place(part):
+        same = (taken.__module__, taken.__qualname__) == (part.__module__, part.__qualname__)
+        if not kind or not same:
             raise ValueError(f"{self.name}: {kind!r} is no new kind")
         self._own[kind] = part
 
@@ -305,8 +207,8 @@ class Family:
         """All parts by their kind: those of other packages, then the library's own."""
         return {**of_other_packages(f"chipglow.{self.name}"), **self._own}
 
-    def find(self, kind: object) -> "type[Part | Section] | None":
-        """The part of a kind, if there is one; other packages are not loaded for the own ones."""
+    def find(self, kind: object) -> Any:
+        """The part of a kind, or None; other packages are not loaded for the library's own."""
         if not isinstance(kind, str):
             return None
         return self._own.get(kind) or self.parts.get(kind)
@@ -326,32 +228,38 @@ class Family:
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Schema of the field: the section of the part whose kind is chosen."""
+
+        def chosen(value: Any, info: core_schema.ValidationInfo) -> Any:
+            # Looked up when the field is read: parts may be added later.
+            if isinstance(value, Part | Section):
+                return value
+            kind = value.get("kind") if isinstance(value, Mapping) else None
+            part = self.find(kind)
+            if part is None:
+                shown = reprlib.repr(value if kind is None else kind)
+                raise ValueError(f"kind: {shown}, expected one of {', '.join(self.kinds)}")
+            return adapter(part).validate_python(value, context=info.context)
+
+        def written(part: Any, info: SerializationInfo) -> Any:
+            return adapter(type(part)).dump_python(
+                part, mode="json" if info.mode_is_json() else "python"
+            )
+
         return core_schema.with_info_plain_validator_function(
-            self._chosen,
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                lambda section: section.model_dump(mode="json"), when_used="json"
-            ),
+            chosen,
+            serialization=core_schema.plain_serializer_function_ser_schema(written, info_arg=True),
         )
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         """JSON schema: that of one of the parts."""
-        sections = {
-            kind: _section_of(part).__pydantic_core_schema__ for kind, part in self.parts.items()
-        }
-        return handler(core_schema.tagged_union_schema(sections, discriminator="kind"))
+        sections = [handler(adapter(part).core_schema) for part in self.parts.values()]
+        return {"oneOf": sections, "discriminator": {"propertyName": "kind"}}
 
-    def _chosen(self, value: Any, info: core_schema.ValidationInfo) -> Section:
-        """The section of the kind that is chosen when the field is read: parts may come later."""
-        if isinstance(value, Section):
-            return value
-        kind = value.get("kind") if isinstance(value, Mapping) else None
-        part = self.find(kind)
-        if part is None:
-            shown = reprlib.repr(value if kind is None else kind)
-            raise ValueError(f"kind: {shown}, expected one of {', '.join(self.kinds)}")
-        return _section_of(part).model_validate(value, context=info.context)
+
+adapter: Final[Callable[[Any], TypeAdapter[Any]]] = cache(TypeAdapter)
+"""What reads and writes a part or a section, by its class."""
 
 
 @cache
@@ -372,111 +280,23 @@ def of_other_packages(group: str) -> dict[str, Any]:
     return found
 
 
-def _place(part: type) -> tuple[str, str]:
-    return part.__module__, part.__qualname__
-
-
-def _section_of(part: Any) -> type[Section]:
-    section: type[Section] = part if issubclass(part, Section) else _section(part, Declared)
-    return section
-
-
-@cache
-def _declared(part: Any) -> dict[str, tuple[Parameter, Any]]:
-    """Parameter and annotation of each field that declares one."""
-    hints = get_type_hints(part, include_extras=True)
-    found = {}
-    for one in fields(part):
-        for metadata in getattr(hints[one.name], "__metadata__", ()):
-            if isinstance(metadata, Parameter):
-                found[one.name] = (metadata, hints[one.name])
-    return found
-
-
-@cache
-def _section(part: Any, base: Any) -> Any:
-    definitions: dict[str, Any] = {}
-    if part.kind:
-        definitions["kind"] = (Literal[part.kind], described(part.kind, _first_sentence(part)))
-    defaults = {one.name: one for one in fields(part)}
-    for name, (parameter, annotation) in _declared(part).items():
-        definitions[name] = (annotation, _field(parameter, defaults[name]))
-    made = create_model(
-        f"{part.__name__}Section",
-        __base__=base,
-        __module__=part.__module__,
-        __doc__=_first_sentence(part),
-        **definitions,
-    )
-    made.part = part
-    return made
-
-
-def _field(parameter: Parameter, one: Field[Any]) -> Any:
-    none = "none, or " if one.default is None else ""
-    extra: dict[str, Any] = {"allowed": none + parameter.limits if parameter.is_limited else ""}
-    if one.default is MISSING:
-        return pydantic.Field(description=parameter.meaning, json_schema_extra=extra)
-    return pydantic.Field(
-        default_factory=lambda: _written(parameter, one.default),
-        description=parameter.meaning,
-        json_schema_extra=extra,
-        validate_default=True,
-    )
-
-
-def _written(parameter: Parameter, value: Any) -> Any:
-    if parameter.quantity is None or value is None:
-        return value
-    return parameter.quantity.written(value)
-
-
-def _is_of(value: object, annotation: Any) -> bool:
-    """Whether a value is a number, where one is expected."""
-    plain, optional = _without_none(get_args(annotation)[0])
-    if value is None:
-        return optional
-    number = {float: Real, int: Integral}.get(plain)
-    return number is None or (isinstance(value, number) and not isinstance(value, bool))
-
-
-def _without_none(source: Any) -> tuple[Any, bool]:
-    if get_origin(source) not in (Union, UnionType):
-        return source, False
-    rest = tuple(one for one in get_args(source) if one is not NoneType)
-    return Union[rest], len(rest) < len(get_args(source))  # noqa: UP007
-
-
-def _first_sentence(part: type[Part]) -> str:
+def first_sentence(part: type) -> str:
+    """The first paragraph of a class's documentation, in one line."""
     return " ".join((part.__doc__ or "").split("\n\n")[0].split())
 
 
-def _with_parameters(text: str, rows: dict[str, str]) -> str:
-    """A class's documentation with rows of its parameters, after those that it has already."""
-    blocks = text.split("\n\n")
-    titles = [i for i, block in enumerate(blocks) if re.match(r"\w+\n-+\n", block)]
-    at = titles[0] if titles else len(blocks)
-    if not (titles and blocks[at].startswith("Parameters\n")):
-        blocks.insert(at, "Parameters\n----------")
-    heads = re.findall(r"^(\w.*?) :", blocks[at], re.MULTILINE)
-    told = {name for head in heads for name in head.split(", ")}
-    blocks[at] = "\n".join([blocks[at], *(row for name, row in rows.items() if name not in told)])
-    return "\n\n".join(blocks)
+def _with_parameters(text: str, declared: Mapping[str, Declaration]) -> str:
+    """A class's documentation with the declared parameters, before those that it has already."""
+    title = "Parameters\n----------\n"
+    before, found, after = text.partition(title)
+    rows = [
+        f"{name} : {_type_text(kind, parameter)}\n    " + parameter.meaning.replace("\n", "\n    ")
+        for name, (_, kind, parameter) in declared.items()
+    ]
+    before = before if found else before + "\n\n"
+    return "\n".join([before + title + "\n".join(rows), after]).rstrip() + "\n"
 
 
-def _documented(cls: type[Part]) -> dict[str, str]:
-    """Rows of the documentation for the parameters of a class that is being made."""
-    rows = {}
-    annotations = [inspect.get_annotations(one) for one in reversed(cls.__mro__)]
-    for name, annotation in [pair for one in annotations for pair in one.items()]:
-        for metadata in getattr(annotation, "__metadata__", ()):
-            if isinstance(metadata, Parameter):
-                meaning = metadata.meaning.replace("\n", "\n    ")
-                rows[name] = f"{name} : {_type_text(annotation, metadata)}\n    {meaning}"
-    return rows
-
-
-def _type_text(annotation: Any, parameter: Parameter) -> str:
-    plain = get_args(annotation)[0]
-    name = plain.__name__ if isinstance(plain, type) else str(plain).replace("typing.", "")
+def _type_text(kind: Any, parameter: Parameter) -> str:
+    name = kind.__name__ if isinstance(kind, type) else str(kind).replace("typing.", "")
     return f"{name}, in {parameter.quantity.base}" if parameter.quantity else name

@@ -1,82 +1,19 @@
-"""What a section of a YAML file is: known keys only, each described, built into one object."""
+"""Sections of YAML files that are written by hand: known keys only, each declared once."""
 
 import reprlib
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from difflib import get_close_matches
+from inspect import Parameter as Argument, Signature
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Generic, Self, TypeVar
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    SerializerFunctionWrapHandler,
-    ValidationInfo,
-    ValidatorFunctionWrapHandler,
-    model_validator,
-)
-from pydantic.fields import FieldInfo
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, core_schema
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationInfo, model_validator
+from pydantic_core import CoreConfig
 
+Built = TypeVar("Built")
 
-def or_word(schema: CoreSchema, word: str, value: object) -> CoreSchema:
-    """Schema of a field that may also hold one value, which descriptions write as a word."""
-
-    def read(given: object, rest: ValidatorFunctionWrapHandler) -> object:
-        return value if given is value or given == word else rest(given)
-
-    def written(held: object, rest: SerializerFunctionWrapHandler) -> object:
-        return word if held == value else rest(held)
-
-    return core_schema.no_info_wrap_validator_function(
-        read,
-        schema,
-        serialization=core_schema.wrap_serializer_function_ser_schema(
-            written, schema=schema, when_used="json"
-        ),
-    )
-
-
-def or_the_word(schema: JsonSchemaValue, word: str) -> JsonSchemaValue:
-    """JSON schema of a field that may also be a word."""
-    return {"anyOf": [schema, {"const": word}]}
-
-
-@dataclass(frozen=True)
-class OrWord:
-    """Annotation of a field that may also hold one value, which descriptions write as a word.
-
-    Parameters
-    ----------
-    word : str
-        The word.
-    value : object
-        What the field then holds.
-    """
-
-    word: str
-    value: object
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Schema of the field, or the word."""
-        return or_word(handler(source), self.word, self.value)
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        """JSON schema of the field, or the word."""
-        return or_the_word(handler(schema), self.word)
-
-
-OR_NONE: Final = OrWord("none", None)
-"""Annotation of a field that may be none."""
+STRICT: Final = CoreConfig(strict=True, allow_inf_nan=False)
 
 
 def beside_the_study(file: str, info: ValidationInfo) -> str:
@@ -95,36 +32,81 @@ FileBeside = Annotated[str, AfterValidator(beside_the_study)]
 """A file that a study names."""
 
 
-def described(default: object, description: str, allowed: str = "") -> Any:
-    """Field with its default as a YAML file would give it, its meaning and what is allowed."""
-    extra: dict[str, Any] = {"allowed": allowed}
-    return Field(default, description=description, json_schema_extra=extra, validate_default=True)
+def known_keys(data: object, keys: Iterable[str]) -> Mapping[str, Any]:
+    """Data of a section; None is the section with its defaults.
+
+    Raises
+    ------
+    ValueError
+        If it is no mapping, or has an unknown key.
+    """
+    if data is None:
+        return {}
+    names = list(keys)
+    known = ", ".join(names)
+    if not isinstance(data, Mapping):
+        raise ValueError(f"{reprlib.repr(data)} is no section, expected keys of {known}")
+    for key in data:
+        if key not in names:
+            close = get_close_matches(str(key), names, n=1)
+            hint = f"did you mean {close[0]!r}?" if close else f"expected one of {known}"
+            raise ValueError(f"unknown key {key!r}, {hint}")
+    return data
 
 
-def allowed(field: FieldInfo) -> str:
-    """What a field may be, in words; empty if its description says it."""
-    extra = field.json_schema_extra
-    return str(extra.get("allowed", "")) if isinstance(extra, Mapping) else ""
+@contextmanager
+def naming_file(values: Mapping[str, Any]) -> Iterator[None]:
+    """Name the field of a file that cannot be read, in a ValueError."""
+    try:
+        yield
+    except OSError as error:
+        named = [name for name, value in values.items() if str(value) == str(error.filename)]
+        place = ": ".join([*named, str(error.filename)])
+        raise ValueError(f"{place}: {error.strerror}, expected a file") from None
 
 
 class Section(BaseModel):
-    """A section of a study. Unknown keys are refused, an empty section means the defaults."""
+    """A section of a description, whose fields declare their `Parameter` as those of a `Part` do.
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    Unknown keys are refused; an empty section means the defaults.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, arbitrary_types_allowed=True
+    )
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **arguments: Any) -> None:
+        """Let `help` show the plain types."""
+        super().__pydantic_init_subclass__(**arguments)
+        cls.__signature__ = Signature(
+            [
+                Argument(
+                    name,
+                    Argument.KEYWORD_ONLY,
+                    default=Argument.empty if one.is_required() else one.default,
+                    annotation=one.annotation,
+                )
+                for name, one in cls.model_fields.items()
+                if name.isidentifier()
+            ]
+        )
 
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, data: object) -> object:
-        if data is None:
-            return {}
-        if isinstance(data, Section):
-            return data
-        known = ", ".join(cls.model_fields)
-        if not isinstance(data, Mapping):
-            raise ValueError(f"{reprlib.repr(data)} is no section, expected keys of {known}")
-        for key in data:
-            if key not in cls.model_fields:
-                close = get_close_matches(str(key), list(cls.model_fields), n=1)
-                hint = f"did you mean {close[0]!r}?" if close else f"expected one of {known}"
-                raise ValueError(f"unknown key {key!r}, {hint}")
-        return data
+        return known_keys(data, cls.model_fields)
+
+
+class Settings(Section, Generic[Built]):
+    """A section from which an object of the library is built, whose checks hold for the section."""
+
+    def build(self) -> Built:
+        """The object that this section describes."""
+        raise NotImplementedError
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        with naming_file(dict(self)):
+            self.build()
+        return self

@@ -9,6 +9,7 @@ from decimal import Decimal
 from fractions import Fraction
 from functools import cache
 from math import isfinite
+from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any, Final, get_origin
 
 import numpy as np
@@ -158,9 +159,25 @@ class Quantity:
                 f"{value} has no unit, {self.expected}" if match else self._not_this_kind(value)
             )
         lower, upper = (self._to_base(str(value), match[i], match[3]) for i in (1, 2))
-        if not lower < upper:
-            raise ValueError(f"{value} is reversed, {self.expected}, the lower limit first")
-        return lower, upper
+        return self._ascending(str(value), lower, upper)
+
+    def si(self, value: object) -> float:
+        """SI number of a text with its unit, or of a number in SI units already.
+
+        Raises
+        ------
+        ValueError
+            As `parse`.
+        """
+        if isinstance(value, Real) and not isinstance(value, bool):
+            return self._checked(f"{value} {self.base}", float(value))
+        return self.parse(value)
+
+    def si_range(self, value: object) -> tuple[float, float]:
+        """SI limits of a text, or of a pair of numbers in SI units already; see `si`."""
+        if not isinstance(value, tuple) or len(value) != 2:
+            return self.parse_range(value)
+        return self._ascending(str(value), self.si(value[0]), self.si(value[1]))
 
     def text(self, value: float) -> str:
         """Shortest text in this quantity's unit that is read back as the same number."""
@@ -185,11 +202,22 @@ class Quantity:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Schema of a field with this annotation: one number, or a pair of limits."""
-        pair = (self.parse_range, self.range_text)
-        parse, text = pair if get_origin(source) is tuple else (self.parse, self.text)
-        return core_schema.no_info_plain_validator_function(
-            parse,
+        """Schema of a field with this annotation: one number, or a pair of limits.
+
+        SI numbers pass from Python; what is read from a file, in a context, needs its unit.
+        """
+        pair = get_origin(source) is tuple
+        parse, si, text = (
+            (self.parse_range, self.si_range, self.range_text)
+            if pair
+            else (self.parse, self.si, self.text)
+        )
+
+        def read(value: object, info: core_schema.ValidationInfo) -> object:
+            return si(value) if info.context is None else parse(value)
+
+        return core_schema.with_info_plain_validator_function(
+            read,
             serialization=core_schema.plain_serializer_function_ser_schema(text, when_used="json"),
         )
 
@@ -205,11 +233,19 @@ class Quantity:
         # 1/0, or a malformed or foreign unit: anything from AssertionError to TokenError.
         except Exception:
             raise ValueError(self._not_this_kind(value)) from None
+        return self._checked(value, result)
+
+    def _checked(self, value: str, result: float) -> float:
         if not isfinite(result):
             raise ValueError(f"{value} is not finite, {self.expected}")
         if self.positive and result <= 0:
             raise ValueError(f"{value} is not over 0{self._zero}, {self.expected}")
         return result
+
+    def _ascending(self, value: str, lower: float, upper: float) -> tuple[float, float]:
+        if not lower < upper:
+            raise ValueError(f"{value} is reversed, {self.expected}, the lower limit first")
+        return lower, upper
 
     def _exact(self, number: Decimal, unit: str) -> Decimal:
         return _in_base(number, unit, self.base)
@@ -274,7 +310,8 @@ WavelengthRange = Annotated[tuple[float, float], WAVELENGTHS]
 TIME: Final = Quantity("a time", "s", "us", "10 us")
 Time = Annotated[float, TIME]
 INSTANT: Final = Quantity("a time", "s", "us", "10 us", positive=False)
-Frequency = Annotated[float, Quantity("a frequency", "Hz", "Hz", "600 Hz")]
+FREQUENCY: Final = Quantity("a frequency", "Hz", "Hz", "600 Hz")
+Frequency = Annotated[float, FREQUENCY]
 SPEED: Final = Quantity("a speed", "m/s", "m/min", "250 m/min")
 Speed = Annotated[float, SPEED]
 ANGLE: Final = Quantity("an angle", "rad", "deg", "-7 deg", positive=False)

@@ -127,7 +127,7 @@ def table_2(study: Study) -> list[tuple[str, str, str]]:
         A study that cuts.
     """
     cutting, tool = study.cutting, study.cutting.tool
-    region, window = cutting.numerics.build(), cutting.window
+    region, window = cutting.numerics, cutting.window
     depth = f"{region.depth * 1e3:g} mm simulated"
     if tool.outline:
         angles = ("from a file", "from a file", "from a file")

@@ -7,7 +7,6 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Strict
 
 from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import SPEED, TEMPERATURE, Position
@@ -29,7 +28,7 @@ from chipglow.scene.tool import Tool
 STRAIN_OF_CHIP: Final = 1.0
 """Plastic strain of the region that is said to be chip, where a source has no strain."""
 
-_Corner: TypeAlias = Annotated[tuple[Position, Position], Strict(False)]
+_Corner: TypeAlias = tuple[Position, Position]
 _VELOCITY: Final = frozenset(("velocity_x", "velocity_y"))
 _CHIP_STARTS, _CHIP_ENDS = 0.3, 0.5
 _MOST_FILLED: Final = 0.5
@@ -65,23 +64,23 @@ class Completion(Part):
         ),
     ] = None
     chip: Annotated[
-        Annotated[tuple[_Corner, ...], Strict(False)] | None,
+        tuple[_Corner, ...] | None,
         Parameter(
-            "Corners of the chip, for a source without plastic strain, such as\n"
-            "[[-300 um, 0 um], [-50 um, 0 um], [-50 um, 400 um]]."
+            "Corners of the chip, for a source without plastic strain, such as [[-300 um, 0 um], "
+            "[-50 um, 0 um], [-50 um, 400 um]]."
         ),
     ] = None
     motion: Annotated[
         Literal["auto", "flow", "none"],
         Parameter(
-            "Velocity of a source that has none: flow (the optical flow), none, or auto: the flow\n"
+            "Velocity of a source that has none: flow (the optical flow), none, or auto: the flow "
             "where there is a strain, a chip or a cutting speed, for what is cut moves."
         ),
     ] = "auto"
     rate_frames: Annotated[
         int,
         Parameter(
-            "Frames over which a missing strain rate is taken: more of them make less noise and\n"
+            "Frames over which a missing strain rate is taken: more of them make less noise and "
             "more blur.",
             least=1,
             most=20,

@@ -2,67 +2,82 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Strict, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from chipglow.analysis import LinePlace, Plan, PointPlace, RegionPlace, ScenePlan
 from chipglow.analysis.old_places import Place
 from chipglow.laboratory.emissivity import RegionSection
-from chipglow.quantities import Settings, described
+from chipglow.quantities import Parameter, Settings
 from chipglow.quantities.units import Length, Position
 
-PointOfScene = Annotated[tuple[Position, Position], Strict(False)]
-Corners = Annotated[tuple[PointOfScene, ...], Strict(False)]
+PointOfScene = tuple[Position, Position]
+Corners = tuple[PointOfScene, ...]
 
 
 class AnalysisSection(Settings[Plan]):
     """What is computed from the simulated measurement."""
 
-    exposures: int = described(9, "Exposures, spread evenly over the scene.")
-    phases: int = described(
-        3,
-        "Positions of the pixels along each axis, evenly over a pixel, on which each headline is\n"
-        "drawn anew: 3 makes 9.",
-        "1 or more",
-    )
-    textures: int = described(
-        5,
-        "Textures of the emissivity on which each headline is drawn anew: of the study's seed and\n"
-        "those after it.",
-        "1 or more",
-    )
-    rake_chip: str = described(
-        "chip 2", "Chip whose errors are read at the rake face; the paper took its chip 2."
-    )
-    band_chip: str = described(
-        "chip 1", "Chip whose errors are read at the shear band; the paper took its chip 1."
-    )
-    reference: Literal["maximum", "mean", "centre", "true"] = described(
-        "maximum",
-        "What a pixel's measured temperature is compared with, in its square during the exposure:\n"
-        "the greatest radiance temperature (maximum, the paper's), that of the mean radiance\n"
-        "(mean), that in the middle of both (centre) or the greatest true temperature (true).",
-    )
-    psf_widths: Annotated[tuple[Length, ...], Strict(False)] = described(
-        [f"{width} um" for width in range(4, 21)],
-        "Full widths at half maximum of Gaussians for which the headline errors are shown.",
-    )
+    exposures: Annotated[int, Parameter("Exposures, spread evenly over the scene.")] = 9
+    phases: Annotated[
+        int,
+        Parameter(
+            "Positions of the pixels along each axis, evenly over a pixel, on which each headline "
+            "is drawn anew: 3 makes 9.",
+            least=1,
+        ),
+    ] = 3
+    textures: Annotated[
+        int,
+        Parameter(
+            "Textures of the emissivity on which each headline is drawn anew: of the study's seed "
+            "and those after it.",
+            least=1,
+        ),
+    ] = 5
+    rake_chip: Annotated[
+        str, Parameter("Chip whose errors are read at the rake face; the paper took its chip 2.")
+    ] = "chip 2"
+    band_chip: Annotated[
+        str, Parameter("Chip whose errors are read at the shear band; the paper took its chip 1.")
+    ] = "chip 1"
+    reference: Annotated[
+        Literal["maximum", "mean", "centre", "true"],
+        Parameter(
+            "What a pixel's measured temperature is compared with, in its square during the "
+            "exposure: the greatest radiance temperature (maximum, the paper's), that of the mean "
+            "radiance (mean), that in the middle of both (centre) or the greatest true "
+            "temperature (true)."
+        ),
+    ] = "maximum"
+    psf_widths: Annotated[
+        tuple[Length, ...],
+        Parameter(
+            "Full widths at half maximum of Gaussians for which the headline errors are shown."
+        ),
+    ] = tuple(width / 1e6 for width in range(4, 21))
 
-    points: dict[str, PointOfScene] = described(
-        {},
-        "Points by name where the error is read, in the place of rake face and shear band.",
-        "{} or positions: {middle of the pool: [0 um, -20 um]}",
-    )
-    lines: dict[str, Corners] = described(
-        {},
-        "Lines by name, from corner to corner.",
-        "{} or positions: {across: [[-100 um, 0 um], [100 um, 0 um]]}",
-    )
-    regions: dict[str, RegionSection] = described(
-        {},
-        "Regions by name: a polygon, a rectangle or a circle.",
-        "{} or {pad: {rectangle: [[0 um, 0 um], [100 um, -50 um]]}}; also\n"
-        "{circle: {centre: [0 um, 0 um], radius: 20 um}}",
-    )
+    points: Annotated[
+        dict[str, PointOfScene],
+        Parameter(
+            "Points by name where the error is read, in the place of rake face and shear band.",
+            allowed="{} or positions: {middle of the pool: [0 um, -20 um]}",
+        ),
+    ] = Field(default_factory=dict)
+    lines: Annotated[
+        dict[str, Corners],
+        Parameter(
+            "Lines by name, from corner to corner.",
+            allowed="{} or positions: {across: [[-100 um, 0 um], [100 um, 0 um]]}",
+        ),
+    ] = Field(default_factory=dict)
+    regions: Annotated[
+        dict[str, RegionSection],
+        Parameter(
+            "Regions by name: a polygon, a rectangle or a circle.",
+            allowed="{} or {pad: {rectangle: [[0 um, 0 um], [100 um, -50 um]]}}; also {circle: "
+            "{centre: [0 um, 0 um], radius: 20 um}}",
+        ),
+    ] = Field(default_factory=dict)
 
     @field_validator("reference", mode="before")
     @classmethod

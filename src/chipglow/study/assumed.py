@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import yaml
 
-from chipglow.quantities.section import Section
+from chipglow.quantities import Part, Section, given, own_settings
 from chipglow.study.schema import Study
 from chipglow.study.surface_section import FeaturesSection
 
@@ -32,24 +32,20 @@ def left_to_the_paper(study: Study) -> Iterator[str]:
         section = getattr(study, name)
         if name == "surface" and not isinstance(section, FeaturesSection):
             continue
-        values = section.model_dump(mode="json")
-        left = list(_unset(section, values, _HOW_FINELY[name], ""))
+        left = list(_unset(section, _HOW_FINELY[name], ""))
         if left:
             yield f"Not said by the study and so the paper's, of {name}: {', '.join(left)}."
 
 
-def _unset(
-    section: Section, values: dict[str, Any], without: set[str], prefix: str
-) -> Iterator[str]:
+def _unset(section: Section | Part, without: set[str], prefix: str) -> Iterator[str]:
     """Fields that nobody set, with their values as a study writes them."""
-    for name in type(section).model_fields:
-        value = getattr(section, name)
-        if name in without or values[name] in ("none", []):
+    for one in own_settings(section):
+        if one.name in without or one.plain in ("none", []):
             continue
-        if name not in section.model_fields_set:
-            yield f"{prefix}{name} {_written(values[name])}"
-        elif isinstance(value, Section):
-            yield from _unset(value, values[name], {"kind"}, f"{prefix}{name}.")
+        if one.name not in given(section):
+            yield f"{prefix}{one.name} {_written(one.plain)}"
+        elif one.is_section:
+            yield from _unset(one.value, {"kind"}, f"{prefix}{one.name}.")
 
 
 def _written(value: Any) -> str:

@@ -60,7 +60,7 @@ def expected_cost(study: Study) -> Cost:
     cutting, camera = study.cutting, study.camera
     view, window = cutting.field_of_view, cutting.window
     samples = view.rows * view.columns
-    cell = cutting.numerics.build().cell
+    cell = cutting.numerics.cell
     down, across = (n * view.spacing / cell + _NODES_BEYOND for n in (view.rows, view.columns))
     nodes = down * across
     kept = window.later_bands * ceil(window.band_duration / window.interval)

@@ -1,8 +1,9 @@
 """The section of the cut: the paper's Table 2 by default."""
 
-from typing import Annotated, Final, Self
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Final, Literal
 
-from pydantic import ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, ValidationInfo
 
 from chipglow.cutting import (
     CuttingConditions,
@@ -19,97 +20,118 @@ from chipglow.cutting import (
 )
 from chipglow.cutting.conditions import INITIAL_TEMPERATURE
 from chipglow.io import ToolSection
-from chipglow.quantities import (
-    Declared,
-    OrWord,
-    Settings,
-    beside_the_study,
-    described,
-)
-from chipglow.quantities.units import Length, Position
+from chipglow.quantities import Parameter, Settings, beside_the_study
+from chipglow.quantities.units import LENGTH, POSITION, TEMPERATURE
 from chipglow.scene import Raster
 
 _IN_REGION: Final = "the whole scene within the simulated region"
+
+STEADY: Final = "steady"
+"""Temperature of a tool that has been cutting for long."""
 
 
 class FieldOfViewSection(Settings[Raster]):
     """Where the scene is sampled. The tip of the tool is near the origin, y points up."""
 
-    left: Position = described("-620 um", "Left edge of the scene.", _IN_REGION)
-    top: Position = described("460 um", "Upper edge of the scene.", _IN_REGION)
-    spacing: Length = described(
-        "2/3 um",
-        "Side of a sample. A whole number of them should make camera.pitch: the paper has 9.",
-        "over 0 um",
+    left: Annotated[
+        float, Parameter("Left edge of the scene.", POSITION, allowed=_IN_REGION)
+    ] = -620e-6
+    top: Annotated[float, Parameter("Upper edge of the scene.", POSITION, allowed=_IN_REGION)] = (
+        460e-6
     )
-    rows: int = described(810, "Samples from top to bottom.", "1 or more")
-    columns: int = described(990, "Samples from left to right.", "1 or more")
+    spacing: Annotated[
+        float,
+        Parameter(
+            "Side of a sample. A whole number of them should make camera.pitch: the paper has 9.",
+            LENGTH,
+            over=0.0,
+        ),
+    ] = 2 / 3e6
+    rows: Annotated[int, Parameter("Samples from top to bottom.", least=1)] = 810
+    columns: Annotated[int, Parameter("Samples from left to right.", least=1)] = 990
 
     def build(self) -> Raster:
         """The grid of samples."""
         return Raster(self.left, self.top, self.spacing, self.rows, self.columns)
 
 
-STEADY: Final = "steady"
-"""Temperature of a tool that has been cutting for long."""
-
-
 class CutToolSection(ToolSection):
     """The cutting tool, and how warm it is."""
 
-    temperature: Annotated[float | None, INITIAL_TEMPERATURE, OrWord(STEADY, STEADY)] = described(
-        "none",
-        "Temperature of the tool when the cut begins; steady: that of a tool that has been\n"
-        "cutting for long; none: as cold as the workpiece, as the paper's.",
-        f"{INITIAL_TEMPERATURE.limits}; none; or steady",
+    temperature: Annotated[
+        float | Literal["steady"] | None,
+        Parameter(
+            "Temperature of the tool when the cut begins; steady: that of a tool that has been "
+            "cutting for long; none: as cold as the workpiece, as the paper's.",
+            TEMPERATURE,
+            least=INITIAL_TEMPERATURE.least,
+            most=INITIAL_TEMPERATURE.most,
+            allowed=f"{INITIAL_TEMPERATURE.limits}; none; or steady",
+        ),
+    ] = None
+    body: Annotated[ToolBody, Parameter("What the heat of a steady tool flows through.")] = (
+        ToolBody()
     )
-    body: Declared[ToolBody] = described({}, "What the heat of a steady tool flows through.")
 
     def start(self) -> float | ToolBody | None:
         """What the simulation takes."""
-        given: object = self.temperature
-        return self.body.build() if given == STEADY else self.temperature
+        return self.body if self.temperature == STEADY else self.temperature
 
 
-class CuttingSection(Declared[CuttingConditions]):
+def _known(name: str, info: ValidationInfo) -> str:
+    """Name of a material, or the path of a material's file beside the study."""
+    if is_own_file(name):
+        name = beside_the_study(name, info)
+    try:
+        workpiece(name)
+    except OSError as error:
+        raise ValueError(f"{name!r}: {error.strerror}, expected a material's file") from None
+    return name
+
+
+@dataclass(frozen=True)
+class CuttingSection(CuttingConditions):
     """The cutting simulation; the paper's Table 2."""
 
-    workpiece: str = described(
-        "aisi-1045",
-        "Material of the workpiece. The command chipglow materials shows them.",
-        f"{', '.join(material_names('workpiece'))}; with one of its sets of the\n"
-        "flow stress after a slash (aisi-1045/ozel); or a file of your own (steel.yaml)",
+    workpiece: Annotated[
+        str,
+        AfterValidator(_known),
+        Parameter(
+            "Material of the workpiece. The command chipglow materials shows them.",
+            allowed=f"{', '.join(material_names('workpiece'))}; with one of its sets of the "
+            "flow stress after a slash (aisi-1045/ozel); or a file of your own (steel.yaml)",
+        ),
+    ] = "aisi-1045"
+    tool: Annotated[CutToolSection, Parameter("The cutting tool.")] = field(
+        default_factory=CutToolSection
     )
-    tool: CutToolSection = described({}, "The cutting tool.")
-    friction: Declared[Friction] = described({}, "Friction between chip and tool.")
-    surroundings: Declared[Surroundings] = described(
-        {}, "What the free surfaces of chip, workpiece and tool lose heat to; nothing by default."
+    friction: Annotated[Friction, Parameter("Friction between chip and tool.")] = field(
+        default_factory=Friction
     )
-    numerics: Declared[Numerics] = described({}, "How finely the cut is computed.")
-    window: Declared[OutputWindow] = described({}, "The part of the cut that becomes the scene.")
-    field_of_view: FieldOfViewSection = described(
-        {}, "Where the scene is sampled: the tool's tip is near the origin, y points up."
+    surroundings: Annotated[
+        Surroundings,
+        Parameter(
+            "What the free surfaces of chip, workpiece and tool lose heat to; nothing by default."
+        ),
+    ] = field(default_factory=Surroundings)
+    numerics: Annotated[Numerics, Parameter("How finely the cut is computed.")] = field(
+        default_factory=Numerics
     )
+    window: Annotated[OutputWindow, Parameter("The part of the cut that becomes the scene.")] = (
+        field(default_factory=OutputWindow)
+    )
+    field_of_view: Annotated[
+        FieldOfViewSection,
+        Parameter("Where the scene is sampled: the tool's tip is near the origin, y points up."),
+    ] = field(default_factory=FieldOfViewSection)
 
-    @field_validator("workpiece")
-    @classmethod
-    def _known(cls, name: str, info: ValidationInfo) -> str:
-        if is_own_file(name):
-            name = beside_the_study(name, info)
-        try:
-            workpiece(name)
-        except OSError as error:
-            raise ValueError(f"{name!r}: {error.strerror}, expected a material's file") from None
-        return name
-
-    @model_validator(mode="after")
-    def _window_within_cut(self) -> Self:
+    def __post_init__(self) -> None:
+        super().__post_init__()
         if self.window.end > self.cutting_length * (1 + 1e-9):
             raise ValueError(
                 f"window.end: {self.window.end * 1e3:g} mm is beyond cutting_length, "
                 f"expected up to {self.cutting_length * 1e3:g} mm"
             )
-        return self
 
     @property
     def duration(self) -> float:
@@ -118,13 +140,14 @@ class CuttingSection(Declared[CuttingConditions]):
 
     def simulation(self) -> CuttingSimulation:
         """The simulation that this section describes."""
+        conditions = {one.name: getattr(self, one.name) for one in fields(CuttingConditions)}
         return CuttingSimulation(
-            conditions=self.build(),
+            conditions=CuttingConditions(**conditions),
             tool=self.tool.build(),
             workpiece=workpiece(self.workpiece),
             tool_material=tool_material(self.tool.material),
-            friction=self.friction.build(),
-            numerics=self.numerics.build(),
-            surroundings=self.surroundings.build(),
+            friction=self.friction,
+            numerics=self.numerics,
+            surroundings=self.surroundings,
             tool_temperature=self.tool.start(),
         )

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
+from chipglow.quantities import given
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study.schema import Study
 from chipglow.study.surface_section import surfaces_of
@@ -62,7 +63,7 @@ def fit(study: Study, scene: Scene) -> Fitted:
     surfaces = surfaces_of(study.surface, study.seed)
     notes = Notes()
     assumed = notes.assumed
-    if scene.tool is None and "tool" in study.cutting.model_fields_set:
+    if scene.tool is None and "tool" in given(study.cutting):
         scene = scene.with_tool(study.cutting.tool.build())
         assumed.append("The scene has no tool: it is that of the study's section cutting.tool.")
     if scene.tool is not None and not (scene.frame(0).material == Material.TOOL).any():

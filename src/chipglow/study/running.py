@@ -28,6 +28,7 @@ from chipglow.cutting import (
 from chipglow.io import SCENE_FORMAT, SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.interrupts import uninterrupted
 from chipglow.laboratory.chip import NoContactError, NoShearBandError
+from chipglow.quantities import adapter
 from chipglow.scene import Frame, Scene, SceneError, ToolOutline
 from chipglow.study.assumed import left_to_the_paper
 from chipglow.study.cache import scene_path
@@ -271,7 +272,9 @@ def _inputs(study: Study) -> dict[str, Any]:
     simulation = study.cutting.simulation()
     tool = simulation.tool
     return {
-        "cutting": study.cutting.model_dump(exclude={"tool": {"outline"}}),
+        "cutting": adapter(type(study.cutting)).dump_python(
+            study.cutting, exclude={"tool": {"outline"}}
+        ),
         "outline": tool.points if isinstance(tool, ToolOutline) else None,
         "workpiece": _numbers(simulation.workpiece),
         "law": type(simulation.workpiece.flow_stress).__qualname__,
@@ -336,7 +339,7 @@ def _compute(
             keeper.note_kept(state, start.checkpoint)
         try:
             history = simulation.run(
-                cutting.window.build(),
+                cutting.window,
                 raster,
                 writer.append,
                 (lambda fraction: progress(CUTTING_STEP, fraction)) if progress else None,

@@ -20,7 +20,7 @@ _SUB_FRAMES: Final = 10
 """Frames that an exposure has at least."""
 
 
-def scaled(study: Mapping[str, Any]) -> dict[str, Any]:
+def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
     """A study's data with the defaults that follow from its feed, speed and camera.
 
     Lengths of the cut, the window and the view go with the feed, the time between frames with the
@@ -31,17 +31,19 @@ def scaled(study: Mapping[str, Any]) -> dict[str, Any]:
     ----------
     study : mapping
         Sections as a YAML file gives them.
+    from_file : bool
+        Whether it is from a file, where numbers without their unit are refused.
     """
     cutting, camera = (_section(study, name) for name in ("cutting", "camera"))
     if camera is not None:
         try:
-            camera = with_pitch(camera)
+            camera = with_pitch(camera, from_file)
         except ValueError:  # said by the section itself, with its name
             return dict(study)
     if cutting is None or camera is None or study.get("scene", "none") not in ("none", None):
         return dict(study)
     feed, speed, pitch, exposure = (
-        _value(section, name, quantity)
+        _value(section, name, quantity, from_file)
         for section, name, quantity in (
             (cutting, "feed", CUT_LENGTH),
             (cutting, "speed", SPEED),
@@ -57,10 +59,10 @@ def scaled(study: Mapping[str, Any]) -> dict[str, Any]:
         return dict(study)
     ratio, slower = feed / _PAPERS["feed"], _PAPERS["speed"] / speed
     derived: dict[str, Any] = {"window": {}, "field_of_view": {}}
-    start = _value(window, "start", CUT_LENGTH) or ratio * _START
+    start = _value(window, "start", CUT_LENGTH, from_file) or ratio * _START
     travel = max(ratio * (_END - _START), _EXPOSURES * exposure * speed)
     if ratio != 1.0 or exposure * speed > _END - _START:
-        end = _value(window, "end", CUT_LENGTH) or start + travel
+        end = _value(window, "end", CUT_LENGTH, from_file) or start + travel
         derived["window"] |= {"start": CUT_LENGTH.text(start), "end": CUT_LENGTH.text(end)}
         derived["cutting_length"] = CUT_LENGTH.text(max(ratio * _LENGTH, 1.05 * end))
     if ratio != 1.0 or slower != 1.0:
@@ -69,7 +71,7 @@ def scaled(study: Mapping[str, Any]) -> dict[str, Any]:
     if exposure > _BAND:
         derived["window"]["band_duration"] = TIME.text(exposure)
     if ratio != 1.0:
-        spacing = _value(view, "spacing", LENGTH) or pitch / _ACROSS
+        spacing = _value(view, "spacing", LENGTH, from_file) or pitch / _ACROSS
         derived["field_of_view"] = {
             "left": POSITION.text(ratio * _LEFT),
             "top": POSITION.text(ratio * _TOP),
@@ -84,13 +86,15 @@ def scaled(study: Mapping[str, Any]) -> dict[str, Any]:
     return {**study, "cutting": {**outer, **cutting, **filled}}
 
 
-def with_pitch(camera: Mapping[str, Any]) -> dict[str, Any]:
+def with_pitch(camera: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
     """A camera's data with the pitch on the scene that its data sheet makes.
 
     Parameters
     ----------
     camera : mapping
         The section as a YAML file gives it.
+    from_file : bool
+        As for `scaled`.
 
     Raises
     ------
@@ -105,8 +109,8 @@ def with_pitch(camera: Mapping[str, Any]) -> dict[str, Any]:
         raise ValueError("magnification: is missing, expected it with detector_pitch")
     if not magnification > 0:
         raise ValueError(f"magnification: {magnification:g}, expected over 0")
-    pitch = LENGTH.parse(detector) / magnification
-    given = _value(camera, "pitch", LENGTH) if "pitch" in camera else pitch
+    pitch = (LENGTH.parse if from_file else LENGTH.si)(detector) / magnification
+    given = _value(camera, "pitch", LENGTH, from_file) if "pitch" in camera else pitch
     if given is None or abs(given - pitch) > 1e-6 * pitch:
         raise ValueError(
             f"pitch: {camera['pitch']} beside a detector_pitch that makes {LENGTH.text(pitch)}, "
@@ -123,11 +127,13 @@ def _section(data: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
     return section if isinstance(section, Mapping) else None
 
 
-def _value(section: Mapping[str, Any], name: str, quantity: Quantity) -> float | None:
+def _value(
+    section: Mapping[str, Any], name: str, quantity: Quantity, from_file: bool
+) -> float | None:
     """What a section says in SI, or the paper's; None for what is no quantity, said later."""
     if name not in section:
         return _PAPERS.get(name)
     try:
-        return quantity.parse(section[name])
+        return (quantity.parse if from_file else quantity.si)(section[name])
     except ValueError:
         return None

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Self
 
-from pydantic import field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from chipglow.analysis import Plan
-from chipglow.quantities import OR_NONE, FileBeside, Section, described
+from chipglow.quantities import FileBeside, Parameter, Section, changed
 from chipglow.study.analysis_section import AnalysisSection
 from chipglow.study.camera_section import CameraSection
 from chipglow.study.cutting_section import STEADY, CuttingSection
@@ -34,29 +34,36 @@ class Study(Section):
     5e-06
     """
 
-    title: str = described(
-        "The effects of emissivity and camera point spread function (Heigel and Whitenton 2010)",
-        "What the report is headed with.",
+    title: Annotated[str, Parameter("What the report is headed with.")] = (
+        "The effects of emissivity and camera point spread function (Heigel and Whitenton 2010)"
     )
-    seed: int = described(2010, "Seed of all random numbers.")
-    scene: Annotated[FileBeside | None, OR_NONE] = described(
-        "none",
-        "File of a scene that takes the place of the cut, such as one of chipglow import. Its own\n"
-        "times and samples count; of the section cutting only the tool, if the scene has none.",
-        "none, or a file beside this one: scene.nc",
+    seed: Annotated[int, Parameter("Seed of all random numbers.", least=0)] = 2010
+    scene: Annotated[
+        FileBeside | None,
+        Parameter(
+            "File of a scene that takes the place of the cut, such as one of chipglow import. Its "
+            "own times and samples count; of the section cutting only the tool, if the scene has "
+            "none.",
+            allowed="none, or a file beside this one: scene.nc",
+        ),
+    ] = None
+    cutting: Annotated[
+        CuttingSection, Parameter("The cutting simulation; defaults: the paper's Table 2.")
+    ] = Field(default_factory=CuttingSection)
+    surface: Annotated[
+        SurfaceSection, Parameter("Emissivities; defaults: the paper's Table 1.")
+    ] = FeaturesSection()
+    camera: Annotated[CameraSection, Parameter("The infrared camera.")] = Field(
+        default_factory=CameraSection
     )
-    cutting: CuttingSection = described(
-        {}, "The cutting simulation; defaults: the paper's Table 2."
-    )
-    surface: SurfaceSection = described(
-        {"kind": "features"}, "Emissivities; defaults: the paper's Table 1."
-    )
-    camera: CameraSection = described({}, "The infrared camera.")
-    analysis: AnalysisSection = described({}, "What is computed from the simulated measurement.")
+    analysis: Annotated[
+        AnalysisSection, Parameter("What is computed from the simulated measurement.")
+    ] = Field(default_factory=AnalysisSection)
 
-    wavelengths: WavelengthsSection = described(
-        {}, "Bands that chipglow wavelengths compares, alone and as ratios."
-    )
+    wavelengths: Annotated[
+        WavelengthsSection,
+        Parameter("Bands that chipglow wavelengths compares, alone and as ratios."),
+    ] = Field(default_factory=WavelengthsSection)
 
     @property
     def plan(self) -> Plan:
@@ -69,8 +76,7 @@ class Study(Section):
 
     def with_steady_tool(self) -> Self:
         """The same study with a tool that has been cutting for long."""
-        tool = self.cutting.tool.model_copy(update={"temperature": STEADY})
-        return self.model_copy(update={"cutting": self.cutting.model_copy(update={"tool": tool})})
+        return changed(self, {"cutting.tool.temperature": STEADY})
 
     @property
     def is_papers(self) -> bool:
@@ -78,10 +84,12 @@ class Study(Section):
 
         How finely it is computed, and how often drawn, does not matter.
         """
-        paper, finely = type(self)(), {"numerics", "window", "field_of_view", "cutting_length"}
+        paper = type(self)()
+        names = ("numerics", "window", "field_of_view", "cutting_length")
+        finely = {name: getattr(paper.cutting, name) for name in names}
         return (
             self.scene is None
-            and self.cutting.model_dump(exclude=finely) == paper.cutting.model_dump(exclude=finely)
+            and replace(self.cutting, **finely) == paper.cutting
             and self.surface == paper.surface
             and self.camera == paper.camera
             and self.analysis.reference == paper.analysis.reference
@@ -107,17 +115,10 @@ class Study(Section):
             }
         )
 
-    @field_validator("seed")
-    @classmethod
-    def _not_negative(cls, seed: int) -> int:
-        if seed < 0:
-            raise ValueError(f"{seed} is negative, expected 0 or more")
-        return seed
-
     @model_validator(mode="before")
     @classmethod
-    def _scaled(cls, data: object) -> object:
-        return scaled(data) if isinstance(data, Mapping) else data
+    def _scaled(cls, data: object, info: ValidationInfo) -> object:
+        return scaled(data, bool(info.context)) if isinstance(data, Mapping) else data
 
     @field_validator("surface", mode="before")
     @classmethod

@@ -13,8 +13,8 @@ from chipglow.laboratory.emissivity import (
     read_emissivity_map,
     read_measured_areas,
 )
-from chipglow.quantities import OR_NONE, Declared, FileBeside, Section, described
-from chipglow.quantities.units import Length, WavelengthRange
+from chipglow.quantities import FileBeside, Parameter, Section
+from chipglow.quantities.units import LENGTH, WAVELENGTHS
 from chipglow.radiometry import Band
 from chipglow.surface import (
     CHIP_1,
@@ -47,21 +47,17 @@ _FEATURE: Final = {"body": "chip"}
 """Features whose name in a study is another than that of the surface."""
 
 
-def _numbers(emissivity: Emissivity) -> dict[str, float]:
-    return {"mean": emissivity.mean, "standard_deviation": emissivity.standard_deviation}
-
-
-OxideSection = Annotated[Declared[Oxide], OXIDES]
-SpectralSection = Annotated[Declared[SpectralSurface], SPECTRA]
-DirectionalSection = Annotated[Declared[Direction], DIRECTIONS]
-ReflectionsSection = Annotated[Declared[SideShape], REFLECTIONS]
+OxideSection = Annotated[Oxide, OXIDES]
+SpectralSection = Annotated[SpectralSurface, SPECTRA]
+DirectionalSection = Annotated[Direction, DIRECTIONS]
+ReflectionsSection = Annotated[SideShape, REFLECTIONS]
 
 
 class ChipSection(Section):
     """Emissivity of one chip."""
 
-    body: Declared[Emissivity] = Field(description="Body of the segments.")
-    shear_band: Declared[Emissivity] = Field(description="Shear bands: the paper's fissures.")
+    body: Annotated[Emissivity, Parameter("Body of the segments.")]
+    shear_band: Annotated[Emissivity, Parameter("Shear bands: the paper's fissures.")]
 
     @classmethod
     def __get_pydantic_json_schema__(
@@ -75,71 +71,97 @@ class ChipSection(Section):
     def _preset(cls, data: object) -> object:
         if not isinstance(data, str):
             return data
-        preset = CHIPS[_known_name(data, CHIPS)]
-        return {"body": _numbers(preset.chip), "shear_band": _numbers(preset.shear_band)}
+        if data not in CHIPS:
+            raise ValueError(f"{data!r} is unknown, expected one of {', '.join(CHIPS)}")
+        chip = CHIPS[data]
+        return {"body": chip.chip, "shear_band": chip.shear_band}
+
+    @classmethod
+    def of(cls, surface: FeatureSurface) -> Self:
+        """Chip of a surface."""
+        return cls(body=surface.chip, shear_band=surface.shear_band)
 
 
 class FeaturesSection(Section):
     """Emissivity of the features of chips: the paper's maps."""
 
-    kind: Literal["features"] = described(
-        "features",
-        "What tells the emissivity: the features of a chip, each with its texture. Other kinds:\n"
-        f"{SURFACES.examples}",
+    kind: Annotated[
+        Literal["features"],
+        Parameter("The emissivity of each feature of a chip, each with its texture."),
+    ] = "features"
+    chips: Annotated[
+        dict[str, ChipSection],
+        Parameter(
+            "Chips by name, each laid on the same scene. A chip is chip-1 or chip-2 (the paper's "
+            "Table 1), or the numbers of its body and shear bands."
+        ),
+    ] = Field(default={"chip 1": ChipSection.of(CHIP_1), "chip 2": ChipSection.of(CHIP_2)})
+    maps: Annotated[
+        dict[str, FileBeside],
+        Parameter(
+            "Emissivity maps by name, files of chipglow emissivity: each is laid on the scene "
+            "where its pixels lie, as one more chip. Of several true temperatures each pixel has "
+            "its line.",
+            allowed="{} or names and files beside this one: {measured: emissivity.nc}",
+        ),
+    ] = Field(default_factory=dict)
+    measured: Annotated[
+        dict[str, FileBeside],
+        Parameter(
+            "Measured chips by name, files of chipglow emissivity: chip body and shear band (and "
+            "workpiece and tool, if they are there) by their regions, over the temperature.",
+            allowed="{} or names and files beside this one: {heated chip: emissivity.nc}",
+        ),
+    ] = Field(default_factory=dict)
+    workpiece: Annotated[
+        Emissivity, Parameter("The uncut workpiece; the paper assumed these numbers.")
+    ] = CHIP_1.workpiece
+    tool: Annotated[Emissivity, Parameter("The tool's side.")] = CHIP_1.tool
+    grain: Annotated[float, Parameter("Size of a grain of the emissivity's texture.", LENGTH)] = (
+        20e-6
     )
-    chips: dict[str, ChipSection] = described(
-        {"chip 1": "chip-1", "chip 2": "chip-2"},
-        "Chips by name, each laid on the same scene. A chip is chip-1 or chip-2 (the paper's\n"
-        "Table 1), or the numbers of its body and shear bands.",
-    )
-    maps: dict[str, FileBeside] = described(
-        {},
-        "Emissivity maps by name, files of chipglow emissivity: each is laid on the scene where\n"
-        "its pixels lie, as one more chip. Of several true temperatures each pixel has its line.",
-        "{} or names and files beside this one: {measured: emissivity.nc}",
-    )
-    measured: dict[str, FileBeside] = described(
-        {},
-        "Measured chips by name, files of chipglow emissivity: chip body and shear band (and\n"
-        "workpiece and tool, if they are there) by their regions, over the temperature.",
-        "{} or names and files beside this one: {heated chip: emissivity.nc}",
-    )
-    workpiece: Declared[Emissivity] = described(
-        _numbers(CHIP_1.workpiece), "The uncut workpiece; the paper assumed these numbers."
-    )
-    tool: Declared[Emissivity] = described(_numbers(CHIP_1.tool), "The tool's side.")
-    grain: Length = described("20 um", "Size of a grain of the emissivity's texture.")
-    follow: Literal["material", "mean", "none"] = described(
-        "material",
-        "How textures move: material (each point keeps its own), mean (the paper's shift by the\n"
-        "feature's mean velocity) or none.",
-    )
-    restore_standard_deviation: bool = described(
-        True, "Make up for the standard deviation that is lost when a texture is enlarged."
-    )
-    spectral: Annotated[SpectralSection | None, OR_NONE] = described(
-        "none",
-        "How all these emissivities depend on the wavelength, for cameras of other bands; or\n"
-        f"none: they are grey. Kinds:\n{SPECTRA.examples}",
-    )
-    measured_in: WavelengthRange = described(
-        "3.8-5.1 um", "Band in which they are as they stand here, where they are not grey."
-    )
-    oxide: Annotated[OxideSection | None, OR_NONE] = described(
-        "none",
-        "Oxide that grows on the material while it is in view, by its temperatures, or none.\n"
-        f"Kinds:\n{OXIDES.examples}",
-    )
-    directional: Annotated[DirectionalSection | None, OR_NONE] = described(
-        "none",
-        "How emissivities depend on the angle at which they are seen, or none: they do not.\n"
-        f"Kinds:\n{DIRECTIONS.examples}",
-    )
-    reflections: Annotated[ReflectionsSection | None, OR_NONE] = described(
-        "none",
-        "Reflections between the rake face and the chip's side, which flowed sideways, or none.\n"
-        f"Kinds:\n{REFLECTIONS.examples}",
-    )
+    follow: Annotated[
+        Literal["material", "mean", "none"],
+        Parameter(
+            "How textures move: material (each point keeps its own), mean (the paper's shift by "
+            "the feature's mean velocity) or none."
+        ),
+    ] = "material"
+    restore_standard_deviation: Annotated[
+        bool,
+        Parameter("Make up for the standard deviation that is lost when a texture is enlarged."),
+    ] = True
+    spectral: Annotated[
+        SpectralSection | None,
+        Parameter(
+            "How all these emissivities depend on the wavelength, for cameras of other bands; or "
+            "none: they are grey."
+        ),
+    ] = None
+    measured_in: Annotated[
+        tuple[float, float],
+        Parameter(
+            "Band in which they are as they stand here, where they are not grey.", WAVELENGTHS
+        ),
+    ] = (3.8e-6, 5.1e-6)
+    oxide: Annotated[
+        OxideSection | None,
+        Parameter(
+            "Oxide that grows on the material while it is in view, by its temperatures, or none."
+        ),
+    ] = None
+    directional: Annotated[
+        DirectionalSection | None,
+        Parameter(
+            "How emissivities depend on the angle at which they are seen, or none: they do not."
+        ),
+    ] = None
+    reflections: Annotated[
+        ReflectionsSection | None,
+        Parameter(
+            "Reflections between the rake face and the chip's side, which flowed sideways, or none."
+        ),
+    ] = None
 
     @field_validator("chips")
     @classmethod
@@ -181,34 +203,34 @@ class FeaturesSection(Section):
             If it is not there.
         """
         chips = {
-            name: self._features(chip.body.build(), chip.shear_band.build(), seed)
+            name: self._features(chip.body, chip.shear_band, seed)
             for name, chip in self.chips.items()
         }
         maps = {name: read_emissivity_map(file) for name, file in self.maps.items()}
         measured = {name: self._measured(file, seed) for name, file in self.measured.items()}
         surfaces: dict[str, Surface] = {**chips, **maps, **measured}
         if self.spectral is not None:
-            spectrum, band = self.spectral.build(), Band(*self.measured_in)
+            spectrum, band = self.spectral, Band(*self.measured_in)
             surfaces = {
                 name: DispersiveSurface(bare, spectrum, band) for name, bare in surfaces.items()
             }
         if self.oxide is not None:
-            oxide = self.oxide.build()
+            oxide = self.oxide
             surfaces = {name: OxidisedSurface(bare, oxide) for name, bare in surfaces.items()}
         if self.directional is not None:
-            law = self.directional.build()
+            law = self.directional
             surfaces = {name: DirectionalSurface(bare, law) for name, bare in surfaces.items()}
         if self.reflections is None:
             return surfaces
-        shape = self.reflections.build()
+        shape = self.reflections
         return {name: ReflectingSurface(bare, shape) for name, bare in surfaces.items()}
 
     def _features(self, chip: Emissivity, shear_band: Emissivity, seed: int) -> FeatureSurface:
         return FeatureSurface(
             chip=chip,
             shear_band=shear_band,
-            workpiece=self.workpiece.build(),
-            tool=self.tool.build(),
+            workpiece=self.workpiece,
+            tool=self.tool,
             grain=self.grain,
             follow=self.follow,
             seed=seed,
@@ -237,22 +259,20 @@ class FeaturesSection(Section):
 
 SURFACES.add("features", FeaturesSection)
 
-SurfaceSection = Annotated[FeaturesSection | Declared[SurfaceChoice], SURFACES]
+SurfaceSection = Annotated[FeaturesSection | SurfaceChoice, SURFACES]
 
 
-def surface_names(section: FeaturesSection | Declared[SurfaceChoice]) -> tuple[str, ...]:
+def surface_names(section: FeaturesSection | SurfaceChoice) -> tuple[str, ...]:
     """Names of a section's surfaces; a surface that is the only one is called by its kind."""
     return section.names if isinstance(section, FeaturesSection) else (section.kind,)
 
 
-def surfaces_of(
-    section: FeaturesSection | Declared[SurfaceChoice], seed: int
-) -> dict[str, Surface]:
+def surfaces_of(section: FeaturesSection | SurfaceChoice, seed: int) -> dict[str, Surface]:
     """The surfaces of a section by their names.
 
     Parameters
     ----------
-    section : FeaturesSection or Declared
+    section : FeaturesSection or SurfaceChoice
         The section.
     seed : int
         Seed of the textures.
@@ -266,10 +286,4 @@ def surfaces_of(
     """
     if isinstance(section, FeaturesSection):
         return section.build(seed)
-    return {section.kind: section.build().surface()}
-
-
-def _known_name(name: str, names: Mapping[str, object]) -> str:
-    if name not in names:
-        raise ValueError(f"{name!r} is unknown, expected one of {', '.join(names)}")
-    return name
+    return {section.kind: section.surface()}

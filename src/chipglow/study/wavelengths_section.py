@@ -2,54 +2,56 @@
 
 from typing import Annotated
 
-from pydantic import Strict, model_validator
-
 from chipglow.analysis import WavelengthPlan
-from chipglow.quantities import Settings, described
-from chipglow.quantities.units import INSTANT, Position, WavelengthRange
+from chipglow.quantities import Parameter, Settings
+from chipglow.quantities.units import INSTANT, POSITION, WavelengthRange
 from chipglow.radiometry import Band
 
 
 class WavelengthsSection(Settings[WavelengthPlan]):
     """Bands that are compared, alone and as ratios of two."""
 
-    bands: Annotated[tuple[WavelengthRange, ...], Strict(False)] = described(
-        [
-            "0.9-1.1 um",
-            "1.5-1.7 um",
-            "2.0-2.4 um",
-            "3.2-3.8 um",
-            "3.8-5.1 um",
-            "8.0-9.5 um",
-            "10-14 um",
-        ],
-        "The bands; each pair of them is a ratio. The camera's diffraction is that of each band.",
+    bands: Annotated[
+        tuple[WavelengthRange, ...],
+        Parameter(
+            "The bands; each pair of them is a ratio. The camera's diffraction is that of each "
+            "band."
+        ),
+    ] = (
+        (0.9e-6, 1.1e-6),
+        (1.5e-6, 1.7e-6),
+        (2.0e-6, 2.4e-6),
+        (3.2e-6, 3.8e-6),
+        (3.8e-6, 5.1e-6),
+        (8.0e-6, 9.5e-6),
+        (10e-6, 14e-6),
     )
-    misregistration: Position = described(
-        "1 um",
-        "How far the pixels of a ratio's second channel look beside those of the first, on the\n"
-        "scene, in a direction that is not known.",
-        "0 um or more",
-    )
-    delay: Annotated[float, INSTANT] = described(
-        "0 us", "How much later the second channel is exposed.", "0 us or more"
-    )
-    emissivity_uncertainty: float = described(
-        0.1,
-        "Relative standard uncertainty of the emissivity that one band alone needs.",
-        "0 or more",
-    )
-    exponent_uncertainty: float = described(
-        0.15,
-        "Standard uncertainty of the exponent with which the emissivity goes with the wavelength:\n"
-        "0 for a grey surface, as it is taken to be; -0.5 for a bare metal.",
-        "0 or more",
-    )
-
-    @model_validator(mode="after")
-    def _possible(self) -> "WavelengthsSection":
-        self.build()
-        return self
+    misregistration: Annotated[
+        float,
+        Parameter(
+            "How far the pixels of a ratio's second channel look beside those of the first, on "
+            "the scene, in a direction that is not known.",
+            POSITION,
+            least=0.0,
+        ),
+    ] = 1e-6
+    delay: Annotated[
+        float, Parameter("How much later the second channel is exposed.", INSTANT, least=0.0)
+    ] = 0.0
+    emissivity_uncertainty: Annotated[
+        float,
+        Parameter(
+            "Relative standard uncertainty of the emissivity that one band alone needs.", least=0.0
+        ),
+    ] = 0.1
+    exponent_uncertainty: Annotated[
+        float,
+        Parameter(
+            "Standard uncertainty of the exponent with which the emissivity goes with the "
+            "wavelength: 0 for a grey surface, as it is taken to be; -0.5 for a bare metal.",
+            least=0.0,
+        ),
+    ] = 0.15
 
     def build(self) -> WavelengthPlan:
         """What to compare."""

@@ -28,7 +28,7 @@ class Direction(Part, ABC):
     tilt: Annotated[
         float,
         Parameter(
-            "Angle of the camera's line of sight to the normal of the scene's plane, in the plane\n"
+            "Angle of the camera's line of sight to the normal of the scene's plane, in the plane "
             "of that normal and the rake face.",
             ANGLE,
             least=0.0,

@@ -6,7 +6,6 @@ from typing import Annotated, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Strict
 from scipy.constants import c, epsilon_0, pi
 
 from chipglow.quantities import Family, Parameter
@@ -31,7 +30,7 @@ REFERENCE: Final = 293.15
 _STEP: Final = 5.0
 _NEAR: Final = 0.5
 
-_Row = Annotated[tuple[Wavelength, Temperature, float], Strict(False)]
+_Row = tuple[Wavelength, Temperature, float]
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,6 @@ class SpectralTable(SpectralSurface):
     example: ClassVar[str] = "{kind: spectral, table: [[3 um, 20 degC, 0.3], [5 um, 20 degC, 0.2]]}"
     table: Annotated[
         tuple[_Row, ...],
-        Strict(False),
         Parameter("Wavelength, temperature, emissivity a row: every pair of the first two once."),
     ]
 

@@ -5,14 +5,13 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Strict
 
 from chipglow.quantities import Parameter
 from chipglow.quantities.units import TEMPERATURE, Temperature
 from chipglow.scene import Frame, Material, Scene
 from chipglow.surface.surface import SURFACES, EmissivityField, Surface, SurfaceChoice
 
-_Row = Annotated[tuple[Temperature, float], Strict(False)]
+_Row = tuple[Temperature, float]
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,6 @@ class TemperatureTable(SurfaceChoice):
     )
     table: Annotated[
         tuple[_Row, ...],
-        Strict(False),
         Parameter("Temperature and emissivity, a pair a row; linear between."),
     ]
 

@@ -1,53 +1,83 @@
 """Sections as commented YAML."""
 
 import json
+import re
 from collections.abc import Collection, Iterator, Mapping
-from typing import Any
+from textwrap import wrap
+from typing import Any, Final
 
 import yaml
-from pydantic import BaseModel
+from pydantic import TypeAdapter
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue, NoDefault
+from pydantic_core import SchemaSerializer, core_schema
 
-from chipglow.quantities import Section, allowed
+from chipglow.quantities import Part, Section, adapter, own_settings
+
+_WIDTH: Final = 90
+"""Letters in a line of comment."""
 
 
-def commented_yaml(header: str, section: Section, unused: Collection[str] = ()) -> str:
+def commented_yaml(header: str, section: Section | Part, unused: Collection[str] = ()) -> str:
     """A section as YAML, every field with a comment."""
-    values = section.model_dump(mode="json")
-    return "\n".join([header, *_section_lines(section, values, "", unused)]) + "\n"
+    return "\n".join([header, *_section_lines(section, "", unused)]) + "\n"
 
 
-def json_schema(model: type[BaseModel]) -> str:
-    """JSON schema of a model, by which editors check and complete YAML."""
+class _TextDefaults(GenerateJsonSchema):
+    """Defaults as YAML has them: text with a unit."""
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        """Schema of a field with its default."""
+        json = self.generate_inner(schema["schema"])
+        default = self.get_default_value(schema)
+        if default is NoDefault:
+            return json
+        if default is None:
+            return json | {"default": "none"}
+        if isinstance(default, Section | Part):
+            return json | {"default": adapter(type(default)).dump_python(default, mode="json")}
+        text = SchemaSerializer(schema["schema"]).to_python(default, mode="json")
+        return json | {"default": text}
+
+
+def json_schema(kind: type) -> str:
+    """JSON schema of a section, by which editors check and complete YAML."""
     dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
-    return json.dumps(dialect | model.model_json_schema(), indent=1) + "\n"
+    schema = TypeAdapter(kind).json_schema(schema_generator=_TextDefaults)
+    return json.dumps(dialect | schema, indent=1) + "\n"
 
 
 def _section_lines(
-    section: Section, values: Mapping[str, Any], indent: str, unused: Collection[str] = ()
+    section: Section | Part, indent: str, unused: Collection[str] = ()
 ) -> Iterator[str]:
-    for name, field in type(section).model_fields.items():
-        if name in unused:
+    for one in own_settings(section):
+        if one.name in unused:
             continue
-        value = getattr(section, name)
-        if not indent and isinstance(value, BaseModel):
+        if not indent and one.is_section:
             yield ""
-        for line in (field.description or "").splitlines():
+        allowed = f"Allowed: {one.allowed}." if one.allowed else ""
+        kinds = f"Kinds:\n{one.examples}" if one.examples else ""
+        for line in (*_wrapped(one.meaning), *_wrapped(allowed), *kinds.splitlines()):
             yield f"{indent}# {line}"
-        if may_be := allowed(field):
-            yield from (f"{indent}# {line}" for line in f"Allowed: {may_be}.".splitlines())
-        yield from _entry_lines(name, value, values[name], indent)
+        yield from _entry_lines(one.name, one.value, one.plain, indent)
 
 
 def _entry_lines(name: str, value: object, plain: Any, indent: str) -> Iterator[str]:
-    if isinstance(value, Section):
+    if isinstance(value, Section | Part):
         yield f"{indent}{_scalar(name)}:"
-        yield from _section_lines(value, plain, indent + "  ")
+        yield from _section_lines(value, indent + "  ")
     elif isinstance(value, Mapping) and value:
         yield f"{indent}{_scalar(name)}:"
         for key, item in value.items():
             yield from _entry_lines(key, item, plain[key], indent + "  ")
     else:
         yield f"{indent}{_scalar(name)}: {_scalar(plain)}"
+
+
+def _wrapped(text: str) -> list[str]:
+    """Lines of a text; a number stays with its unit."""
+    joined = re.sub(r"(?<=\d) (?=[a-z])", "\xa0", text)
+    lines = [wrap(one, _WIDTH, break_on_hyphens=False) for one in joined.splitlines()]
+    return [one.replace("\xa0", " ") for each in lines for one in each]
 
 
 def _scalar(value: Any) -> str:

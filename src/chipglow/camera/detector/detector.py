@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Final, Literal, TypeAlias, get_args
+from typing import Annotated, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.camera.detector.response import DetectorResponse, OperationPoint
-from chipglow.camera.detector.terms import DetectorTerm, Readout, Stage
+from chipglow.camera.detector.response import RESPONSES, DetectorResponse, OperationPoint
+from chipglow.camera.detector.terms import DETECTOR_TERMS, DetectorTerm, Readout, Stage
 from chipglow.camera.measurement import Measurement
 from chipglow.camera.recording import Recording
 from chipglow.quantities import Parameter, Part
@@ -32,7 +32,7 @@ class Detector(Part):
     counts, offset + gain × electrons, rounded to whole ones between 0 and 2^bits − 1.
     """
 
-    response: DetectorResponse
+    response: Annotated[DetectorResponse, RESPONSES, Parameter("Electrons that light makes.")]
     full_well: Annotated[
         float | None,
         Parameter("Electrons that an element holds; none: as many as the digitiser.", over=0.0),
@@ -45,7 +45,12 @@ class Detector(Part):
     ] = None
     offset: Annotated[float, Parameter("Counts without electrons.", least=0.0)] = 400.0
     bits: Annotated[int, Parameter("Bits of the digitiser.", least=1, most=32)] = 12
-    terms: tuple[DetectorTerm, ...] = ()
+    terms: Annotated[
+        tuple[Annotated[DetectorTerm, DETECTOR_TERMS], ...],
+        Parameter(
+            "What happens besides, a list; each acts in its own place between light and counts."
+        ),
+    ] = ()
     correction: Annotated[
         Correction,
         Parameter("How pixels are made alike: two-point, one-point or none."),
@@ -72,7 +77,7 @@ class Detector(Part):
     least_signal: Annotated[
         float,
         Parameter(
-            "Signal at the lower range limit, in standard deviations of its noise, if the limit\n"
+            "Signal at the lower range limit, in standard deviations of its noise, if the limit "
             "is the detector's.",
             over=0.0,
         ),
@@ -83,21 +88,6 @@ class Detector(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not isinstance(self.response, DetectorResponse):
-            raise ValueError(
-                f"Detector.response: {self.response!r}, expected one such as EnergyResponse(1e4)"
-            )
-        if self.correction not in get_args(Correction):
-            raise ValueError(
-                f"Detector.correction: {self.correction!r}, expected one of "
-                f"{', '.join(get_args(Correction))}"
-            )
-        if not (
-            isinstance(self.terms, tuple) and all(isinstance(t, DetectorTerm) for t in self.terms)
-        ):
-            raise ValueError(
-                f"Detector.terms: {self.terms!r}, expected a tuple of terms such as ShotNoise()"
-            )
         kinds = [term.kind for term in self.terms]
         for kind in kinds:
             if kinds.count(kind) > 1:

@@ -11,7 +11,6 @@ import numpy as np
 import scipy
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Strict
 from scipy.special import erf, erfinv, j1
 
 from chipglow.camera.optics.kernel import (
@@ -394,7 +393,7 @@ NumericalAperture = Annotated[
 FNumber = Annotated[
     float | None,
     Parameter(
-        "F-number of the lens, focused at infinity; with the camera's magnification m the\n"
+        "F-number of the lens, focused at infinity; with the camera's magnification m the "
         "numerical aperture is m / (2 f_number (1 + m)).",
         over=0.0,
     ),
@@ -494,9 +493,8 @@ class MeasuredPSFFile(PSFChoice):
 
     includes: Annotated[
         tuple[str, ...] | None,
-        Strict(False),
         Parameter(
-            "What it holds besides the optics, because it was measured through it: footprint for\n"
+            "What it holds besides the optics, because it was measured through it: footprint for "
             "the pixel's sensitive square, and kinds of blur; none: what a .nc says, or nothing."
         ),
     ] = None

@@ -85,7 +85,7 @@ class OpticalElement(OpticsTerm):
     calibrated_at: Annotated[
         float | None,
         Parameter(
-            "Temperature that it had when the camera was calibrated; none: the calibration was\n"
+            "Temperature that it had when the camera was calibrated; none: the calibration was "
             "without it.",
             TEMPERATURE,
         ),
@@ -223,7 +223,7 @@ class Distortion(OpticsTerm):
     fraction: Annotated[
         float,
         Parameter(
-            "How much farther out pixels at the radius see, as a fraction of it: over 0 for a\n"
+            "How much farther out pixels at the radius see, as a fraction of it: over 0 for a "
             "barrel.",
             least=-0.3,
             most=0.3,

@@ -8,7 +8,6 @@ from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Strict
 
 from chipglow.io.sources.conventions import (
     COMMON_NAMES,
@@ -86,7 +85,7 @@ class CloudSource(Source, Part):
     spacing: Annotated[
         float | None,
         Parameter(
-            "Distance of neighbours before the cut; none: from the points' volumes or, without\n"
+            "Distance of neighbours before the cut; none: from the points' volumes or, without "
             "them, from the first frame.",
             LENGTH,
             over=0.0,
@@ -94,7 +93,6 @@ class CloudSource(Source, Part):
     ] = None
     tool_parts: Annotated[
         tuple[int, ...],
-        Strict(False),
         Parameter("Numbers of the part field that are tool, such as [2]."),
     ] = ()
     depth: Annotated[

@@ -9,7 +9,6 @@ from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Strict
 
 from chipglow.io.sources.arrays import (
     MOST_ON_A_SIDE,
@@ -82,10 +81,9 @@ class GridSource(Source, Part):
     names: Mapping[str, str] = field(default_factory=dict)
     axes: Annotated[
         tuple[str, ...] | None,
-        Strict(False),
         Parameter(
-            "Order of the arrays' axes, without time for a single frame; none: as the file\n"
-            "says, or [time, y, x]."
+            "Order of the arrays' axes, without time for a single frame; none: as the file says, "
+            "or [time, y, x]."
         ),
     ] = None
     top_first: Annotated[

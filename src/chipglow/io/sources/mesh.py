@@ -8,7 +8,6 @@ from typing import Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Strict
 
 from chipglow.io.sources import mesh_meshio, mesh_tecplot, mesh_vtk
 from chipglow.io.sources.conventions import Placement, Units, match_names, simple
@@ -27,7 +26,7 @@ from chipglow.io.sources.source import (
     required,
     span_of,
 )
-from chipglow.quantities import OrWord, Parameter, Part
+from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import POSITION
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.rasterise import NOTHING, rasterise
@@ -93,17 +92,15 @@ class MeshSource(Source, Part):
     section: Annotated[
         float | Literal["facing"] | None,
         Parameter(
-            "Of solid elements: where to cut along the axis of depth, such as 0 mm; facing: the\n"
+            "Of solid elements: where to cut along the axis of depth, such as 0 mm; facing: the "
             "surface that faces the camera, which looks at the scene's x and y from the front.",
             POSITION,
         ),
-        OrWord("facing", "facing"),
     ] = None
     tool_parts: Annotated[
         tuple[str | int, ...],
-        Strict(False),
         Parameter(
-            "Names of the blocks, parts or sets of elements that are tool, such as [TOOL], or\n"
+            "Names of the blocks, parts or sets of elements that are tool, such as [TOOL], or "
             "their numbers in the field of parts, such as [2]."
         ),
     ] = ()

@@ -9,7 +9,6 @@ from typing import Annotated, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Strict
 
 from chipglow.io.sources.colour_scale import (
     ColourScale,
@@ -45,7 +44,7 @@ from chipglow.text import Notes
 MOVIE_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate")
 """Fields that a movie can show, the first of those given decides on the material."""
 
-Pixel = Annotated[tuple[float, float], Strict(False)]
+Pixel = tuple[float, float]
 """A place in a picture: pixels right and down from its upper left corner."""
 
 _LEGEND_MARGIN: Final = 3
@@ -144,14 +143,14 @@ class MovieSource(Source, Part):
     origin: Annotated[
         Pixel,
         Parameter(
-            "The tip of the tool, in pixels right and down from the upper left corner of the\n"
+            "The tip of the tool, in pixels right and down from the upper left corner of the "
             "whole picture: 0.5, 0.5 is the middle of the first pixel."
         ),
     ] = (0.0, 0.0)
     crop: Annotated[
         Box | None,
         Parameter(
-            "Left, top, right and bottom pixel of what shows the field, such as [0, 0, 600, 400];\n"
+            "Left, top, right and bottom pixel of what shows the field, such as [0, 0, 600, 400]; "
             "none: all."
         ),
     ] = None
@@ -160,15 +159,13 @@ class MovieSource(Source, Part):
     placement: Placement = field(default_factory=Placement)
     background: Annotated[
         tuple[Colour, ...] | None,
-        Strict(False),
         Parameter(
-            "Colours of where nothing is, such as [[255, 255, 255]]; none: looked for at the\n"
+            "Colours of where nothing is, such as [[255, 255, 255]]; none: looked for at the "
             "border."
         ),
     ] = None
     covered: Annotated[
         tuple[Box, ...],
-        Strict(False),
         Parameter("Boxes where something else is drawn, such as text."),
     ] = ()
     overlay_limit: Annotated[
@@ -180,7 +177,6 @@ class MovieSource(Source, Part):
     ] = 20.0
     tool_polygon: Annotated[
         tuple[Pixel, ...],
-        Strict(False),
         Parameter("Corners of the tool in pixels; two are opposite corners of a box."),
     ] = ()
     tool_colour: Annotated[Colour | None, Parameter("Colour of a tool that shows no values.")] = (

@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Strict
 from scipy.ndimage import grey_closing, maximum_filter, minimum_filter
 
 from chipglow.io.sources.colour_scale import ColourScale, Picture, lab
@@ -16,10 +15,10 @@ from chipglow.scene import FILLED, Material
 from chipglow.scene.nearest import fill
 from chipglow.scene.polygon import in_polygon
 
-Box = Annotated[tuple[int, int, int, int], Strict(False)]
+Box = tuple[int, int, int, int]
 """Left, top, right and bottom edge in whole pixels from the upper left corner of a picture."""
 
-Colour = Annotated[tuple[int, int, int], Strict(False)]
+Colour = tuple[int, int, int]
 """Red, green and blue of 0 to 255."""
 
 MARK_TOLERANCE: Final = 10.0

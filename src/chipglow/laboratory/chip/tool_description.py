@@ -3,27 +3,25 @@
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Strict
-
 from chipglow.camera import Measurement
 from chipglow.io import ToolSection
-from chipglow.quantities.section import OR_NONE, described
+from chipglow.quantities import Parameter
 from chipglow.quantities.units import Position
 from chipglow.scene import PlacedTool, Tool
 from chipglow.text import load_described
-
-_Tip = Annotated[tuple[Position, Position] | None, Strict(False), OR_NONE]
 
 
 class ToolDescription(ToolSection):
     """A cutting tool and where it is."""
 
-    tip: _Tip = described(
-        "none",
-        "Where the tip is in the measurement's coordinates: x of the edge's leftmost point, y of\n"
-        "its lowest one; at the origin by default.",
-        "none, or [-12 um, 3.5 um]",
-    )
+    tip: Annotated[
+        tuple[Position, Position] | None,
+        Parameter(
+            "Where the tip is in the measurement's coordinates: x of the edge's leftmost point, y "
+            "of its lowest one; at the origin by default.",
+            allowed="none, or [-12 um, 3.5 um]",
+        ),
+    ] = None
 
     def build(self) -> Tool:
         """The tool in the measurement's coordinates."""

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
-from pydantic import PlainSerializer, PlainValidator, Strict, field_validator, model_validator
+from pydantic import Field, PlainSerializer, PlainValidator, field_validator, model_validator
 
-from chipglow.quantities import OR_NONE, Section, Settings, described
+from chipglow.quantities import Parameter, Section, Settings
 from chipglow.quantities.units import POSITION
 from chipglow.scene import Circle, Polygon, Region
 from chipglow.scene.regions import Point
@@ -51,27 +51,28 @@ def _as_written(coordinate: Coordinate) -> float | str:
 CoordinateField = Annotated[
     Coordinate, PlainValidator(_coordinate), PlainSerializer(_as_written, when_used="json")
 ]
-PointField = Annotated[tuple[CoordinateField, CoordinateField], Strict(False)]
+PointField = tuple[CoordinateField, CoordinateField]
 
 
 class CircleSection(Section):
     """A circle."""
 
-    centre: PointField = described([0, 0], "Its middle.")
-    radius: CoordinateField = described(0, "Its radius.")
+    centre: Annotated[PointField, Parameter("Its middle.")] = (
+        Coordinate(0.0, "pixel"),
+        Coordinate(0.0, "pixel"),
+    )
+    radius: Annotated[CoordinateField, Parameter("Its radius.")] = Coordinate(0.0, "pixel")
 
 
 class RegionSection(Section):
     """One region: a polygon, a rectangle or a circle."""
 
-    polygon: Annotated[tuple[PointField, ...] | None, Strict(False), OR_NONE] = described(
-        "none", "Corners in order."
-    )
-    rectangle: Annotated[tuple[PointField, PointField] | None, Strict(False), OR_NONE] = described(
-        "none", "Two opposite corners."
-    )
-    circle: Annotated[CircleSection | None, OR_NONE] = described("none", "Centre and radius.")
-    feature: str = described("", "What it is a part of; by default its own name.")
+    polygon: Annotated[tuple[PointField, ...] | None, Parameter("Corners in order.")] = None
+    rectangle: Annotated[
+        tuple[PointField, PointField] | None, Parameter("Two opposite corners.")
+    ] = None
+    circle: Annotated[CircleSection | None, Parameter("Centre and radius.")] = None
+    feature: Annotated[str, Parameter("What it is a part of; by default its own name.")] = ""
 
     @model_validator(mode="after")
     def _one_shape(self) -> "RegionSection":
@@ -99,7 +100,9 @@ class RegionSection(Section):
 class RegionsDescription(Settings[tuple[Region, ...]]):
     """A file of regions."""
 
-    regions: dict[str, RegionSection] = described({}, "Regions by name.")
+    regions: Annotated[dict[str, RegionSection], Parameter("Regions by name.")] = Field(
+        default_factory=dict
+    )
 
     @field_validator("regions")
     @classmethod

@@ -5,12 +5,15 @@ from pathlib import Path
 from typing import Annotated, Final, Literal
 
 import numpy as np
-from pydantic import Field, Strict
 
 from chipglow.camera import CalibrationFit, FittedCalibration, LinearCalibration, SakumaHattori
 from chipglow.io import atomic_path
-from chipglow.quantities import OR_NONE, Settings, described
-from chipglow.quantities.units import Temperature, Time, WavelengthRange
+from chipglow.quantities import Parameter, Settings
+from chipglow.quantities.units import (
+    TEMPERATURE,
+    TIME,
+    WAVELENGTHS,
+)
 from chipglow.radiometry import Band, TabulatedResponse
 from chipglow.text import commented_yaml, load_described
 
@@ -19,43 +22,62 @@ MODELS: Final[Mapping[str, type[FittedCalibration]]] = {
 }
 """Forms of a calibration by the names of a file."""
 
-Rows = Annotated[tuple[Annotated[tuple[float, ...], Strict(False)], ...], Strict(False)]
-PointRow = Annotated[tuple[float, float, float, float], Strict(False)]
+Rows = tuple[tuple[float, ...], ...]
+PointRow = tuple[float, float, float, float]
 
 
 class CalibrationDescription(Settings[FittedCalibration]):
     """A calibration of a camera's counts by blackbodies."""
 
-    model: Literal["linear", "sakuma-hattori"] = Field(
-        description="linear: counts = offset + gain L(T), L the radiance in the band;\n"
-        "sakuma-hattori: counts = offset + C / (exp(c2/(A T + B)) - 1)."
-    )
-    band: WavelengthRange = Field(description="The camera's spectral band.")
-    response: Annotated[Rows | None, OR_NONE] = described(
-        "none", "Pairs of wavelength in um and relative response; none: 1 in the band."
-    )
-    lowest: Temperature = Field(description="Coldest blackbody: colder pixels are flagged.")
-    highest: Temperature = Field(description="Hottest blackbody: hotter pixels are flagged.")
-    integration_time: Annotated[Time | None, OR_NONE] = described(
-        "none", "Integration time for which it holds; none: not stated, not checked."
-    )
-    range: Annotated[str | None, OR_NONE] = described(
-        "none", "The camera's measuring range for which it holds; none: not stated, not checked."
-    )
-    parameters: dict[str, float] = Field(
-        description="offset and C in counts, gain in counts per W/(m^2 sr), A in m, B in m K."
-    )
-    covariance: Rows = Field(
-        description="Covariance of offset and gain, or of offset, A, B and C: of the fit, and of\n"
-        "what the temperatures of the blackbody have in common."
-    )
-    warnings: Annotated[tuple[str, ...], Strict(False)] = described(
-        [], "Why it may not be relied on, a sentence each; every measurement by it says so."
-    )
-    points: Annotated[tuple[PointRow, ...], Strict(False)] = described(
-        [],
-        "For readers only: radiance temperature in degC, counts, residual in counts and in K.",
-    )
+    model: Annotated[
+        Literal["linear", "sakuma-hattori"],
+        Parameter(
+            "linear: counts = offset + gain L(T), L the radiance in the band; sakuma-hattori: "
+            "counts = offset + C / (exp(c2/(A T + B)) - 1)."
+        ),
+    ]
+    band: Annotated[tuple[float, float], Parameter("The camera's spectral band.", WAVELENGTHS)]
+    response: Annotated[
+        Rows | None,
+        Parameter("Pairs of wavelength in um and relative response; none: 1 in the band."),
+    ] = None
+    lowest: Annotated[
+        float, Parameter("Coldest blackbody: colder pixels are flagged.", TEMPERATURE)
+    ]
+    highest: Annotated[
+        float, Parameter("Hottest blackbody: hotter pixels are flagged.", TEMPERATURE)
+    ]
+    integration_time: Annotated[
+        float | None,
+        Parameter("Integration time for which it holds; none: not stated, not checked.", TIME),
+    ] = None
+    range: Annotated[
+        str | None,
+        Parameter(
+            "The camera's measuring range for which it holds; none: not stated, not checked."
+        ),
+    ] = None
+    parameters: Annotated[
+        dict[str, float],
+        Parameter("offset and C in counts, gain in counts per W/(m^2 sr), A in m, B in m K."),
+    ]
+    covariance: Annotated[
+        Rows,
+        Parameter(
+            "Covariance of offset and gain, or of offset, A, B and C: of the fit, and of what the "
+            "temperatures of the blackbody have in common."
+        ),
+    ]
+    warnings: Annotated[
+        tuple[str, ...],
+        Parameter("Why it may not be relied on, a sentence each; every measurement by it says so."),
+    ] = ()
+    points: Annotated[
+        tuple[PointRow, ...],
+        Parameter(
+            "For readers only: radiance temperature in degC, counts, residual in counts and in K."
+        ),
+    ] = ()
 
     @classmethod
     def of(cls, fit: CalibrationFit[FittedCalibration]) -> "CalibrationDescription":

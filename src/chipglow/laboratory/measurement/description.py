@@ -8,13 +8,18 @@ from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BeforeValidator, Strict, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
 
 from chipglow.camera import Recording
 from chipglow.io.column_file import read_bad_pixels, read_response
 from chipglow.laboratory.measurement.radiometric_calibration import ImagePosition
-from chipglow.quantities.section import OR_NONE, FileBeside, Section, beside_the_study, described
-from chipglow.quantities.units import WAVELENGTHS, Length, Temperature, Time
+from chipglow.quantities import FileBeside, Parameter, Section, beside_the_study
+from chipglow.quantities.units import (
+    LENGTH,
+    TEMPERATURE,
+    TIME,
+    WAVELENGTHS,
+)
 from chipglow.radiometry import Band, ObjectParameters
 from chipglow.text import commented_yaml, described_by
 
@@ -31,7 +36,7 @@ def _two_numbers(value: object) -> object:
         raise ValueError(f"{value!r}, expected two numbers such as 36.5,41.6") from None
 
 
-Pixels = Annotated[tuple[float, float], Strict(False), BeforeValidator(_two_numbers)]
+Pixels = Annotated[tuple[float, float], BeforeValidator(_two_numbers)]
 
 
 def _limits_or_file(text: str, info: ValidationInfo) -> str:
@@ -69,18 +74,19 @@ def band_of(text: str) -> Band:
 class ObjectSection(Section):
     """The camera's settings of the object, where the file does not say them or says them wrong."""
 
-    emissivity: Annotated[float | None, OR_NONE] = described(
-        "none", "Emissivity of the object.", "none, or over 0 to 1"
-    )
-    reflected: Annotated[Temperature | None, OR_NONE] = described(
-        "none", "Temperature of the surroundings that the object reflects."
-    )
-    transmittance: Annotated[float | None, OR_NONE] = described(
-        "none", "Transmission of atmosphere and window.", "none, or over 0 to 1"
-    )
-    atmosphere: Annotated[Temperature | None, OR_NONE] = described(
-        "none", "Temperature of atmosphere and window."
-    )
+    emissivity: Annotated[
+        float | None, Parameter("Emissivity of the object.", over=0.0, most=1.0)
+    ] = None
+    reflected: Annotated[
+        float | None,
+        Parameter("Temperature of the surroundings that the object reflects.", TEMPERATURE),
+    ] = None
+    transmittance: Annotated[
+        float | None, Parameter("Transmission of atmosphere and window.", over=0.0, most=1.0)
+    ] = None
+    atmosphere: Annotated[
+        float | None, Parameter("Temperature of atmosphere and window.", TEMPERATURE)
+    ] = None
 
     def applied_to(self, recorded: ObjectParameters | None) -> ObjectParameters | None:
         """What the camera was set to: as recorded, but for what is said here."""
@@ -91,107 +97,146 @@ class ObjectSection(Section):
 class FlatFieldSection(Section):
     """Frames of flat-field sources, such as a blackbody out of focus, by the same camera."""
 
-    low: Annotated[FileBeside | None, OR_NONE] = described(
-        "none", "Frames of a flat-field source: with them every pixel's offset is corrected."
-    )
-    high: Annotated[FileBeside | None, OR_NONE] = described(
-        "none", "Frames of a brighter flat-field source: with both the gain is corrected, too."
-    )
-    correct: bool = described(
-        True, "Whether to correct the pixels, or only to find bad pixels with these frames."
-    )
+    low: Annotated[
+        FileBeside | None,
+        Parameter("Frames of a flat-field source: with them every pixel's offset is corrected."),
+    ] = None
+    high: Annotated[
+        FileBeside | None,
+        Parameter("Frames of a brighter flat-field source: with both the gain is corrected, too."),
+    ] = None
+    correct: Annotated[
+        bool,
+        Parameter("Whether to correct the pixels, or only to find bad pixels with these frames."),
+    ] = True
 
 
 class MeasurementDescription(Section):
     """A measurement of a camera's file: what it holds, how it lies, what is done with it."""
 
-    file: Annotated[FileBeside | None, OR_NONE] = described(
-        "none", "The camera's file; of TIFF and tables also a pattern: frame_*.tif."
+    file: Annotated[
+        FileBeside | None,
+        Parameter("The camera's file; of TIFF and tables also a pattern: frame_*.tif."),
+    ] = None
+    format: Annotated[
+        str | None,
+        Parameter(
+            "What the file is; none: known by its content.",
+            allowed="none, flir, ptw, hcc, tiff, ...",
+        ),
+    ] = None
+    frames: Annotated[
+        str | None,
+        Parameter(
+            "Frames to take, from 0: first:end, first:end:step; none: all.",
+            allowed="none, 100:200, ::10",
+        ),
+    ] = None
+    dataset: Annotated[str | None, Parameter("Which array of the file, if it has several.")] = None
+    axes: Annotated[
+        tuple[str, ...] | None,
+        Parameter(
+            "Order of the array's axes; none: as the file says.", allowed="none, or [time, y, x]"
+        ),
+    ] = None
+    quantity: Annotated[
+        Literal["counts", "radiance", "temperature"] | None,
+        Parameter(
+            "What the numbers are, for files that do not say it.",
+            allowed="none, counts, radiance, temperature",
+        ),
+    ] = None
+    unit: Annotated[
+        str | None,
+        Parameter(
+            "Their unit, for files that do not say it.", allowed="none, counts, W/m2/sr, K, degC"
+        ),
+    ] = None
+    interval: Annotated[
+        float | None, Parameter("Time from frame to frame; none: as the file says.", TIME)
+    ] = None
+    camera: Annotated[
+        str | None, Parameter("Which camera, for readers; none: as the file says.")
+    ] = None
+    band: Annotated[
+        BandText | None,
+        Parameter(
+            "Limits of the camera's band, or a table of its response (.csv with the columns "
+            "wavelength_um,response); none: that of the calibration or the file.",
+            allowed="none, 3.8-5.1 um, response.csv",
+        ),
+    ] = None
+    pitch: Annotated[
+        float | None,
+        Parameter("Distance between pixels on the object; none: as the file says.", LENGTH),
+    ] = None
+    fill_factor: Annotated[
+        float | None,
+        Parameter(
+            "Portion of a pixel's square that takes light; none: not stated, 1 is assumed for an "
+            "edge.",
+            over=0.0,
+            most=1.0,
+        ),
+    ] = None
+    quarter_turns: Annotated[
+        int,
+        Parameter("Quarter turns counter-clockwise that put the image upright.", least=0, most=3),
+    ] = 0
+    mirror: Annotated[
+        Literal["none", "horizontal", "vertical"],
+        Parameter(
+            "After turning: exchange left and right (horizontal) or top and bottom (vertical).",
+            allowed="none, horizontal, vertical",
+        ),
+    ] = "none"
+    tip: Annotated[
+        Pixels | None,
+        Parameter(
+            "The tip of the tool, the origin of coordinates, in pixels right and down from the "
+            "upper left corner of the image so turned; none: the lower left corner is the origin.",
+            allowed="none, [120.5, 88], or 120.5,88",
+        ),
+    ] = None
+    integration_time: Annotated[
+        float | None, Parameter("Integration time; none: as the file says.", TIME)
+    ] = None
+    range: Annotated[
+        str | None, Parameter("Measuring range of the camera by its name; none: not stated.")
+    ] = None
+    saturation: Annotated[
+        float | None,
+        Parameter("Greatest number in the file that is not saturated; none: as the file says."),
+    ] = None
+    lower_limit: Annotated[
+        float | None,
+        Parameter(
+            "Radiance temperatures under this are flagged; none: those under the calibration's.",
+            TEMPERATURE,
+        ),
+    ] = None
+    calibration: Annotated[
+        FileBeside | None,
+        Parameter("Calibration of the counts, as chipglow calibrate writes it; none: the maker's."),
+    ] = None
+    bad_pixels: Annotated[
+        MaskText | None,
+        Parameter(
+            "Table of bad pixels (.csv with the columns column,row, from 0 at the upper left of "
+            "the file's image), or find: those that show in the uniform frames.",
+            allowed="none, find, bad.csv",
+        ),
+    ] = None
+    object_parameters: Annotated[
+        ObjectSection,
+        Parameter(
+            "What the camera was set to for the object; none: as the file says. Of temperatures "
+            "it is taken back: chipglow takes radiance as the camera received it."
+        ),
+    ] = Field(default_factory=ObjectSection)
+    flat_field: Annotated[FlatFieldSection, Parameter("Frames of flat-field sources.")] = Field(
+        default_factory=FlatFieldSection
     )
-    format: Annotated[str | None, OR_NONE] = described(
-        "none", "What the file is; none: known by its content.", "none, flir, ptw, hcc, tiff, ..."
-    )
-    frames: Annotated[str | None, OR_NONE] = described(
-        "none",
-        "Frames to take, from 0: first:end, first:end:step; none: all.",
-        "none, 100:200, ::10",
-    )
-    dataset: Annotated[str | None, OR_NONE] = described(
-        "none", "Which array of the file, if it has several."
-    )
-    axes: Annotated[tuple[str, ...] | None, Strict(False), OR_NONE] = described(
-        "none", "Order of the array's axes; none: as the file says.", "none, or [time, y, x]"
-    )
-    quantity: Annotated[Literal["counts", "radiance", "temperature"] | None, OR_NONE] = described(
-        "none",
-        "What the numbers are, for files that do not say it.",
-        "none, counts, radiance, temperature",
-    )
-    unit: Annotated[str | None, OR_NONE] = described(
-        "none", "Their unit, for files that do not say it.", "none, counts, W/m2/sr, K, degC"
-    )
-    interval: Annotated[Time | None, OR_NONE] = described(
-        "none", "Time from frame to frame; none: as the file says."
-    )
-    camera: Annotated[str | None, OR_NONE] = described(
-        "none", "Which camera, for readers; none: as the file says."
-    )
-    band: Annotated[BandText | None, OR_NONE] = described(
-        "none",
-        "Limits of the camera's band, or a table of its response (.csv with the columns\n"
-        "wavelength_um,response); none: that of the calibration or the file.",
-        "none, 3.8-5.1 um, response.csv",
-    )
-    pitch: Annotated[Length | None, OR_NONE] = described(
-        "none", "Distance between pixels on the object; none: as the file says."
-    )
-    fill_factor: Annotated[float | None, OR_NONE] = described(
-        "none",
-        "Portion of a pixel's square that takes light; none: not stated, 1 is assumed for an edge.",
-        "none, or over 0 to 1",
-    )
-    quarter_turns: int = described(
-        0, "Quarter turns counter-clockwise that put the image upright.", "0 to 3"
-    )
-    mirror: Literal["none", "horizontal", "vertical"] = described(
-        "none",
-        "After turning: exchange left and right (horizontal) or top and bottom (vertical).",
-        "none, horizontal, vertical",
-    )
-    tip: Annotated[Pixels | None, OR_NONE] = described(
-        "none",
-        "The tip of the tool, the origin of coordinates, in pixels right and down from the upper\n"
-        "left corner of the image so turned; none: the lower left corner is the origin.",
-        "none, [120.5, 88], or 120.5,88",
-    )
-    integration_time: Annotated[Time | None, OR_NONE] = described(
-        "none", "Integration time; none: as the file says."
-    )
-    range: Annotated[str | None, OR_NONE] = described(
-        "none", "Measuring range of the camera by its name; none: not stated."
-    )
-    saturation: Annotated[float | None, OR_NONE] = described(
-        "none", "Greatest number in the file that is not saturated; none: as the file says."
-    )
-    lower_limit: Annotated[Temperature | None, OR_NONE] = described(
-        "none", "Radiance temperatures under this are flagged; none: those under the calibration's."
-    )
-    calibration: Annotated[FileBeside | None, OR_NONE] = described(
-        "none",
-        "Calibration of the counts, as chipglow calibrate writes it; none: the maker's.",
-    )
-    bad_pixels: Annotated[MaskText | None, OR_NONE] = described(
-        "none",
-        "Table of bad pixels (.csv with the columns column,row, from 0 at the upper left of the\n"
-        "file's image), or find: those that show in the uniform frames.",
-        "none, find, bad.csv",
-    )
-    object_parameters: ObjectSection = described(
-        {},
-        "What the camera was set to for the object; none: as the file says. Of temperatures it is\n"
-        "taken back: chipglow takes radiance as the camera received it.",
-    )
-    flat_field: FlatFieldSection = described({}, "Frames of flat-field sources.")
 
     def chosen_frames(self) -> slice | None:
         """The frames to take."""

@@ -3,26 +3,23 @@
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, Strict
-
+from chipglow.quantities import Parameter
 from chipglow.quantities.section import FileBeside, Section
-from chipglow.quantities.units import Length
+from chipglow.quantities.units import LENGTH
 from chipglow.text import load_described
 
 
 class ApertureSection(Section):
     """An image of a round aperture."""
 
-    file: FileBeside = Field(description="The measurement.")
-    diameter: Length = Field(description="Diameter of the aperture on the object.")
+    file: Annotated[FileBeside, Parameter("The measurement.")]
+    diameter: Annotated[float, Parameter("Diameter of the aperture on the object.", LENGTH)]
 
 
 class ApertureList(Section):
     """Images of apertures of several diameters before one source."""
 
-    apertures: Annotated[tuple[ApertureSection, ...], Strict(False)] = Field(
-        description="The images."
-    )
+    apertures: Annotated[tuple[ApertureSection, ...], Parameter("The images.")]
 
 
 def load_apertures(path: str | Path) -> list[tuple[Path, float]]:

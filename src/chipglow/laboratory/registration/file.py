@@ -5,15 +5,14 @@ from typing import Annotated, Final
 
 import numpy as np
 import yaml
-from pydantic import Strict
 
 from chipglow.io import atomic_path
 from chipglow.laboratory.registration.registration import Method, Model, Registration
-from chipglow.quantities import Settings, described
+from chipglow.quantities import Parameter, Settings
 from chipglow.text import DescriptionError, Notes, read_description, validated
 
-_Row = Annotated[tuple[float, ...], Strict(False)]
-_Rows = Annotated[tuple[_Row, ...], Strict(False)]
+_Row = tuple[float, ...]
+_Rows = tuple[_Row, ...]
 
 _HEAD: Final = """\
 # Map from the infrared image onto the visible picture, by chipglow register.
@@ -25,13 +24,19 @@ _HEAD: Final = """\
 class RegistrationDescription(Settings[Registration]):
     """A registration."""
 
-    model: Model = described("affine", "What the matrix may be.")
-    method: Method = described("points", "How it was found.")
-    matrix: _Rows = described(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), "The map.")
-    covariance: _Rows = described(((0.0,) * 9,) * 9, "Of the elements of the matrix.")
-    degrees_of_freedom: float | None = described(None, "Of the covariance; none: infinite.")
-    assumed: list[str] = described([], "Assumptions.")
-    warnings: list[str] = described([], "Reasons why it may be wrong.")
+    model: Annotated[Model, Parameter("What the matrix may be.")] = "affine"
+    method: Annotated[Method, Parameter("How it was found.")] = "points"
+    matrix: Annotated[_Rows, Parameter("The map.")] = (
+        (1.0, 0.0, 0.0),
+        (0.0, 1.0, 0.0),
+        (0.0, 0.0, 1.0),
+    )
+    covariance: Annotated[_Rows, Parameter("Of the elements of the matrix.")] = ((0.0,) * 9,) * 9
+    degrees_of_freedom: Annotated[float | None, Parameter("Of the covariance; none: infinite.")] = (
+        None
+    )
+    assumed: Annotated[tuple[str, ...], Parameter("Assumptions.")] = ()
+    warnings: Annotated[tuple[str, ...], Parameter("Reasons why it may be wrong.")] = ()
 
     def build(self) -> Registration:
         """The registration."""
@@ -44,7 +49,7 @@ class RegistrationDescription(Settings[Registration]):
             self.model,
             self.method,
             np.inf if self.degrees_of_freedom is None else self.degrees_of_freedom,
-            Notes(self.assumed, self.warnings),
+            Notes(list(self.assumed), list(self.warnings)),
         )
 
 
