@@ -372,7 +372,7 @@ def load(text, folder):
         ),
         ("- 1", "", "[1] is no section"),
         ("a: [1,", "line 1", "expected YAML"),
-        ("seed: 1\nseed: 2", "line 2", "key 'seed' is there twice"),
+        ("seed: 1\nseed: 2", "line 2", "duplicate key 'seed'"),
         ("x: !!python/object/apply:os.system [ls]", "line 1", "could not determine a constructor"),
         ("seed: 2026-13-45", "", "month must be in 1..12, expected YAML"),
     ],

@@ -5,7 +5,7 @@ from typing import Any
 
 
 def check_own_data(path: Path) -> None:
-    """Refuse an HDF5 file that takes data from other files, which could be any of this computer."""
+    """Refuse an HDF5 file that takes data from other files."""
     import h5py
 
     if not h5py.is_hdf5(path):

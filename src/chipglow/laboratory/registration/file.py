@@ -9,7 +9,7 @@ import yaml
 from chipglow.io import atomic_path
 from chipglow.laboratory.registration.registration import Method, Model, Registration
 from chipglow.quantities import Parameter, Settings
-from chipglow.text import DescriptionError, Notes, read_description, validated
+from chipglow.text import DescriptionError, Notes, read_yaml, validated
 
 _Row = tuple[float, ...]
 _Rows = tuple[_Row, ...]
@@ -87,7 +87,7 @@ def load_registration(path: str | Path) -> Registration:
         If it cannot be read.
     """
     path = Path(path)
-    data = read_description(path)
+    data = read_yaml(path)
     for name in ("matrix", "covariance"):
         if not isinstance(data, dict) or name not in data:
             raise DescriptionError(f"{path.name}: {name} is missing, expected a registration")
