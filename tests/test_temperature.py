@@ -367,7 +367,7 @@ def test_warnings_of_the_emissivity_travel_to_the_temperature(tmp_path):
     stored = read_region_emissivity(tmp_path / "e.nc")["chip"]
     for emissivity in (found.of(WHOLE), stored):
         (warning,) = true_temperature([image()], WHOLE, emissivity).estimate.warnings
-        assert warning.startswith("emissivity of chip: 300 of 1200 pixels are left out")
+        assert warning.startswith("Emissivity: chip: 300 of 1200 pixels are left out")
 
 
 def test_two_temperatures_by_one_emissivity_have_its_errors_in_common():

@@ -134,9 +134,14 @@ def _print_tables(screen: "Screen", found: "RegionEmissivities") -> None:
         screen.table(None, rows, parts)
     if found.lines:
         screen.heading("\nOver the temperature, with standard uncertainties")
-        columns = ["region", "emissivity ± emissivity_uncertainty", "temperature_degC"]
-        columns += ["change_in_100_K ± change_in_100_K_uncertainty", "residual"]
-        screen.table("lines", found.line_frame(), columns)
+        over_temperature = {
+            "region": "region",
+            "emissivity": "emissivity ± emissivity_uncertainty",
+            "at / °C": "temperature_degC",
+            "change in 100 K": "change_in_100_K ± change_in_100_K_uncertainty",
+            "sd about line": "residual",
+        }
+        screen.table("lines", found.line_frame(), over_temperature)
 
 
 def _print_study(screen: "Screen", found: "RegionEmissivities", out: Path | None) -> None:
