@@ -193,7 +193,7 @@ def test_a_pixel_without_light_does_not_take_the_uncertainty_away():
 def test_few_frames_and_an_unknown_calibration_are_doubtful():
     one = measured([field(X, Y)])
     warnings = compare(one, {"same": frames(field(X, Y))}, TOOL, CURVE).notes.warnings
-    assert any("1 frame only" in warning for warning in warnings)
+    assert any("Only 1 frame" in warning for warning in warnings)
     assert any(
         "does not state the uncertainty of its calibration" in warning for warning in warnings
     )
