@@ -40,8 +40,9 @@ from chipglow.camera import (
 from chipglow.cli.app import app
 from chipglow.io import read_measurement, write_measurement, write_scene
 from chipglow.radiometry import Band
-from chipglow.report.camera_rows import camera_rows
-from chipglow.report.scene_report import write_scene_report
+from chipglow.report import write_report
+from chipglow.report.facts import Facts
+from chipglow.report.rows import camera_rows
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study, errors, load_study, study_text
 from chipglow.surface import CHIP_1, CHIP_2
@@ -431,13 +432,13 @@ def test_the_errors_of_a_scene_have_the_noise_of_each_draw(tmp_path):
     np.testing.assert_allclose(
         shown.errors.measured, shown.measurement.radiance_temperature()[0], rtol=1e-12
     )
-    rows = {row.key: row.here for row in camera_rows(noisy.camera, noisy.raster)}
+    rows = {row.key: row.here for row in camera_rows(Facts(noisy))}
     assert rows["netd_half_K"] == calibration.half_netd
-    assert camera_rows(quiet.camera, quiet.raster) == []
+    assert camera_rows(Facts(quiet)) == []
     for result, told in ((noisy, True), (quiet, False)):
         folder = tmp_path / str(told)
         folder.mkdir()
-        page = write_scene_report(result, folder, "title", "", {}).read_text()
+        page = write_report(result, folder, "title", "", {}).read_text()
         assert ("NETD, half of the range filled" in page) == told
         assert ("camera" in json.loads((folder / "summary.json").read_text())) == told
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 from chipglow.cli.options import Resume, StudyFile, Yes, file_option, picture_option
 
 if TYPE_CHECKING:
-    from chipglow.analysis import WavelengthErrors
+    import pandas as pd
+
     from chipglow.cli.screen import Screen
 
 
@@ -23,6 +24,7 @@ def wavelengths(
     yes: Yes = False,
 ) -> None:
     """Compare spectral bands and two-band ratios: the error of the true temperature."""
+    from chipglow.analysis import wavelengths_frame
     from chipglow.cli.finish import figure, finish
     from chipglow.cli.progress import progress_bars, say_where_it_starts
     from chipglow.cli.screen import current
@@ -36,20 +38,19 @@ def wavelengths(
         say_where_it_starts(loaded, resume, yes)
     with progress_bars() as report:
         found = compare(loaded, report, resume, assumed.append)
+    frame = wavelengths_frame(found)
     screen = current()
-    for place in found.places:
-        _print(screen, found, place)
+    for place in frame.place.unique():
+        _print(screen, frame[frame.place == place].sort_values("total_K"), place)
         screen.heading()
     finish(
         Notes(assumed),
-        (out, partial(write_frame, found.to_frame())),
+        (out, partial(write_frame, frame)),
         (plot, figure(draw_wavelengths, found)),
     )
 
 
-def _print(screen: "Screen", found: "WavelengthErrors", place: str) -> None:
-    frame = found.to_frame()
-    frame = frame[frame.place == place].sort_values("total_K")
+def _print(screen: "Screen", frame: "pd.DataFrame", place: str) -> None:
     truth, draws = frame.truth_degC.iloc[0], frame.draws.iloc[0]
     columns = ["first_um", "second_um", "total_K", "error_K ± standard_deviation_K"]
     columns += ["misregistration_K", "noise_K", "emissivity_uncertainty_K"]

@@ -10,7 +10,9 @@ from chipglow.quantities.settings import (
     field_tables,
     given,
     own_settings,
+    setting_at,
     settings,
+    value_at,
 )
 from chipglow.quantities.units import Quantity
 
@@ -33,6 +35,8 @@ __all__ = [
     "own_settings",
     "quantity_text",
     "rounded_text",
+    "setting_at",
     "settings",
     "uncertain_text",
+    "value_at",
 ]

@@ -10,7 +10,7 @@ from chipglow.quantities.parameter import Parameter
 from chipglow.quantities.part import Family, Part, adapter, first_sentence
 from chipglow.quantities.section import Section
 
-Described = TypeVar("Described", bound=Section | Part)
+Described = TypeVar("Described", bound=Section | Part | tuple[Any, ...] | Mapping[str, Any])
 
 
 @dataclass(frozen=True)
@@ -90,6 +90,44 @@ def own_settings(section: Section | Part) -> Iterator[Setting]:
         yield Setting(name, parameter, kind, value, plain[name], default, examples)
 
 
+def value_at(section: Any, path: str) -> Any:
+    """Value of a setting by its path, which may lead through lists and mappings.
+
+    Raises
+    ------
+    LookupError
+        If there is no such setting.
+    """
+    for key in path.split("."):
+        if isinstance(section, tuple):
+            section = dict(enumerate(section))[int(key) if key.isdigit() else -1]
+        elif isinstance(section, Mapping):
+            section = section[key]
+        elif key in getattr(section, "declared", getattr(type(section), "model_fields", ())):
+            section = getattr(section, key)
+        else:
+            raise LookupError(path)
+    return section
+
+
+def setting_at(section: Section | Part, path: str) -> Setting:
+    """Setting by its path; one in a list or a mapping has unit and type of the whole.
+
+    Raises
+    ------
+    LookupError
+        If there is no such setting.
+    """
+    keys, at = path.split("."), 0
+    for count in range(1, len(keys)):
+        inner = value_at(section, ".".join(keys[:count]))
+        if isinstance(inner, Section | Part):
+            at = count
+    owner = value_at(section, ".".join(keys[:at])) if at else section
+    found = {one.name: one for one in own_settings(owner)}[keys[at]]
+    return replace(found, path=path, value=value_at(section, path))
+
+
 def given(section: Section | Part) -> frozenset[str]:
     """Fields that a description gave; those of a part that was made in Python are all given."""
     if isinstance(section, Section):
@@ -102,10 +140,11 @@ def changed(section: Described, changes: Mapping[str, object]) -> Described:
 
     Parameters
     ----------
-    section : Section or Part
+    section : Section, Part, tuple or mapping
         The section.
     changes : mapping
-        New values by their paths: numbers in SI units, text with units, mappings or parts.
+        New values by their paths, as of `value_at`: numbers in SI units, text with units, mappings
+        or parts.
 
     Raises
     ------
@@ -119,7 +158,13 @@ def changed(section: Described, changes: Mapping[str, object]) -> Described:
             for path, value in changes.items()
             if path.startswith(f"{name}.")
         }
-        own[name] = changed(getattr(section, name), inner)
+        own[name] = changed(value_at(section, name), inner)
+    if isinstance(section, Mapping):
+        return {**section, **own}  # type: ignore[return-value]
+    if isinstance(section, tuple):
+        return tuple(  # type: ignore[return-value]
+            own.get(str(number), one) for number, one in enumerate(section)
+        )
     if isinstance(section, Part):
         kept = {name: getattr(section, name) for name in section.declared}
         made = adapter(type(section)).validate_python({**kept, **own})
