@@ -155,7 +155,7 @@ def test_run_writes_a_report_and_prints_the_comparison(folder, runs):
     assert "results/report.html" in result.output
     for heading in ("quantity", "the paper", "here", "95 % interval", "differs", "−42", "90"):
         assert heading in result.output
-    assert "Warning: The edge radius, 20 um, is 2 cells, expected 5 or more" in result.stdout
+    assert "Warning: The edge radius, 20 um, is 2 cells, expected 5 or more" in result.stderr
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     last = result.stdout.splitlines()[-1]
     assert last.startswith(f"Cite as: The chipglow developers: chipglow {citation['version']}.")

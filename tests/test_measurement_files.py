@@ -459,14 +459,14 @@ def test_convert_makes_a_measurement_and_says_what_it_assumed(laboratory, tmp_pa
     out = tmp_path / "measured.nc"
     code, said = run("convert", "chip.yaml", "--out", out, "--set", "tip=none")
     assert code == 0, said
-    assert said.startswith("The file, and what you said of it:")
+    assert said.startswith("The file with your settings:")
     for words in ("counts as uint16", "5 of 40 x 30 pixels", "replaced by neighbours",
                   "standard uncertainty", "Assumed: The origin of coordinates"):  # fmt: skip
         assert words in said
     assert read_measurement(out).data.attrs["calibration"].startswith("straight line")
     code, said = run("convert", out)
     assert code == 2
-    assert "is a measurement already" in said
+    assert "already a measurement" in said
 
 
 def test_what_is_assumed_and_doubtful_of_a_camera_s_file_is_said_by_who_takes_it(laboratory):
@@ -500,7 +500,7 @@ def test_what_the_camera_s_file_leaves_in_doubt_is_said_once(laboratory, tmp_pat
     (tmp_path / "a.cine").write_bytes(written)
     warning = "Warning: The integration time varies from 3.00002 us to 5.00004 us."
     code, said = run("convert", tmp_path / "a.cine")
-    assert "It is no measurement yet" in said
+    assert "Settings are missing for a measurement" in said
     assert said.count(warning) == 1
     settings = ("--set", f"calibration={laboratory / 'calibration.yaml'}", "--set", "pitch=6 um")
     code, said = run("convert", tmp_path / "a.cine", *settings)
@@ -521,7 +521,7 @@ def test_convert_only_looks_without_out(laboratory):
     settings = ["--set", "unit=counts", "--set", "interval=1 ms"]
     code, said = run("convert", "chip.npy", *settings)
     assert code == 0, said
-    assert "It is no measurement yet. chip.npy: calibration: is missing" in said
+    assert "Settings are missing for a measurement. chip.npy: calibration: is missing" in said
     code, said = run("convert", "chip.npy", *settings, "--out", "never.nc")
     assert code == 2
     assert said.count("calibration: is missing") == 1

@@ -26,12 +26,12 @@ def convert(
     from chipglow.laboratory.measurement import load_description, load_recording, measurement_of
 
     if is_measurement(source):
-        raise ValueError(f"{source}: is a measurement already, expected a camera's file")
+        raise ValueError(f"{source}: already a measurement; expected a camera file")
     description = load_description(source, settings or ())
     recording = load_recording(description)
     screen = current()
     given = bool(settings) or source.suffix.lower() in (".yaml", ".yml")
-    screen.heading("The file, and what you said of it:" if given else "The file says:")
+    screen.heading("The file with your settings:" if given else "The file states:")
     screen.facts("file", _facts(recording))
     try:
         measurement = measurement_of(description, recording, str(source))
@@ -39,7 +39,7 @@ def convert(
         if out is not None:
             raise
         screen.heading()
-        screen.say(f"It is no measurement yet. {error}")
+        screen.say(f"Settings are missing for a measurement. {error}")
         screen.notes(recording.notes)
         return
     screen.heading("\nThe measurement:")

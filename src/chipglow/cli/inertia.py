@@ -1,4 +1,4 @@
-"""What to know of a cut, on the terminal: what its scaled mass amounts to, and its warnings."""
+"""Effects of the scaled mass of a cut, on the terminal."""
 
 from collections.abc import Iterable
 from math import isfinite
@@ -9,7 +9,7 @@ from chipglow.text import Notes
 
 
 def say_of_cut(inertia: Inertia | None, warnings: Iterable[str] = ()) -> None:
-    """Say on stderr what kinetic energy and momentum the scaled mass has; warn if too much."""
+    """Print kinetic energy and momentum of the scaled mass, and the warnings of the cut."""
     parts = _known(inertia) if inertia else {}
     if parts:
         current().aside(
@@ -21,7 +21,7 @@ def say_of_cut(inertia: Inertia | None, warnings: Iterable[str] = ()) -> None:
 
 
 def _known(inertia: Inertia) -> dict[str, tuple[str, float]]:
-    """What is known, by its name for programs: as text, and the number."""
+    """Return the known effects by name, as text and number."""
     known = {
         "kinetic_fraction": "kinetic energy at most {:.2%} of the work",
         "force_fraction": "momentum flux {:.2%} of the mean cutting force",

@@ -1,4 +1,4 @@
-"""The command ``chipglow materials``: tables of materials and of their numbers."""
+"""The command ``chipglow materials``."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from chipglow.text import Notes
 
 
 def list_materials() -> None:
-    """Print the library: names, sets of the flow stress, what they are."""
+    """List the materials of the library."""
     title = "The first of several sets is the default."
     frame = pd.DataFrame(map(_row, material_names()))
     current().table("materials", frame, title=title, unbroken=("name",))
@@ -28,7 +28,7 @@ def _row(name: str) -> dict[str, str]:
 
 
 def show_material(name: str) -> None:
-    """Print all numbers of a material, with units, and their sources as numbered notes."""
+    """Print all properties of a material, with units and numbered sources."""
     material = material_file(name)
     sources = list(dict.fromkeys(number.source for number in material.properties))
     rows = [
@@ -50,7 +50,7 @@ def show_material(name: str) -> None:
 
 
 def plot_material(name: str, path: Path) -> None:
-    """Draw a material to a picture whose kind is that of the file's name."""
+    """Draw a material."""
     from chipglow.report.materials import material_figure
 
     finish(Notes(), (path, figure(material_figure, material_file(name))))

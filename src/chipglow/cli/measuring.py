@@ -1,4 +1,4 @@
-"""The camera alone, from a scene's file to a measurement's."""
+"""The command ``chipglow measure``: a scene to a measurement."""
 
 from functools import partial
 from math import floor
@@ -13,7 +13,7 @@ from chipglow.study import Study, fit
 
 
 def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: str | None) -> None:
-    """Look at a scene with a study's camera and write the measurement."""
+    """Measure a scene with a study's camera and write the measurement."""
     fitted = fit(study, open_scene(path))
     camera = study.camera.on(fitted.scene.raster, study.seed)
     scene, surfaces = fitted.scene, fitted.surfaces

@@ -1,4 +1,4 @@
-"""What is in a measurement, as text and as a picture."""
+"""The command ``chipglow show`` for measurements."""
 
 from collections.abc import Iterator
 from math import degrees
@@ -31,7 +31,7 @@ _IN_FACTS: Final = ("integration_time", "lower_limit", "netd", "netd_temperature
 
 
 def show_measurement(path: Path, at: str | None, plot: Path | None) -> None:
-    """Print what is in a measurement, and draw it if a picture is wanted."""
+    """Print the contents of a measurement and optionally draw it."""
     measurement = read_measurement(path)
     time = None if at is None else parse_instant("--at", at)
     say_measurement(measurement, time)
@@ -39,7 +39,7 @@ def show_measurement(path: Path, at: str | None, plot: Path | None) -> None:
 
 
 def say_measurement(measurement: Measurement, time: float | None = None) -> None:
-    """Print what is in a measurement."""
+    """Print the contents of a measurement."""
     try:
         summary = measurement_summary(measurement, time)
     except ValueError as error:
@@ -87,7 +87,7 @@ def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tu
 
 
 def _response_text(band: Band) -> str:
-    """A response curve in words."""
+    """Describe a response curve."""
     wavelengths = 1e6 * band.wavelengths
     values = np.asarray(band.response(band.wavelengths) if band.response else 1.0)
     mean, peak = np.average(wavelengths, weights=values), wavelengths[values.argmax()]
