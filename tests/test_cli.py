@@ -215,7 +215,7 @@ def test_reproduce_runs_the_papers_study(folder, monkeypatch):
 def test_a_foreign_folder_is_refused_before_anything_is_computed(folder, runs):
     (folder / "thesis").mkdir()
     (folder / "thesis" / "chapter.tex").write_text("years of work")
-    assert_refused(chipglow("run", "study.yaml", "--out", "thesis"), "thesis", "expected")
+    assert_refused(chipglow("run", "study.yaml", "--out", "thesis"), "thesis", "--force")
     assert runs == []
     assert [path.name for path in (folder / "thesis").iterdir()] == ["chapter.tex"]
 
