@@ -7,6 +7,7 @@ measured, with all effects first. Each reading is a vector of as many rows.
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf, nan
 from typing import ClassVar, Final
 
 import numpy as np
@@ -182,8 +183,8 @@ class RakePlace(Place):
         """See `Place.read`."""
         across, contact = lines["rake"], lines["contact"]
         distance = _to_both_sides(self.half_length, self.step)
-        reference = np.nanmean(contact[0])
-        errors = np.nanmean(contact[1:] - contact[0], axis=1)
+        reference = _mean(contact[0])
+        errors = np.array([_mean(measured - contact[0]) for measured in contact[1:]])
         lowest = _lowest_near(distance, across[1] - across[0], pixels.spacing)
         return {
             "mid-contact": across[:, np.argmin(np.abs(distance))],
@@ -225,7 +226,9 @@ class BandPlace(Place):
             "ridge of strain rate": across[:, np.argmin(np.abs(distance))],
             # A camera shows no strain rate: the centre for somebody who has the image alone.
             "ridge of measured temperature": across[:, hottest],
-            "most negative beside it": across[:, np.nanargmin(across[1] - across[0])],
+            "most negative beside it": across[
+                :, _lowest_near(distance, across[1] - across[0], inf)
+            ],
         }
 
     def outline(self) -> NDArray[np.float64]:
@@ -242,6 +245,12 @@ def _lowest_near(distance: NDArray[np.float64], values: Stack, pitch: float) -> 
     """Number of the lowest value within `NEAR` pixels of where the distance is 0."""
     near = np.abs(distance) <= NEAR * pitch
     return int(np.argmin(np.where(near & np.isfinite(values), values, np.inf)))
+
+
+def _mean(values: Stack) -> float:
+    """Mean of what is known; NaN if nothing is."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else nan
 
 
 def _mean_and_extremes(values: Stack) -> dict[str, Stack]:
