@@ -144,7 +144,7 @@ def test_help_imports_none_of_the_heavy_libraries():
 def test_init_writes_the_papers_study_and_keeps_what_is_there(folder):
     assert chipglow("init", "paper.yaml").exit_code == 0
     assert load_study("paper.yaml") == Study()
-    assert_refused(chipglow("init", "study.yaml"), "study.yaml", "is there already", "--force")
+    assert_refused(chipglow("init", "study.yaml"), "study.yaml", "already exists", "--force")
     assert (folder / "study.yaml").read_text() == STUDY
     assert chipglow("init", "study.yaml", "--force").exit_code == 0
     assert load_study("study.yaml") == Study()
@@ -156,7 +156,7 @@ def test_run_writes_a_report_and_prints_the_comparison(folder, runs):
     assert "results/report.html" in result.output
     for heading in ("quantity", "the paper", "here", "95 % interval", "differs", "−42", "90"):
         assert heading in result.output
-    assert "Warning: The edge radius, 20 um, is 2 cells, expected 5 or more" in result.stdout
+    assert "Warning: The edge radius, 20 um, is 2 cells, expected 5 or more" in result.stderr
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     last = result.stdout.splitlines()[-1]
     assert last.startswith(f"Cite as: The chipglow developers: chipglow {citation['version']}.")
@@ -204,7 +204,9 @@ def test_a_damaged_scene_in_the_cache_is_computed_again(folder, runs):
     path.write_bytes(whole[:5000] + bytes([whole[5000] ^ 1]) + whole[5001:])
     result = chipglow("cut", "study.yaml", "--out", "scene.nc")
     assert result.exit_code == 0, result.output
-    assert "in the cache is damaged: it is computed again" in " ".join(result.stderr.split())
+    assert "cached scene of this cut is damaged; it is computed again" in " ".join(
+        result.stderr.split()
+    )
     assert len(runs) == 2
     assert open_scene("scene.nc").frame(1).temperature.shape == AnalyticChip().raster.shape
     assert is_intact(path)
@@ -228,7 +230,7 @@ def test_reproduce_runs_the_papers_study(folder, monkeypatch):
 def test_a_foreign_folder_is_refused_before_anything_is_computed(folder, runs):
     (folder / "thesis").mkdir()
     (folder / "thesis" / "chapter.tex").write_text("years of work")
-    assert_refused(chipglow("run", "study.yaml", "--out", "thesis"), "thesis", "expected")
+    assert_refused(chipglow("run", "study.yaml", "--out", "thesis"), "thesis", "--force")
     assert runs == []
     assert [path.name for path in (folder / "thesis").iterdir()] == ["chapter.tex"]
 
