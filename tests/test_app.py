@@ -117,6 +117,15 @@ def test_the_readout_is_that_of_the_pixel_and_the_sample(model):
     assert found.emissivity == nearest(laid, scene.raster, at)
 
 
+def test_a_surface_without_texture_has_no_error_by_it(model):
+    by_texture = model.changed(model.controls.initial, {"error_image": "texture"})
+    assert np.nanmax(np.abs(model.picture(by_texture, quick=True).error)) > 5
+    uniform = model.changed(by_texture, {"surface": "uniform"})
+    for quick in (True, False):
+        picture = model.picture(uniform, quick=quick)
+        assert picture.error.shape == picture.measured.shape and not picture.error.any()
+
+
 def test_draws_are_those_of_other_pixels_and_textures(model):
     state = model.controls.initial
     told = []

@@ -382,7 +382,7 @@ def _celsius(kelvins: float) -> str:
 
 
 def _kelvins(kelvins: float) -> str:
-    return _minus(f"{kelvins:+.1f} K") if isfinite(kelvins) else "–"
+    return _minus(f"{round(kelvins, 1) + 0.0:+.1f} K") if isfinite(kelvins) else "–"
 
 
 def _minus(text: str) -> str:
