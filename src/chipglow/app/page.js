@@ -396,7 +396,7 @@ export function render({ view, model, el }) {
     if (width < 1 || size === `${width}x${height}`) return false;
     size = `${width}x${height}`;
     const count = width < LEAST_PAIR ? 1 : Math.max(spec.images.length, 2);
-    const wide = (width - BORDER - (count - 1) * GAP) / count - 12;
+    const wide = (width - BORDER - (count - 1) * GAP) / count - (count === 1 ? 26 : 12);
     const tallest = Math.max(0.52 * height - 60, LEAST_FRAME);
     const frame = Math.trunc(Math.max(Math.min(wide, tallest / spec.shape), LEAST_FRAME));
     const below = Math.trunc(Math.max(Math.min(height - frame * spec.shape - 345, 330), 150));
