@@ -354,7 +354,7 @@ def test_two_sessions_on_one_scene_do_not_disturb_each_other(opened):
     second.change({"camera.pitch": "8 um"})
     assert first.settle() and second.settle()
     first.change({"surface.emissivity": "0.3"})
-    first.undo()
+    first.step(forward=False)
     assert first.settle()
     assert [session.state.study.camera.pitch for session in (first, second)] == [5e-6, 8e-6]
     assert [one.pictures[-1].raster.spacing for one in heard] == [5e-6, 8e-6]
@@ -370,21 +370,21 @@ def test_undo_goes_back_knob_by_knob(opened):
     for pitch in ("5.5 um", "6.5 um", "7 um"):
         session.change({"camera.pitch": pitch}, final=pitch == "7 um")
     session.change({"camera.psf": "none"})
-    session.undo()
+    session.step(forward=False)
     assert (session.state.study.camera.psf.kind, session.state.study.camera.pitch) == (
         "annular-aperture",
         7e-6,
     )
-    session.undo()
+    session.step(forward=False)
     assert session.state.study.camera.pitch == 5e-6
-    session.undo()
+    session.step(forward=False)
     assert session.state == session.model.controls.initial and not session.can_undo
-    session.redo()
-    session.redo()
+    session.step(forward=True)
+    session.step(forward=True)
     assert session.state.study.camera.pitch == 7e-6 and session.can_redo
     session.change({"camera.pitch": "9 um"})
     assert not session.can_redo
-    session.undo()
+    session.step(forward=False)
     assert session.state.study.camera.pitch == 7e-6
     session.end()
 

@@ -69,8 +69,8 @@ export function render({ view, model, el }) {
       actions.append(button(text, () => send("save", name), { title }));
     }
     actions.append(
-      button("Undo", () => send("undo"), { id: "undo", title: "Ctrl+Z" }),
-      button("Redo", () => send("redo"), { id: "redo", title: "Ctrl+Y" }));
+      button("Undo", () => send("step", false), { id: "undo", title: "Ctrl+Z" }),
+      button("Redo", () => send("step", true), { id: "redo", title: "Ctrl+Y" }));
     if (!spec.embedded) {
       actions.append(button("Copy link", copyLink, { title: "A link that restores this state" }));
     }
@@ -417,7 +417,7 @@ export function render({ view, model, el }) {
     const typing = event.target.type === "text", key = event.key.toLowerCase();
     if ((event.ctrlKey || event.metaKey) && "zy".includes(key) && !typing) {
       event.preventDefault();
-      send(key === "y" || event.shiftKey ? "redo" : "undo");
+      send("step", key === "y" || event.shiftKey);
     } else if (key === "enter" && typing) {
       event.preventDefault(); // a notebook would make no change of it
       event.target.dispatchEvent(new Event("change"));
