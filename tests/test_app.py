@@ -22,6 +22,7 @@ from chipglow.camera import expose, expose_all
 from chipglow.io import example_scene, is_measurement, open_scene
 from chipglow.io.sources import SourceError
 from chipglow.quantities.format import rounded_text
+from chipglow.scene import sample
 from chipglow.scene.lines import nearest
 from chipglow.study import Study, fit, load_study
 from chipglow.surface import CHIP_1, UniformSurface
@@ -88,8 +89,9 @@ def test_a_saved_study_gives_the_same_numbers(model, tmp_path, texts):
     np.testing.assert_array_equal(picture.error, expected.case_1)
     np.testing.assert_array_equal(picture.flagged, expected.flagged)
     place = LinePlace("line", study.analysis.lines["across the rake face"])
-    reference, error, _ = place.profile(expected)
-    np.testing.assert_array_equal(picture.lines["rake_line"].measured, reference + error)
+    points = place.line(expected.raster.spacing).points
+    measured = sample(expected.measured, expected.raster, points)
+    np.testing.assert_array_equal(picture.lines["rake_line"].measured, measured)
 
 
 def test_the_readout_is_that_of_the_pixel_and_the_sample(model):
@@ -137,9 +139,9 @@ def test_draws_are_those_of_other_pixels_and_textures(model):
     exposure = camera.expose(model.opened.scene, surface.redrawn(1), state.start)
     errors = error_images(second, exposure)
     assert found.error.values[1, 1] == nearest(errors.case_1, errors.raster, state.cursor)
-    profile = LinePlace("line", state.line("band_line")).profile(errors)
-    # Measured less reference is the error but for rounding.
-    np.testing.assert_allclose(found.lines["band_line"][5], profile[0] + profile[1], atol=1e-9)
+    line = LinePlace("line", state.line("band_line")).line(errors.raster.spacing)
+    measured = sample(errors.measured, errors.raster, line.points)
+    np.testing.assert_array_equal(found.lines["band_line"][5], measured)
 
 
 def test_a_quick_look_is_the_same_scene_on_fewer_samples(model):
