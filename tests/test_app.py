@@ -161,7 +161,7 @@ def test_a_quick_look_has_no_pixels_finer_than_its_samples(model):
         ({"band_lower": "6"}, "reversed"),
         ({"psf": "sharp"}, "PSF: 'sharp', expected annular-aperture, gaussian, none"),
         ({"seed": "1.5"}, "Seed: '1.5', expected a whole number"),
-        ({"seed": "-1"}, "Seed -1: camera: seed is -1, expected 0 or more"),
+        ({"seed": "-1"}, "Seed -1: Camera.seed: -1, expected 0 or more"),
         (
             {"integration_time": "90"},
             "Exposure 90: exposure: 0.000443 s to 0.000533 s is not",

@@ -30,11 +30,12 @@ PartType = TypeVar("PartType")
 
 
 class Declaration(NamedTuple):
-    """A field of a part that descriptions have: annotation, type and parameter."""
+    """A field of a part that descriptions have: annotation, type, parameter, and their check."""
 
     annotation: Any
     kind: Any
     parameter: Parameter
+    allows: Callable[[object], bool]
 
 
 class Part:
@@ -77,18 +78,24 @@ class Part:
             if parameter is None:
                 declared.pop(name, None)
                 continue
-            declared[name] = Declaration(annotation, annotation.__origin__, parameter)
+            kind = annotation.__origin__
+            declared[name] = Declaration(annotation, kind, parameter, parameter.check(kind))
             # The dataclass, `help` and signatures see the plain type.
-            cls.__annotations__[name] = annotation.__origin__
+            cls.__annotations__[name] = kind
         cls.declared = declared
         if "__doc__" in vars(cls) and cls.__doc__ and declared:
             cls.__doc__ = _with_parameters(inspect.cleandoc(cls.__doc__), declared)
 
     def __post_init__(self) -> None:
-        for name, (_, kind, parameter) in self.declared.items():
+        for name, one in self.declared.items():
             value = getattr(self, name)
-            if not parameter.allows(value, kind):
-                raise parameter.refusal(f"{type(self).__name__}.{name}", value, kind)
+            if not one.allows(value):
+                raise one.parameter.refusal(f"{type(self).__name__}.{name}", value, one.kind)
+
+    @classmethod
+    def parameter(cls, name: str) -> Parameter:
+        """What a field declares, for a section of a description that has it too."""
+        return cls.declared[name].parameter
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -291,7 +298,7 @@ def _with_parameters(text: str, declared: Mapping[str, Declaration]) -> str:
     before, found, after = text.partition(title)
     rows = [
         f"{name} : {_type_text(kind, parameter)}\n    " + parameter.meaning.replace("\n", "\n    ")
-        for name, (_, kind, parameter) in declared.items()
+        for name, (_, kind, parameter, _) in declared.items()
     ]
     before = before if found else before + "\n\n"
     return "\n".join([before + title + "\n".join(rows), after]).rstrip() + "\n"

@@ -170,7 +170,7 @@ def _declared(kind: Any) -> dict[str, tuple[Parameter, Any, Any, Any]]:
         found["kind"] = (Parameter(first_sentence(kind)), str, kind.kind, str)
     for one in fields(kind):
         if one.name in kind.declared:
-            annotation, plain, parameter = kind.declared[one.name]
+            annotation, plain, parameter, _ = kind.declared[one.name]
             default = _default(one.default, one.default_factory)
             found[one.name] = parameter, plain, default, annotation
     return found
