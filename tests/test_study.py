@@ -315,7 +315,7 @@ def load(text, folder):
             "camera.pitch",
             "2000 um is larger than the field of view, expected up to the 540",
         ),
-        ("camera: {fill_factor: 2}", "camera", "fill_factor is 2.0, expected over 0 to 1"),
+        ("camera: {fill_factor: 2}", "camera", "2, expected over 0, up to 1"),
         ("camera: {fill_factor: yes}", "camera.fill_factor", "True, expected a valid number"),
         ("camera: {fill_factor: .nan}", "camera.fill_factor", "nan, expected a finite number"),
         (
