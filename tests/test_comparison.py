@@ -64,7 +64,8 @@ def test_e_n_is_the_difference_over_its_expanded_uncertainty(away, first, second
         for shift, parts in ((0.0, first), (away, second))
     )
     expected = abs(700.0 + away - 700.0) / (2 * hypot(*first, *second))
-    assert normalised_error(one, other)[0] == pytest.approx(expected, abs=1e-12)
+    # A dozen roundings of 2^-53 each.
+    assert normalised_error(one, other)[0] == pytest.approx(expected, rel=12 * 2.0**-53)
     back = normalised_error(other, one)
     np.testing.assert_allclose(normalised_error(one, other), back, rtol=1e-12)
 

@@ -1,6 +1,7 @@
 """Reflections: the exchange of radiation in closed forms, and between rake face and chip's side."""
 
 from dataclasses import replace
+from math import sqrt
 
 import numpy as np
 import pytest
@@ -75,8 +76,9 @@ def test_rows_have_the_sum_one_and_are_reciprocal(angle, radius, count):
     factors = exchange.view_factors
     np.testing.assert_allclose(factors.sum(axis=1), 1.0, rtol=1e-13)
     sent = exchange.lengths[:, None] * factors[:, :-1]
-    # Rays on the wrong side of an edge: up to ten of 2048 where the bar's end is seen at a slant.
-    np.testing.assert_allclose(sent, sent.T, atol=8e-3 * exchange.lengths.max())
+    # Rays are a lattice whose rows have up to √2048 = 45 points. Where an end of the bar is seen
+    # along a row, half of it may count on the wrong side; the bar has two ends.
+    np.testing.assert_allclose(sent, sent.T, atol=exchange.lengths.max() / sqrt(exchange.rays))
 
 
 def test_more_rays_are_more_exact():
@@ -102,7 +104,8 @@ def test_an_isothermal_room_is_a_blackbody(emissivity, mirror, angle):
         exchange.irradiation(black, emissivity, 7.0, mirror),
         exchange.seen((0.3, 1.0), black, emissivity, 7.0, mirror),
     ):
-        np.testing.assert_allclose(found, 7.0, rtol=1e-7)  # the iteration ends at 1e-9
+        # The iteration ends at steps of 1e-9; what is left is 1 / (1 - 0.99) times as much.
+        np.testing.assert_allclose(found, 7.0, rtol=1e-7)
 
 
 @pytest.mark.parametrize("angle", [20.0, 45.0, 90.0, 140.0])
@@ -193,7 +196,10 @@ def test_energy_is_conserved(first, second, angle, surroundings):
     lost = exchange.lengths @ (emissivity * (black - falls))
     leaves = emissivity * black + (1 - emissivity) * falls - surroundings
     out = exchange.lengths @ (exchange.view_factors[:, -1] * leaves)
-    assert lost == pytest.approx(out, abs=0.1)  # of up to 18: the rays' reciprocity
+    # Of up to 18. A pair of elements lacks reciprocity by 1.5 of 2048 rays (root mean square of
+    # 75 000 pairs): of 100 pairs of up to 0.19 long and of a radiosity up to 9, by 0.012 together;
+    # eight times as much.
+    assert lost == pytest.approx(out, abs=0.1)
 
 
 @pytest.mark.parametrize(

@@ -250,8 +250,11 @@ def test_a_symmetric_hone_is_the_round_edge(rake, clearance, radius, seed):
     hone = replace(round_edge, hone=Hone(length, length))
     assert hone.hone.form_factor == 1.0
     points = places(seed)
+    # 64 chords of an arc of half the radius: within their height of it.
+    chord = (pi / 2 + radians(rake) + radians(clearance)) / 64
+    height = radius / 2 * (1 - cos(chord / 2))
     np.testing.assert_allclose(
-        distances(hone, points), distances(round_edge, points), rtol=0, atol=1e-4 * radius
+        distances(hone, points), distances(round_edge, points), rtol=0, atol=height + 1e-15
     )
 
 
