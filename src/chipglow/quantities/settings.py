@@ -76,8 +76,8 @@ def settings(section: Section | Part) -> dict[str, Setting]:
         found[one.path] = one
         if one.is_section:
             inner = settings(one.value)
-            found |= {f"{one.path}.{path}": replace(each, path=f"{one.path}.{path}")
-                      for path, each in inner.items()}  # fmt: skip
+            for path, each in inner.items():
+                found[f"{one.path}.{path}"] = replace(each, path=f"{one.path}.{path}")
     return found
 
 
@@ -91,7 +91,7 @@ def own_settings(section: Section | Part) -> Iterator[Setting]:
 
 
 def given(section: Section | Part) -> frozenset[str]:
-    """Fields that a description gave; those of a part that was made in Python are all given."""
+    """Fields that a description gave; all of a part that was made in Python."""
     if isinstance(section, Section):
         return frozenset(section.model_fields_set)
     return getattr(section, "given", frozenset(section.declared))
@@ -112,35 +112,27 @@ def changed(section: Described, changes: Mapping[str, object]) -> Described:
     pydantic.ValidationError
         If a value is not possible; a ValueError.
     """
-    own = {path: value for path, value in changes.items() if "." not in path}
-    for name in dict.fromkeys(path.partition(".")[0] for path in changes if "." in path):
-        inner = {
-            path.partition(".")[2]: value
-            for path, value in changes.items()
-            if path.startswith(f"{name}.")
-        }
-        own[name] = changed(getattr(section, name), inner)
-    if isinstance(section, Part):
-        kept = {name: getattr(section, name) for name in section.declared}
-        made = adapter(type(section)).validate_python({**kept, **own})
-        values: Any = {name: getattr(made, name) for name in own}
-        copy = replace(section, **values)
-        object.__setattr__(copy, "given", given(section) | own.keys())
-        return copy
-    kept = {name: getattr(section, name) for name in section.model_fields_set}
-    return type(section).model_validate({**kept, **own})
+    made: Described = adapter(type(section)).validate_python(_with_changes(section, changes))
+    return made
+
+
+def _with_changes(section: Section | Part, changes: Mapping[str, object]) -> dict[str, object]:
+    """What a description gave of a section, and the changes, as a description gives them."""
+    data = {name: getattr(section, name) for name in given(section)}
+    if getattr(section, "kind", ""):
+        data["kind"] = section.kind  # type: ignore[union-attr]
+    inner: dict[str, dict[str, object]] = {}
+    for path, value in changes.items():
+        name, dot, rest = path.partition(".")
+        if dot:
+            inner.setdefault(name, {})[rest] = value
+        else:
+            data[name] = value
+    return data | {name: _with_changes(getattr(section, name), one) for name, one in inner.items()}
 
 
 def field_tables(section: Section | Part, name: str) -> str:
-    """Tables in Markdown of a section with its values, and of the sections in it.
-
-    Parameters
-    ----------
-    section : Section or Part
-        The section.
-    name : str
-        Its key in the description; those of the sections in it follow after dots.
-    """
+    """Tables in Markdown of a section with this key, and of the sections in it."""
     return "\n".join(_table_lines(section, name))
 
 
