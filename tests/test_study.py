@@ -259,7 +259,7 @@ def load(text, folder):
         (
             "cutting: {tool: {rake_angle: 80 deg}}",
             "cutting.tool",
-            "rake_angle: expected -60 to 60 degrees",
+            "80 deg, expected over -60 deg, under 60 deg",
         ),
         (
             "cutting: {tool: {material: cheese}}",

@@ -178,7 +178,8 @@ class Parameter:
 
     def _within(self, value: Any) -> Any:
         if not self.holds(value):
-            raise ValueError(f"{self.text(value)}, expected {self.limits}")
+            shown = value if isinstance(value, tuple) else self.text(value)
+            raise ValueError(f"{shown}, expected {self.allowed or self.limits}")
         return value
 
 

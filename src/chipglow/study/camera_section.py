@@ -112,7 +112,7 @@ class CameraSection(Settings[Camera]):
             Camera.parameter("lower_limit"),
             meaning="Radiance temperatures under this are flagged, not returned; or none. With a "
             "detector it is the detector's, unless it is said.",
-            allowed="a temperature, detector or none",
+            allowed=f"{Camera.parameter('lower_limit').limits}; detector; or none",
         ),
     ] = Camera.lower_limit
     reflected: Annotated[float | None, Camera.parameter("reflected")] = None
