@@ -197,11 +197,6 @@ class Family:
         """Add a part, or a section that is written by hand.
 
         A class that is defined again, as by a notebook's cell, replaces the one before.
-
-        Raises
-        ------
-        ValueError
-            If the kind is empty or that of another class.
         """
         taken = self._own.get(kind, part)
         same = (taken.__module__, taken.__qualname__) == (part.__module__, part.__qualname__)
@@ -271,13 +266,7 @@ adapter: Final[Callable[[Any], TypeAdapter[Any]]] = cache(TypeAdapter)
 
 @cache
 def of_other_packages(group: str) -> dict[str, Any]:
-    """What other packages add by entry points, by their names; a warning for what cannot be loaded.
-
-    Parameters
-    ----------
-    group : str
-        Group of the entry points.
-    """
+    """What other packages add by entry points, by name; what cannot be loaded is a warning."""
     found = {}
     for entry in entry_points(group=group):
         try:

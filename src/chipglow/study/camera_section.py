@@ -129,13 +129,7 @@ class CameraSection(Settings[Camera]):
         return camera
 
     def build(self, seed: int = 2010) -> Camera:
-        """The camera, with as many pixels as see the scene.
-
-        Parameters
-        ----------
-        seed : int
-            The study's: of the detector's noise.
-        """
+        """The camera, with as many pixels as see the scene."""
         response = None if self.response is None else read_response(self.response)
         band = Band(*self.band, response)
         shared = Camera.declared.keys() & type(self).model_fields.keys()
@@ -149,15 +143,7 @@ class CameraSection(Settings[Camera]):
         return Camera(**made, seed=seed)
 
     def on(self, scene: Raster, seed: int = 2010) -> Camera:
-        """The camera on a scene, with no more pixels than its detector has.
-
-        Parameters
-        ----------
-        scene : Raster
-            The scene's samples.
-        seed : int
-            The study's: of the detector's noise.
-        """
+        """The camera on a scene, with no more pixels than its detector has."""
         camera = self.build(seed)
         if self.array is None:
             return camera

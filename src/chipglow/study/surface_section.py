@@ -172,20 +172,7 @@ class FeaturesSection(Section):
         return (*self.chips, *self.maps, *self.measured)
 
     def build(self, seed: int) -> dict[str, Surface]:
-        """The surfaces by name.
-
-        Parameters
-        ----------
-        seed : int
-            Seed of the textures, the same for every chip: they differ by their numbers only.
-
-        Raises
-        ------
-        ValueError
-            If a file is no emissivity map.
-        OSError
-            If it is not there.
-        """
+        """The surfaces by name."""
         chips = {
             name: self._features(chip.body, chip.shear_band, seed)
             for name, chip in self.chips.items()
@@ -245,22 +232,7 @@ def surface_names(section: FeaturesSection | SurfaceChoice) -> tuple[str, ...]:
 
 
 def surfaces_of(section: FeaturesSection | SurfaceChoice, seed: int) -> dict[str, Surface]:
-    """The surfaces of a section by their names.
-
-    Parameters
-    ----------
-    section : FeaturesSection or SurfaceChoice
-        The section.
-    seed : int
-        Seed of the textures.
-
-    Raises
-    ------
-    ValueError
-        If one is not possible.
-    OSError
-        If a file is not there.
-    """
+    """The surfaces of a section by their names."""
     if isinstance(section, FeaturesSection):
         return section.build(seed)
     return {section.kind: section.surface()}
