@@ -167,7 +167,7 @@ def test_a_quick_look_has_no_pixels_finer_than_its_samples(model):
             "Exposure 90: exposure: 0.000443 s to 0.000533 s is not",
         ),
         ({"pitch": "6 mm"}, "Pixel pitch 6 mm: camera: pitch of 0.006 m"),
-        ({"lower_limit": "9999"}, "Lower range limit 9999: camera: lower_limit"),
+        ({"lower_limit": "9999"}, "Lower range limit 9999: Camera.lower_limit"),
         ({"rake_line": "1,2"}, "across the rake face: '1,2', expected 2 different points"),
         ({"rake_line": "1,2;3,461"}, "expected x from -620.0 to 40.0 µm and y from -80.0 to 460.0"),
         ({"cursor": "here"}, "Cursor: 'here', expected positions"),

@@ -61,7 +61,7 @@ class ToolSection(Settings[Tool]):
                 return read_tool_outline(self.outline)
             except ValueError as error:
                 raise ValueError(f"outline: {error}") from None
-        return ToolGeometry(**{name: getattr(self, name) for name in ToolGeometry.declared})
+        return ToolGeometry(**{name: getattr(self, name) for name in ToolGeometry.parameters()})
 
 
 def read_tool_outline(path: str | os.PathLike[str]) -> ToolOutline:

@@ -60,8 +60,7 @@ class Part:
 
     kind: ClassVar[str] = ""
     example: ClassVar[str] = ""
-    declared: ClassVar[Mapping[str, Declaration]] = {}
-    """What the fields declare, by their names."""
+    _declared: ClassVar[Mapping[str, Declaration]] = {}
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
@@ -70,7 +69,7 @@ class Part:
         own = inspect.get_annotations(cls)
         if any(isinstance(annotation, str) for annotation in own.values()):
             own = inspect.get_annotations(cls, eval_str=True)
-        inherited = [vars(base).get("declared", {}) for base in reversed(cls.__mro__[1:])]
+        inherited = [vars(base).get("_declared", {}) for base in reversed(cls.__mro__[1:])]
         declared = {name: one for each in inherited for name, one in each.items()}
         for name, annotation in own.items():
             metadata = getattr(annotation, "__metadata__", ())
@@ -82,12 +81,12 @@ class Part:
             declared[name] = Declaration(annotation, kind, parameter, parameter.check(kind))
             # The dataclass, `help` and signatures see the plain type.
             cls.__annotations__[name] = kind
-        cls.declared = declared
+        cls._declared = declared
         if "__doc__" in vars(cls) and cls.__doc__ and declared:
             cls.__doc__ = _with_parameters(inspect.cleandoc(cls.__doc__), declared)
 
     def __post_init__(self) -> None:
-        for name, one in self.declared.items():
+        for name, one in self._declared.items():
             value = getattr(self, name)
             if not one.allows(value):
                 raise one.parameter.refusal(f"{type(self).__name__}.{name}", value, one.kind)
@@ -95,7 +94,12 @@ class Part:
     @classmethod
     def parameter(cls, name: str) -> Parameter:
         """What a field declares, for a section of a description that has it too."""
-        return cls.declared[name].parameter
+        return cls._declared[name].parameter
+
+    @classmethod
+    def parameters(cls) -> dict[str, Parameter]:
+        """What the fields declare, by their names."""
+        return {name: one.parameter for name, one in cls._declared.items()}
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -104,11 +108,11 @@ class Part:
             return core_schema.is_instance_schema(cls)
         fields = {
             one.name: core_schema.typed_dict_field(
-                handler.generate_schema(cls.declared[one.name].annotation),
+                handler.generate_schema(cls._declared[one.name].annotation),
                 required=one.default is MISSING and one.default_factory is MISSING,
             )
             for one in dataclass_fields(cls)
-            if one.name in cls.declared
+            if one.name in cls._declared
         }
         if cls.kind:
             kind = core_schema.typed_dict_field(
@@ -160,7 +164,7 @@ class Parameters(Section, Generic[PartType]):
             return super().__class_getitem__(part)
         defaults = {one.name: one.default for one in dataclass_fields(part)}
         fields: dict[str, Any] = {
-            name: (one.annotation, defaults[name]) for name, one in part.declared.items()
+            name: (one.annotation, defaults[name]) for name, one in part._declared.items()
         }
         made = create_model(f"{part.__name__}Section", __base__=cls, **fields)
         made.part = part
@@ -169,7 +173,7 @@ class Parameters(Section, Generic[PartType]):
     @property
     def values(self) -> dict[str, Any]:
         """What the parameters are, by their names."""
-        return {name: getattr(self, name) for name in self.part.declared}
+        return {name: getattr(self, name) for name in self.part._declared}
 
 
 class Family:

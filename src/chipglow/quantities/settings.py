@@ -94,7 +94,7 @@ def given(section: Section | Part) -> frozenset[str]:
     """Fields that a description gave; all of a part that was made in Python."""
     if isinstance(section, Section):
         return frozenset(section.model_fields_set)
-    return getattr(section, "given", frozenset(section.declared))
+    return getattr(section, "given", frozenset(section.parameters()))
 
 
 def changed(section: Described, changes: Mapping[str, object]) -> Described:
@@ -161,8 +161,8 @@ def _declared(kind: Any) -> dict[str, tuple[Parameter, Any, Any, Any]]:
     if kind.kind:
         found["kind"] = (Parameter(first_sentence(kind)), str, kind.kind, str)
     for one in fields(kind):
-        if one.name in kind.declared:
-            annotation, plain, parameter, _ = kind.declared[one.name]
+        if one.name in kind.parameters():
+            annotation, plain, parameter, _ = kind._declared[one.name]
             default = _default(one.default, one.default_factory)
             found[one.name] = parameter, plain, default, annotation
     return found

@@ -132,7 +132,7 @@ class CameraSection(Settings[Camera]):
         """The camera, with as many pixels as see the scene."""
         response = None if self.response is None else read_response(self.response)
         band = Band(*self.band, response)
-        shared = Camera.declared.keys() & type(self).model_fields.keys()
+        shared = Camera.parameters().keys() & type(self).model_fields.keys()
         made = {
             **{name: getattr(self, name) for name in shared},
             "band": band,

@@ -197,7 +197,7 @@ class FeaturesSection(Section):
         return {name: ReflectingSurface(bare, shape) for name, bare in surfaces.items()}
 
     def _features(self, chip: Emissivity, shear_band: Emissivity, seed: int) -> FeatureSurface:
-        shared = FeatureSurface.declared.keys() & type(self).model_fields.keys()
+        shared = FeatureSurface.parameters().keys() & type(self).model_fields.keys()
         values = {name: getattr(self, name) for name in shared}
         return FeatureSurface(chip=chip, shear_band=shear_band, seed=seed, **values)
 
