@@ -102,7 +102,7 @@ class Part:
         return {name: one.parameter for name, one in cls._declared.items()}
 
     @classmethod
-    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+    def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:
         """Schema of a section of a description that has the declared fields."""
         if isabstract(cls) or "__dataclass_fields__" not in vars(cls):
             return core_schema.is_instance_schema(cls)
@@ -141,9 +141,7 @@ class Part:
         )
 
     @classmethod
-    def __get_pydantic_json_schema__(
-        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> Any:
         """JSON schema of the section."""
         return handler(schema) | {"title": cls.__name__, "description": first_sentence(cls)}
 
