@@ -1,4 +1,4 @@
-"""How long the app takes from a knob to the new picture, in a real browser.
+"""How long the app takes from a control to the new picture, in a real browser.
 
     python benchmarks/app_latency.py [--scene FILE] [--turns N] [--chromium PATH]
 
@@ -25,9 +25,9 @@ FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
 )  # fmt: skip
-KNOBS = (
+CONTROLS = (
     "Exposure begins", "Band from", "Pixel pitch", "Exposure", "Numerical aperture",
-    "Noise (NETD at 300 °C)", "Lower range limit", "Seed",
+    "Noise (NETD)", "Lower range limit", "Seed",
 )  # fmt: skip
 WATCH = """() => {
   const log = (window.chipglowLog = { asked: 0, shown: 0, first: [], lines: [], fresh: false });
@@ -56,8 +56,8 @@ def main():
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scene", type=Path, help="a scene's file; the app's own by default")
-    parser.add_argument("--turns", type=int, default=40, help="turns of each knob")
-    parser.add_argument("--knobs", nargs="+", default=KNOBS, help="labels of knobs")
+    parser.add_argument("--turns", type=int, default=40, help="turns of each control")
+    parser.add_argument("--controls", nargs="+", default=CONTROLS, help="labels of controls")
     parser.add_argument("--chromium", default=CHROMIUM)
     given = parser.parse_args()
     from playwright.sync_api import sync_playwright
@@ -77,20 +77,22 @@ def main():
 
 
 def measured(browser, url, given):
-    """Milliseconds by knob, of first and of exact pictures; when the first one was there."""
+    """Milliseconds by control, of first and of exact pictures; when the first one was there."""
     found = {}
     page = browser.new_page(viewport={"width": 1280, "height": 800})
     page.goto(url)
     page.get_by_text("Exact picture").wait_for(timeout=300_000)
     found["opened"] = time.perf_counter()
+    page.get_by_label("Detector", exact=True).select_option("noise")
+    page.wait_for_timeout(2000)
     page.wait_for_function(WATCH)
-    for label in given.knobs:
+    for label in given.controls:
         found[label] = turned(page, label, given.turns)
     return found
 
 
 def turned(page, label, turns):
-    """Turn one knob to and fro: milliseconds to the first pictures, then to an exact one."""
+    """Turn one control to and fro: milliseconds to the first pictures, then to an exact one."""
     slider = page.get_by_role("slider", name=label, exact=True)
     slider.focus()
     page.evaluate("() => { chipglowLog.first = []; chipglowLog.lines = []; }")
@@ -113,9 +115,9 @@ def time_to(begun, times):
 
 
 def report(times, opened, process, scene):
-    """Print milliseconds by knob, and what the server holds."""
+    """Print milliseconds by control, and the memory of the server."""
     heads = "".join(f"{head:>9}" for head in ("median", "95 %", "most", "lines", "exact"))
-    print(f"{'knob':26}{'turns':>7}{heads}   ms")
+    print(f"{'control':26}{'turns':>7}{heads}   ms")
     for label, (first, lines, last) in times.items():
         print(f"{label:26}{row(first, lines)}{last:9.0f}")
     first, lines = (np.concatenate([one[part] for one in times.values()]) for part in (0, 1))

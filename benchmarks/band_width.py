@@ -9,7 +9,7 @@ textures and pixel phases. Scenes are kept in chipglow's cache. Prints a Markdow
 
 import sys
 
-from chipglow.report.comparison import comparison_rows
+from chipglow.report import result_rows
 from chipglow.study import Study, run
 
 CELLS = (28.0, 20.0, 14.0, 10.0, 7.0)
@@ -33,7 +33,7 @@ def study_with(cell):
 
 def row(cell):
     """Cut and look, and return the cell's row of the table."""
-    found = {each.key: each.here_text for each in comparison_rows(run(study_with(cell)))}
+    found = {each.key: each.here_text for each in result_rows(run(study_with(cell)))}
     return [f"{cell:g}", *(found[key] for key in SHOWN)]
 
 

@@ -33,7 +33,7 @@ import numba
 import numpy as np
 from scipy.signal import fftconvolve
 
-from chipglow.analysis.starts import spread_starts
+from chipglow.analysis import spread_starts
 from chipglow.camera import AnnularAperturePSF, Camera, GaussianPSF
 from chipglow.camera.detector import Detector, OperationPoint, PhotonResponse, ReadNoise, ShotNoise
 from chipglow.camera.optics.sampling import integrate

@@ -12,24 +12,37 @@ from measured_band import BandImage
 from scipy.interpolate import RegularGridInterpolator
 
 from chipglow.analysis import (
+    CASES,
+    BandPlace,
     Plan,
+    PointPlace,
+    RakePlace,
     analyse,
     error_images,
-    rake_errors,
+    headline,
+    headlines,
+    image_error,
+    line_error,
+    one_draw,
     reference_temperature,
+    sensitivity_error,
+    sensitivity_psf_fraction,
 )
-from chipglow.analysis.error_images import LEAST_COVERED, ErrorImages
-from chipglow.camera import Camera, Exposure, GaussianPSF
+from chipglow.analysis.error_images import LEAST_COVERED
+from chipglow.camera import Camera, Detector, EnergyResponse, Exposure, GaussianPSF, ReadNoise
 from chipglow.laboratory.chip import NoShearBandError, contact_length, find_shear_band, segmentation
 from chipglow.radiometry import Band
 from chipglow.scene import Material, Raster, Scene, ToolGeometry, sample, straight_line
+from chipglow.scene.lines import nearest
 from chipglow.study import Study
-from chipglow.surface import CHIP_1, CHIP_2
+from chipglow.surface import CHIP_1, CHIP_2, UniformSurface
 
 BAND = Band(3.8e-6, 5.1e-6)
 CAMERA = Camera(band=BAND, pitch=6e-6, psf=GaussianPSF(12e-6), psf_order="detector")
 GRID = Raster(left=-300e-6, top=300e-6, spacing=2e-6, rows=180, columns=180)
 TOOL = ToolGeometry()
+SURFACES = {"chip 1": CHIP_1, "chip 2": CHIP_2}
+NOISY = Detector(response=EnergyResponse(1e4), full_well=1e7, terms=(ReadNoise(2000.0),))
 
 
 def exposure_of(radiance, peak=None, raster=GRID, temperature=None):
@@ -361,41 +374,40 @@ def test_the_contact_ends_where_the_chip_leaves(length):
     assert contact_length(GRID, chip, TOOL, 3e-6) == pytest.approx(length, abs=4e-6)
 
 
-def test_no_contact_is_no_length_and_no_line():
+def test_no_contact_is_no_length():
     x, y = np.meshgrid(GRID.x, GRID.y)
     chip = TOOL.signed_distance(x, y) > 20e-6
     assert contact_length(GRID, chip, TOOL, 3e-6) == 0.0
-    with pytest.raises(ValueError, match="does not touch"):
-        rake_errors(linear_errors(), 0.0, TOOL, 40e-6, 1e-6)
-
-
-def linear_errors():
-    """Errors that grow by 1 K a µm away from the rake face, a quarter of them the PSF's."""
-    sensors = Raster(left=-300e-6, top=300e-6, spacing=6e-6, rows=60, columns=60)
-    points = np.stack(np.meshgrid(sensors.x, sensors.y), axis=-1)
-    depth = (points - TOOL.rake_point(0.0)) @ np.array(TOOL.rake_normal)
-    case_1 = -40.0 + depth * 1e6
-    return ErrorImages(
-        raster=sensors,
-        reference=np.full(sensors.shape, 900.0),
-        case_1=case_1,
-        case_2=0.75 * case_1,
-        flagged=np.zeros(sensors.shape, bool),
-    )
 
 
 def test_lines_across_the_rake_face_follow_its_normal():
-    rake = rake_errors(linear_errors(), 120e-6, TOOL, 30e-6, 1e-6)
+    """Errors that grow by 1 K a µm away from the rake face, a quarter of them the PSF's."""
+    pixels = Raster(left=-300e-6, top=300e-6, spacing=6e-6, rows=60, columns=60)
+    points = np.stack(np.meshgrid(pixels.x, pixels.y), axis=-1)
+    error = -40.0 + (points - TOOL.rake_point(0.0)) @ np.array(TOOL.rake_normal) * 1e6
+    images = np.array([np.full(pixels.shape, 900.0), 900.0 + error, 900.0 + 0.75 * error])
+    place = RakePlace("rake face", TOOL, 120e-6, 30e-6, 1e-6)
+    found = place.lines(6e-6)
+    lines = {
+        name: np.array([sample(image, pixels, line.points) for image in images])
+        for name, line in found.items()
+    }
     # Planes are read exactly, so rounding only.
-    np.testing.assert_allclose(rake.case_1, -40.0 + rake.line.distance * 1e6, atol=1e-9)
-    np.testing.assert_allclose(rake.contact_case_1, -40.0, atol=1e-9)
-    assert rake.face.error == pytest.approx(-40.0)
-    assert rake.along_contact.error == pytest.approx(-40.0)
-    assert rake.face.psf_fraction == pytest.approx(0.25)
-    # Two pixels into the tool, the last place that belongs to the face.
-    assert rake.extremum.error == pytest.approx(-52.0)
-    assert rake.extremum.psf_fraction == pytest.approx(0.25)
-    assert rake.contact.distance[-1] == 120e-6
+    np.testing.assert_allclose(
+        lines["rake"][1], 860.0 + found["rake"].distance * 1e6, rtol=0, atol=1e-9
+    )
+    np.testing.assert_allclose(lines["contact"][1], 860.0, rtol=0, atol=1e-9)
+    assert found["contact"].distance[-1] == 120e-6
+    readings = place.read(images, pixels, lines)
+    for quantity, expected in (
+        ("mid-contact", -40.0),
+        ("mean along the contact", -40.0),
+        # Two pixels into the tool, the last place that belongs to the face.
+        ("most negative within two pixels", -52.0),
+    ):
+        reading = readings[quantity]
+        assert reading[1] - reading[0] == pytest.approx(expected), quantity
+        assert reading[2] - reading[0] == pytest.approx(0.75 * expected), quantity
 
 
 # Segments
@@ -499,89 +511,90 @@ def study(chip):
     plan = Plan(exposures=5, phases=2, textures=3, psf_widths=(6e-6, 12e-6, 18e-6))
     told = []
     result = analyse(
-        chip.scene(),
-        {"chip 1": CHIP_1, "chip 2": CHIP_2},
-        CAMERA,
-        plan,
-        lambda label, part: told.append((label, part)),
+        chip.scene(), SURFACES, CAMERA, plan, lambda label, part: told.append((label, part))
     )
-    assert {label for label, part in told if part == 1.0} >= {"shear band", "camera", "draws"}
+    assert {label for label, part in told if part == 1.0} >= {"shear band", "camera", "chip"}
     assert all(0.0 <= part <= 1.0 for _, part in told)
     return result
 
 
 def test_the_developed_instant_is_the_first_near_the_greatest_rise(study, chip):
-    middles = [instant.start + CAMERA.integration_time / 2 for instant in study.instants]
+    starts = study.data.instant.values
     # On the ridge of the chip: half of what shearing heats, and all that the band does.
-    rise = np.array([180 / 2 + chip.peak_rise * chip.growth(middle) for middle in middles])
-    assert study.developed == np.flatnonzero(rise >= 0.95 * rise.max())[0]
-    assert study.surfaces["chip 1"].measurement.times.tolist() == [i.start for i in study.instants]
+    rise = np.array(
+        [
+            180 / 2 + chip.peak_rise * chip.growth(start + CAMERA.integration_time / 2)
+            for start in starts
+        ]
+    )
+    assert study.cut.developed == np.flatnonzero(rise >= 0.95 * rise.max())[0]
+    assert study.data.shown_instant == study.cut.developed
+    assert study.measurements["chip 1"].times.tolist() == starts.tolist()
 
 
 def test_the_band_of_the_study_is_the_chips(study, chip):
-    middle = study.instants[study.developed].start + CAMERA.integration_time / 2
-    band = study.band
+    segment = study.cut.segments[0]
+    middle = segment.start + CAMERA.integration_time / 2
+    band = study.cut.band
     offset = chip.distance_to_band(band.ridge.points, middle)
     inner = (band.ridge.distance > 40e-6) & (band.ridge.distance < 0.85 * band.ridge.distance[-1])
     assert np.abs(offset[inner]).max() < 1e-6
-    assert study.segment.momentary_band is not None
-    assert study.segment.band_width == pytest.approx(chip.band_width, rel=0.03)
+    assert segment.momentary_band is not None
+    assert segment.band_width == pytest.approx(chip.band_width, rel=0.03)
     drift = chip.shear_angle_drift * CAMERA.integration_time * band.length / 2
-    assert study.segment.sweep == pytest.approx(drift, abs=2e-6)
+    assert segment.sweep == pytest.approx(drift, abs=2e-6)
 
 
 def test_contact_and_errors_of_the_study_make_sense(study, chip):
     lift = 3e-6 / np.tan(radians(12.0))
-    assert study.rake.contact_length == pytest.approx(chip.contact_length + lift, abs=8e-6)
-    rake, band = study.rake.face, study.band_errors.centre
-    assert rake.error < rake.psf_portion < 0
-    assert band.error < band.psf_portion < 0
-    assert study.rake.extremum.error <= rake.error
-    assert study.band_errors.worst.error <= band.error
-    assert study.band_errors.worst.error == min(study.band_errors.beside)
-    assert (study.draws.band_line.motion <= 0).all()
+    rake_place, band_place = study.places
+    assert isinstance(rake_place, RakePlace) and isinstance(band_place, BandPlace)
+    assert rake_place.contact_length == pytest.approx(chip.contact_length + lift, abs=8e-6)
+    draws = {name: one_draw(study.data, name) for name in headlines(study.data)}
+    for name in ("rake", "band"):
+        assert draws[name].error < draws[name].psf_portion < 0
+    assert draws["rake_extremum"].error <= draws["rake"].error
+    assert draws["band_worst"].error <= draws["band"].error
+    across = line_error(study.data, "band").isel(exposure=0, texture=0, pixel_phase=0)
+    assert draws["band_worst"].error == float(across.min())
+    assert (study.data.line_motion.sel(line="band") <= 0).all()
 
 
 def test_the_measured_centre_of_a_band_is_where_the_image_is_hottest(study):
-    band = study.band_errors
-    near = np.abs(band.line.distance) <= 2 * CAMERA.pitch
-    hottest = np.flatnonzero(near)[np.argmax(band.measured[near])]
-    assert band.measured_centre.error == band.case_1[hottest]
-    errors = study.surfaces["chip 1"].errors
-    measured = study.surfaces["chip 1"].measurement.radiance_temperature(flagged=True)
-    there = np.isfinite(errors.reference)
-    np.testing.assert_allclose(errors.measured[there], measured[study.developed][there], atol=1e-9)
+    first = study.data.isel(exposure=0, texture=0, pixel_phase=0)
+    line = first.sel(line="band", effects="all")
+    near = np.abs(line.line_distance.values) <= 2 * CAMERA.pitch
+    hottest = np.flatnonzero(near)[np.argmax(line.line_measured.values[near])]
+    error = line.line_measured.values[hottest] - line.line_reference.values[hottest]
+    assert one_draw(study.data, "band_measured").error == error
+    image = study.data.image_measured.sel(surface="chip 1", effects="all").values
+    measured = study.measurements["chip 1"].radiance_temperature(flagged=True)
+    there = np.isfinite(image)
+    np.testing.assert_allclose(image[there], measured[study.cut.developed][there], atol=1e-9)
 
 
-def test_the_first_draw_is_the_papers_procedure(study):
-    headlines = study.draws.headlines
-    for name, place in (
-        ("rake", study.rake.face),
-        ("rake_extremum", study.rake.extremum),
-        ("rake_mean", study.rake.along_contact),
-        ("band", study.band_errors.centre),
-        ("band_measured", study.band_errors.measured_centre),
-        ("band_worst", study.band_errors.worst),
-    ):
-        assert headlines[name].error.values.shape == (1, 3, 4)
-        # One texture and several are summed in another order: float32 of the emissivity, 1e-4 K.
-        assert headlines[name].error.values[0, 0, 0] == pytest.approx(place.error, abs=1e-4)
-        portion = headlines[name].psf_portion.values[0, 0, 0]
-        assert portion == pytest.approx(place.psf_portion, abs=1e-4)
-    drawn = study.draws.rake_line.case_1[0, 0, 0]
-    np.testing.assert_allclose(drawn, study.rake.case_1, atol=1e-4)
+def test_the_first_draw_is_read_in_the_shown_image(study):
+    assert headline(study.data, "rake").error.values.shape == (1, 3, 4)
+    errors = image_error(study.data)
+    pixels = study.measurements["chip 1"].raster
+    for line, surface in (("rake", "chip 2"), ("band", "chip 1")):
+        where = study.data.isel(exposure=0).sel(line=line)
+        points = np.stack([where.line_x.values, where.line_y.values], axis=-1)
+        known = np.isfinite(points).all(axis=1)
+        expected = sample(errors.sel(surface=surface).values, pixels, points[known])
+        drawn = line_error(study.data, line).values[0, 0, 0]
+        np.testing.assert_allclose(drawn, expected, atol=1e-9)
 
 
 def test_every_draw_is_the_loop_of_figure_6(chip):
     """A literal transcription: textures of other seeds, pixels that begin at another sample."""
     scene, phases, group = chip.scene(), 3, 3
-    surfaces = {"chip 1": CHIP_1, "chip 2": CHIP_2}
     plan = Plan(exposures=5, phases=phases, textures=2, psf_widths=(12e-6,))
-    result = analyse(scene, surfaces, CAMERA, plan)
-    start, kernel = result.segment.start, CAMERA.psf.kernel(CAMERA.pitch)
-    first = int(np.searchsorted(scene.times, start - 1e-9))
+    result = analyse(scene, SURFACES, CAMERA, plan)
+    kernel = CAMERA.psf.kernel(CAMERA.pitch)
+    first = int(np.searchsorted(scene.times, result.cut.segments[0].start - 1e-9))
     frames = [scene.frame(i) for i in range(first, first + 20)]
-    place = scene.tool.rake_point(result.rake.contact_length / 2)
+    place = scene.tool.rake_point(result.places[0].contact_length / 2)
     for texture in range(2):
         field = replace(CHIP_2, seed=CHIP_2.seed + texture).on(scene)
         emissivities = [field.emissivity(frame) for frame in frames]
@@ -599,7 +612,7 @@ def test_every_draw_is_the_loop_of_figure_6(chip):
             x = chip.raster.left + right * 2e-6 + 6e-6 * (np.arange(columns // group) + 0.5)
             y = chip.raster.top - down * 2e-6 - 6e-6 * (np.arange(rows // group) + 0.5)
             read = RegularGridInterpolator((y[::-1], x), error[::-1])
-            found = result.draws.headlines["rake"].error.values[0, texture, phase]
+            found = headline(result.data, "rake").error.values[0, texture, phase]
             # Radiance within 4e-7 by the look-up and float32: 1e-3 K.
             assert found == pytest.approx(read(place[::-1]).item(), abs=5e-3)
 
@@ -610,58 +623,100 @@ def test_each_part_of_a_scene_with_gaps_is_a_segment(chip):
     kept = [*range(0, 50), *range(55, 75)]
     scene = Scene(whole.data.isel(time=kept))
     plan = Plan(exposures=5, phases=1, textures=2, psf_widths=(12e-6,))
-    result = analyse(scene, {"chip 1": CHIP_1, "chip 2": CHIP_2}, CAMERA, plan)
-    starts = [segment.start for segment in result.segments]
-    assert starts[1] == whole.times[55]
-    assert result.one_segment[-1].start == whole.times[30]
-    assert [instant.start for instant in result.instants[5:]] == [whole.times[55]]
-    assert result.draws.headlines["band"].error.values.shape == (2, 2, 1)
+    result = analyse(scene, SURFACES, CAMERA, plan)
+    assert result.data.exposure.values[1] == whole.times[55]
+    assert result.cut.one_segment[-1].start == whole.times[30]
+    assert result.data.instant.values[5:].tolist() == [whole.times[55]]
+    drawn = headline(result.data, "band").error
+    assert drawn.values.shape == (2, 2, 1) and drawn.causes[0] == "segment"
     alone = Scene(whole.data.isel(time=range(55, 75)))
-    other = analyse(alone, {"chip 1": CHIP_1, "chip 2": CHIP_2}, CAMERA, plan)
-    np.testing.assert_allclose(
-        result.draws.headlines["band"].error.values[1],
-        other.draws.headlines["band"].error.values[0],
-        atol=1e-9,
-    )
+    other = headline(analyse(alone, SURFACES, CAMERA, plan).data, "band").error
+    np.testing.assert_allclose(drawn.values[1], other.values[0], atol=1e-9)
 
 
 def test_the_sensitivity_meets_the_study_at_its_own_width(study):
-    by_order = {series.psf_order: series for series in study.sensitivity}
-    for series in by_order.values():
-        at = int(np.flatnonzero(np.isclose(series.widths, 12e-6))[0])
-        camera = replace(CAMERA, psf_order=series.psf_order)
-        for name, headline in study.draws.headlines.items():
-            if series.psf_order != CAMERA.psf_order:
-                continue
-            drawn = headline.error.values[:, 0]
-            np.testing.assert_allclose(series.errors[name][at], drawn.ravel(), atol=1e-9)
-            assert series.error(name)[at] == pytest.approx(drawn.mean())
-        face = series.errors["rake"][at, 0]
-        errors = error_images(camera, exposure_at(study, "chip 2"))
-        contact = study.rake.contact_length
-        expected = rake_errors(errors, contact, TOOL, 60e-6, 1e-6).face.error
-        assert face == pytest.approx(expected, abs=1e-4)
-        assert (np.diff(series.error("band")) < 0).all()
-        assert (np.diff(series.psf_fraction("rake")) > 0).all()
+    data = study.data
+    at = int(np.flatnonzero(np.isclose(data.psf_width, 12e-6))[0])
+    for name, drawn in headlines(data).items():
+        own = drawn.error.values[:, 0].mean()
+        assert sensitivity_error(data, CAMERA.psf_order, name)[at] == pytest.approx(own, abs=1e-9)
+    for order in ("detector", "optics"):
+        errors = error_images(replace(CAMERA, psf_order=order), exposure_at(study, "chip 2"))
+        across = study.places[0].lines(CAMERA.pitch)["rake"]
+        face = sample(errors.case_1, errors.raster, across.points[across.distance == 0.0])
+        first = data.sel(psf_order=order, reading="rake").isel(
+            psf_width=at, exposure=0, pixel_phase=0
+        )
+        error = first.varied_measured.sel(effects="all") - first.varied_reference
+        assert float(error) == pytest.approx(face[0], abs=1e-4)
+        assert (np.diff(sensitivity_error(data, order, "band")) < 0).all()
+        assert (np.diff(sensitivity_psf_fraction(data, order, "rake")) > 0).all()
 
 
 def exposure_at(study, name):
-    surface = {"chip 1": CHIP_1, "chip 2": CHIP_2}[name]
-    return CAMERA.expose(AnalyticChip().scene(), surface, study.segment.start)
+    return CAMERA.expose(AnalyticChip().scene(), SURFACES[name], study.cut.segments[0].start)
+
+
+def test_an_effect_switched_off_is_one_more_row(chip):
+    """Without motion the camera sees what radiates in the middle of the exposure."""
+    scene = chip.scene()
+
+    def still(camera, exposure):
+        return camera, replace(exposure, mean_radiance=exposure.centre_radiance)
+
+    place = PointPlace("here", (-60e-6, 80e-6))
+    plan = Plan(exposures=1, phases=1, textures=1, places=(place,))
+    effects = {**CASES, "without motion": still}
+    result = analyse(scene, {"chip 1": CHIP_1}, CAMERA, plan, effects=effects)
+    row = result.data.measured.sel(reading="here, pixel").isel(exposure=0, texture=0, pixel_phase=0)
+    exposure = CAMERA.expose(scene, CHIP_1, float(result.data.exposure[0]))
+    for effect, seen in (("all", exposure), ("without motion", still(CAMERA, exposure)[1])):
+        errors = error_images(CAMERA, seen)
+        expected = nearest(errors.measured, errors.raster, place.point)
+        assert row.sel(effects=effect) == pytest.approx(float(expected), abs=1e-9)
+    assert row.sel(effects="all") != row.sel(effects="without motion")
+
+
+def test_other_noise_is_in_every_draw(chip):
+    noisy = replace(CAMERA, detector=NOISY)
+    plan = Plan(exposures=3, phases=1, textures=2, psf_widths=(12e-6,))
+    scene = chip.scene()
+    data = analyse(scene, {"chip": UniformSurface(0.6)}, noisy, replace(plan, cut=False)).data
+    # The noise of each exposure of one surface without texture, and no noise of the reference.
+    clean = analyse(scene, {"chip": UniformSurface(0.6)}, CAMERA, replace(plan, cut=False)).data
+    noise = (data.measured - clean.measured).sel(reading="rake face, mid-contact", effects="all")
+    assert np.unique(noise.values).size == 3 and np.ptp(noise.values) > 1e-3
+    np.testing.assert_array_equal(data.reference, clean.reference)
 
 
 def test_the_curves_run_along_the_ridges(study):
-    for surface in study.surfaces.values():
-        for instant, curve in zip(study.instants, surface.curves, strict=True):
-            assert instant.band is not None
-            assert curve.shape == instant.band.ridge.distance.shape
-    ends = study.band.ridge.points[0] - study.band.ridge.points[-1]
-    assert hypot(*ends) < study.band.length * 1.01
+    data = study.data
+    for i, instant in enumerate(study.cut.instants):
+        known = np.isfinite(data.ridge_distance.isel(instant=i).values)
+        np.testing.assert_array_equal(
+            data.ridge_distance.isel(instant=i).values[known], instant.band.ridge.distance
+        )
+        assert np.isfinite(data.ridge_radiance_temperature.isel(instant=i).values[:, known]).any()
+    band = study.cut.band
+    assert hypot(*(band.ridge.points[0] - band.ridge.points[-1])) < band.length * 1.01
 
 
 def test_forces_of_the_study(study, chip):
-    assert study.forces is not None
-    assert study.forces.segmentation.period == pytest.approx(chip.segment_period, rel=0.02)
+    assert study.cut.forces is not None
+    assert study.cut.forces.segmentation.period == pytest.approx(chip.segment_period, rel=0.02)
+
+
+def test_a_part_that_fails_leaves_the_others(chip, monkeypatch):
+    def broken(*arguments):
+        raise ValueError("region chip 1 body: reaches over columns 50.34 to 81.35")
+
+    monkeypatch.setattr("chipglow.analysis.engine.heated_objects", broken)
+    plan = Plan(exposures=2, phases=1, textures=1, psf_widths=(12e-6,))
+    result = analyse(chip.scene(), SURFACES, CAMERA, plan)
+    assert list(result.failed) == ["heated chips and tool"]
+    assert "columns 50.34 to 81.35" in result.failed["heated chips and tool"]
+    assert result.cut.heated == () and result.cut.chip is not None
+    assert set(headlines(result.data)) >= {"rake", "band"}
 
 
 def test_a_study_that_can_not_be_is_refused(chip):
@@ -675,15 +730,23 @@ def test_a_study_that_can_not_be_is_refused(chip):
     for name in ("exposures", "phases", "textures", "line_step", "touching"):
         with pytest.raises(ValueError, match=f"plan: {name}"):
             Plan(**{name: 0})
-    bare = scene.data.copy()
-    bare.attrs = {}
-    with pytest.raises(ValueError, match="does not state its tool"):
-        analyse(type(scene)(bare), surfaces, CAMERA, plan)
-    cold = scene.data.copy()
-    cold["plastic_strain_rate"] = cold["plastic_strain_rate"] * 0 + np.float32(1.0)
-    cold["plastic_strain_rate"].attrs["units"] = "1/s"
-    with pytest.raises(NoShearBandError, match="in any of the exposures"):
-        analyse(type(scene)(cold), surfaces, CAMERA, plan)
+
+
+@pytest.mark.parametrize("without", ["tool", "band"])
+def test_a_scene_without_tool_or_band_is_read_exposure_by_exposure(without):
+    data = AnalyticChip(frames=30).scene().data.copy()
+    if without == "tool":
+        data.attrs = {}
+    else:
+        data["plastic_strain_rate"] = data["plastic_strain_rate"] * 0 + np.float32(1.0)
+        data["plastic_strain_rate"].attrs["units"] = "1/s"
+    plan = Plan(exposures=2, phases=1, textures=1, rake_surface="chip 1")
+    result = analyse(Scene(data), {"chip 1": CHIP_1}, CAMERA, plan)
+    assert result.cut is None
+    reason = "the scene has no tool" if without == "tool" else "in any of the exposures"
+    assert reason in " ".join(result.missing)
+    places = [place.name for place in result.places]
+    assert places == (["hottest pixel"] if without == "tool" else ["hottest pixel", "rake face"])
 
 
 def test_the_scene_of_the_tests_holds_the_contract(chip):

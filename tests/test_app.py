@@ -1,4 +1,4 @@
-"""The app without a browser: its numbers are the library's, its knobs the study's."""
+"""The app without a browser: its numbers are the library's, its state the study's."""
 
 import ast
 import subprocess
@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 
 import chipglow
 from chipglow.analysis import LinePlace, error_images, error_parts
+from chipglow.app.controls import OWN, TABLE
 from chipglow.app.files import figure_file, measurement_file, study_file
-from chipglow.app.knobs import OWN, UNIFORM
 from chipglow.app.model import MeasurementModel, SceneModel
 from chipglow.app.opening import open_any, open_uploaded
-from chipglow.app.session import Listener, Newest, Session, SupersededError
+from chipglow.app.session import Newest, Session, SupersededError
 from chipglow.camera import expose, expose_all
 from chipglow.io import example_scene, is_measurement, open_scene
 from chipglow.io.sources import SourceError
@@ -54,23 +54,35 @@ def seen_by_the_library(study, start):
 
 STATES = [
     {},
-    {"start": "440 us", "pitch": "5 um", "offset_right": "2 um"},
-    {"band_lower": "3.5", "integration_time": "7 us", "reflected": "60 degC"},
-    {"psf": "gaussian", "fwhm": "9", "psf_order": "optics", "netd": "0.4", "seed": "7"},
-    {"surface": OWN, "body_mean": "0.6", "band_deviation": "0.01", "lower_limit": "none"},
-    {"surface": UNIFORM, "emissivity": "0.7", "numerical_aperture": "0.4"},
+    {"start": "440 us", "camera.pitch": "5 um", "camera.offset_right": "2 um"},
+    {"camera.band.0": "3.5", "camera.integration_time": "7 us", "camera.reflected": "60 degC"},
+    {
+        "camera.psf": "gaussian",
+        "camera.psf.fwhm": "9",
+        "camera.psf_order": "optics",
+        "camera.detector": "noise",
+        "camera.detector.terms.0.netd": "0.4",
+        "seed": "7",
+    },
+    {
+        "surface": OWN,
+        f"surface.chips.{OWN}.body.mean": "0.6",
+        f"surface.chips.{OWN}.shear_band.standard_deviation": "0.01",
+        "camera.lower_limit": "none",
+    },
+    {"surface": "uniform", "surface.emissivity": "0.7", "camera.psf.numerical_aperture": "0.4"},
 ]
 
 
 @pytest.mark.parametrize("texts", STATES, ids=lambda texts: ", ".join(texts) or "first")
 def test_a_saved_study_gives_the_same_numbers(model, tmp_path, texts):
-    knobs = model.panel.changed(model.panel.initial, texts)
-    picture = model.picture(knobs)
+    state = model.controls.changed(model.controls.initial, texts)
+    picture = model.picture(state)
     file = tmp_path / "study.yaml"
-    file.write_bytes(study_file(model, knobs))
+    file.write_bytes(study_file(model, state))
     study = load_study(file)
     assert Path(study.scene) == example_scene().path
-    camera, exposure, _ = seen_by_the_library(study, knobs.start)
+    camera, exposure, _ = seen_by_the_library(study, state.start)
     expected = error_images(camera, exposure, study.analysis.reference)
     np.testing.assert_array_equal(picture.measured, expected.measured)
     np.testing.assert_array_equal(picture.error, expected.case_1)
@@ -81,39 +93,44 @@ def test_a_saved_study_gives_the_same_numbers(model, tmp_path, texts):
 
 
 def test_the_readout_is_that_of_the_pixel_and_the_sample(model):
-    texts = {"netd": "0.5", "cursor": "-40,200", "error": "psf"}
-    knobs = model.panel.changed(model.panel.initial, texts)
-    picture = model.picture(knobs)
+    texts = {
+        "camera.detector": "noise",
+        "camera.detector.terms.0.netd": "0.5",
+        "cursor": "-40,200",
+        "error_image": "psf",
+    }
+    state = model.controls.changed(model.controls.initial, texts)
+    picture = model.picture(state)
     found = model.readout(picture)
-    study = model.panel.study_of(knobs)
-    camera, exposure, surface = seen_by_the_library(study, knobs.start)
+    study = state.study
+    camera, exposure, surface = seen_by_the_library(study, state.start)
     scene, at = model.opened.scene, (-40e-6, 200e-6)
-    plain = camera.expose(scene, surface.without_texture(), knobs.start)
+    plain = camera.expose(scene, surface.without_texture(), state.start)
     parts = error_parts(camera, exposure, "maximum", plain)
     np.testing.assert_array_equal(picture.error, parts.psf)
     np.testing.assert_array_equal(found.parts.texture, parts.texture)
     assert found.measured == nearest(parts.errors.measured, parts.errors.raster, at)
     assert found.uncertainty == camera.calibration(parts.errors.raster.shape).netd(found.measured)
-    frame = scene.frame(int(np.searchsorted(scene.times, knobs.start + 5e-6 + 1e-12)) - 1)
+    frame = scene.frame(int(np.searchsorted(scene.times, state.start + 5e-6 + 1e-12)) - 1)
     assert found.true == nearest(frame.temperature, scene.raster, at)
     laid = camera.lay(surface, scene).emissivity(frame)
     assert found.emissivity == nearest(laid, scene.raster, at)
 
 
 def test_draws_are_those_of_other_pixels_and_textures(model):
-    knobs = model.panel.initial
+    state = model.controls.initial
     told = []
-    found = model.drawn(knobs, 2, 2, told.append)
+    found = model.drawn(state, 2, 2, told.append)
     assert told == sorted(told) and told[-1] == 1.0
     assert found.error.values.shape == (2, 4)
-    camera, _, surface = seen_by_the_library(model.panel.study_of(knobs), knobs.start)
+    camera, _, surface = seen_by_the_library(state.study, state.start)
     second = replace(camera, offset=(camera.pitch / 2, 0.0))
-    exposure = camera.expose(model.opened.scene, surface.redrawn(1), knobs.start)
+    exposure = camera.expose(model.opened.scene, surface.redrawn(1), state.start)
     errors = error_images(second, exposure)
-    assert found.error.values[1, 1] == nearest(errors.case_1, errors.raster, knobs.cursor)
-    profile = LinePlace("line", knobs.band_line).profile(errors)
+    assert found.error.values[1, 1] == nearest(errors.case_1, errors.raster, state.cursor)
+    profile = LinePlace("line", state.line("band_line")).profile(errors)
     # Measured less reference is the error but for rounding.
-    np.testing.assert_allclose(found.lines["band_line"].error[5], profile[1], atol=1e-9)
+    np.testing.assert_allclose(found.lines["band_line"][5], profile[0] + profile[1], atol=1e-9)
 
 
 def test_a_quick_look_is_the_same_scene_on_fewer_samples(model):
@@ -127,25 +144,25 @@ def test_a_quick_look_is_the_same_scene_on_fewer_samples(model):
     assert coarse.times.tolist() == scene.times[::3].tolist()
     alike = np.abs(fine.temperature[middles, middles][:rows, :columns] - few.temperature) < 40
     assert alike[(kept == few.material)].mean() > 0.99
-    quick = model.picture(model.panel.initial, quick=True)
-    exact = model.picture(model.panel.initial)
-    assert quick.coarse and not exact.coarse
+    quick = model.picture(model.controls.initial, quick=True)
+    exact = model.picture(model.controls.initial)
+    assert quick.quick and not exact.quick
     rows, columns = quick.measured.shape  # the coarse scene may have some pixels fewer
     known = ~(quick.flagged | exact.flagged[:rows, :columns])
     assert np.median(np.abs(quick.measured - exact.measured[:rows, :columns])[known]) < 3.0
 
 
 def test_a_quick_look_has_no_pixels_finer_than_its_samples(model):
-    knobs = replace(model.panel.initial, pitch=1e-6)
-    model.picture(model.panel.initial)
-    assert model.is_ready(model.panel.initial) and not model.is_ready(knobs)
-    quick = model.picture(knobs, quick=True)
+    state = model.changed(model.controls.initial, {"camera.pitch": "1 um"})
+    model.picture(model.controls.initial)
+    assert model.is_ready(model.controls.initial) and not model.is_ready(state)
+    quick = model.picture(state, quick=True)
     assert quick.raster.spacing == model.opened.coarse.raster.spacing > 1e-6
     assert quick.raster.rows * quick.raster.spacing == pytest.approx(
         model.opened.scene.raster.rows * model.opened.scene.raster.spacing,
         abs=2 * quick.raster.spacing,
     )
-    assert model.picture(knobs).raster.spacing == 1e-6 and model.is_ready(knobs)
+    assert model.picture(state).raster.spacing == 1e-6 and model.is_ready(state)
 
 
 # Knobs and files
@@ -154,54 +171,81 @@ def test_a_quick_look_has_no_pixels_finer_than_its_samples(model):
 @pytest.mark.parametrize(
     ("texts", "said"),
     [
-        ({"pitch": "-3 um"}, "Pixel pitch: -3 um is not over 0"),
-        ({"pitch": "5 kg"}, "expected one such as 6 um"),
-        ({"numerical_aperture": "1.5"}, "expected"),
-        ({"surface": OWN, "body_mean": "2"}, "body.mean: 2, expected 0 to 1"),
-        ({"band_lower": "6"}, "reversed"),
-        ({"psf": "sharp"}, "PSF: 'sharp', expected annular-aperture, gaussian, none"),
+        ({"camera.pitch": "-3 um"}, "Pixel pitch: -3 um is not over 0"),
+        ({"camera.pitch": "5 kg"}, "expected one such as 6 um"),
+        ({"camera.psf.numerical_aperture": "1.5"}, "expected"),
+        ({"surface": OWN, f"surface.chips.{OWN}.body.mean": "2"}, "mean: 2, expected 0 to 1"),
+        ({"camera.band.0": "6"}, "reversed"),
+        ({"camera.psf": "sharp"}, "PSF: 'sharp', expected annular-aperture, gaussian, none"),
         ({"seed": "1.5"}, "Seed: '1.5', expected a whole number"),
         ({"seed": "-1"}, "Seed -1: Camera.seed: -1, expected 0 or more"),
         (
-            {"integration_time": "90"},
+            {"camera.integration_time": "90"},
             "Exposure 90: exposure: 0.000443 s to 0.000533 s is not",
         ),
-        ({"pitch": "6 mm"}, "Pixel pitch 6 mm: camera: pitch of 0.006 m"),
-        ({"lower_limit": "9999"}, "Lower range limit 9999: Camera.lower_limit"),
+        ({"camera.pitch": "6 mm"}, "Pixel pitch 6 mm: camera: pitch of 0.006 m"),
+        ({"camera.lower_limit": "9999"}, "Lower range limit 9999: lower_limit: 9999 degC"),
         ({"rake_line": "1,2"}, "across the rake face: '1,2', expected 2 different points"),
         ({"rake_line": "1,2;3,461"}, "expected x from -620.0 to 40.0 µm and y from -80.0 to 460.0"),
         ({"cursor": "here"}, "Cursor: 'here', expected positions"),
         ({"cursor": "999,0"}, "Cursor: 999,0, expected x from -620.0 to 40.0 µm"),
-        ({"zoom": "2"}, "zoom: unknown knob"),
+        ({"zoom": "2"}, "zoom: unknown control"),
     ],
 )
 def test_what_a_knob_cannot_be_is_one_clear_error(model, texts, said):
     with pytest.raises(ValueError) as error:
-        model.turned(model.panel.initial, texts)
+        model.changed(model.controls.initial, texts)
     assert said in str(error.value) and "\n" not in str(error.value)
 
 
 def test_a_link_brings_the_state_back(model):
     texts = {
         "start": "441.5 us",
-        "psf": "none",
-        "lower_limit": "none",
+        "camera.psf": "none",
+        "camera.lower_limit": "none",
         "band_line": "-310,90;-250,200",
     }
-    knobs = model.panel.changed(model.panel.initial, texts)
-    assert model.panel.changed(model.panel.initial, model.panel.texts(knobs)) == knobs
-    assert model.panel.texts(model.panel.initial) == {}
+    state = model.controls.changed(model.controls.initial, texts)
+    restored = model.controls.changed(model.controls.initial, state.texts)
+    assert restored == state and restored.study == state.study
+    assert state.texts.keys() == texts.keys() and state.start == 441.5e-6
+    back = dict.fromkeys(texts, "") | model.controls.values(model.controls.initial)
+    assert model.controls.changed(state, {path: back[path] for path in texts}).texts == {}
+
+
+def test_a_setting_counts_again_when_the_study_has_it_again(model):
+    texts = {"camera.psf.numerical_aperture": "0.2", "camera.psf": "gaussian"}
+    state = model.changed(model.controls.initial, texts)
+    assert state.study.camera.psf.kind == "gaussian"
+    shown = {row.path: model.controls.is_shown(row, state) for row in model.controls.rows}
+    assert shown["camera.psf.fwhm"] and not shown["camera.psf.numerical_aperture"]
+    again = model.changed(state, {"camera.psf": "annular-aperture"})
+    assert again.study.camera.psf.numerical_aperture == 0.2
+
+
+@pytest.mark.parametrize("path", [row.path for row in TABLE])
+def test_the_study_has_the_setting_of_each_control(model, path):
+    """It has it at first, or when a word of another control says so."""
+    controls = model.controls
+    states = [
+        controls.changed(controls.initial, {row.path: word})
+        for row in controls.rows
+        for word in row.options
+    ]
+    assert any(controls.is_shown(controls.row(path), state) for state in states)
 
 
 def test_an_exponent_needs_no_unit_either(model):
-    initial = model.panel.initial
-    assert model.turned(initial, {"pitch": "5e0"}) == model.turned(initial, {"pitch": "5 um"})
+    initial = model.controls.initial
+    assert model.changed(initial, {"camera.pitch": "5e0"}) == model.changed(
+        initial, {"camera.pitch": "5 um"}
+    )
 
 
 def test_off_the_material_there_is_no_emissivity(model):
     """The readout names it a dash, at a cursor that may well be there."""
-    knobs = model.turned(model.panel.initial, {"cursor": "-610,440"})
-    readout = model.readout(model.picture(knobs))
+    state = model.changed(model.controls.initial, {"cursor": "-610,440"})
+    readout = model.readout(model.picture(state))
     assert np.isnan(readout.emissivity)
     assert rounded_text(readout.emissivity) == "–"
 
@@ -212,7 +256,7 @@ def test_the_saved_figure_shows_what_the_page_shows(model, monkeypatch):
     monkeypatch.setattr(
         Figure, "savefig", lambda figure, path, **_: saved.append(figure) or path.touch()
     )
-    initial = model.panel.initial
+    initial = model.controls.initial
     picture = model.picture(initial)
     drawn = model.drawn(initial, 2, 1, lambda _: None)
     seen = (-100e-6, 20e-6, 100e-6, 200e-6)
@@ -226,21 +270,21 @@ def test_the_saved_figure_shows_what_the_page_shows(model, monkeypatch):
     for one in (scene, measured, error):
         assert (*one.get_xlim(), *one.get_ylim()) == pytest.approx([1e6 * end for end in seen])
     shaded = rake.collections[0].get_paths()[0].get_extents()
-    low, high = (end(drawn.lines["rake_line"].measured - 273.15) for end in (np.nanmin, np.nanmax))
+    low, high = (end(drawn.lines["rake_line"] - 273.15) for end in (np.nanmin, np.nanmax))
     assert (shaded.y0, shaded.y1) == pytest.approx((low, high))
     text = caption.texts[0].get_text()
     assert "Exposure: 10 µs" in text and "Emissivity: Chip 1" in text
 
 
 def test_what_is_saved_can_be_opened(model, tmp_path):
-    picture = model.picture(model.panel.initial)
+    picture = model.picture(model.controls.initial)
     file = tmp_path / "measurement.nc"
     file.write_bytes(measurement_file(picture, model))
     assert is_measurement(file)
     again = open_uploaded(file, "mine.nc")
     assert again.name == "mine.nc"
     shown = MeasurementModel(again)
-    seen = shown.picture(shown.panel.initial)
+    seen = shown.picture(shown.controls.initial)
     np.testing.assert_array_equal(seen.flagged, picture.flagged)
     usable = ~picture.flagged
     np.testing.assert_array_equal(seen.measured[usable], picture.measured[usable])
@@ -277,36 +321,33 @@ def test_a_scene_of_temperature_alone_is_seen_with_one_emissivity(tmp_path):
     view = chipglow.explore(scene)
     assert "plastic_strain" not in view.spec
     opened = open_any(None)
-    assert opened.panel.knob("shown").choices.keys() >= {"speed", "plastic_strain"}
+    assert opened.controls.row("scene_image").options.keys() >= {"speed", "plastic_strain"}
 
 
 # Sessions
 
 
 class Heard:
-    """A listener that keeps what it hears."""
+    """Keeps what a session tells."""
 
     def __init__(self):
         self.pictures, self.readouts, self.failures = [], [], []
-        self.listener = Listener(
-            picture=lambda number, picture: self.pictures.append(picture),
-            readout=lambda picture, found: self.readouts.append(found),
-            drawn=lambda drawn: None,
-            progress=lambda done: None,
-            failed=self.failures.append,
-        )
+
+    def __call__(self, kind, *content):
+        kept = {"picture": self.pictures, "readout": self.readouts, "failed": self.failures}
+        kept[kind].append(content[-1])
 
 
 def test_two_sessions_on_one_scene_do_not_disturb_each_other(opened):
     heard = Heard(), Heard()
-    first, second = (Session(opened, one.listener) for one in heard)
-    first.turn({"pitch": "5 um"})
-    second.turn({"pitch": "8 um"})
+    first, second = (Session(opened, one) for one in heard)
+    first.change({"camera.pitch": "5 um"})
+    second.change({"camera.pitch": "8 um"})
     assert first.settle() and second.settle()
-    first.turn({"emissivity": "0.3"})
+    first.change({"surface.emissivity": "0.3"})
     first.undo()
     assert first.settle()
-    assert [session.knobs.pitch for session in (first, second)] == [5e-6, 8e-6]
+    assert [session.state.study.camera.pitch for session in (first, second)] == [5e-6, 8e-6]
     assert [one.pictures[-1].raster.spacing for one in heard] == [5e-6, 8e-6]
     assert heard[0].failures == heard[1].failures == []
     first.end()
@@ -314,29 +355,39 @@ def test_two_sessions_on_one_scene_do_not_disturb_each_other(opened):
 
 
 def test_undo_goes_back_knob_by_knob(opened):
-    session = Session(opened, Heard().listener)
+    session = Session(opened, Heard())
     assert not session.can_undo
-    session.turn({"pitch": "5 um"})
+    session.change({"camera.pitch": "5 um"})
     for pitch in ("5.5 um", "6.5 um", "7 um"):
-        session.turn({"pitch": pitch}, final=pitch == "7 um")
-    session.turn({"psf": "none"})
+        session.change({"camera.pitch": pitch}, final=pitch == "7 um")
+    session.change({"camera.psf": "none"})
     session.undo()
-    assert (session.knobs.psf, session.knobs.pitch) == ("annular-aperture", 7e-6)
+    assert (session.state.study.camera.psf.kind, session.state.study.camera.pitch) == (
+        "annular-aperture",
+        7e-6,
+    )
     session.undo()
-    assert session.knobs.pitch == 5e-6
+    assert session.state.study.camera.pitch == 5e-6
     session.undo()
-    assert session.knobs == session.model.panel.initial and not session.can_undo
+    assert session.state == session.model.controls.initial and not session.can_undo
+    session.redo()
+    session.redo()
+    assert session.state.study.camera.pitch == 7e-6 and session.can_redo
+    session.change({"camera.pitch": "9 um"})
+    assert not session.can_redo
+    session.undo()
+    assert session.state.study.camera.pitch == 7e-6
     session.end()
 
 
 def test_what_is_not_possible_on_the_scene_is_said(opened):
     heard = Heard()
-    session = Session(opened, heard.listener)
-    before = session.knobs
+    session = Session(opened, heard)
+    before = session.state
     with pytest.raises(ValueError, match="is not within the scene"):
-        session.turn({"integration_time": "60 us"})
-    assert session.knobs == before and not session.can_undo
-    session.set(replace(before, integration_time=60e-6))
+        session.change({"camera.integration_time": "60 us"})
+    assert session.state == before and not session.can_undo
+    session.set(session.model.controls.changed(before, {"camera.integration_time": "60 us"}))
     assert session.settle()
     assert "is not within the scene" in heard.failures[0]
     session.end()
@@ -350,7 +401,7 @@ def test_only_the_newest_job_is_done():
         go.wait(10)
         done.append(job)
 
-    newest = Newest(work, done.append)
+    newest = Newest(work, lambda kind, text: done.append(text))
     newest.ask("first")
     assert begun.wait(10)
     for job in ("second", "third", "fourth"):
@@ -365,7 +416,7 @@ def test_only_the_newest_job_is_done():
 def test_a_pass_that_nobody_waits_for_ends_early(opened):
     scene, camera = opened.scene, Study().camera.build()
     field = camera.lay(CHIP_1, scene)
-    start = opened.panel.initial.start
+    start = opened.controls.initial.start
     calls = []
 
     def check():
@@ -384,7 +435,7 @@ def test_a_pass_that_nobody_waits_for_ends_early(opened):
 
 
 def test_parts_sum_to_the_error_and_vanish_with_their_effects(opened):
-    scene, start = opened.scene, opened.panel.initial.start
+    scene, start = opened.scene, opened.controls.initial.start
     camera = Study(camera={"psf": "none", "lower_limit": "none"}).camera.build()
     exposure = camera.expose(scene, CHIP_1, start)
     for reference in ("maximum", "mean", "centre", "true"):
@@ -455,7 +506,7 @@ def finaliser():
         pass  # as Python does with what is raised in one
 app.server.io_loop.add_callback(finaliser)
 app.run()
-print(app.opened.folder.exists())
+print(app.files.folder.exists())
 """
     ended = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True

@@ -86,6 +86,7 @@ def test_a_given_feed_counts():
         chip_metrics(replace(CHIP, frames=2).scene(), feed=0.0)
 
 
+@pytest.mark.slow
 def test_the_view_does_not_decide():
     """A taller and wider view shows the chip where it has left the face: not to be measured."""
     chip = replace(CHIP, contact=266e-6, lift=np.radians(25.0))

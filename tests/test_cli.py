@@ -184,7 +184,7 @@ def earlier_results(folder, runs):
 
 
 def test_a_second_run_finds_the_scene_and_replaces_the_results(earlier_results, runs, monkeypatch):
-    def write_report(result, folder, title, text, provenance, remarks, settings, steady):
+    def write_report(analysis, folder, title, text, provenance, remarks, study, steady):
         (folder / "summary.json").write_text(text)
         return folder / "summary.json"
 

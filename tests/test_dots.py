@@ -47,6 +47,7 @@ def drawn(seed):
     )
 
 
+@pytest.mark.slow
 def test_a_target_gives_the_map_within_its_uncertainty():
     """Hotelling's T^2 of three places in targets whose contrast, noise, turn and size differ."""
     inside = 0

@@ -369,6 +369,7 @@ def test_movies_are_read_in_step(tmp_path):
         ).survey()  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_movie_that_ffmpeg_drew():
     """The example of docs/do/import-movie.md: another program's movie, jet, legend and lines."""
     place = Path(__file__).parents[1] / "docs" / "samples" / "hot_spot.py"
@@ -617,17 +618,24 @@ def test_the_maps_of_matplotlib_are_told_from_ours():
 # A matrix of maps, bands, edges and codecs; all of it in benchmarks/movie_matrix.py
 
 
+def case_of(name, bands, edges, codec, marks=()):
+    """A case, with an id."""
+    case = Case(name, bands, edges, codec)
+    return pytest.param(case, id=f"{name}-{bands}-{edges}-{codec.name}", marks=marks)
+
+
 @pytest.mark.parametrize(
     "case",
     [
-        Case("jet", 0, False, MJPEG),  # colours mixed along the scale, a page that is no white
-        Case("jet", 0, True, MJPEG),  # edges within the colours of the ends of the scale
-        Case("rainbow", 9, False, MJPEG),  # bands whose jumps are blurred
-        Case("viridis", 0, False, MJPEG),
-        Case("hot", 12, False, MJPEG),
-        Case("gray", 0, True, GIF),  # edges of the colour of a value
+        # Colours mixed along the scale, a page that is no white.
+        case_of("jet", 0, False, MJPEG, pytest.mark.slow),
+        # Edges within the colours of the ends of the scale.
+        case_of("jet", 0, True, MJPEG, pytest.mark.slow),
+        case_of("rainbow", 9, False, MJPEG),  # bands whose jumps are blurred
+        case_of("viridis", 0, False, MJPEG, pytest.mark.slow),
+        case_of("hot", 12, False, MJPEG, pytest.mark.slow),
+        case_of("gray", 0, True, GIF),  # edges of the colour of a value
     ],
-    ids=lambda case: f"{case.name}-{case.bands}-{case.edges}-{case.codec.name}",
 )
 def test_what_is_stated_of_a_movie_holds(tmp_path, case):
     found = outcome(tmp_path, case, 1)

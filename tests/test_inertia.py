@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis.cut_error import _unaccounted
+from chipglow.analysis.cut import _unaccounted
 from chipglow.cli.inertia import say_of_cut
 from chipglow.cli.screen import begin
 from chipglow.cutting import (

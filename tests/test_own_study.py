@@ -2,20 +2,18 @@
 
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
 import typer
 from analytic_chip import AnalyticChip
 
-from chipglow.analysis import Distribution
-from chipglow.analysis.cut_error import Plan, analyse
-from chipglow.analysis.draws import Headline
+from chipglow.analysis import Distribution, Plan, analyse
+from chipglow.analysis.reductions import Headline
 from chipglow.camera import AnnularAperturePSF, Camera
 from chipglow.cli import progress
 from chipglow.radiometry import Band
-from chipglow.report import comparison_rows, write_report
+from chipglow.report import result_rows, write_report
 from chipglow.scene import Raster
 from chipglow.study import Study, expected_cost, fit, load_study, study_text
 from chipglow.study.assumed import left_to_the_paper
@@ -23,6 +21,7 @@ from chipglow.study.camera_presets import CAMERAS
 from chipglow.surface import CHIP_1, CHIP_2
 from chipglow.text import DescriptionError
 
+NAMES = ("rake face", "mid-contact", "chip 2")
 TITANIUM = {
     "cutting": {"workpiece": "ti-6al-4v", "speed": "60 m/min", "feed": "0.1 mm"},
     "camera": {
@@ -137,29 +136,25 @@ def test_what_is_left_to_the_paper_is_said():
 
 @pytest.fixture(scope="module")
 def own_result():
-    plan = Plan(
-        exposures=2, phases=1, textures=1, psf_widths=(8e-6, 12e-6), study=Study(**TITANIUM)
-    )
+    plan = Plan(exposures=2, phases=1, textures=1, psf_widths=(8e-6, 12e-6))
     scene = AnalyticChip().scene()
     camera = Camera(integration_time=5e-6)
     return analyse(scene, {"chip 1": CHIP_1, "chip 2": CHIP_2}, camera, plan)
 
 
 def test_the_paper_stands_beside_its_own_study_only(own_result, tmp_path):
-    rows = comparison_rows(own_result)
-    assert all(row.paper is None and not row.where for row in rows)
-    write_report(own_result, tmp_path, "Titanium", "cutting: {}\n", {"seed": "1"})
+    titanium = Study(**TITANIUM)
+    assert all(row.paper is None for row in result_rows(own_result, titanium))
+    write_report(own_result, tmp_path, "Titanium", "cutting: {}\n", {"seed": "1"}, (), titanium)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     told = page[page.index("<main>") : page.index('<div class="part" id="study">')]
     assert "paper" not in told.lower().replace("data:image/png;base64", "")
     assert "Figure 5" not in told
     assert (tmp_path / "figures" / "scene.png").exists()
-    beside = replace(own_result, plan=replace(own_result.plan, study=Study.quick()))
-    assert any(row.paper is not None for row in comparison_rows(beside))
+    assert any(row.paper is not None for row in result_rows(own_result, Study.quick()))
     # Nor beside what somebody analyses without a study, nor if one thing of it is another.
     for study in (None, Study(camera={"integration_time": "20 us"})):
-        other = replace(own_result, plan=replace(own_result.plan, study=study))
-        assert all(row.paper is None for row in comparison_rows(other))
+        assert all(row.paper is None for row in result_rows(own_result, study))
 
 
 def test_the_cost_of_the_papers_study_is_about_what_it_was():
@@ -233,9 +228,11 @@ def test_a_part_of_an_error_of_unknown_sign_is_not_told():
     causes = ("segment", "texture", "pixel phase")
     error = Distribution(np.array([[[-30.0, 1.0, -20.0]]]), causes)
     portion = Distribution(np.array([[[-10.0, -10.0, -10.0]]]), causes)
-    assert Headline(error, portion).psf_fraction is None
+    assert Headline(*NAMES, error, error, portion).psf_fraction is None
     known = Distribution(np.array([[[-30.0, -10.0, -20.0]]]), causes)
-    assert Headline(known, portion).psf_fraction.mean == pytest.approx((1 / 3 + 1 + 1 / 2) / 3)
+    assert Headline(*NAMES, known, known, portion).psf_fraction.mean == pytest.approx(
+        (1 / 3 + 1 + 1 / 2) / 3
+    )
 
 
 def test_a_camera_by_name_has_its_data_sheets_numbers_and_says_where_they_stand():

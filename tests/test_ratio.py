@@ -20,6 +20,7 @@ from chipglow.analysis import (
     cut_spots,
     ratio_errors,
     wavelength_errors,
+    wavelengths_frame,
 )
 from chipglow.camera import (
     AnnularAperturePSF,
@@ -346,7 +347,7 @@ def test_noise_is_that_of_both_channels():
         scene(1000.0), {"plate": UniformSurface()}, camera, plan, [spot], 1, 1
     )
     # A second way: frames of a flat field, of 64 x 64 elements.
-    assert study.errors[-1].noise == pytest.approx(found, rel=0.03)
+    assert float(study.noise[0, -1]) == pytest.approx(found, rel=0.03)
 
 
 def test_what_a_ratio_camera_refuses():
@@ -405,36 +406,39 @@ def test_a_study_of_bands_beside_the_loop_of_figure_6():
     def ratio(one, other):
         return inverse(one / other, lambda t: planck(t, SHORT) / planck(t, LONG))
 
-    alone, _, pair = (
-        next(e for e in study.errors if (e.first, e.second) == bands)
-        for bands in ((LONG, None), (SHORT, None), (SHORT, LONG))
+    bands = list(zip(study.first_um.values, study.second_um.values, strict=True))
+    here = study.isel(place=0)
+    alone, pair = (
+        here.isel(ratio=bands.index(names)) for names in (("3.8-5.1", ""), ("1.5-1.7", "3.8-5.1"))
     )
     early, late, ideal = values[:2], values[1:3], np.ones((1, 1))
     long, short = image(LONG, early)[9, 16], image(SHORT, early)[9, 16]
     # float32 temperatures of a scene, and a table of 1/32 K.
     close = {"abs": 2e-3}
     found = inverse(long / 0.6, lambda t: planck(t, LONG))
-    assert alone.truth == pytest.approx([truth], abs=1e-9)
-    assert alone.error == pytest.approx([found - truth], **close)
+    assert here.truth.values == pytest.approx([truth], abs=1e-9)
+    assert alone.step.sum("cause").values == pytest.approx([found - truth], **close)
     sharp = inverse(image(LONG, early, psf=ideal)[9, 16] / 0.6, lambda t: planck(t, LONG))
-    assert alone.steps["optics"] == pytest.approx([found - sharp], **close)
+    assert alone.step.sel(cause="optics").values == pytest.approx([found - sharp], **close)
     slope = planck(truth + 0.5, LONG) - planck(truth - 0.5, LONG)
-    assert alone.emissivity == pytest.approx(0.1 * planck(truth, LONG) / slope, rel=1e-4)
+    assert float(alone.emissivity_uncertainty) == pytest.approx(
+        0.1 * planck(truth, LONG) / slope, rel=1e-4
+    )
 
     together, delayed = ratio(short, long), ratio(short, image(LONG, late)[9, 16])
-    assert pair.error == pytest.approx([delayed - truth], **close)
-    assert pair.steps["delay"] == pytest.approx([delayed - together], **close)
+    assert pair.step.sum("cause").values == pytest.approx([delayed - truth], **close)
+    assert pair.step.sel(cause="delay").values == pytest.approx([delayed - together], **close)
     # One sample to the right, to the left, up and down; the pixels begin within the first.
     places = [((1, 0), (9, 16)), ((3, 0), (9, 15)), ((0, 3), (8, 16)), ((0, 1), (9, 16))]
     shifts = [
         ratio(short, image(LONG, early, *corner)[pixel]) - together for corner, pixel in places
     ]
-    assert pair.misregistration[:, 0] == pytest.approx(shifts, **close)
+    assert pair.misregistration.values[:, 0] == pytest.approx(shifts, **close)
     logarithm = 0.15 * np.log(8.9 / 3.2)
     change = np.log(ratio_at(truth + 0.5) / ratio_at(truth - 0.5))
-    assert pair.emissivity == pytest.approx(logarithm / change, rel=1e-4)
-    row = study.to_frame().iloc[-1]
-    squares = [pair.error[0], np.sqrt(np.mean(np.square(shifts))), 0.0, pair.emissivity]
+    assert float(pair.emissivity_uncertainty) == pytest.approx(logarithm / change, rel=1e-4)
+    row = wavelengths_frame(study).iloc[-1]
+    squares = [row.error_K, np.sqrt(np.mean(np.square(shifts))), 0.0, row.emissivity_uncertainty_K]
     assert row.total_K == pytest.approx(np.linalg.norm(squares), rel=1e-4)
 
 
@@ -460,7 +464,9 @@ def test_what_a_study_of_bands_refuses():
         WavelengthPlan((SHORT, SHORT))
     with pytest.raises(ValueError, match="delay: -1, expected 0 or more"):
         WavelengthPlan((SHORT, LONG), delay=-1)
-    with pytest.raises(ValueError, match=r"(?s)wavelengths.*misregistration: -1e-06, expected 0"):
+    with pytest.raises(
+        ValueError, match=r"(?s)wavelengths.misregistration.*-1 um, expected 0 um or more"
+    ):
         Study(wavelengths={"misregistration": "-1 um"})
     spot = Spot("far", "plate", 0.0, np.array([1.0, 0.0]))
     arguments = {"plate": UniformSurface()}, CAMERA, WavelengthPlan((SHORT, LONG), delay=1e-3)

@@ -15,16 +15,15 @@ import xarray as xr
 from analytic_chip import AnalyticChip
 from PIL import Image
 
-from chipglow.analysis import Distribution, Plan, analyse
-from chipglow.analysis.draws import CAUSES
+from chipglow.analysis import Distribution, Plan, analyse, one_draw, with_errors
 from chipglow.camera import Camera
-from chipglow.laboratory.chip import Inertia, rake_grid
-from chipglow.report import Row, comparison_frame, comparison_rows, write_report
-from chipglow.report.chip_rows import chip_rows
-from chipglow.report.comparison import cause_rows, part_rows
-from chipglow.report.error_player import cut_player
-from chipglow.report.evidence import answer, crossing, place
-from chipglow.report.paper import PAPER, TABLE_1, table_1, table_2
+from chipglow.laboratory.chip import Inertia
+from chipglow.report import Row, result_rows, results_frame, write_report
+from chipglow.report.answer import answer
+from chipglow.report.facts import Facts
+from chipglow.report.paper import PAPER, TABLE_1, PaperValue, crossing, position, table_2
+from chipglow.report.player import exposure_player
+from chipglow.report.rows import cause_rows, chip_rows, error_rows, part_rows
 from chipglow.report.visible import visible_picture
 from chipglow.scene import Line, Material
 from chipglow.study import Study
@@ -47,7 +46,9 @@ PAPER_FIGURES = {
     "figure-11-error-lines": "Figure 11",
 }
 FIGURES = {*PAPER_FIGURES, "psf-sensitivity", "forces", "chip-thickness"}
-SETTINGS = table_2(Study())
+PAPERS = Study()
+CAUSES = ("segment", "texture", "pixel phase")
+SETTINGS = table_2(PAPERS)
 
 
 @pytest.fixture(scope="module")
@@ -56,14 +57,23 @@ def result():
         AnalyticChip(frames=60).scene(),
         {"chip 1": CHIP_1, "chip 2": CHIP_2},
         Camera(psf_order="detector"),
-        Plan(exposures=3, phases=2, textures=2, psf_widths=(4e-6, 12e-6, 20e-6), study=Study()),
+        Plan(exposures=3, phases=2, textures=2, psf_widths=(4e-6, 12e-6, 20e-6)),
     )
+
+
+@pytest.fixture(scope="module")
+def facts(result):
+    return Facts(result, PAPERS)
+
+
+def of_cut(result, **changes):
+    return replace(result, cut=replace(result.cut, **changes))
 
 
 @pytest.fixture(scope="module")
 def folder(result, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    report = write_report(result, folder, TITLE, STUDY, PROVENANCE, REMARKS, SETTINGS)
+    report = write_report(result, folder, TITLE, STUDY, PROVENANCE, REMARKS, PAPERS)
     assert report == folder / "report.html"
     return folder
 
@@ -125,37 +135,43 @@ def test_every_figure_is_there_as_picture_and_as_drawing(folder):
             assert ElementTree.fromstring(content).tag.endswith("svg")
 
 
-def test_the_page_stands_alone_and_escapes_text(page, result):
+def test_the_page_stands_alone_and_escapes_text(page, result, facts):
     assert page.open == []
     assert all(s.startswith(("data:image/png;base64,", "#")) for s in page.sources)
     assert page.seen.count("script") == 1 and not {"b", "i", "link"} & set(page.seen)
     shown = "".join(page.text)
     assert STUDY in shown
-    sentences = [sentence.text for sentence in answer(result)]
+    sentences = sentences_of(facts)
     for value in (*PROVENANCE.values(), *REMARKS, *sentences):
         assert value in shown
-    for row in (*comparison_rows(result), *chip_rows(result.chip)):
+    for row in (*result_rows(result, PAPERS), *chip_rows(facts)):
         texts = (row.paper_text, row.here_text, row.interval_text, row.one_draw_text)
         for part in (row.quantity, *texts, row.explanation):
             assert part in shown
-    for row in cause_rows(result):
-        assert row.unit == "%" or all(text in shown for text in row.texts)
+    for row in cause_rows(error_rows(facts)):
+        assert row.unit == "%" or all(text in shown for text in row.cells)
     headings = [f"{number}:" for number in PAPER_FIGURES.values()] + ["Table 1:", "Table 2:"]
     places = [shown.index(heading) for heading in headings]
     assert places == sorted(places)
-    assert len(table_1(result)) == 5
+    for feature, published in TABLE_1.items():
+        assert feature in shown
+        assert f"{published.mean:.2f} ± {published.standard_deviation:.2f}" in shown
     for setting in SETTINGS:
         assert all(text in shown for text in setting)
 
 
-def test_the_answer_comes_first_then_causes_paper_tables_and_how_to_repeat_it(page, result):
+def sentences_of(facts):
+    return [sentence.text for sentence in answer(facts, error_rows(facts)).statements]
+
+
+def test_the_answer_comes_first_then_causes_paper_tables_and_how_to_repeat_it(page, facts):
     assert page.sections == ["answer", "causes", "comparison", "tables", "repeat"]
     shown = "".join(page.text)
     assert shown.count(TITLE) == 2
-    sentences = [sentence.text for sentence in answer(result)]
+    sentences = sentences_of(facts)
     assert len(sentences) == 3
-    assert "cutting for long" not in shown
-    later = (REMARKS[0], "What causes it\n", "Figure 2:", "Table 1:", STUDY)
+    assert "steady" not in shown.lower()
+    later = (REMARKS[0], "Causes of the errors\n", "Figure 2:", "Table 1:", STUDY)
     places = [shown.index(text) for text in (TITLE, *sentences, *later)]
     assert places == sorted(places)
 
@@ -164,7 +180,7 @@ def test_every_link_leads_somewhere_and_every_picture_is_described(page):
     assert len(set(page.ids)) == len(page.ids)
     linked = {source[1:] for source in page.sources if source.startswith("#")}
     assert linked <= set(page.ids)
-    assert {"why-rake_error_degC", "why-feed_um", "interval", "psf"} <= linked
+    assert {"why-rake_error_degC", "why-feed_um", "interval", "psf-contribution"} <= linked
     # Views: three of two chips, each with a scale of colours and three exposures.
     assert len(page.alts) == len(FIGURES) + 6 * (1 + 3)
     assert all(alt.endswith(".") for alt in page.alts)
@@ -184,17 +200,18 @@ def test_every_number_has_its_unit(page):
     assert {text for text in without if any(map(str.isdigit, text))} <= settings
 
 
-def test_images_go_through_time_and_without_script_stand_still(result, page):
-    player = cut_player(result)
+def test_images_go_through_time_and_without_script_stand_still(result, facts, folder, page):
+    player = exposure_player(facts)
     reference, measured, error = player.views[:3]
-    surface = result.surfaces[result.plan.rake_surface]
-    seen = ~surface.errors.flagged
+    shown = with_errors(result.data).isel(surface=0)
+    flagged = shown.flagged.values
     # The error of the developed instant, computed apart from the player's.
     still = error.frames[player.still]
-    np.testing.assert_allclose(still[seen], surface.errors.case_1[seen], atol=1e-9)
-    assert np.isnan(still[surface.errors.flagged]).all()
-    np.testing.assert_array_equal(error.frames, measured.frames - reference.frames)
-    pictures = re.findall(r'<img data-frame="(\d)"([^>]*) alt="[^"]*" src="([^"]*)"', player.html)
+    np.testing.assert_allclose(still[~flagged], shown.error_case_1.values[~flagged], atol=1e-9)
+    assert np.isnan(still[flagged]).all()
+    np.testing.assert_allclose(error.frames, measured.frames - reference.frames, atol=1e-9)
+    html = (folder / "report.html").read_text(encoding="utf-8")
+    pictures = re.findall(r'<img data-frame="(\d)"([^>]*) alt="[^"]*" src="([^"]*)"', html)
     assert [int(frame) for frame, hidden, _ in pictures if not hidden] == [player.still] * 6
     assert [int(frame) for frame, *_ in pictures] == [0, 1, 2] * 6
     # The colours say the values: 255 of them between the ends, grey where there is none.
@@ -205,44 +222,44 @@ def test_images_go_through_time_and_without_script_stand_still(result, page):
     np.testing.assert_array_equal(index == 0, np.isnan(values))
     told = np.where(index > 0, low + (index - 1) * (high - low) / 254, np.nan)
     np.testing.assert_allclose(told, values, atol=0.51 * (high - low) / 254)
-    starts = [1e6 * instant.start for instant in result.one_segment]
+    starts = [1e6 * instant.start for instant in result.cut.one_segment]
     assert [
-        f"begins at {start:.1f} µs, lasts 10 µs." in time
+        f"begins at {start:.4g} µs, lasts 10 µs." in time
         for start, time in zip(starts, player.times, strict=True)
     ] == [True] * 3
     assert player.times[player.still] in "".join(page.text)
 
 
-def test_the_parts_of_an_error_are_all_of_it(result):
-    rows = {row.key: row for row in part_rows(result)}
+def test_the_parts_of_an_error_are_all_of_it(result, facts):
+    rows = {row.key: row for row in part_rows(facts, error_rows(facts))}
     assert list(rows) == ["rake_error_degC", "band_error_degC", "band_worst_error_degC"]
     for row in rows.values():
         total = sum(part.values for part in row.parts.values())
         np.testing.assert_allclose(total, row.error.values, atol=1e-9)
     assert set(rows["band_error_degC"].parts) == {"psf", "motion", "footprint"}
     assert set(rows["band_worst_error_degC"].parts) == {"psf", "rest"}
-    mean = replace(result, plan=replace(result.plan, reference="mean"))
-    assert all("motion" not in row.parts for row in part_rows(mean))
+    mean = Facts(replace(result, plan=replace(result.plan, reference="mean")))
+    assert all("motion" not in row.parts for row in part_rows(mean, error_rows(mean)))
 
 
 def test_inertia_that_is_too_much_is_said(result):
     def rows(fraction):
         inert = Inertia(kinetic_fraction=fraction, force_fraction=0.004, mass_scaling=300.0)
-        found = comparison_rows(replace(result, forces=replace(result.forces, inertia=inert)))
-        return {row.key: row for row in found}
+        forces = replace(result.cut.forces, inertia=inert)
+        return {row.key: row for row in result_rows(of_cut(result, forces=forces))}
 
     assert rows(0.02)["kinetic_fraction_percent"].here_text == "2.00 %"
     assert "lower mass_scaling, now 300" in rows(0.02)["kinetic_fraction_percent"].explanation
     assert "lower" not in rows(0.009)["kinetic_fraction_percent"].explanation
     assert rows(0.009)["inertia_force_fraction_percent"].here_text == "0.40 %"
-    assert "1/300 of it" in rows(0.009)["inertia_force_fraction_percent"].explanation
+    assert "1/300 of this" in rows(0.009)["inertia_force_fraction_percent"].explanation
 
 
-def test_the_answer_states_interval_and_whether_the_paper_differs(result):
-    sentences = [sentence.text for sentence in answer(result)]
-    error = result.draws.headlines["rake"].error
+def test_the_answer_states_interval_and_whether_the_paper_differs(facts):
+    sentences = sentences_of(facts)
+    error = facts.headlines["rake"].error
     high, low = (f"{-end:.0f}".replace("-", "−") for end in error.interval)
-    assert f"{-error.mean:.0f} ± {error.standard_deviation:.0f} °C too little" in sentences[0]
+    assert f"{-error.mean:.0f} ± {error.standard_deviation:.0f} °C too low" in sentences[0]
     assert f"8 draws; 95 % interval {low} °C to {high} °C" in sentences[0]
     for sentence in sentences:
         assert ("lies inside the interval" in sentence) != ("lies outside the interval" in sentence)
@@ -263,20 +280,22 @@ def test_the_summary_keeps_its_schema(folder):
         assert not check.is_valid(wrong)
 
 
-def test_the_summary_is_strict_json(folder, result):
+def test_the_summary_is_strict_json(folder, result, facts):
     def refuse(constant):
         raise AssertionError(f"{constant} is not JSON")
 
     text = (folder / "summary.json").read_text(encoding="utf-8")
     summary = json.loads(text, parse_constant=refuse)
     assert summary["provenance"] == PROVENANCE
-    for name, one in (("rake", result.rake.face), ("band", result.band_errors.centre)):
-        error = result.draws.headlines[name].error
+    for name in ("rake", "band"):
+        error = facts.headlines[name].error
         key = f"{name}_error_degC"
         assert summary["results"][key] == summary["draws"][key]["mean"] == error.mean
         assert summary["draws"][key]["standard_deviation"] == error.standard_deviation
         assert summary["draws"][key]["count"] == 8
-        assert summary["one_draw"][key] == one.error
+        assert summary["one_draw"][key] == one_draw(result.data, name).error
+        celsius = facts.headlines[name].reference.mean - 273.15
+        assert summary["references"][key] == pytest.approx(celsius, abs=1e-9)
         parts = summary["causes"][key]
         assert list(parts) == ["segment", "texture", "pixel phase", "causes together"]
         assert sum(part["fraction_percent"] for part in parts.values()) == pytest.approx(100.0)
@@ -287,29 +306,18 @@ def test_the_summary_is_strict_json(folder, result):
     parts = summary["parts"]["rake_error_degC"]
     total = sum(part["mean"] for part in parts.values())
     assert total == pytest.approx(summary["results"]["rake_error_degC"])
-    assert summary["chip"]["feed_um"] == pytest.approx(result.chip.feed * 1e6)
+    assert summary["chip"]["feed_um"] == pytest.approx(result.cut.chip.feed * 1e6)
     assert set(summary["chip_uncertainty"]) <= set(summary["chip"])
 
 
-def test_the_arrays_come_back_with_units(folder, result):
+def test_the_arrays_come_back_with_units(folder, result, facts):
     with xr.open_dataset(folder / "results.nc", engine="h5netcdf") as data:
-        surface = result.surfaces["chip 2"]
-        stored = data.sel(surface="chip 2")
-        np.testing.assert_array_equal(stored["error_case_1"], surface.errors.case_1)
-        reference = stored["reference_temperature"][result.developed]
-        np.testing.assert_array_equal(reference, surface.errors.reference)
-        np.testing.assert_array_equal(stored["rake_error"], surface.rake.case_1)
-        np.testing.assert_array_equal(data["temperature"], result.frame.temperature)
-        drawn = result.draws.headlines["band_measured"].psf_portion.values
+        for name, values in result.data.data_vars.items():
+            np.testing.assert_array_equal(data[name], values)
+        drawn = facts.headlines["band_measured"].psf_portion.values
         np.testing.assert_array_equal(data["draws_band_measured_psf_portion"], drawn)
-        np.testing.assert_array_equal(data["draws_rake_line_case_1"], result.draws.rake_line.case_1)
-        curve = surface.curves[1]
-        np.testing.assert_array_equal(stored["ridge_radiance_temperature"][1, : curve.size], curve)
-        assert data.sizes["instant"] == len(result.instants)
-        assert data["psf_width"].values.tolist() == [4e-6, 12e-6, 20e-6]
-        for name in data.data_vars:
-            assert "units" in data[name].attrs, name
-        assert data.attrs["developed_instant"] == result.developed
+        assert all(data[name].attrs.get("units") for name in data.data_vars)
+        assert data.attrs["provenance_Seed"] == "1"
 
 
 def test_the_study_is_kept_as_run(folder):
@@ -317,7 +325,7 @@ def test_the_study_is_kept_as_run(folder):
 
 
 def test_the_comparison_holds_what_the_paper_states(result):
-    rows = {row.key: row for row in comparison_rows(result)}
+    rows = {row.key: row for row in result_rows(result, PAPERS)}
     paper = {key: row.paper for key, row in rows.items() if row.paper is not None}
     assert paper == {
         "rake_error_degC": -42.0,
@@ -335,8 +343,8 @@ def test_the_comparison_holds_what_the_paper_states(result):
     assert rows["band_width_um"].here == pytest.approx(20.0, rel=0.05)
     assert rows["contact_length_um"].paper_text == "–"
     assert all(row.explanation.endswith(".") for row in rows.values())
-    assert PAPER.rake_error.where in rows["rake_error_degC"].where
-    frame = comparison_frame(result)
+    assert rows["rake_error_degC"].published is PAPER["rake_error_degC"]
+    frame = results_frame(result, PAPERS)
     assert list(frame.index) == list(rows)
     assert frame["paper"].dropna().to_dict() == paper
     draws = rows["rake_error_degC"].draws
@@ -346,23 +354,24 @@ def test_the_comparison_holds_what_the_paper_states(result):
 
 
 def test_a_band_that_begins_away_from_the_edge_is_as_long_as_itself(result):
-    whole = result.band
+    whole = result.cut.band
     ridge = Line(whole.ridge.distance[20:], whole.ridge.points[20:])
     values = {name: getattr(whole, name)[20:] for name in ("normals", "rate", "widths")}
-    segment = replace(result.segment, band=replace(whole, ridge=ridge, **values))
-    shorter = replace(result, segments=(segment,))
-    row = next(r for r in comparison_rows(shorter) if r.key == "band_length_um")
+    segment = replace(result.cut.segments[0], band=replace(whole, ridge=ridge, **values))
+    shorter = of_cut(result, segments=(segment,))
+    row = next(r for r in result_rows(shorter) if r.key == "band_length_um")
     begins = whole.ridge.distance[20]
     assert row.here == pytest.approx(1e6 * (whole.ridge.distance[-1] - begins))
     assert f"begins {1e6 * begins:.0f} µm from the cutting edge" in row.explanation
 
 
 def test_numbers_are_printed_with_sign_unit_and_dash():
-    row = Row("error_degC", "Error", "°C", -42.0, -35.4, 0, "Why.", uncertainty=3.1)
+    paper = PaperValue(-42.0, "abstract")
+    row = Row("error_degC", "Error", "°C", -35.4, uncertainty=3.1, published=paper)
     assert (row.paper_text, row.here_text) == ("−42 °C", "−35 ± 3 °C")
     assert (row.differs, row.differs_text, row.interval_text) == (True, "yes", "–")
     assert replace(row, uncertainty=3.4).differs is False
-    rate = Row("rate_per_s", "Rate", "1/s", None, 123456.0, -3, "Why.")
+    rate = Row("rate_per_s", "Rate", "1/s", 123456.0, -3)
     assert (rate.paper_text, rate.here_text) == ("–", "123 000 1/s")
     assert rate.differs is None and rate.differs_text == "–"
     draws = Distribution(np.array([[[-30.0, -50.0, -40.0, -44.0]]]), CAUSES)
@@ -374,11 +383,11 @@ def test_numbers_are_printed_with_sign_unit_and_dash():
 
 def test_the_place_of_the_papers_figure_is_stated():
     draws = Distribution(np.array([[[-30.0, -50.0, -40.0, -44.0]]]), CAUSES)
-    near, far = (place(draws, paper, "°C") for paper in (-42.0, -120.0))
-    assert near.startswith("50 % of our 4 draws are lower than the paper's figure")
-    assert near.endswith("does not differ.") and far.endswith("the paper's differs.")
+    near, far = (position(draws, paper, "°C") for paper in (-42.0, -120.0))
+    assert near.startswith("50 % of our 4 draws are below the paper's value")
+    assert "lies within the 95 %" in near and "lies outside the 95 %" in far
     single = Distribution(np.full((1, 1, 1), -40.0), CAUSES)
-    assert "does not say whether" in place(single, -42.0, "°C")
+    assert "does not show whether" in position(single, -42.0, "°C")
 
 
 def test_a_width_is_found_where_the_series_meets_the_value():
@@ -389,28 +398,49 @@ def test_a_width_is_found_where_the_series_meets_the_value():
 
 
 def test_what_is_missing_is_left_out_and_unknown_is_null(result, tmp_path):
-    still = tuple(replace(segment, sweep=float("nan")) for segment in result.segments)
+    segments = tuple(replace(segment, sweep=float("nan")) for segment in result.cut.segments)
     ideal = replace(result.camera, psf=None, lower_limit=None)
-    headlines = {name: h for name, h in result.draws.headlines.items() if name != "rake"}
-    draws = replace(result.draws, headlines=headlines)
-    bare = replace(result, forces=None, camera=ideal, segments=still, draws=draws)
-    write_report(bare, tmp_path, TITLE, STUDY, PROVENANCE)
-    unseen = next(row for row in comparison_rows(bare) if row.key == "rake_error_degC")
-    assert (unseen.here_text, unseen.differs) == ("–", None)
-    assert unseen.one_draw == result.rake.face.error
+    unseen = result.data.copy()
+    unseen["measured"] = unseen.measured.where(
+        (unseen.reading != "rake") | (unseen.pixel_phase != 1)
+    )
+    bare = replace(of_cut(result, forces=None, segments=segments), camera=ideal, data=unseen)
+    write_report(bare, tmp_path, TITLE, STUDY, PROVENANCE, study=PAPERS)
+    row = next(row for row in result_rows(bare) if row.key == "rake_error_degC")
+    assert (row.here_text, row.differs) == ("–", None)
+    assert row.one_draw == one_draw(result.data, "rake").error
+    assert "outside the image" in row.explanation
     names = {path.stem for path in (tmp_path / "figures").iterdir()}
     assert names == FIGURES - {"figure-2-psf", "forces"}
-    assert "segment_period_us" not in {row.key for row in comparison_rows(bare)}
-    still = replace(result.forces.segmentation, period=float("nan"))
-    unknown = replace(result, forces=replace(result.forces, segmentation=still))
-    row = next(r for r in comparison_rows(unknown) if r.key == "segment_period_us")
+    assert "failed" not in Page((tmp_path / "report.html").read_text(encoding="utf-8")).text
+    assert "segment_period_us" not in {row.key for row in result_rows(bare)}
+    segmentation = replace(result.cut.forces.segmentation, period=float("nan"))
+    unknown = of_cut(result, forces=replace(result.cut.forces, segmentation=segmentation))
+    row = next(r for r in result_rows(unknown) if r.key == "segment_period_us")
     assert row.here is None and row.here_text == "–"
     assert "no period" in row.explanation
 
 
+def test_a_part_that_fails_is_shown_with_its_reason_beside_the_others(result, tmp_path):
+    """The analysis names one part; a figure that cannot be drawn is another."""
+    reason = "region chip 1 body: reaches over columns 50.34 to 81.35"
+    data = result.data.drop_vars("ridge_distance")
+    failed = {"heated chips and tool": reason}
+    broken = replace(of_cut(result, heated=()), data=data, failed=failed)
+    write_report(broken, tmp_path, TITLE, STUDY, PROVENANCE, study=PAPERS)
+    page = "".join(Page((tmp_path / "report.html").read_text(encoding="utf-8")).text)
+    assert f"heated chips and tool failed: {reason}" in page
+    assert "Development of the shear band failed: AttributeError" in page
+    gone = {"figure-3-heated-chips", "figure-4-heated-tool", "figure-9-band-curves"}
+    assert {path.stem for path in (tmp_path / "figures").iterdir()} == FIGURES - gone
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["failed"] == failed
+    assert summary["results"]["rake_error_degC"] < 0
+
+
 def test_the_papers_emissivities_come_back_from_heated_objects(result):
     """Within what the procedure states, and what the camera's blur is known to do."""
-    found = {row.feature: row for heated in result.heated for row in heated.rows}
+    found = {row.feature: row for heated in result.cut.heated for row in heated.rows}
     assert set(found) == set(TABLE_1)
     for feature, paper in TABLE_1.items():
         row = found[feature]
@@ -425,13 +455,6 @@ def test_the_papers_emissivities_come_back_from_heated_objects(result):
     for chip in ("chip 1", "chip 2"):
         body, band = found[f"{chip} chip body"].found, found[f"{chip} shear band"].found
         assert band.mean > body.mean + 2 * band.estimate.standard_uncertainty
-
-
-def test_profiles_beside_the_rake_face_are_those_of_the_laboratory(result):
-    surface = result.surfaces["chip 2"]
-    grid = rake_grid(surface.measurement, result.tool)
-    np.testing.assert_array_equal(surface.rake_grid.frame_mean, grid.frame_mean)
-    assert surface.rake_grid.times.size == len(result.instants)
 
 
 def test_the_visible_picture_shows_tool_and_bands(result):

@@ -65,7 +65,7 @@ def test_summary_holds_the_papers_figures_beside_ours(results):
 def test_the_quick_studys_remark_states_its_own_errors_and_those_of_the_page(results):
     page = (ROOT / "docs" / "learn" / "paper-study.md").read_text(encoding="utf-8")
     summary = json.loads((results / "summary.json").read_text(encoding="utf-8"))
-    stated = re.findall(r"−(\d+) °C in place of −(\d+) °C", QUICK)
+    stated = re.findall(r"−(\d+) °C instead of −(\d+) °C", QUICK)
     names = ("rake_error_degC", "band_error_degC", "band_worst_error_degC")
     for name, (quick, full) in zip(names, stated, strict=True):
         # Another processor rounds another way, and the chip differs in detail: within the scatter.

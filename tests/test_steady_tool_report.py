@@ -20,12 +20,12 @@ from chipglow.surface import CHIP_1, CHIP_2
 WARMER = 50.0
 
 
-def analysed(scene, **plan):
+def analysed(scene):
     return analyse(
         scene,
         {"chip 1": CHIP_1, "chip 2": CHIP_2},
         Camera(psf_order="detector", lower_limit=None),
-        Plan(exposures=3, phases=1, textures=1, psf_widths=(12e-6,), **plan),
+        Plan(exposures=3, phases=1, textures=1, psf_widths=(12e-6,)),
     )
 
 
@@ -36,7 +36,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def own(scene):
-    return analysed(scene, study=Study())
+    return analysed(scene)
 
 
 @pytest.fixture(scope="module")
@@ -68,10 +68,11 @@ def test_a_scene_warmer_by_some_degrees_is_warmer_by_these_in_the_table(own, ste
 
 
 def test_the_report_shows_both_and_what_the_paper_misses(own, steady, tmp_path):
-    report = write_report(own, tmp_path, "A study", "title: A study\n", {}, steady=steady)
+    text = "title: A study\n"
+    report = write_report(own, tmp_path, "A study", text, {}, study=Study(), steady=steady)
     page = report.read_text(encoding="utf-8").replace("\u00a0", " ")
-    assert "A tool that has been cutting for long" in page
-    assert "100 °C under the measured one" in page
+    assert "Tool at steady-state temperature" in page
+    assert "100 °C below the measured one" in page
     summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     schema = json.loads((tmp_path / "summary.schema.json").read_text(encoding="utf-8"))
     jsonschema.validate(summary, schema)

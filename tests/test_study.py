@@ -10,7 +10,7 @@ from analytic_chip import AnalyticChip
 from hypothesis import HealthCheck, given, settings, strategies as st
 from pydantic import ValidationError
 
-from chipglow.analysis.cut_error import Plan
+from chipglow.analysis import Plan
 from chipglow.camera import Camera, GaussianPSF, MeasuredPSF
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Friction, Numerics, OutputWindow
 from chipglow.io import open_scene, read_tool_outline

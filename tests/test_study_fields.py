@@ -12,7 +12,9 @@ from chipglow.quantities import (
     changed,
     field_tables,
     own_settings,
+    setting_at,
     settings,
+    value_at,
 )
 from chipglow.study import Study, study_text
 
@@ -156,3 +158,29 @@ def test_the_template_says_what_is_allowed():
 
 def test_a_field_without_limits_says_none():
     assert not settings(Study())["title"].allowed
+
+
+def test_paths_lead_through_lists_and_mappings():
+    detector = {
+        "response": {"kind": "range", "hottest": "2500 degC"},
+        "full_well": 1e7,
+        "terms": [{"kind": "netd", "netd": "0.1 K", "temperature": "300 degC"}],
+    }
+    study = Study(camera={"detector": detector})
+    paths = {
+        "camera.band.0": 3.6e-6,
+        "camera.detector.terms.0.netd": 0.2,
+        "surface.chips.chip 1.body.mean": 0.6,
+    }
+    new = changed(study, paths)
+    assert {path: value_at(new, path) for path in paths} == paths
+    assert new.camera.band == (3.6e-6, study.camera.band[1])
+    assert value_at(study, "surface.chips.chip 1.body.mean") == 0.42
+    assert setting_at(new, "camera.band.0").unit == "um"
+    assert setting_at(new, "camera.detector.terms.0.netd").unit == "K"
+    assert setting_at(new, "seed").value == study.seed
+    with pytest.raises(ValidationError, match="expected 0 to 1"):
+        changed(study, {"surface.chips.chip 1.body.mean": 2.0})
+    for path in ("camera.band.2", "surface.chips.chip 9.body", "camera.psf.fwhm", "camera.zoom"):
+        with pytest.raises(LookupError):
+            value_at(study, path)

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from chipglow.camera import MeasuredPSF
 from chipglow.cli import app
 
-REPEATS = 10
+REPEATS = 7
 TYPED = ["--set", "flat_field.low=cold.hcc", "--set", "flat_field.high=hot.hcc"]
 TYPED += ["--set", "bad_pixels=find"]
 DEVELOPED = [*TYPED, "--set", "calibration=calibration.yaml", "--set", "pitch=6 um"]
@@ -45,18 +45,18 @@ def experiment(tmp_path, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", QUANTITIES)
 def test_the_truth_is_in_the_stated_interval(rows, name):
-    """Of ten 95 % intervals, two or fewer miss with a probability of 0.989."""
+    """Of seven 95 % intervals, two or fewer miss with a probability of 0.996."""
     assert hits(rows, name) >= REPEATS - 2
 
 
 @pytest.mark.slow
 def test_all_truths_together_are_in_their_intervals(rows):
-    """Of sixty, 57 are expected.
+    """Of 42, 40 are expected; of intervals half as wide 36 would with a probability of 0.006.
 
     The emissivities and the temperature share a thermocouple, and the width and the MTF an image.
-    If three results always miss together the number varies by 2.9: 52 are 1.7 times as much less.
+    If three results always miss together the number varies by 2.4: 36 are 1.6 times as much less.
     """
-    assert sum(hits(rows, name) for name in QUANTITIES) >= 52
+    assert sum(hits(rows, name) for name in QUANTITIES) >= 36
 
 
 @pytest.mark.slow
@@ -75,6 +75,7 @@ def test_the_intervals_are_narrow(rows):
         assert row["temperature of the shear band"][2] < 12.0
 
 
+@pytest.mark.slow
 def test_a_thermocouple_far_off_is_found_out(experiment, tmp_path):
     """The intervals do not hold just anything: ten standard uncertainties of it are too much."""
     notes = yaml.safe_load((tmp_path / "notes.yaml").read_text())

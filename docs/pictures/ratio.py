@@ -9,9 +9,10 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+import xarray as xr
 
 import chipglow
-from chipglow.analysis import RatioErrors, WavelengthErrors, ratio_errors
+from chipglow.analysis import RatioErrors, ratio_errors, wavelengths_frame
 from chipglow.analysis.wavelengths import band_name
 from chipglow.camera import RatioCamera
 from chipglow.drawing import drawing
@@ -99,24 +100,23 @@ def draw_images(errors: RatioErrors, tool: Any) -> None:
     figure.savefig(HERE / "ratio.png", dpi=150)
 
 
-def print_study(grey: WavelengthErrors, metal: WavelengthErrors) -> None:
+def print_study(grey: xr.Dataset, metal: xr.Dataset) -> None:
     """Rows of the table of bands, the least error first."""
-    for place in grey.places:
-        both = zip(grey.errors, metal.errors, strict=True)
-        rows = sorted((pair for pair in both if pair[0].place == place), key=lambda p: p[0].total)
-        truth = rows[0][0].truth
-        print(f"{place}: {truth.mean() - KELVIN:.0f} °C ± {truth.std():.0f} K, {truth.size} draws")
-        for one, bare in rows:
-            names = [band_name(band) for band in (one.first, one.second) if band]
-            parts = [f"{one.steps[name].mean():+.1f}" for name in ("motion", "footprint", "optics")]
-            numbers = [one.shift_error, one.noise, one.emissivity]
+    frame = wavelengths_frame(grey).assign(metal_K=wavelengths_frame(metal).emissivity_K)
+    for place, rows in frame.groupby("place", sort=False):
+        truth = grey.truth.sel(place=place)
+        count = int(truth.count())
+        print(f"{place}: {truth.mean() - KELVIN:.0f} °C ± {truth.std():.0f} K, {count} draws")
+        for row in rows.sort_values("total_K").itertuples():
             cells = [
-                " / ".join(names) + (" alone" if one.second is None else ""),
-                f"{one.total:.0f}",
-                f"{one.error.mean():+.1f} ± {one.error.std():.1f}",
-                *parts,
-                *(f"{number:.1f}" for number in numbers),
-                f"{bare.steps['emissivity'].mean():+.1f}",
+                f"{row.first_um} / {row.second_um}" if row.second_um else f"{row.first_um} alone",
+                f"{row.total_K:.0f}",
+                f"{row.error_K:+.1f} ± {row.standard_deviation_K:.1f}",
+                *(f"{value:+.1f}" for value in (row.motion_K, row.footprint_K, row.optics_K)),
+                f"{row.misregistration_K:.1f}",
+                f"{row.noise_K:.1f}",
+                f"{row.emissivity_uncertainty_K:.1f}",
+                f"{row.metal_K:+.1f}",
             ]
             print(f"| {' | '.join(cells)} |")
 

@@ -13,8 +13,8 @@ from . import (
     uncertainty as uncertainty,
 )
 from .analysis import (
+    Analysis as Analysis,
     Plan as Plan,
-    StudyResult as StudyResult,
     analyse as analyse,
     error_images as error_images,
     error_parts as error_parts,

@@ -23,7 +23,8 @@ import sample_files
 
 import chipglow
 from chipglow.drawing.drawing import style
-from chipglow.report.scene_error_figures import error_images, profiles
+from chipglow.report.facts import Facts
+from chipglow.report.figures import error_images, error_lines
 from chipglow.study import errors
 
 # %%
@@ -40,7 +41,7 @@ def looked_at(source, settings, study):
     with TemporaryDirectory() as folder:
         scene = Path(folder) / "scene.nc"
         chipglow.import_scene(chipglow.load_import(str(files / source), settings).build(), scene)
-        return errors(chipglow.load_study(files / study, scene))
+        return Facts(errors(chipglow.load_study(files / study, scene)))
 
 
 # %%
@@ -59,7 +60,7 @@ with style():
 
 bar = looked_at("bar.npz", ["interval=1 us", "grid.spacing=2 um", "grid.top=150 um"], "bar.yaml")
 with style():
-    across = profiles(bar)
+    across = error_lines(bar)
 
 # %%
 # A brake disc with hot spots, of which there is a movie only:

@@ -1,22 +1,30 @@
 """The virtual camera's error against its scene: images, places, distributions, causes."""
 
-from chipglow.analysis.adapter import analysis_of
-from chipglow.analysis.band_error import BandErrors, band_errors
-from chipglow.analysis.cut_error import Plan, StudyResult, analyse
+from chipglow.analysis.cut import lacking, spread_starts
 from chipglow.analysis.distribution import Distribution, VarianceComponent
-from chipglow.analysis.draws import Draws, Headline, LineDraws
+from chipglow.analysis.engine import HEADLINES, analyse
 from chipglow.analysis.error_images import (
     ErrorImages,
     ReferenceKind,
+    Unblurred,
     error_images,
     reference_temperature,
 )
 from chipglow.analysis.error_parts import ErrorParts, error_parts
-from chipglow.analysis.local_error import LocalError
-from chipglow.analysis.old_places import LinePlace, Place, PointPlace, RegionPlace
-from chipglow.analysis.rake_error import RakeErrors, rake_errors
+from chipglow.analysis.looks import CASES, Effect, pixel_phases
+from chipglow.analysis.places import (
+    BandPlace,
+    HottestPlace,
+    LinePlace,
+    Place,
+    PointPlace,
+    RakePlace,
+    RegionPlace,
+)
+from chipglow.analysis.plan import Plan
 from chipglow.analysis.ratio_error import RATIO_CAUSES, RatioErrors, ratio_errors
 from chipglow.analysis.reductions import (
+    Headline,
     OneDraw,
     headline,
     headlines,
@@ -33,52 +41,43 @@ from chipglow.analysis.reductions import (
     with_errors,
 )
 from chipglow.analysis.result import Analysis, Cut, CuttingForces
-from chipglow.analysis.scene_error import SceneErrors, ScenePlan, scene_errors
-from chipglow.analysis.sensitivity import Sensitivity, sensitivity
 from chipglow.analysis.wavelengths import (
     Spot,
-    WavelengthError,
-    WavelengthErrors,
     WavelengthPlan,
     cut_spots,
     point_spots,
     wavelength_errors,
+    wavelengths_frame,
 )
 
 __all__ = [
+    "CASES",
+    "HEADLINES",
     "RATIO_CAUSES",
     "Analysis",
-    "BandErrors",
+    "BandPlace",
     "Cut",
     "CuttingForces",
     "Distribution",
-    "Draws",
+    "Effect",
     "ErrorImages",
     "ErrorParts",
     "Headline",
-    "LineDraws",
+    "HottestPlace",
     "LinePlace",
-    "LocalError",
     "OneDraw",
     "Place",
     "Plan",
     "PointPlace",
-    "RakeErrors",
+    "RakePlace",
     "RatioErrors",
     "ReferenceKind",
     "RegionPlace",
-    "SceneErrors",
-    "ScenePlan",
-    "Sensitivity",
     "Spot",
-    "StudyResult",
+    "Unblurred",
     "VarianceComponent",
-    "WavelengthError",
-    "WavelengthErrors",
     "WavelengthPlan",
     "analyse",
-    "analysis_of",
-    "band_errors",
     "cut_spots",
     "error_images",
     "error_parts",
@@ -86,20 +85,21 @@ __all__ = [
     "headlines",
     "image_error",
     "image_psf_portion",
+    "lacking",
     "line_change",
     "line_error",
     "line_psf_portion",
     "line_steepest",
     "one_draw",
+    "pixel_phases",
     "point_spots",
-    "rake_errors",
     "ratio_errors",
     "readings_frame",
     "reference_temperature",
-    "scene_errors",
-    "sensitivity",
     "sensitivity_error",
     "sensitivity_psf_fraction",
+    "spread_starts",
     "wavelength_errors",
+    "wavelengths_frame",
     "with_errors",
 ]

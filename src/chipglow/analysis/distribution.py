@@ -21,14 +21,8 @@ COVERAGE: Final = 0.95
 class VarianceComponent:
     """What one cause contributes to the scatter of a distribution.
 
-    Parameters
-    ----------
-    draws : int
-        How many values the cause took.
-    standard_deviation : float
-        Of the means over all other causes; NaN for a single draw.
-    fraction : float
-        Its part of the sum of squares of the scatter, 0 to 1; 0 without any scatter.
+    The cause took `draws` values. `standard_deviation` is that of the means over all other causes,
+    NaN for a single draw; `fraction` is its part of the sum of squares of the scatter, 0 to 1.
     """
 
     draws: int
@@ -38,20 +32,7 @@ class VarianceComponent:
 
 @dataclass(frozen=True, eq=False)
 class Distribution:
-    """One number, drawn anew for each combination of its causes.
-
-    Parameters
-    ----------
-    values : ndarray
-        The draws; one axis a cause, all combinations.
-    causes : tuple of str
-        What the axes are.
-
-    Raises
-    ------
-    ValueError
-        If there is no draw, a value is not finite, or the causes are not as many as the axes.
-    """
+    """One finite number for each combination of its causes, which are the axes of the values."""
 
     values: NDArray[np.float64]
     causes: tuple[str, ...]
@@ -161,13 +142,7 @@ class Distribution:
 
 
 def ratio(part: Distribution, whole: Distribution) -> Distribution | None:
-    """Draw by draw, a part of a whole; None where a draw of the whole is 0.
-
-    Parameters
-    ----------
-    part, whole : Distribution
-        Of the same draws.
-    """
+    """Draw by draw, a part of a whole; None where a draw of the whole is 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         values = part.values / whole.values
     return Distribution(values, whole.causes) if np.isfinite(values).all() else None

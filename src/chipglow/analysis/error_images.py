@@ -33,21 +33,10 @@ neighbours' samples. A single hot one would be the reference of the whole pixel.
 class ErrorImages:
     """Measurement error of every pixel in one exposure, in K of radiance temperature.
 
-    Parameters
-    ----------
-    raster : Raster
-        The pixels' places.
-    reference : ndarray
-        What the measured temperature is compared with in K, shape (y, x); NaN where nothing
-        radiates.
-    case_1 : ndarray
-        Error with everything: emissivity, exposure, size of source, point spread function,
-        detector.
-    case_2 : ndarray
-        Error with all but the point spread function; the detector's noise is the same.
-    flagged : ndarray of bool
-        Pixels whose measurement (case 1) the camera marks as unusable, such as under its
-        range. Their errors are given nevertheless: they follow from the radiance.
+    `reference` is what the measured temperature is compared with, NaN where nothing radiates.
+    `case_1` is the error with all effects, `case_2` that without the point spread function and
+    with the same noise. Pixels that the camera marks as unusable are `flagged`; their errors
+    follow from the radiance nevertheless.
     """
 
     raster: Raster
@@ -88,20 +77,10 @@ def error_images(
 
 @dataclass(frozen=True)
 class Unblurred:
-    """What cameras that differ in their point spread function alone make of one exposure alike.
+    """What cameras that differ in their point spread function alone have in common.
 
-    Parameters
-    ----------
-    camera : Camera
-        Any of them.
-    raster : Raster
-        The pixels' places.
-    reference : ndarray
-        As in `ErrorImages`.
-    ideal : ndarray
-        Radiance of the pixels without point spread function in W/(m² sr), shape (y, x).
-    start : float
-        When the exposure began in s: each frame has its own noise.
+    `ideal` is the radiance of the pixels without point spread function in W/(m² sr); the noise is
+    that of the frame that begins at `start`.
     """
 
     camera: Camera
@@ -122,13 +101,7 @@ class Unblurred:
         )
 
     def errors(self, radiance: NDArray[np.float64]) -> ErrorImages:
-        """Error images of what a camera measured.
-
-        Parameters
-        ----------
-        radiance : ndarray
-            Radiance of its pixels, as `Camera.form_image` gives it.
-        """
+        """Error images of the radiance that `Camera.form_image` gives."""
         lower_limit = self.camera.lower_limit
         measured, unusable = read_temperature(self.camera, radiance, self.start)
         ideal, _ = read_temperature(self.camera, self.ideal, self.start)
@@ -153,27 +126,7 @@ def read_temperature(
 def reference_temperature(
     camera: Camera, exposure: Exposure, kind: ReferenceKind = "maximum"
 ) -> NDArray[np.float64]:
-    """What a pixel without error would say, by the chosen meaning.
-
-    Parameters
-    ----------
-    camera : Camera
-        Its band and the places and sensitive squares of its pixels are used.
-    exposure : Exposure
-        Radiance and temperature of the scene's samples during the exposure.
-    kind : ReferenceKind
-        The meaning.
-
-    Returns
-    -------
-    ndarray
-        Temperature in K, shape (y, x); NaN where nothing radiates.
-
-    Raises
-    ------
-    ValueError
-        If the meaning is unknown.
-    """
+    """Temperature in K that a pixel without error would read; NaN where nothing radiates."""
     pixels = camera.pixels(exposure.raster)
     if kind == "maximum":
         return _temperature(camera, _maximum(exposure.peak_radiance, camera, exposure, pixels))

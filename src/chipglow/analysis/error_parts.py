@@ -23,23 +23,11 @@ class ErrorParts:
     difference that its effect makes: `emissivity`, `motion`, `footprint`, `psf` and `detector` sum
     to the error of case 1. `texture` is in them.
 
-    Parameters
-    ----------
-    errors : ErrorImages
-        The whole errors.
-    emissivity : ndarray
-        Radiance temperature less true temperature, where the reference is the true one; else 0.
-    motion : ndarray
-        Mean over the exposure less its greatest, at the samples that make the reference.
-    footprint : ndarray
-        Mean over the pixel's area less the reference of a scene that stands still.
-    psf : ndarray
-        With the point spread function less without it; the paper's case 1 − case 2.
-    detector : ndarray
-        What noise, counts and calibration of the detector add.
-    texture : ndarray or None
-        The error less that with a surface whose features have no texture; None if that is not
-        known.
+    `emissivity` is radiance temperature less true temperature if the reference is the true one;
+    `motion` the mean over the exposure less its greatest, at the samples that make the reference;
+    `footprint` the mean over the pixel's area less the reference of a scene that stands still;
+    `psf` the paper's case 1 − case 2; `texture`, if known, the error less that of a surface whose
+    features have no texture.
     """
 
     errors: ErrorImages

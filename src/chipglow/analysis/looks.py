@@ -4,8 +4,8 @@ Images that agree up to a stage share it: frames are read once for all surfaces 
 exposure, an exposure is formed by all cameras, and blurred radiance serves all pixel phases.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import ceil, floor
 from typing import Final, TypeAlias
 
@@ -42,20 +42,10 @@ CASES: Final[Mapping[str, Effect]] = {
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A surface, and the places that are read on it.
+    """A surface and the places that are read on it in each drawn exposure.
 
-    Parameters
-    ----------
-    surface : str
-        The surface's name.
-    places : sequence of sequence of Place
-        The places in each drawn exposure.
-    textures : int
-        How many textures are drawn.
-    first : int
-        Number of the first draw: each has other noise of the detector.
-    strides : tuple of int
-        By how much the number grows from one exposure, texture and pixel phase to the next.
+    Draws of a view have other noise of the detector each: their numbers begin with `first` and
+    grow by `strides` from one exposure, texture and pixel phase to the next.
     """
 
     surface: str
@@ -71,26 +61,11 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """Which images are taken.
+    """Which images are taken: exposures that begin at `starts`, of which some are drawn.
 
-    Parameters
-    ----------
-    starts : ndarray
-        When the exposures begin in s.
-    drawn : tuple of int
-        Numbers of the exposures that are drawn for all textures and pixel phases.
-    shown : int
-        Number of the exposure that images show.
-    views : tuple of View
-        What is read.
-    phases : int
-        Positions of the pixels along each axis.
-    reference : ReferenceKind
-        What the measured temperatures are compared with.
-    effects : mapping
-        By name; with all effects first.
-    vary : sequence of callable
-        Other cameras made of the camera, for the first texture.
+    `drawn` are the numbers of those that are read for all textures and pixel phases, and `shown`
+    is that of which the images are kept. The first of the `effects` is that nothing is switched
+    off. `vary` makes other cameras of the camera, which are read for the first texture.
     """
 
     starts: Array
@@ -99,7 +74,7 @@ class Schedule:
     views: tuple[View, ...]
     phases: int
     reference: ReferenceKind
-    effects: Mapping[str, Effect] = field(default_factory=lambda: CASES)
+    effects: Mapping[str, Effect]
     vary: Sequence[Callable[[Camera], Camera]] = ()
 
 
@@ -131,7 +106,6 @@ class Looked:
     images: Mapping[str, list[Array]]
     references: Mapping[str, list[Array]]
     shown: dict[str, tuple[Exposure, Stack]]
-    fields: Mapping[str, EmissivityField]
     readings: Table
     varied: Table
     lines: Table
@@ -211,12 +185,15 @@ def pixel_phases(camera: Camera, count: int) -> list[Camera]:
 def look(
     scene: Scene,
     surfaces: Mapping[str, Surface],
+    first: Mapping[str, EmissivityField],
     camera: Camera,
     schedule: Schedule,
     progress: Callable[[float], None],
 ) -> Looked:
-    """Take the images of a schedule and read them; `progress` is told the fraction done."""
-    first = {name: camera.lay(surface, scene) for name, surface in surfaces.items()}
+    """Take the images of a schedule and read them; `progress` is told the fraction done.
+
+    `first` are the surfaces with their first texture on the scene.
+    """
     others = {
         (view.surface, number): camera.lay(surfaces[view.surface].redrawn(number), scene)
         for view in schedule.views
@@ -249,7 +226,7 @@ def look(
     return looked
 
 
-def _empty(schedule: Schedule, fields: Mapping[str, EmissivityField], pitch: float) -> Looked:
+def _empty(schedule: Schedule, surfaces: Iterable[str], pitch: float) -> Looked:
     exposures, phases = len(schedule.drawn), schedule.phases**2
     textures = max((view.textures for view in schedule.views), default=1)
     rows = 1 + len(schedule.effects)
@@ -257,10 +234,9 @@ def _empty(schedule: Schedule, fields: Mapping[str, EmissivityField], pitch: flo
     sizes = [line.distance.size for place in places for line in place.lines(pitch).values()]
     points = max(sizes, default=0)
     return Looked(
-        images={name: [] for name in fields},
-        references={name: [] for name in fields},
+        images={name: [] for name in surfaces},
+        references={name: [] for name in surfaces},
         shown={},
-        fields=fields,
         readings=Table(exposures, textures, phases, rows),
         varied=Table(len(schedule.vary), exposures, phases, rows),
         lines=Table(exposures, textures, phases, rows, points),
@@ -279,73 +255,62 @@ def _draw(
 ) -> None:
     """Read every view of one exposure, for all textures, pixel phases and other cameras."""
     for number, view in enumerate(schedule.views):
-        places = view.places[exposure]
         for texture in range(view.textures):
             images = ExposureImages(seen[view.surface, texture], schedule.reference)
-            _read_lines(looked, number, places, exposure, texture, images.exposure, cameras[0])
             noisy = [c.redrawn(view.number(exposure, texture, p)) for p, c in enumerate(cameras)]
+            for place in view.places[exposure]:
+                key = number, place.name
+                _read_scene(looked, key, (exposure, texture), place, images.exposure, cameras[0])
             for phase, camera in enumerate(noisy):
                 stack = images.stack(camera, schedule.effects)
-                index = exposure, texture, phase
                 pixels = camera.pixels(images.exposure.raster)
-                _read(looked, number, places, stack, pixels, looked.readings, index)
-            if texture == 0:
-                for other, (change, phase, camera) in _varied(schedule, noisy):
-                    changed = change(camera)
-                    stack = images.stack(changed, schedule.effects, keep=False)
-                    index = other, exposure, phase
+                for place in view.places[exposure]:
+                    key, index = (number, place.name), (exposure, texture, phase)
+                    lines = _read(looked.readings, key, index, place, stack, pixels)
+                    for name, values in lines.items():
+                        looked.lines.put((*key, name), index, values)
+            for other, change in enumerate(schedule.vary if texture == 0 else ()):
+                for phase, camera in enumerate(noisy):
+                    stack = images.stack(change(camera), schedule.effects, keep=False)
                     pixels = camera.pixels(images.exposure.raster)
-                    _read(looked, number, places, stack, pixels, looked.varied, index)
-
-
-def _varied(
-    schedule: Schedule, cameras: Sequence[Camera]
-) -> Iterator[tuple[int, tuple[Callable[[Camera], Camera], int, Camera]]]:
-    for other, change in enumerate(schedule.vary):
-        for phase, camera in enumerate(cameras):
-            yield other, (change, phase, camera)
+                    for place in view.places[exposure]:
+                        key, index = (number, place.name), (other, exposure, phase)
+                        _read(looked.varied, key, index, place, stack, pixels)
 
 
 def _read(
-    looked: Looked,
-    view: int,
-    places: Sequence[Place],
+    table: Table,
+    key: tuple[int, str],
+    index: tuple[int, int, int],
+    place: Place,
     images: Stack,
     pixels: Raster,
-    table: Table,
-    index: tuple[int, ...],
-) -> None:
-    for place in places:
-        lines = {
-            name: np.array([sample(image, pixels, line.points) for image in images])
-            for name, line in place.lines(pixels.spacing).items()
-        }
-        for quantity, values in place.read(images, pixels, lines).items():
-            table.put((view, place.name, quantity), index, values)
-        if table is looked.readings:
-            for name, values in lines.items():
-                looked.lines.put((view, place.name, name), index, values)
+) -> dict[str, Stack]:
+    """Put the readings at a place into a table; gives the images along the place's lines."""
+    lines = {
+        name: np.array([sample(image, pixels, line.points) for image in images])
+        for name, line in place.lines(pixels.spacing).items()
+    }
+    for quantity, values in place.read(images, pixels, lines).items():
+        table.put((*key, quantity), index, values)
+    return lines
 
 
-def _read_lines(
+def _read_scene(
     looked: Looked,
-    view: int,
-    places: Sequence[Place],
-    exposure: int,
-    texture: int,
+    key: tuple[int, str],
+    index: tuple[int, int],
+    place: Place,
     seen: Exposure,
     camera: Camera,
 ) -> None:
-    """Where the lines lie, and what the scene's samples show there, without a camera."""
-    for place in places:
-        for name, line in place.lines(camera.pitch).items():
-            key = view, place.name, name
-            at = place.motion_samples * seen.raster.spacing
-            scene = _scene_along(camera.band, seen, line)
-            motion = np.array([_motion(camera.band, seen, line, at)])
-            looked.line_places.put(key, (exposure,), np.stack([line.distance, *line.points.T]))
-            looked.line_scene.put(key, (exposure, texture), scene)
-            looked.line_motion.put(key, (exposure, texture), motion)
+    """Where the lines of a place lie, and what the scene's samples show there."""
+    for name, line in place.lines(camera.pitch).items():
+        row = *key, name
+        motion = _motion(camera.band, seen, line, place.motion_samples * seen.raster.spacing)
+        looked.line_places.put(row, index[:1], np.stack([line.distance, *line.points.T]))
+        looked.line_scene.put(row, index, _scene_along(camera.band, seen, line))
+        looked.line_motion.put(row, index, np.array([motion]))
 
 
 def _scene_along(band: Band, exposure: Exposure, line: Line) -> Array:

@@ -12,8 +12,9 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.analysis.error_images import ErrorImages
 from chipglow.laboratory.chip import ShearBand
-from chipglow.scene import Line, Raster, Region, Tool, straight_line
+from chipglow.scene import Line, Raster, Region, Tool, sample, straight_line
 from chipglow.scene.lines import nearest
 from chipglow.scene.regions import Point
 
@@ -103,6 +104,12 @@ class LinePlace(Place):
     def lines(self, pitch: float) -> Mapping[str, Line]:
         """See `Place.lines`."""
         return {self.name: self.line(pitch)}
+
+    def profile(self, errors: ErrorImages) -> Stack:
+        """Reference, error and the PSF's portion along it in K, shape (3, n); NaN off the image."""
+        points = self.line(errors.raster.spacing).points
+        images = (errors.reference, errors.case_1, errors.psf_portion)
+        return np.array([sample(image, errors.raster, points) for image in images])
 
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
         """See `Place.read`."""

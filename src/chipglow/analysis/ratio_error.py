@@ -26,21 +26,14 @@ RATIO_CAUSES: Final = (
 
 @dataclass(frozen=True, eq=False)
 class RatioErrors:
-    """The error of the ratio temperature in one exposure, in K.
+    """The error of the ratio temperature in one exposure, in K, on the raster of the pixels.
 
-    Parameters
-    ----------
-    raster : Raster
-        Where the pixels are taken to look.
-    truth : ndarray
-        True temperature in K at every pixel's centre, linear between the samples, in the middle of
-        the first channel's exposure, shape (y, x); NaN where there is no material.
-    causes : mapping
-        By the names of `RATIO_CAUSES` what each adds to the error, of the same shape:
-        ``emissivity`` where its ratio is another than it is taken to be, or something is
-        reflected; ``motion`` during the exposures; the pixels' ``footprint``; point spread
-        functions and the rest of the ``optics``; ``misregistration``; the ``delay``; and ``noise``
-        with all that detectors do.
+    `truth` is the true temperature at every pixel's centre, linear between the samples, in the
+    middle of the first channel's exposure; NaN where there is no material. `causes` holds by the
+    names of `RATIO_CAUSES` what each adds to the error: ``emissivity`` where its ratio is another
+    than it is taken to be, or something is reflected; ``motion`` during the exposures; the pixels'
+    ``footprint``; point spread functions and the rest of the ``optics``; ``misregistration``; the
+    ``delay``; and ``noise`` with all that detectors do.
     """
 
     raster: Raster

@@ -155,7 +155,13 @@ def with_errors(data: xr.Dataset) -> xr.Dataset:
         for name in data.reading.values
         for part, array in (("error", whole), ("psf_portion", portion))
     }
-    found = {name: array.assign_attrs(units="K") for name, array in (images | draws).items()}
+    lines = {}
+    if "line" in data.dims:
+        along = data["line_measured"]
+        lines["line_error"] = along.sel(effects=ALL, drop=True) - data["line_reference"]
+        lines["line_psf_portion"] = _portion(along)
+    errors = images | draws | lines
+    found = {name: array.assign_attrs(units="K") for name, array in errors.items()}
     return data.assign(found)
 
 

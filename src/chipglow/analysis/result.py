@@ -45,25 +45,10 @@ class CuttingForces:
 class Cut:
     """What only a cut with a shear band and a contact at the rake face has.
 
-    Parameters
-    ----------
-    instants : tuple of Instant
-        The shear band over the scene's longest part without a gap, then in each other part.
-    other_parts : int
-        How many other parts there are.
-    developed : int
-        Number of the instant with the fully developed shear band.
-    segments : tuple of Segment
-        Segments with a developed band: that of the developed instant, then one for each other part
-        of the scene. These are the exposures that are drawn.
-    moments : tuple of Frame
-        The scene in the middle of the instants before, with and after the developed band.
-    chip : ChipMetrics or None
-        Shape, motion and shear band of the chip over the longest part.
-    forces : CuttingForces or None
-        If the scene has them.
-    heated : tuple of HeatedObject
-        Heated chips and tool, and the emissivity determined from their images.
+    `instants` show the shear band over the scene's longest part without a gap, then in each of the
+    `other_parts`; `developed` is the number of that with the fully developed band. `segments` are
+    the exposures that are drawn: the developed one, then one of each other part. `moments` are
+    frames before, with and after the developed band.
     """
 
     instants: tuple[Instant, ...]

@@ -1,21 +1,21 @@
 """Which bands to measure with: the error of one band, and of the ratio of two, side by side."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from math import hypot, isfinite, log, nan
-from typing import Any, Final
+from math import hypot, isfinite, log
+from typing import Final, TypeAlias
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 from numpy.typing import NDArray
 
-from chipglow.analysis.cut_error import Plan, find_segments
-from chipglow.analysis.draws import pixel_phases
-from chipglow.analysis.old_places import PointPlace
+from chipglow.analysis.cut import Progress, find_segments, spread_starts
+from chipglow.analysis.looks import pixel_phases
+from chipglow.analysis.places import PointPlace
+from chipglow.analysis.plan import Plan
 from chipglow.analysis.ratio_error import ideal_image, true_temperature
-from chipglow.analysis.scene_error import ScenePlan
-from chipglow.analysis.starts import spread_starts
 from chipglow.camera import Camera, Exposure, expose_views, frame_weights
 from chipglow.camera.ratio_camera import views_of
 from chipglow.radiometry import Band, RatioThermometer
@@ -23,17 +23,17 @@ from chipglow.scene import Raster, Scene
 from chipglow.scene.lines import nearest
 from chipglow.surface import Surface
 
-Progress = Callable[[str, float], None]
+Array: TypeAlias = NDArray[np.float64]
 
 STEPS: Final = ("emissivity", "motion", "footprint", "optics", "delay")
-"""Causes of the mean error, in the order in which they come one upon the other."""
+"""Causes of the mean error; each is the difference to the cause before it."""
 
 _FOOTPRINT, _FORMED, _DELAYED, _SHIFTED = range(4)
 """Pixels read in every band; from the last on there is one for each of the directions."""
 
 _DIRECTIONS: Final = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 _NOISE_SHAPE: Final = (64, 64)
-"""Elements by which the noise is found."""
+"""Elements over which the noise is determined."""
 
 
 @dataclass(frozen=True)
@@ -85,111 +85,13 @@ class WavelengthPlan:
 
 
 @dataclass(frozen=True, eq=False)
-class WavelengthError:
-    """What one band, or the ratio of two, makes of one place. Temperatures in K.
-
-    Parameters
-    ----------
-    place : str
-        Where.
-    first : Band
-        The band, or that of the shorter waves.
-    second : Band or None
-        The other; None for one band alone, whose emissivity is taken to be known.
-    truth : ndarray
-        True temperature in every draw, shape (draw,).
-    steps : mapping
-        By the names of `STEPS` what each adds to the error, of the same shape.
-    misregistration : ndarray
-        What a shift of the second channel adds, shape (direction, draw).
-    noise : float
-        Standard deviation that the detectors' noise makes; 0 without detectors, NaN where a
-        detector is full.
-    emissivity : float
-        Standard uncertainty that the emissivity makes, or the ratio of two.
-    """
-
-    place: str
-    first: Band
-    second: Band | None
-    truth: NDArray[np.float64]
-    steps: Mapping[str, NDArray[np.float64]]
-    misregistration: NDArray[np.float64]
-    noise: float
-    emissivity: float
-
-    @property
-    def error(self) -> NDArray[np.float64]:
-        """Measured less true temperature in every draw, without misregistration and noise."""
-        return np.asarray(np.sum(list(self.steps.values()), axis=0), np.float64)
-
-    @property
-    def shift_error(self) -> float:
-        """Root mean square of what the misregistration adds."""
-        return float(np.sqrt(np.mean(self.misregistration**2)))
-
-    @property
-    def total(self) -> float:
-        """Root of the sum of the squares of mean error, scatter over draws and uncertainties."""
-        mean = float(np.sqrt(np.mean(self.error**2)))
-        return hypot(mean, self.shift_error, self.noise, self.emissivity)
-
-
-@dataclass(frozen=True, eq=False)
-class WavelengthErrors:
-    """The errors of all bands and pairs of them.
-
-    Parameters
-    ----------
-    plan : WavelengthPlan
-        What was compared.
-    errors : tuple of WavelengthError
-        At each place the bands alone, then their ratios.
-    """
-
-    plan: WavelengthPlan
-    errors: tuple[WavelengthError, ...]
-
-    @property
-    def places(self) -> tuple[str, ...]:
-        """Names of the places."""
-        return tuple(dict.fromkeys(one.place for one in self.errors))
-
-    def to_frame(self) -> pd.DataFrame:
-        """A row for each band and pair at each place.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Columns ``place``, ``first_um`` and ``second_um`` (the bands; the second is empty for
-            one alone), ``draws``, ``truth_degC``; the mean ``error_K`` and what its causes add,
-            ``emissivity_K`` to ``delay_K``; the ``standard_deviation_K`` of the error over the
-            draws; ``misregistration_K``, ``noise_K`` and ``emissivity_uncertainty_K``; and
-            ``total_K``, the root of the sum of their squares and the mean's.
-        """
-        return pd.DataFrame([_row(one) for one in self.errors])
-
-
-@dataclass(frozen=True, eq=False)
 class Spot:
-    """A point that is read in one exposure.
-
-    Parameters
-    ----------
-    place : str
-        What it is called.
-    surface : str
-        Name of the surface that is seen there.
-    start : float
-        When the exposure begins in s.
-    point : ndarray
-        x and y in m, shape (2,).
-    """
+    """A point, x and y in m, that is read on a surface in the exposure that begins at `start`."""
 
     place: str
     surface: str
     start: float
-    point: NDArray[np.float64]
+    point: Array
 
 
 def wavelength_errors(
@@ -201,7 +103,7 @@ def wavelength_errors(
     phases: int,
     textures: int,
     progress: Progress | None = None,
-) -> WavelengthErrors:
+) -> xr.Dataset:
     """Errors of one band and of ratios of two at some spots.
 
     Parameters
@@ -221,6 +123,15 @@ def wavelength_errors(
         emissivity.
     progress : callable, optional
         Told what is being done and how much of it is done.
+
+    Returns
+    -------
+    xarray.Dataset
+        In K over ``place``, ``ratio`` (the bands alone, then their pairs) and ``draw``: ``step``,
+        what each ``cause`` of `STEPS` adds to the error; ``misregistration``, what a shift of the
+        second channel adds by ``direction``; without draws the standard uncertainties ``noise``
+        and ``emissivity_uncertainty``. ``truth`` is the true temperature. `wavelengths_frame`
+        makes a table of it.
 
     Raises
     ------
@@ -250,19 +161,37 @@ def wavelength_errors(
             readings = _read(scene, surface.redrawn(number), cameras, plan, spot, phases)
             gathered.setdefault(spot.place, []).append(readings)
     tell("bands", 1.0)
-    found: list[WavelengthError] = []
-    for place, parts in gathered.items():
-        readings = _Readings.joined(place, parts)
-        noise = [
-            _noise(camera.in_band(band), readings.pixel[number, _FORMED])
-            for number, band in enumerate(plan.bands)
-        ]
-        found += [
-            _alone(place, plan, camera.reflected, number, readings, noise[number])
-            for number in range(len(plan.bands))
-        ]
-        found += [_ratio(place, plan, pair, readings, noise) for pair in plan.pairs]
-    return WavelengthErrors(plan, tuple(found))
+    places = {name: _Readings.joined(name, parts) for name, parts in gathered.items()}
+    return _dataset(plan, camera, places)
+
+
+def wavelengths_frame(data: xr.Dataset) -> pd.DataFrame:
+    """A row for each band and pair at each place.
+
+    Columns ``place``, ``first_um`` and ``second_um`` (the bands; the second is empty for one
+    alone), ``draws``, ``truth_degC``; the mean ``error_K`` and what its causes add,
+    ``emissivity_K`` to ``delay_K``; the ``standard_deviation_K`` of the error over the draws;
+    ``misregistration_K``, ``noise_K`` and ``emissivity_uncertainty_K``; and ``total_K``, the root
+    of the sum of their squares and that of the mean.
+    """
+    error = data.step.sum("cause", skipna=False)
+    table = xr.Dataset(
+        {
+            "draws": data.truth.count("draw"),
+            "truth_degC": data.truth.mean("draw") - 273.15,
+            "error_K": error.mean("draw"),
+            **{f"{name}_K": data.step.sel(cause=name, drop=True).mean("draw") for name in STEPS},
+            "standard_deviation_K": error.std("draw", ddof=1),
+            "misregistration_K": np.sqrt((data.misregistration**2).mean(("direction", "draw"))),
+            "noise_K": data.noise,
+            "emissivity_uncertainty_K": data.emissivity_uncertainty,
+        }
+    )
+    parts = "misregistration_K", "noise_K", "emissivity_uncertainty_K"
+    squares = (error**2).mean("draw") + sum(table[name] ** 2 for name in parts)
+    frame = table.assign(total_K=np.sqrt(squares)).to_dataframe().reset_index()
+    columns = ["place", "first_um", "second_um", *map(str, table.data_vars), "total_K"]
+    return frame[columns]
 
 
 def cut_spots(
@@ -271,25 +200,12 @@ def cut_spots(
     """The chip at the rake face and the middle of the shear band, in every segment of a cut.
 
     The first is half a pixel from the face, at mid-contact; on the face chip and tool differ.
-
-    Parameters
-    ----------
-    scene : Scene
-        A cut.
-    camera : Camera
-        The camera: how long it exposes.
-    plan : Plan
-        How segments are found, and which surfaces are seen.
-    progress : callable, optional
-        Told what is being done and how much of it is done.
-
-    Raises
-    ------
-    ValueError
-        If there is no band or no contact.
+    Raises a ValueError if there is no band or no contact.
     """
+    tell = progress or (lambda label, part: None)
+    found = find_segments(scene, camera.integration_time, plan.exposures, plan.touching, tell)
     spots = []
-    for segment in find_segments(scene, camera.integration_time, plan, progress):
+    for segment in found.segments:
         tool = segment.tool
         inside = camera.pitch / 2 * np.array(tool.rake_normal)
         face = tool.rake_point(segment.contact_length / 2) + inside
@@ -301,22 +217,8 @@ def cut_spots(
     return spots
 
 
-def point_spots(
-    scene: Scene, camera: Camera, plan: ScenePlan, surfaces: Sequence[str]
-) -> list[Spot]:
-    """The user's points in every exposure, with every surface.
-
-    Parameters
-    ----------
-    scene : Scene
-        Any scene.
-    camera : Camera
-        The camera: how long it exposes.
-    plan : ScenePlan
-        The points, and how many exposures.
-    surfaces : sequence of str
-        Names of the surfaces.
-    """
+def point_spots(scene: Scene, camera: Camera, plan: Plan, surfaces: Sequence[str]) -> list[Spot]:
+    """The points of a plan in every exposure, with every surface."""
     starts = spread_starts(scene, camera.integration_time, plan.exposures)
     several = len(surfaces) > 1
     return [
@@ -344,25 +246,17 @@ def _has_room(scene: Scene, camera: Camera, start: float, delay: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _Readings:
-    """What is read at one place.
+    """What is read at one place, in K and W/(m² sr).
 
-    Parameters
-    ----------
-    weights : ndarray
-        Of the four samples around the pixel's centre, shape (sample, draw).
-    truth : ndarray
-        Their true temperatures in K, of the same shape.
-    local : ndarray
-        Their radiance in W/(m² sr) in the middle of the exposure and on average, shape (band, 2,
-        sample, draw).
-    pixel : ndarray
-        Radiance of the pixel, shape (band, step, draw): `_FOOTPRINT` to `_SHIFTED` and on.
+    `weights` and `truth` are those of the four samples around the pixel's centre, shape (sample,
+    draw), and `local` their radiance in the middle of the exposure and on average, shape (band, 2,
+    sample, draw). `pixel` is the pixel's radiance, shape (band, step, draw).
     """
 
-    weights: NDArray[np.float64]
-    truth: NDArray[np.float64]
-    local: NDArray[np.float64]
-    pixel: NDArray[np.float64]
+    weights: Array
+    truth: Array
+    local: Array
+    pixel: Array
 
     @classmethod
     def joined(cls, place: str, parts: Sequence["_Readings"]) -> "_Readings":
@@ -376,7 +270,7 @@ class _Readings:
             raise ValueError(f"{place}: no material is there, expected some in one draw or more")
         return cls(weights[:, known], truth[:, known], local[..., known], pixel[..., known])
 
-    def at_centre(self, values: NDArray[np.floating]) -> NDArray[np.float64]:
+    def at_centre(self, values: NDArray[np.floating]) -> Array:
         """Values of the samples, shape (..., sample, draw), at the pixel's centre."""
         return np.asarray((values * self.weights).sum(axis=-2), np.float64)
 
@@ -413,9 +307,7 @@ def _read(
     )
 
 
-def _around(
-    raster: Raster, points: NDArray[np.float64]
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+def _around(raster: Raster, points: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
     """Rows, columns and weights of the four samples around points, each of shape (4, point)."""
     column = (points[:, 0] - raster.x[0]) / raster.spacing
     row = (raster.y[0] - points[:, 1]) / raster.spacing
@@ -432,7 +324,7 @@ def _around(
     )
 
 
-def _centre(camera: Camera, scene: Scene, spot: Spot) -> NDArray[np.float64]:
+def _centre(camera: Camera, scene: Scene, spot: Spot) -> Array:
     """Centre of the pixel that holds a spot."""
     pixels = camera.pixels(scene.raster)
     corner = np.array([pixels.left, pixels.top])
@@ -446,7 +338,7 @@ def _of_pixel(
     camera: Camera,
     exposure: Exposure,
     late: Exposure,
-    centre: NDArray[np.float64],
+    centre: Array,
     distance: float,
 ) -> list[float]:
     """Radiance of the pixel with a centre: ideal, formed, delayed, shifted."""
@@ -471,7 +363,7 @@ def _of_pixel(
     ]
 
 
-def _noise(camera: Camera, radiance: NDArray[np.float64]) -> float:
+def _noise(camera: Camera, radiance: Array) -> float:
     """Standard deviation of the radiance that a camera reads of such pixels, relative to it."""
     calibration = camera.calibration(_NOISE_SHAPE)
     if calibration is None:
@@ -481,14 +373,62 @@ def _noise(camera: Camera, radiance: NDArray[np.float64]) -> float:
     return float(calibration.netd(temperature) * camera.band.slope(temperature)) / mean
 
 
+@dataclass(frozen=True, eq=False)
+class _Error:
+    """What a band or a ratio makes of one place, by draw, and its standard uncertainties in K."""
+
+    steps: Array
+    misregistration: Array
+    noise: float
+    emissivity: float
+
+
+def _dataset(plan: WavelengthPlan, camera: Camera, places: Mapping[str, _Readings]) -> xr.Dataset:
+    ratios: list[tuple[int, ...]] = [(i,) for i in range(len(plan.bands))]
+    ratios += list(plan.pairs)
+    draws = max(one.truth.shape[1] for one in places.values())
+    shape = len(places), len(ratios)
+    truth = np.full((shape[0], draws), np.nan)
+    steps = np.full((*shape, len(STEPS), draws), np.nan)
+    shifts = np.full((*shape, len(_DIRECTIONS), draws), np.nan)
+    noise, emissivity = np.empty(shape), np.empty(shape)
+    for i, readings in enumerate(places.values()):
+        own = readings.at_centre(readings.truth)
+        truth[i, : own.size] = own
+        noises = [
+            _noise(camera.in_band(band), readings.pixel[number, _FORMED])
+            for number, band in enumerate(plan.bands)
+        ]
+        for j, bands in enumerate(ratios):
+            if len(bands) == 1:
+                one = _alone(plan, camera.reflected, bands[0], readings, noises[bands[0]])
+            else:
+                one = _ratio(plan, (bands[0], bands[1]), readings, noises)
+            steps[i, j, :, : own.size] = one.steps
+            shifts[i, j, :, : own.size] = one.misregistration
+            noise[i, j], emissivity[i, j] = one.noise, one.emissivity
+    names = [[band_name(plan.bands[number]) for number in bands] for bands in ratios]
+    kelvin, over = {"units": "K"}, ("place", "ratio")
+    return xr.Dataset(
+        {
+            "truth": (("place", "draw"), truth, kelvin),
+            "step": ((*over, "cause", "draw"), steps, kelvin),
+            "misregistration": ((*over, "direction", "draw"), shifts, kelvin),
+            "noise": (over, noise, kelvin),
+            "emissivity_uncertainty": (over, emissivity, kelvin),
+        },
+        coords={
+            "place": list(places),
+            "cause": list(STEPS),
+            "first_um": ("ratio", [one[0] for one in names]),
+            "second_um": ("ratio", [one[1] if len(one) > 1 else "" for one in names]),
+        },
+    )
+
+
 def _alone(
-    place: str,
-    plan: WavelengthPlan,
-    reflected: float | None,
-    number: int,
-    readings: _Readings,
-    noise: float,
-) -> WavelengthError:
+    plan: WavelengthPlan, reflected: float | None, number: int, readings: _Readings, noise: float
+) -> _Error:
     """One band, by the emissivity that is at the pixel's centre."""
     band, truth = plan.bands[number], readings.at_centre(readings.truth)
     environment = 0.0 if reflected is None else float(band.radiance(reflected))
@@ -497,7 +437,7 @@ def _alone(
     )
     emissivity = readings.at_centre(of_samples)
 
-    def told(radiance: NDArray[np.float64], by: NDArray[np.float64]) -> NDArray[np.float64]:
+    def told(radiance: Array, by: Array) -> Array:
         own = (radiance - environment) / by + environment
         return np.asarray(band.temperature(own), np.float64)
 
@@ -505,12 +445,8 @@ def _alone(
     ideal, formed = (told(one, emissivity) for one in readings.pixel[number, : _FORMED + 1])
     slope = band.slope(truth)
     uncertain = plan.emissivity_uncertainty * (band.radiance(truth) - environment) / slope
-    return WavelengthError(
-        place=place,
-        first=band,
-        second=None,
-        truth=truth,
-        steps=_steps([truth, centre, mean, ideal, formed, formed]),
+    return _Error(
+        steps=np.diff([truth, centre, mean, ideal, formed, formed], axis=0),
         misregistration=np.zeros((len(_DIRECTIONS), truth.size)),
         noise=float(np.mean(noise * readings.pixel[number, _FORMED] / (emissivity * slope))),
         emissivity=float(np.mean(uncertain)),
@@ -518,12 +454,8 @@ def _alone(
 
 
 def _ratio(
-    place: str,
-    plan: WavelengthPlan,
-    pair: tuple[int, int],
-    readings: _Readings,
-    noise: Sequence[float],
-) -> WavelengthError:
+    plan: WavelengthPlan, pair: tuple[int, int], readings: _Readings, noise: Sequence[float]
+) -> _Error:
     """The ratio of two bands, as of a grey body."""
     first, second = (plan.bands[number] for number in pair)
     one, other = (readings.pixel[number] for number in pair)
@@ -538,42 +470,14 @@ def _ratio(
     shifted = thermometer.temperature(one[_FORMED], other[_SHIFTED:])
     truth = readings.at_centre(readings.truth)
     relative = hypot(*(noise[number] for number in pair))
-    return WavelengthError(
-        place=place,
-        first=first,
-        second=second,
-        truth=truth,
-        steps=_steps([truth, centre, mean, ideal, formed, delayed]),
+    return _Error(
+        steps=np.diff([truth, centre, mean, ideal, formed, delayed], axis=0),
         misregistration=shifted - formed,
         noise=float(np.mean(relative / thermometer.sensitivity(truth))),
         emissivity=float(np.mean(thermometer.uncertainty(truth))),
     )
 
 
-def _steps(told: Sequence[NDArray[np.floating]]) -> dict[str, NDArray[np.float64]]:
-    """Differences of temperatures that have one cause after the other."""
-    pairs = zip(STEPS, told[1:], told[:-1], strict=True)
-    return {name: np.asarray(after - before, np.float64) for name, after, before in pairs}
-
-
 def band_name(band: Band) -> str:
     """Limits of a band in um."""
     return f"{1e6 * band.lower:.4g}-{1e6 * band.upper:.4g}"
-
-
-def _row(one: WavelengthError) -> dict[str, Any]:
-    """The row of a table."""
-    return {
-        "place": one.place,
-        "first_um": band_name(one.first),
-        "second_um": band_name(one.second) if one.second else "",
-        "draws": one.truth.size,
-        "truth_degC": float(one.truth.mean()) - 273.15,
-        "error_K": float(one.error.mean()),
-        **{f"{name}_K": float(values.mean()) for name, values in one.steps.items()},
-        "standard_deviation_K": float(one.error.std(ddof=1)) if one.error.size > 1 else nan,
-        "misregistration_K": one.shift_error,
-        "noise_K": one.noise,
-        "emissivity_uncertainty_K": one.emissivity,
-        "total_K": one.total,
-    }

@@ -1,4 +1,4 @@
-"""How the app is begun: as a local server, or as a part of a notebook."""
+"""Start of the app: as a local server, or as a part of a notebook."""
 
 import gc
 from collections.abc import Callable
@@ -12,14 +12,14 @@ if TYPE_CHECKING:
 
 
 def explore(scene: "Scene | str | Path | None" = None, study: "Study | None" = None) -> Any:
-    """Look at a scene with a camera whose knobs can be turned: the app's page in a notebook.
+    """Return the app's page for a notebook: a scene and a camera with controls.
 
     Parameters
     ----------
     scene : Scene or path-like, optional
-        A scene, or what ``chipglow app`` opens; the scene that comes with the app by default.
+        A scene, or a path that ``chipglow app`` opens; the bundled scene by default.
     study : Study, optional
-        Surface and camera to begin with; the paper's by default.
+        Initial surface and camera; the paper's by default.
 
     Returns
     -------
@@ -49,37 +49,21 @@ def explore(scene: "Scene | str | Path | None" = None, study: "Study | None" = N
     return view.page
 
 
-def serve(
-    path: Path | None,
-    address: str,
-    port: int,
-    told: Callable[[str], None],
-) -> None:
-    """Serve the app until Ctrl-C.
-
-    Parameters
-    ----------
-    path : Path, optional
-        What to open; the scene that comes with the app by default.
-    address : str
-        Where to listen.
-    port : int
-        0 for any that is free.
-    told : callable
-        Called with the address for a browser, when it can be opened.
+def serve(path: Path | None, address: str, port: int, ready: Callable[[str], None]) -> None:
+    """Serve the app until Ctrl-C; `ready` takes the URL as soon as a browser can open it.
 
     Raises
     ------
     ValueError
-        If Panel is not installed, the path cannot be opened, or the address cannot be had.
+        If Panel is not installed, the path cannot be opened, or the address is not available.
     """
     _check_installed()
     from chipglow.app.opening import open_any
     from chipglow.app.server import App
 
     app = App(open_any(path), address, port)
-    told(app.url)
-    # Garbage is not looked for in what is imported: that would take longer than a picture.
+    ready(app.url)
+    # Imported objects are exempt from garbage collection, which would take longer than a picture.
     gc.freeze()
     app.run()
 

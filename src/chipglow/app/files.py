@@ -1,18 +1,17 @@
-"""What the page gives away: the study, a figure, the measurement."""
+"""The files that the page saves: the study, a figure, the measurement."""
 
 import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from chipglow.app.controls import ERROR_IMAGES, LINES, State
 from chipglow.app.figures import LINE_COLOURS, error_limit, temperature_limits
-from chipglow.app.knobs import ERRORS, LINE_NAMES, LINES, Knobs, counts
-from chipglow.app.model import SceneModel
-from chipglow.app.picture import Drawn, Picture
+from chipglow.app.model import Drawn, Picture, SceneModel
 from chipglow.drawing.drawing import (
     colour_bar,
     draw_line,
@@ -25,30 +24,33 @@ from chipglow.drawing.scales import BLUE, GREY, HEAT, KELVIN, PLAIN, SIGNED, VOI
 from chipglow.io import StoredScene, write_dataset
 from chipglow.study import study_text
 
+View: TypeAlias = tuple[float, float, float, float]
+"""Visible part of the images: left, right, bottom and top in m."""
+
 _IMAGE_WIDTH, _LINES_HEIGHT = 1.95, 2.4
 """Width of an image and height of the plots of lines in inches."""
 
 
-def study_file(model: SceneModel, knobs: Knobs) -> bytes:
-    """The study that the knobs mean, as YAML; its scene is that which is open, if it is a file."""
-    study = model.panel.study_of(knobs)
-    scene = model.opened.scene
+def study_file(model: SceneModel, state: State) -> bytes:
+    """Return the study of a state as YAML; it names the open scene if that is a file."""
+    study, scene = state.study, model.opened.scene
     if model.opened.from_file and isinstance(scene, StoredScene):
         study = study.model_copy(update={"scene": str(scene.path.resolve())})
-    start = model.panel.knob("start").text(knobs.start)
-    seen = f"# Seen in the exposure that begins at {start}:\n"
+    start = model.controls.row("start").text(state.start)
+    comment = f"# Exposure that begins at {start}:\n"
     if study.scene is not None:
-        seen += f"# chipglow measure {study.scene} --study FILE --start '{start}' --out FILE.nc\n"
-    return (seen + study_text(study)).encode()
+        comment += (
+            f"# chipglow measure {study.scene} --study FILE --start '{start}' --out FILE.nc\n"
+        )
+    return (comment + study_text(study)).encode()
 
 
 def measurement_file(picture: Picture, model: SceneModel) -> bytes:
-    """The measurement as NetCDF, with the reference temperature and the error of every pixel."""
+    """Return the measurement as NetCDF, with reference and error of every pixel."""
     assert picture.camera is not None and picture.errors is not None
     measurement = picture.camera.form_measurement(picture.exposures[0])
-    tool = model.opened.scene.tool
-    if tool is not None:
-        measurement = measurement.with_tool(tool)
+    if model.opened.scene.tool is not None:
+        measurement = measurement.with_tool(model.opened.scene.tool)
     place, units = ("time", "y", "x"), {"units": "K"}
     data = measurement.data.assign(
         reference_temperature=(place, picture.errors.reference[None], units),
@@ -62,49 +64,36 @@ def measurement_file(picture: Picture, model: SceneModel) -> bytes:
 
 
 def figure_file(
-    picture: Picture,
-    model: SceneModel,
-    seen: tuple[float, float, float, float],
-    drawn: Drawn | None = None,
+    picture: Picture, model: SceneModel, view: View, drawn: Drawn | None = None
 ) -> bytes:
-    """The images and the lines as PNG: the part of the images that is seen, and the draws."""
+    """Return the visible part of the images, the lines and the draws as PNG."""
     with style(), TemporaryDirectory() as folder:
         path = Path(folder, "figure.png")
-        _figure(picture, model, seen, drawn).savefig(
-            path, dpi=200, bbox_inches="tight", pad_inches=0.05
-        )
+        figure = _figure(picture, model, view, drawn)
+        figure.savefig(path, dpi=200, bbox_inches="tight", pad_inches=0.05)
         return path.read_bytes()
 
 
-def _figure(
-    picture: Picture,
-    model: SceneModel,
-    seen: tuple[float, float, float, float],
-    drawn: Drawn | None,
-) -> Figure:
-    left, right, bottom, top = seen
+def _figure(picture: Picture, model: SceneModel, view: View, drawn: Drawn | None) -> Figure:
+    left, right, bottom, top = view
     upper = 1.1 + _IMAGE_WIDTH * (top - bottom) / (right - left)
     figure = new_figure(upper + _LINES_HEIGHT)
     axes = figure.subplots(2, 3, height_ratios=(upper, _LINES_HEIGHT))
-    _draw_images(figure, axes[0], picture, model, seen)
+    _draw_images(figure, axes[0], picture, model, view)
     for name, one in zip(LINES, axes[1], strict=False):
         _draw_line(one, name, picture, drawn)
     axes[1, 0].legend(frameon=False, fontsize=6.5)
     axes[1, 1].set_ylabel("")
     axes[1, 2].axis("off")
-    axes[1, 2].text(0, 1, _caption(picture, model), va="top", fontsize=6)
+    axes[1, 2].text(0, 1, _caption(picture.state, model), va="top", fontsize=6)
     return figure
 
 
 def _draw_images(
-    figure: Figure,
-    axes: Any,
-    picture: Picture,
-    model: SceneModel,
-    seen: tuple[float, float, float, float],
+    figure: Figure, axes: Any, picture: Picture, model: SceneModel, view: View
 ) -> None:
-    """Scene, measurement and error, with the colours of the page."""
-    scene, knobs = picture.scene, picture.knobs
+    """Draw scene, measurement and error in the colours of the page."""
+    scene, state, tool = picture.scene, picture.state, model.opened.scene.tool
     assert scene is not None and picture.error is not None
     measured, error = (
         np.where(picture.flagged, np.nan, image)
@@ -116,20 +105,20 @@ def _draw_images(
     panels = (
         (quantity.capitalize(), unit, scene.shown, scene.raster, *of_scene),
         ("Measured", "°C", measured, picture.raster, heat, HEAT),
-        (ERRORS[knobs.error], "K", error, picture.raster, (-limit, limit), SIGNED),
+        (ERROR_IMAGES[state.error_image], "K", error, picture.raster, (-limit, limit), SIGNED),
     )
     factor, _ = length_unit(model.opened.scene.raster)
-    left, right, bottom, top = (factor * end for end in seen)
+    left, right, bottom, top = (factor * edge for edge in view)
     for one, (title, unit, image, raster, limits, colours) in zip(axes, panels, strict=True):
-        shown = show_image(one, image, raster, model.opened.scene.tool, colours, limits)
-        colour_bar(figure, shown, one, unit, "bottom")
+        colour_bar(
+            figure, show_image(one, image, raster, tool, colours, limits), one, unit, "bottom"
+        )
         one.set_title(title)
         for name in LINES:
-            draw_line(one, np.array(getattr(knobs, name)), LINE_COLOURS[name], factor=factor)
+            draw_line(one, np.array(state.line(name)), LINE_COLOURS[name], factor=factor)
         for colour, width in (("black", 2.6), ("white", 1.2)):
-            one.plot(*factor * np.array(knobs.cursor), "+", color=colour, mew=width, ms=7)
-        one.set_xlim(left, right)
-        one.set_ylim(bottom, top)
+            one.plot(*factor * np.array(state.cursor), "+", color=colour, mew=width, ms=7)
+        one.set(xlim=(left, right), ylim=(bottom, top))
         if one is not axes[0]:
             one.set(ylabel="", yticklabels=[])
 
@@ -139,12 +128,12 @@ def _draw_line(axes: Axes, name: str, picture: Picture, drawn: Drawn | None) -> 
     assert values.reference is not None
     along = 1e6 * values.distance
     if drawn is not None:
-        rows = drawn.lines[name].measured - KELVIN
+        rows = drawn.lines[name] - KELVIN
         low, high = rows.min(axis=0), rows.max(axis=0)
         axes.fill_between(along, low, high, color=BLUE, alpha=0.25, lw=0, label="range of draws")
     axes.plot(along, values.reference - KELVIN, "--", color=GREY, label="reference")
     axes.plot(along, values.measured - KELVIN, color=BLUE, label="measured")
-    axes.set_title(LINE_NAMES[name].capitalize(), color="black")
+    axes.set_title(LINES[name].capitalize(), color="black")
     axes.set(xlabel="distance / µm", ylabel="radiance temp. / °C")
     limit = picture.camera.lower_limit if picture.camera else None
     low, high = axes.get_ylim()
@@ -153,12 +142,12 @@ def _draw_line(axes: Axes, name: str, picture: Picture, drawn: Drawn | None) -> 
         axes.set_ylim(low, high)
 
 
-def _caption(picture: Picture, model: SceneModel) -> str:
-    """What the camera and the surface are: a line for each knob."""
-    knobs = picture.knobs
-    rows = [model.opened.name]
-    for knob in model.panel.knobs:
-        value = getattr(knobs, knob.name)
-        if knob.name not in ("shown", "error") and counts(knob, knobs):
-            rows.append(f"{knob.label}: {(knob.choices or {}).get(value, knob.text(value))}")
-    return re.sub(r"\bdegC\b", "°C", re.sub(r"\bu(m|s)\b", r"µ\1", "\n".join(rows)))
+def _caption(state: State, model: SceneModel) -> str:
+    """Return camera and surface: a line for each control."""
+    lines, controls = [model.opened.name], model.controls
+    for row in controls.rows:
+        if row.path not in ("scene_image", "error_image") and controls.is_shown(row, state):
+            value = controls.value(row, state)
+            text = row.options[value].label if row.options else row.text(value)
+            lines.append(f"{row.label}: {text}")
+    return re.sub(r"\bdegC\b", "°C", re.sub(r"\bu(m|s)\b", r"µ\1", "\n".join(lines)))

@@ -1,15 +1,15 @@
-"""The app without its page: pictures and numbers of a scene at a state of the knobs.
+"""Images and numbers of a scene or a measurement at a state of the controls, without a page.
 
-Nothing is computed here that the library does not compute; what depends on what decides how long a
-result is kept: surfaces, exposures, images.
+The stages of a picture are computed once for all states that agree up to them.
 """
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, replace
+from functools import cached_property
 from math import ceil, nan
 from threading import Lock
-from typing import Final, Generic, TypeVar
+from typing import Final, Generic, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,210 +19,232 @@ from chipglow.analysis import (
     ErrorImages,
     ErrorParts,
     LinePlace,
+    Unblurred,
     error_images,
     error_parts,
+    pixel_phases,
 )
-from chipglow.analysis.draws import pixel_phases
-from chipglow.analysis.error_images import Unblurred
-from chipglow.app.knobs import LINES, ControlPanel, Knobs
-from chipglow.app.opening import QUICK_SAMPLES, OpenedMeasurement, OpenedScene, with_samples
-from chipglow.app.picture import (
-    Drawn,
-    LineBand,
-    LineValues,
-    Picture,
-    Readout,
-    SceneImage,
+from chipglow.app.controls import LINES, SCENE_IMAGES, Controls, Stage, State
+from chipglow.app.opening import (
+    QUICK_SAMPLES,
+    Opened,
+    OpenedMeasurement,
+    OpenedScene,
+    with_samples,
 )
 from chipglow.camera import Camera, Exposure
 from chipglow.camera.exposure import frame_weights
 from chipglow.camera.sweep import Check
+from chipglow.drawing.scales import KELVIN
 from chipglow.radiometry import Band
-from chipglow.scene import Material, Scene, sample
+from chipglow.scene import Material, Raster, Scene, sample
 from chipglow.scene.lines import nearest
-from chipglow.study import Study, fit
+from chipglow.study import fit
 from chipglow.surface import EmissivityField, Surface
 
-Progress = Callable[[float], None]
+Array: TypeAlias = NDArray[np.float64]
+
+_Result = TypeVar("_Result")
 
 DISPLAYED: Final = 100_000
-"""Samples of the scene that the page gets to see."""
+"""Samples of the image of the scene on the page."""
 
-_EXPOSURES: Final = 2
-_COARSE_EXPOSURES: Final = 24
-
-_Kept = TypeVar("_Kept")
+_UNITS: Final = {"plastic_strain_rate": " / (1/s)", "speed": " / (m/s)"}
 
 
-class Kept(Generic[_Kept]):
-    """The results that were asked for last, a few; threads may share them."""
+@dataclass(frozen=True, eq=False)
+class SceneImage:
+    """A field of the scene in SI on few enough samples for a screen; NaN without material."""
 
-    def __init__(self, most: int) -> None:
-        self._most = most
-        self._found: OrderedDict[Hashable, _Kept] = OrderedDict()
+    name: str
+    values: NDArray[np.float32]
+    raster: Raster
+
+    @property
+    def is_temperature(self) -> bool:
+        """Whether the field is a temperature."""
+        return self.name in ("temperature", "radiance_temperature")
+
+    @cached_property
+    def shown(self) -> NDArray[np.float32]:
+        """Values as the page shows them: temperatures in °C."""
+        return self.values - np.float32(KELVIN) if self.is_temperature else self.values
+
+    @property
+    def label(self) -> str:
+        """Quantity and unit."""
+        return SCENE_IMAGES[self.name].lower() + _UNITS.get(
+            self.name, " / °C" * self.is_temperature
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class LineValues:
+    """Radiance temperatures in K along a line; no reference for a measurement."""
+
+    distance: Array
+    measured: Array
+    reference: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """Images and lines at a state; `quick` marks those on a coarser scene."""
+
+    state: State
+    raster: Raster
+    measured: Array
+    flagged: NDArray[np.bool_]
+    lines: dict[str, LineValues]
+    quick: bool = False
+    scene: SceneImage | None = None
+    errors: ErrorImages | None = None
+    error: Array | None = None
+    camera: Camera | None = None
+    exposures: tuple[Exposure, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Readout:
+    """Numbers at the cursor, temperatures in K; NaN for those that are unknown."""
+
+    measured: float
+    uncertainty: float = nan
+    source: str = ""
+    flagged: bool = False
+    true: float = nan
+    emissivity: float = nan
+    reference: float = nan
+    parts: ErrorParts | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """Measured lines in K, shape (draw, n), and error at the cursor over phases and textures."""
+
+    state: State
+    lines: dict[str, Array]
+    error: Distribution | None
+
+
+class _Cache(Generic[_Result]):
+    """The results of the last few keys; threads may share them."""
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self._results: OrderedDict[Hashable, _Result] = OrderedDict()
         self._lock = Lock()
 
     def __contains__(self, key: Hashable) -> bool:
-        return key in self._found
+        return key in self._results
 
-    def get(self, key: Hashable, make: Callable[[], _Kept]) -> _Kept:
-        """The result of a key, made if it is not there."""
+    def get(self, key: Hashable, make: Callable[[], _Result]) -> _Result:
+        """Return the result of a key, which is made if it is not there."""
         with self._lock:
-            if key not in self._found:
-                self._found[key] = make()
-                while len(self._found) > self._most:
-                    self._found.popitem(last=False)
-            self._found.move_to_end(key)
-            return self._found[key]
+            if key not in self._results:
+                self._results[key] = make()
+                while len(self._results) > self._size:
+                    self._results.popitem(last=False)
+            self._results.move_to_end(key)
+            return self._results[key]
 
 
 class SceneModel:
-    """Pictures of a scene; one for each session.
-
-    Parameters
-    ----------
-    opened : OpenedScene
-        The scene and the knobs of its study.
-    """
+    """Pictures of a scene for one session."""
 
     def __init__(self, opened: OpenedScene) -> None:
         self.opened = opened
-        self.panel: ControlPanel = opened.panel
-        self._bands: Kept[Band] = Kept(4)
-        self._fitted: Kept[tuple[Scene, Surface]] = Kept(4)
-        self._laid: Kept[list[EmissivityField]] = Kept(4)
-        self._exact: Kept[tuple[Exposure, ...]] = Kept(_EXPOSURES)
-        self._quick: Kept[tuple[Exposure, ...]] = Kept(_COARSE_EXPOSURES)
-        self._images: Kept[SceneImage] = Kept(4)
-        self._formed: Kept[NDArray[np.float64]] = Kept(8)
-        self._unblurred: Kept[Unblurred] = Kept(8)
-        self._errors: Kept[ErrorImages] = Kept(8)
-        self._parts: Kept[ErrorParts] = Kept(2)
-        self._frames: Kept[tuple[NDArray[np.float32], NDArray[np.float32]]] = Kept(1)
+        self.controls: Controls = opened.controls
+        self._bands: _Cache[Band] = _Cache(4)
+        self._fitted: _Cache[tuple[Scene, Surface]] = _Cache(4)
+        self._fields: _Cache[list[EmissivityField]] = _Cache(4)
+        self._exposures: _Cache[tuple[Exposure, ...]] = _Cache(2)
+        self._quick_exposures: _Cache[tuple[Exposure, ...]] = _Cache(24)
+        self._unblurred: _Cache[Unblurred] = _Cache(8)
+        self._formed: _Cache[Array] = _Cache(8)
+        self._errors: _Cache[ErrorImages] = _Cache(8)
+        self._parts: _Cache[ErrorParts] = _Cache(2)
+        self._images: _Cache[SceneImage] = _Cache(4)
+        self._frames: _Cache[list[NDArray[np.float32]]] = _Cache(1)
         self._displayed = with_samples(opened.scene, DISPLAYED)
-        self._glimpsed = with_samples(opened.scene, QUICK_SAMPLES)
+        self._displayed_quick = with_samples(opened.scene, QUICK_SAMPLES)
 
     @property
     def has_quick_look(self) -> bool:
-        """Whether the scene is so large that a coarse picture goes before the exact one."""
+        """Whether a picture of a coarser scene precedes the exact one."""
         return self.opened.coarse is not None
 
-    def turned(self, knobs: Knobs, texts: Mapping[str, str]) -> Knobs:
-        """Knobs with some of them set by their text, if a picture can be made of them.
+    def changed(self, state: State, texts: dict[str, str]) -> State:
+        """Return the state with some controls at other values.
 
         Raises
         ------
         ValueError
-            If not; the message names the knob.
+            If the scene has no picture at it; the message names the control.
         """
-        new = self.panel.changed(knobs, texts)
+        new = self.controls.changed(state, texts)
         try:
-            self._check(new)
+            scene = self.opened.scene
+            camera = self._camera(new, scene)
+            camera.pixels(scene.raster)
+            duration = camera.frame_duration(scene.raster)
+            frame_weights(scene.times, scene.frame_spacing, new.start, duration)
         except ValueError as error:
-            raise ValueError(f"{self.panel.named(texts)}: {error}") from None
+            raise ValueError(f"{self.controls.named(texts)}: {error}") from None
         return new
 
-    def _check(self, knobs: Knobs) -> None:
-        scene = self.opened.scene
-        camera = self._camera(self.panel.study_of(knobs), scene)
-        camera.pixels(scene.raster)
-        duration = camera.frame_duration(scene.raster)
-        frame_weights(scene.times, scene.frame_spacing, knobs.start, duration)
-
-    def is_ready(self, knobs: Knobs) -> bool:
-        """Whether the exposure of these knobs is at hand, and an exact picture a matter of ms."""
-        if self._exposure_key(knobs) not in self._exact:
+    def is_ready(self, state: State) -> bool:
+        """Whether the exact picture takes milliseconds."""
+        if self._exposure_key(state) not in self._exposures:
             return False
-        on_samples = knobs.psf_order != "detector" and knobs.psf == "annular-aperture"
-        coarse = self.opened.coarse
-        # Of pixels that are hardly larger than the coarse samples a quick look takes half as long.
-        many = on_samples or (coarse is not None and knobs.pitch < 1.5 * coarse.raster.spacing)
-        return not many or self._image_key(knobs, coarse=False) in self._errors
+        camera, coarse = state.study.camera, self.opened.coarse
+        kind = camera.psf.kind if camera.psf else ""
+        on_samples = camera.psf_order != "detector" and kind == "annular-aperture"
+        # A quick look at pixels hardly larger than the coarse samples takes half as long.
+        many = on_samples or (coarse is not None and camera.pitch < 1.5 * coarse.raster.spacing)
+        return not many or (self._key(state, "reading"), False) in self._errors
 
-    def picture(self, knobs: Knobs, quick: bool = False, check: Check | None = None) -> Picture:
-        """Images and lines at a state of the knobs.
-
-        Parameters
-        ----------
-        knobs : Knobs
-            The state.
-        quick : bool
-            Whether to look at the coarse scene, if there is one.
-        check : callable, optional
-            Called now and then; what it raises ends the work.
-
-        Raises
-        ------
-        ValueError
-            If the state is not possible on this scene.
-        """
-        coarse = quick and self.opened.coarse is not None
-        study = self.panel.study_of(knobs)
-        scene, surface = self._on(study, knobs, coarse)
-        camera = self._camera(study, scene, coarse)
-        exposures = self._exposed(scene, surface, camera, knobs, coarse, check)
-        errors = self._image_errors(camera, exposures[0], knobs, coarse)
+    def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
+        """Return images and lines at a state; `check` is called meanwhile and may raise."""
+        quick = quick and self.opened.coarse is not None
+        scene, surface = self._on(state, quick)
+        camera = self._camera(state, scene, quick)
+        exposures = self._exposed(scene, surface, camera, state, quick, check)
+        errors = self._error_images(camera, exposures[0], state, quick)
         picture = Picture(
-            knobs=knobs,
+            state=state,
             raster=errors.raster,
             measured=errors.measured,
             flagged=errors.flagged,
-            lines=line_values(errors, knobs),
-            coarse=coarse,
-            scene=self._scene_image(study, knobs, exposures[0], coarse),
+            lines=line_values(errors, state),
+            quick=quick,
+            scene=self._scene_image(state, exposures[0], quick),
             errors=errors,
             error=errors.case_1,
             camera=camera,
             exposures=exposures,
         )
-        if knobs.error == "total":
+        if state.error_image == "total":
             return picture
-        return replace(picture, error=getattr(self.parts(picture), knobs.error))
-
-    def _image_errors(
-        self, camera: Camera, exposure: Exposure, knobs: Knobs, coarse: bool
-    ) -> ErrorImages:
-        """As `error_images`, of which what the changed knobs do not matter to is kept."""
-        seen, pixels, optics, _ = key = self._image_key(knobs, coarse)
-        reference = self.panel.study.analysis.reference
-        unblurred = self._unblurred.get(
-            (seen, pixels), lambda: Unblurred.of(camera, exposure, reference)
-        )
-        formed = self._formed.get(
-            (seen, pixels, optics),
-            lambda: camera.form_image(exposure.mean_radiance, exposure.raster),
-        )
-        return self._errors.get(key, lambda: replace(unblurred, camera=camera).errors(formed))
-
-    def _image_key(self, knobs: Knobs, coarse: bool) -> tuple[Hashable, ...]:
-        """What an image depends on: exposure, pixels, optics and how it is read."""
-        return (
-            (self._exposure_key(knobs), coarse),
-            (knobs.pitch, knobs.offset_right, knobs.offset_down),
-            (knobs.psf, knobs.numerical_aperture, knobs.fwhm, knobs.psf_order),
-            (knobs.netd, knobs.lower_limit),
-        )
+        part = getattr(self.parts(picture), state.error_image)
+        return replace(picture, error=np.zeros_like(errors.case_1) if part is None else part)
 
     def parts(self, picture: Picture) -> ErrorParts:
-        """What makes the errors of a picture."""
+        """Return the parts of the error of a picture."""
         assert picture.camera is not None
         camera, (exposure, *others) = picture.camera, picture.exposures
+        reference, plain = picture.state.study.analysis.reference, others[0] if others else None
         return self._parts.get(
-            (knobs_key(picture.knobs), picture.coarse),
-            lambda: error_parts(
-                camera,
-                exposure,
-                self.panel.study.analysis.reference,
-                others[0] if others else None,
-            ),
+            (self._key(picture.state, "reading"), picture.quick, len(picture.exposures)),
+            lambda: error_parts(camera, exposure, reference, plain),
         )
 
     def readout(self, picture: Picture) -> Readout:
-        """Numbers at the cursor of a picture."""
+        """Return the numbers at the cursor of a picture."""
         assert picture.errors is not None and picture.camera is not None
-        knobs, errors = picture.knobs, picture.errors
-        temperature, emissivity = self._middle(knobs)
-        at = knobs.cursor
+        state, errors, raster = picture.state, picture.errors, self.opened.scene.raster
+        temperature, emissivity = self._middle(state)
+        at = state.cursor
         measured = float(nearest(errors.measured, errors.raster, at))
         calibration = picture.camera.calibration(errors.raster.shape)
         noisy = calibration is not None and np.isfinite(measured)
@@ -231,273 +253,245 @@ class SceneModel:
             uncertainty=calibration.netd(measured) if calibration and noisy else nan,
             source="noise of one frame" if noisy else "",
             flagged=bool(nearest(errors.flagged, errors.raster, at) == 1.0),
-            true=float(nearest(temperature, self.opened.scene.raster, at)),
-            emissivity=float(nearest(emissivity, self.opened.scene.raster, at)),
+            true=float(nearest(temperature, raster, at)),
+            emissivity=float(nearest(emissivity, raster, at)),
             reference=float(nearest(errors.reference, errors.raster, at)),
             parts=self.parts(picture),
         )
 
-    def drawn(self, knobs: Knobs, phases: int, textures: int, progress: Progress) -> Drawn:
-        """Lines and the error at the cursor, drawn anew over pixel phases and textures.
+    def drawn(
+        self, state: State, phases: int, textures: int, progress: Callable[[float], None]
+    ) -> Drawn:
+        """Return lines and error at the cursor at `phases`² positions of the pixels and textures.
 
-        Parameters
-        ----------
-        knobs : Knobs
-            The state.
-        phases, textures : int
-            Positions of the pixels along each axis, and textures.
-        progress : callable
-            Called with how much is done, 0 to 1; what it raises ends the work.
+        `progress` takes the finished fraction and may raise.
         """
-        study = self.panel.study_of(knobs)
-        scene, surface = self._on(study, knobs, coarse=False)
-        camera = self._camera(study, scene)
+        scene, surface = self._on(state, quick=False)
+        camera = self._camera(state, scene)
         cameras = pixel_phases(camera, phases)
-        surfaces = [surface.redrawn(number) for number in range(textures)]
-        if surface.redrawn(1) is surface:
-            surfaces = surfaces[:1]
-        total = len(surfaces) * len(cameras)
-        profiles: dict[str, list[LineValues]] = {name: [] for name in LINES}
+        count = textures if surface.redrawn(1) is not surface else 1
+        total = count * len(cameras)
+        lines: dict[str, list[Array]] = {name: [] for name in LINES}
         at_cursor: list[float] = []
-        for number, one in enumerate(surfaces):
-            done = number * len(cameras)
+        for number in range(count):
+            field = camera.lay(surface.redrawn(number), scene)
+            done = number * len(cameras) / total
             (exposure,) = camera.expose_fields(
-                scene,
-                (camera.lay(one, scene),),
-                knobs.start,
-                lambda done=done: progress(done / total),  # type: ignore[misc]
-            )
+                scene, (field,), state.start, lambda done=done: progress(done)  # type: ignore[misc]
+            )  # fmt: skip
             for phase in cameras:
                 looking = phase.redrawn(len(at_cursor))
-                errors = error_images(looking, exposure, study.analysis.reference)
-                for name, values in line_values(errors, knobs).items():
-                    profiles[name].append(values)
-                at_cursor.append(float(nearest(errors.case_1, errors.raster, knobs.cursor)))
+                errors = error_images(looking, exposure, state.study.analysis.reference)
+                for name, values in line_values(errors, state).items():
+                    lines[name].append(values.measured)
+                at_cursor.append(float(nearest(errors.case_1, errors.raster, state.cursor)))
                 progress(len(at_cursor) / total)
-        drawn = np.array(at_cursor).reshape(len(surfaces), len(cameras))
-        known = bool(np.isfinite(drawn).all())
+        error = np.array(at_cursor).reshape(count, len(cameras))
+        known = bool(np.isfinite(error).all())
         return Drawn(
-            knobs,
-            {name: _line_band(rows) for name, rows in profiles.items()},
-            Distribution(drawn, ("texture", "pixel phase")) if known else None,
+            state,
+            {name: np.array(rows) for name, rows in lines.items()},
+            Distribution(error, ("texture", "pixel phase")) if known else None,
         )
 
-    def _exposure_key(self, knobs: Knobs) -> Hashable:
-        band = knobs.band_lower, knobs.band_upper
-        when = knobs.start, knobs.integration_time
-        # Of a rolling shutter it is the pixels that say when a sample's row is exposed.
-        rolling = self.panel.study.camera.line_time is not None
-        rows = (knobs.pitch, knobs.offset_down) if rolling else ()
-        return (_surface_key(knobs), band, when, knobs.reflected, rows)
+    def _key(self, state: State, last: Stage) -> Hashable:
+        return self.controls.key(state, last)
 
-    def _on(self, study: Study, knobs: Knobs, coarse: bool) -> tuple[Scene, Surface]:
-        """The scene with its tool, and the surface that is seen."""
-        base = self.opened.coarse if coarse else self.opened.scene
+    def _exposure_key(self, state: State) -> Hashable:
+        """With a rolling shutter the pixels determine when a sample's row is exposed."""
+        rolling = state.study.camera.line_time is not None
+        return self._key(state, "pixels" if rolling else "exposure")
+
+    def _on(self, state: State, quick: bool) -> tuple[Scene, Surface]:
+        """Return the scene with its tool, and the surface on it."""
+        base = self.opened.coarse if quick else self.opened.scene
         assert base is not None
 
         def make() -> tuple[Scene, Surface]:
-            fitted = fit(study, base)
+            fitted = fit(state.study, base)
             (surface,) = fitted.surfaces.values()
             return fitted.scene, surface
 
-        return self._fitted.get((_surface_key(knobs), coarse), make)
+        return self._fitted.get((self._key(state, "surface"), quick), make)
 
-    def _camera(self, study: Study, scene: Scene, coarse: bool = False) -> Camera:
-        """The study's camera; if coarse, with no pixel finer than the scene's samples.
+    def _camera(self, state: State, scene: Scene, quick: bool = False) -> Camera:
+        """Return the study's camera; if quick, with no pixels finer than the scene's samples.
 
         Its band is kept, whose tables take longer than an image.
         """
-        camera = study.camera.on(scene.raster, study.seed)
+        camera = state.study.camera.on(scene.raster, state.study.seed)
         larger = scene.raster.spacing / camera.pitch
-        if coarse and larger > 1:
+        if quick and larger > 1:
             rows, columns = camera.shape or (0, 0)
             shape = (ceil(rows / larger), ceil(columns / larger)) if camera.shape else None
             camera = replace(camera, pitch=scene.raster.spacing, shape=shape)
-        ends = camera.band.lower, camera.band.upper
-        return replace(camera, band=self._bands.get(ends, lambda: camera.band))
+        band: Band = self._bands.get((camera.band.lower, camera.band.upper), lambda: camera.band)
+        return replace(camera, band=band)
 
     def _exposed(
         self,
         scene: Scene,
         surface: Surface,
         camera: Camera,
-        knobs: Knobs,
-        coarse: bool,
+        state: State,
+        quick: bool,
         check: Check | None,
     ) -> tuple[Exposure, ...]:
-        """The exposure, and the same without texture where that differs and is needed."""
+        """Return the exposure, and that without texture where it differs and is needed."""
         plain = surface.without_texture()
-        both = plain is not surface and (not coarse or knobs.error == "texture")
-        kept = self._quick if coarse else self._exact
-        band = knobs.band_lower, knobs.band_upper
+        both = plain is not surface and (not quick or state.error_image == "texture")
+        surfaces = (surface, plain) if both else (surface,)
+
+        def fields() -> list[EmissivityField]:
+            return [camera.lay(one, scene) for one in surfaces]
 
         def make() -> tuple[Exposure, ...]:
-            seen = (surface, plain) if both else (surface,)
-            grey = all(one.in_band(camera.band, camera.reflected) is one for one in seen)
-            fields = self._laid.get(
-                (_surface_key(knobs), coarse, both, () if grey else (band, knobs.reflected)),
-                lambda: [camera.lay(one, scene) for one in seen],
-            )
-            found = camera.expose_fields(scene, fields, knobs.start, check)
+            grey = all(one.in_band(camera.band, camera.reflected) is one for one in surfaces)
+            spectral = () if grey else (camera.band.lower, camera.band.upper, camera.reflected)
+            laid = self._fields.get((self._key(state, "surface"), quick, both, spectral), fields)
             return tuple(
                 replace(exposure, effects=one.effects)
-                for exposure, one in zip(found, seen, strict=True)
+                for exposure, one in zip(
+                    camera.expose_fields(scene, laid, state.start, check), surfaces, strict=True
+                )
             )
 
-        key = self._exposure_key(knobs)
-        return kept.get((key, both) if coarse else key, make)
+        key = self._exposure_key(state)
+        if quick:
+            return self._quick_exposures.get((key, both), make)
+        return self._exposures.get(key, make)
 
-    def _scene_image(
-        self, study: Study, knobs: Knobs, exposure: Exposure, coarse: bool
-    ) -> SceneImage:
-        index = _middle_frame(self.opened.scene, knobs)
-        of_surface = knobs.shown in ("radiance_temperature", "emissivity")
-        seen = (self._exposure_key(knobs), exposure.raster.shape) if of_surface else ()
-        exact, quick = ((index, knobs.shown, seen, few) for few in (False, True))
-        few = coarse and exact not in self._images
-        scene = self._glimpsed if few else self._displayed
+    def _error_images(
+        self, camera: Camera, exposure: Exposure, state: State, quick: bool
+    ) -> ErrorImages:
+        """Return the error images, of which the stages before the changed control are kept."""
+        reference = state.study.analysis.reference
+        unblurred: Unblurred = self._unblurred.get(
+            (self._key(state, "pixels"), quick), lambda: Unblurred.of(camera, exposure, reference)
+        )
+        formed: Array = self._formed.get(
+            (self._key(state, "optics"), quick),
+            lambda: camera.form_image(exposure.mean_radiance, exposure.raster),
+        )
+        return self._errors.get(
+            (self._key(state, "reading"), quick),
+            lambda: replace(unblurred, camera=camera).errors(formed),
+        )
+
+    def _scene_image(self, state: State, exposure: Exposure, quick: bool) -> SceneImage:
+        """Return the image of the scene in the middle of the exposure."""
+        index, name = _middle_frame(self.opened.scene, state), state.scene_image
+        of_surface = name in ("radiance_temperature", "emissivity")
+        shown = (self._exposure_key(state), exposure.raster.shape) if of_surface else ()
+        exact, coarser = ((index, name, shown, few) for few in (False, True))
+        few = quick and exact not in self._images
+        scene = self._displayed_quick if few else self._displayed
 
         def make() -> SceneImage:
-            values = self._shown(study, knobs, exposure, scene, index)
+            values = self._scene_values(state, exposure, scene, index)
             void = scene.field("material", index) == Material.VOID
             values = np.where(void, np.nan, values).astype(np.float32)
-            return SceneImage(knobs.shown, values, scene.raster)
+            return SceneImage(name, values, scene.raster)
 
-        return self._images.get(quick if few else exact, make)
+        return self._images.get(coarser if few else exact, make)
 
-    def _shown(
-        self, study: Study, knobs: Knobs, exposure: Exposure, scene: Scene, index: int
+    def _scene_values(
+        self, state: State, exposure: Exposure, scene: Scene, index: int
     ) -> NDArray[np.floating]:
-        if knobs.shown == "speed":
-            velocity = (scene.field(f"velocity_{axis}", index) for axis in "xy")
-            return np.asarray(np.hypot(*velocity))
-        camera = self._camera(study, scene)
-        if knobs.shown == "emissivity":
-            _, surface = self._on(study, knobs, coarse=False)
-            return camera.lay(surface, scene).emissivity(scene.frame(index))
-        if knobs.shown == "radiance_temperature":
+        if state.scene_image == "speed":
+            return np.asarray(np.hypot(*(scene.field(f"velocity_{xy}", index) for xy in "xy")))
+        if state.scene_image == "emissivity":
+            _, surface = self._on(state, quick=False)
+            return self._camera(state, scene).lay(surface, scene).emissivity(scene.frame(index))
+        if state.scene_image == "radiance_temperature":
             places = np.stack(np.meshgrid(scene.raster.x, scene.raster.y), axis=-1)
-            seen = nearest(exposure.centre_radiance, exposure.raster, places)
-            return np.asarray(camera.band.temperature(seen))
-        return scene.field(knobs.shown, index)
+            radiance = nearest(exposure.centre_radiance, exposure.raster, places)
+            return np.asarray(self._camera(state, scene).band.temperature(radiance))
+        return scene.field(state.scene_image, index)
 
-    def _middle(self, knobs: Knobs) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Temperature and emissivity of all samples in the middle of the exposure; NaN for void."""
-        study = self.panel.study_of(knobs)
-        scene, surface = self._on(study, knobs, coarse=False)
-        index = _middle_frame(scene, knobs)
+    def _middle(self, state: State) -> list[NDArray[np.float32]]:
+        """Return temperature and emissivity in the middle of the exposure; NaN without material."""
+        scene, surface = self._on(state, quick=False)
+        index = _middle_frame(scene, state)
 
-        def make() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        def make() -> list[NDArray[np.float32]]:
             frame = scene.frame(index)
-            camera = self._camera(study, scene)
+            emissivity = self._camera(state, scene).lay(surface, scene).emissivity(frame)
             void = frame.material == Material.VOID
-            emissivity = camera.lay(surface, scene).emissivity(frame)
-            temperature, emissivity = (
-                np.where(void, np.float32(nan), values)
-                for values in (frame.temperature, emissivity)
-            )
-            return temperature, emissivity
+            fields = (frame.temperature, emissivity)
+            return [np.where(void, np.float32(nan), values) for values in fields]
 
-        return self._frames.get((index, self._exposure_key(knobs)), make)
+        return self._frames.get((index, self._exposure_key(state)), make)
 
 
 class MeasurementModel:
-    """Pictures of a measurement: its frames, without any knob of a camera.
-
-    Parameters
-    ----------
-    opened : OpenedMeasurement
-        The measurement.
-    """
+    """Pictures of a measurement: its frames."""
 
     has_quick_look = False
 
     def __init__(self, opened: OpenedMeasurement) -> None:
         self.opened = opened
-        self.panel: ControlPanel = opened.panel
+        self.controls: Controls = opened.controls
 
-    def turned(self, knobs: Knobs, texts: Mapping[str, str]) -> Knobs:
-        """Knobs with some of them set by their text; raises as that of a scene."""
-        return self.panel.changed(knobs, texts)
+    def changed(self, state: State, texts: dict[str, str]) -> State:
+        """Return the state with some controls at other values."""
+        return self.controls.changed(state, texts)
 
-    def is_ready(self, knobs: Knobs) -> bool:
-        """Whether a picture is a matter of milliseconds: always."""
+    def is_ready(self, state: State) -> bool:
+        """Whether the exact picture takes milliseconds: always."""
         return True
 
-    def picture(self, knobs: Knobs, quick: bool = False, check: Check | None = None) -> Picture:
-        """The frame that began nearest to the knobs' start."""
-        measurement, index = self.opened.measurement, self._index(knobs)
+    def picture(self, state: State, quick: bool = False, check: Check | None = None) -> Picture:
+        """Return the frame that began nearest to the state's start."""
+        measurement, index = self.opened.measurement, self._index(state)
         measured = np.asarray(measurement.data["radiance_temperature"][index].values, np.float64)
-        raster = measurement.raster
-        lines = {}
+        raster, lines = measurement.raster, {}
         for name in LINES:
-            line = LinePlace(name, getattr(knobs, name)).line(raster.spacing)
-            values = sample(measured, raster, line.points)
-            lines[name] = LineValues(line.distance, values, None, None)
-        return Picture(
-            knobs=knobs,
-            raster=raster,
-            measured=measured,
-            flagged=~measurement.usable[index],
-            lines=lines,
-        )
+            line = LinePlace(name, state.line(name)).line(raster.spacing)
+            lines[name] = LineValues(line.distance, sample(measured, raster, line.points))
+        return Picture(state, raster, measured, ~measurement.usable[index], lines)
 
     def readout(self, picture: Picture) -> Readout:
-        """The measured temperature at the cursor, with what the calibration leaves uncertain."""
-        at, raster = picture.knobs.cursor, picture.raster
+        """Return the measured temperature at the cursor with its calibration's uncertainty."""
+        at, raster = picture.state.cursor, picture.raster
         measured = float(nearest(picture.measured, raster, at))
-        uncertainty, source = nan, ""
-        measurement, index = self.opened.measurement, self._index(picture.knobs)
-        if measurement.calibration_errors is not None:
-            effects = measurement.calibration_effects(index)
-            estimate = measurement.estimate(picture.measured[None], effects[None])
-            image = estimate.standard_uncertainty[0]
-            uncertainty, source = float(nearest(image, raster, at)), "calibration"
         flagged = bool(nearest(picture.flagged, raster, at) == 1.0)
-        return Readout(measured, uncertainty, source, flagged, nan, nan, nan, None)
+        measurement, index = self.opened.measurement, self._index(picture.state)
+        if measurement.calibration_errors is None:
+            return Readout(measured, flagged=flagged)
+        effects = measurement.calibration_effects(index)
+        estimate = measurement.estimate(picture.measured[None], effects[None])
+        uncertainty = float(nearest(estimate.standard_uncertainty[0], raster, at))
+        return Readout(measured, uncertainty, "calibration", flagged)
 
-    def _index(self, knobs: Knobs) -> int:
-        return int(np.abs(self.opened.measurement.times - knobs.start).argmin())
+    def _index(self, state: State) -> int:
+        return int(np.abs(self.opened.measurement.times - state.start).argmin())
 
 
-def model_of(opened: OpenedScene | OpenedMeasurement) -> SceneModel | MeasurementModel:
-    """The model of what is open."""
+Model: TypeAlias = SceneModel | MeasurementModel
+
+
+def model_of(opened: Opened) -> Model:
+    """Return the model of what is open."""
     if isinstance(opened, OpenedMeasurement):
         return MeasurementModel(opened)
     return SceneModel(opened)
 
 
-def line_values(errors: ErrorImages, knobs: Knobs) -> dict[str, LineValues]:
-    """Temperatures along both lines of the knobs."""
-    found = {}
+def line_values(errors: ErrorImages, state: State) -> dict[str, LineValues]:
+    """Return the temperatures along both lines."""
+    values = {}
     for name in LINES:
-        place = LinePlace(name, getattr(knobs, name))
-        reference, error, portion = place.profile(errors)
-        distance = place.line(errors.raster.spacing).distance
-        found[name] = LineValues(distance, reference + error, reference, portion)
-    return found
+        place = LinePlace(name, state.line(name))
+        reference, error, _ = place.profile(errors)
+        values[name] = LineValues(
+            place.line(errors.raster.spacing).distance, reference + error, reference
+        )
+    return values
 
 
-def knobs_key(knobs: Knobs) -> Knobs:
-    """The knobs without those that no image of the camera depends on."""
-    none = (0.0, 0.0)
-    return replace(
-        knobs, shown="", error="", cursor=none, rake_line=(none, none), band_line=(none, none)
-    )
-
-
-def _surface_key(knobs: Knobs) -> Hashable:
-    own = knobs.body_mean, knobs.body_deviation, knobs.band_mean, knobs.band_deviation
-    return knobs.surface, own, knobs.emissivity, knobs.seed
-
-
-def _middle_frame(scene: Scene, knobs: Knobs) -> int:
-    """Number of the frame that stands for the middle of the exposure."""
-    middle = knobs.start + knobs.integration_time / 2 + 1e-6 * scene.frame_spacing
+def _middle_frame(scene: Scene, state: State) -> int:
+    """Return the index of the frame in the middle of the exposure."""
+    duration = state.study.camera.integration_time
+    middle = state.start + duration / 2 + 1e-6 * scene.frame_spacing
     return max(int(np.searchsorted(scene.times, middle, side="right")) - 1, 0)
-
-
-def _line_band(rows: list[LineValues]) -> LineBand:
-    measured = np.array([row.measured for row in rows])
-    reference = np.array([row.reference for row in rows])
-    return LineBand(measured, measured - reference)

@@ -1,16 +1,15 @@
-"""What the app opens: a scene, a folder of results, a measurement, or the scene that it brings."""
+"""What the app opens: a scene, a folder of results, a measurement, or the bundled scene."""
 
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, sqrt
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from chipglow.analysis.starts import spread_starts
-from chipglow.app.knobs import ControlPanel, Ends, Point, knobs_of
+from chipglow.analysis import spread_starts
+from chipglow.app.controls import CURSOR, LINES, Controls, Corners, Point, rounded
 from chipglow.app.probing import probed
 from chipglow.camera import Measurement
 from chipglow.io import StoredScene, example_scene, is_measurement, open_scene, read_measurement
@@ -22,49 +21,40 @@ from chipglow.surface import UniformEmissivity
 
 BUNDLED: Final = "bundled scene"
 QUICK_SAMPLES: Final = 35_000
-"""Samples of a frame up to which a picture is computed at once, without a coarse one before."""
+"""Samples of a frame up to which a picture is computed at once, without a coarser one before."""
 
 MOST_UPLOADED: Final = 512 * 1024**2
-"""Bytes that a file may have which is uploaded."""
+"""Maximum size of an uploaded file in bytes."""
 
 _REACH: Final = 60e-6
-"""Reach of the lines to either side of rake face and shear band in m: the paper's."""
+"""Half the length of the lines across rake face and shear band in m: the paper's."""
 
 _PATIENCE: Final = 4.0
-"""Times as long as an import may take to answer: the server has other work besides."""
+"""Factor on the time that reading an upload may take: the server has other work."""
 
 _TOUCHING: Final = 3e-6
-_ROUNDED: Final = 1e-7
+
+Places: TypeAlias = tuple[Point, Corners, Corners]
+"""Cursor, line across the rake face and line across the shear band."""
 
 
 @dataclass(frozen=True, eq=False)
 class OpenedScene:
-    """A scene, and the study whose camera looks at it.
+    """A scene and the controls of its study.
 
-    Parameters
-    ----------
-    name : str
-        What the page calls it.
-    scene : Scene
-        What is truly there.
-    coarse : Scene or None
-        The same with fewer samples, for a quick look; None where that is not needed or not to be
-        had.
-    panel : ControlPanel
-        The knobs, and the study that they change.
-    from_file : bool
-        Whether the scene is a file that stays where it is, and a study can name it.
+    `coarse` is the same scene with fewer samples, for a quick look; None where that is not needed
+    or not possible. `from_file` marks a scene whose file a study can name.
     """
 
     name: str
     scene: Scene
     coarse: Scene | None
-    panel: ControlPanel
+    controls: Controls
     from_file: bool = False
 
     @classmethod
-    def of(cls, scene: Scene, study: Study, name: str) -> "OpenedScene":
-        """A scene as a study sees it first: in an exposure in its middle.
+    def of(cls, scene: Scene, study: Study, name: str, from_file: bool = False) -> "OpenedScene":
+        """Open a scene in an exposure in its middle.
 
         Raises
         ------
@@ -74,82 +64,63 @@ class OpenedScene:
         if "plastic_strain" not in scene.fields and study.surface == Study().surface:
             study = study.model_copy(update={"surface": UniformEmissivity(0.5)})
         duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
-        start = _start(scene, duration)
-        place = _places(scene, start, study.camera.integration_time)
-        initial = knobs_of(study, start, *place)
+        starts = spread_starts(scene, duration, 3)
+        start = rounded(starts[len(starts) // 2])
+        places = _scene_places(scene, start, study.camera.integration_time)
+        controls = Controls.of_scene(_with_places(study, places), scene, start, duration)
         coarse = with_samples(scene, QUICK_SAMPLES, fewer_frames=True)
-        panel = ControlPanel.of(study, scene, initial, duration)
-        return cls(name, scene, None if coarse is scene else coarse, panel)
+        return cls(name, scene, None if coarse is scene else coarse, controls, from_file)
 
 
 @dataclass(frozen=True, eq=False)
 class OpenedMeasurement:
-    """A measurement: no truth, and no camera whose knobs could be turned.
-
-    Parameters
-    ----------
-    name : str
-        What the page calls it.
-    measurement : Measurement
-        Its frames.
-    """
+    """A measurement; its only control is the frame."""
 
     name: str
     measurement: Measurement
 
     @property
-    def panel(self) -> ControlPanel:
-        """The one knob, the time, and lines across the middle."""
-        place = _middle(self.measurement.raster)
-        initial = knobs_of(Study(), float(self.measurement.times[0]), *place)
-        return ControlPanel.of_times(initial, self.measurement.times, self.measurement.raster)
+    def controls(self) -> Controls:
+        """Controls with cursor and lines through the hottest pixel of the first frame."""
+        measurement, raster = self.measurement, self.measurement.raster
+        first = np.asarray(measurement.data["radiance_temperature"][0].values, np.float64)
+        usable = np.where(measurement.usable[0], first, -np.inf)
+        row, column = np.unravel_index(int(np.argmax(usable)), usable.shape)
+        hottest = (float(raster.x[column]), float(raster.y[row]))
+        places = _through(raster, hottest if np.isfinite(usable).any() else None)
+        return Controls.of_measurement(_with_places(Study(), places), measurement.times, raster)
 
 
-def open_any(
-    path: str | Path | None, study: Study | None = None
-) -> OpenedScene | OpenedMeasurement:
-    """Open what a path names; without one the scene that comes with the app.
+Opened: TypeAlias = OpenedScene | OpenedMeasurement
 
-    Parameters
-    ----------
-    path : path-like, optional
-        A scene or a measurement, or a folder of results whose scene is in the cache.
-    study : Study, optional
-        Surface and camera of a scene; the paper's by default.
+
+def open_any(path: str | Path | None, study: Study | None = None) -> Opened:
+    """Open a scene, a measurement or a folder of results; without a path the bundled scene.
 
     Raises
     ------
     FileNotFoundError
         If it is not there.
     ValueError
-        If it is nothing of that; the message names it.
+        If it is none of these; the message names it.
     """
     if path is None:
-        opened = OpenedScene.of(example_scene(), study or Study(), BUNDLED)
-        return replace(opened, from_file=True)
+        return OpenedScene.of(example_scene(), study or Study(), BUNDLED, from_file=True)
     path = Path(path)
     if path.is_dir():
         return _results(path)
     if is_measurement(path):
         return OpenedMeasurement(path.name, read_measurement(path))
-    opened = OpenedScene.of(open_scene(path), study or Study(), path.name)
-    return replace(opened, from_file=True)
+    return OpenedScene.of(open_scene(path), study or Study(), path.name, from_file=True)
 
 
-def open_uploaded(path: Path, name: str) -> OpenedScene | OpenedMeasurement:
-    """Open a file that came over the network: first in a subprocess, which it may break.
-
-    Parameters
-    ----------
-    path : Path
-        Where it is.
-    name : str
-        What its owner calls it.
+def open_uploaded(path: Path, name: str) -> Opened:
+    """Open an uploaded file by the name that its owner gave it: first in a subprocess.
 
     Raises
     ------
     ValueError
-        If it cannot be read, or asks for more time or memory than an import may have.
+        If it cannot be read, or takes more time or memory than an import may.
     """
     patience = _PATIENCE * patience_for((str(path),))
     with Sandbox(name, patience).answers(partial(probed, path, name)) as answers:
@@ -163,8 +134,19 @@ def open_uploaded(path: Path, name: str) -> OpenedScene | OpenedMeasurement:
     return replace(opened, name=name, from_file=False)
 
 
+def with_samples(scene: Scene, count: int, fewer_frames: bool = False) -> Scene:
+    """Return a spline scene with at most `count` samples a frame; others as they are.
+
+    With fewer frames, time is coarser by the same factor.
+    """
+    step = ceil(sqrt(scene.raster.rows * scene.raster.columns / count))
+    if step < 2 or not isinstance(scene, StoredScene) or scene.lattice is None:
+        return scene
+    return scene.coarser(step, step if fewer_frames else 1)
+
+
 def _results(folder: Path) -> OpenedScene:
-    """The scene of a folder of results, with the study beside it."""
+    """Open the scene of a folder of results with its study."""
     file = folder / "study.yaml"
     if not file.is_file():
         raise FileNotFoundError(f"{folder}: holds no study.yaml, expected a folder of results")
@@ -179,29 +161,21 @@ def _results(folder: Path) -> OpenedScene:
     return OpenedScene.of(open_scene(cut(study)), study, folder.name)
 
 
-def with_samples(scene: Scene, most: int, fewer_frames: bool = False) -> Scene:
-    """The scene with so many samples a frame at most, if it is one of splines; else as it is.
+def _with_places(study: Study, places: Places) -> Study:
+    """Return a study whose places are the cursor and the lines."""
+    cursor, *lines = places
+    analysis = study.analysis.model_copy(
+        update={"points": {CURSOR: cursor}, "lines": dict(zip(LINES.values(), lines, strict=True))}
+    )
+    return study.model_copy(update={"analysis": analysis})
 
-    With fewer frames time is as much coarser as places are.
+
+def _scene_places(scene: Scene, start: float, duration: float) -> Places:
+    """Return a cursor on the rake face and lines across it and across the shear band.
+
+    For a scene without them: its middle and lines through it.
     """
-    step = ceil(sqrt(scene.raster.rows * scene.raster.columns / most))
-    if step < 2 or not isinstance(scene, StoredScene) or scene.lattice is None:
-        return scene
-    return scene.coarser(step, step if fewer_frames else 1)
-
-
-def _start(scene: Scene, duration: float) -> float:
-    """When the exposure begins in the middle of the scene's longest part."""
-    starts = spread_starts(scene, duration, 3)
-    return float(f"{starts[len(starts) // 2]:.9g}")
-
-
-def _places(scene: Scene, start: float, duration: float) -> tuple[Point, Ends, Ends]:
-    """A cursor on the rake face, and lines across it and across the shear band.
-
-    Of a scene without them: its middle, and lines through that.
-    """
-    cursor, rake, band = _middle(scene.raster)
+    cursor, rake, band = _through(scene.raster)
     tool = scene.tool
     if tool is None:
         return cursor, rake, band
@@ -210,27 +184,25 @@ def _places(scene: Scene, start: float, duration: float) -> tuple[Point, Ends, E
     contact = contact_length(scene.raster, workpiece, tool, _TOUCHING)
     if contact > 0:
         middle, normal = tool.rake_point(contact / 2), np.asarray(tool.rake_normal)
-        cursor = _point(middle)
-        rake = (_point(middle - _REACH * normal), _point(middle + _REACH * normal))
+        cursor = _point(*middle)
+        rake = _point(*(middle - _REACH * normal)), _point(*(middle + _REACH * normal))
     if "plastic_strain_rate" in scene.fields:
-        found = Instant.at(scene, start, duration).band
-        if found is not None:
-            first, _, last = found.across(_REACH, _REACH).points
-            band = (_point(first), _point(last))
+        ridge = Instant.at(scene, start, duration).band
+        if ridge is not None:
+            first, _, last = ridge.across(_REACH, _REACH).points
+            band = _point(*first), _point(*last)
     return cursor, rake, band
 
 
-def _middle(raster: Raster) -> tuple[Point, Ends, Ends]:
-    """A cursor in the middle of an image, and lines across it and up it."""
+def _through(raster: Raster, place: Point | None = None) -> Places:
+    """Return a cursor at a place, by default the image's middle, and lines through it."""
     left, right, bottom, top = raster.extent
-    x, y = (left + right) / 2, (bottom + top) / 2
+    x, y = place or ((left + right) / 2, (bottom + top) / 2)
     across, up = 0.4 * (right - left), 0.4 * (top - bottom)
-    points = ((x, y), (x - across, y), (x + across, y), (x, y - up), (x, y + up))
-    cursor, *ends = (_point(np.array(one)) for one in points)
-    return cursor, (ends[0], ends[1]), (ends[2], ends[3])
+    rake = _point(max(x - across, left), y), _point(min(x + across, right), y)
+    return _point(x, y), rake, (_point(x, max(y - up, bottom)), _point(x, min(y + up, top)))
 
 
-def _point(place: NDArray[np.float64]) -> Point:
-    """A place to a tenth of a micrometre, as links write it."""
-    x, y = (round(float(one) / _ROUNDED) * _ROUNDED for one in place)
-    return float(f"{x:.12g}"), float(f"{y:.12g}")
+def _point(x: float, y: float) -> Point:
+    """Round a position to a tenth of a micrometre, as links write it."""
+    return round(float(x), 7), round(float(y), 7)

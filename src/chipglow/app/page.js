@@ -1,70 +1,62 @@
-// The page of the app: what stands around its figures. What it shows comes from Python in messages
-// of a kind and a content; what the user does goes back in messages, too.
+// The page of the app around its figures. Its content comes from Python in messages of a kind and a
+// content; what the user does goes back in messages.
 
-const FIGURES = ["scene", "measured", "error", "rake_line", "band_line"];
 const BORDER = 46, GAP = 18, LEAST_FRAME = 180;
-const NARROW = 888; // pixels of the part beside the knobs, which are 292 wide
+const NARROW = 888; // width in pixels of the part beside the controls, which are 292 wide
+const VIEW_WIDTH = 160; // µm
+const GRIP = 12; // pixels
 
 export function render({ view, model, el }) {
   const spec = JSON.parse(model.spec);
-  const page = document.createElement("div");
-  page.className = "app";
-  el.style.width = "100%";
+  const extent = spec.extent;
+  const figures = model.get_child("figures");
+  const page = element("div", { class: "app" });
   const controls = new Map();
-  let sent = 0;
-
-  const send = (message) => {
-    sent += 1;
-    model.send_msg({ n: sent, ...message });
-    return sent;
-  };
-
-  // A knob that moves sends at most once for each picture of the screen.
-  let waiting = null;
-  const turn = (name, text, final) => {
-    if (final) {
-      waiting = null;
-      controls.get(name).sent = send({ turn: { [name]: text }, final: true });
-      return;
-    }
-    const first = waiting === null;
-    waiting = { [name]: text };
-    controls.get(name).sent = Infinity;
-    if (first) {
-      requestAnimationFrame(() => {
-        if (waiting === null) return;
-        const turned = waiting;
-        waiting = null;
-        const n = send({ turn: turned, final: false });
-        for (const one of Object.keys(turned)) controls.get(one).sent = n;
-      });
-    }
-  };
-
+  el.style.width = "100%";
   page.append(header(), aside(), main());
   el.append(page);
+  const find = (selector) => page.querySelector(selector);
+  const named = (name) => view.model.document.get_model_by_name(name);
 
   function element(tag, attributes = {}, ...children) {
     const made = document.createElement(tag);
     for (const [key, value] of Object.entries(attributes)) {
       if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
       else if (value === true) made.setAttribute(key, "");
-      else if (value !== false && value !== null) made.setAttribute(key, value);
+      else if (value !== false && value != null) made.setAttribute(key, value);
     }
     made.append(...children);
     return made;
   }
-
   function button(text, click, attributes = {}) {
     return element("button", { type: "button", onclick: click, ...attributes }, text);
   }
 
+  // Messages to Python. A moving control sends once per frame of the screen at most.
+
+  let sent = 0, waiting = null;
+  function send(kind, content = null) {
+    sent += 1;
+    model.send_msg({ n: sent, kind, content });
+    return sent;
+  }
+  function change(path, text, final) {
+    const entry = controls.get(path);
+    const asked = waiting !== null;
+    waiting = final ? null : { [path]: text };
+    entry.sent = final ? send("change", { [path]: text }) : Infinity;
+    if (final || asked) return;
+    requestAnimationFrame(() => {
+      if (waiting === null) return;
+      const n = send("move", waiting);
+      for (const one of Object.keys(waiting)) controls.get(one).sent = n;
+      waiting = null;
+    });
+  }
+
+  // Controls.
+
   function header() {
-    const bar = element("header", {});
-    bar.append(
-      element("h1", {}, "chipglow"),
-      element("span", { class: "name", title: spec.name }, spec.name),
-    );
     const actions = element("div", { class: "actions", role: "toolbar", "aria-label": "Files and view" });
     if (spec.uploads) {
       const file = element("input", {
@@ -73,78 +65,72 @@ export function render({ view, model, el }) {
       });
       actions.append(file, button("Open…", () => file.click(), { title: "A scene or a measurement, NetCDF" }));
     }
-    if (spec.knobs.length > 1) {
-      actions.append(
-        button("study.yaml", () => send({ save: "study" }), { title: "Save what is set as a study" }),
-        button("Figure", () => send({ save: "figure" }), { title: "Save the images and lines as PNG" }),
-        button("NetCDF", () => send({ save: "netcdf" }), { title: "Save the measurement and its error" }),
-      );
+    for (const [name, text, title] of spec.saves) {
+      actions.append(button(text, () => send("save", name), { title }));
     }
-    actions.append(button("Undo", () => send({ undo: true }), { id: "undo", title: "Ctrl+Z" }));
+    actions.append(
+      button("Undo", () => send("undo"), { id: "undo", title: "Ctrl+Z" }),
+      button("Redo", () => send("redo"), { id: "redo", title: "Ctrl+Y" }));
     if (!spec.embedded) {
       actions.append(button("Copy link", copyLink, { title: "A link that restores this state" }));
     }
-    actions.append(button("Dark", toggleTheme, { id: "theme" }));
-    bar.append(actions);
-    return bar;
+    actions.append(button("Dark", () => setTheme(theme === "dark" ? "light" : "dark"), { id: "theme" }));
+    return element("header", {}, element("h1", {}, "chipglow"),
+      element("span", { class: "name", title: spec.name }, spec.name), actions);
   }
 
   function aside() {
-    const column = element("aside", { "aria-label": "Knobs" });
-    let group = null;
-    for (const knob of spec.knobs) {
-      if (group?.title !== knob.group) {
-        const box = element("fieldset", {}, element("legend", {}, knob.group));
-        group = { title: knob.group, box };
-        column.append(box);
+    const column = element("aside", { "aria-label": "Controls" });
+    let title = null;
+    for (const row of spec.rows) {
+      if (row.group !== title) {
+        title = row.group;
+        column.append(element("fieldset", {}, element("legend", {}, title)));
       }
-      group.box.append(control(knob));
-      if (knob.name === "start" && knob.stops.length > 1) group.box.append(player(knob));
+      column.lastChild.append(control(row));
+      if (row.stops.length > 1) column.lastChild.append(player(row.path));
     }
     return column;
   }
 
-  function control(knob) {
-    const id = `knob-${knob.name}`;
-    const row = element("div", { class: "knob", "data-knob": knob.name });
-    const entry = { knob, row, sent: 0, text: "", typing: false };
-    controls.set(knob.name, entry);
-    const label = element("label", { for: id }, knob.label);
-    if (knob.choices) {
-      const options = knob.choices.map(([value, text]) => element("option", { value }, text));
-      entry.field = element("select", { id, onchange: () => turn(knob.name, entry.field.value, true) }, ...options);
-      row.classList.add("choice");
-      row.append(label, entry.field);
-      return row;
+  function control(row) {
+    const id = `control-${row.path}`;
+    const label = element("label", { for: id }, row.label);
+    const box = element("div", { class: "control" }, label);
+    const entry = { row, box, sent: 0, text: "", typing: false };
+    controls.set(row.path, entry);
+    if (row.options) {
+      const options = row.options.map(([value, text]) => element("option", { value }, text));
+      entry.field = element("select", { id, onchange: () => change(row.path, entry.field.value, true) }, ...options);
+      box.classList.add("choice");
+      box.append(entry.field);
+      return box;
     }
-    entry.field = entryField(entry, { id, inputmode: "decimal", placeholder: knob.optional ? "none" : null });
-    row.append(label, element("span", { class: "value" }, entry.field, element("span", { class: "unit" }, knob.unit)));
-    const stepped = knob.stops.length > 1;
-    if (!knob.stops.length || stepped) {
-      const [min, max, step] = stepped ? [0, knob.stops.length - 1, 1] : [knob.low, knob.high, knob.step];
-      const text = () => String(stepped ? knob.stops[entry.slider.value] : Number(Number(entry.slider.value).toPrecision(9)));
-      const moved = (final) => {
-        entry.field.value = text();
-        entry.slider.setAttribute("aria-valuetext", `${text()} ${knob.unit}`);
-        turn(knob.name, text(), final);
-      };
-      entry.slider = element("input", {
-        type: "range", min, max, step, "aria-label": knob.label,
-        oninput: () => moved(false), onchange: () => moved(true),
-      });
-      row.append(entry.slider);
-    }
-    return row;
+    textField(entry, { id, inputmode: "decimal", placeholder: row.optional ? "none" : null });
+    box.append(element("span", { class: "value" }, entry.field, element("span", { class: "unit" }, row.unit)));
+    if (row.stops.length === 1) return box;
+    const [min, max, step] = row.stops.length ? [0, row.stops.length - 1, 1] : [row.low, row.high, row.step];
+    const moved = (final) => {
+      const at = Number(entry.slider.value);
+      setText(entry, row.stops.length ? row.stops[at] : Number(at.toPrecision(9)));
+      change(row.path, entry.field.value, final);
+    };
+    entry.slider = element("input", {
+      type: "range", min, max, step, "aria-label": row.label,
+      oninput: () => moved(false), onchange: () => moved(true),
+    });
+    box.append(entry.slider);
+    return box;
   }
 
-  // What is being typed stays, whatever comes from Python meanwhile.
-  function entryField(entry, attributes) {
-    return element("input", {
+  // A text that is being typed stays, whatever comes from Python meanwhile.
+  function textField(entry, attributes) {
+    entry.field = element("input", {
       type: "text", autocomplete: "off", spellcheck: "false", ...attributes,
       oninput: () => { entry.typing = true; },
       onchange: () => {
         entry.typing = false;
-        turn(entry.knob.name, entry.field.value, true);
+        change(entry.row.path, entry.field.value, true);
       },
       onblur: () => {
         if (entry.typing) entry.field.value = entry.text;
@@ -152,99 +138,161 @@ export function render({ view, model, el }) {
       },
     });
   }
-
-  function setControl(entry, text) {
-    const { knob, field, slider } = entry;
-    entry.text = text;
-    if (!entry.typing) {
-      field.removeAttribute("aria-invalid");
-      field.value = text;
-    }
-    if (!slider) return;
-    let at = Number(text === "" ? knob.low : text);
-    if (knob.stops.length > 1) {
-      at = knob.stops.reduce((best, one, i) => Math.abs(one - at) < Math.abs(knob.stops[best] - at) ? i : best, 0);
-    }
-    slider.value = at;
-    slider.setAttribute("aria-valuetext", text === "" ? "none" : `${text} ${knob.unit}`);
+  function setText(entry, text) {
+    entry.field.value = text;
+    entry.slider.setAttribute("aria-valuetext", text === "" ? "none" : `${text} ${entry.row.unit}`);
   }
 
-  // The player steps on when the page has painted the picture before.
-  let playing = false;
-  let stepped = 0;
-  function player(knob) {
+  function placeField(name, label) {
+    const entry = { row: { path: name }, sent: 0, text: "", typing: false };
+    controls.set(name, entry);
+    textField(entry, { id: `place-${name}` });
+    return element("span", { class: "place" }, element("label", { for: `place-${name}` }, label), entry.field);
+  }
+
+  // The player goes on when the page has painted the picture before.
+  let playing = false, stepped = 0;
+  function player(path) {
     const play = button("Play", () => {
       playing = !playing;
       play.textContent = playing ? "Pause" : "Play";
-      if (playing) step(knob, 1);
+      if (playing) step(path, 1);
     }, { id: "play" });
     return element("div", { class: "player" },
-      button("◀", () => step(knob, -1), { "aria-label": "One frame back" }), play,
-      button("▶", () => step(knob, 1), { "aria-label": "One frame on" }));
+      button("◀", () => step(path, -1), { "aria-label": "One frame back" }), play,
+      button("▶", () => step(path, 1), { "aria-label": "One frame on" }));
   }
-  function step(knob, by) {
-    const { slider, field } = controls.get(knob.name);
-    const count = knob.stops.length;
+  function step(path, by) {
+    const { slider, row } = controls.get(path);
+    const count = row.stops.length;
     slider.value = (Number(slider.value) + by + count) % count;
     stepped = performance.now();
-    field.value = knob.stops[slider.value];
-    slider.setAttribute("aria-valuetext", `${field.value} ${knob.unit}`);
-    turn(knob.name, field.value, !playing);
+    slider.dispatchEvent(new Event(playing ? "input" : "change"));
   }
 
   function main() {
-    const area = element("main", {});
-    const zooms = element("div", { class: "zooms", role: "toolbar", "aria-label": "View" });
-    for (const [name, text] of spec.views) zooms.append(button(text, () => send({ view: name })));
-    zooms.append(place("cursor", "Cursor x, y / µm"));
-    zooms.append(element("span", { class: "hint" }, "Drag: cursor, line, view. Wheel: zoom. Grey: out of range."));
-    const images = element("div", { class: "images" });
+    const views = element("div", { class: "views", role: "toolbar", "aria-label": "View" });
+    for (const [name, text] of spec.views) views.append(button(text, () => showView(name)));
+    views.append(placeField("cursor", "Cursor x, y / µm"),
+      element("span", { class: "hint" }, "Drag: cursor, line, view. Wheel: zoom. Grey: out of range."));
+    const images = element("div", { class: "images", onpointerdown: grip });
     const below = element("div", { class: "below" });
-    for (const name of FIGURES) {
-      const child = model.get_child(`${name}_figure`);
-      if (!child || !spec.figures.includes(name)) continue;
-      const cell = element("div", { class: "figure", id: `figure-${name}`, role: "group", "aria-label": spec.titles[name] }, child);
-      if (!name.endsWith("_line")) { images.append(cell); continue; }
-      cell.append(place(name, "Ends x, y / µm"));
+    spec.figures.forEach(([name, title], i) => {
+      const cell = element("div", { class: "figure", id: `figure-${name}`, role: "group", "aria-label": title }, figures[i]);
+      if (spec.images.includes(name)) { images.append(cell); return; }
+      cell.append(placeField(name, "Ends x, y / µm"));
       below.append(cell);
-    }
+    });
     below.append(element("section", { class: "numbers", "aria-label": "Numbers at the cursor" }));
     const status = element("div", { class: "status" },
       element("span", { id: "status", role: "status" }),
       element("progress", { id: "progress", max: 1, hidden: true, "aria-label": "Progress" }));
     if (spec.draws) {
       status.append(
-        button("Draw phases and textures", () => send({ draw: true }), { id: "draw", title: spec.draws }),
-        button("Cancel", () => send({ cancel: true }), { id: "cancel", hidden: true }));
+        button("Draw phases and textures", () => send("draw"), { id: "draw", title: spec.draws }),
+        button("Cancel", () => send("cancel"), { id: "cancel", hidden: true }));
     }
-    area.append(zooms, images, below, status);
-    return area;
+    return element("main", {}, views, images, below, status);
   }
 
-  function place(name, label) {
-    const id = `place-${name}`;
-    const row = element("span", { class: "place" });
-    const entry = { knob: { name, unit: "", stops: [] }, row, sent: 0, text: "", typing: false };
-    entry.field = entryField(entry, { id });
-    controls.set(name, entry);
-    row.append(element("label", { for: id }, label), entry.field);
-    return row;
+  // Places on the images: the cursor, the lines and the view are dragged; a click sets the cursor.
+
+  const points = (name) => controls.get(name).text.split(";").map((one) => one.split(",").map(Number));
+  function setPlaces(name, places) {
+    const [x, y] = [0, 1].map((axis) => places.map((one) => one[axis]));
+    named(name)?.setv({ data: { x, y } }, { sync: false });
+  }
+  function clamped(x, y) {
+    return [Math.min(Math.max(x, extent[0]), extent[1]), Math.min(Math.max(y, extent[2]), extent[3])];
   }
 
-  const find = (selector) => page.querySelector(selector);
-  const found = (name) => view.model.document.get_model_by_name(name);
-
-  // What comes from Python.
-
-  function showValues({ n, values, visible, can_undo, link }) {
-    for (const [name, text] of Object.entries(values)) {
-      const entry = controls.get(name);
-      if (entry && entry.sent <= n) setControl(entry, text);
+  function grip(down) {
+    const cell = down.target.closest?.(".figure");
+    if (!cell || down.button !== 0) return;
+    const figure = named(cell.id.replace("figure-", "") + "_figure");
+    const plot = Bokeh.index.find_one_by_id(figure.id);
+    const box = plot.canvas_view.el.getBoundingClientRect();
+    const { x_scale, y_scale, bbox } = plot.frame;
+    const at = (event) => [x_scale.invert(event.clientX - box.x), y_scale.invert(event.clientY - box.y)];
+    if (!bbox.contains(down.clientX - box.x, down.clientY - box.y)) return;
+    const { x_range, y_range } = figure;
+    const pixel = (x_range.end - x_range.start) / figure.inner_width;
+    const start = at(down), ends = [x_range.start, x_range.end, y_range.start, y_range.end];
+    const near = ([x, y]) => Math.hypot(x - start[0], y - start[1]) < GRIP * pixel;
+    let held = null;
+    for (const name of ["rake_line", "band_line", "cursor"]) {
+      const places = points(name);
+      const index = places.findIndex(near);
+      if (!held && index >= 0) held = { name, places, moved: [index] };
     }
-    for (const [name, entry] of controls) {
-      if (entry.knob.label) entry.row.hidden = !visible.includes(name);
+    for (const name of held ? [] : ["rake_line", "band_line"]) {
+      const places = points(name), [[x0, y0], [x1, y1]] = places;
+      const [dx, dy] = [x1 - x0, y1 - y0];
+      const along = ((start[0] - x0) * dx + (start[1] - y0) * dy) / (dx * dx + dy * dy);
+      const t = Math.min(Math.max(along, 0), 1);
+      if (near([x0 + t * dx, y0 + t * dy])) held = { name, places, moved: [0, 1] };
     }
+    let dragged = false, text = "";
+    const move = (event) => {
+      const [sx, sy] = [event.clientX - down.clientX, event.clientY - down.clientY];
+      dragged ||= Math.hypot(sx, sy) > 3;
+      if (!dragged) return;
+      if (!held) {
+        const [dx, dy] = [-sx * pixel, sy * pixel];
+        x_range.setv({ start: ends[0] + dx, end: ends[1] + dx });
+        y_range.setv({ start: ends[2] + dy, end: ends[3] + dy });
+        return;
+      }
+      const [x, y] = [start[0] + sx * pixel, start[1] - sy * pixel];
+      const places = held.places.map((one, i) => held.moved.includes(i)
+        ? clamped(...(held.moved.length > 1 ? [one[0] + x - start[0], one[1] + y - start[1]] : [x, y])) : one);
+      setPlaces(held.name, places);
+      text = places.map((one) => one.map((value) => value.toFixed(1)).join(",")).join(";");
+      change(held.name, text, false);
+    };
+    const up = (event) => {
+      for (const [kind, handler] of Object.entries(handlers)) removeEventListener(kind, handler);
+      if (!dragged && event.type === "pointerup") {
+        change("cursor", clamped(...start).map((value) => value.toFixed(1)).join(","), true);
+      } else if (held && text) change(held.name, text, true);
+    };
+    const handlers = { pointermove: move, pointerup: up, pointercancel: up };
+    for (const [kind, handler] of Object.entries(handlers)) addEventListener(kind, handler);
+  }
+
+  function showView(name) {
+    let [left, right, bottom, top] = extent;
+    if (name !== "whole") {
+      const places = points(name);
+      const [x, y] = [0, 1].map((axis) => places.reduce((sum, one) => sum + one[axis] / places.length, 0));
+      const [half, tall] = [VIEW_WIDTH / 2, VIEW_WIDTH / 2 * spec.shape];
+      [left, right, bottom, top] = [x - half, x + half, y - tall, y + tall];
+    }
+    const { x_range, y_range } = named("measured_figure");
+    x_range.setv({ start: left, end: right });
+    y_range.setv({ start: bottom, end: top });
+  }
+
+  // Messages from Python.
+
+  function showValues({ n, values, shown, can_undo, can_redo, link }) {
+    for (const [path, text] of Object.entries(values)) {
+      const entry = controls.get(path), { row } = entry;
+      if (entry.sent > n) continue;
+      entry.text = text;
+      if (!entry.typing) {
+        entry.field.removeAttribute("aria-invalid");
+        entry.field.value = text;
+      }
+      if (!row.label) setPlaces(path, points(path));
+      if (!entry.slider) continue;
+      const nearest = (best, one, i) => Math.abs(one - text) < Math.abs(row.stops[best] - text) ? i : best;
+      entry.slider.value = row.stops.length ? row.stops.reduce(nearest, 0) : text === "" ? row.low : text;
+      if (!entry.typing) setText(entry, text);
+    }
+    for (const [path, { box }] of controls) if (box) box.hidden = !shown.includes(path);
     find("#undo").disabled = !can_undo;
+    find("#redo").disabled = !can_redo;
     if (!spec.embedded) {
       const query = new URLSearchParams(link).toString();
       history.replaceState(null, "", query ? `?${query}` : location.pathname);
@@ -255,128 +303,99 @@ export function render({ view, model, el }) {
     find("#status").textContent = text;
     find("#status").className = kind;
     const bar = find("#progress");
-    bar.hidden = progress === null;
-    if (progress !== null) bar.value = progress;
+    bar.hidden = progress == null;
+    bar.value = progress ?? 0;
     if (spec.draws) {
-      find("#cancel").hidden = progress === null;
-      find("#draw").disabled = progress !== null;
+      find("#cancel").hidden = bar.hidden;
+      find("#draw").disabled = !bar.hidden;
     }
-    for (const name of invalid) controls.get(name)?.field.setAttribute("aria-invalid", "true");
+    for (const path of invalid ?? []) controls.get(path)?.field.setAttribute("aria-invalid", "true");
   }
 
   function showNumbers({ rows, parts, note }) {
+    const head = (label) => element("th", { scope: "row" }, label);
+    const table = element("table", {}, element("caption", {}, "At the cursor"),
+      ...rows.map(([label, value, tip]) => element("tr", { title: tip }, head(label), element("td", {}, value))));
     const box = find(".numbers");
-    const table = element("table", {}, element("caption", {}, "At the cursor"));
-    for (const [label, value, tip] of rows) {
-      table.append(element("tr", { title: tip ?? "" }, element("th", { scope: "row" }, label), element("td", {}, value)));
-    }
     box.classList.remove("old");
     box.replaceChildren(table);
     if (!parts.length) return;
     const most = Math.max(1e-9, ...parts.map((part) => Math.abs(part.kelvin ?? 0)));
-    const bars = element("table", { class: "parts" }, element("caption", {}, "Parts of the error"));
-    for (const part of parts) {
-      const width = 50 * Math.abs(part.kelvin ?? 0) / most;
-      const side = part.kelvin < 0 ? `right:50%` : `left:50%`;
-      const bar = element("span", { class: `bar ${part.kind}`, style: `width:${width}%;${side}` });
-      bars.append(element("tr", { title: part.tip },
-        element("th", { scope: "row" }, part.label),
-        element("td", { class: "track", "aria-hidden": "true" }, element("span", { class: "axis" }), bar),
-        element("td", {}, part.text)));
-    }
-    box.append(bars, element("p", { class: "note" }, note));
+    const bars = parts.map(({ label, kelvin, text, tip, kind }) => {
+      const style = `width:${50 * Math.abs(kelvin ?? 0) / most}%;${kelvin < 0 ? "right" : "left"}:50%`;
+      return element("tr", { title: tip }, head(label),
+        element("td", { class: "track", "aria-hidden": "true" }, element("span", { class: "axis" }),
+          element("span", { class: `bar ${kind}`, style })),
+        element("td", {}, text));
+    });
+    box.append(element("table", { class: "parts" }, element("caption", {}, "Parts of the error"), ...bars),
+      element("p", { class: "note" }, note));
   }
 
   function saveDownload({ name, type, data }) {
     const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
-    const url = URL.createObjectURL(new Blob([bytes], { type }));
-    const link = element("a", { href: url, download: name });
-    page.append(link);
-    link.click();
-    link.remove();
-    setTimeout(() => URL.revokeObjectURL(url), 10000);
+    const href = URL.createObjectURL(new Blob([bytes], { type }));
+    element("a", { href, download: name }).click();
+    setTimeout(() => URL.revokeObjectURL(href), 10000);
   }
 
-  // A picture is told to be painted when the browser had the time for it: then comes the next, and
-  // meanwhile what stands along the lines of this one.
+  // A picture counts as painted when the browser had time for it: then come the curves along its
+  // lines, and the next picture.
   function showPicture({ number, lines }) {
     requestAnimationFrame(() => setTimeout(() => {
-      send({ painted: number });
+      send("painted", number);
       find(".numbers").classList.add("old"); // until those of this picture come
-      for (const [name, data] of Object.entries(lines)) {
-        found(name).setv({ data }, { sync: false });
-      }
-      if (!playing) return;
+      for (const [name, data] of Object.entries(lines)) named(name).setv({ data }, { sync: false });
       const left = 80 - (performance.now() - stepped);
-      setTimeout(() => playing && step(controls.get("start").knob, 1), Math.max(left, 0));
+      if (playing) setTimeout(() => playing && step("start", 1), Math.max(left, 0));
     }, 0));
   }
 
+  // Files, links, theme and size.
+
   function upload(file) {
     const request = new XMLHttpRequest();
-    const say = (text, kind, progress) => showStatus({ text, kind, progress, invalid: [] });
-    request.upload.onprogress = (event) => {
-      const done = event.loaded === event.total;
-      say(`${done ? "Checking" : "Uploading"} ${file.name}`, "busy", event.loaded / event.total);
+    request.upload.onprogress = ({ loaded, total }) => {
+      const text = `${loaded === total ? "Checking" : "Uploading"} ${file.name}`;
+      showStatus({ text, kind: "busy", progress: loaded / total });
     };
     request.onload = () => {
-      if (request.status === 200) {
-        location.search = `?open=${request.responseText}`;
-      } else {
-        say(request.responseText || `${file.name}: not taken`, "error", null);
-      }
+      if (request.status === 200) location.search = `?open=${request.responseText}`;
+      else showStatus({ text: request.responseText || `${file.name}: refused`, kind: "error" });
     };
-    request.onerror = () => say(`${file.name}: the upload broke off, expected a file of up to ${spec.uploads}`, "error", null);
+    request.onerror = () => showStatus({
+      text: `${file.name}: the upload was interrupted; a file may have up to ${spec.uploads}`, kind: "error",
+    });
     request.open("POST", `upload?name=${encodeURIComponent(file.name)}`);
     request.send(file);
   }
 
   async function copyLink() {
-    const text = location.origin + location.pathname + location.search;
-    try {
-      await navigator.clipboard.writeText(text);
-      find("#status").textContent = "The link is copied.";
-    } catch {
-      find("#status").textContent = text;
-    }
+    const text = location.href;
+    const copied = await navigator.clipboard?.writeText(text).then(() => true, () => false);
+    find("#status").textContent = copied ? "The link is copied." : text;
   }
 
-  // Theme and size.
-
   let theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
-  function setTheme() {
-    page.dataset.theme = theme;
+  function setTheme(name) {
+    page.dataset.theme = theme = name;
     if (!spec.embedded) {
       document.documentElement.style.colorScheme = theme;
       document.body.style.background = theme === "dark" ? "#14171c" : "#ffffff";
       document.body.style.margin = "0";
     }
     find("#theme").textContent = theme === "dark" ? "Light" : "Dark";
-    send({ theme });
-  }
-  function toggleTheme() {
-    theme = theme === "dark" ? "light" : "dark";
-    setTheme();
+    send("theme", theme);
   }
 
-  // A notebook takes keys for itself, unless an element over them says otherwise.
-  function keepKeys() {
-    for (let one = page; one; one = one.getRootNode().host) {
-      one.setAttribute("data-lm-suppress-shortcuts", "true");
-    }
-  }
-  if (spec.embedded) page.addEventListener("focusin", keepKeys);
-
-  // Figures fit their places, in CSS pixels. All change at once: every single change would lay the
-  // whole page out anew.
+  // Figures fit their places, in CSS pixels. All change at once: each change lays the page out.
   let size = "";
   function fit() {
     const width = Math.round(find("main").getBoundingClientRect().width);
     const height = Math.round(spec.embedded ? 900 : innerHeight);
     if (width < 1 || size === `${width}x${height}`) return false;
     size = `${width}x${height}`;
-    const images = spec.figures.filter((name) => !name.endsWith("_line"));
-    const count = Math.max(images.length, 2);
+    const count = Math.max(spec.images.length, 2);
     const wide = (width - BORDER - (count - 1) * GAP) / count - 12;
     const tallest = Math.max(0.52 * height - 60, LEAST_FRAME);
     const frame = Math.trunc(Math.max(Math.min(wide, tallest / spec.shape), LEAST_FRAME));
@@ -384,33 +403,37 @@ export function render({ view, model, el }) {
     // Numbers stand beside the lines, or below them where it is narrow: see page.css.
     const numbers = width > NARROW ? 345 : 60;
     const across = Math.trunc(Math.max((width - 2 * BORDER - numbers) / 2 - 20, LEAST_FRAME));
-    for (const name of spec.figures) {
-      const [frame_width, frame_height] = images.includes(name)
+    for (const [name] of spec.figures) {
+      const [frame_width, frame_height] = spec.images.includes(name)
         ? [frame, Math.trunc(frame * spec.shape)] : [across, below];
-      found(`${name}_figure`).setv({ frame_width, frame_height }, { sync: false, silent: true });
+      named(`${name}_figure`).setv({ frame_width, frame_height }, { sync: false, silent: true });
     }
     return true;
   }
-  function refit() {
-    if (fit()) view.invalidate_layout();
-  }
+  const refit = () => fit() && view.invalidate_layout();
 
   page.addEventListener("keydown", (event) => {
-    if ((event.ctrlKey || event.metaKey) && event.key === "z" && event.target.type !== "text") {
+    const typing = event.target.type === "text", key = event.key.toLowerCase();
+    if ((event.ctrlKey || event.metaKey) && "zy".includes(key) && !typing) {
       event.preventDefault();
-      send({ undo: true });
-    }
-    if (event.key === "Enter" && event.target.type === "text") {
-      event.preventDefault(); // in notebooks no change would follow from it
+      send(key === "y" || event.shiftKey ? "redo" : "undo");
+    } else if (key === "enter" && typing) {
+      event.preventDefault(); // a notebook would make no change of it
       event.target.dispatchEvent(new Event("change"));
     }
   });
+  // A notebook takes keys for itself, unless an element over them says otherwise.
+  if (spec.embedded) {
+    page.addEventListener("focusin", () => {
+      for (let one = page; one; one = one.getRootNode().host) one.setAttribute("data-lm-suppress-shortcuts", "true");
+    });
+  }
   const shows = { values: showValues, status: showStatus, numbers: showNumbers, download: saveDownload, picture: showPicture };
   model.on("msg:custom", ({ kind, content }) => shows[kind](content));
   const watcher = new ResizeObserver(refit);
   model.on("after_render", () => {
-    send({ ready: true });
-    setTheme();
+    send("ready");
+    setTheme(theme);
     refit();
     watcher.observe(find("main"));
   });

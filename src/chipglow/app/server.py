@@ -1,11 +1,10 @@
-"""The app as a local server: who may come in, what may be uploaded, how it ends."""
+"""The app as a local server: access by a token, uploads, and the end on a signal."""
 
 import secrets
 import signal
 import socket
 from asyncio import get_running_loop
 from collections import OrderedDict
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from shutil import rmtree
@@ -17,12 +16,7 @@ import panel as pn
 from bokeh.server.auth_provider import AuthProvider
 from tornado.web import HTTPError, RequestHandler, stream_request_body
 
-from chipglow.app.opening import (
-    MOST_UPLOADED,
-    OpenedMeasurement,
-    OpenedScene,
-    open_uploaded,
-)
+from chipglow.app.opening import MOST_UPLOADED, Opened, open_uploaded
 from chipglow.app.view import View
 
 LOCAL: Final = "127.0.0.1"
@@ -30,120 +24,69 @@ TOKEN: Final = "token"
 OPEN: Final = "open"
 
 _MOST_OPEN: Final = 8
-_WORDS: Final = f"{MOST_UPLOADED // 1024**2} MiB"
-
-
-class Door(AuthProvider):  # type: ignore[misc]
-    """Lets in who has the token: by the address that was printed, then by a cookie.
-
-    Parameters
-    ----------
-    token : str
-        The token.
-    """
-
-    def __init__(self, token: str) -> None:
-        self._token = token
-
-    def admits(self, handler: RequestHandler) -> bool:
-        """Whether a request brings the token."""
-        for given in (handler.get_query_argument(TOKEN, ""), self._cookie(handler)):
-            if secrets.compare_digest(given.encode(), self._token.encode()):
-                return True
-        return False
-
-    @property
-    def get_user(self) -> Callable[[RequestHandler], str | None]:
-        """Who asks; nobody without the token."""
-
-        def user(handler: RequestHandler) -> str | None:
-            if not self.admits(handler):
-                return None
-            if handler.get_query_argument(TOKEN, ""):
-                name = _cookie_name(handler)
-                handler.set_cookie(name, self._token, httponly=True, samesite="Strict")
-            return "user"
-
-        return user
-
-    @property
-    def get_user_async(self) -> None:
-        """None: `get_user` says it."""
-        return None
-
-    @property
-    def login_url(self) -> str:
-        """Where nobody is sent."""
-        return "/closed"
-
-    @property
-    def get_login_url(self) -> None:
-        """None: `login_url` says it."""
-        return None
-
-    @property
-    def login_handler(self) -> type[RequestHandler]:
-        """What nobody sees."""
-        return _Closed
-
-    @property
-    def logout_url(self) -> None:
-        """None: who closes the page is out."""
-        return None
-
-    @property
-    def logout_handler(self) -> None:
-        """See `logout_url`."""
-        return None
-
-    def _cookie(self, handler: RequestHandler) -> str:
-        return handler.get_cookie(_cookie_name(handler), "") or ""
+_MOST_UPLOADED_TEXT: Final = f"{MOST_UPLOADED // 1024**2} MiB"
 
 
 class _Closed(RequestHandler):  # type: ignore[misc]
     def get(self) -> None:
         self.set_status(403)
-        self.finish("Open the address that chipglow app printed: it holds a token.")
+        self.finish("Open the address that chipglow app printed: it contains a token.")
 
 
-def _cookie_name(handler: RequestHandler) -> str:
-    """One for each port: browsers keep cookies by host alone."""
+class TokenAuth(AuthProvider):  # type: ignore[misc]
+    """Admits requests with the token: in the printed address, then in a cookie."""
+
+    login_url = "/closed"  # Panel needs one; it answers 403
+    login_handler = _Closed
+    get_login_url = get_user_async = logout_url = logout_handler = None
+
+    def __init__(self, token: str) -> None:
+        self._token = token
+
+    def admits(self, handler: RequestHandler) -> bool:
+        """Whether a request has the token."""
+        given = handler.get_query_argument(TOKEN, ""), handler.get_cookie(_cookie(handler)) or ""
+        return any(secrets.compare_digest(one.encode(), self._token.encode()) for one in given)
+
+    def get_user(self, handler: RequestHandler) -> str | None:
+        """Return a user for a request with the token, and set the cookie."""
+        if not self.admits(handler):
+            return None
+        if handler.get_query_argument(TOKEN, ""):
+            handler.set_cookie(_cookie(handler), self._token, httponly=True, samesite="Strict")
+        return "user"
+
+
+def _cookie(handler: RequestHandler) -> str:
+    """Return the name of the cookie, one for each port: browsers keep cookies by host alone."""
     return f"chipglow-{handler.request.host.rpartition(':')[2]}"
 
 
-class Opened:
-    """What is open: what the command named, and what was uploaded since.
+class OpenFiles:
+    """What the command opened, and what was uploaded since."""
 
-    Parameters
-    ----------
-    first : OpenedScene or OpenedMeasurement
-        What the command named.
-    """
-
-    def __init__(self, first: OpenedScene | OpenedMeasurement) -> None:
-        self.first = first
+    def __init__(self, first: Opened) -> None:
         self.folder = Path(mkdtemp(prefix="chipglow-app-"))
-        self._uploaded: OrderedDict[str, OpenedScene | OpenedMeasurement] = OrderedDict()
+        self._first = first
+        self._uploaded: OrderedDict[str, Opened] = OrderedDict()
 
-    def find(self, key: str) -> OpenedScene | OpenedMeasurement | None:
-        """What was uploaded with a key, or the first; None for an unknown key."""
-        return self._uploaded.get(key) if key else self.first
+    def find(self, key: str) -> Opened | None:
+        """Return an upload by its key, or the first without one; None if it is not open."""
+        return self._uploaded.get(key) if key else self._first
 
     def add(self, path: Path, name: str) -> str:
-        """Open a file that was uploaded; its key.
+        """Open an uploaded file and return its key.
 
         Raises
         ------
         ValueError
             If it cannot be opened.
         """
-        opened = open_uploaded(path, name)
-        key = path.stem
-        self._uploaded[key] = opened
+        self._uploaded[path.stem] = open_uploaded(path, name)
         while len(self._uploaded) > _MOST_OPEN:
             old, _ = self._uploaded.popitem(last=False)
             (self.folder / f"{old}.nc").unlink(missing_ok=True)
-        return key
+        return path.stem
 
     def close(self) -> None:
         """Remove the uploaded files."""
@@ -152,42 +95,40 @@ class Opened:
 
 @stream_request_body
 class Upload(RequestHandler):  # type: ignore[misc]
-    """Takes a file, piece by piece, and opens it."""
+    """Receives a file in pieces and opens it."""
 
-    def initialize(self, opened: Opened, door: Door, origins: tuple[str, ...]) -> None:
-        """Set what Tornado gives every request."""
-        self._opened, self._door, self._origins = opened, door, origins
+    def initialize(self, files: OpenFiles, auth: TokenAuth, origins: tuple[str, ...]) -> None:
+        """Set the arguments that Tornado passes to every request."""
+        self._files, self._auth, self._origins = files, auth, origins
         self._path: Path | None = None
-        self._size = 0
 
     def prepare(self) -> None:
-        """Refuse strangers, other origins and what is too large, before a byte is taken."""
+        """Refuse requests without token, of other origins and of large files at once."""
         origin = urlsplit(self.request.headers.get("Origin", "")).netloc
-        if not self._door.admits(self) or origin not in self._origins:
+        if not self._auth.admits(self) or origin not in self._origins:
             raise HTTPError(403)
         length = int(self.request.headers.get("Content-Length", "0"))
         if length > MOST_UPLOADED:
-            self._refuse(413, f"{self._name}: {length} bytes, expected up to {_WORDS}")
+            text = f"{self._name}: {length} bytes, expected up to {_MOST_UPLOADED_TEXT}"
+            self._refuse(413, text)
             return
         self.request.connection.set_max_body_size(MOST_UPLOADED)
-        self._path = self._opened.folder / f"{secrets.token_urlsafe(12)}.nc"
+        self._path = self._files.folder / f"{secrets.token_urlsafe(12)}.nc"
         self._path.touch(mode=0o600)
 
     def data_received(self, chunk: bytes) -> None:
         """Write a piece."""
-        if self._path is None:
-            return
-        with self._path.open("ab") as file:
-            file.write(chunk)
+        if self._path is not None:
+            with self._path.open("ab") as file:
+                file.write(chunk)
 
     async def post(self) -> None:
-        """Open the file; answer with its key, or with what is wrong with it."""
+        """Open the file; answer with its key or the reason why it cannot be opened."""
         path = self._path
         if path is None:
             return
-        loop = get_running_loop()
         try:
-            key = await loop.run_in_executor(None, self._opened.add, path, self._name)
+            key = await get_running_loop().run_in_executor(None, self._files.add, path, self._name)
         except (ValueError, OSError) as error:
             path.unlink(missing_ok=True)
             self._refuse(400, " ".join(str(error).split()))
@@ -195,7 +136,7 @@ class Upload(RequestHandler):  # type: ignore[misc]
         self.finish(key)
 
     def on_connection_close(self) -> None:
-        """Forget a file whose sender went away."""
+        """Remove a file whose sender has closed the connection."""
         if self._path is not None:
             self._path.unlink(missing_ok=True)
 
@@ -211,37 +152,24 @@ class Upload(RequestHandler):  # type: ignore[misc]
 
 
 class App:
-    """The running app.
-
-    Parameters
-    ----------
-    first : OpenedScene or OpenedMeasurement
-        What a page shows that names nothing else.
-    address : str
-        Where it listens; this machine alone by default.
-    port : int
-        0 for any that is free.
+    """The running app; port 0 means any that is free.
 
     Raises
     ------
-    OSError
-        If the address or the port cannot be had.
+    ValueError
+        If the address or the port is not available.
     """
 
-    def __init__(
-        self, first: OpenedScene | OpenedMeasurement, address: str = LOCAL, port: int = 0
-    ) -> None:
-        self._check(address, port)
-        self.opened = Opened(first)
-        self._token = secrets.token_urlsafe(24)
-        door = Door(self._token)
-        port = port or _free_port(address)
-        names = {address, LOCAL, "localhost"} if address != "0.0.0.0" else _own_names()
+    def __init__(self, first: Opened, address: str = LOCAL, port: int = 0) -> None:
+        port = _free_port(address, port)
+        self.files = OpenFiles(first)
+        token = secrets.token_urlsafe(24)
+        auth = TokenAuth(token)
+        everywhere = address == "0.0.0.0"
+        names = _own_names() if everywhere else {address, LOCAL, "localhost"}
         origins = tuple(f"{name}:{port}" for name in sorted(names))
-        upload = {"opened": self.opened, "door": door, "origins": origins}
-        self.url = (
-            f"http://{address if address != '0.0.0.0' else LOCAL}:{port}/?{TOKEN}={self._token}"
-        )
+        upload = {"files": self.files, "auth": auth, "origins": origins}
+        self.url = f"http://{LOCAL if everywhere else address}:{port}/?{TOKEN}={token}"
         self.server = pn.io.server.get_server(
             {"/": self._page},
             port=port,
@@ -249,7 +177,7 @@ class App:
             websocket_origin=list(origins),
             title="chipglow",
             location=False,
-            auth_provider=door,
+            auth_provider=auth,
             extra_patterns=[(r"/upload", Upload, upload)],
             unused_session_lifetime_milliseconds=15_000,
             check_unused_sessions_milliseconds=5_000,
@@ -273,45 +201,40 @@ class App:
             self.stop()
 
     def stop(self) -> None:
-        """End it, and remove what was uploaded."""
+        """Stop serving, and remove the uploaded files."""
         self.server.stop()
-        self.opened.close()
+        self.files.close()
 
     def _page(self) -> Any:
         given = {name: values[0].decode() for name, values in pn.state.session_args.items()}
         given.pop(TOKEN, None)
         key = given.pop(OPEN, "")
-        opened = self.opened.find(key)
+        opened = self.files.find(key)
         if opened is None:
-            return pn.pane.HTML("<p>This file is not open any more: open it again.</p>")
-        link = {OPEN: key} if key else {}
-        view = View(opened, given, link, _WORDS)
+            return pn.pane.HTML("<p>This file is no longer open: open it again.</p>")
+        view = View(opened, given, {OPEN: key} if key else {}, _MOST_UPLOADED_TEXT)
         view.start(pn.state.curdoc)
         pn.state.on_session_destroyed(lambda _: view.session.end())
         return view.page
 
-    @staticmethod
-    def _check(address: str, port: int) -> None:
-        if not 0 <= port <= 65535:
-            raise ValueError(f"--port: {port}, expected 0 to 65535")
-        with socket.socket() as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                probe.bind((address, port))
-            except (OSError, OverflowError) as error:
-                raise ValueError(f"{address}:{port}: cannot be listened on ({error})") from None
 
-
-def _free_port(address: str) -> int:
+def _free_port(address: str, port: int) -> int:
+    """Return the port, or a free one for 0."""
+    if not 0 <= port <= 65535:
+        raise ValueError(f"--port: {port}, expected 0 to 65535")
     with socket.socket() as probe:
-        probe.bind((address, 0))
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((address, port))
+        except (OSError, OverflowError) as error:
+            raise ValueError(f"{address}:{port}: not available ({error})") from None
         return int(probe.getsockname()[1])
 
 
 def _own_names() -> set[str]:
-    """Names by which other machines may call this one."""
+    """Return the names by which other machines may call this one."""
     host = socket.gethostname()
-    found = {LOCAL, "localhost", host, socket.getfqdn()}
+    names = {LOCAL, "localhost", host, socket.getfqdn()}
     with suppress(OSError):
-        found |= {str(one[4][0]) for one in socket.getaddrinfo(host, None, socket.AF_INET)}
-    return found
+        names |= {str(one[4][0]) for one in socket.getaddrinfo(host, None, socket.AF_INET)}
+    return names

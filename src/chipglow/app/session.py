@@ -1,57 +1,46 @@
-"""One user's state: the knobs, what was before them, and the threads that compute what they mean.
+"""The state of one user, and the threads that compute its pictures.
 
-A thread makes pictures, always of the newest knobs: what was asked for in between is never
-computed, and what is under way for older ones ends at the next opportunity. Long work has a thread
-of its own.
+One thread makes pictures, always of the newest state: states between are never computed, and work
+for an older one ends at the next opportunity. Draws have a thread of their own.
 """
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from threading import Condition, Thread
-from typing import Final, Generic, TypeVar
+from typing import Final, Generic, TypeAlias, TypeVar
 
-from chipglow.app.knobs import Knobs
-from chipglow.app.model import MeasurementModel, SceneModel, model_of
-from chipglow.app.opening import OpenedMeasurement, OpenedScene
-from chipglow.app.picture import Drawn, Picture, Readout
+from chipglow.app.controls import State
+from chipglow.app.model import Picture, SceneModel, model_of
+from chipglow.app.opening import Opened
 
 PAUSE: Final = 0.15
-"""Seconds without a newer state after a quick look, before the exact picture is begun."""
+"""Seconds without a newer state after a quick look before the exact picture is begun."""
 
-_PATIENCE: Final = 0.5
-"""Seconds to wait for the page to have painted a picture before the next one is sent."""
+_PAINT_TIMEOUT: Final = 0.5
+"""Seconds to wait for the page to paint a picture before the next one is sent."""
 
-_MOST_STEPS: Final = 200
+_UNDO_STEPS: Final = 200
 
 _log = logging.getLogger(__name__)
 _Job = TypeVar("_Job")
 
 
 class SupersededError(Exception):
-    """Work that nobody waits for any more."""
+    """The work is no longer needed."""
 
 
 class Newest(Generic[_Job]):
-    """A thread that does the newest job alone.
+    """A thread that does only the newest job; `notify` takes the message of an error."""
 
-    Parameters
-    ----------
-    work : callable
-        Does a job.
-    failed : callable
-        Told what went wrong.
-    """
-
-    def __init__(self, work: Callable[[_Job], None], failed: Callable[[str], None]) -> None:
-        self._work, self._failed = work, failed
+    def __init__(self, work: Callable[[_Job], None], notify: Callable[[str, str], None]) -> None:
+        self._work, self._notify = work, notify
         self._news = Condition()
         self._job: _Job | None = None
         self._busy = self._ended = self._cancelled = False
         self._thread: Thread | None = None
 
     def ask(self, job: _Job) -> None:
-        """Do this job next, in the place of any that waits; what is under way ends."""
+        """Do this job next; waiting and running ones end."""
         with self._news:
             self._job, self._cancelled = job, False
             if self._thread is None:
@@ -60,7 +49,7 @@ class Newest(Generic[_Job]):
             self._news.notify_all()
 
     def cancel(self) -> None:
-        """End what is under way, and forget what waits."""
+        """End the running job and forget the waiting one."""
         with self._news:
             self._job, self._cancelled = None, True
             self._news.notify_all()
@@ -73,38 +62,32 @@ class Newest(Generic[_Job]):
 
     @property
     def superseded(self) -> bool:
-        """Whether nobody waits for what is under way."""
+        """Whether the running job is no longer needed."""
         return self._ended or self._cancelled or self._job is not None
 
     def check(self) -> None:
-        """End the job that calls it if nobody waits for it.
-
-        Raises
-        ------
-        SupersededError
-            If so.
-        """
+        """Raise `SupersededError` if the running job is no longer needed."""
         if self.superseded:
             raise SupersededError
 
     def pause(self, seconds: float) -> None:
-        """Let a job wait, and end it if meanwhile nobody waits for it any more."""
+        """Let the running job wait, and end it if it is superseded meanwhile."""
         with self._news:
             self._news.wait_for(lambda: self.superseded, seconds)
         self.check()
 
     def wait_for(self, condition: Callable[[], bool], seconds: float) -> None:
-        """Let a job wait until `wake` finds a condition true, or the time is over."""
+        """Let the running job wait until `wake` finds a condition true."""
         with self._news:
             self._news.wait_for(lambda: self._ended or condition(), seconds)
 
     def wake(self) -> None:
-        """Let a job that waits for a condition look again."""
+        """Let a waiting job test its condition again."""
         with self._news:
             self._news.notify_all()
 
     def settle(self, seconds: float) -> bool:
-        """Wait until there is nothing to do; whether that came within the time."""
+        """Wait until no job is left; return whether that happened within the time."""
         with self._news:
             return self._news.wait_for(lambda: self._job is None and not self._busy, seconds)
 
@@ -123,112 +106,88 @@ class Newest(Generic[_Job]):
             except SupersededError:
                 continue
             except (ValueError, OSError) as error:
-                self._failed(str(error))
+                self._notify("failed", str(error))
             except Exception as error:  # a defect: it must not end the session's thread
                 _log.exception("chipglow app")
-                self._failed(f"defect: {type(error).__name__}: {error}")
+                self._notify("failed", f"defect: {type(error).__name__}: {error}")
 
 
-@dataclass(frozen=True)
-class Listener:
-    """Who is told what the threads of a session find; called from these threads.
-
-    Parameters
-    ----------
-    picture, readout, drawn : callable
-        Take what was found; `readout` the picture besides.
-    progress : callable
-        Takes the progress of long work, 0 to 1.
-    failed : callable
-        Takes what went wrong, a sentence.
-    """
-
-    picture: Callable[[int, Picture], None]
-    readout: Callable[[Picture, Readout], None]
-    drawn: Callable[[Drawn], None]
-    progress: Callable[[float], None]
-    failed: Callable[[str], None]
+Notify: TypeAlias = Callable[..., None]
+"""Takes the kind of a result and the result; called from the threads of a session."""
 
 
 class Session:
-    """One user's state.
+    """The state of one user, by default that of the study."""
 
-    Parameters
-    ----------
-    opened : OpenedScene or OpenedMeasurement
-        What is looked at.
-    listener : Listener
-        Who is told.
-    knobs : Knobs, optional
-        The first state; that of the study by default.
-    """
-
-    def __init__(
-        self,
-        opened: OpenedScene | OpenedMeasurement,
-        listener: Listener,
-        knobs: Knobs | None = None,
-    ) -> None:
-        self.opened = opened
-        self.model: SceneModel | MeasurementModel = model_of(opened)
-        self.knobs = knobs or self.model.panel.initial
-        self._settled: list[Knobs] = [self.knobs]
-        self._listener = listener
-        self._number = self._painted = 0
-        self._pictures = Newest(self._picture, listener.failed)
-        self._draws: Newest[tuple[Knobs, int, int]] = Newest(self._draw, listener.failed)
+    def __init__(self, opened: Opened, notify: Notify) -> None:
+        self.model = model_of(opened)
+        self.state = self.model.controls.initial
+        self._settled = [self.state]
+        self._at = 0
+        self._notify = notify
+        self._sent = self._painted = 0
+        self._pictures = Newest(self._picture, notify)
+        self._draws: Newest[tuple[State, int, int]] = Newest(self._draw, notify)
 
     def show(self) -> None:
-        """Compute what the knobs mean now."""
+        """Compute the picture of the state."""
         self._draws.cancel()
-        self._pictures.ask(self.knobs)
+        self._pictures.ask(self.state)
 
-    def turn(self, texts: Mapping[str, str], final: bool = True) -> None:
-        """Turn knobs.
-
-        Parameters
-        ----------
-        texts : mapping
-            Their new values, by name.
-        final : bool
-            Whether the hand has let go of the knob: `undo` goes back to such states.
+    def change(self, texts: Mapping[str, str], final: bool = True) -> None:
+        """Set controls; only a final state can be returned to by `undo`.
 
         Raises
         ------
         ValueError
-            If that is not possible; the knobs then stay.
+            If that is not possible; the state then stays.
         """
-        self.set(self.model.turned(self.knobs, texts), final)
+        self.set(self.model.changed(self.state, dict(texts)), final)
 
-    def set(self, knobs: Knobs, final: bool = True) -> None:
-        """Go to a state of the knobs."""
-        if final and knobs != self._settled[-1]:
-            self._settled = [*self._settled[-_MOST_STEPS:], knobs]
-        if knobs != self.knobs:
-            self.knobs = knobs
+    def restore(self, texts: Mapping[str, str]) -> None:
+        """Set controls without a picture and without a step to undo, as `change` otherwise."""
+        self.state = self.model.changed(self.state, dict(texts))
+
+    def set(self, state: State, final: bool = True) -> None:
+        """Go to a state."""
+        if final and state != self._settled[self._at]:
+            self._settled = [*self._settled[: self._at + 1][-_UNDO_STEPS:], state]
+            self._at = len(self._settled) - 1
+        if state != self.state:
+            self.state = state
             self.show()
 
     @property
     def can_undo(self) -> bool:
-        """Whether there was another state before."""
-        return len(self._settled) > 1 or self.knobs != self._settled[-1]
+        """Whether there is a state before."""
+        return self._at > 0 or self.state != self._settled[self._at]
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether there is a state that was undone."""
+        return self._at + 1 < len(self._settled)
 
     def undo(self) -> None:
         """Go back to the state before."""
-        if self.knobs == self._settled[-1] and len(self._settled) > 1:
-            self._settled = self._settled[:-1]
-        self.set(self._settled[-1], final=False)
+        if self.state == self._settled[self._at]:
+            self._at = max(self._at - 1, 0)
+        self.set(self._settled[self._at], final=False)
+
+    def redo(self) -> None:
+        """Go to the state that was undone last."""
+        self._at = min(self._at + 1, len(self._settled) - 1)
+        self.set(self._settled[self._at], final=False)
 
     def draw(self, phases: int, textures: int) -> None:
-        """Draw the lines anew over phases of the pixels and textures."""
-        self._draws.ask((self.knobs, phases, textures))
+        """Draw the lines at several phases of the pixels and textures."""
+        self._draws.ask((self.state, phases, textures))
 
     def cancel(self) -> None:
         """End the drawing."""
         self._draws.cancel()
 
     def painted(self, number: int) -> None:
-        """Note that the page shows a picture: the next one may come."""
+        """Note that the page shows a picture, so that the next one may follow."""
         self._painted = max(self._painted, number)
         self._pictures.wake()
 
@@ -238,38 +197,38 @@ class Session:
         self._draws.end()
 
     def settle(self, seconds: float = 60.0) -> bool:
-        """Wait until all is computed; whether that came within the time."""
+        """Wait until everything is computed; return whether that happened within the time."""
         return self._pictures.settle(seconds) and self._draws.settle(seconds)
 
-    def _picture(self, knobs: Knobs) -> None:
-        """One picture always arrives, so that a knob in motion is followed; then what is exact."""
-        work = self._pictures
-        if self.model.has_quick_look and not self.model.is_ready(knobs):
-            self._tell(self.model.picture(knobs, quick=True))
+    def _picture(self, state: State) -> None:
+        """Always send one picture, so that a moving control is followed; then the exact one."""
+        work, model = self._pictures, self.model
+        if model.has_quick_look and not model.is_ready(state):
+            self._send(model.picture(state, quick=True))
             work.pause(PAUSE)
-            picture = self.model.picture(knobs, check=work.check)
-            self._tell(picture)
+            picture = model.picture(state, check=work.check)
+            self._send(picture)
             work.check()
         else:
-            picture = self.model.picture(knobs)
-            self._tell(picture)
-            # The numbers of a large scene take longer than its picture: they let the next go first.
-            work.pause(PAUSE if self.model.has_quick_look else 0.0)
-        self._listener.readout(picture, self.model.readout(picture))
+            picture = model.picture(state)
+            self._send(picture)
+            # The numbers of a large scene take longer than its picture: a newer state goes first.
+            work.pause(PAUSE if model.has_quick_look else 0.0)
+        self._notify("readout", picture, self.model.readout(picture))
 
-    def _tell(self, picture: Picture) -> None:
+    def _send(self, picture: Picture) -> None:
         """Send a picture as soon as the page has painted the one before."""
-        last = self._number
-        self._pictures.wait_for(lambda: self._painted >= last, _PATIENCE)
-        self._number += 1
-        self._listener.picture(self._number, picture)
+        last = self._sent
+        self._pictures.wait_for(lambda: self._painted >= last, _PAINT_TIMEOUT)
+        self._sent += 1
+        self._notify("picture", self._sent, picture)
 
-    def _draw(self, job: tuple[Knobs, int, int]) -> None:
-        knobs, phases, textures = job
+    def _draw(self, job: tuple[State, int, int]) -> None:
+        state, phases, textures = job
 
         def progress(done: float) -> None:
             self._draws.check()
-            self._listener.progress(done)
+            self._notify("progress", done)
 
         assert isinstance(self.model, SceneModel)
-        self._listener.drawn(self.model.drawn(knobs, phases, textures, progress))
+        self._notify("drawn", self.model.drawn(state, phases, textures, progress))

@@ -1,9 +1,9 @@
-"""The page: a session, its figures, and what stands around them, as a Panel component."""
+"""The page: a session and its figures as a Panel component, see page.js."""
 
 import json
 from asyncio import AbstractEventLoop, get_running_loop
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from math import floor, isfinite, log10
 from pathlib import Path
@@ -14,65 +14,57 @@ from typing import Any, ClassVar, Final
 import panel as pn
 import param
 from bokeh.document import Document
-from bokeh.events import PanEnd, Tap
-from panel.custom import Child, JSComponent
+from panel.custom import Children, JSComponent
 from panel.io import unlocked
 
-from chipglow.app.figures import IMAGES, Figures, places
-from chipglow.app.knobs import (
-    CURSOR,
-    LINES,
-    Knob,
-    counts,
-)
-from chipglow.app.model import SceneModel
-from chipglow.app.opening import OpenedMeasurement, OpenedScene
-from chipglow.app.picture import Drawn, Picture, Readout
-from chipglow.app.session import Listener, Session
+from chipglow.app.controls import CURSOR, Control
+from chipglow.app.figures import TITLES, Figures, line_data
+from chipglow.app.model import Drawn, Picture, Readout, SceneModel
+from chipglow.app.opening import Opened, OpenedScene
+from chipglow.app.session import Session
 from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import rounded_text
 from chipglow.scene.lines import nearest
 
 PHASES: Final = 3
 TEXTURES: Final = 5
-"""Of what "Draw phases and textures" makes: the paper's study has as many."""
+"""Draws of "Draw phases and textures": as many as in the paper's study."""
 
 _FOLDER: Final = Path(__file__).parent
-_VIEW_WIDTH: Final = 160e-6
 
 _PARTS: Final = (
-    ("motion", "Motion", "Mean over the exposure less its greatest", ""),
-    ("footprint", "Footprint", "Mean over the pixel less its hottest sample", ""),
-    ("psf", "PSF", "Case 1 − case 2: with the point spread function less without it", ""),
+    ("motion", "Motion", "Mean over the exposure minus its maximum", ""),
+    ("footprint", "Footprint", "Mean over the pixel minus its hottest sample", ""),
+    ("psf", "PSF", "Case 1 − case 2: with minus without the point spread function", ""),
     ("detector", "Detector", "Noise, counts and calibration", ""),
-    ("texture", "of it: texture", "The error less that without texture: in the others", "within"),
-)  # fmt: skip
+    ("texture", "of it: texture", "Error minus that without texture: part of the others", "within"),
+)
+_SAVES: Final = (
+    ("study", "study.yaml", "Save the settings as a study"),
+    ("figure", "Figure", "Save the images and lines as PNG"),
+    ("netcdf", "NetCDF", "Save the measurement and its error"),
+)
 
 
 class Page(JSComponent):  # type: ignore[misc]
-    """What stands around the figures; what changes goes to and fro as messages, see page.js."""
+    """The page around the figures; it exchanges messages with `View`."""
 
     spec = param.String()
-    scene_figure = Child()
-    measured_figure = Child()
-    error_figure = Child()
-    rake_line_figure = Child()
-    band_line_figure = Child()
+    figures = Children()
 
     _esm = (_FOLDER / "page.js").read_text(encoding="utf-8")
     _stylesheets: ClassVar[list[str]] = [(_FOLDER / "page.css").read_text(encoding="utf-8")]
 
     def __init__(self, **params: Any) -> None:
-        self._turn = RLock()
+        self._message = RLock()
         super().__init__(**params)
 
     def alone(self, change: Callable[[], None]) -> None:
-        """Change what a notebook shows while no message of its page is taken.
+        """Change a notebook's page while it receives no message.
 
-        A notebook's messages may come in a thread of their own, and Panel drops what changes in
-        another one meanwhile.
+        Messages of a notebook may come in another thread, and Panel drops changes made meanwhile.
         """
-        with self._turn:
+        with self._message:
             change()
 
     def _on_msg(self, ref: str, manager: Any, msg: Any) -> None:
@@ -84,336 +76,262 @@ class View:
 
     Parameters
     ----------
-    opened : OpenedScene or OpenedMeasurement
-        What is looked at.
-    texts : dict, optional
-        Knobs that are not at their first value, as a link has them.
-    link : dict, optional
-        What a link of this page says besides.
+    opened : Opened
+        Shown on the page.
+    texts : mapping, optional
+        Values of controls that a link gives.
+    link : mapping, optional
+        Other parameters of links to this page.
     uploads : str
-        How large a file may be that is uploaded, in words; empty where none may.
+        Maximum size of an uploaded file in words; empty if uploads are not possible.
     embedded : bool
-        Whether it is part of another page, such as a notebook's.
+        Whether it is part of another page, such as a notebook.
     """
 
     def __init__(
         self,
-        opened: OpenedScene | OpenedMeasurement,
-        texts: dict[str, str] | None = None,
-        link: dict[str, str] | None = None,
+        opened: Opened,
+        texts: Mapping[str, str] | None = None,
+        link: Mapping[str, str] | None = None,
         uploads: str = "",
         embedded: bool = False,
     ) -> None:
         self._link, self._embedded = link or {}, embedded
-        listener = Listener(
-            picture=lambda number, picture: self._later(lambda: self._show(number, picture)),
-            readout=lambda picture, found: self._later(lambda: self._tell(picture, found)),
-            drawn=lambda drawn: self._later(lambda: self._show_drawn(drawn)),
-            progress=self._tell_progress,
-            failed=lambda text: self._later(lambda: self._say(text, "error")),
-        )
-        self.session = Session(opened, listener)
-        refused = self._restore(texts or {})
-        scene = opened.scene if isinstance(opened, OpenedScene) else None
-        pixels = opened.measurement if isinstance(opened, OpenedMeasurement) else None
-        source = scene or pixels
-        assert source is not None
-        names = IMAGES if scene is not None else ("measured",)
-        self.figures = Figures(source.raster, source.tool, self.session.knobs, names)
+        self.session = Session(opened, self._notified)
+        self._refused = self._restore(texts or {})
+        source = opened.scene if isinstance(opened, OpenedScene) else opened.measurement
+        images = tuple(TITLES) if isinstance(opened, OpenedScene) else ("measured",)
+        self.figures = Figures(source.raster, source.tool, images)
         self._document: Document | None = None
         self._loop: AbstractEventLoop | None = None
         self._handled = 0
         self._began = 0.0
         self._picture: Picture | None = None
         self._drawn: Drawn | None = None
-        self.page = Page(
-            spec=json.dumps(self._spec(opened, uploads)),
-            sizing_mode="stretch_width",
-            **{
-                f"{name}_figure": pn.pane.Bokeh(one, sizing_mode="fixed", margin=0)
-                for name, one in (
-                    *((name, image.figure) for name, image in self.figures.images.items()),
-                    *self.figures.lines.items(),
-                )
-            },
-        )
-        self._refused = refused
-        self._listen()
+        panes = [
+            pn.pane.Bokeh(one, sizing_mode="fixed", margin=0) for one in self.figures.all.values()
+        ]
+        spec = json.dumps(self._spec(opened, uploads))
+        self.page = Page(spec=spec, figures=panes, sizing_mode="stretch_width")
+        self.page.on_msg(self._receive)
 
     def start(self, document: Document | None) -> None:
-        """Say in which document the results of other threads are shown; None of a notebook's."""
+        """Set the document in which results of other threads are shown; None for a notebook."""
         self._document = document
         if document is None:
-            with suppress(RuntimeError):  # no notebook's kernel, nothing that shows the page
+            with suppress(RuntimeError):  # not in a notebook's kernel: nothing shows the page
                 self._loop = get_running_loop()
 
-    def _ready(self) -> None:
-        """Fill a page that is there now, and compute its picture."""
+    def _restore(self, texts: Mapping[str, str]) -> str:
+        """Set the controls of a link that are possible; return what is wrong with the others."""
+        refused = ""
+        try:
+            self.session.restore(texts)
+        except ValueError:
+            for path, text in texts.items():
+                try:
+                    self.session.restore({path: text})
+                except ValueError as error:
+                    refused = refused or f"Link: {error}"
+        return refused
+
+    def _receive(self, event: Any) -> None:
+        """Answer a message of the page."""
+        message = event.data
+        self._handled = int(message["n"])
+        with unlocked():  # one answer, that the browser draws once
+            getattr(self, f"_on_{message['kind']}")(message.get("content"))
+
+    def _notified(self, kind: str, *content: Any) -> None:
+        """Show a result of another thread."""
+        self._later(lambda: getattr(self, f"_show_{kind}")(*content))
+
+    def _on_ready(self, _: None) -> None:
+        """Fill a page that has just been rendered, and compute its picture."""
         self._put_values()
         text = self._refused or "Computing the first picture."
         self._say(text, "error" if self._refused else "busy")
         self.session.show()
 
-    def _send(self, kind: str, content: Any) -> None:
-        self.page._send_msg({"kind": kind, "content": content})
-
-    def _restore(self, texts: dict[str, str]) -> str:
-        """Turn the knobs as a link says; what is wrong with it, or nothing.
-
-        What is right of a link counts even if something else is wrong.
-        """
-        model, knobs = self.session.model, self.session.knobs
-        refused = ""
+    def _on_change(self, texts: dict[str, str], final: bool = True) -> None:
         try:
-            knobs = model.turned(knobs, texts)
-        except ValueError:
-            for name, text in texts.items():
-                try:
-                    knobs = model.turned(knobs, {name: text})
-                except ValueError as error:
-                    refused = refused or f"Link: {error}"
-        self.session.knobs = knobs
-        return refused
-
-    def _listen(self) -> None:
-        def received(event: Any) -> None:
-            with unlocked():  # one answer, that the browser draws once
-                self._receive(event.data)
-
-        self.page.on_msg(received)
-        for image in self.figures.images.values():
-            image.figure.on_event(Tap, self._tapped)
-            image.figure.on_event(PanEnd, lambda _: self._turn({}, True))
-        sources = {CURSOR: self.figures.cursor, **self.figures.ends}
-        for name, source in sources.items():
-            source.on_change("data", self._dragged(name, source))
-
-    def _tapped(self, event: Any) -> None:
-        self._turn({CURSOR: f"{event.x:.1f},{event.y:.1f}"}, True)
-        self.figures.set_places(self.session.knobs)
-
-    def _dragged(self, name: str, source: Any) -> Callable[..., None]:
-        def moved(attribute: str, old: Any, new: Any) -> None:
-            points = self.session.knobs.points(name)
-            kept = ";".join(f"{1e6 * x:.1f},{1e6 * y:.1f}" for x, y in points)
-            if places(source) != kept:
-                self._turn({name: places(source)}, False)
-
-        return moved
-
-    def _receive(self, message: dict[str, Any]) -> None:
-        """Do what the page's message says."""
-        self._handled = int(message["n"])
-        if "ready" in message:
-            self._ready()
-        elif "painted" in message:
-            self.session.painted(int(message["painted"]))
-        elif "turn" in message:
-            self._turn(message["turn"], bool(message["final"]))
-        elif "undo" in message:
-            self.session.undo()
-            self._turned()
-        elif "theme" in message:
-            self.figures.set_theme(str(message["theme"]))
-            self._put_values()
-        elif "view" in message:
-            self._view(str(message["view"]))
-            self._put_values()
-        elif "save" in message:
-            self._save(str(message["save"]))
-        elif "draw" in message:
-            self._tell_progress(0.0)
-            self.session.draw(PHASES, TEXTURES)
-        elif "cancel" in message:
-            self.session.cancel()
-            self._say("The drawing was cancelled.", "")
-
-    def _turn(self, texts: dict[str, str], final: bool) -> None:
-        try:
-            self.session.turn(texts, final)
+            self.session.change(texts, final)
         except ValueError as error:
             self._say(str(error), "error", invalid=list(texts))
             return
-        self._turned()
+        self._changed()
 
-    def _turned(self) -> None:
+    def _on_move(self, texts: dict[str, str]) -> None:
+        self._on_change(texts, final=False)
+
+    def _on_undo(self, _: None) -> None:
+        self.session.undo()
+        self._changed()
+
+    def _on_redo(self, _: None) -> None:
+        self.session.redo()
+        self._changed()
+
+    def _changed(self) -> None:
         self._refused = ""
         self._began = perf_counter()
-        self.figures.set_places(self.session.knobs)
         self._put_values()
 
-    def _view(self, name: str) -> None:
-        knobs = self.session.knobs
-        if name == "whole":
-            self.figures.view(None)
-            return
-        ends = {"rake": knobs.rake_line, "band": knobs.band_line}
-        points = ends.get(name, (knobs.cursor,))
-        x, y = (sum(point[axis] for point in points) / len(points) for axis in (0, 1))
-        self.figures.view((x, y), _VIEW_WIDTH)
+    def _on_painted(self, number: int) -> None:
+        self.session.painted(number)
 
-    def _save(self, what: str) -> None:
-        # Only who saves something waits for Matplotlib.
+    def _on_theme(self, theme: str) -> None:
+        self.figures.set_theme(theme)
+
+    def _on_draw(self, _: None) -> None:
+        self._show_progress(0.0)
+        self.session.draw(PHASES, TEXTURES)
+
+    def _on_cancel(self, _: None) -> None:
+        self.session.cancel()
+        self._say("The drawing was cancelled.", "")
+
+    def _on_save(self, kind: str) -> None:
+        # Matplotlib is imported only to save something.
         from chipglow.app.files import figure_file, measurement_file, study_file
 
         model, picture = self.session.model, self._picture
-        if not isinstance(model, SceneModel):
+        assert isinstance(model, SceneModel)
+        if kind == "study":
+            data, name = study_file(model, self.session.state), "study.yaml"
+        elif picture is None or picture.quick or picture.state != self.session.state:
+            self._say("The exact picture is not finished: save it when it is.", "error")
             return
-        if what == "study":
-            data, name, kind = study_file(model, self.session.knobs), "study.yaml", "text/yaml"
-        elif picture is None or picture.coarse or picture.knobs != self.session.knobs:
-            self._say("The exact picture is not there yet: save it when it is.", "error")
-            return
-        elif what == "figure":
-            data = figure_file(picture, model, self.figures.seen, self._drawn)
-            name, kind = "chipglow.png", "image/png"
+        elif kind == "figure":
+            data = figure_file(picture, model, self.figures.view, self._drawn)
+            name = "chipglow.png"
         else:
-            data, name, kind = (
-                measurement_file(picture, model),
-                "measurement.nc",
-                "application/x-netcdf",
-            )
-        text = b64encode(data).decode()
-        self._send("download", {"name": name, "type": kind, "data": text})
+            data, name = measurement_file(picture, model), "measurement.nc"
+        types = {"study": "text/yaml", "figure": "image/png", "netcdf": "application/x-netcdf"}
+        content = {"name": name, "type": types[kind], "data": b64encode(data).decode()}
+        self._send("download", content)
         self._say(f"{name} is saved.", "")
 
-    def _show(self, number: int, picture: Picture) -> None:
+    def _show_picture(self, number: int, picture: Picture) -> None:
         self._picture, self._drawn = picture, None
         self.figures.show(picture)
-        self.figures.show_drawn(None)
-        assert picture.scene is not None or picture.errors is None
-        if picture.coarse:
-            step = picture.exposures[0].raster.spacing
-            finer = picture.knobs.pitch < picture.raster.spacing
+        self.figures.show_drawn(picture, None)
+        if picture.quick:
+            spacing = picture.exposures[0].raster.spacing
+            finer = picture.state.study.camera.pitch < picture.raster.spacing
             what = "samples and pixels" if finer else "samples"
-            text = f"Quick look on {what} of {1e6 * step:.3g} µm; the exact picture follows."
+            text = f"Quick look on {what} of {1e6 * spacing:.3g} µm; the exact picture follows."
         else:
-            text = "Exact picture."
-            if self._began:
-                took = 1e3 * (perf_counter() - self._began)
-                text = f"Exact picture, {took:.0f} ms after the last change."
-        if self._refused and not picture.coarse:
+            took = f", {1e3 * (perf_counter() - self._began):.0f} ms after the last change"
+            text = f"Exact picture{took if self._began else ''}."
+        if self._refused and not picture.quick:
             self._say(self._refused, "error")
         else:
-            self._say(text, "busy" if picture.coarse else "")
-        self._send("picture", {"number": number, "lines": self.figures.line_data(picture)})
+            self._say(text, "busy" if picture.quick else "")
+        self._send("picture", {"number": number, "lines": line_data(picture)})
 
-    def _tell(self, picture: Picture, found: Readout) -> None:
-        """Numbers at the cursor."""
-        errors = picture.errors
-        x, y = picture.knobs.cursor
-        rows = [("x, y", _signed(f"{1e6 * x:.1f}, {1e6 * y:.1f} µm"), "")]
-        if errors is not None:
-            rows += [
-                ("true temperature", _celsius(found.true), "Of the scene's sample, in the middle"),
-                ("emissivity", rounded_text(found.emissivity), "Of the same sample"),
-                ("reference", _celsius(found.reference), "Greatest radiance temperature in pixel"),
-            ]
-        rows.append(("measured", self._measured_text(found), found.source))
-        if errors is None or found.parts is None:
-            self._put_numbers(rows, [])
+    def _show_readout(self, picture: Picture, found: Readout) -> None:
+        x, y = picture.state.cursor
+        rows = [("x, y", _minus(f"{1e6 * x:.1f}, {1e6 * y:.1f} µm"), "")]
+        measured = ("measured", _measured(found), found.source)
+        if found.parts is None:
+            self._send("numbers", {"rows": [*rows, measured], "parts": [], "note": ""})
             return
         error = found.measured - found.reference
-        rows.append(("error", _kelvins(error), "Measured less reference"))
+        rows += [
+            ("true temperature", _celsius(found.true), "Of the scene's sample in mid-exposure"),
+            ("emissivity", rounded_text(found.emissivity), "Of the same sample"),
+            ("reference", _celsius(found.reference), "Maximum radiance temperature in the pixel"),
+            measured,
+            ("error", _kelvins(error), "Measured minus reference"),
+        ]
         parts = []
         for name, label, tip, kind in _PARTS:
             image = getattr(found.parts, name)
-            if image is None or (
-                name == "detector" and picture.camera and not picture.camera.detector
-            ):
+            without = name == "detector" and picture.camera and not picture.camera.detector
+            if image is None or without:
                 continue
-            value = float(nearest(image, picture.raster, picture.knobs.cursor))
-            known = isfinite(value)
+            value = float(nearest(image, picture.raster, picture.state.cursor))
+            kelvin = value if isfinite(value) else None
             parts.append(
                 {
                     "label": label,
-                    "kelvin": value if known else None,
+                    "kelvin": kelvin,
                     "text": _kelvins(value),
                     "tip": tip,
                     "kind": kind,
                 }
             )
-        self._put_numbers(rows, parts)
-
-    def _measured_text(self, found: Readout) -> str:
-        if not isfinite(found.measured):
-            return "–"
-        text = _celsius(found.measured)
-        if isfinite(found.uncertainty):
-            text = _with_uncertainty(found.measured - KELVIN, found.uncertainty)
-        return f"{text} (under range)" if found.flagged else text
-
-    def _put_numbers(self, rows: list[tuple[str, str, str]], parts: list[dict[str, Any]]) -> None:
-        note = "They sum to the error; ± is the standard uncertainty (k = 1)." if parts else ""
+        note = "They sum to the error; ± is the standard uncertainty (k = 1)."
         self._send("numbers", {"rows": rows, "parts": parts, "note": note})
 
     def _show_drawn(self, drawn: Drawn) -> None:
-        if drawn.knobs != self.session.knobs:
+        if drawn.state != self.session.state or self._picture is None:
             return
         self._drawn = drawn
-        self.figures.show_drawn(drawn)
+        self.figures.show_drawn(self._picture, drawn)
         if drawn.error is None:
-            self._say("Drawn: shaded is the range of the draws.", "")
+            self._say("Drawn: the range of the draws is shaded.", "")
             return
-        found = drawn.error
+        error = drawn.error
+        low, high = map(_kelvins, error.range)
         self._say(
-            f"Error at the cursor over {found.draws} draws: {_kelvins(found.mean)}, sample "
-            f"standard deviation {found.standard_deviation:.1f} K, {_kelvins(found.range[0])} to "
-            f"{_kelvins(found.range[1])}. Shaded: the range along the lines.",
+            f"Error at the cursor over {error.draws} draws: {_kelvins(error.mean)}, sample "
+            f"standard deviation {error.standard_deviation:.1f} K, {low} to {high}. Shaded: the "
+            "range along the lines.",
             "",
         )
 
-    def _tell_progress(self, done: float) -> None:
-        self._later(lambda: self._say("Drawing phases and textures.", "busy", done))
+    def _show_progress(self, done: float) -> None:
+        self._say("Drawing phases and textures.", "busy", done)
+
+    def _show_failed(self, text: str) -> None:
+        self._say(text, "error")
+
+    def _send(self, kind: str, content: Any) -> None:
+        self.page._send_msg({"kind": kind, "content": content})
 
     def _say(
         self, text: str, kind: str, progress: float | None = None, invalid: list[str] | None = None
     ) -> None:
-        said = {"text": text, "kind": kind, "progress": progress, "invalid": invalid or []}
-        self._send("status", said)
+        content = {"text": text, "kind": kind, "progress": progress, "invalid": invalid or []}
+        self._send("status", content)
 
     def _put_values(self) -> None:
-        knobs, panel = self.session.knobs, self.session.model.panel
-        values = {knob.name: knob.number(getattr(knobs, knob.name)) for knob in panel.knobs}
-        for name in (CURSOR, *LINES):
-            points = knobs.points(name)
-            values[name] = "; ".join(f"{1e6 * x:.1f}, {1e6 * y:.1f}" for x, y in points)
-        visible = [knob.name for knob in panel.knobs if counts(knob, knobs)]
+        session, controls = self.session, self.session.model.controls
         content = {
             "n": self._handled,
-            "values": values,
-            "visible": visible,
-            "can_undo": self.session.can_undo,
-            "link": {**self._link, **panel.texts(knobs)},
+            "values": controls.values(session.state),
+            "shown": [row.path for row in controls.rows if controls.is_shown(row, session.state)],
+            "can_undo": session.can_undo,
+            "can_redo": session.can_redo,
+            "link": {**self._link, **session.state.texts},
         }
         self._send("values", content)
 
-    def _spec(self, opened: OpenedScene | OpenedMeasurement, uploads: str) -> dict[str, Any]:
+    def _spec(self, opened: Opened, uploads: str) -> dict[str, Any]:
         is_scene = isinstance(opened, OpenedScene)
-        views = {"whole": "Whole view", "cursor": "Cursor"}
+        left, right, bottom, top = self.figures.extent
+        views = {"whole": "Whole view", CURSOR: "Cursor"}
         if is_scene:
-            views |= {"rake": "Rake face", "band": "Shear band"}
-        titles = {
-            "scene": "Scene",
-            "measured": "Measured radiance temperature",
-            "error": "Error",
-            "rake_line": "Along the first line",
-            "band_line": "Along the second line",
-        }
+            views |= {"rake_line": "Rake face", "band_line": "Shear band"}
+        titles = {name: one.title.text for name, one in self.figures.all.items()}
         return {
             "name": opened.name,
             "embedded": self._embedded,
             "uploads": uploads,
-            "knobs": [_described(knob) for knob in self.session.model.panel.knobs],
+            "rows": [_described(row) for row in self.session.model.controls.rows],
+            "saves": _SAVES if is_scene else (),
             "views": list(views.items()),
-            "figures": [*self.figures.images, *self.figures.lines],
-            "shape": self.figures.shape,
-            "titles": titles,
+            "images": list(self.figures.images),
+            "figures": list(titles.items()),
+            "extent": self.figures.extent,
+            "shape": (top - bottom) / (right - left),
             "draws": f"{PHASES}² positions of the pixels, {TEXTURES} textures" if is_scene else "",
         }
 
     def _later(self, show: Callable[[], None]) -> None:
-        """Show something that another thread found."""
+        """Show the result of another thread."""
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self.page.alone, show)
             return
@@ -431,38 +349,41 @@ class View:
             self.session.end()
 
 
-def _described(knob: Knob) -> dict[str, Any]:
-    """A knob as page.js has it."""
-    unit = {"um": "µm", "us": "µs", "degC": "°C"}
-    written = knob.quantity.unit if knob.quantity else ""
+def _described(row: Control) -> dict[str, Any]:
+    """Return a control as page.js needs it."""
+    options = [(word, option.label) for word, option in row.options.items()]
     return {
-        "name": knob.name,
-        "label": knob.label,
-        "group": knob.group,
-        "unit": unit.get(written, written),
-        "low": knob.low,
-        "high": knob.high,
-        "step": knob.step,
-        "stops": [float(knob.number(stop)) for stop in knob.stops],
-        "choices": list(knob.choices.items()) if knob.choices else None,
-        "optional": knob.optional,
+        "path": row.path,
+        "label": row.label,
+        "group": row.group,
+        "unit": row.unit,
+        "low": row.low,
+        "high": row.high,
+        "step": row.step,
+        "stops": [float(row.number(stop)) for stop in row.stops],
+        "options": options or None,
+        "optional": row.optional,
     }
 
 
+def _measured(found: Readout) -> str:
+    """Return the measured temperature to two digits of its uncertainty, at least to 0.1 °C."""
+    text = _celsius(found.measured)
+    if isfinite(found.measured) and isfinite(found.uncertainty):
+        size = floor(log10(found.uncertainty)) if found.uncertainty > 0 else 0
+        digits = min(max(1 - size, 1), 4)
+        celsius = found.measured - KELVIN
+        text = _minus(f"{celsius:.{digits}f} ± {found.uncertainty:.{digits}f} °C")
+    return f"{text} (under range)" if found.flagged and isfinite(found.measured) else text
+
+
 def _celsius(kelvins: float) -> str:
-    return _signed(f"{kelvins - KELVIN:.1f} °C") if isfinite(kelvins) else "–"
-
-
-def _with_uncertainty(celsius: float, uncertainty: float) -> str:
-    """Both to the second digit that counts in the uncertainty, and at least to 0.1 °C."""
-    size = floor(log10(uncertainty)) if uncertainty > 0 else 0
-    digits = min(max(1 - size, 1), 4)
-    return _signed(f"{celsius:.{digits}f} ± {uncertainty:.{digits}f} °C")
+    return _minus(f"{kelvins - KELVIN:.1f} °C") if isfinite(kelvins) else "–"
 
 
 def _kelvins(kelvins: float) -> str:
-    return _signed(f"{kelvins:+.1f} K") if isfinite(kelvins) else "–"
+    return _minus(f"{kelvins:+.1f} K") if isfinite(kelvins) else "–"
 
 
-def _signed(text: str) -> str:
+def _minus(text: str) -> str:
     return text.replace("-", "−")

@@ -2,20 +2,21 @@
 
 import json
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
 import pandas as pd
 
-from chipglow.analysis import SceneErrors, StudyResult
+from chipglow.analysis import Analysis
 from chipglow.cli.inertia import say_of_cut
 from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.cli.screen import current
 from chipglow.cutting import SOLVER_VERSION
 from chipglow.io import atomic_folder
-from chipglow.report import comparison_rows, place_rows, table_2, write_report, write_scene_report
+from chipglow.report import result_rows, write_report
 from chipglow.report.paper import CITATION, stands_beside
 from chipglow.study import Progress, Study, errors, run, study_text
 
@@ -29,37 +30,37 @@ def write_results(
     remarks: Sequence[str] = (),
     steady_tool: bool = False,
 ) -> None:
-    """Run a study, write its report and print the comparison with the paper.
+    """Run a study, write its report and print its results.
 
     Parameters
     ----------
     study : Study
-        What to do.
+        The study.
     folder : Path
-        Folder of the results; appears when they are complete.
+        Folder of the results; it appears when they are complete.
     force : bool
         Whether to keep files in the folder that chipglow did not write. By default such a folder
         is refused before anything is computed.
     resume : bool
-        Whether to go on with a cut that an earlier run left unfinished.
+        Whether to resume a cut that an earlier run left unfinished.
     agreed : bool
-        Whether the user agreed beforehand to what it costs.
+        Whether the user agreed beforehand to the cost.
     remarks : sequence of str
-        What a reader must know before quoting a number: printed, and on the page.
+        Remarks to consider before quoting a number: printed, and on the page.
     steady_tool : bool
-        Whether the same study with a tool that has been cutting for long stands beside it.
+        Whether to compare with the same study with a tool at steady-state temperature.
     """
     beside = study.with_steady_tool() if steady_tool else None
     _write(study, folder, force, resume, agreed, remarks, run, beside)
 
 
 def write_errors(study: Study, folder: Path, force: bool) -> None:
-    """Write and print the measurement error of a study's scene, whatever it shows.
+    """Write and print the measurement error of a study's scene, of a cut or not.
 
     Parameters
     ----------
     study : Study
-        What to do.
+        The study.
     folder, force
         As for `write_results`.
     """
@@ -73,7 +74,7 @@ def _write(
     resume: bool,
     agreed: bool,
     remarks: Sequence[str],
-    compute: Callable[..., StudyResult | SceneErrors],
+    compute: Callable[..., Analysis],
     beside: Study | None = None,
 ) -> None:
     with atomic_folder(folder, force) as temporary:
@@ -83,22 +84,32 @@ def _write(
             say_where_it_starts(beside, resume, agreed)
         assumed: list[str] = []
         with progress_bars() as progress:
-            result = compute(study, progress, resume, assumed.append)
-            steady = _steady(beside, progress, resume)
+            analysis = compute(study, progress, resume, assumed.append)
+            steady, failed = _steady(beside, progress, resume)
+            analysis = replace(analysis, failed={**analysis.failed, **failed})
             progress("report", 0.0)
-            said = [*remarks, *(f"Assumed: {one}" for one in assumed), *_warnings(result)]
-            report = _report(result, temporary, study, said, steady)
+            titled = _titled(study, analysis)
+            report = write_report(
+                analysis,
+                temporary,
+                titled.title,
+                study_text(titled),
+                _provenance(study),
+                [*remarks, *(f"Assumed: {one}" for one in assumed), *analysis.warnings],
+                study,
+                steady,
+            )
             progress("report", 1.0)
     screen = current()
     screen.assumed(assumed)
-    _print_table(result)
+    _print_table(analysis, study)
     for remark in remarks:
         screen.say(remark)
-    screen.warnings(_warnings(result))
-    if isinstance(result, StudyResult):
-        say_of_cut(result.forces.inertia if result.forces else None)
-    else:
-        screen.missing(result.missing)
+    failures = [f"{title} failed: {reason}" for title, reason in analysis.failed.items()]
+    screen.warnings([*analysis.warnings, *failures])
+    if analysis.cut is not None:
+        say_of_cut(analysis.cut.forces.inertia if analysis.cut.forces else None)
+    screen.missing(analysis.missing)
     if screen.is_for_programs:
         text = (folder / "summary.json").read_text(encoding="utf-8")
         screen.values({"summary": json.loads(text)})
@@ -106,44 +117,27 @@ def _write(
     screen.say(f"Cite as: The chipglow developers: chipglow {version('chipglow')}. {CITATION}")
 
 
-def _steady(beside: Study | None, progress: Progress, resume: bool) -> StudyResult | None:
-    """The study with a steady tool, each step named so."""
+def _steady(
+    beside: Study | None, progress: Progress, resume: bool
+) -> tuple[Analysis | None, Mapping[str, str]]:
+    """Return the analysis with a steady tool, or why it failed; each step is named so."""
     if beside is None:
-        return None
-    found = run(beside, lambda step, done: progress(f"{step}, steady tool", done), resume)
-    if isinstance(found, SceneErrors):
-        raise ValueError(f"steady tool: {' '.join(found.missing)}")
-    return found
+        return None, {}
+    try:
+        analysis = run(beside, lambda step, done: progress(f"{step}, steady tool", done), resume)
+    except ValueError as error:
+        return None, {"steady tool": str(error)}
+    if analysis.cut is None:
+        return None, {"steady tool": " ".join(analysis.missing)}
+    return analysis, {}
 
 
-def _report(
-    result: StudyResult | SceneErrors,
-    folder: Path,
-    study: Study,
-    remarks: Sequence[str],
-    steady: StudyResult | None,
-) -> Path:
-    provenance = _provenance(study)
-    if isinstance(result, StudyResult):
-        text, settings = study_text(study), table_2(study) if study.scene is None else ()
-        return write_report(
-            result, folder, study.title, text, provenance, remarks, settings, steady
-        )
-    if study.title == Study().title:
-        of = Path(study.scene).name if study.scene is not None else "the cut"
-        study = study.model_copy(update={"title": f"Measurement error of {of}"})
-    text = study_text(study)
-    return write_scene_report(result, folder, study.title, text, provenance, remarks)
-
-
-def _warnings(result: StudyResult | SceneErrors) -> list[str]:
-    """Warnings of the cut and of the images."""
-    of_images = [
-        f"Image of {name}. {warning}"
-        for name, surface in result.surfaces.items()
-        for warning in surface.warnings
-    ]
-    return [*(result.warnings if isinstance(result, StudyResult) else ()), *of_images]
+def _titled(study: Study, analysis: Analysis) -> Study:
+    """Return the study, with a title of its own if it is no cut and has the default title."""
+    if analysis.cut is not None or study.title != Study().title:
+        return study
+    of = Path(study.scene).name if study.scene is not None else "the cut"
+    return study.model_copy(update={"title": f"Measurement error of {of}"})
 
 
 def _provenance(study: Study) -> dict[str, str]:
@@ -159,20 +153,17 @@ def _provenance(study: Study) -> dict[str, str]:
     }
 
 
-def _print_table(result: StudyResult | SceneErrors) -> None:
-    """The paper's figures beside ours; of any scene the error at each place."""
-    if isinstance(result, StudyResult):
-        beside = stands_beside(result)
-        texts = {
-            "quantity": "quantity",
-            **({"the paper": "paper_text"} if beside else {}),
-            "here": "here_text",
-            "95 % interval": "interval_text",
-            **({"differs": "differs_text"} if beside else {}),
-        }
-        rows = [[getattr(row, name) for name in texts.values()] for row in comparison_rows(result)]
-        frame = pd.DataFrame(rows, columns=list(texts))
-    else:
-        heads = ["place", "reference", "error", "95 % interval", "PSF's portion"]
-        frame = pd.DataFrame(place_rows(result), columns=heads)
+def _print_table(analysis: Analysis, study: Study) -> None:
+    """Print all results; with the paper's values if the study is the paper's."""
+    beside = stands_beside(study, analysis)
+    texts = {
+        "quantity": "quantity",
+        **({"the paper": "paper_text"} if beside else {"reference": "reference_text"}),
+        "here": "here_text",
+        "95 % interval": "interval_text",
+        **({"differs": "differs_text"} if beside else {}),
+    }
+    rows = result_rows(analysis, study)
+    frame = pd.DataFrame([[getattr(row, name) for name in texts.values()] for row in rows])
+    frame.columns = list(texts)
     current().table("results", frame, {head: f"{{{head}}}" for head in frame.columns})

@@ -8,7 +8,8 @@ import typer
 from chipglow.cli.options import file_option, picture_option
 
 if TYPE_CHECKING:
-    from chipglow.analysis import WavelengthErrors
+    import pandas as pd
+
     from chipglow.cli.screen import Screen
 
 
@@ -28,6 +29,7 @@ def wavelengths(
     ] = False,
 ) -> None:
     """Compare bands, alone and as ratios of two: the error of the true temperature."""
+    from chipglow.analysis import wavelengths_frame
     from chipglow.cli.pictures import write_picture
     from chipglow.cli.progress import progress_bars, say_where_it_starts
     from chipglow.cli.screen import current
@@ -40,21 +42,20 @@ def wavelengths(
         say_where_it_starts(loaded, resume, yes)
     with progress_bars() as report:
         found = compare(loaded, report, resume, assumed.append)
+    frame = wavelengths_frame(found)
     screen = current()
-    for place in found.places:
-        _print(screen, found, place)
+    for place in frame.place.unique():
+        _print(screen, frame[frame.place == place].sort_values("total_K"), place)
         screen.heading()
     screen.assumed(assumed)
     if out is not None:
-        write_frame(found.to_frame(), out)
+        write_frame(frame, out)
         screen.file(out)
     if plot is not None:
         write_picture(draw_wavelengths(found), plot)
 
 
-def _print(screen: "Screen", found: "WavelengthErrors", place: str) -> None:
-    frame = found.to_frame()
-    frame = frame[frame.place == place].sort_values("total_K")
+def _print(screen: "Screen", frame: "pd.DataFrame", place: str) -> None:
     truth, draws = frame.truth_degC.iloc[0], frame.draws.iloc[0]
     cells = {
         "band / µm": "{first_um}",

@@ -1,9 +1,9 @@
 """How figures look: sizes, colours, images on micrometre axes."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Generic, Literal, TypeVar
+from typing import Any, Final, Literal
 
 import matplotlib
 import numpy as np
@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from chipglow.drawing.scales import PLAIN, VOID
 from chipglow.scene import Raster, Tool
-
-Result = TypeVar("Result")
 
 WIDTH: Final = 7.2
 """Width of a figure in inches: a page's text."""
@@ -212,6 +210,40 @@ class ImagePanel:
         axes.label_outer()
 
 
+def image_panels(panels: Sequence[ImagePanel], raster: Raster, tool: Tool | None) -> Figure:
+    """Return a figure of images on the same raster, two in a row."""
+    rows = (len(panels) + 1) // 2
+    figure = image_figure(raster, 2.5, rows)
+    grid = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
+    for axes, panel in zip(grid.flat, panels, strict=False):
+        panel.draw(figure, axes, raster, tool)
+    for axes in grid.flat[len(panels) :]:
+        axes.remove()
+    return figure
+
+
+def draw_mean(
+    axes: Axes, along: NDArray[np.float64], draws: NDArray[np.float64], colour: str, name: str
+) -> None:
+    """Draw the mean of draws with a standard deviation to either side, and the first dotted.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where to draw.
+    along : ndarray
+        Positions, shape (n,).
+    draws : ndarray
+        Values, one row per draw, shape (draws, n); NaN where undefined.
+    colour, name : str
+        Colour of the curves and their name in the legend.
+    """
+    mean, deviation = draws.mean(axis=0), draws.std(axis=0)
+    axes.plot(along, mean, color=colour, label=name)
+    shade(axes, along, mean, deviation, colour, 0.2)
+    axes.plot(along, draws[0], color=colour, linewidth=0.9, linestyle=":")
+
+
 def shade(
     axes: Axes,
     along: NDArray[np.float64],
@@ -234,64 +266,3 @@ def crop(axes: Axes, points: NDArray[np.float64], raster: Raster, around: float)
     (x_least, y_least), (x_most, y_most) = known.min(axis=0), known.max(axis=0)
     axes.set_xlim(max(left, x_least - 1e6 * around), min(right, x_most + 1e6 * around))
     axes.set_ylim(max(bottom, y_least - 1e6 * around), min(top, y_most + 1e6 * around))
-
-
-@dataclass(frozen=True)
-class Drawing(Generic[Result]):
-    """How one figure of a report is drawn.
-
-    Parameters
-    ----------
-    name, title, paper : str
-        As those of the `FigureFile`.
-    caption, alt : callable
-        Texts of a result.
-    draw : callable
-        Figure of a result; None where it has nothing for it.
-    """
-
-    name: str
-    title: str
-    paper: str
-    caption: Callable[[Result], str]
-    alt: Callable[[Result], str]
-    draw: Callable[[Result], Figure | None]
-
-    def write(self, result: Result, folder: Path) -> "FigureFile | None":
-        """Draw it into a folder, as PNG and SVG."""
-        with style():
-            figure = self.draw(result)
-            if figure is None:
-                return None
-            files = save(figure, folder, self.name)
-        texts = self.caption(result), self.alt(result)
-        return FigureFile(self.name, self.title, self.paper, *texts, *files)
-
-
-@dataclass(frozen=True)
-class FigureFile:
-    """A figure as written.
-
-    Parameters
-    ----------
-    name : str
-        Name of the files without ending.
-    title : str
-        Heading.
-    paper : str
-        The figure of the paper that it stands beside, such as "Figure 5"; empty without.
-    caption : str
-        What it shows; beside one of the paper, what is the same and what differs.
-    alt : str
-        What is seen in it, for who cannot see it.
-    png, svg : Path
-        The files.
-    """
-
-    name: str
-    title: str
-    paper: str
-    caption: str
-    alt: str
-    png: Path
-    svg: Path

@@ -10,7 +10,9 @@ from chipglow.quantities.settings import (
     field_tables,
     given,
     own_settings,
+    setting_at,
     settings,
+    value_at,
 )
 from chipglow.quantities.units import Quantity
 
@@ -33,5 +35,7 @@ __all__ = [
     "own_settings",
     "quantity_text",
     "rounded_text",
+    "setting_at",
     "settings",
+    "value_at",
 ]

@@ -7,7 +7,8 @@ def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "")
     """Text of a number with its unit, or a dash where there is none."""
     if value is None:
         return "–"
-    number = f"{round(value, decimals):{sign},.{max(decimals, 0)}f}"
+    rounded = round(value, decimals) + 0.0  # no negative zero
+    number = f"{rounded:{sign},.{max(decimals, 0)}f}"
     return f"{number.replace(',', ' ').replace('-', '−')} {unit}".strip()
 
 

@@ -10,7 +10,7 @@ from chipglow.quantities.parameter import Parameter
 from chipglow.quantities.part import Family, Part, adapter, first_sentence
 from chipglow.quantities.section import Section
 
-Described = TypeVar("Described", bound=Section | Part)
+Described = TypeVar("Described", bound=Section | Part | tuple[Any, ...] | Mapping[str, Any])
 
 
 @dataclass(frozen=True)
@@ -90,6 +90,44 @@ def own_settings(section: Section | Part) -> Iterator[Setting]:
         yield Setting(name, parameter, kind, value, plain[name], default, examples)
 
 
+def value_at(section: Any, path: str) -> Any:
+    """Value of a setting by its path, which may lead through lists and mappings.
+
+    Raises
+    ------
+    LookupError
+        If there is no such setting.
+    """
+    for key in path.split("."):
+        if isinstance(section, tuple):
+            section = dict(enumerate(section))[int(key) if key.isdigit() else -1]
+        elif isinstance(section, Mapping):
+            section = section[key]
+        elif isinstance(section, Section | Part) and key in _declared(type(section)):
+            section = getattr(section, key)
+        else:
+            raise LookupError(path)
+    return section
+
+
+def setting_at(section: Section | Part, path: str) -> Setting:
+    """Setting by its path; one in a list or a mapping has unit and type of the whole.
+
+    Raises
+    ------
+    LookupError
+        If there is no such setting.
+    """
+    keys, at = path.split("."), 0
+    for count in range(1, len(keys)):
+        inner = value_at(section, ".".join(keys[:count]))
+        if isinstance(inner, Section | Part):
+            at = count
+    owner = value_at(section, ".".join(keys[:at])) if at else section
+    found = {one.name: one for one in own_settings(owner)}[keys[at]]
+    return replace(found, path=path, value=value_at(section, path))
+
+
 def given(section: Section | Part) -> frozenset[str]:
     """Fields that a description gave; all of a part that was made in Python."""
     if isinstance(section, Section):
@@ -102,10 +140,11 @@ def changed(section: Described, changes: Mapping[str, object]) -> Described:
 
     Parameters
     ----------
-    section : Section or Part
+    section : Section, Part, tuple or mapping
         The section.
     changes : mapping
-        New values by their paths: numbers in SI units, text with units, mappings or parts.
+        New values by their paths, as of `value_at`: numbers in SI units, text with units, mappings
+        or parts.
 
     Raises
     ------
@@ -116,11 +155,16 @@ def changed(section: Described, changes: Mapping[str, object]) -> Described:
     return made
 
 
-def _with_changes(section: Section | Part, changes: Mapping[str, object]) -> dict[str, object]:
-    """What a description gave of a section, and the changes, as a description gives them."""
-    data = {name: getattr(section, name) for name in given(section)}
-    if getattr(section, "kind", ""):
-        data["kind"] = section.kind  # type: ignore[union-attr]
+def _with_changes(section: Any, changes: Mapping[str, object]) -> Any:
+    """What a description gave of a section, a mapping or a list, with the changes."""
+    if isinstance(section, Mapping):
+        data = dict(section)
+    elif isinstance(section, tuple):
+        data = {str(number): one for number, one in enumerate(section)}
+    else:
+        data = {name: getattr(section, name) for name in given(section)}
+        if getattr(section, "kind", ""):
+            data["kind"] = section.kind
     inner: dict[str, dict[str, object]] = {}
     for path, value in changes.items():
         name, dot, rest = path.partition(".")
@@ -128,7 +172,9 @@ def _with_changes(section: Section | Part, changes: Mapping[str, object]) -> dic
             inner.setdefault(name, {})[rest] = value
         else:
             data[name] = value
-    return data | {name: _with_changes(getattr(section, name), one) for name, one in inner.items()}
+    for name, one in inner.items():
+        data[name] = _with_changes(value_at(section, name), one)
+    return tuple(data.values()) if isinstance(section, tuple) else data
 
 
 def field_tables(section: Section | Part, name: str) -> str:

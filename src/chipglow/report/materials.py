@@ -1,4 +1,4 @@
-"""Pictures of materials: flow stress over strain; heat, elasticity and density over temperature."""
+"""Figure of a material: flow stress over strain; thermal and elastic properties, density."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -17,17 +17,9 @@ _STRAINS: Final = np.linspace(0.0, 2.0, 81)
 
 
 def material_figure(material: MaterialFile) -> Figure:
-    """Flow stress of every set; conductivity, heat capacity, elastic moduli and density.
+    """Draw the flow stress of every set; conductivity, heat capacity, moduli and density.
 
-    Parameters
-    ----------
-    material : MaterialFile
-        A workpiece's material; a tool's has nothing that varies.
-
-    Raises
-    ------
-    ValueError
-        If it is a tool's.
+    Tool materials, whose properties are constant, raise ValueError.
     """
     if not material.workpieces:
         raise ValueError(f"{material.name} is a tool's material, expected a workpiece's to draw")
@@ -61,7 +53,7 @@ def _flow_stress_panel(axes: Axes, name: str, workpiece: WorkpieceMaterial) -> N
 
 
 def _temperature_panels(panels: Sequence[Axes], workpiece: WorkpieceMaterial) -> None:
-    """Conductivity, heat capacity, elastic moduli and density over the temperature."""
+    """Draw conductivity, heat capacity, elastic moduli and density over temperature."""
     celsius = np.linspace(0.0, workpiece.melting_temperature - KELVIN, 300)
     kelvins = celsius + KELVIN
     left, middle, right, last = panels

@@ -38,17 +38,7 @@ _DECADES: Final = 3
 
 @dataclass(frozen=True)
 class MovieScales:
-    """Limits of the colours of a movie: known before the cut, the same from end to end.
-
-    Parameters
-    ----------
-    temperature : tuple
-        In K.
-    strain : tuple
-        Plastic strain.
-    rate : tuple
-        Plastic strain rate in 1/s, whole decades.
-    """
+    """Limits of the colours of a movie, fixed before the cut: K, plastic strain, 1/s."""
 
     temperature: tuple[float, float]
     strain: tuple[float, float]
@@ -56,11 +46,11 @@ class MovieScales:
 
     @classmethod
     def of(cls, simulation: CuttingSimulation) -> "MovieScales":
-        """Scales of a cut.
+        """Return the scales of a cut.
 
-        Temperature: from the initial one to where the material is soft, 0.6 of the way to melting
-        (that of steel, if the law of the flow stress knows none), to a whole 50 °C. Strain rate:
-        three decades from a tenth of speed over feed, the rate of a shear as thick as the feed.
+        Temperature: from the initial one to 0.6 of the way to melting (of steel, if the flow law
+        has no melting temperature), rounded up to 50 °C. Strain rate: three decades from a tenth
+        of speed over feed, the rate of a shear as thick as the feed.
         """
         conditions = simulation.conditions
         start = conditions.initial_temperature
@@ -76,15 +66,7 @@ class MovieScales:
 
 
 class CutPicture:
-    """One figure whose images are renewed from frame to frame; all else is drawn once.
-
-    Parameters
-    ----------
-    raster : Raster
-        Samples of the frames.
-    simulation : CuttingSimulation
-        Of which the frames are.
-    """
+    """A figure of a simulation's frames: only its images are redrawn for each frame."""
 
     def __init__(self, raster: Raster, simulation: CuttingSimulation) -> None:
         self._raster, self._tool = raster, simulation.tool
@@ -94,12 +76,12 @@ class CutPicture:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns of the pictures, both even."""
+        """Rows and columns of the pictures, both even numbers."""
         columns, rows = self._canvas.get_width_height()
         return rows, columns
 
     def draw(self, frame: Frame) -> NDArray[np.uint8]:
-        """Picture of a frame: red, green and blue, shape (rows, columns, 3)."""
+        """Return the picture of a frame as RGB, shape (rows, columns, 3)."""
         solid = frame.material == Material.WORKPIECE
         there = frame.material != Material.VOID
         rate = np.maximum(frame.needed("plastic_strain_rate"), self._slowest)
@@ -164,7 +146,7 @@ class CutPicture:
 
 
 def _canvas(figure: Figure) -> Any:
-    """Canvas of a figure; matplotlib does not say its types."""
+    """Return the canvas of a figure, which Matplotlib does not type."""
     return FigureCanvasAgg(figure)
 
 
@@ -172,28 +154,10 @@ def _canvas(figure: Figure) -> Any:
 def cut_movie(
     path: str | os.PathLike[str], raster: Raster, simulation: CuttingSimulation
 ) -> Iterator[Callable[[Frame], None]]:
-    """Write a movie of a cut, frame by frame as they come.
+    """Write a movie of a cut, .mp4 or .gif; yields the function that appends a frame.
 
-    Parameters
-    ----------
-    path : path-like
-        The file to write, .mp4 or .gif. It appears when the block ends, not if that raises.
-    raster : Raster
-        Samples of the frames.
-    simulation : CuttingSimulation
-        Of which the frames are.
-
-    Yields
-    ------
-    callable
-        Takes the next frame.
-
-    Raises
-    ------
-    ValueError
-        If the name does not end in .mp4 or .gif, PyAV is missing for .mp4, or there is no frame.
-    OSError
-        If the file cannot be written.
+    The file appears when the block ends without an exception. Another ending, a missing PyAV for
+    .mp4, or no frame raise ValueError.
     """
     picture = CutPicture(raster, simulation)
     with movie_writer(path, picture.shape, _palette()) as append:
@@ -201,7 +165,7 @@ def cut_movie(
 
 
 def _palette() -> NDArray[np.uint8]:
-    """The colours of the three scales and greys, as many as a GIF may have."""
+    """Return the colours of the three scales and greys, as many as a GIF can hold."""
     greys = 30
     each = (PALETTE_SIZE - greys) // 3
     maps: list[Any] = [scales.HEAT, scales.PLAIN, scales.RATE]

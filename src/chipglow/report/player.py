@@ -1,12 +1,11 @@
-"""A figure of a report's page that can be scrubbed through time, without network."""
+"""Images of all exposures on the page: reference, measurement and error, with one slider."""
 
 from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from html import escape
 from io import BytesIO
-from json import dumps
 from math import floor, log10
+from typing import Any, Final, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -15,79 +14,85 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from chipglow.drawing import drawing, scales
+from chipglow.drawing.scales import KELVIN
 from chipglow.quantities.format import quantity_text
-from chipglow.report.page import shown
+from chipglow.report.facts import Facts, texts, time_text
 from chipglow.scene import Raster, Tool
 
-_COLOURS = 255
+_COLOURS: Final = 255
 
 
-@dataclass(frozen=True)
-class View:
-    """One quantity through time.
-
-    Parameters
-    ----------
-    title : str
-        What it is; stands above the image.
-    frames : ndarray
-        Values in the unit, shape (time, y, x); NaN where there is none.
-    unit : str
-        The unit, as printed.
-    limits : tuple of float
-        Ends of the colours.
-    colours : str
-        Name of the colour map.
-    alt : str
-        What is seen in the still, a sentence.
-    """
-
-    title: str
-    frames: NDArray[np.float64]
-    unit: str
-    limits: tuple[float, float]
-    colours: str
-    alt: str
-
-
-@dataclass(frozen=True)
-class Mark:
-    """A curve on all views, points in m of shape (n, 2); of one frame only if it says which."""
+class Mark(NamedTuple):
+    """A curve on all images, points in m of shape (n, 2); on those of one frame if it is given."""
 
     points: NDArray[np.float64]
     kind: str
     frame: int | None = None
 
 
+class Curve(NamedTuple):
+    """A mark in the unit of the page's drawing."""
+
+    points: str
+    kind: str
+    frame: int | None
+
+
+@dataclass(frozen=True)
+class View:
+    """One quantity through time: images of shape (time, y, x) in the unit, NaN where undefined."""
+
+    title: str
+    frames: NDArray[np.float64]
+    limits: tuple[float, float]
+    colours: str
+    alt: str
+    unit: str = "°C"
+
+    @property
+    def pictures(self) -> list[str]:
+        """Images of all frames as data URLs."""
+        return [self._picture(frame) for frame in self.frames]
+
+    @property
+    def scale(self) -> str:
+        """Image of the colour scale."""
+        return self._picture(np.linspace(*self.limits, 256)[None])
+
+    @property
+    def low(self) -> str:
+        """Lower end of the colour scale."""
+        return quantity_text(self.limits[0], self.unit, 0)
+
+    @property
+    def high(self) -> str:
+        """Upper end of the colour scale."""
+        return quantity_text(self.limits[1], self.unit, 0)
+
+    def _picture(self, values: NDArray[np.float64]) -> str:
+        """Return a data URL of a PNG with one pixel per value; index 0 is undefined."""
+        low, high = self.limits
+        part = np.clip((values - low) / (high - low), 0.0, 1.0)
+        index = np.where(np.isfinite(values), 1 + np.round(part * (_COLOURS - 1)), 0)
+        colours = matplotlib.colormaps[self.colours](np.linspace(0.0, 1.0, _COLOURS))[:, :3]
+        palette = np.concatenate([[to_rgb(scales.VOID)], colours])
+        image = Image.fromarray(np.nan_to_num(index).astype(np.uint8))
+        image.putpalette(np.round(palette * 255).astype(np.uint8).tobytes())
+        file = BytesIO()
+        image.save(file, "PNG", optimize=True)
+        return f"data:image/png;base64,{b64encode(file.getvalue()).decode('ascii')}"
+
+
 @dataclass(frozen=True)
 class Player:
-    """Views side by side, rows of as many, with one slider for the time.
+    """Views of the same frames; `still` is shown first, without script and in print.
 
-    Parameters
-    ----------
-    name, title, caption : str
-        As those of other figures.
-    views : sequence of View
-        Of the same frames.
-    columns : int
-        Views in a row.
-    times : sequence of str
-        What the frames show, with units.
-    still : int
-        Frame that is shown first, without script and in print.
-    raster : Raster
-        Where the values are.
-    tool : Tool, optional
-        Drawn on the views.
-    marks : sequence of Mark
-        Drawn on the views.
+    Tool and marks are drawn on all views; `times` are the captions of the frames.
     """
 
-    name: str
     title: str
     caption: str
     views: Sequence[View]
-    columns: int
     times: Sequence[str]
     still: int
     raster: Raster
@@ -95,107 +100,103 @@ class Player:
     marks: Sequence[Mark] = ()
 
     @property
-    def html(self) -> str:
-        """The figure as a part of a page."""
-        views = "\n".join(self._view(view) for view in self.views)
-        return (
-            f'<figure class="player" id="{self.name}" data-times="{escape(dumps(self.times))}">\n'
-            f"<h3>{escape(self.title)}</h3>\n{self._drawn_once()}\n"
-            f'<div class="views" style="--columns: {self.columns}">\n{views}\n</div>\n'
-            f'<div class="time">{self._controls()}'
-            f'<p class="when">{escape(self.times[self.still])}</p></div>\n'
-            f"<figcaption>{shown(self.caption)}</figcaption></figure>"
-        )
-
-    def _view(self, view: View) -> str:
-        images = "\n".join(
-            f'<img data-frame="{i}"{self._hidden(i)} alt="{escape(self._alt(view, i))}" '
-            f'src="{_picture(frame, view)}">'
-            for i, frame in enumerate(view.frames)
-        )
-        low, high = (quantity_text(end, view.unit, 0) for end in view.limits)
-        scale = np.linspace(*view.limits, 256)[None]
-        return (
-            f'<div class="view"><p>{escape(view.title)}</p>\n'
-            f'<div class="image" style="aspect-ratio: {self.raster.columns} / {self.raster.rows}">'
-            f'\n{images}\n<svg viewBox="{self._box}"><use href="#{self.name}-marks"/></svg></div>\n'
-            f'<div class="scale"><span>{low}</span><img alt="Colours from {low} to {high}." '
-            f'src="{_picture(scale, view)}"><span>{high}</span></div></div>'
-        )
-
-    def _alt(self, view: View, frame: int) -> str:
-        return view.alt if frame == self.still else f"{view.title}. {self.times[frame]}"
-
-    def _hidden(self, frame: int | None) -> str:
-        return "" if frame in (None, self.still) else ' class="off"'
-
-    def _controls(self) -> str:
-        if len(self.times) < 2:
-            return ""
-        return (
-            '<div class="controls" hidden><button type="button">Play</button>'
-            f'<input type="range" min="0" max="{len(self.times) - 1}" value="{self.still}" '
-            'aria-label="Exposure" autocomplete="off"></div>'
-        )
-
-    @property
-    def _box(self) -> str:
-        left, right, bottom, top = np.array(self.raster.extent) * self._factor
+    def box(self) -> str:
+        """View box of the drawing on an image."""
+        left, right, bottom, top = self._extent
         return f"{left:.1f} {-top:.1f} {right - left:.1f} {top - bottom:.1f}"
 
     @property
-    def _factor(self) -> float:
-        return drawing.length_unit(self.raster)[0]
-
-    def _drawn_once(self) -> str:
-        """Tool, marks and a scale of length, to which every view refers."""
-        return (
-            f'<svg class="once" aria-hidden="true"><defs><g id="{self.name}-marks">'
-            f"{''.join(self._curves())}{self._length()}</g></defs></svg>"
-        )
-
-    def _curves(self) -> Iterator[str]:
-        marks = list(self.marks)
-        if self.tool is not None:
-            marks.insert(0, Mark(self.tool.outline(3e-3), "tool"))
-        for mark in marks:
-            points = " ".join(f"{x:.1f},{-y:.1f}" for x, y in mark.points * self._factor)
-            of_frame = "" if mark.frame is None else f' data-frame="{mark.frame}"'
-            yield (
-                f"<g{of_frame}{self._hidden(mark.frame)}>"
-                f'<polyline class="under" points="{points}"/>'
-                f'<polyline class="{mark.kind}" points="{points}"/></g>'
+    def curves(self) -> list[Curve]:
+        """Outline of the tool and marks in the drawing's unit."""
+        tool = [] if self.tool is None else [Mark(self.tool.outline(3e-3), "tool")]
+        factor = drawing.length_unit(self.raster)[0]
+        return [
+            Curve(
+                " ".join(f"{x:.1f},{-y:.1f}" for x, y in mark.points * factor),
+                mark.kind,
+                mark.frame,
             )
+            for mark in (*tool, *self.marks)
+        ]
 
-    def _length(self) -> str:
-        """A bar of a round length in the corner at the bottom left."""
-        factor, unit = drawing.length_unit(self.raster)
-        left, right, bottom, top = np.array(self.raster.extent) * factor
+    @property
+    def scale_bar(self) -> dict[str, Any]:
+        """Bar of a round length at the bottom left."""
+        left, right, bottom, top = self._extent
         length = _round_down((right - left) / 4)
         x, y, size = left + (right - left) / 25, -bottom - (top - bottom) / 16, (right - left) / 18
-        points = f"{x:.1f},{y:.1f} {x + length:.1f},{y:.1f}"
-        text = f'x="{x:.1f}" y="{y - size / 2:.1f}" font-size="{size:.1f}"'
-        return (
-            f'<polyline class="under" points="{points}"/><polyline points="{points}"/>'
-            f'<text {text} stroke-width="{size / 6:.2f}">{length:g} {unit}</text>'
-        )
+        return {
+            "points": f"{x:.1f},{y:.1f} {x + length:.1f},{y:.1f}",
+            "x": f"{x:.1f}",
+            "y": f"{y - size / 2:.1f}",
+            "size": f"{size:.1f}",
+            "stroke": f"{size / 6:.2f}",
+            "text": f"{length:g} {drawing.length_unit(self.raster)[1]}",
+        }
+
+    @property
+    def _extent(self) -> NDArray[np.float64]:
+        return np.array(self.raster.extent) * drawing.length_unit(self.raster)[0]
 
 
 def _round_down(length: float) -> float:
-    """1, 2 or 5 times a power of ten, up to a length."""
+    """Return the largest 1, 2 or 5 times a power of ten that is not over a length."""
     power = 10.0 ** floor(log10(length))
     return max(step * power for step in (1, 2, 5) if step * power <= length)
 
 
-def _picture(values: NDArray[np.float64], view: View) -> str:
-    """Values as a picture of as many pixels, for an image's source."""
-    low, high = view.limits
-    part = np.clip((values - low) / (high - low), 0.0, 1.0)
-    index = np.where(np.isfinite(values), 1 + np.round(part * (_COLOURS - 1)), 0)
-    colours = matplotlib.colormaps[view.colours](np.linspace(0.0, 1.0, _COLOURS))[:, :3]
-    palette = np.concatenate([[to_rgb(scales.VOID)], colours])
-    image = Image.fromarray(np.nan_to_num(index).astype(np.uint8))
-    image.putpalette(np.round(palette * 255).astype(np.uint8).tobytes())
-    file = BytesIO()
-    image.save(file, "PNG", optimize=True)
-    return f"data:image/png;base64,{b64encode(file.getvalue()).decode('ascii')}"
+def exposure_player(facts: Facts) -> Player:
+    """Return the images of an analysis: of the longest part of a cut, else of all exposures."""
+    analysis = facts.analysis
+    starts = analysis.data.instant.values[: facts.starts]
+    caption = facts.text(texts()["figures"]["player"]["caption"])
+    raster = next(iter(analysis.measurements.values())).raster
+    return Player(
+        title=texts()["figures"]["player"]["title"],
+        caption=caption,
+        views=list(_views(facts)),
+        times=[
+            f"Exposure {i + 1} of {len(starts)}: begins at {time_text(start, '.4g')}, lasts "
+            f"{time_text(analysis.camera.integration_time)}."
+            for i, start in enumerate(starts)
+        ],
+        still=int(analysis.data.attrs["shown_instant"]),
+        raster=raster,
+        tool=analysis.tool,
+        marks=list(_marks(facts)),
+    )
+
+
+def _marks(facts: Facts) -> Iterator[Mark]:
+    """Yield where the errors are read and, of a cut, the ridge of the band in every exposure."""
+    cut, still = facts.analysis.cut, int(facts.data.attrs["shown_instant"])
+    if cut:
+        for i, instant in enumerate(cut.one_segment):
+            if instant.band is not None:
+                yield Mark(instant.band.ridge.points, "ridge", i)
+    for points in facts.read_curves():
+        if len(points) > 1:
+            yield Mark(points, "line", still if cut else None)
+        else:
+            yield Mark(points.repeat(2, axis=0), "spot")
+
+
+def _views(facts: Facts) -> Iterator[View]:
+    """Yield three views for each surface that is read; colours are the same in all rows."""
+    data = facts.data.isel(instant=slice(facts.starts)).sel(surface=facts.read_surfaces)
+    reference, measured = data.reference_temperature - KELVIN, data.radiance_temperature - KELVIN
+    error = measured - reference
+    low, high = scales.ends(reference.values, 0.5, 99.9, 1.0)
+    if facts.analysis.camera.lower_limit is not None:
+        low = max(facts.analysis.camera.lower_limit - KELVIN - 50.0, low)
+    heat = (low, max(high, low + 1.0))
+    largest = scales.round_limit(error.values, 99.0, 10.0)
+    for name in facts.read_surfaces:
+        of = f", {name}" if len(facts.read_surfaces) > 1 else ""
+        for title, images, limits, colours, alt in (
+            ("Reference", reference, heat, scales.HEAT, "reference, sharp and mottled"),
+            ("Measured", measured, heat, scales.HEAT, "measured radiance temperature, blurred"),
+            ("Error", error, (-largest, largest), scales.SIGNED, "error, blue where negative"),
+        ):
+            frames = images.sel(surface=name).values.astype(np.float64)
+            yield View(f"{title}{of}", frames, limits, colours, f"Image of the {alt}{of}.")

@@ -1,355 +1,420 @@
-"""The report's folder: page, figures, numbers, arrays and the study as run."""
+"""The report: page, figures, numbers, arrays and the study as run, in one folder."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from html import escape
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+
+import xarray as xr
+from matplotlib.figure import Figure
 
 from chipglow import __version__
-from chipglow.analysis import StudyResult
-from chipglow.drawing.drawing import FigureFile
-from chipglow.report.camera_rows import camera_rows
-from chipglow.report.chip_rows import chip_rows
-from chipglow.report.comparison import (
-    CauseRow,
-    PartRow,
+from chipglow.analysis import Analysis, with_errors
+from chipglow.analysis.distribution import TOGETHER
+from chipglow.drawing import drawing
+from chipglow.report import cut_figures, figures, paper
+from chipglow.report.answer import answer
+from chipglow.report.facts import Facts, texts
+from chipglow.report.page import (
+    Failure,
+    FigureFile,
+    Line,
+    Pairs,
+    Part,
+    Remarks,
+    Section,
+    Table,
+    Term,
+    Terms,
+    Text,
+    page,
+)
+from chipglow.report.player import exposure_player
+from chipglow.report.rows import (
     Row,
+    camera_rows,
     cause_rows,
+    chip_rows,
     cut_rows,
+    draws_text,
     error_rows,
     part_rows,
+    spread_text,
 )
-from chipglow.report.error_player import cut_player
-from chipglow.report.evidence import answer, answer_note, error_definition
-from chipglow.report.figures import draw_figures
-from chipglow.report.page import (
-    Line,
-    Section,
-    Term,
-    answer_part,
-    document,
-    figure_part,
-    repeat_section,
-    table_part,
-    terms_part,
-    titled_part,
-    write_files,
-)
-from chipglow.report.paper import CITATION, EmissivityTexts, stands_beside, table_1
-from chipglow.report.results import results_dataset
-from chipglow.report.steady_tool import ToolRow, steady_tool_part, tool_rows
-from chipglow.report.summary import cut_summary
-from chipglow.report.terms import INTERVAL, PSF
+from chipglow.report.steady_tool import tool_rows, tool_table
+from chipglow.report.summary import summary
 from chipglow.study import Study
+from chipglow.text import json_schema
+
+_FIGURES: Final[Mapping[str, Callable[[Facts], Figure | None]]] = {
+    "psf": figures.point_spread,
+    "heated-chips": cut_figures.heated_chips,
+    "heated-tool": cut_figures.heated_tool,
+    "scene": figures.scene,
+    "measurement": figures.measurement,
+    "rake-profiles": cut_figures.rake_profiles,
+    "dual-spectrum": cut_figures.dual_spectrum,
+    "band-curves": cut_figures.band_curves,
+    "error-images": figures.error_images,
+    "error-lines": figures.error_lines,
+    "over-time": figures.over_time,
+    "psf-sensitivity": figures.psf_sensitivity,
+    "forces": cut_figures.forces,
+    "chip-thickness": cut_figures.chip_thickness,
+}
+"""All figures in the order of the paper, then further ones."""
+
+_ELSEWHERE: Final = ("psf-sensitivity", "over-time", "forces", "chip-thickness")
+"""Figures beside the numbers that they explain; the others follow the table of the errors."""
 
 
 def write_report(
-    result: StudyResult,
+    analysis: Analysis,
     folder: Path,
     title: str,
     study_text: str,
     provenance: Mapping[str, str],
     remarks: Sequence[str] = (),
-    settings: Sequence[tuple[str, str, str]] = (),
-    steady: StudyResult | None = None,
+    study: Study | None = None,
+    steady: Analysis | None = None,
 ) -> Path:
-    """Write everything that a study gives into a folder.
+    """Write the results of an analysis into a folder.
+
+    The numbers and arrays are written first. A part of the page that fails is shown there with
+    its reason; the other parts are not affected.
 
     Parameters
     ----------
-    result : StudyResult
-        The study.
+    analysis : Analysis
+        The analysis, of a cut or any scene.
     folder : Path
         An existing folder, such as a temporary one that is moved into place at the end.
     title : str
-        Heads the page.
+        Title of the page.
     study_text : str
         The study's YAML, written as ``study.yaml`` and shown in the report.
     provenance : mapping
-        What, when, version, seed and the like, in the order in which it is shown.
+        Origin, time, version, seed and the like, in the order of display.
     remarks : sequence of str
-        What a reader must know before quoting a number: sentences under the answer.
-    settings : sequence of tuple
-        Settings of the cut beside the paper's, see `paper.table_2`; none for a scene from a file.
-    steady : StudyResult, optional
-        The same study with a tool that has been cutting for long, to stand beside it.
+        Assumptions and warnings to consider before quoting a number, one sentence each.
+    study : Study, optional
+        The study; the paper's values are shown if it is the paper's.
+    steady : Analysis, optional
+        Analysis of the same study with a steady tool, for comparison.
 
     Returns
     -------
     Path
-        ``report.html``; beside it are ``figures/``, ``summary.json`` and its schema,
+        ``report.html``; the folder also holds ``figures/``, ``summary.json`` and its schema,
         ``results.nc`` and ``study.yaml``.
 
     Raises
     ------
     OSError
-        If something can't be written.
+        If a file cannot be written.
     """
-    pictures = folder / "figures"
-    pictures.mkdir()
-    errors, cut = error_rows(result), cut_rows(result)
-    chip, camera = chip_rows(result.chip), camera_rows(result.camera, result.raster)
-    causes, parts = cause_rows(result), part_rows(result)
-    beside_steady = tool_rows(result, steady) if steady else []
-    figures = {figure.name: figure for figure in draw_figures(result, pictures)}
-    apart = {name: _figure(figures.pop(name, None)) for name in _APART}
-    compared = [*errors, *(row for row in cut if row.paper is not None)]
-    others = [row for row in cut if row.paper is None]
-    tables = (
-        *_emissivity_tables(result, settings),
-        ("cut", "The cut", f"{table_part('', _HEADS, map(_line, others))}\n{apart['forces']}"),
-        ("chip", "The chip", f"{_single(chip)}\n{apart['chip-thickness']}"),
-        ("camera", "The camera", _single(camera) if camera else ""),
+    report = _Report(analysis, title, study_text, provenance, remarks, study, steady)
+    (folder / "study.yaml").write_text(study_text, encoding="utf-8")
+    _write_arrays(analysis.data, provenance, folder / "results.nc")
+    report.write_numbers(folder)
+    (folder / "figures").mkdir()
+    path = folder / "report.html"
+    path.write_text(page(title, report.sections(folder / "figures")), encoding="utf-8")
+    return path
+
+
+def _write_arrays(data: xr.Dataset, provenance: Mapping[str, str], path: Path) -> None:
+    written = with_errors(data).assign_attrs(
+        {f"provenance_{name.replace(' ', '_')}": text for name, text in provenance.items()}
     )
-    found = [row.term for row in (*cut, *chip, *camera)] + [row.term for row in beside_steady]
-    sections = [
-        Section(
-            "answer",
-            "The answer",
-            answer_part(answer(result), _note(result), remarks, cut_player(result).html),
-        ),
-        Section(
-            "causes",
-            "What causes it",
-            "\n".join(
+    packed = {
+        str(name): {"zlib": True, "complevel": 4}
+        for name, values in written.data_vars.items()
+        if values.ndim > 1
+    }
+    written.to_netcdf(path, engine="h5netcdf", encoding=packed)
+
+
+@dataclass(frozen=True)
+class _Report:
+    """What `write_report` is given, its rows and the sections of the page."""
+
+    analysis: Analysis
+    title: str
+    study_text: str
+    provenance: Mapping[str, str]
+    remarks: Sequence[str]
+    study: Study | None
+    steady: Analysis | None
+
+    @cached_property
+    def facts(self) -> Facts:
+        """Values for the texts."""
+        return Facts(self.analysis, self.study)
+
+    @cached_property
+    def errors(self) -> list[Row]:
+        """Rows of the errors."""
+        return error_rows(self.facts)
+
+    @cached_property
+    def cut(self) -> list[Row]:
+        """Rows of the cut."""
+        return cut_rows(self.facts)
+
+    @cached_property
+    def chip(self) -> list[Row]:
+        """Rows of the chip."""
+        return chip_rows(self.facts)
+
+    @cached_property
+    def camera(self) -> list[Row]:
+        """Rows of the camera."""
+        return camera_rows(self.facts)
+
+    @cached_property
+    def tool(self) -> list[Any]:
+        """Rows of the comparison with a steady tool."""
+        return tool_rows(self.analysis, self.steady) if self.steady else []
+
+    def write_numbers(self, folder: Path) -> None:
+        """Write ``summary.json`` and its schema."""
+        rows = [*self.errors, *self.cut]
+        numbers = summary(
+            rows,
+            cause_rows(self.errors),
+            part_rows(self.facts, self.errors),
+            self.chip,
+            self.camera,
+            self.tool,
+            provenance=dict(self.provenance),
+            missing=list(self.analysis.missing),
+            failed=dict(self.analysis.failed),
+        )
+        text = numbers.model_dump_json(indent=2, exclude_defaults=True)
+        (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+        schema = json_schema(type(numbers))
+        (folder / "summary.schema.json").write_text(schema, encoding="utf-8")
+
+    def sections(self, folder: Path) -> list[Section]:
+        """Return the sections of the page; figures are drawn into a folder."""
+        drawn = dict(self._draw(folder))
+        beside = {name: [drawn.pop(name)] if name in drawn else [] for name in _ELSEWHERE}
+        player = self._attempt("Images of the exposures", lambda: exposure_player(self.facts))
+        failed = [Failure(title, reason) for title, reason in self.analysis.failed.items()]
+        first = [answer(self.facts, self.errors), player, *failed, Remarks(self.remarks)]
+        heading = "Comparison with the paper" if self.facts.is_compared else "The errors"
+        return [
+            Section("answer", "The answer", [Part("", "", first)]),
+            Section("causes", "Causes of the errors", list(self._causes(beside))),
+            Section("comparison", heading, [Part("", "", [self._comparison(), *drawn.values()])]),
+            Section("tables", "Tables", list(self._tables(beside))),
+            Section("repeat", "How to repeat it", list(self._repeat())),
+        ]
+
+    def _attempt(self, title: str, make: Callable[[], Any]) -> Any:
+        """Return a part of the page, or its failure with the reason."""
+        try:
+            return make()
+        except Exception as error:
+            return Failure(title, f"{type(error).__name__}: {error}")
+
+    def _draw(self, folder: Path) -> Iterator[tuple[str, FigureFile | Failure]]:
+        for name, draw in _FIGURES.items():
+            if self.analysis.cut is None and draw.__module__ == cut_figures.__name__:
+                continue
+            title = self.facts.text(texts()["figures"][name]["title"])
+            block = self._attempt(title, partial(self._figure, name, title, draw, folder))
+            if block is not None:
+                yield name, block
+
+    def _figure(
+        self, name: str, title: str, draw: Callable[[Facts], Figure | None], folder: Path
+    ) -> FigureFile | None:
+        with drawing.style():
+            figure = draw(self.facts)
+            if figure is None:
+                return None
+            published = paper.FIGURES.get(name) if self.facts.is_compared else None
+            number = published.number if published else ""
+            file = f"{number.lower().replace(' ', '-')}-{name}".lstrip("-")
+            png, _ = drawing.save(figure, folder, file)
+        caption, alt = (
+            self.facts.text(texts()["figures"][name][key]) for key in ("caption", "alt")
+        )
+        caption = f"{caption} {published.text}" if published else caption
+        return FigureFile(file, title, number, caption, alt, png)
+
+    def _causes(self, beside: Mapping[str, Sequence[Any]]) -> Iterator[Part]:
+        explained = Terms([row.term for row in self.errors if row.explanation])
+        yield Part("", "", [self._parts(), explained])
+        scatter = [self._scatter(), *beside["over-time"], *beside["psf-sensitivity"]]
+        yield Part("scatter", "Sources of scatter", scatter)
+        if self.tool:
+            table = tool_table(self.analysis, self.tool, self.study)
+            yield Part("steady-tool", "Tool at steady-state temperature", [table])
+
+    def _parts(self) -> Table:
+        """Return the contributions to each error."""
+        rows = part_rows(self.facts, self.errors)
+        references = {row.key: row.reference_text for row in self.errors}
+        names = [
+            name
+            for name in ("psf", "motion", "footprint", "rest")
+            if any(name in row.parts for row in rows)
+        ]
+        words = ("psf-contribution" if name == "psf" else name for name in names)
+        heads = [Term("", "Quantity"), *map(self._head, ("reference", "error", *words))]
+        lines = [
+            Line(
                 (
-                    _parts(parts),
-                    terms_part(row.term for row in errors),
-                    titled_part("scatter", "What makes the scatter", _causes(causes)),
-                    apart["psf-sensitivity"],
-                    *_steady(result, beside_steady),
+                    row.quantity,
+                    references[row.key],
+                    draws_text(row.error),
+                    *(draws_text(row.parts.get(name)) for name in names),
+                ),
+                "°C",
+                row.link,
+            )
+            for row in rows
+        ]
+        text = "Contributions to each error: mean ± standard deviation over the draws."
+        return Table(text, heads, lines)
+
+    def _scatter(self) -> Table | Text:
+        """Return the causes of the scatter of each error."""
+        rows = [row for row in cause_rows(self.errors) if row.key.endswith("_error_degC")]
+        if not rows:
+            return Text("There is only one draw, so the scatter is not known.")
+        *names, together = (f"{name} ({count})" for name, count, _, _ in rows[0].causes)
+        together = together.replace(TOGETHER, "interactions")
+        heads = [Term("", "Quantity"), *(Term("causes-of-scatter", name) for name in names)]
+        heads.append(Term("together", together))
+        lines = [Line((row.quantity, *row.cells), row.unit, row.link) for row in rows]
+        text = (
+            "Scatter of the errors due to each cause alone, as a standard deviation with its "
+            "fraction of the sum of squares. The headings state the number of values."
+        )
+        return Table(text, heads, lines)
+
+    def _comparison(self) -> Table:
+        """Return all errors and, if the study is the paper's, the published values."""
+        compared = self.facts.is_compared
+        rows = [*self.errors, *(row for row in self.cut if row.published)]
+        heads = [Term("", "Quantity"), *([Term("", "Paper")] if compared else [])]
+        heads += map(self._head, ("mean", "interval", "one-draw"))
+        heads += [self._head("differs")] if compared else []
+        lines = []
+        for row in rows:
+            cells = [row.quantity, *([row.paper_text] if compared else [])]
+            cells += [row.here_text, row.interval_text, row.one_draw_text]
+            cells += [row.differs_text] if compared else []
+            where = f"Paper: {row.published.where}" if row.published else ""
+            lines.append(Line(cells, row.unit or "1", row.term.key, where))
+        return Table(self.facts.text(texts()["definition"]), heads, lines)
+
+    def _tables(self, beside: Mapping[str, Sequence[Any]]) -> Iterator[Part]:
+        compared = self.facts.is_compared
+        if heated := self._emissivity():
+            title = "Table 1: emissivity of heated chips and tool" if compared else "Emissivity"
+            yield Part("table-1" if compared else "emissivity", title, [heated])
+        if compared and self.study and self.study.scene is None:
+            lines = [Line(row) for row in paper.table_2(self.study)]
+            heads = [Term("", head) for head in ("Setting", "Paper", "Here")]
+            table = Table(paper.TABLE_2_TEXT, heads, lines)
+            yield Part("table-2", "Table 2: settings of the simulation", [table])
+        for key, title, rows, figure in (
+            ("cut", "The cut", [row for row in self.cut if not row.published], "forces"),
+            ("chip", "The chip", self.chip, "chip-thickness"),
+            ("camera", "The camera", self.camera, ""),
+        ):
+            if rows:
+                yield Part(key, title, [self._numbers(rows), *beside.get(figure, [])])
+        if self.analysis.missing:
+            missing = [Text(sentence) for sentence in self.analysis.missing]
+            yield Part("missing", "Not available", missing)
+
+    def _numbers(self, rows: Sequence[Row]) -> Table:
+        drawn = any(row.draws for row in rows)
+        heads = [Term("", "Quantity"), self._head("mean")]
+        heads += map(self._head, ("interval", "one-draw")) if drawn else ()
+        lines = []
+        for row in rows:
+            cells = [row.quantity, row.here_text]
+            cells += [row.interval_text, row.one_draw_text] if drawn else []
+            lines.append(Line(cells, row.unit or "1", row.term.key))
+        return Table("", heads, lines)
+
+    def _emissivity(self) -> Table | None:
+        """Return the emissivities of the heated objects: published, put in and found."""
+        rows = (
+            [row for one in self.analysis.cut.heated for row in one.rows]
+            if self.analysis.cut
+            else []
+        )
+        compared = self.facts.is_compared
+        if not rows:
+            return None
+        lines = []
+        for row in rows:
+            cells = [row.feature]
+            published = paper.TABLE_1.get(row.feature)
+            if compared:
+                cells.append(
+                    spread_text(published.mean, published.standard_deviation, "", 2).strip()
+                    if published
+                    else "–"
                 )
-            ),
-        ),
-        Section(
-            "comparison",
-            "The paper beside this study" if stands_beside(result) else "The errors, and figures",
-            "\n".join((_comparison(result, compared), *map(figure_part, figures.values()))),
-        ),
-        Section("tables", "Tables", "\n".join(titled_part(*one) for one in tables if one[2])),
-        repeat_section(
-            _command(result, steady is not None),
-            study_text,
-            provenance,
-            [*_terms(result), *found],
-            _citation(),
-        ),
-    ]
-    return write_files(
-        folder,
-        document(title, sections),
-        results_dataset(result, provenance),
-        cut_summary([*errors, *cut], causes, parts, chip, camera, beside_steady, provenance),
-        study_text,
-    )
+            several = row.means.size > 1
+            cells += [
+                spread_text(row.true.mean, row.true.standard_deviation, "", 2),
+                spread_text(row.found.mean, float(row.found.estimate.standard_uncertainty), "", 3),
+                f"{row.found.standard_deviation:.3f}",
+                spread_text(float(row.means.mean()), float(row.means.std(ddof=1)), "", 3)
+                if several
+                else "–",
+            ]
+            lines.append(Line(cells, "1"))
+        found = self._head("found")
+        heads = [Term("", "Feature"), *([Term("", "Paper")] if compared else []), Term("", "Input")]
+        names = ("Found", "Standard deviation found", "Several textures")
+        heads += [found._replace(name=name) for name in names]
+        text = "Emissivity of isothermal objects as mean ± standard deviation: input and result."
+        return Table(f"{text} {paper.TABLE_1_TEXT}" if compared else text, heads, lines)
 
-
-_APART: Final = ("psf-sensitivity", "forces", "chip-thickness")
-"""Figures that stand beside what they explain; the others are in the paper's order."""
-
-_HERE: Final = Term(
-    "mean",
-    "Here",
-    "Mean ± sample standard deviation of the draws. Of a single number ± is its standard "
-    "uncertainty, or what its explanation says; a number without it has none that is known.",
-)
-_ONE_DRAW: Final = Term(
-    "one-draw",
-    "One draw",
-    "What a single frame gives: one segment, one texture, one position of the pixels.",
-)
-_DIFFERS: Final = Term(
-    "differs",
-    "Differs",
-    "Whether the paper's figure lies outside the 95 % interval. Of a single number: whether the "
-    "two are more than two standard uncertainties apart.",
-)
-_MOTION: Final = Term(
-    "motion",
-    "Motion",
-    "Radiance temperature of the mean over the exposure less that of its peak, at one sample of "
-    "the scene: the error of infinitely small pixels.",
-)
-_FOOTPRINT: Final = Term(
-    "footprint",
-    "Footprint",
-    "What is left of the error: a detector element measures the mean radiance of its footprint "
-    "(the size of source), and is compared with another value in it.",
-)
-_REST: Final = Term(
-    "rest",
-    "Motion and footprint",
-    "Both together, where the motion's part is not known: the error less the PSF's portion.",
-)
-_SCATTER: Final = Term(
-    "causes-of-scatter",
-    "Segment, texture, pixel phase",
-    "What is drawn anew: which segment of the chip is looked at, the random pattern of the "
-    "emissivity, and where the pixels lie on the scene. Each cause in the mean over the others: "
-    "standard deviation of these means, and its part of the sum of squares.",
-)
-_TOGETHER: Final = Term(
-    "together", "Causes together", "What none of the causes makes by itself: a rest."
-)
-_HEADS: Final = ("Quantity", _HERE, INTERVAL, _ONE_DRAW)
-
-
-def _note(result: StudyResult) -> str:
-    headlines = list(result.draws.headlines.values())
-    return answer_note(headlines[0].error if headlines else None)
-
-
-def _terms(result: StudyResult) -> Iterator[Term]:
-    yield Term("error", "Error", error_definition(result))
-    yield from (_HERE, INTERVAL, _ONE_DRAW)
-    if stands_beside(result):
-        yield _DIFFERS
-    yield from (PSF, _MOTION, _FOOTPRINT, _REST, _SCATTER, _TOGETHER)
-    yield _FOUND
-
-
-def _figure(figure: FigureFile | None) -> str:
-    return figure_part(figure) if figure else ""
-
-
-def _line(row: Row) -> Line:
-    texts = (row.quantity, row.here_text, row.interval_text, row.one_draw_text)
-    return Line(texts, row.unit or "1", row.term.key)
-
-
-def _single(rows: Sequence[Row]) -> str:
-    """Table of what was not drawn."""
-    lines = (Line((row.quantity, row.here_text), row.unit or "1", row.term.key) for row in rows)
-    return table_part("", _HEADS[:2], lines)
-
-
-def _comparison(result: StudyResult, rows: Sequence[Row]) -> str:
-    if not stands_beside(result):
-        return table_part(error_definition(result), _HEADS, map(_line, rows))
-    lines = (
-        Line(
-            (row.quantity, row.paper_text, *_line(row).texts[1:], row.differs_text),
-            row.unit,
-            row.term.key,
-            f"Paper: {row.where}" if row.where else "",
+    def _repeat(self) -> Iterator[Part]:
+        text = (
+            "With the same versions, the study below (study.yaml in the folder of this page) gives "
+            "the same numbers:"
         )
-        for row in rows
-    )
-    heads = ("Quantity", "Paper", *_HEADS[1:], _DIFFERS)
-    return table_part(error_definition(result), heads, lines)
+        yield Part("command", "The command", [Text(text, self._command)])
+        used = [*self.cut, *self.chip, *self.camera, *self.tool]
+        terms = [*self._terms(), *(row.term for row in used)]
+        yield Part("terms", "Glossary and methods", [Terms(terms)])
+        yield Part("study", "The study as run", [Text(code=self.study_text)])
+        yield Part("versions", "Versions", [Pairs(list(self.provenance.items()))])
+        if self.analysis.cut is not None:
+            own = f"This program: chipglow {__version__}. State the version and attach the study."
+            yield Part("cite", "How to cite", [Text(own), Text(f"The method: {paper.CITATION}")])
 
+    @property
+    def _command(self) -> str:
+        if self.steady:
+            quick = self.facts.is_compared and self.study == Study.quick()
+            return f"chipglow reproduce{' --quick' if quick else ''} --steady-tool --out results"
+        if self.analysis.cut is None:
+            return "chipglow error scene.nc --study study.yaml --out results"
+        return "chipglow run study.yaml --out results"
 
-def _parts(rows: Sequence[PartRow]) -> str:
-    """Of what each error consists; motion and footprint apart where that is known."""
-    names = ("psf", "motion", "footprint", "rest")
-    shown = [name for name in names if any(name in row.parts for row in rows)]
-    heads = {"psf": PSF, "motion": _MOTION, "footprint": _FOOTPRINT, "rest": _REST}
-    lines = (
-        Line(
-            (row.quantity, row.error_text, *(row.text(name) for name in shown)),
-            "°C",
-            f"why-{row.key}",
-        )
-        for row in rows
-    )
-    text = "Each error of the answer, and its parts: mean ± standard deviation over the draws."
-    error = Term("error", "Error", "")
-    return table_part(text, ("Quantity", error, *(heads[name] for name in shown)), lines)
+    def _terms(self) -> Iterator[Term]:
+        """Yield the words of this report."""
+        for key in texts()["terms"]:
+            if key == "differs" and not self.facts.is_compared:
+                continue
+            if key in ("motion", "footprint", "found") and self.analysis.cut is None:
+                continue
+            yield self._head(key)
 
-
-def _causes(rows: Sequence[CauseRow]) -> str:
-    if not rows:
-        return "<p>One draw only: it says nothing of the scatter.</p>"
-    *names, together = (f"{name} ({count})" for name, count, _, _ in rows[0].causes)
-    heads = [*(_SCATTER._replace(name=name) for name in names), _TOGETHER._replace(name=together)]
-    text = (
-        "How far each cause alone makes the errors scatter, as a standard deviation, and in "
-        "brackets its part of the sum of squares. In the heads: how many values it took."
-    )
-    lines = (
-        Line((row.quantity, *row.texts), row.unit, f"why-{row.key}")
-        for row in rows
-        if row.unit == "°C"
-    )
-    return table_part(text, ("Quantity", *heads), lines)
-
-
-def _steady(result: StudyResult, rows: list[ToolRow]) -> Iterator[str]:
-    if rows:
-        title = "A tool that has been cutting for long"
-        yield titled_part("steady-tool", title, steady_tool_part(result, rows))
-
-
-def _command(result: StudyResult, steady: bool) -> str:
-    if steady:
-        quick = stands_beside(result) and result.plan.study == Study.quick()
-        return f"chipglow reproduce{' --quick' if quick else ''} --steady-tool --out results"
-    return "chipglow run study.yaml --out results"
-
-
-def _emissivity_tables(
-    result: StudyResult, settings: Sequence[tuple[str, str, str]]
-) -> Iterator[tuple[str, str, str]]:
-    """Tables 1 and 2 of the paper; of another study the first without the paper's numbers."""
-    rows = table_1(result)
-    if not stands_beside(result):
-        yield ("emissivity", "Emissivity", _emissivities(rows))
-        return
-    yield ("table-1", "Table 1: emissivity of heated chips and tool", _table_1(rows))
-    yield ("table-2", "Table 2: settings of the simulation", _table_2(settings))
-
-
-_FOUND: Final = Term(
-    "found",
-    "Emissivity found",
-    "From the image of an evenly heated object: mean and standard uncertainty of one region "
-    "(thermocouple of 2 K assumed), and the standard deviation over its pixels. Several textures: "
-    "mean ± standard deviation of the means of several textures. The camera's blur takes from the "
-    "standard deviation, and draws narrow shear bands toward the bodies beside them.",
-)
-_EMISSIVITY_HEADS: Final = (
-    "Put in",
-    _FOUND._replace(name="Found"),
-    _FOUND._replace(name="Standard deviation found"),
-    _FOUND._replace(name="Several textures"),
-)
-
-
-def _emissivities(rows: Sequence[EmissivityTexts]) -> str:
-    """Table 1 of a study that is not the paper's."""
-    text = "Emissivity of evenly heated objects as mean ± standard deviation put into the study."
-    lines = (
-        Line((row.feature, row.true, row.mean, row.standard_deviation, row.textures), "1")
-        for row in rows
-    )
-    return table_part(text, ("Feature", *_EMISSIVITY_HEADS), lines) if rows else ""
-
-
-def _table_1(rows: Sequence[EmissivityTexts]) -> str:
-    text = (
-        "Emissivity as mean ± standard deviation in the paper and put into the study, and what "
-        "comes back. Same as the paper: procedure and numbers. Different: here the truth is known."
-    )
-    lines = (
-        Line(
-            (row.feature, row.paper, row.true, row.mean, row.standard_deviation, row.textures), "1"
-        )
-        for row in rows
-    )
-    return table_part(text, ("Feature", "Paper", *_EMISSIVITY_HEADS), lines) if rows else ""
-
-
-def _table_2(rows: Sequence[tuple[str, str, str]]) -> str:
-    text = (
-        "Settings of the cutting simulation. Not legible: a cell of the paper's table that its "
-        "copy does not show."
-    )
-    return table_part(text, ("Setting", "Paper", "Here"), map(Line, rows)) if rows else ""
-
-
-def _citation() -> str:
-    own = f"chipglow {__version__}: a virtual infrared camera for metal cutting."
-    return (
-        f"<p>This program: {escape(own)} Name the version and attach the study above.</p>\n"
-        f"<p>The method: {escape(CITATION)}</p>"
-    )
+    def _head(self, key: str) -> Term:
+        return Term(key, *(self.facts.text(text) for text in texts()["terms"][key]))

@@ -1,4 +1,4 @@
-"""A scene at one time, as a picture: its fields, and how their values are spread."""
+"""Figure of a scene at one time: its fields and the distribution of their values."""
 
 from math import ceil
 from typing import Any, Final
@@ -28,19 +28,10 @@ _ARROWS: Final = 14
 
 
 def draw_scene(scene: Scene, time: float | None = None) -> Figure:
-    """Draw the fields of one frame and, below, how their values are spread over the workpiece.
+    """Draw the fields of the frame nearest to a time in s, by default the middle one.
 
-    Parameters
-    ----------
-    scene : Scene
-        Any scene; one frame is read.
-    time : float, optional
-        Time in s of what is drawn, the nearest frame's; the middle one by default.
-
-    Raises
-    ------
-    ValueError
-        If the time is not within the scene.
+    Below are histograms of the values over the workpiece. A time outside the scene raises
+    ValueError.
     """
     frame = scene.frame(shown_frame(scene.times, time, "scene"))
     raster, tool, panels = scene.raster, scene.tool, _panels(frame)
@@ -82,7 +73,7 @@ def draw_scene(scene: Scene, time: float | None = None) -> Figure:
 
 
 def _panels(frame: Frame) -> list[ImagePanel]:
-    """Temperature, and of strain, strain rate and speed what the frame has."""
+    """Return panels of temperature and, if available, strain, strain rate and speed."""
     there, solid = frame.material != Material.VOID, frame.material == Material.WORKPIECE
     temperature = np.where(there, TEMPERATURE(frame.temperature), np.nan)
     heat = scales.ends(temperature, 0.1, 99.9)
@@ -111,7 +102,7 @@ def _panels(frame: Frame) -> list[ImagePanel]:
 
 
 def _decades(rate: NDArray[Any]) -> tuple[float, float]:
-    """Whole decades, the last of which has the fastest."""
+    """Return whole decades up to the largest rate."""
     fastest = scales.ends(rate, 0.0, 99.9)[1]
     top = float(np.ceil(np.log10(max(fastest, 1e-30)) - 1e-9))
     return 10.0 ** (top - _DECADES), 10.0**top
@@ -123,7 +114,7 @@ def _panel_height(raster: Raster) -> float:
 
 
 def _draw_arrows(axes: Axes, frame: Frame, raster: Raster) -> None:
-    """Directions of the motion on a coarse grid, the fastest as long as the grid is wide."""
+    """Draw velocities on a coarse grid; the largest is as long as the grid spacing."""
     step = max(ceil(max(raster.shape) / _ARROWS), 1)
     coarse = np.s_[step // 2 :: step, step // 2 :: step]
     solid = frame.material[coarse] == Material.WORKPIECE
@@ -168,7 +159,7 @@ def _draw_quality(
 
 
 def _leave_out(axes: Axes, above: Axes | None) -> None:
-    """Remove a panel; the one above it is then the lowest of its column."""
+    """Remove a panel and label the one above it, now the lowest of its column."""
     axes.remove()
     if above is None:
         return

@@ -1,4 +1,4 @@
-"""What is in a scene, in numbers: from a few frames of it, however many it has."""
+"""The contents of a scene in numbers, from a few of its frames."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,24 +11,12 @@ from chipglow.drawing.frames import shown_frame
 from chipglow.scene import FILLED, Frame, Material, Raster, Scene
 
 _SAMPLED: Final = 5
-"""Frames over which the greatest and least values of a summary are taken, besides the one shown."""
+"""Frames whose smallest and largest values a summary includes, besides the one shown."""
 
 
 @dataclass(frozen=True)
 class ShownField:
-    """A field as it is shown to people.
-
-    Parameters
-    ----------
-    name : str
-        The field's name in a `chipglow.scene.Frame`.
-    title : str
-        What it is.
-    unit : str
-        In which it is shown; empty for a plain number.
-    scale, offset : float
-        The shown number is `scale` times the SI number, plus `offset`.
-    """
+    """A field of a `chipglow.scene.Frame` as shown: `scale` times the SI value, plus `offset`."""
 
     name: str
     title: str
@@ -37,7 +25,7 @@ class ShownField:
     offset: float = 0.0
 
     def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float64]:
-        """Values in the unit that is shown."""
+        """Return values in the shown unit."""
         return values.astype(np.float64) * self.scale + self.offset
 
     @property
@@ -63,17 +51,10 @@ _FIELDS: Final = (
 
 @dataclass(frozen=True)
 class FieldSummary:
-    """Values of a field over the workpiece, in the unit that is shown.
+    """Values of a field over the workpiece in the shown unit; None if no workpiece is visible.
 
-    Parameters
-    ----------
-    field : ShownField
-        The field.
-    now : tuple, optional
-        Least, median and greatest at the time of the summary; None if no sample of that frame
-        shows the workpiece.
-    overall : tuple, optional
-        Least and greatest over all frames that were read; None if none shows the workpiece.
+    `now` is minimum, median and maximum at the time of the summary, `overall` minimum and maximum
+    over all frames that were read.
     """
 
     field: ShownField
@@ -83,15 +64,10 @@ class FieldSummary:
 
 @dataclass(frozen=True)
 class QualitySummary:
-    """How far the samples that show material can be trusted, at the time of the summary.
+    """Reliability of the samples that show material, at the time of the summary.
 
-    Parameters
-    ----------
-    filled : float
-        Fraction of those samples whose value is their neighbours'.
-    median, percentile_95 : float
-        Distance of the other samples' colours from the colour scale in CIE L*a*b*; 0 if all are
-        filled.
+    `filled` is the fraction whose value is taken from neighbours; `median` and `percentile_95` are
+    the distance of the other samples' colours from the colour scale in CIE L*a*b*.
     """
 
     filled: float
@@ -101,24 +77,9 @@ class QualitySummary:
 
 @dataclass(frozen=True)
 class SceneSummary:
-    """What is in a scene.
+    """The contents of a scene in the frame `index`; `sampled` are all frames that were read.
 
-    Parameters
-    ----------
-    raster : Raster
-        Where the samples are.
-    times : ndarray
-        Times of all frames in s.
-    index : int
-        Number of the frame that the summary is about.
-    sampled : tuple of int
-        Numbers of all frames that were read.
-    fields : tuple of FieldSummary
-        Every field of numbers.
-    fractions : mapping
-        Fraction of the samples that show each material.
-    quality : QualitySummary, optional
-        None if the scene has no flags of its quality.
+    `fractions` are those of the samples that show each material.
     """
 
     raster: Raster
@@ -131,19 +92,10 @@ class SceneSummary:
 
 
 def scene_summary(scene: Scene, time: float | None = None) -> SceneSummary:
-    """Look at one frame of a scene, and at a few others for the range of its values.
+    """Summarise the frame nearest to a time in s, by default the middle one.
 
-    Parameters
-    ----------
-    scene : Scene
-        Any scene; of one in a file, six frames are read at most.
-    time : float, optional
-        Time in s of what is looked at, the nearest frame's; the middle one by default.
-
-    Raises
-    ------
-    ValueError
-        If the time is not within the scene.
+    At most five further frames are read for the range of the values. A time outside the scene
+    raises ValueError.
     """
     index = shown_frame(scene.times, time, "scene")
     last = len(scene.times) - 1
@@ -165,7 +117,7 @@ _Limits: TypeAlias = dict[str, tuple[float, float]]
 
 
 def _limits(frame: Frame) -> _Limits:
-    """Least and greatest value over the workpiece, by field; nothing where there is none."""
+    """Return minimum and maximum over the workpiece, by field; empty without workpiece."""
     values = {field.name: over_workpiece(field, frame) for field in _shown_fields(frame)}
     return {name: (float(v.min()), float(v.max())) for name, v in values.items() if v.size}
 
@@ -182,17 +134,17 @@ def _fields(frame: Frame, limits: list[_Limits]) -> Iterator[FieldSummary]:
 
 
 def _shown_fields(frame: Frame) -> list[ShownField]:
-    """The fields of numbers that a frame has."""
+    """Return the numeric fields of a frame."""
     return [field for field in _FIELDS if getattr(frame, field.name) is not None]
 
 
 def over_workpiece(field: ShownField, frame: Frame) -> NDArray[np.float64]:
-    """Values where the frame shows the workpiece, shape (n,)."""
+    """Return the values of the workpiece, shape (n,)."""
     return field(getattr(frame, field.name)[frame.material == Material.WORKPIECE])
 
 
 def quality_of(frame: Frame) -> QualitySummary | None:
-    """How far a frame can be trusted, if it says so."""
+    """Return the reliability of a frame; None if it has no quality flags."""
     if frame.quality is None:
         return None
     flags = frame.quality[frame.material != Material.VOID]

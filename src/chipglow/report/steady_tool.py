@@ -1,194 +1,128 @@
-"""A study beside the same one with a tool that has been cutting for long."""
+"""A study compared with the same one with a tool at steady-state temperature."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from math import hypot, isfinite, nan
-from typing import Final
 
 import numpy as np
 
-from chipglow.analysis import StudyResult
-from chipglow.laboratory.chip import contact_temperatures
-from chipglow.quantities.format import quantity_text
-from chipglow.report.page import Line, Term, table_part
-from chipglow.report.paper import PAPER, stands_beside
+from chipglow.analysis import Analysis, headline
+from chipglow.drawing.scales import KELVIN
+from chipglow.laboratory.chip import contact_temperatures, rake_grid
+from chipglow.report.facts import Facts, texts
+from chipglow.report.page import Line, Table, Term
+from chipglow.report.paper import RAKE_MISSING, stands_beside
+from chipglow.report.rows import slug, spread_text
 
-_Of = Callable[[StudyResult], tuple[float, float]]
+Spread = tuple[float, float]
+"""Mean and standard deviation; NaN where unknown."""
 
-_OVER_CUT: Final = "Mean over the cut."
+_UNKNOWN: Spread = (nan, nan)
 
 
 @dataclass(frozen=True)
 class ToolRow:
-    """One quantity of a study with its own tool and with a steady one.
-
-    Parameters
-    ----------
-    key : str
-        Name for scripts, with the unit at its end.
-    quantity : str
-        What it is.
-    unit : str
-        Unit of the numbers, as printed.
-    own, steady : tuple of float
-        Mean and standard deviation of the frames, segments or draws; NaN where unknown.
-    explanation : str
-        What it is the mean of.
-    """
+    """One quantity with the study's own tool and with a steady one, in the unit of its key."""
 
     key: str
     quantity: str
     unit: str
-    own: tuple[float, float]
-    steady: tuple[float, float]
+    own: Spread
+    steady: Spread
     explanation: str
 
     @property
-    def difference(self) -> tuple[float, float]:
-        """Steady less own, and the standard deviation of the difference of two single ones."""
+    def difference(self) -> Spread:
+        """Steady minus own, and the standard deviation of the difference of two single values."""
         return self.steady[0] - self.own[0], hypot(self.steady[1], self.own[1])
 
     @property
     def line(self) -> Line:
         """The row of the report's table."""
-        texts = (_text(self.own, self.unit), _text(self.steady, self.unit))
-        return Line(
-            (self.quantity, *texts, _text(self.difference, self.unit, "+")),
-            self.unit,
-            self.term.key,
-        )
+        cells = [spread_text(*spread, self.unit, 0) for spread in (self.own, self.steady)]
+        cells.append(spread_text(*self.difference, self.unit, 0, "+"))
+        return Line((self.quantity, *cells), self.unit, self.term.key)
 
     @property
     def term(self) -> Term:
-        """How it is found."""
+        """The explanation with its id on the page."""
         return Term(f"tool-{self.key}", f"Steady tool: {self.quantity}", self.explanation)
 
 
-def tool_rows(own: StudyResult, steady: StudyResult) -> list[ToolRow]:
-    """What a steady tool changes.
+def tool_rows(own: Analysis, steady: Analysis) -> list[ToolRow]:
+    """Return the quantities that a steady tool may change; all else of the two is the same."""
+    facts, before, after = Facts(own), _values(own), _values(steady)
+    rows = []
+    for key, spread in before.items():
+        kind = "rake_peak_degC" if key.startswith("rake_peak") else key
+        template, surface = texts()["rows"][kind], key[len("rake_peak_") : -len("_degC")]
+        name = next((one for one in own.measurements if slug(one) == surface), "")
+        quantity = facts.text(template["quantity"], surface=name)
+        row = ToolRow(key, quantity, template["unit"], spread, after[key], template["text"])
+        rows.append(row)
+    return rows
 
-    Parameters
-    ----------
-    own, steady : StudyResult
-        The study with its own tool and with a steady one; all else is the same.
-    """
-    beside = (
-        "True temperature within 15 µm of the rake face along the contact; mean ± standard "
-        "deviation of the segments."
+
+def tool_table(own: Analysis, rows: list[ToolRow], study: object) -> Table:
+    """Return the report's table of `tool_rows`."""
+    heads = ("Quantity", "Tool of this study", "Steady tool", "Difference")
+    text = (
+        "The same cut with a tool that starts at the steady-state temperature of conduction from "
+        "the contact to the holder."
     )
-    peak = (
-        "Radiance temperature in squares of 3 by 3 pixels (the paper's Figure 7); mean ± "
-        "standard deviation of the frames' peaks."
-    )
-    kinds: list[tuple[str, str, str, _Of, str]] = [
-        *(
-            (
-                f"rake_peak_{name.replace(' ', '_')}_degC",
-                f"Peak of the measured profile nearest the rake face ({name})",
-                "°C",
-                partial(_peak, name),
-                peak,
-            )
-            for name in own.surfaces
-        ),
-        *(
-            (
-                f"{name}_error_K",
-                what,
-                "K",
-                partial(_error, name),
-                "Mean ± standard deviation of the draws.",
-            )
-            for name, what in (
-                ("rake", "Error at the rake face, mid-contact"),
-                ("band", "Error at the centre of the shear band"),
-            )
-        ),
-        ("cutting_N_per_mm", "Cutting force", "N/mm", partial(_force, "cutting_mean"), _OVER_CUT),
-        ("thrust_N_per_mm", "Thrust force", "N/mm", partial(_force, "thrust_mean"), _OVER_CUT),
+    key = f"rake_peak_{slug(str(own.data.attrs['rake_surface']))}_degC"
+    peak = next((row for row in rows if row.key == key), None)
+    if peak is not None and isfinite(peak.difference[0]) and stands_beside(study, own):
+        text += (
+            f" The peak of the paper's simulated profile nearest the rake face is about "
+            f"{RAKE_MISSING.value:.0f} °C below the measured one ({RAKE_MISSING.where}). The "
+            f"steady tool raises ours by {spread_text(*peak.difference, '°C', 0)}. The "
+            "temperature of the paper's tool is not known."
+        )
+    return Table(text, [Term("", head) for head in heads], [row.line for row in rows])
+
+
+def _values(analysis: Analysis) -> Mapping[str, Spread]:
+    assert analysis.cut is not None
+    contacts = [
+        contact_temperatures(one.frame, analysis.raster, one.tool, one.contact_length)
+        for one in analysis.cut.segments
     ]
-    (chip, tool), (steady_chip, steady_tool) = _beside(own), _beside(steady)
-    return [
-        ToolRow("rake_chip_degC", "Chip at the rake face", "°C", chip, steady_chip, beside),
-        ToolRow("rake_tool_degC", "Tool at the rake face", "°C", tool, steady_tool, beside),
-        *(
-            ToolRow(key, quantity, unit, of(own), of(steady), explanation)
-            for key, quantity, unit, of, explanation in kinds
-        ),
-    ]
+    chip, tool = (_spread(kelvins) for kelvins in zip(*contacts, strict=True))
+    forces = analysis.cut.forces
+    peaks = {
+        f"rake_peak_{slug(name)}_degC": _peak(analysis, name) for name in analysis.measurements
+    }
+    return {
+        "rake_chip_degC": (chip[0] - KELVIN, chip[1]),
+        "rake_tool_degC": (tool[0] - KELVIN, tool[1]),
+        **peaks,
+        "rake_error_K": _error(analysis, "rake"),
+        "band_error_K": _error(analysis, "band"),
+        "cutting_N_per_mm": (1e-3 * forces.segmentation.cutting_mean, nan) if forces else _UNKNOWN,
+        "thrust_N_per_mm": (1e-3 * forces.segmentation.thrust_mean, nan) if forces else _UNKNOWN,
+    }
 
 
-def steady_tool_part(own: StudyResult, rows: list[ToolRow]) -> str:
-    """The report's section, of `tool_rows`."""
-    heads = ("Quantity", "This study's tool", "Steady tool", "Difference")
-    return table_part(" ".join(_sentences(own, rows)), heads, (row.line for row in rows))
+def _peak(analysis: Analysis, name: str) -> Spread:
+    """Return the peak of the measured profile nearest the rake face over the frames, in °C."""
+    assert analysis.tool is not None
+    try:
+        grid = rake_grid(analysis.measurements[name], analysis.tool)
+    except ValueError:
+        return _UNKNOWN
+    mean, deviation = _spread(max(filter(isfinite, one), default=nan) for one in grid.mean[:, 0])
+    return mean - KELVIN, deviation
 
 
-def _sentences(own: StudyResult, rows: list[ToolRow]) -> Iterator[str]:
-    yield (
-        "The same cut with a tool that has been cutting for long: it begins with the temperature "
-        "that conduction from the contact to the holder makes."
-    )
-    peak = next((row for row in rows if row.key == f"rake_peak_{_key(own)}_degC"), None)
-    if peak is None or not isfinite(peak.difference[0]) or not stands_beside(own):
-        return
-    yield (
-        f"The peak of the paper's simulated profile nearest the rake face is about "
-        f"{PAPER.rake_missing.value:.0f} °C under the measured one "
-        f"({PAPER.rake_missing.where}). The steady tool raises ours by "
-        f"{_text(peak.difference, '°C')}. How warm the paper's tool was is not known."
-    )
+def _error(analysis: Analysis, name: str) -> Spread:
+    found = headline(analysis.data, name)
+    return (found.error.mean, found.error.standard_deviation) if found else _UNKNOWN
 
 
-def _key(result: StudyResult) -> str:
-    return result.plan.rake_surface.replace(" ", "_")
-
-
-def _beside(result: StudyResult) -> list[tuple[float, float]]:
-    """Of the chip and of the tool, in °C."""
-    found = [
-        contact_temperatures(one.frame, result.raster, one.tool, one.contact_length)
-        for one in result.segments
-    ]
-    spreads = (_spread(list(kelvins)) for kelvins in zip(*found, strict=True))
-    return [(mean - 273.15, deviation) for mean, deviation in spreads]
-
-
-def _peak(name: str, result: StudyResult) -> tuple[float, float]:
-    grid = result.surfaces[name].rake_grid
-    if grid is None:
-        return nan, nan
-    mean, deviation = _spread([max(filter(isfinite, one), default=nan) for one in grid.mean[:, 0]])
-    return mean - 273.15, deviation
-
-
-def _error(name: str, result: StudyResult) -> tuple[float, float]:
-    headline = result.draws.headlines.get(name)
-    if headline is None:
-        return nan, nan
-    draws = headline.error
-    return draws.mean, draws.standard_deviation if draws.draws > 1 else nan
-
-
-def _force(name: str, result: StudyResult) -> tuple[float, float]:
-    if result.forces is None:
-        return nan, nan
-    return getattr(result.forces.segmentation, name) * 1e-3, nan
-
-
-def _spread(values: list[float]) -> tuple[float, float]:
-    """Mean and sample standard deviation of what is known."""
+def _spread(values: Iterable[float]) -> Spread:
+    """Return mean and sample standard deviation of the known values."""
     known = [value for value in values if isfinite(value)]
     if not known:
-        return nan, nan
+        return _UNKNOWN
     return float(np.mean(known)), float(np.std(known, ddof=1)) if len(known) > 1 else nan
-
-
-def _text(value: tuple[float, float], unit: str, sign: str = "") -> str:
-    mean, deviation = value
-    if not isfinite(mean):
-        return "–"
-    if not isfinite(deviation):
-        return quantity_text(mean, unit, 0, sign)
-    return f"{quantity_text(mean, '', 0, sign)} ± {quantity_text(deviation, unit, 0)}"

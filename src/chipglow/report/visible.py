@@ -1,4 +1,4 @@
-"""A grey picture of the chip, as a camera for visible light might show it."""
+"""A grey image of the chip, as a camera for visible light might show it."""
 
 from typing import Final
 
@@ -17,17 +17,9 @@ _DARKEST: Final = 0.45
 
 
 def visible_picture(frame: Frame, raster: Raster) -> NDArray[np.float64]:
-    """Grey values from 0 to 1, shape (y, x).
+    """Return grey values from 0 to 1, shape (y, x), for orientation only.
 
-    Steel is mottled and carries its mottles along, what is sheared strongly is darker, the tool is
-    black: it serves to recognise places, not to measure brightness.
-
-    Parameters
-    ----------
-    frame : Frame
-        The scene at one time.
-    raster : Raster
-        Its samples.
+    The texture of the steel moves with the material, sheared material is darker, the tool black.
     """
     x, y = frame.material_x, frame.material_y
     if x is None or y is None:

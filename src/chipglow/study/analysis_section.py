@@ -4,8 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from chipglow.analysis import LinePlace, Plan, PointPlace, RegionPlace, ScenePlan
-from chipglow.analysis.old_places import Place
+from chipglow.analysis import LinePlace, Place, Plan, PointPlace, RegionPlace
 from chipglow.laboratory.emissivity import RegionSection
 from chipglow.quantities import Parameter, Settings
 from chipglow.quantities.units import Length, Position
@@ -93,19 +92,9 @@ class AnalysisSection(Settings[Plan]):
             *(RegionPlace(name, one.region(name)) for name, one in self.regions.items()),
         )
 
-    def scene_plan(self) -> ScenePlan:
-        """What to analyse of a scene that is no cut, or at the user's places."""
-        return ScenePlan(
-            places=self.places,
-            exposures=self.exposures,
-            phases=self.phases,
-            textures=self.textures,
-            reference=self.reference,
-        )
-
     @model_validator(mode="after")
     def _possible_places(self) -> Self:
-        self.scene_plan()
+        self.build()
         return self
 
     def build(self) -> Plan:
@@ -118,4 +107,5 @@ class AnalysisSection(Settings[Plan]):
             band_surface=self.band_chip,
             psf_widths=self.psf_widths,
             reference=self.reference,
+            places=self.places,
         )

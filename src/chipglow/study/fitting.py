@@ -49,7 +49,8 @@ def fit(study: Study, scene: Scene) -> Fitted:
     """
     surfaces = surfaces_of(study.surface, study.seed)
     assumed = []
-    if scene.tool is None and "tool" in given(study.cutting):
+    said = "cutting" in given(study) and "tool" in given(study.cutting)
+    if scene.tool is None and said:
         scene = scene.with_tool(study.cutting.tool.build())
         assumed.append("The scene has no tool: it is that of the study's section cutting.tool.")
     if scene.tool is not None and not (scene.frame(0).material == Material.TOOL).any():

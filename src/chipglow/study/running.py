@@ -2,20 +2,21 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from json import dumps
 from pathlib import Path
 from time import monotonic
 from typing import Any, Final, TypeAlias
 
+import xarray as xr
+
 from chipglow.analysis import (
-    SceneErrors,
-    StudyResult,
-    WavelengthErrors,
+    Analysis,
+    Plan,
     analyse,
     cut_spots,
+    lacking,
     point_spots,
-    scene_errors,
     wavelength_errors,
 )
 from chipglow.cutting import (
@@ -27,9 +28,8 @@ from chipglow.cutting import (
 )
 from chipglow.io import SCENE_FORMAT, SceneWriter, open_scene, unfinished_scenes
 from chipglow.io.interrupts import uninterrupted
-from chipglow.laboratory.chip import NoContactError, NoShearBandError
 from chipglow.quantities import adapter
-from chipglow.scene import Frame, Scene, SceneError, ToolOutline
+from chipglow.scene import Frame, SceneError, ToolOutline
 from chipglow.study.assumed import left_to_the_paper
 from chipglow.study.cache import scene_path
 from chipglow.study.fitting import Fitted, fit
@@ -103,7 +103,7 @@ def run(
     progress: Progress | None = None,
     resume: bool = False,
     assume: Callable[[str], None] | None = None,
-) -> StudyResult | SceneErrors:
+) -> Analysis:
     """Run a study from the cut, or from the scene that takes its place, to the analysis.
 
     Parameters
@@ -119,7 +119,7 @@ def run(
 
     Returns
     -------
-    StudyResult or SceneErrors
+    Analysis
         All that the report shows: the paper's analysis of a cut; or, of a scene that shows no
         shear band or no contact with a tool, and at places of the user's own, the camera's error
         there and what is missing.
@@ -129,9 +129,7 @@ def run(
     ValueError
         If the scene cannot be analysed as the study wants it; the message names the scene's file.
     """
-    path = cut(study, progress, resume) if study.scene is None else Path(study.scene)
-    with _naming(study):
-        return _look(study, path, progress, assume)
+    return _analyse(study, study.plan, progress, resume, assume)
 
 
 def errors(
@@ -139,34 +137,12 @@ def errors(
     progress: Progress | None = None,
     resume: bool = False,
     assume: Callable[[str], None] | None = None,
-) -> SceneErrors:
-    """Measurement error of any scene: images, and readings at the study's places.
+) -> Analysis:
+    """Measurement error of any scene, exposure by exposure, at the study's places; see `run`.
 
     Nothing is asked of the scene but its temperature: it may be of no cut at all.
-
-    Parameters
-    ----------
-    study : Study
-        What to do; `scene` says of what, else it is the study's cut.
-    progress, resume, assume
-        As for `run`.
-
-    Raises
-    ------
-    ValueError
-        If a surface cannot be laid on the scene, or a place is outside the pixels.
     """
-    path = cut(study, progress, resume) if study.scene is None else Path(study.scene)
-    with _naming(study):
-        fitted = _fitted(study, path, assume)
-        plan = study.analysis.scene_plan()
-        return scene_errors(
-            fitted.scene,
-            fitted.surfaces,
-            study.camera.on(fitted.scene.raster, study.seed),
-            plan,
-            progress,
-        )
+    return _analyse(study, replace(study.plan, cut=False), progress, resume, assume)
 
 
 def wavelengths(
@@ -174,7 +150,7 @@ def wavelengths(
     progress: Progress | None = None,
     resume: bool = False,
     assume: Callable[[str], None] | None = None,
-) -> WavelengthErrors:
+) -> xr.Dataset:
     """Errors of the bands of a study's section wavelengths, alone and as ratios of two.
 
     They are read at the rake face and in the shear band of a cut, or at the points of the section
@@ -192,79 +168,61 @@ def wavelengths(
     ValueError
         If the scene shows no band and no contact with a tool, and the study names no points.
     """
-    path = cut(study, progress, resume) if study.scene is None else Path(study.scene)
-    with _naming(study):
-        fitted = _fitted(study, path, assume)
-        scene, analysis = fitted.scene, study.analysis
+    plan = study.plan
+    with _fitted(study, progress, resume, assume) as fitted:
+        scene = fitted.scene
         camera = study.camera.on(scene.raster, study.seed)
-        if analysis.points:
-            spots = point_spots(scene, camera, analysis.scene_plan(), list(fitted.surfaces))
+        if study.analysis.points:
+            spots = point_spots(scene, camera, plan, list(fitted.surfaces))
         else:
-            if lacking := list(_lacking(scene)):
-                raise ValueError(f"{lacking[0]} Expected points to read (analysis.points).")
-            spots = cut_spots(scene, camera, study.plan, progress)
+            if missing := list(lacking(scene)):
+                raise ValueError(f"{missing[0]} Expected points to read (analysis.points).")
+            spots = cut_spots(scene, camera, plan, progress)
         return wavelength_errors(
             scene,
             fitted.surfaces,
             camera,
             study.wavelengths.build(),
             spots,
-            analysis.phases,
-            analysis.textures,
+            plan.phases,
+            plan.textures,
             progress,
         )
 
 
+def _analyse(
+    study: Study,
+    plan: Plan,
+    progress: Progress | None,
+    resume: bool,
+    assume: Callable[[str], None] | None,
+) -> Analysis:
+    with _fitted(study, progress, resume, assume) as fitted:
+        camera = study.camera.on(fitted.scene.raster, study.seed)
+        return analyse(fitted.scene, fitted.surfaces, camera, plan, progress)
+
+
 @contextmanager
-def _naming(study: Study) -> Iterator[None]:
-    """Name the scene's file in what is wrong with it."""
+def _fitted(
+    study: Study,
+    progress: Progress | None,
+    resume: bool,
+    assume: Callable[[str], None] | None,
+) -> Iterator[Fitted]:
+    """The scene and the surfaces of a study; what is wrong with them names the scene's file."""
+    path = cut(study, progress, resume) if study.scene is None else Path(study.scene)
     try:
-        yield
+        fitted = fit(study, open_scene(path))
+        if assume:
+            for sentence in (*left_to_the_paper(study), *fitted.assumed):
+                assume(sentence)
+        yield fitted
     except SceneError:
         raise
     except ValueError as error:
         if study.scene is None:
             raise
         raise ValueError(f"{study.scene}: {error}") from None
-
-
-def _look(
-    study: Study, path: Path, progress: Progress | None, assume: Callable[[str], None] | None
-) -> StudyResult | SceneErrors:
-    fitted = _fitted(study, path, assume)
-    camera = study.camera.on(fitted.scene.raster, study.seed)
-    missing = [] if study.analysis.places else list(_lacking(fitted.scene))
-    if not missing and not study.analysis.places:
-        try:
-            return analyse(fitted.scene, fitted.surfaces, camera, study.plan, progress)
-        except (NoShearBandError, NoContactError) as error:
-            missing = [f"The errors of the paper's places are not here: {error}."]
-    plan = study.analysis.scene_plan()
-    return scene_errors(fitted.scene, fitted.surfaces, camera, plan, progress, missing)
-
-
-def _fitted(study: Study, path: Path, assume: Callable[[str], None] | None) -> Fitted:
-    fitted = fit(study, open_scene(path))
-    if assume:
-        for sentence in (*left_to_the_paper(study), *fitted.assumed):
-            assume(sentence)
-    return fitted
-
-
-def _lacking(scene: Scene) -> Iterator[str]:
-    """What the scene lacks for the analysis of a cut, a sentence each."""
-    if scene.tool is None:
-        yield (
-            "No rake face is read: the scene has no tool (the section cutting.tool of the study "
-            "gives it one)."
-        )
-    for name, title, why in (
-        ("plastic_strain", "plastic strain", "no chip is told from the workpiece"),
-        ("plastic_strain_rate", "plastic strain rate", "no shear band is looked for"),
-        ("velocity_x", "velocity", "the chip's speed and shape are not measured"),
-    ):
-        if name not in scene.fields:
-            yield f"The scene has no {title}: {why}."
 
 
 def _inputs(study: Study) -> dict[str, Any]:

@@ -67,8 +67,8 @@ class Study(Section):
 
     @property
     def plan(self) -> Plan:
-        """What to analyse of a cut; a surface that is the only one is seen everywhere."""
-        plan = replace(self.analysis.build(), study=self)
+        """What to analyse; a surface that is the only one is seen everywhere."""
+        plan = self.analysis.build()
         if isinstance(self.surface, FeaturesSection):
             return plan
         (name,) = surface_names(self.surface)

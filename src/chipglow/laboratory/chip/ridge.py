@@ -5,6 +5,7 @@ from math import ceil, pi, radians
 from typing import Final
 
 import numpy as np
+from numba import njit
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
@@ -172,14 +173,24 @@ class PolarGrid:
         """Greatest sum within reach at the radius before, less a little for turning."""
         slope = self.radii[i] * self.angle_step / self.radius_step
         reach = max(1, min(ceil(_STEEPEST / slope), total.size - 1))
-        padded = np.pad(total, reach, constant_values=-np.inf)
-        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
         turns = np.arange(-reach, reach + 1)
-        candidates = windows - _STRAIGHTNESS * (turns * slope) ** 2
-        choice = candidates.argmax(axis=1)
-        best = candidates[np.arange(total.size), choice]
-        came_from = np.clip(np.arange(total.size) + choice - reach, 0, total.size - 1)
-        return best, came_from.astype(np.int64)
+        best, came_from = _greatest_within_reach(total, _STRAIGHTNESS * (turns * slope) ** 2)
+        return best, came_from
+
+
+@njit(cache=True, nogil=True)
+def _greatest_within_reach(total, penalty):  # type: ignore[no-untyped-def]
+    """For each place the greatest of the totals about it less their penalties, and its index."""
+    best, came_from = np.empty(total.size), np.empty(total.size, np.int64)
+    reach = penalty.size // 2
+    for i in range(total.size):
+        low = max(i - reach, 0)
+        best[i], came_from[i] = total[low] - penalty[low - i + reach], low
+        for j in range(low + 1, min(i + reach + 1, total.size)):
+            value = total[j] - penalty[j - i + reach]
+            if value > best[i]:
+                best[i], came_from[i] = value, j
+    return best, came_from
 
 
 def off_face(points: NDArray[np.float64], tool: Tool) -> NDArray[np.bool_]:

@@ -1,12 +1,13 @@
 """The analysis: which images are taken of a scene, where they are read, and the Dataset of it."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import isfinite
 from typing import Any, Final, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chipglow.analysis.cut import (
     Progress,
@@ -26,7 +27,7 @@ from chipglow.analysis.dataset import (
     ridge_variables,
     scene_variables,
 )
-from chipglow.analysis.looks import Looked, Schedule, View, look
+from chipglow.analysis.looks import CASES, Effect, Looked, Schedule, View, look
 from chipglow.analysis.places import BandPlace, HottestPlace, Place, RakePlace
 from chipglow.analysis.plan import Plan
 from chipglow.analysis.result import Analysis, Cut
@@ -71,6 +72,7 @@ class _Task:
     camera: Camera
     plan: Plan
     tell: Progress
+    effects: Mapping[str, Effect]
     failed: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -93,6 +95,7 @@ def analyse(
     camera: Camera,
     plan: Plan,
     progress: Progress | None = None,
+    effects: Mapping[str, Effect] = CASES,
 ) -> Analysis:
     """Measure a scene with a virtual camera, and read the errors.
 
@@ -108,6 +111,9 @@ def analyse(
         What to analyse, and where.
     progress : callable, optional
         Called with what is being done and which fraction of it is done.
+    effects : mapping
+        What the axis ``effects`` of the result holds: by name a function that changes the camera
+        and the exposure. ``all`` is the first and changes nothing, ``without psf`` is there too.
 
     Returns
     -------
@@ -122,27 +128,32 @@ def analyse(
         If the plan names a surface that is not there, the scene is shorter than an exposure, a
         place is outside the pixels, or a surface cannot be applied to the scene.
     """
-    task = _Task(scene, surfaces, camera, plan, progress or (lambda label, part: None))
+    tell = progress or (lambda label, part: None)
+    task = _Task(scene, surfaces, camera, plan, tell, effects)
+    fields = {name: camera.lay(surface, scene) for name, surface in surfaces.items()}
     found, missing = _segments(task)
     schedule, frame = _scene_schedule(task) if found is None else _cut_schedule(task, found)
-    looked = look(scene, surfaces, camera, schedule, lambda part: task.tell("camera", part))
+    looked = look(scene, surfaces, fields, camera, schedule, lambda part: tell("camera", part))
     measurements = {
         name: camera.redrawn(number).measurement(np.stack(images), schedule.starts, scene.raster)
         for number, (name, images) in enumerate(looked.images.items())
     }
     cut = None if found is None else _cut(task, found)
-    parts = {} if cut is None else _cut_variables(cut, measurements)
-    attributes = {"rake_surface": plan.rake_surface, "band_surface": plan.band_surface}
+    emissivities = [field.emissivity(frame) for field in fields.values()]
+    variables = _variables(
+        task, schedule, looked, frame, measurements, emissivities, found is not None
+    )
+    attributes: dict[str, Any] = {
+        "shown_instant": schedule.shown,
+        "error_reference": plan.reference,
+        **(tool_attributes(scene.tool) if scene.tool else {}),
+    }
+    if cut is not None:
+        variables |= ridge_variables(cut.instants, measurements)
+        variables |= history_variables(cut.forces, cut.chip)
+        attributes |= {"rake_surface": plan.rake_surface, "band_surface": plan.band_surface}
     return Analysis(
-        data=assembled(
-            _variables(task, schedule, looked, frame, measurements, found is not None) | parts,
-            {
-                "shown_instant": schedule.shown,
-                "error_reference": plan.reference,
-                **(attributes if cut else {}),
-                **(tool_attributes(scene.tool) if scene.tool else {}),
-            },
-        ),
+        data=assembled(variables, attributes),
         plan=plan,
         camera=camera,
         raster=scene.raster,
@@ -198,6 +209,7 @@ def _cut_schedule(task: _Task, found: Segments) -> tuple[Schedule, Frame]:
         ),
         phases=plan.phases,
         reference=plan.reference,
+        effects=task.effects,
         vary=[
             partial(replace, psf=GaussianPSF(width), psf_order=order)
             for order in PSF_ORDERS
@@ -223,7 +235,13 @@ def _scene_schedule(task: _Task) -> tuple[Schedule, Frame]:
         views.append(View(name, [places] * len(starts), textures, first, strides))
         first += textures * plan.phases**2
     schedule = Schedule(
-        starts, tuple(range(len(starts))), shown, tuple(views), plan.phases, plan.reference
+        starts=starts,
+        drawn=tuple(range(len(starts))),
+        shown=shown,
+        views=tuple(views),
+        phases=plan.phases,
+        reference=plan.reference,
+        effects=task.effects,
     )
     return schedule, frame
 
@@ -277,19 +295,13 @@ def _band_width(found: Segments) -> float:
     return float(np.nanmean([segment.band_width for segment in found.segments]))
 
 
-def _cut_variables(cut: Cut, measurements: Mapping[str, Measurement]) -> dict[str, Any]:
-    return {
-        **ridge_variables(cut.instants, measurements),
-        **history_variables(cut.forces, cut.chip),
-    }
-
-
 def _variables(
     task: _Task,
     schedule: Schedule,
     looked: Looked,
     frame: Frame,
     measurements: Mapping[str, Measurement],
+    emissivities: Sequence[NDArray[np.float32]],
     is_cut: bool,
 ) -> dict[str, Any]:
     camera, names = task.camera, list(task.surfaces)
@@ -302,7 +314,7 @@ def _variables(
         **scene_variables(
             frame,
             task.scene.raster,
-            [looked.fields[name].emissivity(frame) for name in names],
+            emissivities,
             [np.asarray(camera.band.temperature(one.centre_radiance)) for one in exposures],
         ),
         **image_variables(

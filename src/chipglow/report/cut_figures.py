@@ -1,0 +1,221 @@
+"""Figures of a cut: heated chips and tool, rake face, dual spectrum, shear band, forces, chip."""
+
+from typing import Any, Final
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from chipglow.analysis import Analysis, Cut
+from chipglow.drawing import drawing, scales
+from chipglow.drawing.scales import BLUE, GREEN, GREY, KELVIN, VERMILLION
+from chipglow.laboratory.chip import RakeGrid, rake_grid
+from chipglow.laboratory.emissivity import HeatedObject
+from chipglow.report.facts import Facts
+from chipglow.report.visible import visible_picture
+from chipglow.scene import Material
+
+_COLOURS: Final = (BLUE, VERMILLION)
+
+
+def heated_chips(facts: Facts) -> Figure | None:
+    """Draw the radiance temperature of isothermal chips, with the regions that are read."""
+    chips = [heated for heated in _cut(facts).heated if heated.regions]
+    if not chips:
+        return None
+    figure = drawing.new_figure(2.6)
+    panels = figure.subplots(1, len(chips), squeeze=False)[0]
+    for letter, axes, heated in zip("abcdefgh", panels, chips, strict=False):
+        _draw_heated(figure, axes, heated)
+        truth = heated.map.heating.reference - KELVIN
+        axes.set_title(f"{letter}) {heated.name}, at {truth:.0f} °C")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return figure
+
+
+def heated_tool(facts: Facts) -> Figure | None:
+    """Draw the radiance temperature of an isothermal tool, and its emissivity."""
+    tools = [heated for heated in _cut(facts).heated if not heated.regions]
+    if not tools:
+        return None
+    found, raster, tool = tools[0], tools[0].map.raster, _cut(facts).segments[0].tool
+    figure = drawing.new_figure(2.9)
+    left, right = figure.subplots(1, 2)
+    _draw_heated(figure, left, found)
+    limits = left.get_xlim(), left.get_ylim()
+    drawing.draw_tool(left, tool)
+    left.set(xlim=limits[0], ylim=limits[1])
+    left.set_title(f"a) tool, at {found.map.heating.reference - KELVIN:.0f} °C")
+    inside = tool.signed_distance(*np.meshgrid(raster.x, raster.y)) < -3 * raster.spacing
+    right.hist(found.map.emissivity[inside], bins=40, color=BLUE, density=True)
+    row = found.rows[0]
+    right.axvline(row.found.mean, color="black", linestyle="-", label="found")
+    right.axvline(row.true.mean, color="black", linestyle="--", label="input")
+    right.set(xlabel="emissivity", ylabel="pixels, density", title="b) emissivity of its pixels")
+    right.legend()
+    return figure
+
+
+def rake_profiles(facts: Facts) -> Figure | None:
+    """Draw the temperature along the rake face by depth in the chip."""
+    grids = rake_grids(facts.analysis)
+    if not grids:
+        return None
+    figure = drawing.new_figure(3.6)
+    panels = figure.subplots(1, len(grids), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, (name, grid) in zip(panels, grids.items(), strict=True):
+        colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.9, grid.depth.size))
+        for row, colour in enumerate(colours):
+            axes.errorbar(
+                grid.along * 1e6,
+                grid.frame_mean[row] - KELVIN,
+                yerr=grid.frame_standard_deviation[row],
+                color=colour,
+                linewidth=1.4,
+                elinewidth=0.8,
+                capsize=1.5,
+                marker=".",
+                label=f"{grid.depth[row] * 1e6:.0f} µm",
+            )
+        axes.set_title(name)
+    panels[0].set_ylabel("radiance temperature / °C")
+    figure.supxlabel("distance from the edge along the rake face / µm", fontsize=9.5)
+    handles = panels[0].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside right center", title="depth")
+    return figure
+
+
+def rake_grids(analysis: Analysis) -> dict[str, RakeGrid]:
+    """Return the squares along the rake face of each surface that has usable ones."""
+    assert analysis.tool is not None
+    grids = {}
+    for name, measurement in analysis.measurements.items():
+        try:
+            grids[name] = rake_grid(measurement, analysis.tool)
+        except ValueError:
+            continue
+    return grids
+
+
+def dual_spectrum(facts: Facts) -> Figure:
+    """Draw a grey picture and the infrared image of the same moments."""
+    analysis, cut = facts.analysis, _cut(facts)
+    name, tool, rows = analysis.data.attrs["band_surface"], cut.segments[0].tool, len(cut.moments)
+    images = analysis.data.radiance_temperature.sel(surface=name).values - KELVIN
+    starts = analysis.data.instant.values[: facts.starts]
+    figure = drawing.image_figure(analysis.raster, 2.3, rows=rows)
+    grid = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
+    low = (analysis.camera.lower_limit or KELVIN + 100.0) - KELVIN
+    heat = (low, max(scales.round_limit(images[np.isfinite(images)], 99.9, 50.0), low + 50.0))
+    pixels = analysis.measurements[name].raster
+    for (left, right), frame in zip(grid, cut.moments, strict=True):
+        grey = visible_picture(frame, analysis.raster)
+        drawing.show_image(left, grey, analysis.raster, None, "gray", (0.0, 1.0))
+        number = max(int(np.searchsorted(starts, frame.time)) - 1, 0)
+        picture = drawing.show_image(right, images[number], pixels, None, scales.HEAT, heat)
+        left.set_title(f"visible, {frame.time * 1e6:.0f} µs")
+        right.set_title(f"infrared, {name}")
+        for axes in (left, right):
+            drawing.black_tool(axes, tool)
+            axes.set_facecolor(GREY)
+            axes.label_outer()
+    drawing.colour_bar(figure, picture, list(grid[:, 1]), "radiance temperature / °C")
+    return figure
+
+
+def band_curves(facts: Facts) -> Figure:
+    """Draw the measured temperature along the shear band as it develops."""
+    data, shown = facts.data, int(facts.data.attrs["shown_instant"])
+    figure = drawing.new_figure(3.7)
+    panels = figure.subplots(1, data.sizes["surface"], sharex=True, sharey=True, squeeze=False)[0]
+    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.88, facts.starts))
+    after = (data.instant.values - data.instant.values[0]) * 1e6
+    for axes, name in zip(panels, data.surface.values, strict=True):
+        curves = data.ridge_radiance_temperature.sel(surface=name).values - KELVIN
+        for i in range(facts.starts):
+            axes.plot(
+                data.ridge_distance.values[i] * 1e6,
+                curves[i],
+                color=shades[i],
+                linewidth=2.6 if i == shown else 1.2,
+                label=f"{after[i]:.0f} µs" + (" (full)" if i == shown else ""),
+            )
+        if facts.analysis.camera.lower_limit is not None:
+            limit = facts.analysis.camera.lower_limit - KELVIN
+            axes.axhline(limit, color=GREY, linestyle="--", linewidth=1.0)
+        axes.set_title(name)
+    panels[0].set_ylabel("radiance temperature / °C")
+    figure.supxlabel("distance from the cutting edge along the band / µm", fontsize=9.5)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right center", title="time")
+    return figure
+
+
+def forces(facts: Facts) -> Figure | None:
+    """Draw the force history with its segments."""
+    history = _cut(facts).forces
+    if history is None:
+        return None
+    segments, time = history.segmentation, history.time * 1e6
+    figure = drawing.new_figure(3.3)
+    axes = figure.subplots()
+    axes.plot(time, history.cutting * 1e-3, color=BLUE, label="cutting force", linewidth=1.2)
+    axes.plot(time, history.thrust * 1e-3, color=VERMILLION, label="thrust force", linewidth=1.2)
+    for i, peak in enumerate(segments.peaks * 1e6):
+        axes.axvline(peak, color=GREY, linewidth=0.8, linestyle=":", label="" if i else "segments")
+    axes.axvspan(time[0], segments.start * 1e6, color=scales.VOID, label="first build-up")
+    duration = facts.analysis.camera.integration_time
+    for i, start in enumerate(facts.data.instant.values):
+        ends = (start * 1e6, (start + duration) * 1e6)
+        axes.axvspan(*ends, ymax=0.03, color=GREEN, label="" if i else "exposures")
+    axes.set_xlim(time[0], time[-1])
+    axes.set_ylim(0.0)
+    period = segments.period * 1e6
+    axes.set_title(f"period {period:.0f} µs" if np.isfinite(period) else "no period")
+    axes.set(xlabel="time / µs", ylabel="force per width / (N/mm)")
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+def chip_thickness(facts: Facts) -> Figure | None:
+    """Draw where the thickness of the chip is read, and its course over time."""
+    cut, raster, frame = _cut(facts), facts.analysis.raster, facts.analysis.frame
+    if cut.chip is None or not np.isfinite(cut.chip.scan.height):
+        return None
+    scan, tool = cut.chip.scan, cut.segments[0].tool
+    figure = drawing.new_figure(3.6)
+    left, right = figure.subplots(1, 2)
+    strain = np.where(frame.material == Material.WORKPIECE, frame.needed("plastic_strain"), np.nan)
+    picture = drawing.show_image(left, strain, raster, tool, scales.PLAIN, (0.0, 4.0))
+    drawing.colour_bar(figure, picture, left, "plastic strain")
+    thickness = float(np.interp(frame.time, scan.time, scan.thickness))
+    foot, normal = tool.rake_point(scan.height), np.array(tool.rake_normal)
+    drawing.draw_line(left, np.stack([foot, foot + thickness * normal]), VERMILLION, "thickness")
+    drawing.draw_line(left, cut.segments[0].moment.ridge.points, BLUE, "band")
+    figure.legend(loc="outside lower center", ncols=2)
+    left.set_title(f"a) at {frame.time * 1e6:.0f} µs")
+    right.plot(scan.time * 1e6, scan.thickness * 1e6, color=VERMILLION)
+    place: Any = {"xycoords": ("axes fraction", "data"), "va": "center"}
+    levels = {"peak": cut.chip.peak, "mean": cut.chip.thickness, "valley": cut.chip.valley}
+    for label, level in levels.items():
+        if np.isfinite(level):
+            right.axhline(level * 1e6, color=GREY, linewidth=0.8, linestyle=":")
+            right.annotate(f"{label} {level * 1e6:.0f}", (1.02, level * 1e6), **place)
+    right.set(xlabel="time / µs", ylabel="thickness / µm", title="b) the chip passing the line")
+    return figure
+
+
+def _cut(facts: Facts) -> Cut:
+    assert facts.analysis.cut is not None
+    return facts.analysis.cut
+
+
+def _draw_heated(figure: Figure, axes: Axes, heated: HeatedObject) -> None:
+    temperature, raster = heated.map.radiance_temperature - KELVIN, heated.map.raster
+    low, high = scales.ends(temperature[heated.map.emissivity > 0.1], 1.0, 99.9)
+    limits = (low - 10.0, high)
+    picture = drawing.show_image(axes, temperature, raster, None, scales.HEAT, limits)
+    drawing.colour_bar(figure, picture, axes, "radiance temperature / °C")
+    for colour, region in zip(_COLOURS, heated.regions, strict=False):
+        outline = region.outline(raster)
+        drawing.draw_line(axes, np.concatenate([outline, outline[:1]]), colour, region.feature)
