@@ -262,15 +262,16 @@ def test_the_borders_warning_is_not_of_the_noise():
     quiet = replace(PLAIN, psf=AnnularAperturePSF())
     noisy = replace(quiet, detector=camera(ShotNoise(), ReadNoise(9e4)).detector)
     assert (
-        noisy.form_measurement(exposure()).warnings == quiet.form_measurement(exposure()).warnings
+        noisy.form_measurement(exposure()).notes.warnings
+        == quiet.form_measurement(exposure()).notes.warnings
     )
 
 
 def test_lag_without_a_frame_before_is_said():
     made = camera(Lag(0.3))
     at = PLAIN.frame_times(0.0, 2)
-    assert "Lag: no frame" in made.form_measurement(exposure()).warnings[0]
-    assert made.form_measurement([exposure(float(start)) for start in at]).warnings == ()
+    assert "Lag: no frame" in made.form_measurement(exposure()).notes.warnings[0]
+    assert made.form_measurement([exposure(float(start)) for start in at]).notes.warnings == []
 
 
 def test_error_images_have_the_noise_in_both_cases_and_the_psf_does_not():

@@ -143,7 +143,7 @@ def test_help_imports_none_of_the_heavy_libraries():
 def test_init_writes_the_papers_study_and_keeps_what_is_there(folder):
     assert chipglow("init", "paper.yaml").exit_code == 0
     assert load_study("paper.yaml") == Study()
-    assert_refused(chipglow("init", "study.yaml"), "study.yaml", "is there already", "--force")
+    assert_refused(chipglow("init", "study.yaml"), "study.yaml", "already exists", "--force")
     assert (folder / "study.yaml").read_text() == STUDY
     assert chipglow("init", "study.yaml", "--force").exit_code == 0
     assert load_study("study.yaml") == Study()
@@ -155,7 +155,7 @@ def test_run_writes_a_report_and_prints_the_comparison(folder, runs):
     assert "results/report.html" in result.output
     for heading in ("quantity", "the paper", "here", "95 % interval", "differs", "−42", "90"):
         assert heading in result.output
-    assert "Warning: The edge radius, 20 um, is 2 cells, expected 5 or more" in result.stdout
+    assert "Warning: The edge radius, 20 um, is 2 cells, expected 5 or more" in result.stderr
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     last = result.stdout.splitlines()[-1]
     assert last.startswith(f"Cite as: The chipglow developers: chipglow {citation['version']}.")
@@ -215,7 +215,7 @@ def test_reproduce_runs_the_papers_study(folder, monkeypatch):
 def test_a_foreign_folder_is_refused_before_anything_is_computed(folder, runs):
     (folder / "thesis").mkdir()
     (folder / "thesis" / "chapter.tex").write_text("years of work")
-    assert_refused(chipglow("run", "study.yaml", "--out", "thesis"), "thesis", "expected")
+    assert_refused(chipglow("run", "study.yaml", "--out", "thesis"), "thesis", "--force")
     assert runs == []
     assert [path.name for path in (folder / "thesis").iterdir()] == ["chapter.tex"]
 

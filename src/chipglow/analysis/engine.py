@@ -351,7 +351,7 @@ def _coarse(task: _Task, found: Segments) -> tuple[str, ...]:
 def _of_images(task: _Task, looked: Looked) -> Iterator[str]:
     """Warnings of the images of the shown exposure."""
     for number, (name, (exposure, _)) in enumerate(looked.shown.items()):
-        for warning in task.camera.redrawn(number).form_measurement(exposure).warnings:
+        for warning in task.camera.redrawn(number).form_measurement(exposure).notes.warnings:
             yield f"Image of {name}. {warning}"
 
 

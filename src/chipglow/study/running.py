@@ -214,7 +214,7 @@ def _fitted(
     try:
         fitted = fit(study, open_scene(path))
         if assume:
-            for sentence in (*left_to_the_paper(study), *fitted.assumed):
+            for sentence in (*left_to_the_paper(study), *fitted.notes.assumed):
                 assume(sentence)
         yield fitted
     except SceneError:
