@@ -352,7 +352,7 @@ def load(text, folder):
             "analysis.reference",
             "'best', expected 'maximum', 'mean', 'centre' or 'true'",
         ),
-        ("analysis: {exposures: 0}", "analysis", "exposures is 0, expected 1 or more"),
+        ("analysis: {exposures: 0}", "analysis", "exposures: 0, expected 1 or more"),
         ("analysis: {psf_widths: [4]}", "analysis.psf_widths.0", "4 has no unit"),
         ("seed: -1", "seed", "-1, expected 0 or more"),
         (
