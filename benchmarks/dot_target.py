@@ -164,7 +164,8 @@ def main() -> None:
         stated = np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean()) / size
         print(
             f"{seed:4d} {len(target.holes):5d} {len(fit.points.pixels):5d} "
-            f"{error:6.3f} {stated:7.3f} {inside.mean():7.2f}  {'; '.join(found.warnings) or '-'}",
+            f"{error:6.3f} {stated:7.3f} {inside.mean():7.2f}  "
+            f"{'; '.join(found.notes.warnings) or '-'}",
             flush=True,
         )
     print(f"{within / max(tried, 1):.2f} of the places are within their 95 % region")

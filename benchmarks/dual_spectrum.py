@@ -218,11 +218,11 @@ def main() -> None:
         seconds = time.process_time() - begin
         beyond = error > 2 * stated
         wrong += beyond
-        missed += beyond and not fit.registration.warnings
+        missed += beyond and not fit.registration.notes.warnings
         print(
             f"{seed:4d} {pair.chip_brightness:6.2f} {pair.noise:6.4f} {pair.visible_noise:8.1f} "
             f"{error:6.2f} {stated:7.2f} {error / stated:6.2f} {seconds:8.1f}  "
-            f"{'; '.join(fit.registration.warnings) or '-'}",
+            f"{'; '.join(fit.registration.notes.warnings) or '-'}",
             flush=True,
         )
     print(f"{wrong} of {options.count} wrong by over twice what they state, {missed} undoubted")

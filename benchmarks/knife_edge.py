@@ -107,8 +107,10 @@ def kinds_of_optics(repeats):
             found = knife_edge(images)
             errors.append(found.fwhm - fwhm)
             uncertainties.append(found.fwhm_uncertainty)
-            oblique = any("lies oblique" in text for text in found.assumptions)
-            said.append(oblique or any("no model fits" in warning for warning in found.warnings))
+            oblique = any("lies oblique" in text for text in found.notes.assumed)
+            said.append(
+                oblique or any("No model fits" in warning for warning in found.notes.warnings)
+            )
             models[found.best.model.name] += 1
         held = np.abs(errors) < 1.96 * np.array(uncertainties)
         print(

@@ -42,6 +42,7 @@ from skimage.transform import AffineTransform, SimilarityTransform, resize, warp
 
 from chipglow.laboratory.registration import Registration, fit_images
 from chipglow.scene import Raster
+from chipglow.text import Notes
 
 sitk: Any = import_module("SimpleITK") if find_spec("SimpleITK") else None
 
@@ -104,7 +105,9 @@ class Pair:
         )
         full = matrix @ np.vstack([before, [0, 0, 1]])
         none = np.zeros((9, 9))
-        return Registration(full, none, self.model, "mutual-information", warnings=tuple(warnings))
+        return Registration(
+            full, none, self.model, "mutual-information", notes=Notes(warnings=list(warnings))
+        )
 
 
 def mapped(matrix: Matrix, places: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -428,7 +431,7 @@ def judged(name: str, pair: Pair, truth: DualSpectrum) -> Outcome:
     seconds = time.process_time() - begin
     if found is None:
         return Outcome(np.inf, 0.0, True, seconds)
-    return Outcome(*errors(found, truth), bool(found.warnings), seconds)
+    return Outcome(*errors(found, truth), bool(found.notes.warnings), seconds)
 
 
 def drawn_pairs() -> Iterator[tuple[Pair, DualSpectrum]]:

@@ -410,6 +410,21 @@ def test_lines_across_the_rake_face_follow_its_normal():
         assert reading[2] - reading[0] == pytest.approx(0.75 * expected), quantity
 
 
+def test_lines_beyond_the_image_have_no_reading():
+    pixels = Raster(left=-300e-6, top=300e-6, spacing=6e-6, rows=60, columns=60)
+    band = find_shear_band(GRID, *ridge_scene(radians(42.0), 20e-6)[:2], TOOL)
+    for place in (
+        RakePlace("rake face", TOOL, 120e-6, 30e-6, 1e-6),
+        BandPlace("shear band", band, 30e-6, 1e-6),
+    ):
+        lines = {
+            name: np.full((3, line.distance.size), np.nan)
+            for name, line in place.lines(6e-6).items()
+        }
+        for reading in place.read(np.full((3, *pixels.shape), np.nan), pixels, lines).values():
+            assert np.isnan(reading).all() and reading.shape == (3,)
+
+
 # Segments
 
 

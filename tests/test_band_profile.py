@@ -162,7 +162,7 @@ def test_a_linear_field_is_read_exactly_along_a_given_curve():
     assert profile.distance[0] == pytest.approx(np.hypot(30e-6, 30e-6))
     assert profile.distance[-1] - profile.distance[0] == pytest.approx(np.hypot(2e-4, 2e-4))
     assert profile.stage == (Stage.NONE,)
-    assert any(text.startswith("the given curve") for text in profile.assumptions)
+    assert any(text.startswith("The given curve") for text in profile.notes.assumed)
 
 
 def test_the_mean_is_over_the_stated_width():
@@ -242,9 +242,9 @@ def test_the_stage_follows_from_the_place_beside_the_reference():
 def test_without_a_reference_the_hottest_band_at_the_edge_is_it():
     frames = [BandImage(bend=1e-3).temperature() + rise for rise in (0.0, 20.0, 10.0)]
     profile = band_profile(measured(frames), TOOL)
-    assert any("at 10 µs is fully developed" in text for text in profile.assumptions)
+    assert any("at 10 µs is fully developed" in text for text in profile.notes.assumed)
     chosen = band_profile(measured(frames), TOOL, frames=[0, 2])
-    assert any("at 20 µs is fully developed" in text for text in chosen.assumptions)
+    assert any("at 20 µs is fully developed" in text for text in chosen.notes.assumed)
     assert chosen.times.tolist() == [0.0, 2e-5]
 
 
@@ -260,7 +260,7 @@ def test_a_given_curve_is_the_place_of_the_reference():
 def test_a_single_band_has_a_doubtful_stage():
     frames = [BandImage().temperature(), NO_BANDS["uniform"]]
     profile = band_profile(measured(frames, relative_uncertainty=0.01), TOOL)
-    assert profile.warnings == ("one frame has a band; without another its stage says nothing.",)
+    assert profile.notes.warnings == ["Only one frame has a band; its stage cannot be judged."]
 
 
 @pytest.mark.parametrize(("left", "doubted"), [(0.3, True), (0.95, False)])
@@ -271,8 +271,8 @@ def test_a_curve_over_a_deep_valley_is_doubtful(left, doubted):
     valley = (1.0 - left) * np.exp(-(((along - 150e-6) / 30e-6) ** 2))
     temperature = 600.0 + (image.temperature() - 600.0) * (1.0 - valley)
     profile = band_profile(measured([temperature, temperature]), TOOL)
-    said = "the curve at 0, 10 µs crosses a valley"
-    assert any(warning.startswith(said) for warning in profile.warnings) is doubted
+    said = "The curve at 0, 10 µs crosses a valley"
+    assert any(warning.startswith(said) for warning in profile.notes.warnings) is doubted
 
 
 def test_without_a_band_near_the_edge_the_stages_are_doubtful():
@@ -281,7 +281,7 @@ def test_without_a_band_near_the_edge_the_stages_are_doubtful():
     temperature = np.where(along > 150e-6, image.temperature(), 600.0)
     profile = band_profile(measured([temperature, temperature + 5.0]), TOOL)
     assert profile.stage == (Stage.DEVELOPED, Stage.DEVELOPED)
-    assert any(warning.startswith("no band begins near") for warning in profile.warnings)
+    assert any(warning.startswith("No band begins near") for warning in profile.notes.warnings)
 
 
 def test_a_tool_far_outside_the_image_is_one_error():
@@ -381,8 +381,8 @@ def test_the_command_writes_what_it_shows(file, tmp_path):
 def test_an_unknown_calibration_is_doubtful(tmp_path):
     unknown = measured([BandImage().temperature()])
     write_measurement(unknown, tmp_path / "m.nc")
-    assert "Warning: the measurement does not state" in run(tmp_path / "m.nc").output
-    assert CALIBRATION_UNKNOWN in band_profile(unknown, TOOL).warnings
+    assert "Warning: The measurement does not state" in run(tmp_path / "m.nc").output
+    assert CALIBRATION_UNKNOWN in band_profile(unknown, TOOL).notes.warnings
 
 
 def test_the_netcdf_file_holds_si_units(file, tmp_path):

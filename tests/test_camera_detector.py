@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 from typer.testing import CliRunner
 
-from chipglow.analysis import Plan, analyse
+from chipglow.analysis import Plan, analyse, headline, headlines, sensitivity_error
 from chipglow.analysis.error_images import error_images
 from chipglow.camera import (
     UNUSABLE,
@@ -262,15 +262,16 @@ def test_the_borders_warning_is_not_of_the_noise():
     quiet = replace(PLAIN, psf=AnnularAperturePSF())
     noisy = replace(quiet, detector=camera(ShotNoise(), ReadNoise(9e4)).detector)
     assert (
-        noisy.form_measurement(exposure()).warnings == quiet.form_measurement(exposure()).warnings
+        noisy.form_measurement(exposure()).notes.warnings
+        == quiet.form_measurement(exposure()).notes.warnings
     )
 
 
 def test_lag_without_a_frame_before_is_said():
     made = camera(Lag(0.3))
     at = PLAIN.frame_times(0.0, 2)
-    assert "Lag: no frame" in made.form_measurement(exposure()).warnings[0]
-    assert made.form_measurement([exposure(float(start)) for start in at]).warnings == ()
+    assert "Lag: no frame" in made.form_measurement(exposure()).notes.warnings[0]
+    assert made.form_measurement([exposure(float(start)) for start in at]).notes.warnings == []
 
 
 def test_error_images_have_the_noise_in_both_cases_and_the_psf_does_not():
@@ -418,19 +419,17 @@ def test_the_errors_of_a_scene_have_the_noise_of_each_draw(tmp_path):
     )
 
     def spot(result):
-        (surface,) = result.surfaces.values()
-        return next(one.error.values for one in surface.readings if one.place == "spot")
+        return headline(result.data, "spot, pixel").error.values
 
     np.testing.assert_array_equal(spot(noisy), spot(again))
     noise = (spot(noisy) - spot(quiet)).ravel()
     assert np.unique(noise).size == 4
     calibration = noisy.camera.calibration(noisy.camera.pixels(noisy.raster).shape)
     assert np.abs(noise).max() < 5 * calibration.netd(600.0)
-    shown = next(iter(noisy.surfaces.values()))
-    assert "detector_response" in shown.measurement.data.attrs
-    np.testing.assert_allclose(
-        shown.errors.measured, shown.measurement.radiance_temperature()[0], rtol=1e-12
-    )
+    (measurement,) = noisy.measurements.values()
+    assert "detector_response" in measurement.data.attrs
+    image = noisy.data.image_measured.sel(effects="all").values[0]
+    np.testing.assert_allclose(image, measurement.radiance_temperature()[0], rtol=1e-12)
     rows = {row.key: row.here for row in camera_rows(Facts(noisy))}
     assert rows["netd_half_K"] == calibration.half_netd
     assert camera_rows(Facts(quiet)) == []
@@ -457,20 +456,22 @@ def test_every_headline_draw_of_a_cut_has_noise_of_its_own():
         for one in (looking, replace(looking, detector=detector))
     )
     netd = replace(looking, detector=detector).calibration((56, 70)).netd(800.0)
-    for name, found in noisy.draws.headlines.items():
-        without = quiet.draws.headlines[name]
+    for name, found in headlines(noisy.data).items():
+        without = headline(quiet.data, name)
         noise = (found.error.values - without.error.values).ravel()
         assert np.unique(noise).size == noise.size >= 8
         assert 0 < np.abs(noise).max() < 30 * netd
-    for series, without in zip(noisy.sensitivity, quiet.sensitivity, strict=True):
-        assert (series.errors["band"] != without.errors["band"]).all()
-    for surface in noisy.surfaces.values():
-        frame = surface.measurement.radiance_temperature(flagged=True)[noisy.developed]
-        known = np.isfinite(surface.errors.reference) & np.isfinite(frame)
+    for order in ("detector", "optics"):
+        errors = (sensitivity_error(result.data, order, "band") for result in (noisy, quiet))
+        assert (next(errors) != next(errors)).all()
+    for name, measurement in noisy.measurements.items():
+        frame = measurement.radiance_temperature(flagged=True)[noisy.cut.developed]
+        image = noisy.data.image_measured.sel(surface=name, effects="all").values
+        known = np.isfinite(image) & np.isfinite(frame)
         assert known.mean() > 0.3
-        np.testing.assert_allclose(surface.errors.measured[known], frame[known], rtol=1e-9)
-    one, other = (noisy.surfaces[name].measurement.radiance[0] for name in ("chip 1", "chip 2"))
-    clean = [quiet.surfaces[name].measurement.radiance[0] for name in ("chip 1", "chip 2")]
+        np.testing.assert_allclose(image[known], frame[known], rtol=1e-9)
+    one, other = (noisy.measurements[name].radiance[0] for name in ("chip 1", "chip 2"))
+    clean = [quiet.measurements[name].radiance[0] for name in ("chip 1", "chip 2")]
     # Two chips at the same time have other noise.
     assert abs(np.corrcoef((one - clean[0]).ravel(), (other - clean[1]).ravel())[0, 1]) < 0.2
 

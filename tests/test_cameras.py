@@ -23,6 +23,7 @@ from chipglow.io.cameras.formats import find_format, read_here
 from chipglow.io.cameras.stacks import Stated
 from chipglow.io.sources import SourceError
 from chipglow.radiometry import ObjectParameters
+from chipglow.text import Notes
 
 REFERENCE = Path(__file__).parent / "reference" / "flir"
 PICTURES = files.pictures()
@@ -69,7 +70,7 @@ def test_a_frame_of_a_real_camera(tmp_path):
     temperature = recording.conversion.temperature(recording.signal)
     assert 295 < temperature.min() < temperature.max() < 303
     assert recording.conversion.temperature(recording.saturation) == pytest.approx(423.15, abs=0.5)
-    assert "Frame 0 was taken at 2024-08-23 14:29:24.092+00:00." in recording.notes
+    assert "Frame 0 was taken at 2024-08-23 14:29:24.092+00:00." in recording.notes.remarks
 
 
 @pytest.mark.parametrize("order", ["<", ">"])
@@ -84,7 +85,7 @@ def test_a_sequence_of_flir(tmp_path, order):
 def test_what_is_behind_the_last_frame_of_flir_is_said(tmp_path):
     recording = read_recording(make(tmp_path, "a.seq", files.seq(PICTURES) + b"an index"))
     assert np.array_equal(recording.signal, PICTURES)
-    assert recording.warnings == ("8 bytes behind the last frame are no frame.",)
+    assert recording.notes.warnings == ["8 bytes after the last frame are not a frame."]
 
 
 def test_big_endian_counts_and_zeros_between_frames(tmp_path):
@@ -120,7 +121,9 @@ def test_the_air_takes_what_flirs_formula_says(tmp_path):
     air = np.array([1.9, -0.9]) @ np.exp(-thick)
     assert recording.object_parameters.transmittance == pytest.approx(0.9 * air, rel=1e-6)
     assert recording.object_parameters.atmosphere == pytest.approx(292.15)
-    assert any("a window that lets 90 % pass, at 20 degC" in note for note in recording.notes)
+    assert any(
+        "a window that lets 90 % pass, at 20 degC" in note for note in recording.notes.remarks
+    )
 
 
 def test_what_a_camera_cannot_have_been_told_is_left_out_and_said(tmp_path):
@@ -130,14 +133,14 @@ def test_what_a_camera_cannot_have_been_told_is_left_out_and_said(tmp_path):
     recording = read_recording(path)
     assert recording.conversion is None
     assert recording.object_parameters.emissivity == 1
-    assert sum(note.startswith("Left out") for note in recording.notes) == 2
+    assert sum(note.startswith("Ignored") for note in recording.notes.remarks) == 2
 
 
 def test_stamps_that_do_not_ascend_give_way_to_the_frame_rate(tmp_path):
     path = make(tmp_path, "a.seq", files.seq(PICTURES, np.zeros(5), rate=50))
     recording = read_recording(path)
     assert recording.times == pytest.approx(np.arange(5) / 50)
-    assert any("the frames are 1/50 s apart" in assumed for assumed in recording.assumptions)
+    assert any("The frames are 1/50 s apart" in assumed for assumed in recording.notes.assumed)
     assert read_recording(path, interval=0.1).times == pytest.approx(0.1 * np.arange(5))
     without = make(tmp_path, "b.seq", files.seq(PICTURES, np.zeros(5), rate=0))
     with pytest.raises(SourceError, match="give an interval"):
@@ -151,10 +154,10 @@ def test_a_picture_that_ends_before_the_missing_end_of_a_file_is_whole(tmp_path,
     content = files.seq(PICTURES, pack=lambda image: pack(image) + bytes(4), camera_first=True)
     recording = read_recording(make(tmp_path, "a.csq", content[:-4]))
     assert np.array_equal(recording.signal, PICTURES)
-    assert any("last 4 bytes of the file are missing" in note for note in recording.notes)
+    assert any("last 4 bytes of the file are missing" in note for note in recording.notes.remarks)
     cut = read_recording(make(tmp_path, "b.csq", content[:-20]))
     assert np.array_equal(cut.signal, PICTURES[:4])
-    assert any("its first 4 frames are whole" in warning for warning in cut.warnings)
+    assert any("4 complete frames read" in warning for warning in cut.notes.warnings)
 
 
 # PTW, CINE
@@ -172,8 +175,8 @@ def test_ptw(tmp_path, lock_in):
     assert told == pytest.approx(
         {"emissivity": 0.8, "reflected": 296.15, "transmittance": 0.98, "atmosphere": 295.15}
     )
-    assert any("lock-in" in note for note in recording.notes) == lock_in
-    assert not recording.warnings
+    assert any("lock-in" in note for note in recording.notes.remarks) == lock_in
+    assert not recording.notes.warnings
 
 
 def test_ptw_as_altair_560_writes_it(tmp_path):
@@ -185,8 +188,8 @@ def test_ptw_as_altair_560_writes_it(tmp_path):
     recording = read_recording(path)
     assert np.array_equal(recording.signal, PICTURES)
     assert recording.times == pytest.approx(stamps, rel=1e-6)
-    assert any("30000 us apart, as their stamps say" in one for one in recording.assumptions)
-    assert not recording.warnings
+    assert any("30000 us apart by their time stamps" in one for one in recording.notes.assumed)
+    assert not recording.notes.warnings
     assert np.array_equal(read_recording(path, slice(2, 4)).times, recording.times[2:4])
 
 
@@ -194,13 +197,13 @@ def test_stamps_that_no_multiple_of_the_period_explains_are_the_times(tmp_path):
     stamps = 0.025 * np.arange(5)
     recording = read_recording(make(tmp_path, "a.ptw", files.ptw(PICTURES, 1 / 100, stamps)))
     assert recording.times == pytest.approx(stamps, rel=1e-6)
-    assert any("the period in the header is 10000 us" in one for one in recording.assumptions)
+    assert any("the period in the header is 10000 us" in one for one in recording.notes.assumed)
 
 
 def test_frames_missing_in_ptw_are_said(tmp_path):
     stamps = np.array([0, 1, 2, 12, 13]) / 600
     recording = read_recording(make(tmp_path, "a.ptw", files.ptw(PICTURES, stamps=stamps)))
-    assert any("frames may be missing" in warning for warning in recording.warnings)
+    assert any("frames may be missing" in warning for warning in recording.notes.warnings)
 
 
 def test_ptw_without_period_has_the_times_of_its_stamps_also_over_midnight(tmp_path):
@@ -225,7 +228,7 @@ def test_cine(tmp_path, kind, bits):
     assert recording.integration_time == pytest.approx(3e-6, abs=2.0**-32)
     assert recording.saturation == 2**bits - 2
     assert recording.camera == "Phantom 711, serial number 12345"
-    assert any(note.startswith("The trigger was at 3.3") for note in recording.notes)
+    assert any(note.startswith("The trigger was at 3.3") for note in recording.notes.remarks)
 
 
 def test_codes_of_ten_bits_become_counts_that_are_proportional_to_light(tmp_path):
@@ -253,7 +256,7 @@ def test_cine_whose_exposure_changes_has_no_integration_time(tmp_path):
     path = make(tmp_path, "a.cine", files.cine(PICTURES, exposures=exposures))
     recording = read_recording(path)
     assert recording.integration_time is None
-    assert any("the integration time goes" in warning for warning in recording.warnings)
+    assert any("The integration time varies" in warning for warning in recording.notes.warnings)
     assert read_recording(path, slice(2, 5)).integration_time == pytest.approx(5e-6, rel=1e-4)
 
 
@@ -413,7 +416,7 @@ def test_lines_of_text_before_an_exported_table_are_left_out(tmp_path, mark, dec
     path = make(tmp_path, "a.csv", text.encode())
     recording = read_here(path, "csv", None, Stated(unit="K"))
     assert np.abs(recording.signal[0] - PICTURES[0] / 40).max() < 0.006
-    assert recording.notes[-1] == "Left out: 3 lines of text before the numbers."
+    assert recording.notes.remarks[-1] == "Ignored 3 lines of text before the numbers."
 
 
 def test_a_file_that_says_units_times_and_packing_needs_no_more(tmp_path):
@@ -509,7 +512,7 @@ def test_of_a_file_cut_anywhere_the_whole_frames_are_read_or_it_is_one_error(tmp
         assert np.array_equal(recording.signal, PICTURES[: known[-1]])
         # FLIR and Telops do not tell how many frames there should be.
         ends_with_one = kind in ("flir", "hcc") and length == known[-1] * len(content) // 5
-        assert ends_with_one or any("cut short" in warning for warning in recording.warnings)
+        assert ends_with_one or any("truncated" in warning for warning in recording.notes.warnings)
     assert set(known) == {1, 2, 3, 4}
 
 
@@ -579,8 +582,8 @@ def test_a_recording_comes_out_of_the_subprocess_as_it_is():
         "any",
         conversion=PlanckConversion(**files.PLANCK),
         object_parameters=ObjectParameters(emissivity=0.9),
-        warnings=("one", "two"),
         fill_factor=0.9,
+        notes=Notes(warnings=["one", "two"]),
     )
     stream = BytesIO()
     sandbox.write_message(stream, recordings._message(recording))

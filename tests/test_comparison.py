@@ -192,14 +192,14 @@ def test_a_pixel_without_light_does_not_take_the_uncertainty_away():
 
 def test_few_frames_and_an_unknown_calibration_are_doubtful():
     one = measured([field(X, Y)])
-    warnings = compare(one, {"same": frames(field(X, Y))}, TOOL, CURVE).warnings
-    assert any("1 frame only" in warning for warning in warnings)
+    warnings = compare(one, {"same": frames(field(X, Y))}, TOOL, CURVE).notes.warnings
+    assert any("Only 1 frame" in warning for warning in warnings)
     assert any(
         "does not state the uncertainty of its calibration" in warning for warning in warnings
     )
     assert not any(
         "calibration" in warning
-        for warning in compare(one, {"a": one}, TOOL, CURVE, STATED).warnings
+        for warning in compare(one, {"a": one}, TOOL, CURVE, STATED).notes.warnings
     )
 
 
@@ -270,7 +270,10 @@ def test_found_bands_are_compared_at_the_same_distance():
     inside = (result.band.distance > 70e-6) & (result.band.distance < 350e-6)
     # Reading between four pixels of a Gaussian of 200 K, 3.3 pixels wide: up to 4.6 K.
     assert np.abs(away[inside]).max() < 4.6
-    assert any("is fully developed" in text and "(turned)" in text for text in result.assumptions)
+    assert any(
+        "is fully developed" in text and text.startswith("turned: ")
+        for text in result.notes.assumed
+    )
 
 
 def test_frames_that_have_moved_are_left_out():
@@ -304,7 +307,9 @@ def test_without_a_band_the_rake_face_is_left():
     base = np.where(TOOL.signed_distance(X, Y) < 100e-6, 650.0, 500.0)
     result = compare(frames(base), {"same": frames(base)}, TOOL, stated=STATED)
     assert result.band is None
-    assert any("the shear band is left out: measured:" in warning for warning in result.warnings)
+    assert any(
+        "The shear band is left out: measured:" in warning for warning in result.notes.warnings
+    )
     assert all("rake face" in place.place or "chip" in place.place for place in result.places)
 
 
@@ -322,8 +327,8 @@ def test_another_rake_angle_and_no_tool_are_said():
     data = base.data.copy()
     data.attrs = {k: v for k, v in data.attrs.items() if not k.startswith("tool_")}
     result = compare(base, {"other": other, "none": Measurement(data)}, TOOL, CURVE, STATED)
-    assert "the rake angle of other differs by 7 degrees." in result.warnings
-    assert any("none states no tool" in text for text in result.assumptions)
+    assert "The rake angle of other differs by 7 degrees." in result.notes.warnings
+    assert any("none: The file states no tool" in text for text in result.notes.assumed)
 
 
 @pytest.mark.parametrize(

@@ -189,9 +189,9 @@ def test_arrangements_that_have_nothing_to_do_with_each_other_are_refused():
 def test_a_map_with_perspective_is_of_another_kind_than_an_affine_one():
     target = replace(SMALL, perspective=(200.0, -120.0))
     straight = fit_dots(target.infrared, RASTER, target.visible).registration
-    assert any("another kind than the model" in warning for warning in straight.warnings)
+    assert any("another kind than the model" in warning for warning in straight.notes.warnings)
     found = fit_dots(target.infrared, RASTER, target.visible, "homography").registration
-    assert found.warnings == ()
+    assert found.notes.warnings == []
     assert found.pixels(CORNERS) == pytest.approx(target.pixels(CORNERS), abs=1.0)
 
 
@@ -237,8 +237,8 @@ def test_the_command_registers_by_dots(tmp_path, monkeypatch):
     assert result.exit_code == 0, output
     assert "Infrared: 19 bright dots of a radius of" in output
     assert "Visible: 19 dark dots of a radius of" in output
-    assert "Assumed: the visible picture is not mirrored, is turned by up to 30 degrees" in output
+    assert "Assumed: The visible picture is not mirrored, is turned by up to 30 degrees" in output
     found = load_registration("map.yaml")
-    assert (found.method, found.warnings) == ("dots", ())
+    assert (found.method, found.notes.warnings) == ("dots", [])
     assert found.pixels(CORNERS) == pytest.approx(SMALL.pixels(CORNERS), abs=1.0)
     assert (tmp_path / "over.png").exists()

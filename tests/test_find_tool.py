@@ -13,6 +13,7 @@ from chipglow.cli import app
 from chipglow.io import read_measurement, write_measurement
 from chipglow.laboratory.chip import find_tool, rake_grid
 from chipglow.laboratory.comparison import normalised_error
+from chipglow.quantities import uncertain_text
 from chipglow.scene import PlacedTool, Raster, ToolGeometry
 from chipglow.surface import CHIP_1, CHIP_2
 from chipglow.uncertainty import Estimate
@@ -82,7 +83,9 @@ def test_the_shape_says_where_to_look_and_what_the_edge_is(seen):
     assert degrees(found.rake_angle) == pytest.approx(-7.0, abs=4.0)  # as stated above
     assert (found.clearance_angle, found.edge_radius) == (radians(10.0), 8e-6)
     elsewhere = find_tool(measurement, ToolGeometry(radians(30.0)))
-    assert any("at the end of what was looked for" in warning for warning in elsewhere.warnings)
+    assert any(
+        "at the limit of the search range" in warning for warning in elsewhere.notes.warnings
+    )
 
 
 def test_a_found_tool_moves_with_the_image(seen):
@@ -108,9 +111,9 @@ def test_a_weak_edge_is_doubtful():
     image = np.where(x + 0.12 * y < 0.0, 106.5, 100.0)
     image = image + np.random.default_rng(0).normal(0.0, 2.0, image.shape)
     measurement = Measurement.from_radiance(image[None], BAND, np.zeros(1), raster)
-    warnings = find_tool(measurement).warnings
+    warnings = find_tool(measurement).notes.warnings
     assert any("hardly stands out" in warning for warning in warnings)
-    assert any("the tip is not in the image" in warning for warning in warnings)
+    assert any("The tip is not in the image" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("noise", [0.0, 3.0])
@@ -152,7 +155,7 @@ def test_the_command_writes_what_the_function_gives(folder, seen):
         assert data.attrs["tool_rake_angle"] == radians(-7.0)
     assert (folder / "grid.png").read_bytes().startswith(b"\x89PNG")
     value, spread = grid.frame_mean[0, 4] - 273.15, grid.frame_standard_deviation[0, 4]
-    assert f"{value:.1f} ± {spread:.1f}" in text
+    assert uncertain_text(value, spread) in text
     assert "squares are left out" in text
 
 
@@ -185,7 +188,7 @@ def test_a_given_and_a_found_tool(folder):
     assert code == 0
     angle = degrees(find_tool(read_measurement(folder / "real.nc")).tool.rake_angle)
     assert f"Found: rake angle {angle:.1f} deg, tip at x " in found
-    assert "Assumed: clearance angle 7 deg, edge radius 20 um." in assumed
+    assert "Assumed: The clearance angle is 7 deg, the edge radius 20 um." in assumed
 
 
 def test_a_tool_that_the_image_shows_elsewhere_is_doubted(folder):
@@ -196,9 +199,9 @@ def test_a_tool_that_the_image_shows_elsewhere_is_doubted(folder):
         ("rake_angle: 7 deg\ntip: [0 um, 0 um]\n", True),
     ):
         (folder / "tool.yaml").write_text(text)
-        code, said, _ = command("real.nc", "--tool", "tool.yaml")
+        code, _, said = command("real.nc", "--tool", "tool.yaml")
         assert code == 0
-        assert ("Warning: the rake face that shows in the image is" in said) is doubted
+        assert ("Warning: The rake face that shows in the image is" in said) is doubted
 
 
 @pytest.mark.parametrize(
@@ -206,7 +209,7 @@ def test_a_tool_that_the_image_shows_elsewhere_is_doubted(folder):
     [
         (["real.nc"], "--tool: the measurement states no tool"),
         (["told.nc", "--frame", "2"], "--frame: '2', expected 0 to 1, or all"),
-        (["told.nc", "--frame", "0", "--at", "1 us"], "--frame: '0' beside --at"),
+        (["told.nc", "--frame", "0", "--at", "1 us"], "--frame and --at cannot be combined"),
         (["told.nc", "--at", "1 s"], "--at: 1 s, expected 0 us to 10 us"),
         (["told.nc", "--depth", "3 s"], "--depth: '3 s' is not a length"),
         (["told.nc", "--position", "-3 um"], "--position: -3 um is not over 0"),

@@ -270,7 +270,7 @@ def test_every_format_gives_back_what_was_written(tmp_path, write):
     np.testing.assert_allclose(survey.extent, (0, COLUMNS * A, 0, ROWS * A), atol=1e-3 * A)
     assert survey.found["temperature"] == "temperature"
     assert survey.spacing == pytest.approx(A, rel=1e-4)
-    assert any("as neighbours are in the first frame" in text for text in survey.assumed)
+    assert any("neighbours in the first frame" in text for text in survey.notes.assumed)
     expected = linear(*np.meshgrid(RASTER.x, RASTER.y))
     frames = list(source.frames(RASTER))
     assert [frame.time for frame in frames] == pytest.approx(list(TIMES))
@@ -555,7 +555,7 @@ def test_a_dump_without_times_or_units_says_what_is_assumed(tmp_path):
     places = lattice() / 1e-6
     path = write_dump(tmp_path / "cut.dump", [(None, dump_rows(0.0, places))] * 2)
     source = CloudSource(str(path), {"temperature": "v_temp"}, units=Units(length=Unit(1e-6)))
-    assert "no times in the files: frames are 1 s apart" in source.survey().assumed
+    assert "The files contain no times: frames are 1 s apart." in source.survey().notes.assumed
 
 
 @pytest.mark.parametrize(

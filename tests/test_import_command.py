@@ -49,7 +49,7 @@ def test_a_grid_becomes_a_scene_and_the_command_says_what_it_assumed(arrays, tmp
     assert result.exit_code == 0, result.output
     said = " ".join(result.output.split())
     assert "NT11" in said
-    assert "Assumed: velocity: the cutting speed where the strain is small" in said
+    assert "Assumed: Velocity: the cutting speed where the strain is small" in said
     scene = open_scene(out)
     assert list(scene.times) == pytest.approx([0.0, 2e-6, 4e-6, 6e-6])
     frame = scene.frame(3)
@@ -58,7 +58,7 @@ def test_a_grid_becomes_a_scene_and_the_command_says_what_it_assumed(arrays, tmp
     assert frame.temperature[-1, 0] == pytest.approx(403.15, abs=0.02)
     assert frame.temperature[0, 0] == pytest.approx(403.15 + 19 * 2.5, abs=0.02)
     assert frame.temperature[-1, 29] == pytest.approx(403.15 + 29 * 5.0, abs=0.02)
-    assert "plastic strain rate: from the change" in scene.data.attrs["assumed"]
+    assert "Plastic strain rate: from the change" in scene.data.attrs["assumed"]
     assert "NT11" in scene.data.attrs["import"]
 
 
@@ -72,9 +72,9 @@ def test_what_the_file_says_is_told_from_what_is_assumed(arrays, tmp_path):
         app, ["import", str(tmp_path / "cut.h5"), "--out", str(out), *options(settings)]
     )
     assert result.exit_code == 0, result.output
-    assert "From the file: T is in 'degC'\n" in result.output
+    assert "T is in 'degC'.\n" in result.output
     assert "degC" not in " ".join(result.output.split("Assumed: ")[1:])
-    assert open_scene(out).data.attrs["from_file"] == "T is in 'degC'"
+    assert open_scene(out).data.attrs["remarks"] == "T is in 'degC'."
 
 
 def test_without_out_the_command_only_looks(arrays, tmp_path):
@@ -192,9 +192,9 @@ def test_units_that_follow_from_others_are_said(arrays, tmp_path):
     np.savez(tmp_path / "v.npz", T=np.full((4, 6), 300.0), vx=np.ones((4, 6)))
     settings = ["grid.spacing=5 um", "units={length: mm, time: us}"]
     looked = prospect(load_import(tmp_path / "v.npz", settings).build())
-    assert "velocities are in mm/us, made of units.length and time" in looked.assumed
+    assert "Velocities are in mm/us, by units.length and units.time." in looked.notes.assumed
     given = load_import(tmp_path / "v.npz", [*settings, "units.velocity=m/s"])
-    assert not any("velocities" in said for said in prospect(given.build()).assumed)
+    assert not any("Velocities" in said for said in prospect(given.build()).notes.assumed)
 
 
 @pytest.mark.parametrize(

@@ -331,8 +331,8 @@ def test_units_from_the_file_are_honoured_and_said(tmp_path):
         for name, unit in {"x": "mm", "y": "um", "time": "microseconds since 2020-01-01"}.items():
             file[name].attrs["units"] = unit
     source = GridSource(str(tmp_path / "all.h5"))
-    assert "temp is in 'degC'" in source.survey().from_file
-    assert not any("degC" in text for text in source.survey().assumed)
+    assert "temp is in 'degC'." in source.survey().notes.remarks
+    assert not any("degC" in text for text in source.survey().notes.assumed)
     np.testing.assert_allclose(source.survey().times, TIMES)
     (frame, *_) = source.frames(INNER)
     np.testing.assert_allclose(frame.fields["temperature"], linear(INNER.x, INNER.y), atol=3e-4)
@@ -340,7 +340,7 @@ def test_units_from_the_file_are_honoured_and_said(tmp_path):
     (other, *_) = given.frames(INNER)
     moved = other.fields["temperature"] - frame.fields["temperature"]
     np.testing.assert_allclose(moved, 100.0 - 273.15, atol=3e-4)
-    assert "temp is in 'degC', but the unit given is taken" in given.survey().from_file
+    assert "temp is in 'degC'; the given unit is used instead." in given.survey().notes.remarks
 
 
 @pytest.mark.parametrize("packed", [False, True])
@@ -359,7 +359,9 @@ def test_units_given_where_the_file_says_none(tmp_path):
     source = a_source(str(tmp_path / "T.npy"), units=Units(temperature=CELSIUS))
     (frame, *_) = source.frames(INNER)
     np.testing.assert_allclose(frame.fields["temperature"], linear(INNER.x, INNER.y), atol=3e-4)
-    assert any("K: the file says no unit" in t for t in a_source(source.files).survey().assumed)
+    assert any(
+        "K: the file states no unit" in t for t in a_source(source.files).survey().notes.assumed
+    )
 
 
 @pytest.mark.parametrize(
@@ -419,9 +421,9 @@ def test_fields_in_files_of_their_own(tmp_path):
 def test_what_is_not_named_is_said(tmp_path):
     np.save(tmp_path / "result.npy", a_stack())
     survey = a_source(str(tmp_path / "result.npy"), interval=None).survey()
-    assert any("the only array 'result'" in text for text in survey.assumed)
-    assert "no times in the files: frames are 1 s apart" in survey.assumed
-    assert "the axes of result are time, y, x" in survey.assumed
+    assert any("The only array 'result'" in text for text in survey.notes.assumed)
+    assert "The files contain no times: frames are 1 s apart." in survey.notes.assumed
+    assert "The axes of result are time, y, x." in survey.notes.assumed
     np.savez(tmp_path / "two.npz", one=a_stack(), two=a_stack())
     refused(a_source(str(tmp_path / "two.npz")), "it has one, two")
     refused(a_source(str(tmp_path / "two.npz"), names={"temperature": "three"}), "'three'")

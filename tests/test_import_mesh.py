@@ -222,8 +222,8 @@ def test_times_of_files_are_taken_and_what_is_assumed_is_said(tmp_path):
         for name in ("plain", "timed")
     )
     assert timed.survey().times.tolist() == pytest.approx([0.0, 2.5e-4, 5e-4])
-    assert any("1 s apart" in sentence for sentence in plain.survey().assumed)
-    assert not any("1 s apart" in sentence for sentence in timed.survey().assumed)
+    assert any("1 s apart" in sentence for sentence in plain.survey().notes.assumed)
+    assert not any("1 s apart" in sentence for sentence in timed.survey().notes.assumed)
 
 
 def test_files_are_sorted_by_their_numbers(tmp_path):
@@ -279,7 +279,7 @@ def test_deleted_elements_are_void(tmp_path):
     grid.save(tmp_path / "chip.vtu")
     source = MeshSource(tmp_path / "chip.vtu")
     check_linear(only_frame(source), inside=X < 5e-4)
-    assert survey_of(source).from_file == ("elements whose STATUS is 0 are deleted",)
+    assert survey_of(source).notes.remarks == ["Elements whose STATUS is 0 are deleted."]
 
 
 def test_a_displacement_is_added_if_it_is_named(tmp_path):
@@ -288,7 +288,7 @@ def test_a_displacement_is_added_if_it_is_named(tmp_path):
     grid.save(tmp_path / "chip.vtu")
     still, moved = (MeshSource(tmp_path / "chip.vtu", displacement=name) for name in (None, "U"))
     assert still.survey().extent[0] == 0.0
-    assert any("U is not added" in sentence for sentence in still.survey().assumed)
+    assert any("U is not added" in sentence for sentence in still.survey().notes.assumed)
     assert moved.survey().extent[:2] == pytest.approx((1e-4, WIDTH + 1e-4))
 
 
@@ -299,7 +299,7 @@ def test_values_of_integration_points_are_averaged_and_tensors_refused(tmp_path)
     grid.save(tmp_path / "chip.vtu")
     source = MeshSource(tmp_path / "chip.vtu")
     assert (only_frame(source).fields["plastic_strain"] == 3.0).all()
-    assert any("PEEQ has 4 values" in sentence for sentence in source.survey().assumed)
+    assert any("PEEQ has 4 values" in sentence for sentence in source.survey().notes.assumed)
     with pytest.raises(SourceError, match="'strain' has 6 components"):
         MeshSource(tmp_path / "chip.vtu", names={"plastic_strain": "strain"}).survey()
     with pytest.raises(SourceError, match="velocity: 'NT11' has 1 components"):
@@ -560,7 +560,7 @@ def test_labels_without_a_row_are_counted(tmp_path):
     table = tmp_path / "chip_2_nodes.csv"
     rows = table.read_text().split("\n")
     table.write_text("\n".join([*rows[:3], *rows[5:]]))
-    said = survey_of(MeshSource(path)).from_file
+    said = survey_of(MeshSource(path)).notes.remarks
     assert [text.split(";")[0] for text in said] == [
         "PEEQ: 36 of 72 elements have no value in the first frame",
         "NT11: 2 of 70 nodes have no value in the last frame",
@@ -830,7 +830,7 @@ def test_u_of_openfoam_is_the_velocity(tmp_path):
     source = MeshSource(write_foam(tmp_path, velocity="(3 1 2)"), section=0.5)
     survey = survey_of(source)
     assert survey.found["velocity_x"] == survey.found["velocity_y"] == "U"
-    assert not any("U is not added" in sentence for sentence in survey.assumed)
+    assert not any("U is not added" in sentence for sentence in survey.notes.assumed)
     frame = next(source.frames(Raster(0.0, 1.0, 0.1, 10, 20)))
     assert (frame.fields["velocity_x"] == 3.0).all()
     assert (frame.fields["velocity_y"] == 1.0).all()
@@ -920,7 +920,7 @@ def test_fields_of_two_materials_are_one_temperature(tmp_path, divided):
 def test_a_block_without_a_temperature_is_void_and_never_of_0_kelvin(tmp_path):
     path = two_materials(tmp_path / "two.e", whole_name="temp")
     source = MeshSource(path, section=0.5)
-    assert "steel has no temperature: it is void" in survey_of(source).from_file
+    assert "steel has no temperature: it is treated as void." in survey_of(source).notes.remarks
     frame = next(source.frames(TWO))
     right = np.broadcast_to(TWO.x > 1.0, TWO.shape)
     np.testing.assert_array_equal(frame.material, np.where(right, VOID, WORKPIECE))

@@ -267,8 +267,8 @@ def test_frames_times_and_places(tmp_path):
 def test_the_playing_time_is_told(tmp_path):
     found = a_source(a_movie(tmp_path / "a.avi")).survey()
     assert found.times == pytest.approx([0, 0.05, 0.1])
-    assert any("playing the movie, 0.05 s" in text for text in found.assumed)
-    assert any("standard uncertainty of 1.25 K" in text for text in found.assumed)
+    assert any("playing the movie, 0.05 s" in text for text in found.notes.assumed)
+    assert any("standard uncertainty of 1.25 K" in text for text in found.notes.assumed)
 
 
 @pytest.mark.parametrize(
@@ -378,7 +378,7 @@ def test_a_movie_that_ffmpeg_drew():
     spec.loader.exec_module(example)
     source = example.source()
     found = source.survey()
-    assert any("legend found at (272, 20, 288, 220)" in text for text in found.assumed)
+    assert any("Legend found at (272, 20, 288, 220)" in text for text in found.notes.assumed)
     frames = list(source.frames(own_raster(source)))
     assert len(frames) == 4
     for number, frame in enumerate(frames):
@@ -431,7 +431,7 @@ def test_the_background_is_found_and_told(tmp_path):
     found, refused = find_background(grey, ColourScale.named("gray", ENDS))
     assert found == () and (255, 255, 255) in refused
     found = a_source(a_movie(tmp_path / "a.avi")).survey()
-    assert "temperature: background colours at the border: (255, 255, 255)" in found.assumed
+    assert "temperature: Background colours at the border: (255, 255, 255)." in found.notes.assumed
 
 
 def test_a_background_of_the_colour_of_a_value_is_refused(tmp_path):
@@ -727,7 +727,7 @@ def test_what_lies_under_lines_is_in_the_uncertainty(tmp_path):
     found = source.uncertainty()["temperature"]
     assert plain.lines == 0.0
     assert found.lines > 2 * found.colours
-    assert "by the lines drawn over them" in source.survey().assumed[-1]
+    assert "by the lines drawn over them" in source.survey().notes.assumed[-1]
     frame = first_frame(source)
     error = (frame.fields["temperature"] - known_field(0, SHAPE))[frame.material == 1]
     assert 0.5 < np.sqrt(np.nanmean(error**2)) / found.total < 2

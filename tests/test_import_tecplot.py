@@ -186,7 +186,7 @@ def test_a_file_for_each_time(tmp_path):
     write_tecplot(tmp_path / "chip_1.plt", NAMES, [zone_of(at=0.5, strand=1)])
     survey = source.survey()
     assert survey.times.tolist() == [0.0, 1.0, 2.0]
-    assert "no times in the files: frames are 1 s apart" in survey.assumed
+    assert "The files contain no times: frames are 1 s apart." in survey.notes.assumed
 
 
 def test_zones_without_strands_are_of_their_times_if_no_two_are_of_one(tmp_path):

@@ -39,7 +39,7 @@ def inner(frame):
 def test_a_whole_source_comes_through_as_it_is(tmp_path):
     looked = import_scene(Import(MovingBlock(WHOLE)), tmp_path / "scene.nc")
     scene = open_scene(tmp_path / "scene.nc")
-    assert looked.assumed == ()
+    assert looked.notes.assumed == []
     assert scene.raster == RASTER
     frame = scene.frame(5)
     solid = frame.material == Material.WORKPIECE
@@ -58,7 +58,7 @@ def test_missing_strain_rate_is_the_change_of_strain_along_the_motion():
         rate = frame.plastic_strain_rate[inner(frame)]
         # The strain's pattern is far wider than a sample: the cubic spline is right to 1e-5 of it.
         assert np.abs(rate - RATE).max() < 0.02 * RATE
-    assert "plastic strain rate: from the change" in scene.data.attrs["assumed"]
+    assert "Plastic strain rate: from the change" in scene.data.attrs["assumed"]
 
 
 def test_strain_rate_does_not_take_motion_for_straining():
@@ -190,9 +190,11 @@ class InMillimetres(MovingBlock):
 
 
 def test_a_size_that_no_chip_has_is_said():
-    assert not any("units.length" in text for text in prospect(Import(MovingBlock(WHOLE))).assumed)
-    (said,) = prospect(Import(InMillimetres(WHOLE))).assumed
-    assert "the source is 120 m large" in said
+    assert not any(
+        "units.length" in text for text in prospect(Import(MovingBlock(WHOLE))).notes.assumed
+    )
+    (said,) = prospect(Import(InMillimetres(WHOLE))).notes.assumed
+    assert "The source is 120 m large" in said
 
 
 @pytest.mark.parametrize(

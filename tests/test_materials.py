@@ -188,7 +188,7 @@ def _write(path: Path, old: str, new: str) -> Path:
         ),
         ("[200 degC, 42.3 W/(m K)]", "42.3 W/(m K)", "expected [temperature, value]"),
         ("[200 degC, 42.3", "[200, 42.3", "conductivity: 200 has no unit, expected a temperature"),
-        ("  loss: 0.5\n", "  loss: 0.5\n  loss: 0.8\n", "key 'loss' is there twice"),
+        ("  loss: 0.5\n", "  loss: 0.5\n  loss: 0.8\n", "duplicate key 'loss'"),
         ("value: 0.9\n", "value: 1.9\n", "taylor_quinney: 1.9, expected 0 to 1"),
         ("value: 0.9\n", f"value: {RATES}\n".replace("1/s", "K"), "'1 K' is not a strain rate"),
         (

@@ -408,7 +408,7 @@ def test_calibrate_prints_fits_and_writes_the_preferred(laboratory, tmp_path):
 def test_calibrate_says_what_is_doubtful(laboratory):
     code, said = run("calibrate", "points.csv", "--band", "2-2.5 um", "--out", "wrong.yaml")
     assert code == 0, said
-    assert "Warning: linear: the residuals are" in said
+    assert "Warning: linear: The residuals are" in said
     assert "(common_uncertainty)" in said
     assert "Assumed: The blackbody's emissivity is 1" in said
     assert "Assumed: The camera did not drift" in said
@@ -417,7 +417,7 @@ def test_calibrate_says_what_is_doubtful(laboratory):
     given = ["unit=counts", "interval=1 ms", "pitch=6 um", "calibration=wrong.yaml"]
     code, said = run("convert", "chip.npy", *(part for one in given for part in ("--set", one)))
     assert code == 0, said
-    assert "Warning: The calibration: the residuals are" in said
+    assert "Warning: Calibration: The residuals are" in said
     code, said = run(
         "calibrate", "points.csv", "--band", "3.8-5.1 um", "--emissivity", "0.97",
         "--emissivity-uncertainty", "0.005",
@@ -459,14 +459,14 @@ def test_convert_makes_a_measurement_and_says_what_it_assumed(laboratory, tmp_pa
     out = tmp_path / "measured.nc"
     code, said = run("convert", "chip.yaml", "--out", out, "--set", "tip=none")
     assert code == 0, said
-    assert said.startswith("The file, and what you said of it:")
+    assert said.startswith("The file with your settings:")
     for words in ("counts as uint16", "5 of 40 x 30 pixels", "replaced by neighbours",
                   "standard uncertainty", "Assumed: The origin of coordinates"):  # fmt: skip
         assert words in said
     assert read_measurement(out).data.attrs["calibration"].startswith("straight line")
     code, said = run("convert", out)
     assert code == 2
-    assert "is a measurement already" in said
+    assert "already a measurement" in said
 
 
 def test_what_is_assumed_and_doubtful_of_a_camera_s_file_is_said_by_who_takes_it(laboratory):
@@ -498,9 +498,9 @@ def test_what_the_camera_s_file_leaves_in_doubt_is_said_once(laboratory, tmp_pat
     exposures = [3e-6, 3e-6, 5e-6, 5e-6, 5e-6]
     written = camera_files.cine(camera_files.pictures(bits=12), "16", exposures=exposures)
     (tmp_path / "a.cine").write_bytes(written)
-    warning = "Warning: the integration time goes from 3.00002 us to 5.00004 us."
+    warning = "Warning: The integration time varies from 3.00002 us to 5.00004 us."
     code, said = run("convert", tmp_path / "a.cine")
-    assert "It is no measurement yet" in said
+    assert "Settings are missing for a measurement" in said
     assert said.count(warning) == 1
     settings = ("--set", f"calibration={laboratory / 'calibration.yaml'}", "--set", "pitch=6 um")
     code, said = run("convert", tmp_path / "a.cine", *settings)
@@ -521,7 +521,7 @@ def test_convert_only_looks_without_out(laboratory):
     settings = ["--set", "unit=counts", "--set", "interval=1 ms"]
     code, said = run("convert", "chip.npy", *settings)
     assert code == 0, said
-    assert "It is no measurement yet. chip.npy: calibration: is missing" in said
+    assert "Settings are missing for a measurement. chip.npy: calibration: is missing" in said
     code, said = run("convert", "chip.npy", *settings, "--out", "never.nc")
     assert code == 2
     assert said.count("calibration: is missing") == 1

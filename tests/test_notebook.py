@@ -55,14 +55,14 @@ def test_a_scene_in_a_line():
 def test_a_measurement_in_a_line():
     assert repr(measurement()) == (
         "<Measurement: 2 frames of 1 x 3 pixels of 6 µm; 0 µs to 5000 µs; 426.9 °C to 527 °C in "
-        "the first; with tool; 2 warnings: see .warnings>"
+        "the first; with tool; 2 warnings: see .notes>"
     )
-    assert measurement().warnings == ("A.", "B.")
+    assert measurement().notes.warnings == ["A.", "B."]
     cold = Camera(psf=None, integration_time=1e-6).measure(scene(), UniformSurface(0.1), 0.0)
     assert repr(cold) == (
         "<Measurement: 1 frame of 8 x 13 pixels of 6 µm; at 0 µs; no temperature; with tool>"
     )
-    assert cold.warnings == ()
+    assert cold.notes.warnings == []
 
 
 def test_the_length_is_the_number_of_frames():

@@ -207,11 +207,11 @@ def test_the_package_runs_as_a_module():
 def test_what_is_too_coarse_is_said():
     coarse = Study(cutting={"feed": "0.05 mm", "numerics": {"cell": "10 um"}})
     scene = AnalyticChip(frames=10, frame_spacing=8e-6).scene()
-    told = " ".join(fit(coarse, scene).assumed)
+    told = " ".join(fit(coarse, scene).notes.assumed)
     assert "The feed is 5 cells: too coarse" in told
     assert "one of them stands for 8 us of the exposure's 10 us" in told
     fine = AnalyticChip(frames=10, frame_spacing=1e-6).scene()
-    assert fit(Study(), fine).assumed == ()
+    assert fit(Study(), fine).notes.assumed == []
 
 
 def test_the_reference_true_needs_no_quotes(tmp_path):

@@ -52,7 +52,7 @@ def test_the_command_says_what_was_found(folder):
     assert abs(float(width[0]) - 10.0) < 3 * float(width[1]) < 0.3
     assert "kind: gaussian, fwhm: " in output
     assert "they agree" in output
-    assert "Assumed: the whole square of a pixel takes light" in output
+    assert "Assumed: The whole square of a pixel takes light" in output
     assert "Warning" not in output
 
 
@@ -60,7 +60,7 @@ def test_doubts_are_printed(folder):
     write_edge(folder / "straight.nc", 0.0)
     code, output = psf("straight.nc")
     assert code == 0
-    assert "Warning: straight.nc: with a tilt of" in output
+    assert "Warning: straight.nc: With a tilt of" in output
 
 
 @pytest.mark.parametrize("model", [None, "radial"])
@@ -194,7 +194,7 @@ def test_counts_without_a_calibration_serve_for_an_edge(folder, offset):
     assert code == 0, output
     width, uncertainty = found_width(output)
     assert abs(width - 10.0) < 3 * uncertainty < 0.6
-    assert "Assumed: the counts are a straight line over the radiance" in output
+    assert "Assumed: The counts are linear in the radiance" in output
     assert ("below the camera's lower range limit" in output) is (offset < 0)
 
 
@@ -217,7 +217,7 @@ def test_a_measurement_under_the_cameras_range_serves_for_an_edge(folder):
     code, output = psf("cold.nc")
     assert code == 0
     assert found_width(output)[0] == pytest.approx(found_width(psf("edge.nc")[1])[0], abs=1e-3)
-    assert "Assumed: 50 % of the pixels of cold.nc are under the range" in output
+    assert "Assumed: 50 % of the pixels of cold.nc are below the range" in output
 
 
 def test_the_fill_factor_of_a_cameras_file_is_taken(folder):

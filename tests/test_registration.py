@@ -71,7 +71,7 @@ def test_exact_points_give_the_exact_map(model, mirrored, seed):
     fit = fit_points(places, mapped(matrix, places), model, picked=False)
     assert fit.registration.pixels(CORNERS) == pytest.approx(mapped(matrix, CORNERS), abs=1e-5)
     assert fit.registration.positions(mapped(matrix, CORNERS)) == pytest.approx(CORNERS, abs=1e-10)
-    assert fit.registration.warnings == ()
+    assert fit.registration.notes.warnings == []
 
 
 @pytest.mark.parametrize("model", ["similarity", "affine", "homography"])
@@ -117,7 +117,7 @@ def test_a_point_picked_wrong_is_named():
     pixels[4] += [12.0, -5.0]
     fit = fit_points(places, pixels)
     assert np.flatnonzero(fit.misplaced).tolist() == [4]
-    assert "point 5 is" in fit.registration.warnings[0]
+    assert "Point 5 is" in fit.registration.notes.warnings[0]
 
 
 def test_points_that_say_too_little_are_refused():
@@ -191,7 +191,11 @@ def test_images_of_unlike_contrast_come_within_the_stated_uncertainty(cropped):
     """Through the command: bright flanks and dark gaps beside hot bands and a hot rake face."""
     folder, pair, corner, output = cropped
     found = load_registration(folder / "map.yaml")
-    assert (found.method, found.model, found.warnings) == ("mutual-information", "similarity", ())
+    assert (found.method, found.model, found.notes.warnings) == (
+        "mutual-information",
+        "similarity",
+        [],
+    )
     part = Raster(RASTER.left + 180e-6, RASTER.top - 120e-6, 6e-6, 80, 100)
     places = np.stack(np.meshgrid(part.x, part.y), axis=-1).reshape(-1, 2)
     off = found.pixels(places) + corner - pair.pixels(places)
@@ -201,7 +205,7 @@ def test_images_of_unlike_contrast_come_within_the_stated_uncertainty(cropped):
     assert 4e-6 < typical < 9e-6
     assert error < 2 * typical
     assert "Warning" not in output
-    assert "Assumed: the visible picture is not mirrored" in output
+    assert "Assumed: The visible picture is not mirrored" in output
     assert "Mutual information: " in output
     score, chance = (
         float(output.split(text)[1].split()[0].rstrip(".,"))
@@ -216,7 +220,9 @@ def test_images_of_other_things_are_doubtful(cropped):
     other = np.random.default_rng(4).normal(100.0, 10.0, (80, 100))
     coarse = Raster(RASTER.left, RASTER.top, 12e-6, 40, 50)
     found = fit_images(image, coarse, other, "similarity").registration
-    assert any("no better than that of images" in warning for warning in found.warnings)
+    assert any(
+        "no better than that of unrelated images" in warning for warning in found.notes.warnings
+    )
 
 
 def test_images_without_contrast_are_refused():
@@ -287,7 +293,7 @@ def test_periodic_and_unrelated_signals_are_doubtful():
     )
     assert any("fits nearly as well" in warning for warning in found.warnings)
     found = align_times(infrared, generator.normal(size=60), visible, generator.normal(size=4500))
-    assert any("nothing to do with each other" in warning for warning in found.warnings)
+    assert any("unrelated" in warning for warning in found.warnings)
 
 
 def test_visible_frames_within_an_integration():
@@ -356,7 +362,7 @@ def test_the_command_writes_map_pictures_and_numbers(folder):
     assert "A visible pixel is 1.5 um" in output
     assert "2 degrees of freedom" in output
     # The folder's points are computed, not picked.
-    assert "Warning: the points agree to" in output
+    assert "Warning: The points agree to" in output
     found = load_registration("map.yaml")
     assert found.pixels([3e-6, 117e-6]) == pytest.approx([1.5, 1.5], abs=1e-6)
     assert found.model == "affine"
@@ -387,7 +393,7 @@ def test_the_command_aligns_the_clocks(folder):
     command = ["register", *arguments, *region, "--visible-interval", "200 us"]
     result = CliRunner().invoke(app, [*command, "--pairs", "pairs.csv"], env={"COLUMNS": "120"})
     assert result.exit_code == 0, result.output
-    assert "Assumed: a visible exposure lasts as long as its frame, 200 us." in result.stderr
+    assert "Assumed: A visible exposure lasts as long as its frame, 200 us." in result.stderr
     assert "Assumed" not in result.stdout
     offset = float(" ".join(result.stdout.split()).split("infrared clock + ")[1].split(" us")[0])
     # The visible frames are exposed for 200 us, whose middle is 100 us after their times.
@@ -409,7 +415,7 @@ def test_a_cine_file_is_the_visible_camera(folder):
         *("--align", "60 um, 30 um, 120 um, 90 um", "--pairs", "pairs.csv"),
     )
     assert code == 0, output
-    assert "Assumed: a visible exposure" not in output
+    assert "Assumed: A visible exposure" not in output
     offset = float(output.split("infrared clock + ")[1].split(" us")[0])
     # Middles of exposures: 200 us after the visible stamps, 5 us after the infrared ones.
     assert offset == pytest.approx(7000 + 200 - 5, abs=20)
@@ -476,19 +482,19 @@ def test_pictures_of_another_kind_are_refused(folder):
     [
         (["--frame", "40"], "--frame: 40, expected 0 to 39"),
         (["--visible-frame", "1"], "--visible-frame: 1, expected 0 to 0"),
-        (["--method", "points"], "--method: points without --points"),
+        (["--method", "points"], "--method points requires --points"),
         (
             ["--method", "mutual-information", "--points", "points.csv"],
-            "--method: mutual-information with --points",
+            "--method mutual-information cannot be combined",
         ),
-        (["--map", "m.yaml", "--points", "points.csv"], "--map: m.yaml beside --points"),
+        (["--map", "m.yaml", "--points", "points.csv"], "--map cannot be combined"),
         (["--method", "dots", "--frame", "20"], "infrared image: 0 dots are found, expected a"),
         (["--out", "map.txt"], "--out: map.txt, expected a file that ends in .yaml"),
         (["--overlay", "map.txt"], "--overlay: map.txt, expected a file that ends in .png"),
         (["--blink", "map.png"], "--blink: map.png, expected a file that ends in .gif"),
         (["--align", "1 um, 2 um"], "--align: '1 um, 2 um', expected left, bottom, right, top"),
-        (["--align", "9 um, 0 um, 1 um, 5 um"], "expected left under right"),
-        (["--pairs", "p.csv"], "--pairs: p.csv without --align"),
+        (["--align", "9 um, 0 um, 1 um, 5 um"], "left must be less than right"),
+        (["--pairs", "p.csv"], "--pairs requires --align"),
         (["--visible-interval", "3"], "--visible-interval: 3 has no unit"),
     ],
 )

@@ -159,7 +159,7 @@ def test_a_cut_that_is_killed_again_and_again_ends_with_the_same_bits(cache, unb
     with start("--resume") as process:
         _, errors = process.communicate(timeout=120)
     assert process.returncode == 0, errors
-    assert f"The cut goes on at {reached[2]:.0%}" in errors
+    assert f"Resuming the cut at {reached[2]:.0%}" in errors
     assert_same_scene("scene.nc", unbroken)
     assert [path.suffix for path in cache.iterdir()] == [".nc"]
 
@@ -255,7 +255,7 @@ def test_the_movie_of_a_cut_that_goes_on_shows_what_is_still_to_come(cache, unbr
     assert {path.name for path in cache.parent.iterdir()} == {"study.yaml", "cache"}
     result = CliRunner().invoke(app, [*command, "--resume"])
     assert result.exit_code == 0, result.output
-    assert "The preview shows what is still to come." in result.output
+    assert "The preview shows the rest of the cut." in result.output
     with Image.open("rest.gif") as movie:
         assert movie.n_frames == 48 - 30
     assert_same_scene("scene.nc", unbroken)

@@ -66,7 +66,7 @@ def test_what_json_cannot_say_is_null(capsys):
     screen = Screen()
     screen.for_programs()
     frame = pd.DataFrame({"name": ["a", "b"], "value_K": [1.5, np.nan]})
-    screen.table("all", frame, {"name": "{name}"})
+    screen.table("all", frame, ["name"])
     screen.say("Two.", {"array": np.array([1.0, np.inf]), "count": np.int64(2)})
     screen.close()
     found = json.loads(capsys.readouterr().out)

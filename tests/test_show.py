@@ -210,9 +210,9 @@ def test_what_is_wrong_is_one_line(path):
         (["scene.nc", "--at", "2 ms"], ("--at: 2000 us is not in the scene", "0 us to 100 us")),
         (["scene.nc", "--at", "20"], ("--at: 20 has no unit", "10 us")),
         (["scene.nc", "--plot", "scene.jpg"], ("--plot: scene.jpg", ".png, .pdf or .svg")),
-        (["camera.fff"], ("camera.fff: is no NetCDF-4 file", "chipglow convert looks into")),
+        (["camera.fff"], ("camera.fff: not a NetCDF-4 file", "chipglow convert inspects")),
         (["none.nc"], ("none.nc: there is no such file",)),
-        (["cut.nc"], ("cut.nc: is no NetCDF-4 file, or cut short",)),
+        (["cut.nc"], ("cut.nc: not a NetCDF-4 file, or truncated",)),
     ):
         code, text = show(*arguments)
         assert code == 2

@@ -372,7 +372,7 @@ def load(text, folder):
         ),
         ("- 1", "", "[1] is no section"),
         ("a: [1,", "line 1", "expected YAML"),
-        ("seed: 1\nseed: 2", "line 2", "key 'seed' is there twice"),
+        ("seed: 1\nseed: 2", "line 2", "duplicate key 'seed'"),
         ("x: !!python/object/apply:os.system [ls]", "line 1", "could not determine a constructor"),
         ("seed: 2026-13-45", "", "month must be in 1..12, expected YAML"),
     ],
@@ -652,7 +652,7 @@ def test_a_scene_without_tool_and_coordinates_is_fitted_and_says_so():
     whole = AnalyticChip(frames=2).scene()
     untouched = fit(Study(), whole)
     assert untouched.scene is whole
-    assert untouched.assumed == ()
+    assert untouched.notes.assumed == []
     fields = {name: whole.data[name].values for name in FIELD_UNITS}
     fields["material"] = np.where(fields["material"] == Material.TOOL, Material.VOID, 1)
     bare = Scene.from_fields(whole.raster, whole.times, fields)
@@ -660,7 +660,7 @@ def test_a_scene_without_tool_and_coordinates_is_fitted_and_says_so():
     assert fitted.scene.tool == ToolGeometry(rake_angle=radians(5.0))
     assert bare.tool is None
     assert [surface.follow for surface in fitted.surfaces.values()] == ["mean", "mean"]
-    assert [sentence[:23] for sentence in fitted.assumed] == [
+    assert [sentence[:23] for sentence in fitted.notes.assumed] == [
         "The scene has no tool: ",
         "The scene shows no tool",
         "The scene does not say ",
@@ -685,7 +685,7 @@ def test_where_an_emissivity_was_measured_is_said(monkeypatch):
         for surface in (TrendSurface(trend), FeatureTrends(CHIP_1, {"chip": trend})):
             found = {"heated": ReflectingSurface(surface)}
             monkeypatch.setattr("chipglow.study.fitting.surfaces_of", lambda *_, of=found: of)
-            (sentence,) = fit(Study(), scene).assumed
+            (sentence,) = fit(Study(), scene).notes.assumed
             assert sentence.startswith("The emissivity of 'heated' was measured at 377 °C")
             assert said in sentence
 

@@ -367,7 +367,7 @@ def test_warnings_of_the_emissivity_travel_to_the_temperature(tmp_path):
     stored = read_region_emissivity(tmp_path / "e.nc")["chip"]
     for emissivity in (found.of(WHOLE), stored):
         (warning,) = true_temperature([image()], WHOLE, emissivity).estimate.warnings
-        assert warning.startswith("emissivity of chip: 300 of 1200 pixels are left out")
+        assert warning.startswith("Emissivity: chip: 300 of 1200 pixels are left out")
 
 
 def test_two_temperatures_by_one_emissivity_have_its_errors_in_common():
@@ -441,8 +441,8 @@ def test_the_command_prints_what_it_found_and_assumed(folder):
     code, output = run("hot.nc", "--regions", "regions.yaml", "--emissivity", "0.42")
     assert code == 0, output
     assert "body left" in output
-    assert "Assumed: the emissivity is exact" in output
-    assert "Assumed: the object reflects 293 K exactly" in output
+    assert "Assumed: The emissivity is exact" in output
+    assert "Assumed: The object reflects 293 K exactly" in output
     code, output = run(
         "hot.nc", "--regions", "regions.yaml", "--emissivity", "0.42",
         "--emissivity-uncertainty", "0.01", "--reflected", "20 degC",
@@ -464,7 +464,7 @@ def test_an_emissivity_of_another_temperature_is_doubtful(folder):
         write_emissivity(RegionEmissivities((found,), (tuple(rows),)), folder / "e.nc")
         code, output = run("hot.nc", "--regions", "regions.yaml", "--emissivity", "e.nc")
         assert code == 0, output
-        assert "Assumed: the emissivity is the same at all temperatures" in output
+        assert "Assumed: The emissivity is the same at all temperatures" in output
         far = "°C at which its emissivity was determined"
         assert (f"K from the {reference - 273.15:.0f} {far}" in output) == doubtful, output
 
@@ -477,7 +477,7 @@ def test_the_command_takes_the_line_of_several_temperatures(folder):
         write_emissivity(RegionEmissivities(maps, tables), folder / "e.nc")
         code, output = run("hot.nc", "--regions", "regions.yaml", "--emissivity", "e.nc")
         assert code == 0, output
-        assert "Assumed: the emissivity is a straight line over the temperature" in output
+        assert "Assumed: The emissivity is a straight line over the temperature" in output
         assert "is the same at all temperatures" not in output
         assert ("K beyond the 287 °C to 387 °C" in output) == beyond, output
 

@@ -160,7 +160,10 @@ def test_a_tool_that_is_off_moves_all_squares_together():
 def test_a_rake_angle_is_doubted_beyond_its_expanded_uncertainty(turned, doubted):
     other = linear().with_tool(replace(TOOL, rake_angle=TOOL.rake_angle + radians(turned)))
     result = compare(linear(), {"other": other}, TOOL, CURVE, StatedUncertainties(1.0, tool=FOUND))
-    assert any("rake angle of other differs" in warning for warning in result.warnings) is doubted
+    assert (
+        any("rake angle of other differs" in warning for warning in result.notes.warnings)
+        is doubted
+    )
 
 
 def test_how_sure_the_best_is_knows_of_the_tool():

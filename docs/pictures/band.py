@@ -54,7 +54,7 @@ def main() -> None:
 def tell(result: Comparison) -> None:
     """Print the sentences."""
     places = (place.sentence for place in result.places)
-    for text in (*result.assumptions, *result.warnings, *places, result.statement):
+    for text in (*result.notes.assumed, *result.notes.warnings, *places, result.statement):
         print(text)
 
 

@@ -41,7 +41,7 @@ def say_found(name: str, measurement: Measurement) -> None:
         f"{name}: {degrees(found.tool.rake_angle):.1f} ± {degrees(stated.angle):.1f} "
         f"deg, face off by {1e6 * off @ true.rake_normal:.1f} ± "
         f"{1e6 * stated.across:.1f} um, tip off by {1e6 * along:.0f} ± "
-        f"{1e6 * stated.along:.0f} um; {found.warnings}"
+        f"{1e6 * stated.along:.0f} um; {found.notes.warnings}"
     )
 
 

@@ -29,7 +29,7 @@ from chipglow.scene import FILLED, Material, Raster
 
 movie = source()
 survey = movie.survey()
-print(*survey.assumed, sep="\n")
+print(*survey.notes.assumed, sep="\n")
 left, _, _, top = survey.extent
 frame = next(movie.frames(Raster(left, top, survey.spacing, 240, 250)))
 temperature = np.where(frame.material == Material.TOOL, np.nan, frame.fields["temperature"])

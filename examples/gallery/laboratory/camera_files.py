@@ -57,4 +57,4 @@ with style():
 # What the camera was set to for the object, and what had to be assumed:
 
 print(real.object_parameters)
-print(*simulated.assumptions, *real.assumptions, sep="\n")
+print(*simulated.notes.assumed, *real.notes.assumed, sep="\n")

@@ -40,5 +40,9 @@ figure = draw_comparison(result)
 # %%
 # The sentences that ``chipglow compare`` prints:
 
-for text in (*(place.sentence for place in result.places), result.statement, *result.warnings):
+for text in (
+    *(place.sentence for place in result.places),
+    result.statement,
+    *result.notes.warnings,
+):
     print(text)

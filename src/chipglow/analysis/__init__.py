@@ -2,10 +2,9 @@
 
 from chipglow.analysis.cut import lacking, spread_starts
 from chipglow.analysis.distribution import Distribution, VarianceComponent
-from chipglow.analysis.engine import HEADLINES, analyse
+from chipglow.analysis.engine import analyse
 from chipglow.analysis.error_images import (
     ErrorImages,
-    ReferenceKind,
     Unblurred,
     error_images,
     reference_temperature,
@@ -52,7 +51,6 @@ from chipglow.analysis.wavelengths import (
 
 __all__ = [
     "CASES",
-    "HEADLINES",
     "RATIO_CAUSES",
     "Analysis",
     "BandPlace",
@@ -71,7 +69,6 @@ __all__ = [
     "PointPlace",
     "RakePlace",
     "RatioErrors",
-    "ReferenceKind",
     "RegionPlace",
     "Spot",
     "Unblurred",

@@ -7,14 +7,14 @@ measured, with all effects first. Each reading is a vector of as many rows.
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf, nan
 from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.analysis.error_images import ErrorImages
 from chipglow.laboratory.chip import ShearBand
-from chipglow.scene import Line, Raster, Region, Tool, sample, straight_line
+from chipglow.scene import Line, Raster, Region, Tool, straight_line
 from chipglow.scene.lines import nearest
 from chipglow.scene.regions import Point
 
@@ -105,12 +105,6 @@ class LinePlace(Place):
         """See `Place.lines`."""
         return {self.name: self.line(pitch)}
 
-    def profile(self, errors: ErrorImages) -> Stack:
-        """Reference, error and the PSF's portion along it in K, shape (3, n); NaN off the image."""
-        points = self.line(errors.raster.spacing).points
-        images = (errors.reference, errors.case_1, errors.psf_portion)
-        return np.array([sample(image, errors.raster, points) for image in images])
-
     def read(self, images: Stack, pixels: Raster, lines: Mapping[str, Stack]) -> dict[str, Stack]:
         """See `Place.read`."""
         return _mean_and_extremes(lines[self.name])
@@ -189,8 +183,8 @@ class RakePlace(Place):
         """See `Place.read`."""
         across, contact = lines["rake"], lines["contact"]
         distance = _to_both_sides(self.half_length, self.step)
-        reference = np.nanmean(contact[0])
-        errors = np.nanmean(contact[1:] - contact[0], axis=1)
+        reference = _mean(contact[0])
+        errors = np.array([_mean(measured - contact[0]) for measured in contact[1:]])
         lowest = _lowest_near(distance, across[1] - across[0], pixels.spacing)
         return {
             "mid-contact": across[:, np.argmin(np.abs(distance))],
@@ -232,7 +226,9 @@ class BandPlace(Place):
             "ridge of strain rate": across[:, np.argmin(np.abs(distance))],
             # A camera shows no strain rate: the centre for somebody who has the image alone.
             "ridge of measured temperature": across[:, hottest],
-            "most negative beside it": across[:, np.nanargmin(across[1] - across[0])],
+            "most negative beside it": across[
+                :, _lowest_near(distance, across[1] - across[0], inf)
+            ],
         }
 
     def outline(self) -> NDArray[np.float64]:
@@ -249,6 +245,12 @@ def _lowest_near(distance: NDArray[np.float64], values: Stack, pitch: float) -> 
     """Number of the lowest value within `NEAR` pixels of where the distance is 0."""
     near = np.abs(distance) <= NEAR * pitch
     return int(np.argmin(np.where(near & np.isfinite(values), values, np.inf)))
+
+
+def _mean(values: Stack) -> float:
+    """Mean of what is known; NaN if nothing is."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else nan
 
 
 def _mean_and_extremes(values: Stack) -> dict[str, Stack]:

@@ -40,26 +40,12 @@ _NOISE_SHAPE: Final = (64, 64)
 class WavelengthPlan:
     """Which bands are compared, and what is not known of them.
 
-    Parameters
-    ----------
-    bands : tuple of Band
-        The bands, two or more; each pair of them is a ratio, that of the shorter waves first.
-    misregistration : float
-        Distance in m on the scene by which the second channel's pixels are off, in a direction that
-        is not known.
-    delay : float
-        How much later the second channel begins to integrate, in s.
-    emissivity_uncertainty : float
-        Relative standard uncertainty of the emissivity that one band needs.
-    exponent_uncertainty : float
-        Standard uncertainty of the exponent by which the emissivity goes with the wavelength: 0 for
-        a grey surface, as it is taken to be; −0.5 for a bare metal (Hagen and Rubens). It makes the
-        ratio of two emissivities the more uncertain the farther apart their bands are.
-
-    Raises
-    ------
-    ValueError
-        If a value is impossible.
+    The pixels of the second channel of a ratio are off by `misregistration` (m on the scene, in an
+    unknown direction) and exposed later by `delay` (s). `emissivity_uncertainty` is the relative
+    standard uncertainty of the emissivity that one band needs, `exponent_uncertainty` that of the
+    exponent by which the emissivity depends on the wavelength: 0 for a grey surface, −0.5 for a
+    bare metal (Hagen and Rubens). It makes the ratio of two emissivities the more uncertain the
+    farther apart their bands are.
     """
 
     bands: tuple[Band, ...]
@@ -106,23 +92,9 @@ def wavelength_errors(
 ) -> xr.Dataset:
     """Errors of one band and of ratios of two at some spots.
 
-    Parameters
-    ----------
-    scene : Scene
-        What is truly there.
-    surfaces : mapping
-        Surfaces by name.
-    camera : Camera
-        The camera, which is given every band of the plan in turn, its diffraction with it.
-    plan : WavelengthPlan
-        The bands.
-    spots : sequence of Spot
-        Where to read; those of one place are draws of it.
-    phases, textures : int
-        How often each is drawn anew: positions of the pixels along each axis, and textures of the
-        emissivity.
-    progress : callable, optional
-        Told what is being done and how much of it is done.
+    The camera is given every band of the plan in turn, its diffraction with it. Spots of one place
+    are draws of it; each is drawn for `phases` positions of the pixels along each axis and
+    `textures` of the emissivity.
 
     Returns
     -------
@@ -141,9 +113,9 @@ def wavelength_errors(
     Notes
     -----
     The pixel that holds the spot is read. Its true temperature is that at its centre in the middle
-    of the exposure, linear between the four samples around it. One band is told the emissivity of
-    just that place, the ratio that emissivities are the same. Steps are differences as those of
-    `ratio_errors`.
+    of the exposure, interpolated linearly between the four samples around it. For one band the
+    emissivity at the pixel's centre is taken as known; for a ratio the two emissivities are taken
+    as equal. Steps are differences like those of `ratio_errors`.
     """
     tell = progress or (lambda label, part: None)
     cameras = [replace(camera.in_band(band), detector=None) for band in plan.bands]

@@ -482,11 +482,12 @@ def line_values(errors: ErrorImages, state: State) -> dict[str, LineValues]:
     """Return the temperatures along both lines."""
     values = {}
     for name in LINES:
-        place = LinePlace(name, state.line(name))
-        reference, error, _ = place.profile(errors)
-        values[name] = LineValues(
-            place.line(errors.raster.spacing).distance, reference + error, reference
+        line = LinePlace(name, state.line(name)).line(errors.raster.spacing)
+        measured, reference = (
+            sample(image, errors.raster, line.points)
+            for image in (errors.measured, errors.reference)
         )
+        values[name] = LineValues(line.distance, measured, reference)
     return values
 
 

@@ -15,6 +15,7 @@ from chipglow.scene import Raster, Tool
 from chipglow.scene.notebook import ZERO_CELSIUS, frames_text, plot_image
 from chipglow.scene.scene import raster_coordinates
 from chipglow.scene.tool_attributes import stored_tool, tool_attributes
+from chipglow.text import Notes
 from chipglow.uncertainty import Estimate
 
 if TYPE_CHECKING:
@@ -145,14 +146,14 @@ class Measurement:
     def __repr__(self) -> str:
         frames = frames_text(self.times, self.raster, "pixels", self.celsius())
         tool = f"{'with' if self.tool else 'without'} tool"
-        count = len(self.warnings)
-        said = f"; {count} warning{'s' if count > 1 else ''}: see .warnings" if count else ""
+        count = len(self.notes.warnings)
+        said = f"; {count} warning{'s' if count > 1 else ''}: see .notes" if count else ""
         return f"<Measurement: {frames}; {tool}{said}>"
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Why it may not be relied on, a sentence each."""
-        return tuple(str(self.data.attrs.get("warnings", "")).splitlines())
+    def notes(self) -> Notes:
+        """Assumptions and warnings, and what the camera file states."""
+        return Notes.from_attrs(self.data.attrs)
 
     @cached_property
     def band(self) -> Band:

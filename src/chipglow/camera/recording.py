@@ -1,12 +1,13 @@
 """What a real camera's file holds, before a calibration makes a measurement of it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.radiometry import Band, ObjectParameters
+from chipglow.text import Notes
 
 Quantity: TypeAlias = Literal["counts", "radiance", "temperature"]
 QUANTITIES: Final = ("counts", "radiance", "temperature")
@@ -78,16 +79,12 @@ class Recording:
     object_parameters : ObjectParameters, optional
         What was set in the camera of the object. Temperatures were computed with them; counts do
         not depend on them.
-    notes : tuple of str
-        What else the file says, a sentence each.
     range_name : str, optional
         The measuring range that was chosen, as the maker calls it.
-    assumptions : tuple of str
-        What had to be assumed to read it, a sentence each.
-    warnings : tuple of str
-        Why the file may not be relied on, a sentence each.
     fill_factor : float, optional
         Portion of a pixel's square that takes light.
+    notes : Notes
+        Assumptions and warnings of reading the file, and what else the file states.
 
     Raises
     ------
@@ -105,11 +102,9 @@ class Recording:
     pitch: float | None = None
     conversion: PlanckConversion | None = None
     object_parameters: ObjectParameters | None = None
-    notes: tuple[str, ...] = ()
     range_name: str | None = None
-    assumptions: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
     fill_factor: float | None = None
+    notes: Notes = field(default_factory=Notes)
 
     def __post_init__(self) -> None:
         if self.signal.ndim != 3 or 0 in self.signal.shape:

@@ -14,7 +14,19 @@ from chipglow.cli.calibrate import calibrate
 from chipglow.cli.compare import compare
 from chipglow.cli.convert import convert
 from chipglow.cli.emissivity import emissivity
-from chipglow.cli.options import Force, file_option, folder_option, picture_option
+from chipglow.cli.options import (
+    Force,
+    Resume,
+    SceneFile,
+    StudyFile,
+    Yes,
+    argument,
+    file_option,
+    flag,
+    folder_option,
+    option,
+    picture_option,
+)
 from chipglow.cli.psf import psf
 from chipglow.cli.rake import rake
 from chipglow.cli.register import register
@@ -33,31 +45,21 @@ app = typer.Typer(
     add_completion=True,
     pretty_exceptions_enable=False,
 )
-cache_app = typer.Typer(help="Scenes that were computed before.", no_args_is_help=True)
+cache_app = typer.Typer(help="List or delete cached scenes.", no_args_is_help=True)
 app.add_typer(cache_app, name="cache")
 
-StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="The study, a YAML file.")]
-ResultFolder = Annotated[
-    Path, folder_option("Folder of the results; earlier results are replaced.")
-]
-Yes = Annotated[
-    bool, typer.Option("--yes", help="Do not ask before a cut of many minutes or gigabytes.")
-]
-Resume = Annotated[
-    bool, typer.Option("--resume", help="Go on with the same cut where an earlier run was ended.")
-]
+ResultFolder = Annotated[Path, folder_option("Results folder; earlier results are replaced.")]
 
 
 def main() -> None:
     """Run the command ``chipglow``."""
-    # What is imported stays: to look through it for garbage again and again takes a tenth of a
-    # short command.
+    # Imported modules stay: collecting garbage among them takes a tenth of a short command.
     gc.set_threshold(10_000)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
-            # A terminal that knows no µ or − shall show a question mark, not end the command.
+            # A terminal without µ or − shows a question mark instead of ending the command.
             stream.reconfigure(errors="replace")
-    # A job that is ended from outside tidies up as after Ctrl-C, unless nohup keeps it running.
+    # A terminated job cleans up as after Ctrl-C, unless nohup keeps it running.
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, signal.SIGTERM)
         if signal.getsignal(number) != signal.SIG_IGN:
@@ -73,11 +75,25 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _use_json(wanted: bool) -> None:
+    if wanted:
+        current().for_programs()
+
+
 @app.callback()
 def _chipglow(
     version: Annotated[
         bool,
         typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
+    ] = False,
+    json: Annotated[
+        bool,
+        typer.Option(
+            "--json",
+            callback=_use_json,
+            expose_value=False,
+            help="Print the results as one JSON object.",
+        ),
     ] = False,
 ) -> None:
     pass
@@ -86,13 +102,13 @@ def _chipglow(
 @app.command()
 def reproduce(
     quick: Annotated[
-        bool, typer.Option("--quick", help="On a coarse cell and coarse samples, in a minute.")
+        bool, flag("--quick", "Use coarse cells and samples; takes about a minute.")
     ] = False,
     steady_tool: Annotated[
         bool,
-        typer.Option(
+        flag(
             "--steady-tool",
-            help="Beside it the same with a tool that has been cutting for long; twice the time.",
+            "Also run the study with a steady-state tool temperature; doubles the run time.",
         ),
     ] = False,
     out: ResultFolder = PAPER_FOLDER,
@@ -100,7 +116,7 @@ def reproduce(
     resume: Resume = False,
     yes: Yes = False,
 ) -> None:
-    """Do the paper's study anew and set its figures beside the paper's."""
+    """Reproduce the paper's study and compare the results with the published values."""
     from chipglow.cli.results import write_results
     from chipglow.report import QUICK
     from chipglow.study import Study
@@ -113,20 +129,16 @@ def reproduce(
 
 @app.command()
 def init(
-    path: Annotated[
-        Path, typer.Argument(metavar="STUDY", help="The file to write.", writable=True)
-    ] = Path("study.yaml"),
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    path: Annotated[Path, argument("STUDY", "File to write.", writable=True)] = Path("study.yaml"),
+    force: Annotated[bool, flag("--force", "Replace an existing file.")] = False,
     of_import: Annotated[
-        bool, typer.Option("--import", help="Write the description of an import instead.")
+        bool, flag("--import", "Write the description of an import instead.")
     ] = False,
     of_measurement: Annotated[
-        bool,
-        typer.Option("--measurement", help="Write the description of a camera's file instead."),
+        bool, flag("--measurement", "Write the description of a camera file instead.")
     ] = False,
     schema: Annotated[
-        bool,
-        typer.Option("--schema", help="Write its JSON schema, for editors that check YAML."),
+        bool, flag("--schema", "Write its JSON schema, for editors that check YAML.")
     ] = False,
 ) -> None:
     """Write the paper's study as a commented YAML file."""
@@ -136,9 +148,9 @@ def init(
     from chipglow.text import json_schema
 
     if of_import and of_measurement:
-        raise ValueError("--measurement: expected only one of --import and --measurement")
+        raise ValueError("--import and --measurement cannot be combined")
     if path.exists() and not force:
-        raise FileExistsError(f"{path}: is there already, expected a new name or --force")
+        raise FileExistsError(f"{path}: already exists; choose another name or pass --force")
     with atomic_path(path) as temporary:
         if of_import:
             imported = import_description()
@@ -160,7 +172,7 @@ def run(
     resume: Resume = False,
     yes: Yes = False,
 ) -> None:
-    """Run a study: cut, look, analyse, report."""
+    """Run a study: cut, measure, analyse and report."""
     from chipglow.cli.results import write_results
     from chipglow.study import load_study
 
@@ -169,22 +181,22 @@ def run(
 
 @app.command()
 def error(
-    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a NetCDF file.")],
+    scene: SceneFile,
     study: Annotated[
         Path | None,
-        typer.Option(
-            metavar="STUDY",
-            help="Says surface, camera and places; what it leaves out is the paper's.",
+        option(
+            "STUDY",
+            "Study file defining surface, camera and places; omitted settings default to the "
+            "paper's.",
         ),
     ] = None,
     emissivity: Annotated[
-        float | None,
-        typer.Option(metavar="NUMBER", help="One emissivity, in the place of the study's surface."),
+        float | None, option("NUMBER", "Uniform emissivity, instead of the study's surface.")
     ] = None,
     out: ResultFolder = ERROR_FOLDER,
     force: Force = False,
 ) -> None:
-    """Give a camera's error on any scene: of a cut, a weld, a melt pool, a plate."""
+    """Compute the measurement error for any scene (cut, weld, melt pool, plate, ...)."""
     from chipglow.cli.results import write_errors
     from chipglow.cli.scene_error import study_of
 
@@ -194,21 +206,20 @@ def error(
 @app.command()
 def cut(
     study: StudyFile,
-    out: Annotated[Path, file_option("The scene to write, NetCDF.")],
+    out: Annotated[Path, file_option("Scene to write, NetCDF.")],
     preview: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
             writable=True,
-            help="A movie to write, .mp4 or .gif: temperature, plastic strain and strain rate of "
-            "the whole cut; with --resume, of what is still to come; of a cut that was computed "
-            "before, the part that was recorded.",
+            help="Movie to write, .mp4 or .gif: temperature, plastic strain and strain rate of the "
+            "whole cut; with --resume, of the rest; of a cached cut, of the recorded part.",
         ),
     ] = None,
     resume: Resume = False,
     yes: Yes = False,
 ) -> None:
-    """Do only the cutting simulation of a study."""
+    """Run only the cutting simulation of a study."""
     from chipglow.cli.cutting import cut_study
     from chipglow.study import load_study
 
@@ -222,28 +233,18 @@ def cut(
 def import_source(
     source: Annotated[
         Path,
-        typer.Argument(
-            metavar="SOURCE",
-            help="A mesh, grid, point cloud or movie; or a YAML file that describes an import.",
-        ),
+        argument("SOURCE", "Mesh, grid, point cloud or movie, or YAML file describing an import."),
     ],
     out: Annotated[
-        Path | None,
-        file_option("The scene to write, NetCDF; without it, only say what is there."),
+        Path | None, file_option("Scene to write, NetCDF. Omit it to only inspect the source.")
     ] = None,
     settings: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="FIELD=VALUE",
-            help="Set a field of the description, such as units.length=mm; may be repeated.",
-        ),
+        option("FIELD=VALUE", "Set a field of the import (units.length=mm). Repeatable.", "--set"),
     ] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on where an earlier import was ended.")
-    ] = False,
+    resume: Annotated[bool, flag("--resume", "Resume an interrupted import.")] = False,
 ) -> None:
-    """Make a scene of someone else's fields."""
+    """Import meshes, grids, points or movies as a scene."""
     from chipglow.cli.importing import import_fields
     from chipglow.io import load_import
 
@@ -252,29 +253,22 @@ def import_source(
 
 @app.command()
 def measure(
-    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a NetCDF file.")],
-    study: Annotated[
-        Path, typer.Option(metavar="STUDY", help="The study that says surface and camera.")
-    ],
-    out: Annotated[Path, file_option("The measurement to write, NetCDF.")],
+    scene: SceneFile,
+    study: Annotated[Path, option("STUDY", "Study file defining surface and camera.")],
+    out: Annotated[Path, file_option("Measurement to write, NetCDF.")],
     start: Annotated[
         str | None,
-        typer.Option(
-            metavar="TIME",
-            help="When the first exposure starts, such as '400 us'; by default with the scene.",
-        ),
+        option("TIME", "Start of the first exposure, e.g. '400 us'. Default: that of the scene."),
     ] = None,
     chip: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Which of the study's chips; by default the first."),
+        str | None, option("NAME", "One of the study's chips. Default: the first.")
     ] = None,
 ) -> None:
-    """Do only the camera of a study: look at a scene."""
+    """Measure a scene with a study's camera."""
     from chipglow.cli.measuring import measure_scene
     from chipglow.study import load_study
 
     measure_scene(scene, load_study(study), out, start, chip)
-    current().file(out)
 
 
 app.command()(wavelengths)
@@ -282,16 +276,13 @@ app.command()(wavelengths)
 
 @app.command()
 def show(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="A scene or a measurement, a NetCDF file.")
-    ],
+    file: Annotated[Path, argument("FILE", "Scene or measurement, a NetCDF file.")],
     at: Annotated[
-        str | None,
-        typer.Option(metavar="TIME", help="When, such as '400 us'; by default in the middle."),
+        str | None, option("TIME", "Time of the frame, e.g. '400 us'. Default: the middle.")
     ] = None,
     plot: Annotated[Path | None, picture_option("Draw the fields at that time")] = None,
 ) -> None:
-    """Show what is in a scene or a measurement: samples, times, values, where it comes from."""
+    """Show the contents of a scene or measurement: samples, times, values and provenance."""
     from chipglow.io import is_measurement
 
     if is_measurement(file):
@@ -309,46 +300,52 @@ def show(
 def open_app(
     path: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="[PATH]",
-            help="A scene or a measurement, NetCDF, or a folder of results; by default a small "
-            "scene that comes with the program.",
+        argument(
+            "[PATH]",
+            "Scene or measurement (NetCDF), or results folder. Default: a small bundled scene.",
             show_default=False,
         ),
     ] = None,
     address: Annotated[
         str,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Where to listen; another than this machine's own lets others in who have the "
-            "printed address, unencrypted.",
+        option(
+            "ADDRESS",
+            "Address to listen on. Other addresses than loopback admit anyone with the printed "
+            "URL, unencrypted.",
         ),
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(metavar="PORT", help="0 for any that is free.")] = 0,
-    browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")
-    ] = True,
+    port: Annotated[int, option("PORT", "Port; 0 for any free one.")] = 0,
+    browser: Annotated[bool, flag("--browser/--no-browser", "Open the page in a browser.")] = True,
 ) -> None:
-    """Turn the camera's knobs in a browser and see the error change; ends with Ctrl-C."""
-    from chipglow.cli.serving import serve_app
+    """Change camera settings in a browser and see the error change. Stop with Ctrl-C."""
+    import webbrowser
 
-    serve_app(path, address, port, browser)
+    from chipglow.app import serve
+
+    def announce(url: str) -> None:
+        screen = current()
+        screen.say(f"The app is at {url}\nCtrl-C ends it.", {"url": url})
+        if screen.is_for_programs:
+            screen.close()
+        if browser:
+            webbrowser.open(url)
+
+    serve(path, address, port, announce)
 
 
 @app.command()
 def materials(
     name: Annotated[
-        str | None,
-        typer.Argument(metavar="NAME", help="Show this one: a name, or your own file (.yaml)."),
+        str | None, argument("NAME", "Material to show: a name, or your own file (.yaml).")
     ] = None,
     plot: Annotated[Path | None, picture_option("Draw flow stress and heat properties")] = None,
 ) -> None:
-    """List the materials, or show the numbers of one with their sources."""
+    """List the materials, or show the properties of one with their sources."""
     from chipglow.cli.materials import list_materials, plot_material, show_material
 
     if name is None:
         if plot is not None:
-            raise ValueError("--plot: expected the name of a material to draw")
+            raise ValueError("--plot requires the name of a material")
         list_materials()
         return
     show_material(name)
@@ -358,7 +355,7 @@ def materials(
 
 @app.command()
 def doctor() -> None:
-    """Examine this machine: versions, optional parts, threads, cache, GPU, and one number."""
+    """Check the installation and run a numerical self-test."""
     from chipglow.cli.doctor import examine
 
     examine()
@@ -372,7 +369,7 @@ for command in (
 
 @cache_app.command("list")
 def list_cache() -> None:
-    """Show the cached scenes, the latest first, and their size."""
+    """List the cached scenes, the latest first, with their sizes."""
     from datetime import datetime
 
     from chipglow.study import cache_folder, cached_scenes

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable
-from typing import Annotated, Any, Final
+from typing import Any, Final
 
 import typer
 from typer.core import TyperGroup
@@ -16,27 +16,31 @@ INTERRUPTED: Final = 130
 
 
 class Boundary(TyperGroup):
-    """Commands that end in one line and an exit code, never in a traceback, if they fail.
+    """Commands that end in one line and an exit code if they fail, never in a traceback.
 
-    Each has an option ``--json``: its results as one object on stdout, if it does not fail. What a
-    command writes is checked before it begins.
+    Every command has the program's option ``--json``, and what it writes is checked before it
+    begins.
 
-    2 for what the user can put right (input, files, disk), 1 for a simulation that went wrong,
-    130 after Ctrl-C. Anything else is a defect of the program and keeps its traceback.
+    The code is 2 for what the user can put right (input, files, disk), 1 for a failed simulation
+    and 130 after Ctrl-C. Anything else is a defect of the program and keeps its traceback.
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        _complete(self)
+        _complete(self, next(option for option in self.params if option.name == "json"))
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the arguments; options may choose what the screen shows."""
+        screen.begin()
+        return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command."""
-        shown = screen.begin()
         try:
             done = super().invoke(ctx)
-            shown.close()
+            screen.current().close()
             return done
-        except BrokenPipeError:
+        except (BrokenPipeError, typer.Exit):
             raise
         except (ValueError, OSError) as error:
             raise _ended(_one_line(error), BAD_INPUT) from None
@@ -63,14 +67,14 @@ def _one_line(error: Exception) -> str:
     return " ".join(text.split())
 
 
-def _complete(group: TyperGroup) -> None:
-    """Give every command of a group the option for programs and the check of its outputs."""
+def _complete(group: TyperGroup, option: Any) -> None:
+    """Add the program's option and the check of its outputs to every command of a group."""
     for command in group.commands.values():
         if isinstance(command, TyperGroup):
-            _complete(command)
+            _complete(command, option)
         else:
             command.callback = _checked(command.callback)
-            command.params.extend(typer.main.get_command(_JSON).params)
+            command.params.append(option)
 
 
 def _checked(run: Any) -> Callable[..., Any]:
@@ -79,27 +83,3 @@ def _checked(run: Any) -> Callable[..., Any]:
         return run(**values)
 
     return checked
-
-
-_JSON: Final = typer.Typer(add_completion=False)
-"""A command that has only that option, to take it from."""
-
-
-def _chosen(wanted: bool) -> None:
-    if wanted:
-        screen.current().for_programs()
-
-
-@_JSON.command()
-def _with_json(
-    json: Annotated[
-        bool,
-        typer.Option(
-            "--json",
-            callback=_chosen,
-            expose_value=False,
-            help="Print the results as one JSON object, for programs.",
-        ),
-    ] = False,
-) -> None:
-    pass

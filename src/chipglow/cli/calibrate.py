@@ -1,12 +1,13 @@
 """The command ``chipglow calibrate``: counts of blackbodies to a calibration."""
 
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chipglow.cli.options import Settings, file_option, picture_option
+from chipglow.cli.options import Settings, argument, file_option, option, picture_option
 
 if TYPE_CHECKING:
     from chipglow.camera import CalibrationFit, FittedCalibration
@@ -25,59 +26,54 @@ class Model(StrEnum):
 def calibrate(
     points: Annotated[
         Path,
-        typer.Argument(
-            metavar="POINTS.csv",
-            help="Blackbodies: columns temperature_degC (or _K), counts (or file, a recording of "
-            "each) and, if known, their standard uncertainties count_uncertainty and "
+        argument(
+            "POINTS.csv",
+            "Blackbody points: columns temperature_degC (or _K), counts (or file, a recording of "
+            "each) and optionally the standard uncertainties count_uncertainty and "
             "temperature_uncertainty_K.",
         ),
     ],
     band: Annotated[
-        str,
-        typer.Option(
-            metavar="BAND", help="The camera's band, such as '3.8-5.1 um', or its response, a .csv."
-        ),
+        str, option("BAND", "Camera band, e.g. '3.8-5.1 um', or a .csv file of its response.")
     ],
-    model: Annotated[Model, typer.Option(help="Which form to fit.")] = Model.LINEAR,
-    out: Annotated[Path | None, file_option("The calibration to write, YAML.")] = None,
+    model: Annotated[Model, typer.Option(help="Model to fit.")] = Model.LINEAR,
+    out: Annotated[Path | None, file_option("Calibration to write, YAML.")] = None,
     plot: Annotated[Path | None, picture_option("Draw fits and residuals")] = None,
     common_uncertainty: Annotated[
         str | None,
-        typer.Option(
-            metavar="KELVINS",
-            help="Standard uncertainty of the blackbody's temperature that all points have in "
-            "common, such as '0.5 K': that of its certificate.",
+        option(
+            "KELVINS",
+            "Standard uncertainty common to all blackbody temperatures, e.g. '0.5 K' from the "
+            "certificate.",
         ),
     ] = None,
     emissivity: Annotated[
-        float | None,
-        typer.Option(metavar="NUMBER", help="Emissivity of the blackbody; 1 is assumed."),
+        float | None, option("NUMBER", "Emissivity of the blackbody. Default: 1.")
     ] = None,
     emissivity_uncertainty: Annotated[
-        float, typer.Option(metavar="NUMBER", help="Standard uncertainty of that emissivity.")
+        float, option("NUMBER", "Standard uncertainty of the emissivity.")
     ] = 0.0,
     surroundings: Annotated[
         str | None,
-        typer.Option(
-            metavar="TEMPERATURE",
-            help="What a blackbody of less than 1 reflects, such as '23 degC'; 20 degC is assumed.",
-        ),
+        option("TEMPERATURE", "Temperature that the blackbody reflects. Default: 20 degC."),
     ] = None,
     integration_time: Annotated[
-        str | None, typer.Option(metavar="TIME", help="Integration time, such as '10 us'.")
+        str | None, option("TIME", "Integration time, e.g. '10 us'.")
     ] = None,
     range_name: Annotated[
-        str | None, typer.Option("--range", metavar="NAME", help="The camera's measuring range.")
+        str | None, option("NAME", "Measuring range of the camera.", "--range")
     ] = None,
     settings: Settings = None,
 ) -> None:
-    """Fit a calibration of a camera's counts to blackbodies.
+    """Fit a calibration of camera counts to blackbody measurements.
 
-    It holds between the coldest and the hottest blackbody: what is outside is flagged later.
+    It is valid between the coldest and the hottest blackbody. Pixels outside are flagged.
     """
     from chipglow.camera import MODELS
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.laboratory.measurement import calibrate_blackbodies, write_calibration
+    from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
     from chipglow.laboratory.measurement.description import band_of
     from chipglow.quantities.option import parse
     from chipglow.quantities.units import TEMPERATURE, TEMPERATURE_DIFFERENCE, TIME
@@ -105,16 +101,11 @@ def calibrate(
         _print_fit(screen, found, name)
     if len(found.fits) > 1:
         _print_comparison(screen, found)
-    screen.assumed(found.assumptions)
-    screen.warnings(found.warnings)
-    if out is not None:
-        write_calibration(found.fits[found.preferred], out)
-        screen.file(out)
-    if plot is not None:
-        from chipglow.cli.pictures import write_picture
-        from chipglow.laboratory.measurement.calibration_figure import draw_calibrations
-
-        write_picture(draw_calibrations(found.fits), plot)
+    finish(
+        found.notes,
+        (out, partial(write_calibration, found.fits[found.preferred])),
+        (plot, figure(draw_calibrations, found.fits)),
+    )
 
 
 def _print_fit(screen: "Screen", found: "BlackbodyCalibration", name: str) -> None:
@@ -123,26 +114,16 @@ def _print_fit(screen: "Screen", found: "BlackbodyCalibration", name: str) -> No
         f"\n{name}: {calibration.description}, {calibration.lowest - 273.15:.5g} °C to "
         f"{calibration.highest - 273.15:.5g} °C"
     )
-    cells = {
-        "parameter": "{parameter}",
-        "value": "{value:.7g}",
-        "standard uncertainty": "{standard_uncertainty:.2g}",
-        "unit": "{unit}",
-    }
-    screen.table("parameters", found.parameter_frame().query("model == @name"), cells)
-    cells = {
-        "blackbody / °C": "{temperature_degC:.2f}",
-        "counts": "{counts:.6g}",
-        "residual / counts": "{residual_counts:.3g}",
-        "residual / K": "{residual_K:.3g}",
-        "u / K": "{standard_uncertainty_K:.2g}",
-    }
-    screen.table("blackbodies", found.to_frame().query("model == @name"), cells)
+    parameters = found.parameter_frame().query("model == @name")
+    columns = ["parameter", "value ± standard_uncertainty", "unit"]
+    screen.table("parameters", parameters, columns)
+    points = found.to_frame().query("model == @name")
+    screen.table("blackbodies", points, list(points.columns.drop("model")))
     screen.say(_quality(found.fits[name]), {name: _numbers(found.fits[name])})
 
 
 def _numbers(fit: "CalibrationFit[FittedCalibration]") -> dict[str, float | None]:
-    """What `_quality` says, for programs."""
+    """Return the numbers in `_quality`."""
     return {
         "rms_residual_K": _scatter(fit),
         "chi_squared": fit.chi_squared,
@@ -161,12 +142,12 @@ def _scatter(fit: "CalibrationFit[FittedCalibration]") -> float:
 def _quality(fit: "CalibrationFit[FittedCalibration]") -> str:
     text = f"Residuals: {_scatter(fit):.3g} K (root mean square)"
     if not fit.stated:
-        return f"{text}; the uncertainties are from their scatter, as none are stated."
+        return f"{text}; the uncertainties follow from the scatter, as none are stated."
     if fit.probability is None:
-        return f"{text}; as many points as parameters, which prove nothing."
+        return f"{text}; there are as many points as parameters, so the fit cannot be tested."
     return (
         f"{text}, chi² {fit.chi_squared:.3g} with {fit.degrees_of_freedom} degrees of freedom "
-        f"(probability of as much or more: {100 * fit.probability:.3g} %)."
+        f"(probability of a larger value: {100 * fit.probability:.3g} %)."
     )
 
 
@@ -177,5 +158,6 @@ def _print_comparison(screen: "Screen", found: "BlackbodyCalibration") -> None:
     screen.heading()
     screen.say(f"Information criterion (Akaike's, corrected): {criteria}.")
     screen.say(
-        f"Preferred: {found.preferred}, which has the least.", {"preferred": found.preferred}
+        f"Preferred: {found.preferred}, the model with the smallest criterion.",
+        {"preferred": found.preferred},
     )

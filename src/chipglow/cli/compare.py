@@ -1,11 +1,19 @@
 """The command ``chipglow compare``: a measurement beside simulations."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from chipglow.cli.options import Force, Settings, ToolChoice, folder_option, picture_option
+from chipglow.cli.options import (
+    Force,
+    ReferenceFrame,
+    Settings,
+    ToolChoice,
+    argument,
+    folder_option,
+    option,
+    picture_option,
+)
 
 if TYPE_CHECKING:
     from chipglow.cli.screen import Screen
@@ -13,70 +21,57 @@ if TYPE_CHECKING:
 
 
 def compare(
-    measured: Annotated[Path, typer.Argument(metavar="MEASURED", help="A measurement's file.")],
+    measured: Annotated[Path, argument("MEASURED", "Measurement file.")],
     simulated: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="SIMULATED...",
-            help="Simulated measurements, such as one for each set of emissivities; each is called "
-            "by its attribute 'surface' or its file's name.",
+        argument(
+            "SIMULATED...",
+            "Simulated measurements, e.g. one per set of emissivities, named by their attribute "
+            "'surface' or by file.",
         ),
     ],
     tool: ToolChoice = None,
     curve: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Read the shear band of all files along this curve, a CSV file whose first line "
-            "is x_um,y_um, from the cutting edge outward; by default along the ridge of each.",
+        option(
+            "FILE",
+            "Curve of the shear band in all files, a CSV file with header x_um,y_um, from the "
+            "cutting edge outward. Default: the ridge found in each file.",
         ),
     ] = None,
-    reference: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TIME",
-            help="The measured frame whose band is fully developed; by default the given curve is "
-            "its place, or the hottest and longest found band that begins near the cutting edge.",
-        ),
-    ] = None,
+    reference: ReferenceFrame = None,
     uncertainty: Annotated[
         str | None,
-        typer.Option(
-            metavar="KELVINS",
-            help="Standard uncertainty of the measured radiance temperatures, such as '10 K', for "
-            "a measurement that does not state its own.",
+        option(
+            "KELVINS",
+            "Standard uncertainty of the measured radiance temperatures, e.g. '10 K', if the "
+            "measurement does not state it.",
         ),
     ] = None,
     emissivity_uncertainty: Annotated[
         float,
-        typer.Option(
-            metavar="FRACTION",
-            help="Relative standard uncertainty of the emissivities of the simulations, of 1.",
-        ),
+        option("FRACTION", "Relative standard uncertainty of the simulated emissivities."),
     ] = 0.0,
     position: Annotated[
         str | None,
-        typer.Option(
-            metavar="LENGTH",
-            help="Standard uncertainty of positions in the measured image; by default that of the "
-            "tool, where it is found, and of a pixel, its side over the root of 12.",
+        option(
+            "LENGTH",
+            "Standard uncertainty of positions in the measured image. Default: that of a found "
+            "tool and of a pixel, its side / √12.",
         ),
     ] = None,
     out: Annotated[
         Path | None,
-        folder_option(
-            "Folder of the results: comparison.csv, summary.json, comparison.png and .svg."
-        ),
+        folder_option("Results folder: comparison.csv, summary.json, comparison.png and .svg."),
     ] = None,
     force: Force = False,
     plot: Annotated[Path | None, picture_option("Draw the comparison")] = None,
     settings: Settings = None,
 ) -> None:
-    """Lay a measurement and simulations over each other and say which fits where."""
+    """Compare a measurement with simulations and report the best fit at each place."""
     from dataclasses import replace
 
-    from chipglow.cli.assumed import say_of_measurements
-    from chipglow.cli.pictures import write_picture
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.cli.times import frame_at
     from chipglow.laboratory.chip import chosen_tool, read_curve
@@ -97,21 +92,17 @@ def compare(
     )
     screen = current()
     _print(screen, result)
-    for sentence in chosen.found:
-        screen.say(sentence)
-    say_of_measurements(whole)
-    screen.assumed((*chosen.assumptions, *result.assumptions))
-    screen.warnings((*chosen.warnings, *result.warnings))
+    screen.remarks(chosen.notes)
     screen.heading()
     for place in result.places:
         screen.say(place.sentence)
     screen.heading()
     screen.say(result.statement)
-    if out is not None:
-        _write(result, out, force)
-        screen.file(out)
-    if plot is not None:
-        write_picture(draw_comparison(result), plot)
+    finish(
+        whole.notes + chosen.notes + result.notes,
+        (out, partial(_write, result, force)),
+        (plot, figure(draw_comparison, result)),
+    )
 
 
 def _stated(
@@ -134,22 +125,13 @@ def _print(screen: "Screen", result: "Comparison") -> None:
 
     frame = result.fit_frame()
     frame["bias_expanded_K"] = COVERAGE * frame["bias_standard_uncertainty_K"]
-    frame["shown_place"] = frame["place"].mask(frame["place"].duplicated(), "")
-    screen.table(
-        "fits",
-        frame,
-        {
-            "place": "{shown_place}",
-            "simulation": "{simulation}",
-            "bias / K": "{bias_K:+.1f} ± {bias_expanded_K:.1f}",
-            "RMS / K": "{rms_K:.1f}",
-            "E_n up to 1": "{values_with_E_n_up_to_1} of {values}",
-        },
-        f"simulated less measured radiance temperature, ± expanded uncertainty (k = {COVERAGE:g})",
-    )
+    columns = ["place", "simulation", "bias_K ± bias_expanded_K", "rms_K"]
+    columns += ["values_with_E_n_up_to_1", "values"]
+    title = f"simulated minus measured radiance temperature, ± U (k = {COVERAGE:g})"
+    screen.table("fits", frame, columns, title)
 
 
-def _write(result: "Comparison", out: Path, force: bool) -> None:
+def _write(result: "Comparison", force: bool, out: Path) -> None:
     from chipglow.drawing import drawing
     from chipglow.io import atomic_folder
     from chipglow.laboratory.comparison import write_comparison

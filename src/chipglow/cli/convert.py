@@ -1,43 +1,37 @@
 """The command ``chipglow convert``: a camera's file to a measurement."""
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from chipglow.cli.options import Settings, file_option
+from chipglow.cli.options import Settings, argument, file_option
 
 if TYPE_CHECKING:
     from chipglow.camera import Recording
 
 
 def convert(
-    source: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SOURCE", help="A camera's file, or a YAML file that describes one."
-        ),
-    ],
+    source: Annotated[Path, argument("SOURCE", "Camera file, or YAML file describing one.")],
     out: Annotated[
-        Path | None,
-        file_option("The measurement to write, NetCDF; without it, only say what is there."),
+        Path | None, file_option("Measurement to write, NetCDF. Omit it to only inspect the file.")
     ] = None,
     settings: Settings = None,
 ) -> None:
-    """Make a measurement of a camera's file."""
+    """Convert a camera file to a measurement."""
+    from chipglow.cli.finish import finish
     from chipglow.cli.screen import current
     from chipglow.cli.showing_measurement import say_measurement
     from chipglow.io import is_measurement, write_measurement
     from chipglow.laboratory.measurement import load_description, load_recording, measurement_of
 
     if is_measurement(source):
-        raise ValueError(f"{source}: is a measurement already, expected a camera's file")
+        raise ValueError(f"{source}: already a measurement; expected a camera file")
     description = load_description(source, settings or ())
     recording = load_recording(description)
     screen = current()
     given = bool(settings) or source.suffix.lower() in (".yaml", ".yml")
-    screen.heading("The file, and what you said of it:" if given else "The file says:")
+    screen.heading("The file with your settings:" if given else "The file states:")
     screen.facts("file", _facts(recording))
     try:
         measurement = measurement_of(description, recording, str(source))
@@ -45,15 +39,12 @@ def convert(
         if out is not None:
             raise
         screen.heading()
-        screen.say(f"It is no measurement yet. {error}")
-        screen.assumed(recording.assumptions)
-        screen.warnings(recording.warnings)
+        screen.say(f"Settings are missing for a measurement. {error}")
+        screen.notes(recording.notes)
         return
     screen.heading("\nThe measurement:")
     say_measurement(measurement)
-    if out is not None:
-        write_measurement(measurement, out)
-        screen.file(out)
+    finish(measurement.notes, (out, partial(write_measurement, measurement)))
 
 
 def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:
@@ -82,5 +73,5 @@ def _facts(recording: "Recording") -> Iterator[tuple[str, str]]:
         yield "reflected", f"{stated.reflected - 273.15:.2f} °C"
         yield "transmittance", f"{stated.transmittance:g}"
         yield "atmosphere", f"{stated.atmosphere - 273.15:.2f} °C"
-    for note in recording.notes:
-        yield "note", note
+    for remark in recording.notes.remarks:
+        yield "note", remark

@@ -1,4 +1,4 @@
-"""The cut alone, with a movie of it if one is wanted."""
+"""The command ``chipglow cut``: the cutting simulation, and optionally a movie of it."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,26 +16,11 @@ from chipglow.study import Study, cut, is_cut, kept_progress, preview_raster
 
 
 def cut_study(study: Study, out: Path, preview: Path | None, resume: bool, agreed: bool) -> None:
-    """Cut, or find what was cut before, and write the scene.
-
-    Parameters
-    ----------
-    study : Study
-        What to cut.
-    out : Path
-        The scene's file.
-    preview : Path, optional
-        File of a movie: of the whole cut, of what is still to come of a cut that goes on, or of
-        a scene that was found.
-    resume : bool
-        Whether to go on with a cut that an earlier run left unfinished.
-    agreed : bool
-        Whether the user agreed beforehand to what it costs.
-    """
+    """Run the cut, or take it from the cache, and write the scene."""
     with atomic_path(out) as temporary, _movie(study, preview) as on_preview:
         say_where_it_starts(study, resume, agreed)
         if on_preview:
-            _say_what_it_shows(study, resume)
+            _announce_preview(study, resume)
         with progress_bars() as progress:
             copyfile(cut(study, progress, resume, on_preview), temporary)
     scene = open_scene(out)
@@ -60,12 +45,12 @@ def _movie(study: Study, path: Path | None) -> Iterator[Callable[[Frame], None] 
         yield on_preview
 
 
-def _say_what_it_shows(study: Study, resume: bool) -> None:
+def _announce_preview(study: Study, resume: bool) -> None:
     console, window = Console(stderr=True), study.cutting.window
     if is_cut(study):
         console.print(
-            f"The preview shows that scene: {window.start * 1e3:g} mm to {window.end * 1e3:g} mm "
-            "of the cut."
+            f"The preview shows the cached scene: {window.start * 1e3:g} mm to "
+            f"{window.end * 1e3:g} mm of the cut."
         )
     elif resume and kept_progress(study):
-        console.print("The preview shows what is still to come.")
+        console.print("The preview shows the rest of the cut.")

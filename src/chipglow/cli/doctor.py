@@ -1,4 +1,4 @@
-"""The command ``chipglow doctor``: what chipglow finds on this machine."""
+"""The command ``chipglow doctor``: the installation and a numerical self-test."""
 
 import os
 import platform
@@ -26,23 +26,16 @@ _TOLERANCE: Final = 1e-6
 
 
 def examine() -> None:
-    """Print versions, optional parts, threads, cache and GPU, and what is wrong.
-
-    Raises
-    ------
-    ValueError
-        If a package that every command needs is missing or too old, or if the compiled radiometry
-        differs from its equation.
-    """
+    """Print versions, optional packages, threads, cache and GPU; raise if something is wrong."""
     screen = current()
     screen.facts("machine", _machine())
     screen.heading()
     packages = _packages()
-    cells = {"package": "{package}", "here": "{installed}", "needed": "{needed}", "": "{state}"}
-    screen.table("packages", packages[packages["extra"] == ""], cells)
+    columns = ["package", "installed", "needed"]
+    screen.table("packages", packages[packages["extra"] == ""], [*columns, "state"])
     screen.heading("\nOptional parts")
     optional = packages[packages["extra"] != ""]
-    screen.table("optional", optional, {"part": "{extra}", **cells, "": "{advice}"})
+    screen.table("optional", optional, ["extra", *columns, "advice"])
     _say_differences(screen, packages)
 
 
@@ -97,7 +90,7 @@ def _compiled_folder() -> str:
 
 
 def _packages() -> pd.DataFrame:
-    """Each package that chipglow's metadata name, by the extra that needs it."""
+    """Return the packages of chipglow's metadata, by the extra that requires them."""
     rows = []
     for text in requires("chipglow") or ():
         wanted = Requirement(text)
@@ -120,7 +113,7 @@ def _packages() -> pd.DataFrame:
 
 
 def _extra_of(wanted: Requirement) -> str:
-    """The extra that a requirement belongs to; empty for what everybody needs."""
+    """Return the extra of a requirement; empty for mandatory packages."""
     marker = str(wanted.marker or "")
     return marker.partition("extra == ")[2].strip("\"'")
 
@@ -149,7 +142,7 @@ def _say_differences(screen: Screen, packages: pd.DataFrame) -> None:
 
 
 def _radiance_difference(temperature: float) -> float:
-    """Relative difference of the compiled radiance from Planck's law."""
+    """Return the relative difference of the compiled radiance from Planck's law."""
     from math import expm1
 
     from scipy.integrate import quad

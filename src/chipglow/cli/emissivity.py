@@ -1,11 +1,10 @@
 """The command ``chipglow emissivity``: emissivity from images of heated objects."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from chipglow.cli.options import Settings, file_option, picture_option
+from chipglow.cli.options import Settings, argument, file_option, option, picture_option
 
 if TYPE_CHECKING:
     from chipglow.cli.screen import Screen
@@ -13,49 +12,39 @@ if TYPE_CHECKING:
 
 
 def emissivity(
-    images: Annotated[
-        list[Path],
-        typer.Argument(metavar="IMAGE...", help="Measurements of the heated object."),
-    ],
+    images: Annotated[list[Path], argument("IMAGE...", "Measurements of the heated object.")],
     reference: Annotated[
         list[str],
-        typer.Option(
-            metavar="TEMPERATURE",
-            help="True temperature of the object, such as 391degC: once for all images, or once "
-            "for each in their order. Images at one temperature are repetitions.",
+        option(
+            "TEMPERATURE",
+            "True temperature of the object, e.g. 391degC: once for all images, or once per image. "
+            "Images at one temperature are repetitions.",
         ),
     ],
-    regions: Annotated[
-        Path, typer.Option(metavar="FILE", help="The regions of the image, a YAML file.")
-    ],
+    regions: Annotated[Path, option("FILE", "Regions of the image, a YAML file.")],
     reflected: Annotated[
-        str,
-        typer.Option(
-            metavar="TEMPERATURE", help="Temperature of the surroundings that the object reflects."
-        ),
+        str, option("TEMPERATURE", "Temperature of the surroundings that the object reflects.")
     ] = "293 K",
     reference_uncertainty: Annotated[
-        str | None,
-        typer.Option(metavar="KELVINS", help="Its standard uncertainty, such as '2 K'."),
+        str | None, option("KELVINS", "Standard uncertainty of the true temperature, e.g. '2 K'.")
     ] = None,
     reflected_uncertainty: Annotated[
-        str | None,
-        typer.Option(metavar="KELVINS", help="Standard uncertainty of the surroundings'."),
+        str | None, option("KELVINS", "Standard uncertainty of the reflected temperature.")
     ] = None,
     camera_uncertainty: Annotated[
         str | None,
-        typer.Option(
-            metavar="KELVINS",
-            help="Standard uncertainty of radiance temperatures from the camera's calibration; "
-            "by default that which the measurement states.",
+        option(
+            "KELVINS",
+            "Standard uncertainty of the radiance temperatures by the calibration. Default: as "
+            "the measurement states.",
         ),
     ] = None,
     drift: Annotated[
         float | None,
-        typer.Option(
-            metavar="NUMBER",
-            help="Relative standard uncertainty of the radiance from one recording to the next, "
-            "such as 0.01; by default what several images at one temperature show.",
+        option(
+            "NUMBER",
+            "Relative standard uncertainty of the radiance between recordings, e.g. 0.01. "
+            "Default: from several images at one temperature.",
         ),
     ] = None,
     out: Annotated[Path | None, file_option("Write maps and regions, NetCDF.")] = None,
@@ -64,10 +53,16 @@ def emissivity(
     settings: Settings = None,
 ) -> None:
     """Determine emissivity from images of an object of known temperature."""
-    from chipglow.cli.assumed import say_of_measurements
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
-    from chipglow.laboratory.emissivity import determine_emissivities, load_regions
+    from chipglow.laboratory.emissivity import (
+        determine_emissivities,
+        load_regions,
+        write_emissivity,
+    )
+    from chipglow.laboratory.emissivity.figure import draw_emissivity
     from chipglow.laboratory.measurement import load_measurement
+    from chipglow.laboratory.result_file import write_frame
 
     heatings = _heatings(
         images, reference, reflected, reference_uncertainty, reflected_uncertainty,
@@ -79,18 +74,15 @@ def emissivity(
     screen = current()
     _print_tables(screen, found)
     screen.heading()
-    say_of_measurements(*measurements)
-    screen.assumed(found.assumptions)
-    screen.warnings(found.warnings)
     _print_study(screen, found, out)
-    _write(screen, found, out, table)
-    if plot is not None:
-        from chipglow.cli.pictures import write_picture
-        from chipglow.laboratory.emissivity.figure import draw_emissivity
-
-        whole = {row.name for row in found.rows[0] if row.whole}
-        lines = [line for line in found.lines if line.name in whole]
-        write_picture(draw_emissivity(found.maps[0], named, lines), plot)
+    whole = {row.name for row in found.rows[0] if row.whole}
+    lines = [line for line in found.lines if line.name in whole]
+    finish(
+        sum((one.notes for one in measurements), found.notes),
+        (out, partial(write_emissivity, found)),
+        (table, partial(write_frame, found.to_frame())),
+        (plot, figure(draw_emissivity, found.maps[0], named, lines)),
+    )
 
 
 def _heatings(
@@ -130,33 +122,26 @@ def _heatings(
 
 
 def _print_tables(screen: "Screen", found: "RegionEmissivities") -> None:
-    from chipglow.cli.tables import part_cells
     from chipglow.laboratory.emissivity.emissivity import BUDGET
 
-    cells = {
-        "region": "{region}",
-        "pixels": "{pixels}",
-        "mean": "{mean:.4f}",
-        "sd of pixels": "{standard_deviation:u}",
-        "u": "{standard_uncertainty:u}",
-        "U 95 %": "{expanded_uncertainty:u}",
-        "k": "{coverage_factor:.2f}",
-    }
+    columns = ["region", "pixels", "mean", "standard_deviation", "standard_uncertainty"]
+    columns += ["expanded_uncertainty", "coverage_factor"]
+    parts = {"parts of u": "region"} | {cause: f"{cause}_uncertainty" for cause in BUDGET}
     for kelvins, rows in found.to_frame().groupby("reference_K", sort=False):
         screen.heading(f"\nObject at {kelvins - 273.15:.6g} °C")
-        screen.table("regions", rows, cells)
+        screen.table("regions", rows, columns)
         screen.heading()
-        screen.table(None, rows, {"parts of u": "{region}", **part_cells(BUDGET)})
+        screen.table(None, rows, parts)
     if found.lines:
         screen.heading("\nOver the temperature, with standard uncertainties")
-        cells = {
-            "region": "{region}",
-            "emissivity": "{emissivity:.4f} ± {emissivity_uncertainty:u}",
-            "at": "{temperature_degC:.6g} °C",
-            "change in 100 K": "{change_in_100_K:+.4f} ± {change_in_100_K_uncertainty:u}",
-            "sd about line": "{residual:u}",
+        over_temperature = {
+            "region": "region",
+            "emissivity": "emissivity ± emissivity_uncertainty",
+            "at / °C": "temperature_degC",
+            "change in 100 K": "change_in_100_K ± change_in_100_K_uncertainty",
+            "sd about line": "residual",
         }
-        screen.table("lines", found.line_frame(), cells)
+        screen.table("lines", found.line_frame(), over_temperature)
 
 
 def _print_study(screen: "Screen", found: "RegionEmissivities", out: Path | None) -> None:
@@ -174,17 +159,3 @@ def _print_study(screen: "Screen", found: "RegionEmissivities", out: Path | None
 def _print_yaml(screen: "Screen", head: str, text: str) -> None:
     screen.heading(f"\n{head}:\n\n{text}")
     screen.values({"study": text})
-
-
-def _write(
-    screen: "Screen", found: "RegionEmissivities", out: Path | None, table: Path | None
-) -> None:
-    from chipglow.laboratory.emissivity import write_emissivity
-    from chipglow.laboratory.result_file import write_frame
-
-    if out is not None:
-        write_emissivity(found, out)
-        screen.file(out)
-    if table is not None:
-        write_frame(found.to_frame(), table)
-        screen.file(table)

@@ -1,35 +1,24 @@
-"""Other people's fields to a scene's file, with what was found and what had to be assumed."""
+"""The command ``chipglow import``: fields of other programs to a scene."""
 
 from pathlib import Path
 
 import pandas as pd
-from rich.console import Console
 
-from chipglow.cli.progress import progress_bars
+from chipglow.cli.progress import progress_bars, say_checkpoint
 from chipglow.cli.screen import current
 from chipglow.io import ImportDescription, import_scene, prospect
 from chipglow.io.importing import Prospect, kept_import
 
 
 def import_fields(description: ImportDescription, out: Path | None, resume: bool) -> None:
-    """Say what a source holds and, if a file is named, write its scene.
-
-    Parameters
-    ----------
-    description : ImportDescription
-        What to read, and what it means.
-    out : Path, optional
-        The scene's file.
-    resume : bool
-        Whether to go on where an earlier import of the same was ended.
-    """
+    """Print the contents of a source and, if a file is named, write its scene."""
     wanted = description.build()
     looked = prospect(wanted)
     _say(looked)
     if out is None:
         return
     kept = kept_import(wanted, looked, out)
-    _say_where_it_starts(kept.progress if kept else 0.0, resume)
+    say_checkpoint("import", kept.progress if kept else 0.0, resume)
     with progress_bars() as progress:
         import_scene(
             wanted,
@@ -41,19 +30,6 @@ def import_fields(description: ImportDescription, out: Path | None, resume: bool
     current().file(out)
 
 
-def _say_where_it_starts(kept: float, resume: bool) -> None:
-    console = Console(stderr=True)
-    if kept and resume:
-        console.print(f"The import goes on at {kept:.0%}, where an earlier one was ended.")
-    elif kept:
-        console.print(
-            f"An earlier import was ended at {kept:.0%}. This one starts anew; --resume goes on "
-            "from there."
-        )
-    elif resume:
-        console.print("No earlier run left a state of this import: it starts anew.")
-
-
 def _say(looked: Prospect) -> None:
     screen, survey, raster = current(), looked.survey, looked.raster
     times = survey.times * 1e6
@@ -62,7 +38,7 @@ def _say(looked: Prospect) -> None:
         {"kind": survey.kind, "frames": times.size, "from_us": times[0], "to_us": times[-1]},
     )
     fields = pd.DataFrame(survey.found.items(), columns=["field", "from"])
-    screen.table("fields", fields, {"field": "{field}", "from": "{from}"})
+    screen.table("fields", fields)
     if survey.unused:
         screen.say(f"Not used: {', '.join(survey.unused)}", {"unused": list(survey.unused)})
     left, right, bottom, top = (round(edge * 1e6, 6) + 0.0 for edge in raster.extent)
@@ -76,6 +52,5 @@ def _say(looked: Prospect) -> None:
             "extent_um": [left, right, bottom, top],
         },
     )
-    for sentence in survey.from_file:
-        screen.say(f"From the file: {sentence}")
-    screen.assumed(looked.assumed)
+    screen.remarks(looked.notes)
+    screen.notes(looked.notes)

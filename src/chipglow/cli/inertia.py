@@ -1,22 +1,15 @@
-"""What to know of a cut, on the terminal: what its scaled mass amounts to, and its warnings."""
+"""Effects of the scaled mass of a cut, on the terminal."""
 
 from collections.abc import Iterable
 from math import isfinite
 
 from chipglow.cli.screen import current
 from chipglow.laboratory.chip import Inertia
+from chipglow.text import Notes
 
 
 def say_of_cut(inertia: Inertia | None, warnings: Iterable[str] = ()) -> None:
-    """Say on stderr what kinetic energy and momentum the scaled mass has; warn if too much.
-
-    Parameters
-    ----------
-    inertia : Inertia, optional
-        That of the cut, with a warning of its own.
-    warnings : iterable of str, optional
-        The cut's other warnings, a sentence each.
-    """
+    """Print kinetic energy and momentum of the scaled mass, and the warnings of the cut."""
     parts = _known(inertia) if inertia else {}
     if parts:
         current().aside(
@@ -24,11 +17,11 @@ def say_of_cut(inertia: Inertia | None, warnings: Iterable[str] = ()) -> None:
             {name: number for name, (_, number) in parts.items()},
         )
     own = [inertia.warning] if inertia and inertia.warning else []
-    current().warnings((*own, *warnings), aside=True)
+    current().notes(Notes(warnings=[*own, *warnings]))
 
 
 def _known(inertia: Inertia) -> dict[str, tuple[str, float]]:
-    """What is known, by its name for programs: as text, and the number."""
+    """Return the known effects by name, as text and number."""
     known = {
         "kinetic_fraction": "kinetic energy at most {:.2%} of the work",
         "force_fraction": "momentum flux {:.2%} of the mean cutting force",

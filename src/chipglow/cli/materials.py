@@ -1,25 +1,20 @@
-"""The command ``chipglow materials``: tables of materials and of their numbers."""
+"""The command ``chipglow materials``."""
 
 from pathlib import Path
 
 import pandas as pd
 
-from chipglow.cli.pictures import write_picture
+from chipglow.cli.finish import figure, finish
 from chipglow.cli.screen import current
 from chipglow.cutting import material_file, material_names
+from chipglow.text import Notes
 
 
 def list_materials() -> None:
-    """Print the library: names, sets of the flow stress, what they are."""
-    cells = {
-        "name": "{name}",
-        "kind": "{kind}",
-        "sets (the first is the default)": "{sets}",
-        "what": "{what}",
-    }
-    current().table(
-        "materials", pd.DataFrame(map(_row, material_names())), cells, unbroken=("name",)
-    )
+    """List the materials of the library."""
+    title = "The first of several sets is the default."
+    frame = pd.DataFrame(map(_row, material_names()))
+    current().table("materials", frame, title=title, unbroken=("name",))
 
 
 def _row(name: str) -> dict[str, str]:
@@ -28,12 +23,12 @@ def _row(name: str) -> dict[str, str]:
         "name": name,
         "kind": "tool" if material.tool else "workpiece",
         "sets": ", ".join(material.workpieces),
-        "what": f"{material.name}: {material.description}",
+        "description": f"{material.name}: {material.description}",
     }
 
 
 def show_material(name: str) -> None:
-    """Print all numbers of a material, with units, and their sources as numbered notes."""
+    """Print all properties of a material, with units and numbered sources."""
     material = material_file(name)
     sources = list(dict.fromkeys(number.source for number in material.properties))
     rows = [
@@ -48,15 +43,14 @@ def show_material(name: str) -> None:
     screen = current()
     screen.say(f"{material.name}: {material.description}")
     screen.heading()
-    cells = {"field": "{field}", "value": "{value}", "source": "{note}"}
-    screen.table("properties", pd.DataFrame(rows), cells)
+    screen.table("properties", pd.DataFrame(rows), ["field", "value", "note"])
     screen.heading()
     for count, source in enumerate(sources, 1):
         screen.heading(f"({count}) {source}")
 
 
 def plot_material(name: str, path: Path) -> None:
-    """Draw a material to a picture whose kind is that of the file's name."""
+    """Draw a material."""
     from chipglow.report.materials import material_figure
 
-    write_picture(material_figure(material_file(name)), path)
+    finish(Notes(), (path, figure(material_figure, material_file(name))))

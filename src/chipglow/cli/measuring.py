@@ -1,49 +1,25 @@
-"""The camera alone, from a scene's file to a measurement's."""
+"""The command ``chipglow measure``: a scene to a measurement."""
 
+from functools import partial
 from math import floor
 from pathlib import Path
 
 from chipglow.camera import Measurement
-from chipglow.cli.assumed import say_of_measurements
+from chipglow.cli.finish import finish
 from chipglow.cli.progress import progress_bars
-from chipglow.cli.screen import current
 from chipglow.cli.times import parse_instant
 from chipglow.io import open_scene, write_measurement
 from chipglow.study import Study, fit
 
 
 def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: str | None) -> None:
-    """Look at a scene with a study's camera and write the measurement.
-
-    Parameters
-    ----------
-    path : Path
-        The scene's file.
-    study : Study
-        Says surface and camera.
-    out : Path
-        The measurement's file.
-    start : str, optional
-        When the first exposure starts, in the scene's time, with its unit; frames follow at the
-        camera's rate to the end of the scene.
-    chip : str, optional
-        Name of one of the study's chips; the first by default.
-
-    A scene without material coordinates, as imports often are, is looked at with textures that move
-    by the mean velocities, as the paper's did; that is said.
-
-    Raises
-    ------
-    ValueError
-        If there is no such chip, or no exposure fits into the scene.
-    """
+    """Measure a scene with a study's camera and write the measurement."""
     fitted = fit(study, open_scene(path))
     camera = study.camera.on(fitted.scene.raster, study.seed)
     scene, surfaces = fitted.scene, fitted.surfaces
     name = next(iter(surfaces)) if chip is None else chip
     if name not in surfaces:
         raise ValueError(f"--chip: {name!r} is unknown, expected one of {', '.join(surfaces)}")
-    current().assumed(fitted.assumed)
     first = float(scene.times[0]) if start is None else parse_instant("--start", start)
     duration = camera.frame_duration(scene.raster)
     left = float(scene.times[-1]) + scene.frame_spacing - first - duration
@@ -57,5 +33,4 @@ def measure_scene(path: Path, study: Study, out: Path, start: str | None, chip: 
             raise ValueError(f"{path}: {error}") from None
         progress("measurement", 1.0)
     measurement = Measurement(measured)
-    say_of_measurements(measurement)
-    write_measurement(measurement, out)
+    finish(fitted.notes + measurement.notes, (out, partial(write_measurement, measurement)))

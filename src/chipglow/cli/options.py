@@ -11,45 +11,67 @@ from typing import Annotated, Any, TypeAlias, get_args
 
 import typer
 
+
+def argument(metavar: str, text: str, **settings: Any) -> Any:
+    """Return an argument with its placeholder and help."""
+    return typer.Argument(metavar=metavar, help=text, **settings)
+
+
+def option(metavar: str, text: str, *names: str) -> Any:
+    """Return an option with its placeholder and help, named after its parameter by default."""
+    return typer.Option(*names, metavar=metavar, help=text)
+
+
+def flag(name: str, text: str) -> Any:
+    """Return an option without a value."""
+    return typer.Option(name, help=text)
+
+
 MeasurementFile: TypeAlias = Annotated[
-    Path,
-    typer.Argument(
-        metavar="MEASUREMENT",
-        help="A measurement, a camera's file, or a YAML file that describes one.",
-    ),
+    Path, argument("MEASUREMENT", "Measurement, camera file, or YAML file describing one.")
 ]
+StudyFile: TypeAlias = Annotated[Path, argument("STUDY", "Study, a YAML file.")]
+SceneFile: TypeAlias = Annotated[Path, argument("SCENE", "Scene, a NetCDF file.")]
 Settings: TypeAlias = Annotated[
     list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="FIELD=VALUE",
-        help="Set a field of the description of a camera's file, such as 'pitch=6 um'; may be "
-        "repeated.",
+    option(
+        "FIELD=VALUE", "Set a field of the description, e.g. 'pitch=6 um'. Repeatable.", "--set"
+    ),
+]
+Yes: TypeAlias = Annotated[
+    bool, flag("--yes", "Do not ask before a cut of many minutes or gigabytes.")
+]
+Resume: TypeAlias = Annotated[bool, flag("--resume", "Resume an interrupted cut.")]
+ReferenceFrame: TypeAlias = Annotated[
+    str | None,
+    option(
+        "TIME",
+        "Measured frame with the fully developed band. Default: the place of the given curve, or "
+        "the hottest and longest band that begins near the cutting edge.",
     ),
 ]
 ToolChoice: TypeAlias = Annotated[
     str | None,
-    typer.Option(
-        metavar="FILE|found",
-        help="The tool, a YAML file with the keys of a study's cutting.tool and tip; or 'found', "
-        "to look for the rake face in the image; by default what the measurement states, as a "
-        "simulated one does.",
+    option(
+        "FILE|found",
+        "Tool, a YAML file with the keys of a study's cutting.tool and tip, or 'found' to detect "
+        "the rake face in the image. Default: the tool that the measurement states.",
     ),
 ]
 
 
 def picture_option(what: str) -> Any:
-    """Option of a picture to draw: what it shows, for the help."""
+    """Return the option of a figure to draw."""
     return _output(f"{what}, PNG, PDF or SVG.", _check_picture)
 
 
 def table_option(what: str) -> Any:
-    """Option of results to write as a table or as arrays: what they are, for the help."""
+    """Return the option of results to write as a table or as arrays."""
     return _output(f"{what}, .csv or .nc.", _check_table)
 
 
 def file_option(what: str, *endings: str) -> Any:
-    """Option of another file to write: what it is, for the help, and how its name may end."""
+    """Return the option of another file to write, with the allowed endings of its name."""
 
     def check(option: str, path: Path) -> None:
         if endings and path.suffix.lower() not in endings:
@@ -59,7 +81,7 @@ def file_option(what: str, *endings: str) -> Any:
 
 
 def folder_option(what: str) -> Any:
-    """Option of a folder of results to write: what it is, for the help."""
+    """Return the option of a results folder to write."""
     return typer.Option(metavar="DIR", help=what, file_okay=False, writable=True)
 
 
@@ -69,23 +91,7 @@ Force: TypeAlias = Annotated[
 
 
 def check_outputs(command: Callable[..., Any], values: Mapping[str, Any]) -> None:
-    """Check everything that a command writes before it does anything.
-
-    Parameters
-    ----------
-    command : callable
-        The command's function. Its options of writable paths are outputs, all others may be inputs.
-    values : mapping
-        Its arguments by name.
-
-    Raises
-    ------
-    OSError
-        As `check_output` and `check_output_folder`.
-    ValueError
-        If an output is also an input, or a folder of results holds an input that chipglow did not
-        write.
-    """
+    """Check everything that a command writes before it does anything."""
     outputs = _outputs(command)
     inputs = list(_inputs([value for name, value in values.items() if name not in outputs]))
     for name, option in outputs.items():

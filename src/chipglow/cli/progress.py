@@ -1,4 +1,4 @@
-"""Where a run starts and how far it is, on the terminal."""
+"""Where a run starts, its cost and its progress, on the terminal."""
 
 import sys
 from collections.abc import Iterator
@@ -22,63 +22,51 @@ from chipglow.study import Progress as Report, Study, expected_cost, is_cut, kep
 _ROOM: Final = 4
 
 MUCH_TIME: Final = 300.0
-"""Seconds from which on a cut is begun only if the user says so."""
+"""Expected time of a cut in s above which the user is asked first."""
 
 MUCH_DISK: Final = 2e9
-"""The same in bytes of the cache."""
+"""Expected size of the cached scene in bytes above which the user is asked first."""
 
 
 def say_where_it_starts(study: Study, resume: bool, agreed: bool) -> None:
-    """Say on stderr what earlier runs of the same cut left, what it will cost, and ask if much.
-
-    Parameters
-    ----------
-    study : Study
-        A study that cuts.
-    resume : bool
-        Whether to go on from what an earlier run left.
-    agreed : bool
-        Whether the user agreed beforehand to any cost. Without a terminal nobody is asked.
-
-    Raises
-    ------
-    typer.Exit
-        If the user does not agree.
-    """
+    """Print the state of earlier runs and the expected cost; ask before a large one."""
     console = Console(stderr=True)
-    _say_of_earlier_runs(console, study, resume)
     if is_cut(study):
+        console.print("The scene of this cut comes from the cache.")
         return
+    kept = kept_progress(study)
+    say_checkpoint("cut", kept, resume)
     cost = expected_cost(study)
-    left = 1 - kept_progress(study) if resume else 1.0
-    seconds = left * cost.seconds
+    seconds = (1 - kept if resume else 1.0) * cost.seconds
     time = f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
     console.print(
-        f"Expected: about {time}, {cost.disk / 1e9:.2g} GB of the cache, {cost.memory / 1e9:.2g} "
+        f"Expected: about {time}, {cost.disk / 1e9:.2g} GB in the cache, {cost.memory / 1e9:.2g} "
         "GB of memory."
     )
     much = seconds > MUCH_TIME or cost.disk > MUCH_DISK
     if much and not agreed and sys.stdin.isatty() and console.is_terminal:
-        typer.confirm("Go on?", default=True, abort=True, err=True)
+        typer.confirm("Continue?", default=True, abort=True, err=True)
 
 
-def _say_of_earlier_runs(console: Console, study: Study, resume: bool) -> None:
-    if is_cut(study):
-        console.print("The cut was computed before: its scene comes from the cache.")
-    elif kept := kept_progress(study):
-        console.print(
-            f"The cut goes on at {kept:.0%}, where an earlier run was ended."
-            if resume
-            else f"An earlier run was ended at {kept:.0%} of this cut. This one starts anew; "
-            "--resume goes on from there."
+def say_checkpoint(what: str, progress: float, resume: bool) -> None:
+    """Print whether an earlier run left a checkpoint, and whether it is used."""
+    if resume and progress:
+        text = f"Resuming the {what} at {progress:.0%}."
+    elif progress:
+        text = (
+            f"Starting from the beginning; an earlier run of this {what} was interrupted at "
+            f"{progress:.0%} (--resume continues it)."
         )
     elif resume:
-        console.print("No earlier run left a state of this cut: it starts anew.")
+        text = f"No checkpoint of this {what} found; starting from the beginning."
+    else:
+        return
+    Console(stderr=True).print(text)
 
 
 @contextmanager
 def progress_bars() -> Iterator[Report]:
-    """A bar on stderr for each step that is reported: what, how far, time left."""
+    """Show a progress bar on stderr for each step that is reported."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),

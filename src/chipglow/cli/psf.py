@@ -3,56 +3,46 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from chipglow.cli.options import Settings, file_option, picture_option
+from chipglow.cli.options import Settings, argument, file_option, option, picture_option
 
 if TYPE_CHECKING:
     from chipglow.cli.screen import Screen
-    from chipglow.cli.tables import Cell
     from chipglow.laboratory.psf import KnifeEdge
 
 
 def psf(
     edges: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="EDGE...", help="Images of a straight edge, best of several orientations."
-        ),
+        argument("EDGE...", "Images of a straight edge, preferably in several orientations."),
     ],
     apertures: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="A YAML file that lists images of round apertures with their diameters, which "
-            "show the tails.",
+        option(
+            "FILE",
+            "YAML file that lists images of round apertures with their diameters, to determine "
+            "the tails.",
         ),
     ] = None,
     region: Annotated[
         str | None,
-        typer.Option(
-            metavar="ROWS,COLUMNS",
-            help="Part of the images that shows only the edge, such as 10:70,20:90.",
-        ),
+        option("ROWS,COLUMNS", "Part of the images with only the edge, e.g. 10:70,20:90."),
     ] = None,
     model: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME",
-            help="What to write: gaussian, 'gaussian with tail', moffat, 'defocused disc', "
-            "'annular aperture', 'elliptical gaussian' or radial; by default the model that fits "
-            "best.",
+        option(
+            "NAME",
+            "Model to write: gaussian, 'gaussian with tail', moffat, 'defocused disc', "
+            "'annular aperture', 'elliptical gaussian' or radial. Default: the best fit.",
         ),
     ] = None,
     out: Annotated[
-        Path | None,
-        file_option("The point spread function to write, NetCDF (.nc).", ".nc"),
+        Path | None, file_option("Point spread function to write, NetCDF (.nc).", ".nc")
     ] = None,
     plot: Annotated[Path | None, picture_option("Draw edges, spread and MTF")] = None,
     settings: Settings = None,
 ) -> None:
-    """Determine a camera's point spread function and MTF from images of an edge."""
-    from chipglow.cli.pictures import write_picture
+    """Determine the point spread function and MTF of a camera from images of an edge."""
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.laboratory.measurement import load_measurement
     from chipglow.laboratory.psf import (
@@ -61,7 +51,9 @@ def psf(
         load_apertures,
         load_edge,
         psf_kernel,
+        write_psf,
     )
+    from chipglow.laboratory.psf.figure import draw_knife_edge
 
     part = None if region is None else _region(region)
     given = settings or ()
@@ -72,17 +64,12 @@ def psf(
     ]
     found = knife_edge(images, holes)
     chosen = psf_kernel(found, model)
-    screen = current()
-    _print(screen, found)
-    if out is not None:
-        from chipglow.laboratory.psf import write_psf
-
-        write_psf(found, out, chosen)
-        screen.file(out)
-    if plot is not None:
-        from chipglow.laboratory.psf.figure import draw_knife_edge
-
-        write_picture(draw_knife_edge(found), plot)
+    _print(current(), found)
+    finish(
+        found.notes,
+        (out, lambda path: write_psf(found, path, chosen)),
+        (plot, figure(draw_knife_edge, found)),
+    )
 
 
 def _region(text: str) -> tuple[slice, slice]:
@@ -102,34 +89,13 @@ def _region(text: str) -> tuple[slice, slice]:
 def _print(screen: "Screen", found: "KnifeEdge") -> None:
     from chipglow.laboratory.psf.summary import sentences
 
-    models = {
-        "model": "{model}",
-        "FWHM / um": _uncertain("fwhm_um", "fwhm_uncertainty_um"),
-        "AICc": "{aicc:+.1f}",
-        "BIC": "{bic:+.1f}",
-        "weight": "{weight:.3f}",
-        "reduced chi²": "{reduced_chi_squared:.3g}",
-    }
-    edges = {
-        "image": "{image}",
-        "normal / deg": _uncertain("normal_deg", "normal_uncertainty_deg"),
-        "FWHM / um": _uncertain("fwhm_um", "fwhm_uncertainty_um"),
-        "LSF / um": "{line_fwhm_um:.4g}",
-        "step/noise": "{step_over_noise:.3g}",
-        "MTF(Nyquist)": _uncertain("mtf_at_nyquist", "mtf_at_nyquist_uncertainty"),
-    }
+    fwhm = "fwhm_um ± fwhm_uncertainty_um"
+    models = ["model", fwhm, "aicc", "bic", "weight", "reduced_chi_squared"]
+    edges = ["image", "normal_deg ± normal_uncertainty_deg", fwhm, "line_fwhm_um"]
+    edges += ["step_over_noise", "mtf_at_nyquist ± mtf_at_nyquist_uncertainty"]
     screen.table("models", found.to_frame(), models)
     screen.heading()
     screen.table("edges", found.edge_frame(), edges)
     screen.heading()
     for sentence in sentences(found):
         screen.say(sentence)
-    screen.assumed(found.assumptions)
-    screen.warnings(found.warnings)
-
-
-def _uncertain(value: str, uncertainty: str) -> "Cell":
-    """Cell of a value with its uncertainty, by the names of their columns."""
-    from chipglow.laboratory.psf.summary import with_uncertainty
-
-    return lambda row: with_uncertainty(row[value], row[uncertainty])

@@ -1,11 +1,17 @@
 """The command ``chipglow rake``: the analysis grid on the rake face."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from chipglow.cli.options import MeasurementFile, Settings, ToolChoice, picture_option, table_option
+from chipglow.cli.options import (
+    MeasurementFile,
+    Settings,
+    ToolChoice,
+    option,
+    picture_option,
+    table_option,
+)
 
 if TYPE_CHECKING:
     from chipglow.camera import Measurement
@@ -16,25 +22,18 @@ if TYPE_CHECKING:
 def rake(
     measurement: MeasurementFile,
     tool: ToolChoice = None,
-    frame: Annotated[
-        str, typer.Option(metavar="N|all", help="Number of the frame, from 0, or all.")
-    ] = "all",
+    frame: Annotated[str, option("N|all", "Index of the frame, or all.")] = "all",
     at: Annotated[
-        str | None,
-        typer.Option(metavar="TIME", help="Only the frame nearest to this time, such as '2 ms'."),
+        str | None, option("TIME", "Use only the frame nearest to this time, e.g. '2 ms'.")
     ] = None,
-    pixels: Annotated[
-        float, typer.Option(metavar="NUMBER", help="Side of a square in pixels.")
-    ] = 3.0,
-    depth: Annotated[
-        str, typer.Option(metavar="LENGTH", help="How far into the chip the grid reaches.")
-    ] = "90 um",
+    pixels: Annotated[float, option("NUMBER", "Side of a square in pixels.")] = 3.0,
+    depth: Annotated[str, option("LENGTH", "Depth of the grid into the chip.")] = "90 um",
     position: Annotated[
         str | None,
-        typer.Option(
-            metavar="LENGTH",
-            help="Standard uncertainty of the tool's position, along and across its face; by "
-            "default that of a tool that is found, else none.",
+        option(
+            "LENGTH",
+            "Standard uncertainty of the tool's position along and across its face. Default: that "
+            "of a found tool, otherwise none.",
         ),
     ] = None,
     out: Annotated[Path | None, table_option("Write the squares of every frame")] = None,
@@ -43,9 +42,8 @@ def rake(
     ] = None,
     settings: Settings = None,
 ) -> None:
-    """Average radiance temperature in squares along the rake face, as the paper's Figure 7."""
-    from chipglow.cli.assumed import say_of_measurements
-    from chipglow.cli.pictures import write_picture
+    """Average the radiance temperature in squares along the rake face (the paper's Figure 7)."""
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.laboratory.chip import ToolUncertainty, chosen_tool, rake_grid
     from chipglow.laboratory.chip.rake_grid_figure import draw_rake_grid
@@ -64,26 +62,22 @@ def rake(
     grid = rake_grid(measured, chosen.tool, pixels, reach, frames, given or chosen.uncertainty)
     _print(screen, grid)
     screen.budget("budget", grid.frame_estimate, "Standard uncertainty of the squares' means")
-    for sentence in (*chosen.found, *grid.notes):
-        screen.say(sentence)
-    say_of_measurements(measured)
-    screen.assumed(chosen.assumptions)
-    screen.warnings((*chosen.warnings, *grid.warnings))
-    if out is not None:
-        write_result(grid, out)
-        screen.file(out)
-    if plot is not None:
-        write_picture(draw_rake_grid(measured, grid), plot)
+    screen.remarks(chosen.notes + grid.notes)
+    finish(
+        measured.notes + chosen.notes + grid.notes,
+        (out, partial(write_result, grid)),
+        (plot, figure(draw_rake_grid, measured, grid)),
+    )
 
 
 def _frames(measurement: "Measurement", frame: str, at: str | None) -> list[int] | None:
-    """Numbers of the chosen frames; None for all."""
+    """Return the indices of the chosen frames, or None for all."""
     from chipglow.cli.times import frame_at
 
     times = measurement.times
     if at is not None:
         if frame != "all":
-            raise ValueError(f"--frame: {frame!r} beside --at, expected one or the other")
+            raise ValueError("--frame and --at cannot be combined")
         return [frame_at("--at", at, times)]
     if frame == "all":
         return None
@@ -99,10 +93,9 @@ def _print(screen: "Screen", grid: "RakeGrid") -> None:
     wide = squares.pivot(index="along_um", columns="depth_um")
     depths = wide["mean_degC"].columns
     wide.columns = [f"{name}_{depths.get_loc(depth)}" for name, depth in wide.columns]
-    cells = {
-        f"{depth:.4g} µm deep": f"{{mean_degC_{n}:.1f}} ± {{standard_deviation_K_{n}:.1f}}"
+    columns = {"along / µm": "along_um"} | {
+        f"{depth:.4g} µm deep": f"mean_degC_{n} ± standard_deviation_K_{n}"
         for n, depth in enumerate(depths)
     }
-    cells = {"along / µm": "{along_um:.4g}", **cells}
     title = f"radiance temperature / °C ± standard deviation {over}"
-    screen.table("squares", wide.reset_index(), cells, title, unbroken=cells)
+    screen.table("squares", wide.reset_index(), columns, title, columns.values())

@@ -1,12 +1,13 @@
 """The command ``chipglow register``: infrared images on visible pictures."""
 
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chipglow.cli.options import Settings, file_option, picture_option
+from chipglow.cli.options import Settings, argument, file_option, option, picture_option
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class ModelName(StrEnum):
-    """What the map may be."""
+    """Types of the map."""
 
     SIMILARITY = "similarity"
     AFFINE = "affine"
@@ -34,7 +35,7 @@ class ModelName(StrEnum):
 
 
 class MethodName(StrEnum):
-    """How the map is found."""
+    """Ways to find the map."""
 
     POINTS = "points"
     DOTS = "dots"
@@ -42,77 +43,62 @@ class MethodName(StrEnum):
 
 
 def register(
-    infrared: Annotated[Path, typer.Argument(metavar="INFRARED", help="A measurement's file.")],
-    visible: Annotated[
-        Path,
-        typer.Argument(
-            metavar="VISIBLE", help="A picture, or a visible camera's file (CINE, ...)."
-        ),
-    ],
+    infrared: Annotated[Path, argument("INFRARED", "Measurement file.")],
+    visible: Annotated[Path, argument("VISIBLE", "Image, or a visible camera's file (CINE, ...).")],
     points: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Points seen in both, CSV: x_um,y_um,visible_column,visible_row, or "
-            "infrared_column,infrared_row and the same.",
+        option(
+            "FILE",
+            "Points seen in both, CSV: x_um,y_um,visible_column,visible_row, or infrared_column,"
+            "infrared_row and the same.",
         ),
     ] = None,
-    model: Annotated[ModelName, typer.Option(help="What the map may be.")] = ModelName.AFFINE,
+    model: Annotated[ModelName, typer.Option(help="Type of the map.")] = ModelName.AFFINE,
     method: Annotated[
         MethodName | None,
         typer.Option(
-            help="By default points if there are some, else mutual-information; dots are those of "
-            "a target, such as a heated plate with holes."
+            help="Default: points if given, otherwise mutual-information; dots are those of a "
+            "target, e.g. a heated plate with holes."
         ),
     ] = None,
     known: Annotated[
         Path | None,
-        typer.Option(
-            "--map",
-            metavar="FILE",
-            help="Take the map that was written by --out, of a target for instance.",
-        ),
+        option("FILE", "Use a map written by --out, e.g. of a target.", "--map"),
     ] = None,
     tool: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="The tool to draw, a YAML file with the keys of a study's cutting.tool and tip; "
-            "by default what the measurement states, if it does.",
+        option(
+            "FILE",
+            "Tool to draw, a YAML file with the keys of a study's cutting.tool and tip. Default: "
+            "the tool that the measurement states, if any.",
         ),
     ] = None,
-    frame: Annotated[int, typer.Option(metavar="N", help="Number of the infrared frame.")] = 0,
-    visible_frame: Annotated[
-        int, typer.Option(metavar="N", help="Number of the visible frame, from 0.")
-    ] = 0,
+    frame: Annotated[int, option("N", "Index of the infrared frame.")] = 0,
+    visible_frame: Annotated[int, option("N", "Index of the visible frame.")] = 0,
     align: Annotated[
         str | None,
-        typer.Option(
-            metavar="REGION",
-            help="Also find the offset of the clocks by the mean brightness of a region, such as "
-            "'-90 um, 20 um, -10 um, 120 um': left, bottom, right, top.",
+        option(
+            "REGION",
+            "Also find the clock offset from the mean brightness of a region (left, bottom, right, "
+            "top), e.g. '-90 um, 20 um, -10 um, 120 um'.",
         ),
     ] = None,
     visible_interval: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TIME", help="Time between visible frames, for files that do not say it."
-        ),
+        str | None, option("TIME", "Interval of the visible frames, if the file does not state it.")
     ] = None,
     out: Annotated[
-        Path | None, file_option("Write the map, .yaml, to be used again.", ".yaml", ".yml")
+        Path | None, file_option("Write the map for later use, .yaml.", ".yaml", ".yml")
     ] = None,
     pairs: Annotated[
         Path | None,
-        file_option("With --align, write each infrared frame's visible ones, CSV.", ".csv"),
+        file_option("With --align, write the visible frames of each infrared frame, CSV.", ".csv"),
     ] = None,
-    overlay: Annotated[Path | None, picture_option("Draw both images on each other")] = None,
-    blink: Annotated[Path | None, file_option("Show both images in turn, .gif.", ".gif")] = None,
+    overlay: Annotated[Path | None, picture_option("Draw both images overlaid")] = None,
+    blink: Annotated[Path | None, file_option("Write both images in turn, .gif.", ".gif")] = None,
     settings: Settings = None,
 ) -> None:
-    """Find where each point of an infrared image is in a visible picture."""
-    from chipglow.cli.assumed import say_of_measurements
-    from chipglow.cli.pictures import write_picture
+    """Map each point of an infrared image to a visible image."""
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.laboratory.chip import tool_of
     from chipglow.laboratory.measurement import load_measurement
@@ -131,7 +117,7 @@ def register(
     from chipglow.quantities.units import TIME
 
     if pairs is not None and align is None:
-        raise ValueError(f"--pairs: {pairs} without --align, expected both")
+        raise ValueError("--pairs requires --align")
     _check_method(method, points, known)
     interval = parse("--visible-interval", TIME, visible_interval)
     region = None if align is None else _region(align)
@@ -154,25 +140,22 @@ def register(
         _print_fit(screen, fit)
         found = fit.registration
     _say(screen, found, measured)
-    say_of_measurements(measured)
-    screen.assumed(f"{visible}: {sentence}" for sentence in seen.assumptions)
-    screen.warnings(f"{visible}: {sentence}" for sentence in seen.warnings)
+    notes = found.notes + measured.notes + seen.notes.about(str(visible))
+    aligned = []
     if region is not None:
         clocks = align_recordings(found, measured, seen, region)
         _say_clocks(screen, clocks)
-        if pairs is not None:
-            write_frame(clocks.to_frame(), pairs)
-            screen.file(pairs)
-    if out is not None:
-        write_registration(found, out)
-        screen.file(out)
+        notes += clocks.notes
+        aligned = [(pairs, partial(write_frame, clocks.to_frame()))]
     temperature = measured.radiance_temperature()[frame]
     shown = found, temperature, measured.raster, picture, outline
-    if overlay is not None:
-        write_picture(draw_registration(*shown, _marked(fit)), overlay)
-    if blink is not None:
-        write_blink(blink_pictures(*shown), blink)
-        screen.file(blink)
+    finish(
+        notes,
+        *aligned,
+        (out, partial(write_registration, found)),
+        (overlay, figure(draw_registration, *shown, _marked(fit))),
+        (blink, lambda path: write_blink(blink_pictures(*shown), path)),
+    )
 
 
 def _marked(fit: "PointFit | DotFit | ImageFit | None") -> "Points | None":
@@ -185,11 +168,11 @@ def _marked(fit: "PointFit | DotFit | ImageFit | None") -> "Points | None":
 
 def _check_method(method: MethodName | None, points: Path | None, known: Path | None) -> None:
     if known is not None and (points is not None or method is not None):
-        raise ValueError(f"--map: {known} beside --points or --method, expected one way")
+        raise ValueError("--map cannot be combined with --points or --method")
     if method == MethodName.POINTS and points is None:
-        raise ValueError("--method: points without --points, expected a file of points")
+        raise ValueError("--method points requires --points")
     if method not in (None, MethodName.POINTS) and points is not None:
-        raise ValueError(f"--method: {method} with --points, expected one or the other")
+        raise ValueError(f"--method {method} cannot be combined with --points")
 
 
 def _region(text: str) -> tuple[float, float, float, float]:
@@ -203,7 +186,7 @@ def _region(text: str) -> tuple[float, float, float, float]:
             f"'-90 um, 20 um, -10 um, 120 um' ({error})"
         ) from None
     if not (left < right and bottom < top):
-        raise ValueError(f"--align: {text!r}, expected left under right and bottom under top")
+        raise ValueError(f"--align: {text!r}: left must be less than right, bottom less than top")
     return left, bottom, right, top
 
 
@@ -216,7 +199,7 @@ def _check_times(path: Path, interval: float | None) -> None:
     from chipglow.laboratory.registration.picture_file import PICTURE_SUFFIXES
 
     if path.suffix.lower() in PICTURE_SUFFIXES and interval is None:
-        raise ValueError(f"--align: {path} states no times, expected --visible-interval")
+        raise ValueError(f"--align requires --visible-interval: {path} contains no times")
 
 
 def _by_images(
@@ -252,20 +235,11 @@ def _print_fit(screen: "Screen", fit: "PointFit | DotFit | ImageFit") -> None:
                 f"radius of {dots.radius:.1f} {name.lower()} pixels; {match} match.",
                 {f"{name.lower()}_dots": len(dots.pixels), "matching_dots": match},
             )
-    if isinstance(fit, DotFit | ImageFit):
-        screen.assumed(fit.assumptions)
 
 
 def _print_points(screen: "Screen", fit: "PointFit") -> None:
-    cells = {
-        "point": "{point}",
-        "x / um": "{x_um:.1f}",
-        "y / um": "{y_um:.1f}",
-        "column": "{visible_column:.1f}",
-        "row": "{visible_row:.1f}",
-        "off by / pixel": "{residual:.2f}",
-    }
-    screen.table("points", fit.to_frame(), cells)
+    columns = ["point", "x_um", "y_um", "visible_column", "visible_row", "residual"]
+    screen.table("points", fit.to_frame(), columns)
     screen.say(
         f"Scatter of the points: {fit.scatter:.2f} visible pixels in column and in row, with "
         f"{fit.registration.degrees_of_freedom:.0f} degrees of freedom.",
@@ -291,11 +265,9 @@ def _say(screen: "Screen", found: "Registration", measured: "Measurement") -> No
         "at most.",
         {"position_uncertainty_um": 1e6 * typical, "greatest_position_uncertainty_um": 1e6 * worst},
     )
-    screen.warnings(f"{warning}." for warning in found.warnings)
 
 
 def _say_clocks(screen: "Screen", found: "RecordingAlignment") -> None:
-    screen.assumed(found.assumptions)
     unsure = float(found.clocks.covariance[0, 0]) ** 0.5
     screen.say(
         f"Visible clock = infrared clock + {1e6 * found.clocks.offset:.2f} us, standard "
@@ -306,7 +278,6 @@ def _say_clocks(screen: "Screen", found: "RecordingAlignment") -> None:
             "correlation": found.clocks.correlation,
         },
     )
-    screen.warnings(f"{warning}." for warning in found.clocks.warnings)
     empty = sum(numbers.size == 0 for numbers in found.visible_frames)
     if empty:
         screen.say(

@@ -19,6 +19,7 @@ from chipglow.io import atomic_folder
 from chipglow.report import result_rows, write_report
 from chipglow.report.paper import CITATION, stands_beside
 from chipglow.study import Progress, Study, errors, run, study_text
+from chipglow.text import Notes
 
 
 def write_results(
@@ -101,12 +102,11 @@ def _write(
             )
             progress("report", 1.0)
     screen = current()
-    screen.assumed(assumed)
     _print_table(analysis, study)
     for remark in remarks:
         screen.say(remark)
     failures = [f"{title} failed: {reason}" for title, reason in analysis.failed.items()]
-    screen.warnings([*analysis.warnings, *failures])
+    screen.notes(Notes(assumed, [*analysis.warnings, *failures]))
     if analysis.cut is not None:
         say_of_cut(analysis.cut.forces.inertia if analysis.cut.forces else None)
     screen.missing(analysis.missing)
@@ -166,4 +166,4 @@ def _print_table(analysis: Analysis, study: Study) -> None:
     rows = result_rows(analysis, study)
     frame = pd.DataFrame([[getattr(row, name) for name in texts.values()] for row in rows])
     frame.columns = list(texts)
-    current().table("results", frame, {head: f"{{{head}}}" for head in frame.columns})
+    current().table("results", frame)

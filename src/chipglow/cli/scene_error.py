@@ -1,4 +1,4 @@
-"""The study of ``chipglow error``: a scene, and what is said beside it."""
+"""The study of ``chipglow error``."""
 
 from pathlib import Path
 
@@ -8,27 +8,12 @@ from chipglow.text import DescriptionError
 
 
 def study_of(scene: Path, study: Path | None, emissivity: float | None) -> Study:
-    """The study, or the defaults, with a scene and perhaps one emissivity.
-
-    Parameters
-    ----------
-    scene : Path
-        The scene's file.
-    study : Path, optional
-        The study's file.
-    emissivity : float, optional
-        In the place of the study's surface.
-
-    Raises
-    ------
-    DescriptionError
-        If the emissivity is not from 0 to 1.
-    """
+    """Return a study, by default the paper's, with a scene and optionally one emissivity."""
     if not scene.is_file():
-        raise DescriptionError(f"{scene}: there is no such file, expected a scene")
+        raise DescriptionError(f"{scene}: no such file")
     known = Study(scene=str(scene.resolve())) if study is None else load_study(study, scene)
     if emissivity is None:
         return known
     if not 0 <= emissivity <= 1:
-        raise DescriptionError(f"--emissivity: {emissivity:g}, expected 0 to 1")
+        raise DescriptionError(f"--emissivity must be from 0 to 1, got {emissivity:g}")
     return known.model_copy(update={"surface": UniformEmissivity(emissivity)})

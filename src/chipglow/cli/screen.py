@@ -1,11 +1,10 @@
-"""What a command prints: text and tables for people, or one JSON object for programs."""
+"""Output of a command: text and tables, or one JSON object."""
 
 import json
 import os
 import sys
 from collections.abc import Collection, Iterable, Mapping
 from contextvars import ContextVar
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -16,28 +15,31 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from chipglow.cli.tables import Cell
+    from chipglow.cli.tables import Columns
+    from chipglow.text import Notes
     from chipglow.uncertainty import Estimate
 
 _PIPE_WIDTH: Final = 200
-"""Columns of text for a pipe or a file, which has none of its own: tables keep one line a row."""
+"""Width of tables in a pipe or a file, so that each row is one line."""
 
 Facts: TypeAlias = Iterable[tuple[str, str]]
-"""Names and what they are."""
+"""Names with their texts."""
 
 
 class Screen:
-    """Where a command's results go.
+    """Output of one command.
 
-    For people they are printed as they come: tables, sentences, names of written files; what was
-    assumed goes to stderr. For programs they are kept, and printed by `close` as one JSON object.
+    Text is printed immediately: results on stdout, notes on stderr. With JSON, everything is
+    collected and printed by `close` as one object.
     """
 
     def __init__(self) -> None:
         self._kept: dict[str, Any] | None = None
 
     def for_programs(self) -> None:
-        """Print one JSON object in the place of text."""
+        """Print one JSON object instead of text."""
+        from importlib.metadata import version
+
         self._kept = {
             "chipglow": version("chipglow"),
             "tables": {},
@@ -59,30 +61,30 @@ class Screen:
         self,
         name: str | None,
         frame: "pd.DataFrame",
-        cells: Mapping[str, "Cell"],
+        columns: "Columns" = (),
         title: str | None = None,
         unbroken: Collection[str] = (),
     ) -> None:
-        """A frame of a result, as `screen_table`; for programs its columns, a record a row.
+        """Print a frame as `screen_table` formats it, or add its rows to the JSON object.
 
-        Without a name it is for people alone: what the program finds in another table.
+        A table without a name repeats another one and is omitted from the JSON object.
         """
         if self._kept is None:
-            self._print(screen_table(frame, cells, title, unbroken))
+            self._print(screen_table(frame, columns, title, unbroken))
         elif name is not None:
             records = frame.to_dict("records")
             self._kept["tables"].setdefault(name, []).extend(map(_plain, records))
 
     def budget(self, name: str, estimate: "Estimate", title: str) -> None:
-        """What makes values in K uncertain, below a title."""
-        from chipglow.cli.tables import BUDGET_CELLS, budget_frame
+        """Print the uncertainty budget of values in K below a title."""
+        from chipglow.cli.tables import budget_frame
 
         self.heading(f"\n{title}")
-        self.table(name, budget_frame(estimate), BUDGET_CELLS)
+        self.table(name, budget_frame(estimate))
         self.heading()
 
     def facts(self, name: str, rows: Facts) -> None:
-        """Names and what they are, side by side."""
+        """Print names with their texts."""
         if self._kept is not None:
             self._kept["facts"].setdefault(name, {}).update(rows)
             return
@@ -91,12 +93,12 @@ class Screen:
         self._out().print(facts_table(rows))
 
     def heading(self, text: str = "") -> None:
-        """A line for people alone: what comes next."""
+        """Print a line that the JSON object omits."""
         if self._kept is None:
             self._out().print(text, soft_wrap=True)
 
     def say(self, sentence: str, values: Mapping[str, Any] | None = None) -> None:
-        """A sentence of the result, and the numbers in it for programs."""
+        """Print a sentence of the result; the JSON object also gets its numbers."""
         if self._kept is None:
             self._out().print(sentence, soft_wrap=True)
         else:
@@ -104,45 +106,47 @@ class Screen:
             self._kept["values"].update(_plain(values or {}))
 
     def aside(self, sentence: str, values: Mapping[str, Any] | None = None) -> None:
-        """A sentence beside the result, as `say`, for people on stderr."""
+        """Print a sentence on stderr; the JSON object treats it as `say` does."""
         if self._kept is None:
             print(sentence, file=sys.stderr, flush=True)
         else:
             self.say(sentence, values)
 
     def values(self, values: Mapping[str, Any]) -> None:
-        """Numbers for programs alone, of what people read elsewhere."""
+        """Add numbers to the JSON object only."""
         if self._kept is not None:
             self._kept["values"].update(_plain(values))
 
-    def assumed(self, sentences: Iterable[str]) -> None:
-        """What had to be assumed, a sentence each, on stderr."""
-        self._remarks("assumed", "Assumed", sentences, sys.stderr)
+    def notes(self, notes: "Notes") -> None:
+        """Print assumptions and warnings on stderr."""
+        self._sentences("assumed", "Assumed", notes.assumed, sys.stderr)
+        self._sentences("warnings", "Warning", notes.warnings, sys.stderr)
 
-    def warnings(self, sentences: Iterable[str], aside: bool = False) -> None:
-        """Warnings of the results, a sentence each; aside, on stderr."""
-        self._remarks("warnings", "Warning", sentences, sys.stderr if aside else sys.stdout)
+    def remarks(self, notes: "Notes") -> None:
+        """Print the remarks among notes."""
+        for sentence in notes.remarks:
+            self.say(sentence)
 
     def missing(self, sentences: Iterable[str]) -> None:
-        """What is not among the results, and why, a sentence each."""
-        self._remarks("missing", "Missing", sentences, sys.stdout)
+        """Print which results are missing, and why."""
+        self._sentences("missing", "Missing", sentences, sys.stdout)
 
     def file(self, path: Path, what: str = "") -> None:
-        """A file that was written."""
+        """Print the name of a written file."""
         if self._kept is None:
             print(f"{what}: {path}" if what else path)
         else:
             self._kept["files"].append(str(path))
 
     def close(self) -> None:
-        """Print the object for programs, if it is for them, and once: a server does so early."""
+        """Print the JSON object, if any, once; a server does so early."""
         if self._kept is not None:
             found = json.dumps(self._kept, ensure_ascii=False, allow_nan=False, indent=1)
             print(found, flush=True)
             self._kept = None
 
     def _print(self, table: "Table") -> None:
-        """A table; where the terminal is too narrow, each row as a list of its cells."""
+        """Print a table; on a narrow terminal each row becomes a list of its cells."""
         from rich.measure import Measurement
 
         from chipglow.cli.tables import facts_table
@@ -158,7 +162,7 @@ class Screen:
             console.print()
             console.print(facts_table(zip(heads, map(str, row), strict=True)))
 
-    def _remarks(self, key: str, head: str, sentences: Iterable[str], stream: Any) -> None:
+    def _sentences(self, key: str, head: str, sentences: Iterable[str], stream: Any) -> None:
         for sentence in sentences:
             if self._kept is None:
                 print(f"{head}: {sentence}", file=stream, flush=True)
@@ -178,19 +182,19 @@ _CURRENT: ContextVar[Screen] = ContextVar("screen")
 
 
 def begin() -> Screen:
-    """A new screen, for a command that begins."""
+    """Start the output of a command."""
     screen = Screen()
     _CURRENT.set(screen)
     return screen
 
 
 def current() -> Screen:
-    """The screen of the command that runs."""
+    """Return the output of the running command."""
     return _CURRENT.get()
 
 
 def _plain(value: Any) -> Any:
-    """A value as JSON has it: what is no number is null, an array a list."""
+    """Return a value for JSON: NaN becomes null, an array a list."""
     if isinstance(value, Mapping):
         return {str(key): _plain(each) for key, each in value.items()}
     if hasattr(value, "tolist"):

@@ -1,11 +1,18 @@
 """The command ``chipglow shearband``: the temperature along the shear band."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from chipglow.cli.options import MeasurementFile, Settings, ToolChoice, picture_option, table_option
+from chipglow.cli.options import (
+    MeasurementFile,
+    ReferenceFrame,
+    Settings,
+    ToolChoice,
+    option,
+    picture_option,
+    table_option,
+)
 
 if TYPE_CHECKING:
     from chipglow.cli.screen import Screen
@@ -16,41 +23,27 @@ def shearband(
     measurement: MeasurementFile,
     curve: Annotated[
         str,
-        typer.Option(
-            metavar="FILE|found",
-            help="Where to read: a CSV file whose first line is x_um,y_um, from the cutting edge "
-            "outward; or 'found', the ridge of the radiance temperature in each frame.",
+        option(
+            "FILE|found",
+            "Curve to read along: a CSV file with header x_um,y_um, from the cutting edge outward; "
+            "or 'found', the ridge of the radiance temperature in each frame.",
         ),
     ] = "found",
     at: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="TIME",
-            help="The frame nearest to this time, such as '400 us'; may be repeated; by default "
-            "all frames.",
-        ),
+        option("TIME", "Frame nearest to this time, e.g. '400 us'. Repeatable. Default: all."),
     ] = None,
     tool: ToolChoice = None,
-    reference: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TIME",
-            help="The frame whose band is fully developed; by default the given curve is its "
-            "place, or the hottest and longest found band that begins near the cutting edge.",
-        ),
-    ] = None,
+    reference: ReferenceFrame = None,
     width: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LENGTH", help="Width across the curve of the mean; by default a pixel."
-        ),
+        str | None, option("LENGTH", "Averaging width across the curve. Default: one pixel.")
     ] = None,
     position: Annotated[
         str | None,
-        typer.Option(
-            metavar="LENGTH",
-            help="Standard uncertainty of the curve's position; by default that of a pixel, its "
-            "side over the root of 12, and that of the edge, where the tool is found.",
+        option(
+            "LENGTH",
+            "Standard uncertainty of the curve's position. Default: that of a pixel, its side / "
+            "√12, and that of the edge of a found tool.",
         ),
     ] = None,
     out: Annotated[Path | None, table_option("Write the temperatures along the band")] = None,
@@ -59,9 +52,8 @@ def shearband(
     ] = None,
     settings: Settings = None,
 ) -> None:
-    """Read the radiance temperature along the shear band, as the paper's Figure 9."""
-    from chipglow.cli.assumed import say_of_measurements
-    from chipglow.cli.pictures import write_picture
+    """Read the radiance temperature along the shear band (the paper's Figure 9)."""
+    from chipglow.cli.finish import figure, finish
     from chipglow.cli.screen import current
     from chipglow.cli.times import frame_at
     from chipglow.laboratory.chip import band_profile, chosen_tool, read_curve
@@ -87,32 +79,18 @@ def shearband(
     screen = current()
     _print(screen, profile)
     screen.budget("budget", profile.estimate, "Standard uncertainty of the points along the band")
-    for sentence in chosen.found:
-        screen.say(sentence)
-    say_of_measurements(measured)
-    screen.assumed((*chosen.assumptions, *profile.assumptions))
-    screen.warnings((*chosen.warnings, *profile.warnings))
-    if out is not None:
-        write_result(profile, out)
-        screen.file(out)
-    if plot is not None:
-        write_picture(draw_band_profile(measured, chosen.tool, profile), plot)
+    screen.remarks(chosen.notes)
+    finish(
+        measured.notes + chosen.notes + profile.notes,
+        (out, partial(write_result, profile)),
+        (plot, figure(draw_band_profile, measured, chosen.tool, profile)),
+    )
 
 
 def _print(screen: "Screen", profile: "BandProfile") -> None:
     screen.table(
         "stages",
         profile.stage_frame(),
-        {
-            "at / µs": "{time_us:.7g}",
-            "stage": "{stage}",
-            "offset / µm": "{offset_um:+.1f}",
-            "from / µm": "{from_um:.0f}",
-            "to / µm": "{to_um:.0f}",
-            "mean / °C": "{mean_degC:.1f}",
-            "most / °C": "{greatest_degC:.1f}",
-            "u / K": "{standard_uncertainty_K:.1f}",
-        },
-        f"radiance temperature along the band, over a width of {1e6 * profile.width:.4g} µm",
+        title=f"radiance temperature along the band, over a width of {1e6 * profile.width:.4g} µm",
         unbroken=("stage",),
     )

@@ -1,4 +1,4 @@
-"""The command ``chipglow show``: what is in a scene, as text and as a picture."""
+"""The command ``chipglow show`` for scenes."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -10,16 +10,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from chipglow.cli.pictures import write_picture
+from chipglow.cli.finish import figure, finish
 from chipglow.cli.screen import current
-from chipglow.cli.tables import Cell
 from chipglow.cli.times import parse_instant
 from chipglow.drawing.frames import shown_frame
 from chipglow.io import StoredScene, is_scene, open_scene
 from chipglow.io.measurement_file import holds
-from chipglow.quantities.format import rounded_text
 from chipglow.report import SceneSummary, draw_scene, scene_summary
 from chipglow.scene import ENERGY_UNITS, Raster, Scene, Tool, ToolGeometry
+from chipglow.text import Notes
 
 _LONGEST: Final = 800
 _MOST_NUMBERS: Final = 8
@@ -28,17 +27,7 @@ _Rows: TypeAlias = Iterator[tuple[str, str]]
 
 
 def show_scene(path: Path, at: str | None, plot: Path | None) -> None:
-    """Print what is in a scene, and draw it if a picture is wanted.
-
-    Parameters
-    ----------
-    path : Path
-        The scene's file.
-    at : str, optional
-        Time of the frame to look at, with its unit; the middle one by default.
-    plot : Path, optional
-        The picture to write, .png, .pdf or .svg.
-    """
+    """Print the contents of a scene and optionally draw it."""
     scene = open_scene(path)
     time = None if at is None else _time_in(scene, at)
     summary = scene_summary(scene, time)
@@ -51,27 +40,20 @@ def show_scene(path: Path, at: str | None, plot: Path | None) -> None:
     screen.values(raster_values(summary.raster, summary.times))
     screen.values({"at_us": 1e6 * summary.times[summary.index]})
     show_attributes(_other_attributes(scene))
-    if plot is not None:
-        write_picture(draw_scene(scene, time), plot)
+    finish(Notes(), (plot, figure(draw_scene, scene, time)))
     scene.data.close()
 
 
 def check_shown(path: Path) -> None:
-    """Refuse files of other kinds than those that can be shown.
-
-    Raises
-    ------
-    ValueError
-        If it is no scene, nor like one.
-    """
+    """Raise an error if a file is neither a scene nor similar to one."""
     if path.is_file() and not holds(path, ()):
         raise ValueError(
-            f"{path}: is no NetCDF-4 file, or cut short, expected a scene or a measurement "
-            "(chipglow convert looks into a camera's file)"
+            f"{path}: not a NetCDF-4 file, or truncated; expected a scene or measurement "
+            "(chipglow convert inspects camera files)"
         )
     if path.is_file() and not is_scene(path):
         raise ValueError(
-            f"{path}: has neither temperature nor radiance, expected a scene or a measurement"
+            f"{path}: contains neither temperature nor radiance; expected a scene or measurement"
         )
 
 
@@ -99,7 +81,7 @@ def _facts(scene: StoredScene, summary: SceneSummary, path: Path) -> _Rows:
 
 
 def where_and_when(name: str, raster: Raster, times: NDArray[np.float64]) -> _Rows:
-    """Where samples or pixels are, and when the frames."""
+    """Describe the positions of samples or pixels, and the times of the frames."""
     left, right, bottom, top = (f"{1e6 * edge:.6g} µm" for edge in raster.extent)
     yield name, f"{raster.columns} x {raster.rows} of {1e6 * raster.spacing:.6g} µm"
     yield "x", f"{left} to {right}"
@@ -110,7 +92,7 @@ def where_and_when(name: str, raster: Raster, times: NDArray[np.float64]) -> _Ro
 
 
 def _interval_text(steps: NDArray[np.float64]) -> str:
-    """Time between frames, or between which times it is."""
+    """Return the interval of the frames, or its range."""
     least, mean, greatest = (float(f(steps)) for f in (np.min, np.mean, np.max))
     if greatest - least < 1e-3 * mean:
         return microseconds(mean)
@@ -142,7 +124,7 @@ def _state(summary: SceneSummary) -> _Rows:
 
 
 def raster_values(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:
-    """`where_and_when` in numbers, for programs."""
+    """Return the numbers of `where_and_when`."""
     return {
         "rows": raster.rows,
         "columns": raster.columns,
@@ -154,12 +136,8 @@ def raster_values(raster: Raster, times: NDArray[np.float64]) -> dict[str, Any]:
 
 def _show_fields(summary: SceneSummary) -> None:
     everywhere = f"in {len(summary.sampled)} frames"
-    heads = {"least": "least", "median": "median", "greatest": "greatest", everywhere: "overall"}
-    cells: dict[str, Cell] = {
-        "over the material": "{field}",
-        "unit": "{unit}",
-        **{head: _number_cell(column) for head, column in heads.items()},
-    }
+    columns = {name: name for name in ("field", "unit", "least", "median", "greatest")}
+    columns[everywhere] = "overall"
     frame = pd.DataFrame(
         {
             "field": field.field.title,
@@ -169,20 +147,11 @@ def _show_fields(summary: SceneSummary) -> None:
         }
         for field in summary.fields
     )
-    current().table("fields", frame, cells, unbroken=("over the material",))
-
-
-def _number_cell(column: str) -> Cell:
-    def text(row: Mapping[str, Any]) -> str:
-        value = row[column]
-        numbers = value if isinstance(value, tuple) else (value,)
-        return " to ".join(rounded_text(one) for one in numbers if one == one) or "–"
-
-    return text
+    current().table("fields", frame, columns, "Over the material", unbroken=("field",))
 
 
 def show_attributes(attributes: Mapping[str, Any]) -> None:
-    """Attributes of a file, if there are some, below a heading; for programs as they are."""
+    """Print the attributes of a file, if any, below a heading."""
     if not attributes:
         return
     screen = current()
@@ -192,19 +161,19 @@ def show_attributes(attributes: Mapping[str, Any]) -> None:
 
 
 def _other_attributes(scene: Scene) -> dict[str, Any]:
-    """All that the file says of itself but the tool, which is shown above."""
+    """Return the attributes of a scene without those of the tool."""
     attributes = scene.data.attrs.items()
     return {str(name): value for name, value in attributes if not str(name).startswith("tool_")}
 
 
 def attribute_rows(attributes: Mapping[str, Any]) -> _Rows:
-    """Attributes of a file as text that is not too long."""
+    """Return attributes as texts of limited length."""
     for name, value in attributes.items():
         yield name, _shortened(_attribute_text(value))
 
 
 def _attribute_text(value: Any) -> str:
-    """An attribute as text; one that holds JSON, by its keys."""
+    """Return an attribute as text; JSON is flattened by its keys."""
     if not isinstance(value, str):
         return str(value)
     try:
@@ -229,5 +198,5 @@ def _shortened(text: str) -> str:
 
 
 def microseconds(time: float) -> str:
-    """A time in s as text."""
+    """Return a time in s as text in µs."""
     return f"{time * 1e6:.7g} µs"

@@ -1,4 +1,4 @@
-"""What is in a measurement, as text and as a picture."""
+"""The command ``chipglow show`` for measurements."""
 
 from collections.abc import Iterator
 from math import degrees
@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 
 from chipglow.camera import Flag, Measurement
-from chipglow.cli.assumed import say_of_measurements
-from chipglow.cli.pictures import write_picture
+from chipglow.cli.finish import figure, finish
 from chipglow.cli.screen import current
 from chipglow.cli.showing import microseconds, raster_values, show_attributes, where_and_when
 from chipglow.cli.times import parse_instant
@@ -32,39 +31,15 @@ _IN_FACTS: Final = ("integration_time", "lower_limit", "netd", "netd_temperature
 
 
 def show_measurement(path: Path, at: str | None, plot: Path | None) -> None:
-    """Print what is in a measurement, and draw it if a picture is wanted.
-
-    Parameters
-    ----------
-    path : Path
-        The measurement's file.
-    at : str, optional
-        Time of the frame to look at, with its unit; the middle one by default.
-    plot : Path, optional
-        The picture to write, .png, .pdf or .svg.
-    """
+    """Print the contents of a measurement and optionally draw it."""
     measurement = read_measurement(path)
     time = None if at is None else parse_instant("--at", at)
     say_measurement(measurement, time)
-    if plot is not None:
-        write_picture(draw_measurement(measurement, time), plot)
+    finish(measurement.notes, (plot, figure(draw_measurement, measurement, time)))
 
 
 def say_measurement(measurement: Measurement, time: float | None = None) -> None:
-    """Print what is in a measurement.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        Any measurement.
-    time : float, optional
-        Time in s of the frame whose temperatures are printed; the middle one by default.
-
-    Raises
-    ------
-    ValueError
-        If the time is not in the measurement.
-    """
+    """Print the contents of a measurement."""
     try:
         summary = measurement_summary(measurement, time)
     except ValueError as error:
@@ -78,7 +53,6 @@ def say_measurement(measurement: Measurement, time: float | None = None) -> None
         if not str(name).startswith(_SAID_APART) and name not in _IN_FACTS
     }
     show_attributes(attributes)
-    say_of_measurements(measurement)
 
 
 def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tuple[str, str]]:
@@ -113,7 +87,7 @@ def _facts(measurement: Measurement, summary: MeasurementSummary) -> Iterator[tu
 
 
 def _response_text(band: Band) -> str:
-    """A response curve in words."""
+    """Describe a response curve."""
     wavelengths = 1e6 * band.wavelengths
     values = np.asarray(band.response(band.wavelengths) if band.response else 1.0)
     mean, peak = np.average(wavelengths, weights=values), wavelengths[values.argmax()]

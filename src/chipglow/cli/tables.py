@@ -1,7 +1,6 @@
 """Results as tables on the terminal."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from string import Formatter
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 if TYPE_CHECKING:
@@ -10,79 +9,62 @@ if TYPE_CHECKING:
 
     from chipglow.uncertainty import Estimate
 
-Cell: TypeAlias = str | Callable[[Mapping[str, Any]], str]
-"""A template of a frame's columns such as ``{mean_degC:.1f}``, or what makes a text of a row."""
+Columns: TypeAlias = Sequence[str] | Mapping[str, str]
+"""Names of a frame's columns, or headings with the names; ``value ± uncertainty`` names two."""
+
+_UNITS: Final = {"degC": "°C", "K": "K", "um": "µm", "us": "µs", "deg": "°"}
+"""Units by the endings of the names of columns."""
+
+_SHORT: Final = {
+    "standard uncertainty": "u",
+    "expanded uncertainty": "U 95 %",
+    "coverage factor": "k",
+    "standard deviation": "sd",
+    "fwhm": "FWHM",
+    "rms": "RMS",
+    "mtf": "MTF",
+    "aicc": "AICc",
+    "bic": "BIC",
+    "chi squared": "chi²",
+}
+_PLUS_MINUS: Final = " ± "
+_SPREADS: Final = ("uncertainty", "deviation")
 
 
 def screen_table(
     frame: "pd.DataFrame",
-    cells: Mapping[str, Cell],
+    columns: Columns = (),
     title: str | None = None,
     unbroken: Collection[str] = (),
 ) -> "Table":
-    """A frame of a result as a table.
+    """Return a frame as a table; heading, unit and digits follow from a column's name.
 
-    Parameters
-    ----------
-    frame : DataFrame
-        A row for each line.
-    cells : mapping
-        By the heads of the columns what stands in them. A template's format is Python's, or ``u``
-        for two digits that count. Where there is no number a dash stands, and nothing after ±.
-    title : str, optional
-        Above the table.
-    unbroken : collection of str
-        Heads of columns that a narrow terminal must not break. It breaks no number.
+    A narrow terminal breaks no number and no column named in `unbroken`.
     """
     from rich.table import Table
 
-    rows = [[_text(cell, row) for cell in cells.values()] for row in frame.to_dict("records")]
+    columns = columns or list(frame.columns)
+    named = columns if isinstance(columns, Mapping) else {_heading(one): one for one in columns}
     table = Table(box=None, title=title, title_justify="left")
-    for number, (head, cell) in enumerate(cells.items()):
-        is_number = callable(cell) or ":" in cell
+    rows, cells = frame.to_dict("records"), []
+    for heading, column in named.items():
+        texts = [_text(column, row) for row in rows]
+        is_number = not all(isinstance(row[column.partition(_PLUS_MINUS)[0]], str) for row in rows)
         table.add_column(
-            head,
+            heading,
             justify="right" if is_number else "left",
-            no_wrap=head in unbroken,
+            no_wrap=column in unbroken,
             overflow="fold",
-            min_width=max((len(row[number]) for row in rows), default=0) if is_number else None,
+            min_width=max(map(len, texts), default=0) if is_number else None,
         )
-    for row in rows:
-        table.add_row(*row)
+        cells.append(texts)
+    for line in zip(*cells, strict=True):
+        table.add_row(*line)
     return table
 
 
-def budget_frame(estimate: "Estimate") -> "pd.DataFrame":
-    """What makes values in K uncertain: over all values, root mean square and the greatest.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        The values; NaN where there is none.
-    """
-    import numpy as np
-    import pandas as pd
-
-    known = np.isfinite(estimate.values)
-    parts = {name: estimate.contribution(name)[known] for name in estimate.names}
-    if estimate.components:
-        parts["u"] = estimate.standard_uncertainty[known]
-    rows = [
-        {"part": name, "rms_K": np.sqrt((kelvins**2).mean()), "greatest_K": kelvins.max()}
-        for name, kelvins in parts.items()
-    ]
-    return pd.DataFrame(rows)
-
-
-BUDGET_CELLS: Final[Mapping[str, Cell]] = {
-    "parts of u / K": "{part}",
-    "root mean square": "{rms_K:u}",
-    "greatest": "{greatest_K:u}",
-}
-
-
 def facts_table(rows: Iterable[tuple[str, str]]) -> "Table":
-    """Names and what they are, side by side, without what could steer the terminal."""
+    """Return names and texts side by side, without characters that control a terminal."""
     from rich.table import Table
 
     table = Table(box=None, show_header=False)
@@ -93,23 +75,51 @@ def facts_table(rows: Iterable[tuple[str, str]]) -> "Table":
     return table
 
 
-def part_cells(causes: Sequence[str]) -> dict[str, str]:
-    """Cells of the parts of an uncertainty, which a frame has as ``…_uncertainty``."""
-    return {cause: f"{{{cause}_uncertainty:u}}" for cause in causes}
+def budget_frame(estimate: "Estimate") -> "pd.DataFrame":
+    """Return the parts of the uncertainty of values in K: root mean square and maximum."""
+    import numpy as np
+    import pandas as pd
+
+    known = np.isfinite(estimate.values)
+    parts = {name: estimate.contribution(name)[known] for name in estimate.names}
+    if estimate.components:
+        parts["u"] = estimate.standard_uncertainty[known]
+    return pd.DataFrame(
+        {
+            "part": name,
+            "rms_uncertainty_K": np.sqrt((kelvins**2).mean()),
+            "greatest_uncertainty_K": kelvins.max(),
+        }
+        for name, kelvins in parts.items()
+    )
 
 
-class _Template(Formatter):
-    def format_field(self, value: Any, format_spec: str) -> str:
-        if value != value:
-            return "–"
-        if format_spec != "u":
-            return str(super().format_field(value, format_spec))
+def _heading(column: str) -> str:
+    """Return the heading of a column, with its unit."""
+    name = column.partition(_PLUS_MINUS)[0]
+    stem, _, unit = name.rpartition("_")
+    text = (stem if unit in _UNITS else name).replace("_", " ")
+    for long, short in _SHORT.items():
+        text = text.replace(long, short)
+    return f"{text} / {_UNITS[unit]}" if unit in _UNITS else text
+
+
+def _text(column: str, row: Mapping[str, Any]) -> str:
+    from chipglow.quantities import quantity_text, rounded_text, uncertain_text
+
+    name, _, uncertainty = column.partition(_PLUS_MINUS)
+    value = row[name]
+    if isinstance(value, tuple):
+        return " to ".join(map(rounded_text, value)) or "–"
+    if not isinstance(value, float):
+        return str(value)
+    if value != value:
+        return "–"
+    if uncertainty:
+        return uncertain_text(value, row[uncertainty])
+    if any(spread in name for spread in _SPREADS):
         return f"{value:.0f}" if value >= 100 else f"{value:#.2g}".removesuffix(".")
-
-
-def _text(cell: Cell, row: Mapping[str, Any]) -> str:
-    text = cell(row) if callable(cell) else _Template().vformat(cell, (), row)
-    return text.replace(" ± –", "")
+    return quantity_text(value, "", 1) if name.endswith("degC") else rounded_text(value)
 
 
 def _printable(text: str) -> str:

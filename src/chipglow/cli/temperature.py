@@ -1,11 +1,10 @@
 """The command ``chipglow temperature``: true temperature of regions of known emissivity."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from chipglow.cli.options import Settings, file_option
+from chipglow.cli.options import Settings, argument, file_option, option
 
 if TYPE_CHECKING:
     from chipglow.cli.screen import Screen
@@ -20,57 +19,53 @@ if TYPE_CHECKING:
 
 def temperature(
     images: Annotated[
-        list[Path],
-        typer.Argument(metavar="IMAGE...", help="Measurements of the object; repetitions."),
+        list[Path], argument("IMAGE...", "Measurements of the object, taken as repetitions.")
     ],
-    regions: Annotated[
-        Path, typer.Option(metavar="FILE", help="The regions of the image, a YAML file.")
-    ],
+    regions: Annotated[Path, option("FILE", "Regions of the image, a YAML file.")],
     emissivity: Annotated[
         str,
-        typer.Option(
-            metavar="FILE|NUMBER",
-            help="What chipglow emissivity wrote of regions of the same names, NetCDF, of several "
-            "true temperatures the line over them; or one emissivity of all, such as 0.42.",
+        option(
+            "FILE|NUMBER",
+            "Output of chipglow emissivity for regions of the same names (NetCDF), or one "
+            "emissivity for all, e.g. 0.42.",
         ),
     ],
     emissivity_uncertainty: Annotated[
-        float | None,
-        typer.Option(metavar="NUMBER", help="Its standard uncertainty, if it is a number."),
+        float | None, option("NUMBER", "Standard uncertainty of an emissivity given as number.")
     ] = None,
     calibration: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="The camera's calibration, YAML: says how far its errors are the same in the "
-            "emissivity and here.",
+        option(
+            "FILE",
+            "Calibration of the camera, YAML. It states how its errors in the emissivity and in "
+            "these images are correlated.",
         ),
     ] = None,
     reflected: Annotated[
         str | None,
-        typer.Option(
-            metavar="TEMPERATURE",
-            help="Temperature of the surroundings that the object reflects; by default those in "
-            "which the emissivity was determined, with the same error, or 293 K.",
+        option(
+            "TEMPERATURE",
+            "Temperature of the surroundings that the object reflects. Default: as in the "
+            "determination of the emissivity, with the same error, or 293 K.",
         ),
     ] = None,
     reflected_uncertainty: Annotated[
         str | None,
-        typer.Option(metavar="KELVINS", help="Its standard uncertainty, such as '2 K'."),
+        option("KELVINS", "Standard uncertainty of the reflected temperature, e.g. '2 K'."),
     ] = None,
     drift: Annotated[
         float | None,
-        typer.Option(
-            metavar="NUMBER",
-            help="Relative standard uncertainty of the radiance from one recording to the next, "
-            "such as 0.01; by default what several images show.",
+        option(
+            "NUMBER",
+            "Relative standard uncertainty of the radiance between recordings, e.g. 0.01. "
+            "Default: from several images.",
         ),
     ] = None,
     table: Annotated[Path | None, file_option("Write the table of regions, CSV.")] = None,
     settings: Settings = None,
 ) -> None:
-    """Determine the true temperature of regions whose emissivity is known."""
-    from chipglow.cli.assumed import say_of_measurements
+    """Determine the true temperature of regions of known emissivity."""
+    from chipglow.cli.finish import finish
     from chipglow.cli.screen import current
     from chipglow.laboratory.emissivity import load_regions, true_temperatures
     from chipglow.laboratory.measurement import load_calibration, load_measurement
@@ -83,14 +78,9 @@ def temperature(
     given = _emissivities(emissivity, emissivity_uncertainty)
     names = list(map(str, images))
     found = true_temperatures(measurements, named, given, surroundings, known, drift, names)
-    screen = current()
-    _print(screen, found)
-    say_of_measurements(*measurements)
-    screen.assumed(found.assumptions)
-    screen.warnings(found.warnings)
-    if table is not None:
-        write_frame(found.to_frame(), table)
-        screen.file(table)
+    _print(current(), found)
+    notes = sum((one.notes for one in measurements), found.notes)
+    finish(notes, (table, partial(write_frame, found.to_frame())))
 
 
 def _emissivities(
@@ -125,23 +115,21 @@ def _surroundings(reflected: str | None, uncertainty: str | None) -> "ReflectedT
 
 
 def _print(screen: "Screen", found: "RegionTemperatures") -> None:
-    from chipglow.cli.tables import part_cells
     from chipglow.laboratory.emissivity.temperature import TEMPERATURE_BUDGET
 
     rows = found.to_frame()
     for name in ("radiance_temperature", "true_temperature"):
         rows[f"{name}_degC"] = rows[name] - 273.15
-    cells = {
-        "region": "{region}",
-        "pixels": "{pixels}",
-        "radiance temperature": "{radiance_temperature_degC:.2f} °C",
-        "emissivity": "{emissivity:.4f}",
-        "true temperature": "{true_temperature_degC:.2f} °C",
-        "u": "{standard_uncertainty:u} K",
-        "U 95 %": "{expanded_uncertainty:u} K",
-        "k": "{coverage_factor:.2f}",
+    columns = {
+        "region": "region",
+        "pixels": "pixels",
+        "radiance temperature / °C": "radiance_temperature_degC",
+        "emissivity": "emissivity",
+        "true temperature ± u / °C": "true_temperature_degC ± standard_uncertainty",
+        "U 95 % / K": "expanded_uncertainty",
+        "k": "coverage_factor",
     }
-    screen.table("regions", rows, cells)
+    screen.table("regions", rows, columns)
     screen.heading()
-    parts = {"parts of u / K": "{region}", **part_cells(TEMPERATURE_BUDGET)}
-    screen.table(None, rows, parts)
+    parts = {cause: f"{cause}_uncertainty" for cause in TEMPERATURE_BUDGET}
+    screen.table(None, rows, {"parts of u / K": "region"} | parts)

@@ -8,36 +8,15 @@ from chipglow.quantities.units import INSTANT
 
 
 def parse_instant(option: str, text: str) -> float:
-    """Time in s of a text such as ``400 us``, which may be 0.
-
-    Raises
-    ------
-    ValueError
-        If it is none; the message names the option.
-    """
+    """Parse a time such as ``400 us``; may be 0."""
     return parse(option, INSTANT, text)
 
 
 def frame_at(option: str, text: str, times: NDArray[np.float64]) -> int:
-    """Number of the frame that is nearest to a time such as ``400 us``.
-
-    Parameters
-    ----------
-    option : str
-        Name of the option.
-    text : str
-        The time with its unit.
-    times : ndarray
-        When the frames began in s, shape (n,).
-
-    Raises
-    ------
-    ValueError
-        If it is no time, or before the first frame or after the last one.
-    """
+    """Return the index of the frame nearest to a time such as ``400 us``."""
     instant = parse_instant(option, text)
     slack = 0.5 * float(np.diff(times).min()) if times.size > 1 else 1e-6
     if not times[0] - slack <= instant <= times[-1] + slack:
         first, last = (f"{1e6 * time:.7g} us" for time in (times[0], times[-1]))
-        raise ValueError(f"{option}: {text}, expected {first} to {last}, when frames began")
+        raise ValueError(f"{option}: {text}, expected {first} to {last}")
     return int(np.abs(times - instant).argmin())

@@ -426,24 +426,26 @@ class ImportDescription(Section):
             self.field_of_view,
             replace(completion, tool=tool),
             self.model_dump(mode="json"),
-            self._notes(),
+            self._assumptions(),
         )
 
-    def _notes(self) -> dict[str, str]:
-        """What has to be assumed of a field if the source has it."""
-        notes: dict[str, str] = {}
+    def _assumptions(self) -> dict[str, str]:
+        """Return assumptions that apply if the source contains a field, by the field's name."""
+        assumptions: dict[str, str] = {}
         units = self.units
         if units.velocity is None and (units.length, units.time) != ("m", "s"):
-            text = f"velocities are in {units.length}/{units.time}, made of units.length and time"
-            notes |= {"velocity_x": text, "velocity_y": text}
+            text = f"Velocities are in {units.length}/{units.time}, by units.length and units.time."
+            assumptions |= {"velocity_x": text, "velocity_y": text}
         if units.strain_rate is None and units.time != "s":
-            notes["plastic_strain_rate"] = f"strain rates are in 1/{units.time}, as units.time says"
-        if self.tool is not None or self.movie.tool_colour is not None:
-            notes["temperature"] = (
-                "temperature of the tool, where the source has none: "
-                f"{self.completion.surroundings - 273.15:g} °C (completion.surroundings)"
+            assumptions["plastic_strain_rate"] = (
+                f"Strain rates are in 1/{units.time}, from units.time."
             )
-        return notes
+        if self.tool is not None or self.movie.tool_colour is not None:
+            assumptions["temperature"] = (
+                "Where the source has no temperature of the tool, it is "
+                f"{self.completion.surroundings - 273.15:g} °C (completion.surroundings)."
+            )
+        return assumptions
 
 
 def import_description() -> type[ImportDescription]:

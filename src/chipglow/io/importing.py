@@ -21,6 +21,7 @@ from chipglow.quantities.units import LENGTH, POSITION
 from chipglow.scene import Frame, Raster, Scene
 from chipglow.scene.completion import Completion, complete
 from chipglow.scene.scene import COLDEST_PLAUSIBLE, HOTTEST_PLAUSIBLE
+from chipglow.text import Notes
 
 SAMPLES_ACROSS: Final = 900
 """Samples along the longer side of a scene, if nothing is said: those of the paper's scene."""
@@ -129,15 +130,15 @@ class Import:
         What stands in for what the source does not have.
     description : mapping
         How the source was described, kept with the scene: text and numbers.
-    notes : mapping
-        What has to be assumed of fields, by their names, if the source has them: sentences.
+    assumptions : mapping
+        Assumptions that apply if the source contains a field, by the field's name.
     """
 
     source: Source
     view: View = field(default_factory=View)
     completion: Completion = field(default_factory=Completion)
     description: Mapping[str, Any] = field(default_factory=dict)
-    notes: Mapping[str, str] = field(default_factory=dict)
+    assumptions: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -150,13 +151,13 @@ class Prospect:
         What is in the source.
     raster : Raster
         Where the scene's samples will be.
-    assumed : tuple of str
-        All that has to be assumed, a sentence each.
+    notes : Notes
+        All assumptions, and what the source states.
     """
 
     survey: Survey
     raster: Raster
-    assumed: tuple[str, ...]
+    notes: Notes
 
 
 def prospect(wanted: Import) -> Prospect:
@@ -181,7 +182,7 @@ def prospect(wanted: Import) -> Prospect:
     _check_temperatures(survey, raster)
     assumed = [
         *_doubtful_size(survey),
-        *dict.fromkeys(note for name, note in wanted.notes.items() if name in survey.found),
+        *(text for name, text in wanted.assumptions.items() if name in survey.found),
         *wanted.completion.assumptions(survey.found, len(survey.times)),
     ]
     flow = wanted.completion.uses_flow(survey.found, len(survey.times))
@@ -190,7 +191,7 @@ def prospect(wanted: Import) -> Prospect:
             "velocity: the source has none and the optical flow needs scikit-image, expected "
             "pip install 'chipglow[flow]'"
         )
-    return Prospect(survey, raster, (*survey.assumed, *assumed))
+    return Prospect(survey, raster, survey.notes + Notes(assumed))
 
 
 def import_scene(
@@ -298,10 +299,7 @@ def read_scene(source: Import | Source) -> Scene:
 
 def _attributes(key: str, looked: Prospect) -> dict[str, str]:
     """What a scene keeps of where it is from."""
-    kept = {"import": key, "assumed": "; ".join(looked.assumed)}
-    if looked.survey.from_file:
-        kept["from_file"] = "; ".join(looked.survey.from_file)
-    return kept
+    return {"import": key, **looked.notes.attrs()}
 
 
 def _frames(wanted: Import, raster: Raster, done: int) -> Iterator[Frame]:
@@ -356,7 +354,7 @@ def _doubtful_size(survey: Survey) -> tuple[str, ...]:
     size = max(right - left, top - bottom)
     if _SMALLEST <= size <= _LARGEST:
         return ()
-    return (f"the source is {size:.3g} m large, as units.length says; a chip is about 1 mm",)
+    return (f"The source is {size:.3g} m large by units.length; a chip is about 1 mm.",)
 
 
 def _check_times(survey: Survey) -> None:

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from chipglow.io.sources.arrays import MOST_SAMPLES
 from chipglow.io.sources.source import Source, SourceError, Survey, damaged
 from chipglow.scene import READABLE, Raster, SampledFrame
+from chipglow.text import Notes
 
 MEMORY: Final = 2 * 1024**3
 """What a reader may take for itself, in bytes."""
@@ -196,7 +197,8 @@ class Isolated(Source):
         """Look at what is there; see `Source.survey`."""
         with self._sandbox.answers(partial(_survey, self.source), _MOST_TIMES) as answers:
             answer = next(answers)
-        return Survey(**{**answer.header, **answer.arrays})
+        notes = {"notes": Notes(**answer.header["notes"])}
+        return Survey(**{**answer.header, **answer.arrays, **notes})
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
         """Sample the frames one after the other; see `Source.frames`."""

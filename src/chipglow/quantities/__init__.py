@@ -1,6 +1,6 @@
 """Units and their text, values as tables print them, and settings declared once."""
 
-from chipglow.quantities.format import quantity_text, rounded_text
+from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
 from chipglow.quantities.parameter import Parameter
 from chipglow.quantities.part import Family, Parameters, Part, adapter, of_other_packages
 from chipglow.quantities.section import FileBeside, Section, Settings, beside_the_study
@@ -37,5 +37,6 @@ __all__ = [
     "rounded_text",
     "setting_at",
     "settings",
+    "uncertain_text",
     "value_at",
 ]

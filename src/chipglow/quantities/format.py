@@ -1,6 +1,6 @@
 """A number with its unit, as the tables print it."""
 
-from math import floor, isnan, log10
+from math import floor, isfinite, isnan, log10
 
 
 def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "") -> str:
@@ -22,6 +22,14 @@ def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "")
     rounded = round(value, decimals) + 0.0  # no negative zero
     number = f"{rounded:{sign},.{max(decimals, 0)}f}"
     return f"{number.replace(',', ' ').replace('-', '−')} {unit}".strip()
+
+
+def uncertain_text(value: float, uncertainty: float) -> str:
+    """Text of a number and its standard uncertainty, which has two significant digits."""
+    if not isfinite(uncertainty) or uncertainty <= 0:
+        return f"{value:.4g}"
+    decimals = min(max(0, 1 - floor(log10(uncertainty))), 9)
+    return f"{value:.{decimals}f} ± {uncertainty:.{decimals}f}"
 
 
 def rounded_text(value: float, unit: str = "") -> str:

@@ -7,7 +7,7 @@ from math import isfinite, nan
 from typing import Any, Final
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
+from jinja2 import DictLoader, Environment, StrictUndefined, Template
 from numpy.typing import NDArray
 
 from chipglow.analysis import (
@@ -32,6 +32,8 @@ Array = NDArray[np.float64]
 
 SCENE_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate", "emissivity")
 """Fields that the figure of the scene shows, if it has them."""
+
+_IMPORT: Final = '{% from "macros" import gaussian_widths, main_cause, wings with context %}'
 
 
 @cache
@@ -91,8 +93,7 @@ class Facts:
 
     def text(self, template: str, **values: Any) -> str:
         """Return a text with the values of the analysis and further ones, in one line."""
-        made = _environment().from_string(texts()["macros"] + template)
-        return " ".join(made.render(self._context | values).split())
+        return " ".join(_template(template).render(self._context | values).split())
 
     def read_curves(self) -> list[Array]:
         """Return where errors are read in the shown exposure: points in m, of shape (n, 2)."""
@@ -207,8 +208,14 @@ def _hottest(analysis: Analysis) -> float:
 
 
 @cache
+def _template(text: str) -> Template:
+    return _environment().from_string(f"{_IMPORT}{text}" if "{" in text else text)
+
+
+@cache
 def _environment() -> Environment:
-    made = Environment(undefined=StrictUndefined)
+    loader = DictLoader({"macros": texts()["macros"]})
+    made = Environment(loader=loader, undefined=StrictUndefined)
     made.filters |= {"number": _number, "percent": _percent, "um": _micrometres}
     return made
 

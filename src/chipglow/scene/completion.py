@@ -125,7 +125,7 @@ class Completion(Part):
         return tuple(name for name, there in has.items() if there)
 
     def assumptions(self, found: Iterable[str], frames: int) -> tuple[str, ...]:
-        """What stands in for what is not among the fields that were found, a sentence each."""
+        """Return a sentence for each missing field and its substitute."""
         known = set(found)
         return tuple(
             sentence
@@ -158,23 +158,23 @@ class Completion(Part):
 
     def _of_velocity(self, known: set[str], frames: int) -> str:
         if not self._has_velocity(known):
-            return "velocity: none, nothing is said to move (completion.motion: flow looks for it)"
+            return "Velocity: none; completion.motion: flow derives it from the images."
         if self.cutting_speed is None and frames == 1:
-            return "velocity: 0 everywhere, as there is one frame and no cutting speed"
+            return "Velocity: 0 everywhere, as there is one frame and no cutting speed."
         if self.cutting_speed is None:
-            return "velocity: from the optical flow, which cannot see where nothing has a pattern"
+            return "Velocity: from the optical flow, which fails where the image has no pattern."
         chip = "0" if frames == 1 else "that of the optical flow"
-        return f"velocity: the cutting speed where the strain is small, in the chip {chip}"
+        return f"Velocity: the cutting speed where the strain is small, in the chip {chip}."
 
     def _of_strain(self) -> str:
         if self.chip is None:
-            return "plastic strain: none, so that no feature of a chip has its own emissivity"
-        return f"plastic strain: {STRAIN_OF_CHIP:g} in the chip's outline, 0 elsewhere"
+            return "Plastic strain: none, so no feature of the chip has its own emissivity."
+        return f"Plastic strain: {STRAIN_OF_CHIP:g} in the chip's outline, 0 elsewhere."
 
     def _of_rate(self, known: set[str], frames: int) -> str:
         if not self._has_rate(known, frames):
-            return "plastic strain rate: none, so that no shear band has an emissivity of its own"
-        return "plastic strain rate: from the change of the strain along the motion"
+            return "Plastic strain rate: none, so the shear band has no emissivity of its own."
+        return "Plastic strain rate: from the change of the strain along the motion."
 
 
 def complete(

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Final
 
 from chipglow.study.schema import Study
-from chipglow.text import DescriptionError, commented_yaml, placed, read_description, validated
+from chipglow.text import DescriptionError, commented_yaml, placed, read_yaml, validated
 
 
 def load_study(path: str | Path, scene: str | Path | None = None) -> Study:
@@ -25,7 +25,7 @@ def load_study(path: str | Path, scene: str | Path | None = None) -> Study:
         If the file cannot be read.
     """
     path = Path(path)
-    data = read_description(path)
+    data = read_yaml(path)
     if data is None and scene is None:
         raise DescriptionError(
             f"{path.name}: is empty, expected a study (chipglow init writes the paper's)"

@@ -17,6 +17,7 @@ from chipglow.surface import (
     TrendSurface,
     WrappedSurface,
 )
+from chipglow.text import Notes
 
 _FEW_FRAMES: Final = 5
 _FEW_CELLS: Final = 10
@@ -24,7 +25,7 @@ _FEW_CELLS: Final = 10
 
 @dataclass(frozen=True)
 class Fitted:
-    """A scene with a tool, surfaces that can follow it, and what had to be assumed for that.
+    """A scene with a tool, and surfaces that can follow it.
 
     Parameters
     ----------
@@ -32,13 +33,13 @@ class Fitted:
         The scene, with the study's tool if it has none and the study does.
     surfaces : mapping
         The study's surfaces by name.
-    assumed : tuple of str
-        A sentence for each assumption.
+    notes : Notes
+        Assumptions of the fit.
     """
 
     scene: Scene
     surfaces: Mapping[str, Surface]
-    assumed: tuple[str, ...]
+    notes: Notes
 
 
 def fit(study: Study, scene: Scene) -> Fitted:
@@ -60,7 +61,8 @@ def fit(study: Study, scene: Scene) -> Fitted:
         If an emissivity map lies beside the scene.
     """
     surfaces = surfaces_of(study.surface, study.seed)
-    assumed = []
+    notes = Notes()
+    assumed = notes.assumed
     said = "cutting" in given(study) and "tool" in given(study.cutting)
     if scene.tool is None and said:
         scene = scene.with_tool(study.cutting.tool.build())
@@ -85,7 +87,7 @@ def fit(study: Study, scene: Scene) -> Fitted:
     assumed.extend(_measured_at(surfaces))
     assumed.extend(uncovered(surfaces, scene.raster))
     assumed.extend(_too_coarse(study, scene))
-    return Fitted(scene, surfaces, tuple(assumed))
+    return Fitted(scene, surfaces, notes)
 
 
 def _following(surface: Surface, follow: Literal["mean", "none"]) -> Surface:

@@ -140,7 +140,7 @@ def errors(
 ) -> Analysis:
     """Measurement error of any scene, exposure by exposure, at the study's places; see `run`.
 
-    Nothing is asked of the scene but its temperature: it may be of no cut at all.
+    The scene needs no more than its temperature; it need not show a cut.
     """
     return _analyse(study, replace(study.plan, cut=False), progress, resume, assume)
 
@@ -214,7 +214,7 @@ def _fitted(
     try:
         fitted = fit(study, open_scene(path))
         if assume:
-            for sentence in (*left_to_the_paper(study), *fitted.assumed):
+            for sentence in (*left_to_the_paper(study), *fitted.notes.assumed):
                 assume(sentence)
         yield fitted
     except SceneError:

@@ -1,23 +1,20 @@
 """Files from outside: small text files, YAML and what it describes, HDF5 without links."""
 
 from chipglow.text.description import (
-    DescriptionError,
     described_by,
     load_described,
     placed,
     problem,
-    read_description,
     validated,
 )
+from chipglow.text.notes import Notes
 from chipglow.text.own_data import check_own_data
-from chipglow.text.remarks import Remarks
-from chipglow.text.small_file import read_small_text
 from chipglow.text.template import commented_yaml, json_schema
-from chipglow.text.yaml_file import parse_yaml, read_yaml
+from chipglow.text.yaml_file import DescriptionError, parse_yaml, read_small_text, read_yaml
 
 __all__ = [
     "DescriptionError",
-    "Remarks",
+    "Notes",
     "check_own_data",
     "commented_yaml",
     "described_by",
@@ -26,7 +23,6 @@ __all__ = [
     "parse_yaml",
     "placed",
     "problem",
-    "read_description",
     "read_small_text",
     "read_yaml",
     "validated",

@@ -1,4 +1,4 @@
-"""Descriptions: YAML files in, one clear line for whatever is wrong with them."""
+"""Sections from YAML files, with one line for whatever is wrong with them."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -6,50 +6,13 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from chipglow.text.yaml_file import parse_yaml, read_yaml
+from chipglow.text.yaml_file import DescriptionError, parse_yaml, read_yaml
 
 Kind = TypeVar("Kind", bound=BaseModel)
 
 
-class DescriptionError(ValueError):
-    """A description that is not possible: names the file, the field and what was expected."""
-
-
-def read_description(path: Path) -> Any:
-    """What a YAML file holds.
-
-    Raises
-    ------
-    DescriptionError
-        If it is too large or no YAML; the message names the file.
-    OSError
-        If it cannot be read.
-    """
-    try:
-        return read_yaml(path)
-    except ValueError as error:
-        raise DescriptionError(str(error)) from None
-
-
 def validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
-    """What a YAML file holds, as the section that it should be.
-
-    Parameters
-    ----------
-    kind : type
-        The section.
-    data : object
-        As `read_description` gives it.
-    name : str
-        The file, as errors call it.
-    folder : Path
-        Where files that it names are looked up.
-
-    Raises
-    ------
-    DescriptionError
-        If a field is not possible; the message names it, its value and what was expected.
-    """
+    """Validate parsed YAML as a section; `folder` is where files that it names are looked up."""
     try:
         return kind.model_validate(data, context={"folder": folder.resolve()})
     except ValidationError as error:
@@ -57,56 +20,22 @@ def validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
 
 
 def load_described(kind: type[Kind], path: str | Path) -> Kind:
-    """What a YAML file holds, as the section that it should be.
-
-    Parameters
-    ----------
-    kind : type
-        The section.
-    path : str or Path
-        The file. Files that it names are looked up beside it.
-
-    Raises
-    ------
-    DescriptionError
-        If the file is no YAML or the section is not possible.
-    OSError
-        If the file cannot be read.
-    """
+    """Read a section from a YAML file; files that it names are looked up beside it."""
     path = Path(path)
-    return validated(kind, read_description(path), path.name, path.parent)
+    return validated(kind, read_yaml(path), path.name, path.parent)
 
 
 def described_by(kind: type[Kind], path: Path, field: str, settings: Iterable[str]) -> Kind:
-    """What a YAML file describes, or what another file alone, named by a field, means.
-
-    Parameters
-    ----------
-    kind : type
-        The section that describes it.
-    path : Path
-        A YAML file (.yaml, .yml), or the other file.
-    field : str
-        Key of the description that names the other file.
-    settings : iterable of str
-        Fields that come before those of the file: ``units.length=mm``.
-
-    Raises
-    ------
-    DescriptionError
-        If the file is no YAML or the description is not possible.
-    OSError
-        If the file cannot be read.
-    """
+    """Read a section from a YAML file, or make one that names another file in a field."""
     described = path.suffix.lower() in (".yaml", ".yml")
-    data = read_description(path) if described else {field: path.name}
+    data = read_yaml(path) if described else {field: path.name}
     for setting in settings:
         data = _with(data, setting)
     return validated(kind, data, path.name, path.parent)
 
 
 def _with(data: Any, setting: str) -> Any:
-    """The description with one field set."""
+    """Return the description with one field set."""
     place, equals, value = setting.partition("=")
     names = place.strip().split(".")
     if not equals or not all(names):
@@ -118,7 +47,7 @@ def _with(data: Any, setting: str) -> Any:
 
 
 def placed(data: Any, names: list[str], value: Any) -> Any:
-    """Data with the value at a place, given by the names of its sections."""
+    """Return data with a value set at a place, given by the names of its sections."""
     if not names:
         return value
     inside = data if isinstance(data, dict) else {}
@@ -126,7 +55,7 @@ def placed(data: Any, names: list[str], value: Any) -> Any:
 
 
 def problem(error: ValidationError) -> str:
-    """One line for the first problem of a study: field, value and what was expected."""
+    """Describe the first problem in one line: field, value and what was expected."""
     first = error.errors(include_url=False)[0]
     place = ".".join(str(part) for part in first["loc"])
     if first["type"] == "value_error":

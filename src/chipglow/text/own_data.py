@@ -5,15 +5,7 @@ from typing import Any
 
 
 def check_own_data(path: Path) -> None:
-    """Refuse an HDF5 file that takes data from other files, which could be any of this computer.
-
-    Raises
-    ------
-    ValueError
-        If it has an external link, or a virtual or external dataset; the message names that.
-    OSError
-        If it cannot be opened.
-    """
+    """Refuse an HDF5 file that takes data from other files."""
     import h5py
 
     if not h5py.is_hdf5(path):

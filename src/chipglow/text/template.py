@@ -1,4 +1,4 @@
-"""Sections as commented YAML."""
+"""Sections as commented YAML and JSON schemas."""
 
 import json
 import re
@@ -18,17 +18,7 @@ _WIDTH: Final = 90
 
 
 def commented_yaml(header: str, section: Section | Part, unused: Collection[str] = ()) -> str:
-    """A section as YAML, every field with a comment.
-
-    Parameters
-    ----------
-    header : str
-        Lines of comment that come first.
-    section : Section or Part
-        The section.
-    unused : collection of str
-        Fields that are left out.
-    """
+    """Write a section as YAML, every field with a comment."""
     return "\n".join([header, *_section_lines(section, "", unused)]) + "\n"
 
 

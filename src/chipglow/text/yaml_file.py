@@ -1,4 +1,4 @@
-"""YAML that people write: safe, no key twice, one line for whatever is wrong with it."""
+"""Small text files and YAML, with one line for whatever is wrong with them."""
 
 import re
 from pathlib import Path
@@ -6,52 +6,54 @@ from typing import Any, Final
 
 import yaml
 
-from chipglow.text.small_file import read_small_text
-
 _WHOLE: Final = "tag:yaml.org,2002:int"
 _FRACTION: Final = "tag:yaml.org,2002:float"
 
 
-def read_yaml(path: Path) -> Any:
-    """What a YAML file holds.
+_LARGEST_FILE: Final = 1_000_000
+"""Size limit of small text files, in bytes."""
 
-    Raises
-    ------
-    ValueError
-        If it is too large or no YAML; the message names the file.
-    OSError
-        If it cannot be read.
-    """
+
+class DescriptionError(ValueError):
+    """An impossible description: names the file, the field and what was expected."""
+
+
+def read_small_text(path: Path) -> str:
+    """Read a text file in UTF-8, with or without a byte order mark."""
+    if path.stat().st_size > _LARGEST_FILE:
+        raise DescriptionError(f"{path}: expected a file of up to {_LARGEST_FILE // 1000} kB")
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise DescriptionError(f"{path}: expected text in UTF-8") from None
+
+
+def read_yaml(path: Path) -> Any:
+    """Read a YAML file; errors name the file."""
     text = read_small_text(path)
     try:
         return parse_yaml(text)
     except ValueError as error:
-        raise ValueError(f"{path.name}: {error}") from None
+        raise DescriptionError(f"{path.name}: {error}") from None
 
 
 def parse_yaml(text: str) -> Any:
-    """What a text in YAML holds, read with the safe loader.
-
-    Raises
-    ------
-    ValueError
-        If it is no YAML; the message names line and column.
-    """
+    """Parse YAML with the safe loader."""
     try:
         return yaml.load(text, Loader=_Loader)
     except ValueError as error:  # Such as an impossible date.
-        raise ValueError(f"{error}, expected YAML") from None
+        raise DescriptionError(f"{error}, expected YAML") from None
     except (yaml.YAMLError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         problem = getattr(error, "problem", None) or "is no YAML"
-        raise ValueError(f"{place}{problem}, expected YAML") from None
+        raise DescriptionError(f"{place}{problem}, expected YAML") from None
 
 
 class _Loader(yaml.SafeLoader):
-    """YAML with no key twice in a mapping, and with the numbers of YAML 1.2.
+    """Loader that refuses duplicate keys and reads numbers as YAML 1.2.
 
-    So 1e-3 is one, and 4:8 is not 248: YAML 1.1 reads it in base 60, as hours and minutes.
+    So 1e-3 is a number, and 4:8 is not 248, which YAML 1.1 reads in base 60.
     """
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
@@ -59,7 +61,7 @@ class _Loader(yaml.SafeLoader):
         for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
             if key.value in seen:
                 raise yaml.constructor.ConstructorError(
-                    None, None, f"key {key.value!r} is there twice", key.start_mark
+                    None, None, f"duplicate key {key.value!r}", key.start_mark
                 )
             seen.add(key.value)
         return super().construct_mapping(node, deep=deep)

@@ -10,10 +10,10 @@ from typing import Any, BinaryIO, Final
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import check_samples
 from chipglow.radiometry import ObjectParameters
+from chipglow.text import Notes
 
 MOST_FRAMES: Final = 10_000_000
 """Most frames of a file."""
@@ -180,14 +180,14 @@ class Timing:
         Numbers of the frames.
     interval : float, optional
         Time between frames in s, if the user says it.
-    remarks : FileRemarks
-        Takes what had to be assumed.
+    notes : Notes
+        Receives assumptions and warnings.
     """
 
     path: Path
     frames: range
     interval: float | None
-    remarks: FileRemarks
+    notes: Notes
 
     def even(self, interval: float) -> NDArray[np.float64]:
         """Times in s of frames that are as far apart, from the first one of the file on."""
@@ -217,39 +217,56 @@ class Timing:
                 f"{self.path}: has neither time stamps that ascend nor a frame rate, give an "
                 "interval"
             )
-        self.remarks.assumptions.append(
-            f"the frames are 1/{rate:g} s apart, as the file says; it has no time stamps that "
-            "ascend."
+        self.notes.assumed.append(
+            f"The frames are 1/{rate:g} s apart, as the file states; it has no ascending time "
+            "stamps."
         )
         return self.even(1 / rate)
 
 
-def common_exposure(exposures: NDArray[np.float64], remarks: FileRemarks) -> float | None:
+def note_missing_frames(notes: Notes, stated: int, complete: int) -> None:
+    """Warn if a file contains fewer complete frames than its header states."""
+    if complete < stated:
+        notes.warnings.append(
+            f"The file is truncated: {complete} of {stated} frames are complete; the others are "
+            "ignored."
+        )
+
+
+def note_trailing_bytes(notes: Notes, complete: int, trailing: int) -> None:
+    """Warn that a file ends with an incomplete frame."""
+    notes.warnings.append(
+        f"The file is truncated: {complete} complete frames read, {trailing} trailing bytes "
+        "ignored."
+    )
+
+
+def common_exposure(exposures: NDArray[np.float64], notes: Notes) -> float | None:
     """The integration time in s that all frames have; None if they differ or it is not stated.
 
     Parameters
     ----------
     exposures : ndarray
         Integration time of each frame in s, shape (frames,); 0 where it is not stated.
-    remarks : FileRemarks
-        Takes between which times they are, if they differ.
+    notes : Notes
+        Receives a warning if they differ.
     """
     least, greatest = float(exposures.min()), float(exposures.max())
     if least == greatest:
         return least or None
-    remarks.warnings.append(
-        f"the integration time goes from {least * 1e6:g} us to {greatest * 1e6:g} us."
+    notes.warnings.append(
+        f"The integration time varies from {least * 1e6:g} us to {greatest * 1e6:g} us."
     )
     return None
 
 
-def object_parameters(remarks: FileRemarks, **given: float | None) -> ObjectParameters:
+def object_parameters(notes: Notes, **given: float | None) -> ObjectParameters:
     """What was set in a camera of the object; impossible values are noted and left out.
 
     Parameters
     ----------
-    remarks : FileRemarks
-        Takes what is left out.
+    notes : Notes
+        Receives the ignored values.
     **given
         Fields of `ObjectParameters`.
     """
@@ -260,5 +277,5 @@ def object_parameters(remarks: FileRemarks, **given: float | None) -> ObjectPara
                 {} if value is None else {name: ObjectParameters(**{name: value}).__dict__[name]}
             )
         except ValueError:
-            remarks.notes.append(f"Left out: the file says {value:g} for {name}, which cannot be.")
+            notes.remarks.append(f"Ignored {name} {value:g}: out of range.")
     return ObjectParameters(**known)

@@ -19,10 +19,11 @@ from chipglow.io.cameras.binary import (
     common_exposure,
     first_moment,
     layout,
+    note_missing_frames,
     opened,
 )
-from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources import SourceError
+from chipglow.text import Notes
 
 _FILE: Final = layout(
     44,
@@ -106,22 +107,20 @@ def read_cine(path: Path, frames: slice | None = None, interval: float | None = 
         for position, number in enumerate(chosen):
             start = _image_start(binary, int(places[number]), pictures, number)
             signal[position] = pictures.image(binary.read(start, pictures.size, f"frame {number}"))
-        remarks = FileRemarks(notes=[f"Frame 0 is number {header['first']} of the recording."])
-        remarks.say_cut(count, whole)
+        notes = Notes(remarks=[f"Frame 0 is number {header['first']} of the recording."])
+        note_missing_frames(notes, count, whole)
         blocks = _blocks(binary, header, setup)
-        times = _times(
-            binary, blocks, header, setup["rate"], Timing(path, chosen, interval, remarks)
-        )
-        integration_time = _integration_time(binary, blocks, header, setup, chosen, remarks)
-    recording = Recording(
+        times = _times(binary, blocks, header, setup["rate"], Timing(path, chosen, interval, notes))
+        integration_time = _integration_time(binary, blocks, header, setup, chosen, notes)
+    return Recording(
         signal=signal,
         quantity="counts",
         times=times,
         camera=f"Phantom {setup['camera']}, serial number {setup['serial']}",
         integration_time=integration_time,
         saturation=2.0**pictures.bits - 2,
+        notes=notes,
     )
-    return remarks.kept_with(recording)
 
 
 def _pictures(binary: Binary, header: dict[str, Any], setup: dict[str, Any]) -> _Pictures:
@@ -260,9 +259,9 @@ def _times(
         return timing.stamped(None, rate)
     ticks = stamps >> 2 << 2  # the two lowest bits are flags
     after = float(int(header["trigger"]) - int(ticks[0])) * _TICK
-    notes = timing.remarks.notes
-    notes.extend(first_moment(float(ticks[0]) * _TICK))
-    notes.append(f"The trigger was at {after:.9g} s.")
+    remarks = timing.notes.remarks
+    remarks.extend(first_moment(float(ticks[0]) * _TICK))
+    remarks.append(f"The trigger was at {after:.9g} s.")
     since = (ticks[list(timing.frames)] - ticks[0]).astype(np.int64) * _TICK
     return timing.stamped(since, rate)
 
@@ -273,9 +272,9 @@ def _integration_time(
     header: dict[str, Any],
     setup: dict[str, Any],
     chosen: range,
-    remarks: FileRemarks,
+    notes: Notes,
 ) -> float | None:
     exposures = _of_frames(binary, blocks, _EXPOSURES, header["count"], "<u4")
     if exposures is None:
         return setup["shutter"] * 1e-9 or None
-    return common_exposure(exposures[list(chosen)] * _TICK, remarks)
+    return common_exposure(exposures[list(chosen)] * _TICK, notes)

@@ -21,15 +21,16 @@ from chipglow.io.cameras.binary import (
     check_picture,
     chosen_frames,
     first_moment,
+    note_trailing_bytes,
     object_parameters,
     opened,
     text_of,
 )
-from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import reading
 from chipglow.io.sources.source import required
 from chipglow.radiometry import ObjectParameters
+from chipglow.text import Notes
 
 _MAGIC: Final = b"FFF\0"
 _JPEG: Final = b"\xff\xd8\xff"
@@ -91,9 +92,9 @@ def read_flir(path: Path, frames: slice | None = None, interval: float | None = 
     -----
     The layout is that of ExifTool's documentation of FLIR's tags.
     """
-    remarks = FileRemarks()
+    notes = Notes()
     with _records(path) as binary:
-        places = _frames(binary, remarks)
+        places = _frames(binary, notes)
         first = places[0]
         height, width = _shape(binary, first, 0)
         chosen = chosen_frames(path, frames, len(places), height * width)
@@ -104,18 +105,19 @@ def read_flir(path: Path, frames: slice | None = None, interval: float | None = 
             signal[position] = _image(binary, places[number], number, (height, width))
             stamps[position] = _moment(_camera_fields(binary, places[number])) - start
         fields = _camera_fields(binary, places[chosen[0]])
-    remarks.notes.extend(first_moment(start))
+    notes.remarks.extend(first_moment(start))
     recording = Recording(
         signal=signal,
         quantity="counts",
-        times=_times(stamps, fields, len(places), Timing(path, chosen, interval, remarks)),
+        times=_times(stamps, fields, len(places), Timing(path, chosen, interval, notes)),
         camera=_camera(fields),
         saturation=_saturation(fields),
-        conversion=_conversion(fields, remarks),
-        object_parameters=_object(fields, remarks),
+        conversion=_conversion(fields, notes),
+        object_parameters=_object(fields, notes),
+        notes=notes,
     )
-    remarks.notes.extend(_further(fields))
-    return remarks.kept_with(recording)
+    notes.remarks.extend(_further(fields))
+    return recording
 
 
 # Records
@@ -156,25 +158,25 @@ def _inside_jpeg(binary: Binary) -> bytes:
     return b"".join(parts[number] for number in range(last + 1))
 
 
-def _frames(binary: Binary, remarks: FileRemarks) -> list[_Frame]:
+def _frames(binary: Binary, notes: Notes) -> list[_Frame]:
     """Where all frames are that are whole."""
     found: list[_Frame] = []
     place: int | None = 0
     while place is not None:
         try:
-            found.append(_frame(binary, place, len(found), remarks))
+            found.append(_frame(binary, place, len(found), notes))
         except CutShortError:
             if not found:
                 raise
-            remarks.say_cut_behind(len(found), binary.size - place)
+            note_trailing_bytes(notes, len(found), binary.size - place)
             break
         if len(found) > MOST_FRAMES:
             raise SourceError(f"{binary.path}: has over {MOST_FRAMES} frames")
-        place = _next(binary, found[-1].end, remarks)
+        place = _next(binary, found[-1].end, notes)
     return found
 
 
-def _next(binary: Binary, end: int, remarks: FileRemarks) -> int | None:
+def _next(binary: Binary, end: int, notes: Notes) -> int | None:
     """Where the next frame begins: there may be zeros or something else before it."""
     if binary.read(end, min(4, binary.size - end), "what follows a frame") == _MAGIC:
         return end
@@ -183,11 +185,11 @@ def _next(binary: Binary, end: int, remarks: FileRemarks) -> int | None:
     if begin >= 0:
         return end + begin
     if rest.strip(b"\0"):
-        remarks.warnings.append(f"{binary.size - end} bytes behind the last frame are no frame.")
+        notes.warnings.append(f"{binary.size - end} bytes after the last frame are not a frame.")
     return None
 
 
-def _frame(binary: Binary, start: int, number: int, remarks: FileRemarks) -> _Frame:
+def _frame(binary: Binary, start: int, number: int, notes: Notes) -> _Frame:
     header = binary.read(start, _HEADER_LENGTH, f"the header of frame {number}")
     if header[:4] != _MAGIC:
         raise SourceError(f"{binary.path}: begins with {header[:4]!r}, expected 'FFF' (FLIR)")
@@ -215,7 +217,7 @@ def _frame(binary: Binary, start: int, number: int, remarks: FileRemarks) -> _Fr
                     f"{binary.path}: is cut short or damaged, a record of frame {number} ends at "
                     f"byte {binary.size + missing} of {binary.size}"
                 )
-            remarks.notes.append(
+            notes.remarks.append(
                 f"The last {missing} bytes of the file are missing; the picture of frame {number} "
                 "ends before them."
             )
@@ -265,7 +267,7 @@ def packed_counts(path: Path) -> bool:
         If it is damaged, cut short or of another kind.
     """
     with _records(path) as binary:
-        place, length = _frame(binary, 0, 0, FileRemarks()).records[_RAW]
+        place, length = _frame(binary, 0, 0, Notes()).records[_RAW]
         return _packing(binary.read(place, length, "counts of frame 0")[_RAW_HEADER:]) != ""
 
 
@@ -379,7 +381,7 @@ def _saturation(fields: _Fields) -> float | None:
     return high if low < high < 65_535 else None
 
 
-def _conversion(fields: _Fields, remarks: FileRemarks) -> PlanckConversion | None:
+def _conversion(fields: _Fields, notes: Notes) -> PlanckConversion | None:
     try:
         return PlanckConversion(
             r1=fields.number(0x58, "f"),
@@ -389,30 +391,30 @@ def _conversion(fields: _Fields, remarks: FileRemarks) -> PlanckConversion | Non
             r2=fields.number(0x30C, "f"),
         )
     except ValueError as error:
-        remarks.notes.append(
-            f"Left out: the conversion to temperature in the file cannot be ({error})."
+        notes.remarks.append(
+            f"Ignored the impossible conversion to temperature in the file ({error})."
         )
         return None
 
 
-def _object(fields: _Fields, remarks: FileRemarks) -> ObjectParameters:
+def _object(fields: _Fields, notes: Notes) -> ObjectParameters:
     distance, humidity = _finite(fields, 0x24), _finite(fields, 0x3C)
     atmosphere, window = _finite(fields, 0x2C), _finite(fields, 0x34)
     transmittance = window if window is not None and window > 0 else 1.0
     if distance is not None and humidity is not None and atmosphere is not None:
         fraction = humidity / 100 if humidity > 2 else humidity
-        remarks.notes.append(
+        notes.remarks.append(
             f"Set in the camera: an object at {distance:g} m and a humidity of "
             f"{fraction * 100:g} %."
         )
         transmittance *= _through_air(fields, distance, fraction, atmosphere)
     if window is not None and window != 1:
-        remarks.notes.append(
+        notes.remarks.append(
             f"Set in the camera: a window that lets {window * 100:g} % pass, at "
             f"{fields.number(0x30, 'f') - _ZERO:g} degC; here it is as warm as the air."
         )
     return object_parameters(
-        remarks,
+        notes,
         emissivity=_finite(fields, 0x20),
         reflected=_finite(fields, 0x28),
         transmittance=transmittance,

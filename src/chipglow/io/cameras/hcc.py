@@ -20,10 +20,11 @@ from chipglow.io.cameras.binary import (
     common_exposure,
     first_moment,
     layout,
+    note_trailing_bytes,
     opened,
 )
-from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources import SourceError
+from chipglow.text import Notes
 
 _HEADER: Final = layout(
     256,
@@ -97,18 +98,18 @@ def read_hcc(path: Path, frames: slice | None = None, interval: float | None = N
     headers = stored["header"]
     _check_alike(path, headers, first, chosen)
     version = f"Telops header {first['major']}.{first['minor']}"
-    remarks = FileRemarks(notes=[f"The samples are {label} ({version})."])
+    notes = Notes(remarks=[f"The samples are {label} ({version})."])
     if rest:
-        remarks.say_cut_behind(whole, rest)
-    recording = Recording(
+        note_trailing_bytes(notes, whole, rest)
+    return Recording(
         signal=_signal(stored, quantity, path),
         quantity=quantity,
-        times=_times(headers, first, Timing(path, chosen, interval, remarks)),
+        times=_times(headers, first, Timing(path, chosen, interval, notes)),
         camera=f"Telops, serial number {first['serial']}" if first["serial"] else "Telops",
-        integration_time=_integration_time(headers, remarks),
+        integration_time=_integration_time(headers, notes),
         saturation=_saturation(first),
+        notes=notes,
     )
-    return remarks.kept_with(recording)
 
 
 def _frame(header_length: int, height: int, width: int) -> np.dtype[Any]:
@@ -166,7 +167,7 @@ def _times(headers: NDArray[Any], first: dict[str, Any], timing: Timing) -> NDAr
         return timing.even(timing.interval)
     if first["major"] < _WITH_TIME or not headers["seconds"].any():
         return timing.stamped(None, rate)
-    timing.remarks.notes.extend(first_moment(first["seconds"] + _SUBSECOND * first["subseconds"]))
+    timing.notes.remarks.extend(first_moment(first["seconds"] + _SUBSECOND * first["subseconds"]))
     # Whole seconds first: their difference is exact.
     stamps = (
         headers["seconds"].astype(np.int64)
@@ -176,10 +177,10 @@ def _times(headers: NDArray[Any], first: dict[str, Any], timing: Timing) -> NDAr
     return timing.stamped(stamps, rate)
 
 
-def _integration_time(headers: NDArray[Any], remarks: FileRemarks) -> float | None:
+def _integration_time(headers: NDArray[Any], notes: Notes) -> float | None:
     if len(np.unique(headers["filter_position"])) > 1:
-        remarks.warnings.append("the filter wheel turned between frames.")
-    return common_exposure(headers["exposure"] * _EXPOSURE, remarks)
+        notes.warnings.append("The filter wheel turned between frames.")
+    return common_exposure(headers["exposure"] * _EXPOSURE, notes)
 
 
 def _saturation(first: dict[str, Any]) -> float | None:

@@ -15,12 +15,13 @@ from chipglow.io.cameras.binary import (
     check_picture,
     chosen_frames,
     layout,
+    note_missing_frames,
     object_parameters,
     opened,
     text_of,
 )
-from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources import SourceError
+from chipglow.text import Notes
 
 # Places as in the Altair Reference Guide DL002U-D, after pyradi's ryptw.
 _HEADER: Final = layout(
@@ -100,10 +101,10 @@ def read_ptw(path: Path, frames: slice | None = None, interval: float | None = N
             signal[position] = binary.numbers(
                 start + number * stride, rows * columns, "<u2", what
             ).reshape(rows, columns)
-        remarks = FileRemarks(notes=_notes(header, skipped))
-        remarks.say_cut(header["frames"], whole)
-        times = _times(binary, header, stride, Timing(path, chosen, interval, remarks))
-    recording = Recording(
+        notes = Notes(remarks=_notes(header, skipped))
+        note_missing_frames(notes, header["frames"], whole)
+        times = _times(binary, header, stride, Timing(path, chosen, interval, notes))
+    return Recording(
         signal=signal,
         quantity="counts",
         times=times,
@@ -111,14 +112,14 @@ def read_ptw(path: Path, frames: slice | None = None, interval: float | None = N
         integration_time=_positive(header["integration_time"]),
         saturation=2.0 ** header["bits"] - 2 if 8 <= header["bits"] <= 16 else None,
         object_parameters=object_parameters(
-            remarks,
+            notes,
             emissivity=header["emissivity"],
             reflected=header["ambient"],
             transmittance=_positive(header["transmittance"]),
             atmosphere=_positive(header["atmosphere"]),
         ),
+        notes=notes,
     )
-    return remarks.kept_with(recording)
 
 
 def _stride(binary: Binary, header: dict[str, Any], rows: int, columns: int) -> int:
@@ -191,14 +192,14 @@ def _clocked_times(
     for own in (round(mean / period) * period, mean):
         evenly = timing.even(own)
         if np.abs(evenly - since).max() <= allowed:
-            timing.remarks.assumptions.append(
-                f"the frames are {own * 1e6:g} us apart, as their stamps say; the period in the "
+            timing.notes.assumed.append(
+                f"The frames are {own * 1e6:g} us apart by their time stamps; the period in the "
                 f"header is {period * 1e6:g} us."
             )
             return evenly
-    timing.remarks.warnings.append(
-        f"the times are from the frame period, {period * 1e6:g} us; the frames' own stamps are up "
-        f"to {apart:.3g} s off: frames may be missing."
+    timing.notes.warnings.append(
+        f"The times follow the frame period, {period * 1e6:g} us; the time stamps differ by up to "
+        f"{apart:.3g} s, so frames may be missing."
     )
     return times
 

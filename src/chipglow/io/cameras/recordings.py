@@ -12,9 +12,14 @@ from chipglow.io.cameras.stacks import Stated
 from chipglow.io.sandbox import Message, Sandbox, patience_for
 from chipglow.io.sources import SourceError
 from chipglow.radiometry import ObjectParameters
+from chipglow.text import Notes
 
 _ARRAYS: Final = ("signal", "times")
-_PARTS: Final = {"conversion": PlanckConversion, "object_parameters": ObjectParameters}
+_PARTS: Final = {
+    "conversion": PlanckConversion,
+    "object_parameters": ObjectParameters,
+    "notes": Notes,
+}
 
 
 def read_recording(

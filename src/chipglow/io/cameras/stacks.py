@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from chipglow.camera import Recording
 from chipglow.camera.recording import QUANTITIES, Quantity
 from chipglow.io.cameras.binary import check_picture, chosen_frames
-from chipglow.io.cameras.remarks import FileRemarks
 from chipglow.io.sources import SourceError
 from chipglow.io.sources.arrays import (
     ARRAY_READERS,
@@ -31,8 +30,8 @@ from chipglow.io.sources.layout import (
     read_frames,
     read_list,
 )
-from chipglow.io.sources.source import SourceRemarks
 from chipglow.quantities.units import SI
+from chipglow.text import Notes
 
 RECORDING_UNITS: Final[Mapping[str, tuple[Quantity, float]]] = {
     "counts": ("counts", 0.0),
@@ -116,33 +115,23 @@ def read_stack(path: Path, kind: str, frames: slice | None, stated: Stated) -> R
         reader = exported_table if kind == ".csv" else ARRAY_READERS[kind]
         arrays = open_arrays(str(path), stack, reader)
         one = _dataset(path, arrays, stated.dataset)
-        remarks = SourceRemarks()
-        axes = axes_of(one, stated.axes, remarks)
+        notes = Notes()
+        axes = axes_of(one, stated.axes, notes)
         lengths = dict(zip(axes, one.array.shape, strict=True))
         check_picture(path, lengths["y"], lengths["x"], MOST_ON_A_SIDE)
         chosen = chosen_frames(path, frames, lengths.get("time", 1), lengths["y"] * lengths["x"])
-        unit, times = _unit(one, stated), _times(one, arrays, axes, chosen, stated, remarks)
+        unit, times = _unit(one, stated), _times(one, arrays, axes, chosen, stated, notes)
         if unit is None or times is None:
             raise MissingError(f"{one}: {_missing(one, unit, times)}")
         signal = _signal(one, axes, chosen)
-    said = FileRemarks(
-        notes=[f"From the file: {sentence}." for sentence in remarks.from_file],
-        assumptions=[f"{sentence}." for sentence in remarks.assumed],
-    )
     if skipped := one.array.attributes.get("lines_of_text"):
-        said.notes.append(f"Left out: {skipped} lines of text before the numbers.")
+        notes.remarks.append(f"Ignored {skipped} lines of text before the numbers.")
     quantity, offset = RECORDING_UNITS[unit]
     if quantity != "counts":
         # 32 bits hold temperature to 1e-4 K, where the file does not hold more.
         precision = np.float32 if signal.dtype.itemsize <= 4 else np.float64
         signal = (signal.astype(np.float64) + offset).astype(precision)
-    recording = Recording(
-        signal=signal,
-        quantity=quantity,
-        times=times,
-        camera="unknown",
-    )
-    return said.kept_with(recording)
+    return Recording(signal=signal, quantity=quantity, times=times, camera="unknown", notes=notes)
 
 
 def _dataset(path: Path, arrays: Mapping[str, StoredArray], name: str | None) -> Chosen:
@@ -202,7 +191,7 @@ def _times(
     axes: tuple[str, ...],
     chosen: range,
     stated: Stated,
-    remarks: SourceRemarks,
+    notes: Notes,
 ) -> NDArray[np.float64] | None:
     """Times of the chosen frames in s; None if neither the user nor the file says them."""
     if stated.interval is not None:
@@ -214,7 +203,7 @@ def _times(
     found = coordinate("time", {one.path: arrays}, None, dim, count)
     if found is None or found.label == one.label:
         return None
-    times = check_times(str(found), read_list("time", found, SI, remarks))
+    times = check_times(str(found), read_list("time", found, SI, notes))
     if not isfinite(times[-1] - times[0]):
         raise SourceError(f"{found}: is not finite")
     since: NDArray[np.float64] = (times - times[0])[list(chosen)]

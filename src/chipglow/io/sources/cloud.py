@@ -21,7 +21,6 @@ from chipglow.io.sources.point_files import MOST_POINTS, PointFrames, PointTable
 from chipglow.io.sources.source import (
     Source,
     SourceError,
-    SourceRemarks,
     Survey,
     even_times,
     naming,
@@ -31,6 +30,7 @@ from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION, Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.cloud import Cloud, neighbour_distance, sample_cloud
+from chipglow.text import Notes
 
 _AXES: Final = "xyz"
 _EXTRA: Final[Mapping[str, tuple[str, ...]]] = {
@@ -129,9 +129,8 @@ class CloudSource(Source, Part):
                 found=points.found,
                 unused=points.unused,
                 spacing=float(np.median(clouds[0].spacing)),
-                assumed=tuple(dict.fromkeys(points.remarks.assumed)),
-                from_file=tuple(dict.fromkeys(points.remarks.from_file)),
                 temperatures=_temperatures(clouds, list(points.found)),
+                notes=Notes() + points.notes,
             )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
@@ -165,7 +164,7 @@ class _Points:
 
     def __init__(self, source: CloudSource, stack: ExitStack) -> None:
         self._source = source
-        self.remarks = SourceRemarks()
+        self.notes = Notes()
         self.files: PointFrames = open_points(source.files, source.names.get("time"), stack)
         if self.files.count < 1:
             raise SourceError(f"{source.files}: has no frame")
@@ -247,14 +246,14 @@ class _Points:
     def _unit(self, path: str, name: str, label: str, table: PointTable) -> Unit:
         own = self._source.units.of(name)
         known = name.replace("_z", "_x")
-        return unit_of(known, f"{path}: {label}", table.units.get(label), own, self.remarks)
+        return unit_of(known, f"{path}: {label}", table.units.get(label), own, self.notes)
 
     def _times(self, path: str) -> NDArray[np.float64]:
         source = self._source
         if source.interval is not None or self.files.times is None:
-            return even_times(self.files.count, source.interval, self.remarks)
+            return even_times(self.files.count, source.interval, self.notes)
         name = f"{path}: time"
-        unit = unit_of("time", name, self.files.time_unit, source.units.time, self.remarks)
+        unit = unit_of("time", name, self.files.time_unit, source.units.time, self.notes)
         return check_times(name, self.files.times * unit.scale)
 
     def _places(self, path: str, table: PointTable) -> NDArray[np.float64]:
@@ -264,7 +263,7 @@ class _Points:
             label = self._extra.get(axis)
             if label is not None:
                 own, text = self._source.units.length, table.units.get(label)
-                unit = unit_of(axis, f"{path}: {label}", text, own, self.remarks)
+                unit = unit_of(axis, f"{path}: {label}", text, own, self.notes)
                 places[:, number] = _column(path, table, label) * unit.scale
         return places
 
@@ -322,8 +321,8 @@ class _Points:
             spacing = neighbour_distance(np.ascontiguousarray(places[:, axes]))
             if not spacing > 0:
                 raise SourceError(f"{path}: its points are in one place, expected spacing")
-            self.remarks.assumed.append(
-                f"the points are {spacing:.4g} m apart, as neighbours are in the first frame"
+            self.notes.assumed.append(
+                f"The point spacing is that of neighbours in the first frame, {spacing:.4g} m."
             )
         if source.thickness is not None and source.thickness < spacing:
             raise SourceError(

@@ -34,7 +34,6 @@ from chipglow.io.sources.layout import (
 from chipglow.io.sources.source import (
     Source,
     SourceError,
-    SourceRemarks,
     Survey,
     even_times,
     span_of,
@@ -43,6 +42,7 @@ from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION, SI, Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.regrid import regrid, taps
+from chipglow.text import Notes
 
 Arrays = Mapping[str, StoredArray]
 
@@ -144,9 +144,8 @@ class GridSource(Source, Part):
                 found={name: layer.chosen.label for name, layer in grid.layers.items()},
                 unused=grid.unused,
                 spacing=min(grid.steps),
-                assumed=tuple(dict.fromkeys(grid.remarks.assumed)),
-                from_file=tuple(dict.fromkeys(grid.remarks.from_file)),
                 temperatures=temperatures,
+                notes=Notes() + grid.notes,
             )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
@@ -234,7 +233,7 @@ class _Grid:
     y: NDArray[np.float64]
     turned: tuple[bool, bool, bool]
     unused: tuple[str, ...]
-    remarks: SourceRemarks
+    notes: Notes
 
     @property
     def steps(self) -> tuple[float, float]:
@@ -322,15 +321,15 @@ def _turn(values: NDArray[Any], turned: tuple[bool, bool, bool]) -> NDArray[Any]
 
 
 def _open(source: GridSource, stack: ExitStack) -> _Grid:
-    remarks = SourceRemarks()
-    files, chosen = _choose(source, stack, remarks)
+    notes = Notes()
+    files, chosen = _choose(source, stack, notes)
     layers: dict[str, _Layer] = {}
     for name, one in chosen.items():
-        axes = axes_of(one, source.axes, remarks)
+        axes = axes_of(one, source.axes, notes)
         unit = (
             SI
             if name == "material"
-            else unit_of(name, str(one), one.unit, source.units.of(name), remarks)
+            else unit_of(name, str(one), one.unit, source.units.of(name), notes)
         )
         layers[name] = _Layer(one, axes, unit)
         layers[name].check()
@@ -340,7 +339,7 @@ def _open(source: GridSource, stack: ExitStack) -> _Grid:
     material = layers.pop("material", None)
     if not layers:
         raise SourceError(f"{first.chosen}: is a material, expected a temperature too")
-    x, y = (_positions(source, axis, files, first, remarks) for axis in ("x", "y"))
+    x, y = (_positions(source, axis, files, first, notes) for axis in ("x", "y"))
     x, y, turned = _placed(source.placement, x, y)
     used = {one.label for one in chosen.values()} | set(source.names.values())
     return _Grid(
@@ -348,17 +347,17 @@ def _open(source: GridSource, stack: ExitStack) -> _Grid:
         layers={source.placement.in_file(name): layer for name, layer in layers.items()},
         material=material,
         source=source,
-        times=_times(source, files, first, remarks),
+        times=_times(source, files, first, notes),
         x=x,
         y=y,
         turned=turned,
         unused=unused_names((label for arrays in files.values() for label in arrays), used),
-        remarks=remarks,
+        notes=notes,
     )
 
 
 def _choose(
-    source: GridSource, stack: ExitStack, remarks: SourceRemarks
+    source: GridSource, stack: ExitStack, notes: Notes
 ) -> tuple[dict[str, Arrays], dict[str, Chosen]]:
     """Open the files and find every field: arrays by file, and fields by name."""
     given = {name: label for name, label in source.names.items() if name not in COORDINATES}
@@ -366,7 +365,7 @@ def _choose(
         path = source.files
         arrays = open_arrays(path, stack)
         candidates = _candidates(path, arrays, source)
-        return {path: arrays}, find_fields(path, candidates, given, _KNOWN, remarks)
+        return {path: arrays}, find_fields(path, candidates, given, _KNOWN, notes)
     files: dict[str, Arrays] = {}
     chosen: dict[str, Chosen] = {}
     for name, path in source.files.items():
@@ -375,7 +374,7 @@ def _choose(
         own = {name: given[name]} if name in given else {}
         if len(candidates) == 1 and not own:
             own = {name: next(iter(candidates))}
-        chosen.update(find_fields(path, candidates, own, (name,), remarks))
+        chosen.update(find_fields(path, candidates, own, (name,), notes))
     return files, chosen
 
 
@@ -397,7 +396,7 @@ def _positions(
     axis: str,
     files: Mapping[str, Arrays],
     layer: _Layer,
-    remarks: SourceRemarks,
+    notes: Notes,
 ) -> NDArray[np.float64]:
     """Centres of the columns or rows in m, as they follow in the file."""
     count = layer.length(axis)
@@ -408,26 +407,26 @@ def _positions(
             raise SourceError(
                 f"{layer.chosen.path}: has no coordinate {axis!r}, expected grid.spacing"
             )
-        return check_even(str(one), read_list(axis, one, source.units.length, remarks))
+        return check_even(str(one), read_list(axis, one, source.units.length, notes))
     if coordinate(axis, files, source.names.get(axis), layer.dim(axis), count) is not None:
-        remarks.from_file.append(f"its coordinate {axis} is not used, as the spacing is given")
+        notes.remarks.append(f"The coordinate {axis} is not used, as the spacing is given.")
     if axis == "x":
         return source.left + source.spacing * number
-    remarks.assumed.append(f"row 0 is the {'upper' if source.top_first else 'lower'} edge")
+    notes.assumed.append(f"Row 0 is the {'upper' if source.top_first else 'lower'} edge.")
     down = source.row_spacing or source.spacing
     return source.top - down * (number if source.top_first else number[::-1])
 
 
 def _times(
-    source: GridSource, files: Mapping[str, Arrays], layer: _Layer, remarks: SourceRemarks
+    source: GridSource, files: Mapping[str, Arrays], layer: _Layer, notes: Notes
 ) -> NDArray[np.float64]:
     one = None
     if source.interval is None:
         dim = layer.dim("time")
         one = coordinate("time", files, source.names.get("time"), dim, layer.frames)
     if one is None:
-        return even_times(layer.frames, source.interval, remarks)
-    return check_times(str(one), read_list("time", one, source.units.time, remarks))
+        return even_times(layer.frames, source.interval, notes)
+    return check_times(str(one), read_list("time", one, source.units.time, notes))
 
 
 def _placed(

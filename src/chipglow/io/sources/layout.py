@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from chipglow.io.sources.arrays import StoredArray, check_samples, reading
 from chipglow.io.sources.conventions import SI_UNITS, match_names, simple
-from chipglow.io.sources.source import SourceError, SourceRemarks, naming
+from chipglow.io.sources.source import SourceError, naming
 from chipglow.quantities.units import SI, Unit, parse_unit
+from chipglow.text import Notes
 
 AXES: Final = ("time", "y", "x")
 COORDINATES: Final[Mapping[str, tuple[str, ...]]] = {
@@ -48,7 +49,7 @@ def find_fields(
     arrays: Mapping[str, StoredArray],
     given: Mapping[str, str],
     known: Sequence[str],
-    remarks: SourceRemarks,
+    notes: Notes,
 ) -> dict[str, Chosen]:
     """Which of a file's arrays are which fields.
 
@@ -63,8 +64,8 @@ def find_fields(
     known : sequence of str
         Fields to look for, ``material`` among them if it may be there. If the file has one array
         only, it is the first of them.
-    remarks : SourceRemarks
-        Takes what had to be assumed.
+    notes : Notes
+        Receives the assumptions.
 
     Raises
     ------
@@ -92,7 +93,7 @@ def find_fields(
         found["material"] = material
     if not found and len(arrays) == 1:
         found[known[0]] = next(iter(arrays))
-        remarks.assumed.append(f"the only array {found[known[0]]!r} of {path} is {known[0]}")
+        notes.assumed.append(f"The only array {found[known[0]]!r} of {path} is the {known[0]}.")
     if not found:
         listed = ", ".join(sorted(arrays)[:20]) or "none of this kind"
         raise SourceError(
@@ -111,7 +112,7 @@ def _short_names(labels: Collection[str]) -> dict[str, str]:
     }
 
 
-def axes_of(chosen: Chosen, given: Sequence[str] | None, remarks: SourceRemarks) -> tuple[str, ...]:
+def axes_of(chosen: Chosen, given: Sequence[str] | None, notes: Notes) -> tuple[str, ...]:
     """What the axes of an array are: ``time``, ``y`` and ``x`` in their order.
 
     Parameters
@@ -120,8 +121,8 @@ def axes_of(chosen: Chosen, given: Sequence[str] | None, remarks: SourceRemarks)
         The array.
     given : sequence of str, optional
         What the user says.
-    remarks : SourceRemarks
-        Takes what had to be assumed.
+    notes : Notes
+        Receives the assumptions.
 
     Raises
     ------
@@ -134,7 +135,7 @@ def axes_of(chosen: Chosen, given: Sequence[str] | None, remarks: SourceRemarks)
         names = tuple(given)
     elif sorted(names) not in (sorted(AXES), ["x", "y"]):
         names = AXES[-len(shape) :]
-        remarks.assumed.append(f"the axes of {chosen.label} are {', '.join(names)}")
+        notes.assumed.append(f"The axes of {chosen.label} are {', '.join(names)}.")
     if len(names) != len(shape) or len(shape) not in (2, 3):
         raise SourceError(
             f"{chosen}: has shape {shape}, expected the axes {', '.join(given or AXES)}"
@@ -146,7 +147,7 @@ def _axis(dim: str) -> str:
     return next((axis for axis, names in COORDINATES.items() if simple(dim) in names), "")
 
 
-def unit_of(name: str, label: str, text: object, own: Unit, remarks: SourceRemarks) -> Unit:
+def unit_of(name: str, label: str, text: object, own: Unit, notes: Notes) -> Unit:
     """Unit of a field or coordinate: as given if that is not SI, else as the file says.
 
     Parameters
@@ -159,8 +160,8 @@ def unit_of(name: str, label: str, text: object, own: Unit, remarks: SourceRemar
         What the file says; anything but text is nothing said.
     own : Unit
         What the user says.
-    remarks : SourceRemarks
-        Takes what had to be assumed, and which unit the file says.
+    notes : Notes
+        Receives the assumed unit, or the one that the file states.
 
     Raises
     ------
@@ -170,16 +171,16 @@ def unit_of(name: str, label: str, text: object, own: Unit, remarks: SourceRemar
     short = label.rsplit(": ", 1)[-1]
     if own != SI:
         if isinstance(text, str):
-            remarks.from_file.append(f"{short} is in {text!r}, but the unit given is taken")
+            notes.remarks.append(f"{short} is in {text!r}; the given unit is used instead.")
         return own
     if not isinstance(text, str):
         if SI_UNITS[name] != "1":
-            remarks.assumed.append(f"{short} is in {SI_UNITS[name]}: the file says no unit")
+            notes.assumed.append(f"{short} is in {SI_UNITS[name]}: the file states no unit.")
         return own
     with naming(label):
         unit = parse_unit(text, SI_UNITS[name], name)
     if unit != SI:
-        remarks.from_file.append(f"{short} is in {text!r}")
+        notes.remarks.append(f"{short} is in {text!r}.")
     return unit
 
 
@@ -237,7 +238,7 @@ def _is_coordinate(label: str, axis: str, dim: str) -> bool:
     return short == dim or simple(short) in COORDINATES[axis]
 
 
-def read_list(axis: str, chosen: Chosen, own: Unit, remarks: SourceRemarks) -> NDArray[np.float64]:
+def read_list(axis: str, chosen: Chosen, own: Unit, notes: Notes) -> NDArray[np.float64]:
     """All values of a coordinate in SI; for its unit see `unit_of`.
 
     Raises
@@ -245,7 +246,7 @@ def read_list(axis: str, chosen: Chosen, own: Unit, remarks: SourceRemarks) -> N
     SourceError
         If one is not finite, or the unit is unknown.
     """
-    unit = unit_of(axis, str(chosen), chosen.unit, own, remarks)
+    unit = unit_of(axis, str(chosen), chosen.unit, own, notes)
     check_samples(str(chosen), int(np.prod(chosen.array.shape, dtype=np.float64)))
     with reading(chosen):
         raw = chosen.array.read((slice(None),) * len(chosen.array.shape))

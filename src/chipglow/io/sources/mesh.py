@@ -1,6 +1,6 @@
 """Meshes over time, from the programs that compute them."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -20,7 +20,6 @@ from chipglow.io.sources.mesh_restricted import RestrictedFields
 from chipglow.io.sources.source import (
     Source,
     SourceError,
-    SourceRemarks,
     Survey,
     even_times,
     naming,
@@ -31,6 +30,7 @@ from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import POSITION
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.rasterise import NOTHING, rasterise
+from chipglow.text import Notes
 
 _PART_FIELDS: Final = (
     "part", "part_id", "partid", "parts", "material_id", "materialid", "materialids", "material",
@@ -136,8 +136,11 @@ class MeshSource(Source, Part):
         blocks = ends[0]
         found = self._found(reader, blocks, restricted)
         flat = [self._flat(reader, number, there, found) for number, there in ends.items()]
-        remarks = SourceRemarks()
-        times = self._times(reader, remarks)
+        notes = Notes(
+            self._assumed(blocks, found),
+            remarks=[*self._lacking(blocks, found), *_lacking_values(found, tuple(ends.values()))],
+        )
+        times = self._times(reader, notes)
         every = fields_of(blocks)
         return Survey(
             reader.kind,
@@ -145,15 +148,14 @@ class MeshSource(Source, Part):
             self._extent(reader, flat),
             {ours: found[ours] for ours in READABLE if ours in found},
             tuple(sorted(set(every) - set(found.values()))),
-            assumed=(*remarks.assumed, *self._assumed(blocks, found)),
-            from_file=(*self._lacking(blocks, found), *_from_file(found, tuple(ends.values()))),
             temperatures=self._temperatures(flat, found),
+            notes=notes,
         )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
         """Sample the meshes one after the other; see `Source.frames`."""
         reader = self._reader()
-        times = self._times(reader, SourceRemarks())
+        times = self._times(reader, Notes())
         ends, restricted = self._ends(reader)
         found = self._found(reader, ends[0], restricted)
         for number in range(start, reader.count):
@@ -272,15 +274,15 @@ class MeshSource(Source, Part):
         ]
 
     def _lacking(self, blocks: Sequence[Block], found: Mapping[str, str]) -> Iterator[str]:
-        """What is said of blocks without a temperature."""
+        """Describe blocks without a temperature."""
         for block, is_tool in zip(blocks, self._tool(blocks), strict=True):
             name = found.get("temperature")
             if block.grid.n_cells and name and not _has_field(block, name):
                 named = block.names[0] if block.names else "a block"
-                what = "tool of the surroundings' temperature" if is_tool.any() else "void"
-                yield f"{named} has no temperature: it is {what}"
+                what = "tool at the surroundings' temperature" if is_tool.any() else "void"
+                yield f"{named} has no temperature: it is treated as {what}."
 
-    def _times(self, reader: MeshReader, remarks: SourceRemarks) -> NDArray[np.float64]:
+    def _times(self, reader: MeshReader, notes: Notes) -> NDArray[np.float64]:
         count = reader.count
         if self.times:
             if len(self.times) != count:
@@ -290,16 +292,16 @@ class MeshSource(Source, Part):
             return np.array(self.times, np.float64)
         if self.interval is None and reader.times is not None:
             return np.array(reader.times, np.float64) * self.units.time.scale
-        return even_times(count, self.interval, remarks)
+        return even_times(count, self.interval, notes)
 
-    def _assumed(self, blocks: Sequence[Block], found: Mapping[str, str]) -> tuple[str, ...]:
+    def _assumed(self, blocks: Sequence[Block], found: Mapping[str, str]) -> list[str]:
         sentences = []
         sizes = fields_of(blocks)
         for ours, theirs in found.items():
             if ours not in _COMPONENTS and sizes[theirs] > 1:
                 sentences.append(
                     f"{ours}: {theirs} has {sizes[theirs]} values for each place, such as those "
-                    "of integration points: their mean is taken"
+                    "of integration points; their mean is used."
                 )
         names = {simple(name): name for name in sizes}
         moving = [
@@ -308,10 +310,10 @@ class MeshSource(Source, Part):
             if name in names and names[name] not in found.values()
         ]
         if moving and self.displacement is None and not _is_exodus(self.path):
-            sentences.append(f"positions are those of the file, {moving[0]} is not added to them")
+            sentences.append(f"Positions are those of the file; {moving[0]} is not added.")
         if not self.tool_parts:
-            sentences.append("no part is named as tool: all that is there is the workpiece")
-        return tuple(sentences)
+            sentences.append("No part is named as tool: all elements are workpiece.")
+        return sentences
 
     def _extent(
         self, reader: MeshReader, meshes: Sequence[FlatMesh]
@@ -418,8 +420,8 @@ def _check_size(file: Path, ours: str, theirs: str, sizes: Mapping[str, int]) ->
         )
 
 
-def _from_file(found: Mapping[str, str], frames: Sequence[Sequence[Block]]) -> tuple[str, ...]:
-    """What the first and the last frame lack."""
+def _lacking_values(found: Mapping[str, str], frames: Sequence[Sequence[Block]]) -> Iterable[str]:
+    """Describe missing values in the first and the last frame."""
     sentences = []
     for when, blocks in zip(("first", "last"), frames, strict=False):
         for theirs in dict.fromkeys(found.values()):
@@ -428,11 +430,11 @@ def _from_file(found: Mapping[str, str], frames: Sequence[Sequence[Block]]) -> t
                 if lacking:
                     sentences.append(
                         f"{theirs}: {lacking} of {count} {of} have no value in the {when} frame; "
-                        "what they touch is filled from the nearest and marked in quality"
+                        "adjacent samples are filled from the nearest and marked in quality."
                     )
     if any("STATUS" in block.grid.cell_data for blocks in frames for block in blocks):
-        sentences.append("elements whose STATUS is 0 are deleted")
-    return tuple(dict.fromkeys(sentences))
+        sentences.append("Elements whose STATUS is 0 are deleted.")
+    return dict.fromkeys(sentences)
 
 
 def _without_value(blocks: Sequence[Block], name: str, of: str) -> tuple[int, int]:

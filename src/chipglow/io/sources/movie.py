@@ -39,6 +39,7 @@ from chipglow.io.sources.source import Source, SourceError, Survey, naming
 from chipglow.quantities import Parameter, Part
 from chipglow.scene import FIELD_UNITS, FILLED, Material, Raster, SampledFrame
 from chipglow.scene.nearest import fill
+from chipglow.text import Notes
 
 MOVIE_FIELDS: Final = ("temperature", "plastic_strain", "plastic_strain_rate")
 """Fields that a movie can show, the first of those given decides on the material."""
@@ -222,7 +223,7 @@ class MovieSource(Source, Part):
             extent=self._pixels(index).extent,
             found={name: self.movies[name].path.name for name in self._names},
             spacing=self.metre_per_pixel,
-            assumed=(*clock, *assumed, *_doubts(self._uncertainty(indices, readers))),
+            notes=Notes([*clock, *assumed, *_doubts(self._uncertainty(indices, readers))]),
         )
 
     def frames(self, raster: Raster, start: int = 0) -> Iterator[SampledFrame]:
@@ -281,7 +282,7 @@ class MovieSource(Source, Part):
         if index.times is None:
             raise SourceError(f"{path}: it has no times, expected frame_interval")
         step = index.times[-1] / max(index.count - 1, 1)
-        said = f"the times are those of playing the movie, {step:.6g} s from picture to picture"
+        said = f"The times are those of playing the movie, {step:.6g} s per frame."
         return index.times[:: self.every], (said,)
 
     def _pixels(self, index: MovieIndex) -> Raster:
@@ -323,7 +324,9 @@ class MovieSource(Source, Part):
         self._crop(index)
         shape = (index.rows, index.columns)
         tool = self._cropped(polygon_mask(shape, self.tool_polygon))
-        assumed = [] if index.square else ["the pixels are square, though the movie denies it"]
+        assumed = (
+            [] if index.square else ["The pixels are square, although the movie states otherwise."]
+        )
         readers = {}
         for name in self._names:
             movie = self.movies[name]
@@ -356,8 +359,8 @@ class MovieSource(Source, Part):
                 "another background, or background: [] if it shows values"
             )
         named = ", ".join(str(colour) for colour in found) or "none"
-        said = [f"background colours at the border: {named}"]
-        said += [f"{colour} at the border is taken for a value" for colour in refused]
+        said = [f"Background colours at the border: {named}."]
+        said += [f"The colour {colour} at the border is a value." for colour in refused]
         return found, tuple(said)
 
     def _read(self, name: str, reader: FieldReader, picture: Picture, number: int) -> FieldPicture:
@@ -496,10 +499,10 @@ def _scale(
     scale = ColourScale.from_legend(legend_pixels(picture, box), movie.values)
     _check_legend(picture, box, scale)
     kind = f"{len(scale.values)} bands" if scale.banded else "colours without steps"
-    found = "" if movie.colours.box else f"legend found at {box} (left, top, right, bottom), "
+    found = "" if movie.colours.box else f"Legend found at {box} (left, top, right, bottom). "
     first, last = movie.values
     ends = f"{first:g} at its lower or left end, {last:g} at the other"
-    return scale, (box,), (f"{found}legend of {kind}, {ends}",)
+    return scale, (box,), (f"{found}Legend of {kind}, {ends}.",)
 
 
 def _check_legend(picture: Picture, box: Box, scale: ColourScale) -> None:
@@ -526,10 +529,10 @@ def _doubts(uncertainty: Mapping[str, ColourUncertainty]) -> Iterator[str]:
     for name, warning in uncertainty.items():
         unit = FIELD_UNITS[name].replace("1/s", "/s").removeprefix("1")
         yield (
-            f"{name}: the colours leave a standard uncertainty of "
+            f"{name}: The colours leave a standard uncertainty of "
             + f"{warning.total:.3g} {unit}".rstrip()
             + f" ({warning.colours:.3g} by their number, {warning.noise:.3g} by their noise"
             + (f", {warning.legend:.3g} by the ends of the legend" if warning.legend else "")
             + (f", {warning.lines:.3g} by the lines drawn over them" if warning.lines else "")
-            + ")"
+            + ")."
         )

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.scene import Raster, SampledFrame
+from chipglow.text import Notes
 
 
 class SourceError(ValueError):
@@ -62,22 +63,6 @@ def damaged(file: object, error: BaseException, kind: str = "") -> SourceError:
     )
 
 
-@dataclass
-class SourceRemarks:
-    """Takes what there is to say of a source while it is looked at, a sentence each.
-
-    Parameters
-    ----------
-    assumed : list of str
-        What had to be assumed.
-    from_file : list of str
-        What the file itself says or lacks.
-    """
-
-    assumed: list[str] = field(default_factory=list)
-    from_file: list[str] = field(default_factory=list)
-
-
 @dataclass(frozen=True)
 class Survey:
     """What is in a source, before its frames are read.
@@ -97,13 +82,11 @@ class Survey:
         Fields of the source that nothing is taken from.
     spacing : float, optional
         Side of the source's own samples in m, if they are regular.
-    assumed : tuple of str
-        What had to be assumed, a sentence each.
-    from_file : tuple of str
-        What the file itself says or lacks, and how that is taken, a sentence each.
     temperatures : tuple of float, optional
         Least and greatest temperature in K of the frames that were looked at, as samples may have
         them; NaN if there is none at all.
+    notes : Notes
+        Assumptions, and what the file states or lacks.
     """
 
     kind: str
@@ -112,15 +95,14 @@ class Survey:
     found: Mapping[str, str]
     unused: tuple[str, ...] = ()
     spacing: float | None = None
-    assumed: tuple[str, ...] = ()
-    from_file: tuple[str, ...] = ()
     temperatures: tuple[float, float] | None = None
+    notes: Notes = field(default_factory=Notes)
 
 
-def even_times(count: int, interval: float | None, remarks: SourceRemarks) -> NDArray[np.float64]:
+def even_times(count: int, interval: float | None, notes: Notes) -> NDArray[np.float64]:
     """Times in s of frames that are as far apart: by 1 s if nobody says it, which is remarked."""
     if interval is None and count > 1:
-        remarks.assumed.append("no times in the files: frames are 1 s apart")
+        notes.assumed.append("The files contain no times: frames are 1 s apart.")
     return (1.0 if interval is None else interval) * np.arange(count, dtype=np.float64)
 
 

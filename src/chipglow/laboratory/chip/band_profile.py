@@ -1,7 +1,7 @@
 """Temperature along the shear band of a measurement, and how far the band has developed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from math import isfinite, nan, sqrt
 from typing import Final
@@ -26,7 +26,7 @@ from chipglow.laboratory.chip.tool_position import (
     tool_in,
 )
 from chipglow.scene import Line, Tool, sample
-from chipglow.text.remarks import Remarks
+from chipglow.text import Notes
 from chipglow.uncertainty import Estimate, to_xarray
 
 POSITION: Final = "position"
@@ -36,8 +36,8 @@ BAND_BUDGET: Final = (CALIBRATION, POSITION, *TOOL_BUDGET)
 """Lines of the budget of a temperature along the band."""
 
 CALIBRATION_UNKNOWN: Final = (
-    "the measurement does not state the uncertainty of its calibration, which is not in the "
-    "uncertainty here."
+    "The measurement does not state the uncertainty of its calibration, which is therefore "
+    "missing from the uncertainty here."
 )
 """Warning of a profile of such a measurement."""
 
@@ -99,10 +99,8 @@ class BandProfile:
         When each frame's integration began in s, shape (frames,).
     width : float
         Width of the mean across the curve in m.
-    assumptions : tuple of str
-        What had to be assumed, a sentence each.
-    warnings : tuple of str
-        Why it may not be relied on, a sentence each.
+    notes : Notes
+        Assumptions and warnings.
 
     Raises
     ------
@@ -118,8 +116,7 @@ class BandProfile:
     stage: tuple[Stage, ...]
     times: NDArray[np.float64]
     width: float
-    assumptions: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    notes: Notes = field(default_factory=Notes)
 
     def __post_init__(self) -> None:
         shape = (self.times.size, self.distance.size)
@@ -198,11 +195,7 @@ class BandProfile:
                 distance=("distance", self.distance, metres),
                 reference_distance=("reference_distance", self.reference.distance, metres),
             )
-            .assign_attrs(
-                width=self.width,
-                assumed="\n".join(self.assumptions),
-                warnings="\n".join(self.warnings),
-            )
+            .assign_attrs(width=self.width, **self.notes.attrs())
         )
 
     def stage_frame(self) -> pd.DataFrame:
@@ -301,12 +294,12 @@ def band_profile(
     images = _Images(measurement)
     given = None if curve is None else _given(curve, tool, pitch)
     found, reason = _found(images, tool, numbers)
-    remarks = Remarks()
+    notes = Notes()
     if measurement.calibration_errors is None:
-        remarks.warnings.append(CALIBRATION_UNKNOWN)
+        notes.warnings.append(CALIBRATION_UNKNOWN)
     if given is None and not any(found):
         raise NoShearBandError(reason if numbers.size == 1 else _none(numbers.size, reason))
-    base = _reference(measurement, images, tool, found, numbers, given, reference, remarks)
+    base = _reference(measurement, images, tool, found, numbers, given, reference, notes)
     lines = found if given is None else [given] * numbers.size
     distance = _common(lines, pitch) if given is None else given.distance
     points = np.stack([_laid(line, distance) for line in lines])
@@ -321,7 +314,7 @@ def band_profile(
             "in the image where the chip is hotter than the camera's lower range limit"
         )
     if given is None:
-        remarks.warnings.extend(_joined(temperature, measurement.times[numbers]))
+        notes.warnings.extend(_joined(temperature, measurement.times[numbers]))
     estimate = measurement.estimate(temperature, [one.calibration for one in read])
     known = np.isfinite(temperature)
     off = np.where(known, off, nan)
@@ -345,8 +338,7 @@ def band_profile(
         stage=tuple(_stage(value, pitch) for value in offset),
         times=measurement.times[numbers],
         width=width,
-        assumptions=tuple(remarks.assumptions),
-        warnings=tuple(remarks.warnings),
+        notes=notes,
     )
 
 
@@ -411,29 +403,29 @@ def _reference(
     numbers: NDArray[np.int64],
     given: Line | None,
     reference: int | None,
-    remarks: Remarks,
+    notes: Notes,
 ) -> Line:
     """The curve of the fully developed band."""
     if reference is not None:
         frame_numbers([reference], measurement.times.size)
         return find_band(images[reference], tool)
     if given is not None:
-        remarks.assumptions.append("the given curve is the place of the fully developed band.")
+        notes.assumed.append("The given curve is the place of the fully developed band.")
         return given
     pitch = measurement.raster.spacing
     bands = [(line, k) for line, k in zip(found, numbers.tolist(), strict=True) if line]
     near = [(line, k) for line, k in bands if line.distance[0] < NEAR_THE_EDGE * pitch]
     if not near:
-        remarks.warnings.append(
-            "no band begins near the cutting edge, so that all may have moved; the "
-            "stages are judged against the hottest and longest one."
+        notes.warnings.append(
+            "No band begins near the cutting edge, so all may have moved; the stages are "
+            "judged against the hottest and longest one."
         )
     line, number = max(near or bands, key=lambda band: _heat(measurement, *band))
     if len(bands) == 1:
-        remarks.warnings.append("one frame has a band; without another its stage says nothing.")
+        notes.warnings.append("Only one frame has a band; its stage cannot be judged.")
     elif near:
-        remarks.assumptions.append(
-            f"the band at {measurement.times[number] * 1e6:.6g} µs is fully developed: "
+        notes.assumed.append(
+            f"The band at {measurement.times[number] * 1e6:.6g} µs is fully developed: "
             "it is the hottest and longest of those that begin near the cutting edge."
         )
     return line
@@ -451,7 +443,7 @@ def _joined(temperature: NDArray[np.float64], times: NDArray[np.float64]) -> tup
         return ()
     when = ", ".join(f"{time * 1e6:.6g}" for _, time in crossing)
     return (
-        f"the curve at {when} µs crosses a valley, up to {max(crossing)[0]:.0f} K deep: "
+        f"The curve at {when} µs crosses a valley, up to {max(crossing)[0]:.0f} K deep: "
         "it may join two bands, or a band that has moved and the heat at the edge.",
     )
 

@@ -1,6 +1,6 @@
 """The tool that is meant: stated, described in a file, or found in the image."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import degrees, hypot
 from typing import Final
 
@@ -11,6 +11,7 @@ from chipglow.laboratory.chip.find_tool import FoundTool, find_tool
 from chipglow.laboratory.chip.tool_description import tool_of
 from chipglow.laboratory.chip.tool_position import ToolUncertainty
 from chipglow.scene import Tool
+from chipglow.text import Notes
 
 _FACE: Final = 200e-6
 """Length of the face in m on which a tool that was given is compared with one that is seen."""
@@ -21,22 +22,20 @@ _CLEARLY: Final = 4.0
 
 @dataclass(frozen=True)
 class ChosenTool:
-    """A tool, and what is to be said of it, sentences each.
+    """A tool, its uncertainty and its notes.
 
     Parameters
     ----------
     tool : Tool
         The tool in the measurement's coordinates.
-    found, assumptions, warnings : tuple of str
-        What was found, what was assumed, and why it may not be relied on.
+    notes : Notes
+        Assumptions, warnings and, as remarks, what was found.
     uncertainty : ToolUncertainty, optional
         How well its place is known, if it was found and no option gives an uncertainty.
     """
 
     tool: Tool
-    found: tuple[str, ...] = ()
-    assumptions: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    notes: Notes = field(default_factory=Notes)
     uncertainty: ToolUncertainty | None = None
 
 
@@ -67,36 +66,31 @@ def chosen_tool(
         return ChosenTool(tool_of(measurement, None))
     if tool != "found":
         given = tool_of(measurement, tool)
-        return ChosenTool(given, warnings=_contradictions(measurement, given))
+        return ChosenTool(given, Notes(warnings=_contradictions(measurement, given)))
     found = find_tool(measurement)
-    shape = found.tool.tool
-    assumed = (
-        f"clearance angle {degrees(shape.clearance_angle):.3g} deg, edge radius "
-        f"{1e6 * shape.corner_radius:.3g} um."
-    )
     used = found.uncertainty if position is None else None
-    said = (_found(found), _position(found.uncertainty, position))
-    return ChosenTool(found.tool, said, (assumed,), found.warnings, used)
+    remarks = [_found(found), _position(found.uncertainty, position)]
+    return ChosenTool(found.tool, found.notes + Notes(remarks=remarks), used)
 
 
-def _contradictions(measurement: Measurement, given: Tool) -> tuple[str, ...]:
+def _contradictions(measurement: Measurement, given: Tool) -> list[str]:
     """A warning, if the image clearly shows a rake face elsewhere than where the tool's is said."""
     try:
         found = find_tool(measurement)
     except ValueError:
-        return ()
+        return []
     seen = found.tool.rake_point(np.array([0.0, _FACE]))
     offsets = (seen - given.rake_point(np.array([0.0, _FACE]))) @ np.array(given.rake_normal)
     allowed = hypot(found.uncertainty.across, _FACE / 2.0 * found.uncertainty.angle)
     offset = float(np.abs(offsets).max())
     if offset <= _CLEARLY * allowed:
-        return ()
-    return (
-        f"the rake face that shows in the image is {1e6 * offset:.0f} um from that "
+        return []
+    return [
+        f"The rake face that shows in the image is {1e6 * offset:.0f} um from that "
         f"of the tool's file (the file's rake angle is {degrees(given.rake_angle):.1f} deg, the "
         f"image's {degrees(found.tool.rake_angle):.1f} ± {degrees(found.uncertainty.angle):.1f} "
-        "deg): the tip, the origin of coordinates, or which way the image is up may be wrong.",
-    )
+        "deg): the tip, the origin of coordinates, or which way the image is up may be wrong."
+    ]
 
 
 def _found(found: FoundTool) -> str:

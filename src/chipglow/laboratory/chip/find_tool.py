@@ -13,6 +13,7 @@ from scipy.special import ndtr
 from chipglow.camera import Measurement
 from chipglow.laboratory.chip.tool_position import ToolUncertainty
 from chipglow.scene import PlacedTool, Raster, ToolGeometry
+from chipglow.text import Notes
 
 _REACH: Final = 6
 _SEARCH: Final = radians(20.0)
@@ -45,13 +46,13 @@ class FoundTool:
         The tool in the measurement's coordinates.
     uncertainty : ToolUncertainty
         Standard uncertainties of its place and its rake angle.
-    warnings : tuple of str
-        Why it may not be the rake face, a sentence each.
+    notes : Notes
+        The assumed shape, and reasons why it may not be the rake face.
     """
 
     tool: PlacedTool
     uncertainty: ToolUncertainty
-    warnings: tuple[str, ...]
+    notes: Notes
 
 
 def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> FoundTool:
@@ -103,6 +104,10 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
     angle_error, place_error = _jackknife(image, rows, fit)
     angle = atan(fit[1])
     tip_row, tip_seen = _tip_row(image, fit, rows)
+    assumed = (
+        f"The clearance angle is {degrees(shape.clearance_angle):.3g} deg, the edge radius "
+        f"{1e6 * shape.corner_radius:.3g} um."
+    )
     warnings = _warnings(angle, angle_error, place_error, angles, coarse.prominence, tip_seen)
     pitch = raster.spacing
     tool = _placed(replace(shape, rake_angle=angle), raster, fit, tip_row)
@@ -112,7 +117,7 @@ def find_tool(measurement: Measurement, shape: ToolGeometry | None = None) -> Fo
         angle=sqrt(angle_error**2 + 2 * (2 * _SHIFT / rows.size) ** 2),
         pivot=_up_the_face(tool, raster, float(rows.mean())),
     )
-    return FoundTool(tool, uncertainty, warnings)
+    return FoundTool(tool, uncertainty, Notes([assumed], warnings))
 
 
 @dataclass(frozen=True)
@@ -371,18 +376,18 @@ def _warnings(
     angles: NDArray[np.float64],
     prominence: float,
     tip_seen: bool,
-) -> tuple[str, ...]:
+) -> list[str]:
     warnings = []
     if prominence < _SURE:
-        warnings.append("the rake face hardly stands out from the noise of the image.")
+        warnings.append("The rake face hardly stands out from the noise of the image.")
     if angle_error > _WORST_ANGLE:
-        warnings.append("the rows of the image do not agree on the rake angle.")
+        warnings.append("The rows of the image do not agree on the rake angle.")
     if place_error > 1.0:
-        warnings.append("the rows of the image do not agree on a line within a pixel.")
+        warnings.append("The rows of the image do not agree on a line within a pixel.")
     if not angles[0] < angle < angles[-1]:
         warnings.append(
-            f"the rake angle of {degrees(angle):.1f} degrees is at the end of what was looked for."
+            f"The rake angle of {degrees(angle):.1f} degrees is at the limit of the search range."
         )
     if not tip_seen:
-        warnings.append("the tip is not in the image: lengths count from its lower end.")
-    return tuple(warnings)
+        warnings.append("The tip is not in the image: lengths count from its lower end.")
+    return warnings

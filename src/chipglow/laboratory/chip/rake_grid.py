@@ -30,6 +30,7 @@ from chipglow.laboratory.chip.tool_position import (
 )
 from chipglow.scene import Raster, Tool
 from chipglow.scene.tool_attributes import tool_attributes
+from chipglow.text import Notes
 from chipglow.uncertainty import Component, Estimate, to_xarray
 
 PIXELS: Final = 3.0
@@ -217,29 +218,25 @@ class RakeGrid:
         )
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """What the numbers do not hold, a sentence each."""
+    def notes(self) -> Notes:
+        """Squares without a value, causes that the deviations omit, and a warning of the means."""
+        notes, count, frames = Notes(), self.frame_count, self.times.size
         causes = " and ".join(one.cause.name for one in self.estimate.components)
-        left_out = int((self.frame_count == 0).sum())
-        sentences = (
-            f"Errors of {causes} move all squares together and are not in the deviations.",
-            f"{left_out} of {self.frame_count.size} squares are left out (–): a pixel of theirs "
-            "is under the camera's lower range limit, saturated or dead, or outside the image.",
-        )
-        said = (bool(causes), left_out > 0)
-        return tuple(sentence for sentence, true in zip(sentences, said, strict=True) if true)
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Why it may not be relied on, a sentence each."""
-        seen, frames = self.frame_count, self.times.size
-        partly = int(((seen > 0) & (seen < frames)).sum())
-        if not partly:
-            return ()
-        return (
-            f"{partly} squares are usable in some of the {frames} frames only; their means are of "
-            "those frames, which are the hotter ones where the lower range limit is the reason.",
-        )
+        if causes:
+            notes.remarks.append(
+                f"Errors of {causes} move all squares together and are not in the deviations."
+            )
+        if left_out := int((count == 0).sum()):
+            notes.remarks.append(
+                f"{left_out} of {count.size} squares are left out (–): one of their pixels is "
+                "below the camera's lower range limit, saturated, dead or outside the image."
+            )
+        if partly := int(((count > 0) & (count < frames)).sum()):
+            notes.warnings.append(
+                f"{partly} squares are usable in only some of the {frames} frames; their means are "
+                "of those frames, the hotter ones if the lower range limit is the reason."
+            )
+        return notes
 
     def up_to(self, columns: int) -> "RakeGrid":
         """The same of the first squares along the face.

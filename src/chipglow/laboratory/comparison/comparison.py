@@ -24,7 +24,7 @@ from chipglow.laboratory.chip.frame_scatter import FrameScatter
 from chipglow.laboratory.chip.rake_grid import DEPTH, PIXELS
 from chipglow.laboratory.chip.tool_position import TOOL, contribution
 from chipglow.scene import Tool, sample
-from chipglow.text.remarks import Remarks
+from chipglow.text import Notes
 from chipglow.uncertainty import Component, Estimate, draw
 
 COVERAGE: Final = 2.0
@@ -194,18 +194,15 @@ class Comparison:
         Along the shear band; None if there is nothing to compare.
     places : tuple of PlaceResult
         Which simulation fits where.
-    assumptions : tuple of str
-        What had to be assumed, a sentence each.
-    warnings : tuple of str
-        Why it may not be relied on, a sentence each.
+    notes : Notes
+        Assumptions and warnings.
     """
 
     labels: tuple[str, ...]
     grid: GridComparison | None
     band: BandComparison | None
     places: tuple[PlaceResult, ...]
-    assumptions: tuple[str, ...]
-    warnings: tuple[str, ...]
+    notes: Notes
 
     def to_frame(self) -> pd.DataFrame:
         """Every value of each simulation, a row each.
@@ -385,46 +382,35 @@ def compare(
             f"uncertainty: {stated.temperature:g} K beside the uncertainty that the measurement "
             "states, expected one or the other"
         )
-    remarks = Remarks()
+    notes = Notes()
     if measured.calibration_errors is None and stated.temperature == 0.0:
-        remarks.warnings.append(
-            "the measurement does not state the uncertainty of its calibration and none is stated, "
-            "so that the E_n are too great."
+        notes.warnings.append(
+            "The measurement does not state the uncertainty of its calibration and none is given, "
+            "so the E_n are too large."
         )
     allowed = max(_SAME_ANGLE, COVERAGE * stated.tool.angle if stated.tool else 0.0)
     tools = {
-        label: _tool_of(label, item, tool, allowed, remarks) for label, item in simulated.items()
+        label: _tool_of(label, item, tool, allowed, notes) for label, item in simulated.items()
     }
-    grid = _compare_grid(measured, simulated, tool, tools, stated, remarks)
+    grid = _compare_grid(measured, simulated, tool, tools, stated, notes)
     files = [("measured", measured, tool, reference)]
     files += [(label, item, tools[label], None) for label, item in simulated.items()]
-    band = _compare_band(files, curve, stated, remarks)
+    band = _compare_band(files, curve, stated, notes)
     places = _places(tuple(simulated), grid, band)
     if not places:
-        reasons = " ".join(remarks.warnings)
+        reasons = " ".join(notes.warnings)
         raise ValueError(f"comparison: there is nothing that can be compared: {reasons}")
-    return Comparison(
-        tuple(simulated),
-        grid,
-        band,
-        places,
-        tuple(remarks.assumptions),
-        tuple(remarks.warnings),
-    )
+    return Comparison(tuple(simulated), grid, band, places, notes)
 
 
-def _tool_of(
-    label: str, simulated: Measurement, tool: Tool, allowed: float, remarks: Remarks
-) -> Tool:
+def _tool_of(label: str, simulated: Measurement, tool: Tool, allowed: float, notes: Notes) -> Tool:
     own = simulated.tool
     if own is None:
-        remarks.assumptions.append(f"{label} states no tool; it is where the measurement has it.")
+        notes.assumed.append(f"{label}: The file states no tool; that of the measurement is used.")
         return tool
     turn = abs(own.rake_angle - tool.rake_angle)
     if turn > allowed:
-        remarks.warnings.append(
-            f"the rake angle of {label} differs by {degrees(turn):.2g} degrees."
-        )
+        notes.warnings.append(f"The rake angle of {label} differs by {degrees(turn):.2g} degrees.")
     return own
 
 
@@ -434,7 +420,7 @@ def _compare_grid(
     tool: Tool,
     tools: Mapping[str, Tool],
     stated: StatedUncertainties,
-    remarks: Remarks,
+    notes: Notes,
 ) -> GridComparison | None:
     size = PIXELS * measured.raster.spacing
     try:
@@ -444,10 +430,10 @@ def _compare_grid(
             for label, item in simulated.items()
         }
     except ValueError as error:
-        remarks.warnings.append(f"the rake face is left out: {error}.")
+        notes.warnings.append(f"The rake face is left out: {error}.")
         return None
     if base.times.size < _FEW:
-        remarks.warnings.append(_few_frames("measured", base.times.size))
+        notes.warnings.append(_few_frames("measured", base.times.size))
     columns = min(grid.along.size for grid in (base, *grids.values()))
     base = base.up_to(columns)
     readings = [
@@ -505,7 +491,7 @@ def _position(measured: Measurement, stated: StatedUncertainties) -> float:
 def _few_frames(name: str, count: int) -> str:
     frames = "frame" if count == 1 else "frames"
     return (
-        f"{name}: {count} {frames} only, which do not show how the temperature varies between "
+        f"{name}: Only {count} {frames}, which do not show how the temperature varies between "
         "frames."
     )
 
@@ -514,7 +500,7 @@ def _compare_band(
     files: Sequence[tuple[str, Measurement, Tool, int | None]],
     curve: NDArray[np.float64] | None,
     stated: StatedUncertainties,
-    remarks: Remarks,
+    notes: Notes,
 ) -> BandComparison | None:
     """The band of the measurement, which comes first, and of the simulations."""
     _, measured, tool, _ = files[0]
@@ -535,7 +521,7 @@ def _compare_band(
                 )
             )
         except NoShearBandError as error:
-            remarks.warnings.append(f"the shear band is left out: {name}: {error}.")
+            notes.warnings.append(f"The shear band is left out: {name}: {error}.")
             return None
     if curve is not None and stated.tool is not None:
         profiles[0] = _laid_by_the_edge(measured, profiles[0], tool, stated.tool)
@@ -544,7 +530,7 @@ def _compare_band(
     distance = step * np.arange(1, int(last / step) + 1, dtype=np.float64)
     names = [name for name, *_ in files]
     own, *others = [
-        _along(name, p, distance, remarks) for name, p in zip(names, profiles, strict=True)
+        _along(name, p, distance, notes) for name, p in zip(names, profiles, strict=True)
     ]
     readings = [
         _assumed(item, found.without(POSITION), stated)
@@ -574,24 +560,22 @@ def _laid_by_the_edge(
 
 
 def _along(
-    name: str, profile: BandProfile, distance: NDArray[np.float64], remarks: Remarks
+    name: str, profile: BandProfile, distance: NDArray[np.float64], notes: Notes
 ) -> Estimate:
     """Means over the frames at distances from the edge.
 
     Where a single frame reaches, the variance between frames is the mean of it where several do.
     """
     used = profile.in_place
-    remarks.assumptions.extend(f"{sentence} ({name})" for sentence in profile.assumptions)
-    remarks.warnings.extend(
-        f"{sentence} ({name})" for sentence in profile.warnings if sentence != CALIBRATION_UNKNOWN
-    )
+    warnings = [text for text in profile.notes.warnings if text != CALIBRATION_UNKNOWN]
+    own = Notes(profile.notes.assumed, warnings).about(name)
+    notes.assumed.extend(own.assumed)
+    notes.warnings.extend(own.warnings)
     if not used.any():
-        remarks.warnings.append(
-            f"{name}: no frame has a band that is in place; all frames are used."
-        )
+        notes.warnings.append(f"{name}: No frame has a band that is in place; all frames are used.")
         used = np.ones(used.size, np.bool_)
     elif used.sum() < _FEW:
-        remarks.warnings.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
+        notes.warnings.append(_few_frames(f"{name}, shear band in place", int(used.sum())))
 
     def read(field: NDArray[np.float64]) -> NDArray[np.float64]:
         rows = field.reshape(profile.temperature.shape)[used]

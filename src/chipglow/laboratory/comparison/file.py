@@ -55,8 +55,8 @@ def write_comparison(comparison: Comparison, folder: Path) -> None:
         "statement": comparison.statement,
         "simulations": list(comparison.labels),
         "places": [_place(comparison, number) for number in range(len(comparison.places))],
-        "assumed": list(comparison.assumptions),
-        "warnings": list(comparison.warnings),
+        "assumed": comparison.notes.assumed,
+        "warnings": comparison.notes.warnings,
     }
     text = json.dumps(summary, indent=1, ensure_ascii=False)
     (folder / "summary.json").write_text(f"{text}\n", encoding="utf-8")

@@ -334,12 +334,12 @@ class RegionEmissivity:
         if text is not None:
             if self.flagged[Flag.UNDER_RANGE]:
                 text += (
-                    "; what is left is brighter than the region, as the camera's range hides "
-                    f"emissivities under {self.hidden:.3g}"
+                    " The remaining pixels are brighter than the region, as the camera's range "
+                    f"hides emissivities below {self.hidden:.3g}."
                 )
             elif self.flagged[Flag.SATURATED]:
-                text += "; what is left is darker than the region"
-            yield f"{text}."
+                text += " The remaining pixels are darker than the region."
+            yield text
         under, over = self.outside
         if under:
             yield (

@@ -70,11 +70,11 @@ def uncertainty_columns(estimate: Estimate, causes: Sequence[str]) -> dict[str, 
 
 
 def left_out_warning(name: str, pixels: int, left_out: int, flagged: dict[Flag, int]) -> str | None:
-    """A sentence, without its full stop, if many of an area's pixels are left out."""
+    """Return a warning if many of an area's pixels are left out."""
     total = pixels + left_out
     if left_out <= _MANY_LEFT_OUT * total:
         return None
-    return f"{name}: {left_out} of {total} pixels are left out ({flag_text(flagged)})"
+    return f"{name}: {left_out} of {total} pixels are left out ({flag_text(flagged)})."
 
 
 def check_same_pixels(

@@ -18,7 +18,7 @@ from chipglow.laboratory.emissivity.emissivity import (
 )
 from chipglow.laboratory.emissivity.observations import check_same_pixels, uncertainty_columns
 from chipglow.scene import Region, areas, shared_pixels
-from chipglow.text.remarks import Remarks
+from chipglow.text import Notes
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,15 +33,14 @@ class RegionEmissivities:
         The same areas of each map.
     lines : tuple of EmissivityLine
         Each area over the temperature; empty for one heating.
-    assumptions, warnings : list of str
-        What had to be assumed, and why the result may not be relied on, a sentence each.
+    notes : Notes
+        Assumptions and warnings.
     """
 
     maps: tuple[EmissivityMap, ...]
     rows: tuple[tuple[RegionEmissivity, ...], ...]
     lines: tuple[EmissivityLine, ...] = ()
-    assumptions: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
         """Every region at every temperature, a row each.
@@ -105,12 +104,12 @@ def determine_emissivities(
     found = areas(regions, maps[0].raster)
     rows = tuple(tuple(one.of(area) for area in found) for one in maps)
     lines = map(emissivity_line, zip(*rows, strict=True)) if len(maps) > 1 else ()
-    remarks = _remarks(maps, rows)
-    remarks.assumptions.extend(
+    notes = _notes(maps, rows)
+    notes.assumed.extend(
         f"{one} and {other} share {count} pixels, which count in both."
         for (one, other), count in shared_pixels(regions, maps[0].raster).items()
     )
-    return RegionEmissivities(maps, rows, tuple(lines), remarks.assumptions, remarks.warnings)
+    return RegionEmissivities(maps, rows, tuple(lines), notes)
 
 
 def _row(row: RegionEmissivity) -> Mapping[str, float | str]:
@@ -145,37 +144,37 @@ def _line_row(line: EmissivityLine) -> Mapping[str, float | str]:
     }
 
 
-def _remarks(maps: Sequence[EmissivityMap], rows: Sequence[Sequence[RegionEmissivity]]) -> Remarks:
-    heating, remarks = maps[0].heating, Remarks()
-    said = remarks.assumptions.append
+def _notes(maps: Sequence[EmissivityMap], rows: Sequence[Sequence[RegionEmissivity]]) -> Notes:
+    heating, notes = maps[0].heating, Notes()
+    said = notes.assumed.append
     if not heating.reference_uncertainty:
-        said("the true temperature is exact (reference_uncertainty).")
+        said("The true temperature is exact (reference_uncertainty).")
     if not heating.reflected_uncertainty:
         said(
-            f"the object reflects just {heating.reflected - 273.15:.4g} degC; reflected apparent "
-            f"temperature 100 K higher would make {_of_reflected(maps[0]):+.2g} of the emissivity "
-            "(reflected, reflected_uncertainty)."
+            f"The object reflects exactly {heating.reflected - 273.15:.4g} degC; 100 K more would "
+            f"shift the emissivity by {_of_reflected(maps[0]):+.2g} (reflected, "
+            "reflected_uncertainty)."
         )
     if heating.drift is None and any(one.recordings == 1 for one in maps):
         said(
-            "the camera does not drift from one recording to the next: there is one image, which "
-            "does not show it, and u holds nothing of it (drift)."
+            "The camera does not drift between recordings: a single image does not show it, and u "
+            "does not include it (drift)."
         )
     if any(one.calibration is None for one in maps):
         said(
-            "the camera's calibration is exact, as the measurement states no uncertainty of it "
+            "The camera's calibration is exact, as the measurement states no uncertainty of it "
             "(camera_uncertainty)."
         )
     if any(one.observations == 1 for one in maps):
         said(
-            "nothing changes from frame to frame, as there is one only; noise is at most the "
+            "Nothing changes between frames, as there is only one; noise is at most the "
             "standard deviation over the pixels."
         )
     for of in rows:
-        at = f" (object at {of[0].heating.reference - 273.15:.6g} °C)" if len(rows) > 1 else ""
-        for warning in (warning for row in of for warning in row.estimate.warnings):
-            remarks.warnings.append(f"{warning.removesuffix('.')}{at}.")
-    return remarks
+        own = Notes(warnings=[warning for row in of for warning in row.estimate.warnings])
+        several = f"Object at {of[0].heating.reference - 273.15:.6g} °C"
+        notes += own.about(several) if len(rows) > 1 else own
+    return notes
 
 
 def _of_reflected(one: EmissivityMap) -> float:

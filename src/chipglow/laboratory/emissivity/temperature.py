@@ -1,7 +1,7 @@
 """True temperature of an area whose emissivity is known, with its uncertainty."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from math import inf, isnan, sqrt
@@ -30,6 +30,7 @@ from chipglow.laboratory.emissivity.observations import (
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_HOTTEST
 from chipglow.scene import Area, Region, areas
+from chipglow.text import Notes
 from chipglow.uncertainty import Estimate, propagate
 
 TEMPERATURE_BUDGET: Final = (
@@ -258,11 +259,11 @@ def true_temperature(
     )
     pixels = equation.temperature(values.mean(axis=0))
     count_out, mean_of_pixels = int(area.mask.sum()) - count, float(pixels.mean())
-    warnings = [f"emissivity of {warning}" for warning in found.warnings]
+    warnings = [f"Emissivity: {warning}" for warning in found.warnings]
     warnings += _warnings(area.name, found, mean_of_pixels)
     left_out = left_out_warning(area.name, count, count_out, flagged)
     if left_out is not None:
-        warnings = [f"{left_out}.", *warnings]
+        warnings = [left_out, *warnings]
     return TrueTemperature(
         name=area.name,
         pixels=count,
@@ -285,13 +286,12 @@ class RegionTemperatures:
     ----------
     rows : tuple of TrueTemperature
         One for each region of known emissivity.
-    assumptions, warnings : tuple of str
-        What had to be assumed, and why the result may not be relied on, a sentence each.
+    notes : Notes
+        Assumptions and warnings.
     """
 
     rows: tuple[TrueTemperature, ...]
-    assumptions: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
         """Every region, a row each.
@@ -378,7 +378,7 @@ def true_temperatures(
     fixed = isinstance(emissivities, KnownEmissivity)
     lines = any(isinstance(one, EmissivityLine) for one in known.values())
     assumed = _assumptions(rows, fixed, lines, surroundings is None, unknown_drift)
-    return RegionTemperatures(rows, tuple(assumed), tuple(warnings))
+    return RegionTemperatures(rows, Notes(list(assumed), warnings))
 
 
 def _far_from_the_heating(
@@ -419,31 +419,31 @@ def _assumptions(
     same_surroundings: bool,
     unknown_drift: bool,
 ) -> Iterator[str]:
-    yield "every region is of uniform temperature and emissivity."
+    yield "Every region is of uniform temperature and emissivity."
     if lines:
-        yield "the emissivity is a straight line over the temperature."
+        yield "The emissivity is a straight line over the temperature."
     elif not known:
-        yield "the emissivity is the same at all temperatures."
+        yield "The emissivity is the same at all temperatures."
     if known and not any(row.estimate.contribution("emissivity") for row in rows):
-        yield "the emissivity is exact (emissivity_uncertainty)."
+        yield "The emissivity is exact (emissivity_uncertainty)."
     if known and same_surroundings:
-        yield "the object reflects 293 K exactly (reflected, reflected_uncertainty)."
+        yield "The object reflects 293 K exactly (reflected, reflected_uncertainty)."
     if not known and same_surroundings:
-        yield "the object reflects what it did when its emissivity was determined."
+        yield "The object reflects what it did when its emissivity was determined."
     if not any(row.estimate.contribution("calibration") for row in rows):
-        yield "the camera's calibration is exact, as the measurement states no uncertainty of it."
+        yield "The camera's calibration is exact, as the measurement states no uncertainty of it."
     elif not known and rows[0].correlation is None:
         yield (
-            "the calibration's errors in the emissivity and here are independent, which makes u "
+            "The calibration's errors in the emissivity and here are independent, which makes u "
             "too large rather than too small (calibration)."
         )
     if unknown_drift:
         yield (
-            "the camera does not drift from one recording to the next: there is one image here or "
-            "of the emissivity, which does not show it, and u holds nothing of it (drift)."
+            "The camera does not drift between recordings: a single image, here or of the "
+            "emissivity, does not show it, and u does not include it (drift)."
         )
     if any(isnan(row.estimate.contribution("repeatability")) for row in rows):
-        yield "nothing changes from frame to frame, as there is one only."
+        yield "Nothing changes between frames, as there is only one."
 
 
 def _seen(

@@ -13,6 +13,7 @@ from chipglow.camera import Blackbody, CalibrationFit, FittedCalibration, fit_mo
 from chipglow.io.column_file import read_calibration_points
 from chipglow.laboratory.measurement.camera_file import FlatFieldSources, uniform_counts
 from chipglow.radiometry import Band
+from chipglow.text import Notes
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,13 +24,12 @@ class BlackbodyCalibration:
     ----------
     fits : mapping
         By the names of their models.
-    assumptions, warnings : tuple of str
-        What had to be assumed, and why the preferred one may not be relied on, a sentence each.
+    notes : Notes
+        Assumptions, and warnings of the preferred fit.
     """
 
     fits: Mapping[str, CalibrationFit[FittedCalibration]]
-    assumptions: tuple[str, ...]
-    warnings: tuple[str, ...]
+    notes: Notes
 
     @property
     def preferred(self) -> str:
@@ -153,8 +153,10 @@ def calibrate_blackbodies(
     best = preferred(fits)
     return BlackbodyCalibration(
         fits,
-        tuple(_assumptions(emissivity, surroundings, table["temperature"])),
-        tuple(_warnings(best, fits[best], common_uncertainty is not None)),
+        Notes(
+            list(_assumptions(emissivity, surroundings, table["temperature"])),
+            list(_warnings(best, fits[best], common_uncertainty is not None)),
+        ),
     )
 
 
@@ -178,8 +180,8 @@ def _assumptions(
 ) -> Iterator[str]:
     if emissivity is None:
         yield (
-            "The blackbody's emissivity is 1 (emissivity); 0.97 would make 5.4 K at 500 degC "
-            "between 3.8 um and 5.1 um."
+            "The blackbody's emissivity is 1 (emissivity); 0.97 would shift the result by 5.4 K at "
+            "500 degC between 3.8 um and 5.1 um."
         )
     elif emissivity < 1 and surroundings is None:
         yield "The blackbody reflects 20 degC (surroundings)."
@@ -196,7 +198,7 @@ def _warnings(
     name: str, fit: CalibrationFit[FittedCalibration], common_known: bool
 ) -> Iterator[str]:
     for warning in fit.calibration.warnings:
-        yield f"{name}: {warning[0].lower()}{warning[1:]}"
+        yield f"{name}: {warning}"
     if not fit.stated:
         yield (
             "The uncertainty is from the scatter of the points, as if all counts were equally "

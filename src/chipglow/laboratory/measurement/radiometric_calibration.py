@@ -18,6 +18,7 @@ from chipglow.camera import (
 )
 from chipglow.radiometry import Band, ObjectParameters
 from chipglow.scene import Raster
+from chipglow.text import Notes
 
 Mirror: TypeAlias = Literal["none", "horizontal", "vertical"]
 MIRRORS: Final = ("none", "horizontal", "vertical")
@@ -109,8 +110,7 @@ def calibrate_recording(
     -------
     Measurement
         Pixels over the recording's saturation, or hotter than the calibration reaches, are
-        `Flag.SATURATED`; colder ones `Flag.UNDER_RANGE`. Attributes, each with a sentence a line:
-        ``notes`` (what the file says), ``assumed`` and ``warnings``.
+        `Flag.SATURATED`; colder ones `Flag.UNDER_RANGE`. Its attributes contain the notes.
 
     Raises
     ------
@@ -340,9 +340,7 @@ def _attributes(
         "range": _known(recording, calibration, "range_name"),
         "calibration": calibration.description if calibration else None,
         "object_parameters": _object_text(recording),
-        "notes": "\n".join(recording.notes),
-        "assumed": "\n".join(_assumed(recording, calibration, position)),
-        "warnings": "\n".join(_warnings(recording, calibration, errors_known)),
+        **_notes(recording, calibration, position, errors_known).attrs(),
     }
     return {name: value for name, value in attributes.items() if value not in (None, "")}
 
@@ -370,10 +368,24 @@ def _object_text(recording: Recording) -> str | None:
     )
 
 
+def _notes(
+    recording: Recording,
+    calibration: Calibration | None,
+    position: ImagePosition,
+    errors_known: bool,
+) -> Notes:
+    about_calibration = Notes(warnings=list(calibration.warnings if calibration else ()))
+    return (
+        recording.notes
+        + Notes(list(_assumed(recording, calibration, position)))
+        + about_calibration.about("Calibration")
+        + Notes(warnings=list(_warnings(recording, errors_known)))
+    )
+
+
 def _assumed(
     recording: Recording, calibration: Calibration | None, position: ImagePosition
 ) -> Iterator[str]:
-    yield from recording.assumptions
     settings = recording.object_parameters
     if recording.quantity == "temperature" and settings is None:
         yield (
@@ -397,12 +409,7 @@ def _assumed(
         yield "The origin of coordinates is the image's lower left corner: no tip was given."
 
 
-def _warnings(
-    recording: Recording, calibration: Calibration | None, errors_known: bool
-) -> Iterator[str]:
-    yield from recording.warnings
-    for warning in calibration.warnings if calibration else ():
-        yield f"The calibration: {warning[0].lower()}{warning[1:]}"
+def _warnings(recording: Recording, errors_known: bool) -> Iterator[str]:
     if not errors_known:
         yield "The uncertainty of the radiance from the calibration is not known."
     signal = recording.signal

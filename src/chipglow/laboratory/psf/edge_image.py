@@ -1,6 +1,6 @@
 """Images of edges, and which of their pixels can be used."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import sqrt
 from typing import Final
 
@@ -13,6 +13,7 @@ from chipglow.laboratory.psf.edge_line import EdgeLine, NoEdgeError, Straightnes
 from chipglow.laboratory.psf.psf_fit import EdgePixels, ModelFit, fit_model
 from chipglow.laboratory.psf.psf_models import GaussianModel
 from chipglow.scene import Raster
+from chipglow.text import Notes
 
 _LEAST_STEP: Final = 7.0
 _OUTLIER: Final = 7.0
@@ -21,7 +22,7 @@ _BLOCK: Final = 5
 _ROUGHLY: Final = 1e-5
 _LEAST_PILE: Final = 10
 _MANY_CLIPPED: Final = 0.02
-_WHOLE_SQUARE: Final = "the whole square of a pixel takes light (fill factor 1)."
+_WHOLE_SQUARE: Final = "The whole square of a pixel takes light (fill factor 1)."
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +43,10 @@ class EdgeImage:
         Middle of the camera's band in m.
     name : str
         What it is called in messages.
-    notes : tuple of str
-        What is assumed of it, a sentence each.
-    warnings : tuple of str
-        Why it may not be trusted, a sentence each.
     unit : str
         Of the radiance: counts where no calibration is needed.
+    notes : Notes
+        Assumptions and warnings.
     """
 
     radiance: NDArray[np.float64]
@@ -59,9 +58,8 @@ class EdgeImage:
     footprint: float
     wavelength: float | None
     name: str
-    notes: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
     unit: str = "W/(m² sr)"
+    notes: Notes = field(default_factory=Notes)
 
     @property
     def pitch(self) -> float:
@@ -96,11 +94,11 @@ def edge_image(
     attributes = measurement.data.attrs
     band = measurement.band if "band_lower" in attributes else None
     image = _mean_image(measurement.radiance, measurement.flags, measurement.raster, name, region)
-    notes, below = list(_notes(measurement)), image.below
+    notes, below = _notes(measurement), image.below
     if below.any() and np.isfinite(image.radiance[below]).all():
         # An edge needs radiance, which the optics add up, and no temperature.
-        notes.append(
-            f"{100 * np.mean(below):.2g} % of the pixels of {name} are under the range of the "
+        notes.assumed.append(
+            f"{100 * np.mean(below):.2g} % of the pixels of {name} are below the range of the "
             "camera or its calibration; their radiance is used as it is."
         )
         below = np.zeros_like(below)
@@ -109,8 +107,7 @@ def edge_image(
         below=below,
         footprint=image.pitch * sqrt(float(attributes.get("fill_factor", 1.0))),
         wavelength=(band.lower + band.upper) / 2 if band else None,
-        notes=tuple(notes),
-        warnings=tuple(str(attributes.get("warnings", "")).splitlines()),
+        notes=notes,
     )
 
 
@@ -149,22 +146,22 @@ def counts_image(
     # No camera counts less than nothing: there, the dark side is cut off.
     cut = np.where(recording.signal <= 0, Flag.UNDER_RANGE, 0).astype(np.uint8)
     image = _mean_image(signal, flags | cut, raster, name, region)
-    notes = [
-        *recording.assumptions,
-        "the counts are a straight line over the radiance: an edge needs no calibration.",
-    ]
+    notes = recording.notes + Notes(
+        ["The counts are linear in the radiance: an edge needs no calibration."]
+    )
     if recording.fill_factor is None:
-        notes.append(_WHOLE_SQUARE)
+        notes.assumed.append(_WHOLE_SQUARE)
     if recording.saturation is None:
-        notes.append("no pixel is saturated: neither the file nor the description says from where.")
+        notes.assumed.append(
+            "No pixel is saturated: neither the file nor the description states the limit."
+        )
     band = recording.band
     return replace(
         image,
         footprint=image.pitch * sqrt(recording.fill_factor or 1.0),
         wavelength=(band.lower + band.upper) / 2 if band else None,
-        notes=tuple(notes),
-        warnings=recording.warnings,
         unit="counts",
+        notes=notes,
     )
 
 
@@ -197,19 +194,19 @@ def _mean_image(
     )
 
 
-def _notes(measurement: Measurement) -> tuple[str, ...]:
-    notes = str(measurement.data.attrs.get("assumed", "")).splitlines()
+def _notes(measurement: Measurement) -> Notes:
+    notes = measurement.notes
     if "fill_factor" not in measurement.data.attrs:
-        notes.append(_WHOLE_SQUARE)
+        notes.assumed.append(_WHOLE_SQUARE)
     if measurement.data.attrs.get("psf_order") == "detector":
-        notes.append(
-            "each pixel's square acts once; this camera was simulated with psf_order pixel, "
+        notes.assumed.append(
+            "Each pixel's square acts once; this camera was simulated with psf_order pixel, "
             "where it acts twice, and the second time is counted as optics."
         )
-    return tuple(notes)
+    return notes
 
 
-def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
+def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, Notes]:
     """Find the edge in an image, and the pixels that show it.
 
     Where pixels are saturated or under range, all pixels from there on outward are left
@@ -224,8 +221,10 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
     -------
     EdgePixels
         The pixels, x and y from the image's middle, with even noise.
-    list of str
-        Why they may not be trusted.
+
+    Notes
+    -----
+        Warnings of the image and of the choice of pixels, about the image.
 
     Raises
     ------
@@ -252,11 +251,11 @@ def usable_pixels(image: EdgeImage) -> tuple[EdgePixels, list[str]]:
         _check_single(pixels, quick)
     except NoEdgeError as error:
         raise NoEdgeError(f"{image.name}: {error}") from None
-    said = [f"{image.name}: {warning}" for warning in (*image.warnings, *warnings)]
+    notes = Notes(warnings=[*image.notes.warnings, *warnings]).about(image.name)
     noise = float(np.std(pixels.radiance - quick.predicted(0, pixels)))
     pixels = replace(pixels, sigma=np.full(pixels.x.size, max(noise, 1e-300)))
     # A Gaussian with a free step can put the edge of a clipped image far away.
-    return (pixels if clipped else replace(pixels, line=quick.edges[0].line)), said
+    return (pixels if clipped else replace(pixels, line=quick.edges[0].line)), notes
 
 
 def _pixels_of(
@@ -400,11 +399,11 @@ def _check_single(pixels: EdgePixels, quick: ModelFit) -> None:
 
 def _bent(straightness: Straightness | None, image: EdgeImage) -> list[str]:
     if straightness is None:
-        return ["the edge was found by its step only; that it is straight could not be checked."]
+        return ["The edge was found by its step only; its straightness could not be checked."]
     bent, unsure = straightness.sagitta, straightness.uncertainty
     if bent < 4 * unsure or bent < 0.05 * image.pitch:
         return []
     return [
-        f"the edge is bent by {bent * 1e6:.2g} um over its length (standard uncertainty "
+        f"The edge is bent by {bent * 1e6:.2g} um over its length (standard uncertainty "
         f"{unsure * 1e6:.1g} um), which makes the point spread function too wide."
     ]

@@ -11,7 +11,7 @@ from chipglow.drawing import drawing, scales
 from chipglow.drawing.scales import BLUE, GREY, VERMILLION, VOID
 from chipglow.laboratory.psf.knife_edge import EdgeResult, KnifeEdge
 from chipglow.laboratory.psf.psf_fit import FittedEdge
-from chipglow.laboratory.psf.summary import with_uncertainty
+from chipglow.quantities import uncertain_text
 from chipglow.scene import Raster
 
 _HEIGHT: Final = 5.6
@@ -30,7 +30,7 @@ def draw_knife_edge(found: KnifeEdge) -> Figure:
     heights = [_HEIGHT] * len(found.edges) + ([_APERTURES] if found.apertures else [])
     with drawing.style():
         figure = drawing.new_figure(sum(heights) + 0.4)
-        width = with_uncertainty(found.fwhm * 1e6, found.fwhm_uncertainty * 1e6)
+        width = uncertain_text(found.fwhm * 1e6, found.fwhm_uncertainty * 1e6)
         figure.suptitle(f"{found.best.model.name}: optics {width} µm wide (FWHM)")
         parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)
         for k, edge in enumerate(found.edges):

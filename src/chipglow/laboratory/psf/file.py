@@ -41,8 +41,7 @@ def write_psf(
         fwhm=knife.fwhm,
         fwhm_uncertainty=knife.fwhm_uncertainty,
         model=knife.best.model.name,
-        warnings="\n".join(knife.warnings),
-        assumed="\n".join(knife.assumptions),
+        **knife.notes.attrs(),
     )
     for fit, weight in zip(knife.fits, knife.weights, strict=True):
         data = data.assign(_fit_variables(fit.model.name.replace(" ", "_"), fit, weight))

@@ -47,6 +47,7 @@ from chipglow.laboratory.psf.psf_models import (
 )
 from chipglow.laboratory.psf.radial_psf import RadialPSF, radial_psf
 from chipglow.laboratory.psf.size_of_source import ApertureImage, aperture_signals
+from chipglow.text import Notes
 
 RADIAL: Final = "radial"
 """Name of the point spread function without a model."""
@@ -113,17 +114,14 @@ class KnifeEdge:
         criterion first.
     apertures : ApertureSignals or None
         Signals of apertures that were fitted with the edges.
-    warnings : tuple of str
-        Why results may not be trusted, a sentence each.
-    assumptions : tuple of str
-        What had to be assumed, a sentence each.
+    notes : Notes
+        Assumptions and warnings.
     """
 
     edges: tuple[EdgeResult, ...]
     fits: tuple[ModelFit, ...]
     apertures: ApertureSignals | None
-    warnings: tuple[str, ...]
-    assumptions: tuple[str, ...]
+    notes: Notes
 
     @cached_property
     def radial(self) -> RadialPSF:
@@ -293,10 +291,10 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
         raise ValueError("edges: none is given, expected an image or more")
     read = [usable_pixels(image) for image in images]
     edges = [pixels for pixels, _ in read]
-    warnings = [warning for _, said in read for warning in said]
+    notes = sum((said for _, said in read), Notes())
     signals = aperture_signals(apertures, images[0].footprint) if apertures else None
-    models, assumptions = _models(images, edges)
-    assumptions += dict.fromkeys(note for image in images for note in image.notes)
+    models = _models(images, edges, notes)
+    notes += Notes([text for image in images for text in image.notes.assumed])
     first = [fit_model(model, edges, signals, tolerance=_ROUGHLY) for model in models]
     if min(fit.reduced_chi_squared for fit in first) > _NOISE_ALONE:
         # Where much is clipped there are several minima.
@@ -313,33 +311,33 @@ def knife_edge(images: Sequence[EdgeImage], apertures: Sequence[ApertureImage] =
         _result(best, k, images[k], edges[k], spreads[k], alone) for k in range(len(edges))
     )
     for k, result in enumerate(results):
-        warnings += _edge_warnings(best, k, result)
-    warnings += _fit_warnings(best, results)
-    warnings += _aperture_warnings(best, signals) if signals is not None else []
-    return KnifeEdge(results, tuple(fits), signals, tuple(warnings), tuple(assumptions))
+        notes.warnings.extend(_edge_warnings(best, k, result))
+    notes.warnings.extend(_fit_warnings(best, results))
+    if signals is not None:
+        notes.warnings.extend(_aperture_warnings(best, signals))
+    return KnifeEdge(results, tuple(fits), signals, notes)
 
 
 def _models(
-    images: Sequence[EdgeImage], edges: Sequence[EdgePixels]
-) -> tuple[list[PSFModel], list[str]]:
-    """Models that the images can distinguish, and what is assumed with them."""
+    images: Sequence[EdgeImage], edges: Sequence[EdgePixels], notes: Notes
+) -> list[PSFModel]:
+    """Return the models that the images can distinguish; note what they assume."""
     models: list[PSFModel] = [
         GaussianModel(),
         GaussianTailModel(),
         MoffatModel(),
         DefocusedDiscModel(),
     ]
-    assumptions = []
     wavelength = images[0].wavelength
     if wavelength is None:
-        assumptions.append(
-            "diffraction was not tried: the measurement does not state the limits of its band."
+        notes.assumed.append(
+            "Diffraction was not tried: the measurement does not state the limits of its band."
         )
     else:
         models.append(AnnularModel(wavelength))
-        assumptions.append(
-            f"diffraction at {wavelength * 1e6:.4g} um, the middle of the band; only the ratio of "
-            "the wavelength to the numerical aperture can be seen."
+        notes.assumed.append(
+            f"Diffraction acts at {wavelength * 1e6:.4g} um, the centre of the band; only the "
+            "ratio of the wavelength to the numerical aperture can be determined."
         )
     directions = orientations(edges)
     tilts = [abs((direction + np.pi / 4) % (np.pi / 2) - np.pi / 4) for direction in directions]
@@ -347,16 +345,16 @@ def _models(
         models.append(EllipticalModel(tilted=True))
     elif len(directions) == 2 and max(tilts) < _ALIGNED:
         models.append(EllipticalModel(tilted=False))
-        assumptions.append(
-            "an oval point spread function has its axes along rows and columns: edges of two "
+        notes.assumed.append(
+            "An oval point spread function has its axes along rows and columns: edges of two "
             "orientations do not show one that lies oblique; an edge at 45 deg would."
         )
     else:
-        assumptions.append(
-            f"a round point spread function: edges of {_NUMBERS[len(directions)]} are given, "
+        notes.assumed.append(
+            f"The point spread function is round: edges of {_NUMBERS[len(directions)]} are given, "
             "which do not show an oval one; edges of three orientations would."
         )
-    return models, assumptions
+    return models
 
 
 def _result(
@@ -403,14 +401,14 @@ def _edge_warnings(best: ModelFit, k: int, result: EdgeResult) -> list[str]:
     gap = float(np.diff(core).max()) if core.size > 1 else pixels.pitch
     if gap > 1.05 * pixels.pitch / BINS_PER_PITCH:
         warnings.append(
-            f"{name}: with a tilt of {degrees(best.edges[k].line.tilt):.2f} deg the pixels lie at "
+            f"{name}: With a tilt of {degrees(best.edges[k].line.tilt):.2f} deg the pixels lie at "
             f"distances up to {gap * 1e6:.2g} um apart, not at a quarter of the pitch: beyond "
             f"{0.5 / gap / 1e3:.3g} /mm the MTF is aliased; tilt the edge by 2 deg to 10 deg."
         )
     short = min(-float(distance.min()), float(distance.max()))
     if short < _PLATEAU * result.line_fwhm:
         warnings.append(
-            f"{name}: only {short * 1e6:.3g} um of one side of the edge are seen, under "
+            f"{name}: Only {short * 1e6:.3g} um of one side of the edge are seen, under "
             f"{_PLATEAU:g} widths: tails and brightness of the side cannot be distinguished."
         )
     return warnings
@@ -422,13 +420,13 @@ def _fit_warnings(best: ModelFit, edges: Sequence[EdgeResult]) -> list[str]:
     footprint = max(edge.image.footprint for edge in edges)
     if best.fwhm < _UNRESOLVED * footprint or best.fwhm_uncertainty > 0.5 * best.fwhm:
         warnings.append(
-            f"the optics' width of {best.fwhm * 1e6:.2g} um is hardly seen beside the pixel's "
+            f"The optics' width of {best.fwhm * 1e6:.2g} um is hardly seen beside the pixel's "
             f"{footprint * 1e6:.3g} um: take it for an upper limit."
         )
     left = max(_left(edge) for edge in edges)
     if best.reduced_chi_squared > _NOISE_ALONE and left > _NOTHING:
         warnings.append(
-            f"no model fits: the best, {best.model.name}, leaves "
+            f"No model fits: the best, {best.model.name}, leaves "
             f"{sqrt(best.reduced_chi_squared):.2g} times the noise in the means at a distance, "
             f"{100 * left:.2g} % of the step near the edge; uncertainties are enlarged by it, "
             "and the point spread function without a model (radial) may be nearer."
@@ -445,7 +443,7 @@ def _aperture_warnings(best: ModelFit, signals: ApertureSignals) -> list[str]:
     if square < _APERTURES_APART * left.size or abs(left[greatest]) < _NOTHING:
         return []
     return [
-        f"the apertures and the edges contradict each other: the signal of "
+        f"The apertures and the edges contradict each other: the signal of "
         f"{signals.diameters[greatest] * 1e6:.4g} um is {100 * abs(left[greatest]):.2g} % of the "
         "source away from the fit; check the diameters and that the source is even."
     ]

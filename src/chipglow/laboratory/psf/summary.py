@@ -8,11 +8,12 @@ from chipglow.camera import AnnularAperturePSF, GaussianPSF
 from chipglow.laboratory.psf.knife_edge import KnifeEdge
 from chipglow.laboratory.psf.psf_fit import ModelFit
 from chipglow.laboratory.psf.psf_models import is_length
+from chipglow.quantities import uncertain_text
 
 
 def sentences(found: KnifeEdge) -> list[str]:
     """The result, and how to use it."""
-    width = with_uncertainty(found.fwhm * 1e6, found.fwhm_uncertainty * 1e6)
+    width = uncertain_text(found.fwhm * 1e6, found.fwhm_uncertainty * 1e6)
     lines = [
         f"The optics' point spread function is {width} um wide (full width at half maximum, with "
         f"its standard uncertainty; {found.best.model.name}: {_parameters(found.best)})."
@@ -37,21 +38,13 @@ def study_section(found: KnifeEdge) -> str | None:
     return None
 
 
-def with_uncertainty(value: float, uncertainty: float) -> str:
-    """A number and its standard uncertainty, which has two digits."""
-    if not np.isfinite(uncertainty) or uncertainty <= 0:
-        return f"{value:.4g}"
-    decimals = max(0, 1 - int(np.floor(np.log10(uncertainty))))
-    return f"{value:.{min(decimals, 9)}f} ± {uncertainty:.{min(decimals, 9)}f}"
-
-
 def _parameters(fit: ModelFit) -> str:
     texts = []
     for name, value, deviation in zip(
         fit.model.parameters, fit.values, fit.uncertainties, strict=True
     ):
         scale, unit = (1e6, " um") if is_length(name) else (1.0, "")
-        number = with_uncertainty(float(value) * scale, float(deviation) * scale)
+        number = uncertain_text(float(value) * scale, float(deviation) * scale)
         texts.append(f"{name.replace('_', ' ')} {number}{unit}")
     return ", ".join(texts)
 

@@ -138,8 +138,8 @@ def _rivals(
         return ()
     away = _distance(max(others, key=_Placement.worth).matrix, best.matrix, first)
     return (
-        f"the dots match {away:.0f} visible pixels further on as well; a target that both cameras "
-        "see whole, or whose grid has a gap, would decide",
+        f"The dots match {away:.0f} visible pixels further on as well; a target that both cameras "
+        "see whole, or whose grid has a gap, would decide.",
     )
 
 

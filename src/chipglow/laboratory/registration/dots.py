@@ -1,7 +1,7 @@
 """Dots of a target that both cameras see, and the registration that they give."""
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from scipy.special import erfc
 from chipglow.laboratory.registration.dot_matching import Arrangement, match_dots
 from chipglow.laboratory.registration.registration import Model, PointFit, Registration, fit_points
 from chipglow.scene import Raster
+from chipglow.text import Notes
 
 FEWEST_DOTS: Final = 6
 
@@ -33,6 +34,10 @@ _AGAIN: Final = 12
 _SETTLED: Final = 0.2
 _ENOUGH: Final = 1e-6
 _ALIKE_PIXELS: Final = 8
+_NOT_MIRRORED: Final = (
+    "The visible picture is not mirrored, is turned by up to 30 degrees, and shows half to twice "
+    "the infrared image's width; otherwise give points."
+)
 
 
 @dataclass(frozen=True)
@@ -67,14 +72,7 @@ class DotFit:
         The registration, with the dots that were seen in both and their residuals.
     infrared, visible : Dots
         All that were found.
-    assumptions : tuple of str
-        What had to be assumed, a sentence each.
     """
-
-    assumptions: ClassVar[tuple[str, ...]] = (
-        "the visible picture is not mirrored, is turned by up to 30 degrees, and shows half to "
-        "twice the infrared image's width; else give points.",
-    )
 
     points: PointFit
     infrared: Dots
@@ -132,9 +130,10 @@ def fit_dots(
     scale = raster.spacing * np.sqrt(abs(np.linalg.det(fit.registration.jacobian(positions))))
     variance = (scale * dots[0].uncertainty[match.first]) ** 2
     expected = float(np.sqrt((variance + dots[1].uncertainty[match.second] ** 2).mean()))
-    warnings = (*fit.registration.warnings, *match.warnings, *_scattered(fit.scatter, expected))
+    warnings = [*match.warnings, *_scattered(fit.scatter, expected)]
+    notes = fit.registration.notes + Notes([_NOT_MIRRORED], warnings)
     covariance = fit.registration.covariance + _systematic(fit.registration, raster)
-    found = replace(fit.registration, covariance=covariance, method="dots", warnings=warnings)
+    found = replace(fit.registration, covariance=covariance, method="dots", notes=notes)
     return DotFit(replace(fit, registration=found), *dots)
 
 
@@ -398,6 +397,6 @@ def _scattered(scatter: float, expected: float) -> tuple[str, ...]:
     if scatter < _SCATTER * expected:
         return ()
     return (
-        f"the dots scatter by {scatter:.2g} visible pixels where their own uncertainty explains "
-        f"{expected:.2g}: the map is of another kind than the model",
+        f"The dots scatter by {scatter:.2g} visible pixels where their own uncertainty explains "
+        f"{expected:.2g}: the map is of another kind than the model.",
     )

@@ -9,7 +9,7 @@ import yaml
 from chipglow.io import atomic_path
 from chipglow.laboratory.registration.registration import Method, Model, Registration
 from chipglow.quantities import Parameter, Settings
-from chipglow.text import DescriptionError, read_description, validated
+from chipglow.text import DescriptionError, Notes, read_yaml, validated
 
 _Row = tuple[float, ...]
 _Rows = tuple[_Row, ...]
@@ -35,7 +35,8 @@ class RegistrationDescription(Settings[Registration]):
     degrees_of_freedom: Annotated[float | None, Parameter("Of the covariance; none: infinite.")] = (
         None
     )
-    warnings: Annotated[tuple[str, ...], Parameter("Why it is not trusted.")] = ()
+    assumed: Annotated[tuple[str, ...], Parameter("Assumptions.")] = ()
+    warnings: Annotated[tuple[str, ...], Parameter("Reasons why it may be wrong.")] = ()
 
     def build(self) -> Registration:
         """The registration."""
@@ -48,7 +49,7 @@ class RegistrationDescription(Settings[Registration]):
             self.model,
             self.method,
             np.inf if self.degrees_of_freedom is None else self.degrees_of_freedom,
-            self.warnings,
+            Notes(list(self.assumed), list(self.warnings)),
         )
 
 
@@ -67,7 +68,8 @@ def write_registration(registration: Registration, path: str | Path) -> None:
         "matrix": registration.matrix.tolist(),
         "covariance": registration.covariance.tolist(),
         "degrees_of_freedom": registration.degrees_of_freedom if finite else None,
-        "warnings": list(registration.warnings),
+        "assumed": registration.notes.assumed,
+        "warnings": registration.notes.warnings,
     }
     text = _HEAD + yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=100)
     with atomic_path(path) as temporary:
@@ -85,7 +87,7 @@ def load_registration(path: str | Path) -> Registration:
         If it cannot be read.
     """
     path = Path(path)
-    data = read_description(path)
+    data = read_yaml(path)
     for name in ("matrix", "covariance"):
         if not isinstance(data, dict) or name not in data:
             raise DescriptionError(f"{path.name}: {name} is missing, expected a registration")

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from math import cos, hypot, log, radians, sin
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from chipglow.laboratory.registration.registration import (
     parameter_basis,
 )
 from chipglow.scene import Raster
+from chipglow.text import Notes
 
 _BINS: Final = 8
 _ENDS: Final = (0.5, 98.0)
@@ -70,14 +71,7 @@ class ImageFit:
     by_chance : ndarray
         The same for infrared images that are turned over and moved round, so that they have
         nothing to do with the visible picture, shape (n,).
-    assumptions : tuple of str
-        What had to be assumed, a sentence each.
     """
-
-    assumptions: ClassVar[tuple[str, ...]] = (
-        "the visible picture is not mirrored, and shows the infrared image's width within 25 % and "
-        "its middle within a quarter of the width; else give points.",
-    )
 
     registration: Registration
     information: float
@@ -141,13 +135,13 @@ def fit_images(
     spread, flat = _sandwich(fine, frame, matrix, basis)
     full, covariance = frame.undone(matrix, basis @ spread @ basis.T)
     found = Registration(full, covariance, model, "mutual-information")
-    warnings = (
+    warnings = [
         *(() if score > chance.max() else (_BY_CHANCE,)),
         *_rivals(fits[::-1], fine, frame),
         *((_NO_OPTIMUM,) if flat else _unsure(found, raster)),
-    )
+    ]
     return ImageFit(
-        replace(found, warnings=warnings),
+        replace(found, notes=Notes([_NOT_MIRRORED], warnings)),
         _information(fine, frame, matrix),
         _common_edges(fine, frame, matrix, basis)[0],
         score,
@@ -155,10 +149,12 @@ def fit_images(
     )
 
 
-_BY_CHANCE: Final = (
-    "the best placement is no better than that of images that have nothing to do with each other"
+_NOT_MIRRORED: Final = (
+    "The visible picture is not mirrored, and shows the infrared image's width within 25 % and "
+    "its centre within a quarter of the width; otherwise give points."
 )
-_NO_OPTIMUM: Final = "no placement is better than its neighbours in every direction"
+_BY_CHANCE: Final = "The best placement is no better than that of unrelated images."
+_NO_OPTIMUM: Final = "No placement is better than its neighbours in every direction."
 
 
 @dataclass(frozen=True)
@@ -527,8 +523,8 @@ def _rivals(
         distance = _apart(best, matrix, level, frame)
         if distance > _FAR and common > _RIVAL * most:
             return (
-                f"another placement, {distance:.0f} infrared pixels away, fits nearly as well, "
-                "points or dots would decide",
+                f"Another placement, {distance:.0f} infrared pixels away, fits nearly as well, "
+                "points or dots would decide.",
             )
     return ()
 
@@ -538,8 +534,8 @@ def _unsure(found: Registration, raster: Raster) -> tuple[str, ...]:
     if typical < _UNSURE:
         return ()
     return (
-        f"the standard uncertainty of a position is {typical:.2g} infrared pixels in the median: "
-        "the images have too little in common",
+        f"The standard uncertainty of a position is {typical:.2g} infrared pixels in the median: "
+        "the images have too little in common.",
     )
 
 

@@ -1,6 +1,6 @@
 """What two cameras recorded, put on one clock."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
@@ -14,6 +14,7 @@ from chipglow.laboratory.registration.time_alignment import (
     region_signals,
     simultaneous_frames,
 )
+from chipglow.text import Notes
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,14 +29,14 @@ class RecordingAlignment:
         When each infrared integration began in s, shape (n,).
     visible_frames : list of ndarray
         Numbers of the visible frames that were exposed within each, from 0.
-    assumptions : tuple of str
-        What had to be assumed, a sentence each.
+    notes : Notes
+        Assumptions, and warnings of the clocks.
     """
 
     clocks: TimeAlignment
     infrared_times: NDArray[np.float64]
     visible_frames: list[NDArray[np.int64]]
-    assumptions: tuple[str, ...] = ()
+    notes: Notes = field(default_factory=Notes)
 
     def to_frame(self) -> pd.DataFrame:
         """Every infrared frame, a row each.
@@ -88,13 +89,16 @@ def align_recordings(
         registration, infrared.radiance, infrared.raster, visible.signal, region
     )
     exposure = visible.integration_time or float(np.median(np.diff(visible.times)))
-    assumed = f"a visible exposure lasts as long as its frame, {1e6 * exposure:.4g} us."
+    notes = Notes()
+    if visible.integration_time is None:
+        notes.assumed.append(
+            f"A visible exposure lasts as long as its frame, {1e6 * exposure:.4g} us."
+        )
     times = infrared.times
     clocks = align_times(times + integration / 2, hot, visible.times + exposure / 2, bright)
     within = simultaneous_frames(clocks, times, integration, visible.times, exposure)
-    return RecordingAlignment(
-        clocks, times, within, (assumed,) if visible.integration_time is None else ()
-    )
+    notes.warnings.extend(clocks.warnings)
+    return RecordingAlignment(clocks, times, within, notes)
 
 
 def infrared_radiance(measurement: Measurement, frame: int) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 """Where a point of the infrared image is in the visible picture, and how surely."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import ceil, hypot
 from typing import Final, Literal, NamedTuple, TypeAlias
 
@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 from scipy.special import fdtrc
 
 from chipglow.scene import Raster
+from chipglow.text import Notes
 
 Model: TypeAlias = Literal["similarity", "affine", "homography"]
 Method: TypeAlias = Literal["points", "dots", "mutual-information"]
@@ -66,8 +67,8 @@ class Registration:
     degrees_of_freedom : float
         Of the covariance: Student's t with so many gives the intervals; infinite for mutual
         information.
-    warnings : tuple of str
-        Why it cannot be trusted, a sentence each; empty if nothing speaks against it.
+    notes : Notes
+        Assumptions, and reasons why it may be wrong.
 
     Raises
     ------
@@ -80,7 +81,7 @@ class Registration:
     model: Model
     method: Method
     degrees_of_freedom: float = np.inf
-    warnings: tuple[str, ...] = ()
+    notes: Notes = field(default_factory=Notes)
 
     def __post_init__(self) -> None:
         for name, value, shape in (
@@ -282,19 +283,19 @@ def fit_points(
     inverse = np.linalg.inv(slope.T @ slope)
     misplaced = _misplaced(residual, slope @ inverse @ slope.T, variance, freedom)
     full, spread = frame.undone(matrix, basis @ (variance * inverse) @ basis.T)
-    warnings = tuple(
-        f"point {i + 1} is {hypot(*(residual.reshape(-1, 2)[i] * frame.pixel_scale)):.3g} visible "
-        "pixels from where the others expect it"
+    warnings = [
+        f"Point {i + 1} is {hypot(*(residual.reshape(-1, 2)[i] * frame.pixel_scale)):.3g} visible "
+        "pixels from where the others expect it."
         for i in np.flatnonzero(misplaced)
-    )
+    ]
     scatter = float(np.sqrt(variance)) * frame.pixel_scale
     if picked and scatter < _BEST_PICKED:
-        warnings += (
-            f"the points agree to {scatter:.1g} visible pixels, better than anyone picks them: "
-            "they may be computed from each other, and the uncertainty that follows is too small",
+        warnings.append(
+            f"The points agree to {scatter:.1g} visible pixels, better than anyone picks them: "
+            "they may be computed from each other, and the resulting uncertainty is too small."
         )
     return PointFit(
-        Registration(full, spread, model, "points", float(freedom), warnings),
+        Registration(full, spread, model, "points", float(freedom), Notes(warnings=warnings)),
         residual.reshape(-1, 2) * frame.pixel_scale,
         scatter,
         misplaced,

@@ -310,10 +310,7 @@ def _chance(correlation: float, freedom: float, offsets: int) -> tuple[str, ...]
     likely = 2 * float(stdtr(freedom, -abs(correlation) * np.sqrt(freedom / rest))) * offsets
     if likely < _CHANCE:
         return ()
-    return (
-        f"a correlation of {correlation:.2f} is no better than that of signals which have nothing "
-        "to do with each other",
-    )
+    return (f"A correlation of {correlation:.2f} is no better than that of unrelated signals.",)
 
 
 def _rivals(
@@ -331,6 +328,6 @@ def _rivals(
     if gain > _RIVAL or others[rival] == 0.0:
         return ()
     return (
-        f"an offset of {(offsets[rival] - offsets[best]) * 1e6:.4g} us more fits nearly as well, "
-        f"with a correlation of {correlations[rival]:.2f}: the signals are periodic, or say little",
+        f"An offset of {(offsets[rival] - offsets[best]) * 1e6:.4g} us more fits nearly as well, "
+        f"with a correlation of {correlations[rival]:.2f}: they are periodic, or say little.",
     )
