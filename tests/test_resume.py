@@ -146,6 +146,7 @@ def progress_of_all(study):
             continue
 
 
+@pytest.mark.slow
 def test_a_cut_that_is_killed_again_and_again_ends_with_the_same_bits(cache, unbroken):
     study, rng = load_study("study.yaml"), np.random.default_rng(1)
     killed_run(study, rng)
