@@ -17,6 +17,7 @@ from chipglow.camera import (
 )
 from chipglow.laboratory.measurement import ImagePosition, calibrate_recording, flag_fractions
 from chipglow.radiometry import Band, ObjectParameters
+from chipglow.text import Notes
 
 BAND = Band(3.8e-6, 5.1e-6)
 KELVINS = np.linspace(573.15, 1273.15, 8)
@@ -269,12 +270,11 @@ def test_without_object_parameters_it_is_said_what_is_assumed():
 
 
 def test_what_the_file_says_is_kept_apart_from_what_was_assumed_and_is_doubtful():
-    said = {"notes": ("Lens: 25 mm.",), "assumptions": ("an even rate.",), "warnings": ("a gap.",)}
-    measured = calibrate_recording(recording(np.full((1, 2, 2), 9.0), "radiance", **said))
-    attributes = measured.data.attrs
-    assert attributes["notes"] == "Lens: 25 mm."
-    assert "an even rate." in attributes["assumed"].splitlines()
-    assert "a gap." in attributes["warnings"].splitlines()
+    said = Notes(["An even rate."], ["A gap."], ["Lens: 25 mm."])
+    measured = calibrate_recording(recording(np.full((1, 2, 2), 9.0), "radiance", notes=said))
+    assert measured.data.attrs["remarks"] == "Lens: 25 mm."
+    assert "An even rate." in measured.notes.assumed
+    assert "A gap." in measured.notes.warnings
 
 
 def test_radiance_is_taken_as_it_is():

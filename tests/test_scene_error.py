@@ -272,7 +272,7 @@ def test_one_emissivity_is_enough(folder):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("plate.nc", "--emissivity", "1.5"), ("--emissivity", "1.5", "expected 0 to 1")),
+        (("plate.nc", "--emissivity", "1.5"), ("--emissivity", "1.5", "from 0 to 1")),
         (("none.nc",), ("none.nc", "no such file")),
         (("plate.nc",), ("plate.nc", "no plastic strain", "kind: uniform")),
     ],

@@ -1,4 +1,4 @@
-"""The analysis: which images are taken of a scene, where they are read, and the Dataset of it."""
+"""The analysis of a scene: the schedule of its images, the places that are read, the result."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -81,7 +81,7 @@ class _Task:
         return self.camera.frame_duration(self.scene.raster)
 
     def attempt(self, title: str, compute: Callable[[], _Part]) -> _Part | None:
-        """A part of the analysis; if it fails, its reason is noted and the others go on."""
+        """Compute a part of the analysis; if it fails, keep the reason and continue without it."""
         try:
             return compute()
         except ValueError as error:
@@ -181,7 +181,7 @@ def _segments(task: _Task) -> tuple[Segments | None, tuple[str, ...]]:
     try:
         found = find_segments(scene, task.duration, plan.exposures, plan.touching, task.tell)
     except (NoShearBandError, NoContactError) as error:
-        return None, (f"The errors of the paper's places are not here: {error}.",)
+        return None, (f"Rake face and shear band are not analysed: {error}.",)
     return found, ()
 
 
@@ -263,7 +263,7 @@ def _places(task: _Task, frame: Frame) -> Iterator[Place]:
 
 
 def _cut(task: _Task, found: Segments) -> Cut:
-    """What is known of a cut beside the images: each part may fail."""
+    """Chip, forces and heated objects of a cut; each part may fail."""
     task.tell("chip", 0.0)
     chip = task.attempt("chip metrics", lambda: chip_metrics(task.scene))
     task.tell("chip", 1.0)
@@ -366,6 +366,6 @@ def _unread(schedule: Schedule, looked: Looked) -> Iterator[str]:
             ]
             if not any(np.isfinite(row).all() for row in rows):
                 yield (
-                    f"{place.name}, {view.surface}: not read, for in some draw nothing radiates "
-                    "there or it is beyond the pixels."
+                    f"{place.name}, {view.surface}: not read: in some draw nothing radiates "
+                    "there, or it lies outside the pixels."
                 )

@@ -1,4 +1,4 @@
-"""The one loop of an analysis: images of a scene over exposures, textures and pixel phases.
+"""The loop of an analysis: images of a scene over exposures, textures and pixel phases.
 
 Images that agree up to a stage share it: frames are read once for all surfaces and textures of an
 exposure, an exposure is formed by all cameras, and blurred radiance serves all pixel phases.

@@ -113,9 +113,9 @@ def wavelength_errors(
     Notes
     -----
     The pixel that holds the spot is read. Its true temperature is that at its centre in the middle
-    of the exposure, linear between the four samples around it. One band is told the emissivity of
-    just that place, the ratio that emissivities are the same. Steps are differences as those of
-    `ratio_errors`.
+    of the exposure, interpolated linearly between the four samples around it. For one band the
+    emissivity at the pixel's centre is taken as known; for a ratio the two emissivities are taken
+    as equal. Steps are differences like those of `ratio_errors`.
     """
     tell = progress or (lambda label, part: None)
     cameras = [replace(camera.in_band(band), detector=None) for band in plan.bands]

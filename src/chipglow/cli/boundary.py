@@ -40,7 +40,7 @@ class Boundary(TyperGroup):
             done = super().invoke(ctx)
             screen.current().close()
             return done
-        except BrokenPipeError:
+        except (BrokenPipeError, typer.Exit):
             raise
         except (ValueError, OSError) as error:
             raise _ended(_one_line(error), BAD_INPUT) from None

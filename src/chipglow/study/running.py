@@ -147,7 +147,7 @@ def errors(
 ) -> Analysis:
     """Measurement error of any scene, exposure by exposure, at the study's places; see `run`.
 
-    Nothing is asked of the scene but its temperature: it may be of no cut at all.
+    The scene needs no more than its temperature; it need not show a cut.
     """
     return _analyse(study, replace(study.plan, cut=False), progress, resume, assume)
 
