@@ -120,7 +120,7 @@ def test_a_point_spread_function_with_the_footprint_counts_it_once():
     np.testing.assert_allclose(camera.form_image(radiance, scene), expected, atol=0.5)
     twice = Camera(psf=MeasuredPSF(whole.weights, spacing), lower_limit=None)
     assert np.abs(twice.form_image(radiance, scene) - expected).max() > 1.0
-    with pytest.raises(ValueError, match="psf_order is 'detector', expected optics: the point"):
+    with pytest.raises(ValueError, match="psf_order: 'detector', expected optics: the point"):
         Camera(psf=whole, psf_order="detector")
 
 
@@ -140,9 +140,7 @@ def test_a_file_says_what_it_includes(tmp_path):
     part = MeasuredPSFFile(str(path), 2e-6, ("footprint",))
     assert part.of_camera(Camera().band, None).includes == ("footprint",)
     assert MeasuredPSF.from_file(path, 2e-6).includes == ()
-    with pytest.raises(
-        ValueError, match=r"psf.includes is \('pixel',\), expected any of footprint"
-    ):
+    with pytest.raises(ValueError, match=r"psf.includes: \('pixel',\), expected any of footprint"):
         Camera(psf=MeasuredPSF.from_file(path, 2e-6, ("pixel",)))
 
 

@@ -602,7 +602,7 @@ def test_broken_measurements_are_refused(broken):
     ids=str,
 )
 def test_impossible_cameras_are_refused(values):
-    with pytest.raises(ValueError, match=f"camera: {next(iter(values))} is .*, expected"):
+    with pytest.raises(ValueError, match=f"Camera.{next(iter(values))}: .*, expected"):
         Camera(**values)
 
 
@@ -626,7 +626,7 @@ def test_other_floors_are_not_doubted(lower_limit):
 @pytest.mark.parametrize("surface", ["chip-1", 0.6, None])
 def test_what_is_no_surface_is_refused(look, surface):
     scene = make_scene(np.full((1, 18, 18), 900.0))
-    with pytest.raises(ValueError, match=f"camera: surface is {surface!r}, expected a Surface"):
+    with pytest.raises(ValueError, match=f"surface: {surface!r}, expected a Surface"):
         look(Camera(), scene, surface, 0.0)
 
 

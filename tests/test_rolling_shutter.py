@@ -105,11 +105,11 @@ def test_what_is_too_short_is_one_error(moving):
     with pytest.raises(ValueError, match=re.escape(text) + ".* is not within the scene"):
         late.measure(moving, BLACK, 0.0)
     with pytest.raises(
-        ValueError, match=r"line_time is 0.0001, expected up to 5.556e-05 s: 30 rows"
+        ValueError, match=r"line_time: 0.0001 s, expected up to 5.556e-05 s: 30 rows"
     ):
         camera(line_time=1e-4).measure(moving, BLACK, 0.0)
     for wrong in (0.0, -1e-6, 0.01, np.nan):
-        with pytest.raises(ValueError, match=r"line_time is .* the time between frames, or None"):
+        with pytest.raises(ValueError, match=r"line_time: .*, expected"):
             camera(line_time=wrong)
 
 

@@ -259,7 +259,7 @@ def load(text, folder):
         (
             "cutting: {tool: {rake_angle: 80 deg}}",
             "cutting.tool",
-            "rake_angle: expected -60 to 60 degrees",
+            "80 deg, expected over -60 deg, under 60 deg",
         ),
         (
             "cutting: {tool: {material: cheese}}",
@@ -315,7 +315,7 @@ def load(text, folder):
             "camera.pitch",
             "2000 um is larger than the field of view, expected up to the 540",
         ),
-        ("camera: {fill_factor: 2}", "camera", "fill_factor is 2.0, expected over 0 to 1"),
+        ("camera: {fill_factor: 2}", "camera", "2, expected over 0, up to 1"),
         ("camera: {fill_factor: yes}", "camera.fill_factor", "True, expected a valid number"),
         ("camera: {fill_factor: .nan}", "camera.fill_factor", "nan, expected a finite number"),
         (
@@ -352,7 +352,7 @@ def load(text, folder):
             "analysis.reference",
             "'best', expected 'maximum', 'mean', 'centre' or 'true'",
         ),
-        ("analysis: {exposures: 0}", "analysis", "exposures is 0, expected 1 or more"),
+        ("analysis: {exposures: 0}", "analysis", "exposures: 0, expected 1 or more"),
         ("analysis: {psf_widths: [4]}", "analysis.psf_widths.0", "4 has no unit"),
         ("seed: -1", "seed", "-1, expected 0 or more"),
         (

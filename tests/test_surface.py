@@ -391,9 +391,9 @@ def test_a_frame_of_another_scene_is_refused():
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"grain": 0.0}, "grain: expected over 0 m, got 0.0 m"),
-        ({"follow": "chip"}, "follow: expected 'material', 'mean' or 'none', got 'chip'"),
-        ({"seed": -1}, "seed: expected 0 or more, got -1"),
+        ({"grain": 0.0}, "FeatureSurface.grain: 0 m, expected over 0 m"),
+        ({"follow": "chip"}, "FeatureSurface.follow: 'chip', expected material, mean or none"),
+        ({"seed": -1}, "FeatureSurface.seed: -1, expected 0 or more"),
     ],
 )
 def test_feature_surface_refuses(changed, message):

@@ -2,10 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from math import isfinite
-from numbers import Integral, Real
-from sys import float_info
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 from warnings import warn
 
 import numpy as np
@@ -39,12 +36,12 @@ from chipglow.camera.optics.sampling import integrate, sensor_raster, whole_rast
 from chipglow.camera.optics.terms import Blur
 from chipglow.camera.sweep import Check
 from chipglow.camera.warning import ChipglowWarning
+from chipglow.quantities import Parameter, Part
+from chipglow.quantities.units import FREQUENCY, LENGTH, POSITION, TEMPERATURE, TIME
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Raster, Scene
 from chipglow.surface import EmissivityField, Surface
-
-PSF_ORDERS: Final = ("optics", "detector")
 
 BORDER_TOLERANCE: Final = 1.0
 """Change in K of a pixel from which on it is said that the border of the scene matters."""
@@ -54,53 +51,11 @@ _COLD_FLOOR: Final = 373.15
 
 
 @dataclass(frozen=True)
-class Camera:
+class Camera(Part):
     """An infrared camera looking at a scene (Figure 6 of Heigel and Whitenton, 2010).
 
-    By default it is the paper's in all but the order of blur and pixels; `paper` is the paper's.
-
-    Parameters
-    ----------
-    band : Band
-        Spectral band; the paper's 3.8 µm to 5.1 µm by default.
-    pitch : float
-        Distance between pixels in m, on the scene; the paper's 0.96 mm / 160 by default.
-    shape : tuple of int, optional
-        Rows and columns of pixels; as many whole pixels as fit the scene by default.
-    offset : tuple of float
-        Corner of the first pixel in m, right of and down from the scene's upper left corner.
-    fill_factor : float
-        Fraction of a pixel's square that is sensitive: a square in its middle.
-    psf : PointSpreadFunction, optional
-        How the camera spreads a point; None for an ideal camera (the paper's case 2). One that
-        includes the ``footprint`` is of optics and pixel together: then a pixel reads the blurred
-        image in its middle, and does not integrate once more.
-    psf_order : {"optics", "detector"}
-        ``optics`` blurs the scene's samples and lets the pixels integrate the blurred image, as
-        light does it: the point spread function is that of the optics alone. ``detector`` is the
-        paper's: the pixels integrate the scene, and the blur is applied from pixel to pixel.
-        The kernel is then the fraction of a point's light that each pixel receives, which holds
-        the pixel's footprint a second time: the variance of the blur is larger by pitch² / 12.
-    integration_time : float
-        In s.
-    frame_rate : float
-        Frames a second.
-    line_time : float, optional
-        Of a rolling shutter: how much later in s each row's integration begins than that of the row
-        above it. None by default: a global shutter, all rows at once.
-    lower_limit : float, optional
-        Lowest radiance temperature in K that the camera measures; what is under it is flagged.
-        The paper's 300 °C by default; None for no lower range limit.
-    reflected : float, optional
-        Temperature in K of surroundings that the surface reflects (Equation 2); by default
-        reflections are left out, as in the paper's simulation (Equation 3).
-    optics : tuple of OpticsTerm
-        What the optics do besides, in the order of the light; nothing by default.
-    detector : Detector, optional
-        Makes electrons and counts of what the pixels receive, which the camera's own calibration
-        makes radiance again; by default radiance is read as it is.
-    seed : int
-        Of the detector's noise, which each frame has its own of by when it begins.
+    The defaults are those of the paper except for the order of blur and pixels; `paper` returns the
+    paper's camera.
 
     Raises
     ------
@@ -113,98 +68,119 @@ class Camera:
         If the lower range limit is so low and round a number of K that °C is probably meant.
     """
 
-    band: Band = field(default_factory=lambda: Band(3.8e-6, 5.1e-6))
-    pitch: float = 6e-6
-    shape: tuple[int, int] | None = None
-    offset: tuple[float, float] = (0.0, 0.0)
-    fill_factor: float = 1.0
-    psf: PointSpreadFunction | None = field(default_factory=AnnularAperturePSF)
-    psf_order: Literal["optics", "detector"] = "optics"
-    integration_time: float = 10e-6
-    frame_rate: float = 600.0
-    line_time: float | None = None
-    lower_limit: float | None = 573.15
-    reflected: float | None = None
-    optics: tuple[OpticsTerm, ...] = ()
-    detector: Detector | None = None
-    seed: int = 2010
+    band: Annotated[Band, Parameter("Spectral band; the paper's by default.")] = field(
+        default_factory=lambda: Band(3.8e-6, 5.1e-6)
+    )
+    pitch: Annotated[
+        float,
+        Parameter("Distance between pixels, as seen on the scene.", LENGTH, over=0.0, most=1e-2),
+    ] = 6e-6
+    shape: Annotated[
+        tuple[int, int] | None,
+        Parameter(
+            "Rows and columns of pixels; None: as many whole pixels as fit the scene.", least=1
+        ),
+    ] = None
+    offset: Annotated[
+        tuple[float, float],
+        Parameter(
+            "Corner of the first pixel, right of and down from the scene's upper left corner.",
+            POSITION,
+            least=0.0,
+        ),
+    ] = (0.0, 0.0)
+    fill_factor: Annotated[
+        float,
+        Parameter(
+            "Fraction of a pixel's square that takes light: a square in its centre.",
+            over=0.0,
+            most=1.0,
+        ),
+    ] = 1.0
+    psf: Annotated[
+        PointSpreadFunction | None,
+        Parameter(
+            "Point spread function; None: an ideal camera. One that includes the footprint is of "
+            "optics and pixel together: a pixel then reads the blurred image at its centre and "
+            "does not integrate again."
+        ),
+    ] = field(default_factory=AnnularAperturePSF)
+    psf_order: Annotated[
+        Literal["optics", "detector"],
+        Parameter(
+            "detector (the paper's: on the pixels' values, so that the pixel's footprint counts "
+            "twice) or optics (on the samples, before the pixels integrate)."
+        ),
+    ] = "optics"
+    integration_time: Annotated[float, Parameter("Exposure.", TIME, over=0.0)] = 10e-6
+    frame_rate: Annotated[float, Parameter("Frames per second.", FREQUENCY, over=0.0)] = 600.0
+    line_time: Annotated[
+        float | None,
+        Parameter(
+            "Rolling shutter: how much later each row's exposure begins than that of the row "
+            "above; none: a global shutter, all rows at once.",
+            TIME,
+            over=0.0,
+        ),
+    ] = None
+    lower_limit: Annotated[
+        float | None,
+        Parameter(
+            "Radiance temperatures under this are flagged, not returned; or none.",
+            TEMPERATURE,
+            least=TABLE_COLDEST,
+            most=TABLE_HOTTEST,
+        ),
+    ] = 573.15
+    reflected: Annotated[
+        float | None,
+        Parameter(
+            "Temperature of the surroundings that the surface reflects, or none.",
+            TEMPERATURE,
+            least=TABLE_COLDEST,
+            most=TABLE_HOTTEST,
+        ),
+    ] = None
+    optics: Annotated[
+        tuple[OpticsTerm, ...],
+        Parameter("What the optics do besides, a list in the order of the light."),
+    ] = ()
+    detector: Annotated[
+        Detector | None,
+        Parameter(
+            "Electrons, noise and counts of the detector, and the camera's own calibration; none: "
+            "the radiance is read as it is.",
+            allowed="none, or such as\n"
+            "{response: {kind: photon, quantum_efficiency: 0.8, element: 15 um, f_number: 2.5},\n"
+            "full_well: 7e6, bits: 14, terms: [{kind: shot-noise}]}",
+        ),
+    ] = None
+    seed: Annotated[
+        int,
+        Parameter(
+            "Seed of the detector noise, which depends only on it and the frame's start time.",
+            least=0,
+        ),
+    ] = 2010
 
     def __post_init__(self) -> None:
-        _expect(
-            isinstance(self.band, Band), "band", self.band, "a Band such as Band(3.8e-6, 5.1e-6)"
-        )
-        _expect_number("pitch", self.pitch, 0.0, 1e-2, "over 0 to 1e-2 m; 6 um is 6e-6")
-        _expect(
-            self.shape is None or (_are_numbers(self.shape, Integral) and min(self.shape) >= 1),
-            "shape",
-            self.shape,
-            "rows and columns of 1 or more",
-        )
-        _expect(
-            _are_numbers(self.offset, Real) and all(isfinite(o) and o >= 0.0 for o in self.offset),
-            "offset",
-            self.offset,
-            "two lengths of 0 m or more",
-        )
-        _expect_number("fill_factor", self.fill_factor, 0.0, 1.0, "over 0 to 1")
-        _expect(
-            self.psf is None or isinstance(self.psf, PointSpreadFunction),
-            "psf",
-            self.psf,
-            "a PointSpreadFunction such as GaussianPSF(12e-6), or None",
-        )
-        _expect(self.psf_order in PSF_ORDERS, "psf_order", self.psf_order, " or ".join(PSF_ORDERS))
-        held = ("footprint", *BLURS.kinds)
-        _expect(
-            self.psf is None or set(self.psf.includes) <= set(held),
-            "psf.includes",
-            self.psf and self.psf.includes,
-            f"any of {', '.join(held)}",
-        )
-        _expect(
-            self.psf_order == "optics" or not self._blur_has_footprint,
-            "psf_order",
-            self.psf_order,
-            "optics: the point spread function includes the pixel's footprint",
-        )
-        _expect(
-            isinstance(self.optics, tuple) and all(isinstance(t, OpticsTerm) for t in self.optics),
-            "optics",
-            self.optics,
-            "a tuple of terms such as Veil(0.02, 300e-6)",
-        )
-        _expect(
-            self.detector is None or isinstance(self.detector, Detector),
-            "detector",
-            self.detector,
-            "a Detector such as Detector(response=EnergyResponse(1e4), full_well=1e7), or None",
-        )
-        _expect(isinstance(self.seed, Integral) and self.seed >= 0, "seed", self.seed, "0 or more")
-        _expect_number("frame_rate", self.frame_rate, 0.0, float_info.max, "over 0 a second")
-        _expect_number(
-            "integration_time",
-            self.integration_time,
-            0.0,
-            1 / self.frame_rate,
-            f"over 0 to {1 / self.frame_rate:g} s, the time between frames",
-        )
-        if self.line_time is not None:
-            _expect_number(
-                "line_time",
-                self.line_time,
-                0.0,
-                1 / self.frame_rate,
-                f"over 0 to {1 / self.frame_rate:g} s, the time between frames, or None",
+        super().__post_init__()
+        included = self.psf.includes if self.psf else ()
+        if included and not set(included) <= {"footprint", *BLURS.kinds}:
+            known = ", ".join(("footprint", *BLURS.kinds))
+            raise ValueError(f"Camera.psf.includes: {included!r}, expected any of {known}")
+        if self.psf_order == "detector" and self._blur_has_footprint:
+            raise ValueError(
+                "Camera.psf_order: 'detector', expected optics: the point spread function includes "
+                "the pixel's footprint"
             )
-        for name in ("lower_limit", "reflected"):
-            value = getattr(self, name)
-            _expect(
-                value is None
-                or (isinstance(value, Real) and TABLE_COLDEST <= float(value) <= TABLE_HOTTEST),
-                name,
-                value,
-                f"{TABLE_COLDEST:g} to {TABLE_HOTTEST:g} K, or None",
-            )
+        for name in ("integration_time", "line_time"):
+            time = getattr(self, name)
+            if time is not None and time > 1 / self.frame_rate:
+                raise ValueError(
+                    f"Camera.{name}: {time:g} s, expected up to {1 / self.frame_rate:g} s, the "
+                    "time between frames"
+                )
         if (
             self.lower_limit is not None
             and self.lower_limit <= _COLD_FLOOR
@@ -312,13 +288,12 @@ class Camera:
         sensors = self.pixels(scene)
         if self.line_time is None:
             return np.zeros(scene.rows)
-        _expect(
-            sensors.rows * self.line_time <= 1 / self.frame_rate,
-            "line_time",
-            self.line_time,
-            f"up to {1 / (self.frame_rate * sensors.rows):.4g} s: {sensors.rows} rows within the "
-            f"{1 / self.frame_rate:.4g} s between frames",
-        )
+        if sensors.rows * self.line_time > 1 / self.frame_rate:
+            raise ValueError(
+                f"Camera.line_time: {self.line_time:g} s, expected up to "
+                f"{1 / (self.frame_rate * sensors.rows):.4g} s: {sensors.rows} rows within the "
+                f"{1 / self.frame_rate:.4g} s between frames"
+            )
         rows = np.floor((sensors.top - scene.y) / self.pitch)
         return np.asarray(self.line_time * np.clip(rows, 0, sensors.rows - 1), np.float64)
 
@@ -347,12 +322,11 @@ class Camera:
         ValueError
             If the surface is none, or the scene lacks what it needs.
         """
-        _expect(
-            isinstance(surface, Surface),
-            "surface",
-            surface,
-            "a Surface such as chipglow.CHIP_1 or UniformSurface(0.6)",
-        )
+        if not isinstance(surface, Surface):
+            raise ValueError(
+                f"surface: {surface!r}, expected a Surface such as chipglow.CHIP_1 or "
+                "UniformSurface(0.6)"
+            )
         return surface.in_band(self.band, self.reflected).on(scene)
 
     def expose(self, scene: Scene, surface: Surface, start: float) -> Exposure:
@@ -726,21 +700,3 @@ def _border_warning(
         f"border) would change by over {BORDER_TOLERANCE:g} K, by {np.nanmax(change):.3g} K at "
         "most."
     )
-
-
-def _are_numbers(values: object, kind: type) -> bool:
-    """Whether these are two numbers of a kind."""
-    return (
-        isinstance(values, (tuple, list))
-        and len(values) == 2
-        and all(isinstance(value, kind) for value in values)
-    )
-
-
-def _expect_number(name: str, value: object, over: float, most: float, expected: str) -> None:
-    _expect(isinstance(value, Real) and over < float(value) <= most, name, value, expected)
-
-
-def _expect(condition: bool, name: str, value: object, expected: str) -> None:
-    if not condition:
-        raise ValueError(f"camera: {name} is {value!r}, expected {expected}")

@@ -188,11 +188,6 @@ def _in_library(name: str) -> MaterialFile | None:
     return None if path is None else read_material(Path(path))
 
 
-def parameters(part: Any) -> dict[str, Parameter]:
-    """What a part's fields declare, by their names."""
-    return {name: one.parameter for name, one in part.declared.items()}
-
-
 def _kind(material: MaterialFile) -> str:
     return "tool" if material.tool else "workpiece"
 
@@ -212,7 +207,7 @@ class _Reader:
         kind = data.get("kind") if isinstance(data, Mapping) else None
         if kind not in ("workpiece", "tool"):
             raise self._wrong("kind", kind, "workpiece or tool")
-        parts = tuple(parameters(ToolMaterial)) if kind == "tool" else _WORKPIECE_PARTS
+        parts = tuple(ToolMaterial.parameters()) if kind == "tool" else _WORKPIECE_PARTS
         if isinstance(data, Mapping) and kind == "workpiece":
             parts = (*parts, *(one for one in _OPTIONAL if one in data))
         data = self._mapping("", data, (*_HEADER, *parts))
@@ -224,13 +219,13 @@ class _Reader:
         else:
             numbers = {
                 key: self._sourced(key, data[key], one)
-                for key, one in parameters(ToolMaterial).items()
+                for key, one in ToolMaterial.parameters().items()
             }
             tool = self._build("tool", ToolMaterial, {"name": name, **numbers})
         return MaterialFile(name, description, tuple(self._properties), sets, tool)
 
     def _workpieces(self, name: str, data: Mapping[str, Any]) -> dict[str, WorkpieceMaterial]:
-        declared = parameters(WorkpieceMaterial)
+        declared = WorkpieceMaterial.parameters()
         either = {
             key: self._constant_or_table(key, data[key], declared[key])
             for key in _CONSTANT_OR_TABLE
@@ -264,7 +259,7 @@ class _Reader:
         if data == "none":
             return None
         damage: JohnsonCookDamage = self._build(
-            "damage", JohnsonCookDamage, self._group("damage", data, parameters(JohnsonCookDamage))
+            "damage", JohnsonCookDamage, self._group("damage", data, JohnsonCookDamage.parameters())
         )
         return damage
 
@@ -272,7 +267,7 @@ class _Reader:
         if data is None:
             return None
         place = "nonlocal_viscosity"
-        values = self._group(place, data, parameters(NonlocalViscosity))
+        values = self._group(place, data, NonlocalViscosity.parameters())
         made: NonlocalViscosity = self._build(place, NonlocalViscosity, values)
         return made
 
@@ -306,7 +301,7 @@ class _Reader:
             raise self._wrong(f"{place}.law", law, f"one of {', '.join(sorted(FLOW_LAWS.kinds))}")
         if damage not in (None, "none"):
             raise self._wrong(f"{place}.damage", damage, "none, or to be left out")
-        values = self._group(place, rest, parameters(kind))
+        values = self._group(place, rest, kind.parameters())
         return damage is None, self._build(place, kind, values)
 
     def _build(self, place: str, kind: Any, values: Mapping[str, Any]) -> Any:

@@ -135,7 +135,7 @@ class WorkpieceMaterial(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name, (_, _, parameter) in self.declared.items():
+        for name, parameter in self.parameters().items():
             for value in getattr(getattr(self, name), "values", ()):
                 if not parameter.holds(value):
                     raise parameter.refusal(f"{type(self).__name__}.{name}", value)

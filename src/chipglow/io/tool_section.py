@@ -1,7 +1,6 @@
 """The cutting tool as a section of YAML files, and its outline as a file."""
 
 import os
-from math import radians
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -10,51 +9,23 @@ from pydantic import field_validator, model_validator
 from chipglow.cutting import material_names, tool_material
 from chipglow.io.column_file import read_polyline
 from chipglow.quantities import FileBeside, Parameter, Settings
-from chipglow.quantities.units import ANGLE, LENGTH
 from chipglow.scene import Chamfer, Hone, Tool, ToolGeometry, ToolOutline, ToolOutlineError
 
 
 class ToolSection(Settings[Tool]):
     """The cutting tool."""
 
-    rake_angle: Annotated[
-        float,
-        Parameter(
-            "Rake angle; negative: the rake face leans over the chip.",
-            ANGLE,
-            allowed="over -60 deg, under 60 deg; a wedge of 5 deg or more must be left",
-        ),
-    ] = radians(-7.0)
-    clearance_angle: Annotated[
-        float,
-        Parameter(
-            "Angle between the tool's flank and the cut surface.",
-            ANGLE,
-            allowed="over 0 deg, under 45 deg",
-        ),
-    ] = radians(7.0)
-    edge_radius: Annotated[
-        float, Parameter("Radius of the cutting edge, or of a chamfer's corners.", LENGTH, over=0.0)
-    ] = 20e-6
-    chamfer: Annotated[
-        Chamfer | None,
-        Parameter(
-            "Chamfer of the edge: the width between sharp corners, the angle from the rake face.",
-            allowed="none, or {width: 100 um, angle: 20 deg}",
-        ),
-    ] = None
-    hone: Annotated[
-        Hone | None,
-        Parameter(
-            "Hone in the place of the edge's radius: how far from the sharp edge it begins on "
-            "either face.",
-            allowed="none, or {rake: 40 um, clearance: 20 um}",
-        ),
-    ] = None
+    rake_angle: Annotated[float, ToolGeometry.parameter("rake_angle")] = ToolGeometry.rake_angle
+    clearance_angle: Annotated[float, ToolGeometry.parameter("clearance_angle")] = (
+        ToolGeometry.clearance_angle
+    )
+    edge_radius: Annotated[float, ToolGeometry.parameter("edge_radius")] = ToolGeometry.edge_radius
+    chamfer: Annotated[Chamfer | None, ToolGeometry.parameter("chamfer")] = None
+    hone: Annotated[Hone | None, ToolGeometry.parameter("hone")] = None
     outline: Annotated[
         FileBeside | None,
         Parameter(
-            "File of an outline in the place of all these: its first line x_um,y_um, then a point "
+            "File of an outline instead of all these: its first line x_um,y_um, then a point "
             "a line, from the rake face round the edge to the flank face.",
             allowed="none, or a file such as edge.csv",
         ),
@@ -90,13 +61,7 @@ class ToolSection(Settings[Tool]):
                 return read_tool_outline(self.outline)
             except ValueError as error:
                 raise ValueError(f"outline: {error}") from None
-        return ToolGeometry(
-            self.rake_angle,
-            self.clearance_angle,
-            self.edge_radius,
-            self.chamfer,
-            self.hone,
-        )
+        return ToolGeometry(**{name: getattr(self, name) for name in ToolGeometry.parameters()})
 
 
 def read_tool_outline(path: str | os.PathLike[str]) -> ToolOutline:

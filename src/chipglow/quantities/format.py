@@ -4,19 +4,7 @@ from math import floor, isfinite, isnan, log10
 
 
 def quantity_text(value: float | None, unit: str, decimals: int, sign: str = "") -> str:
-    """Text of a number with its unit, or a dash where there is none.
-
-    Parameters
-    ----------
-    value : float or None
-        The number in that unit.
-    unit : str
-        Its unit; empty for a count.
-    decimals : int
-        Decimals worth printing; negative to round before the point.
-    sign : str
-        ``"+"`` to show the sign of positive numbers too.
-    """
+    """Text of a number with its unit, or a dash where there is none."""
     if value is None:
         return "–"
     rounded = round(value, decimals) + 0.0  # no negative zero

@@ -14,13 +14,7 @@ def parse(option: str, quantity: Quantity, text: str | None) -> float | None: ..
 
 
 def parse(option: str, quantity: Quantity, text: str | None) -> float | None:
-    """SI number of an option's text such as ``18 um``; None for an option that is not given.
-
-    Raises
-    ------
-    ValueError
-        If it is no such quantity; the message names the option.
-    """
+    """SI number of an option's text such as ``18 um``; None for an option that is not given."""
     try:
         return None if text is None else quantity.parse(text)
     except ValueError as error:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from itertools import cycle
 from math import isfinite
 from numbers import Integral, Real
 from types import NoneType, UnionType
@@ -89,10 +89,15 @@ class Parameter:
         return ValueError(f"{name}: {self._si_text(value)}, expected {expected}")
 
     def holds(self, value: object) -> bool:
-        """Whether a value is within the limits; what is no number has none."""
-        if not isinstance(value, Real) or isinstance(value, bool):
+        """Whether a value, or each of a tuple, is within the limits; only numbers have any."""
+        if isinstance(value, tuple):
+            return all(self.holds(one) for one in value)
+        if type(value) is float:  # the usual case, without the time that the others take
+            number = value
+        elif not isinstance(value, Real) or isinstance(value, bool):
             return True
-        number = float(value)
+        else:
+            number = float(value)
         return (
             isfinite(number)
             and (self.over is None or number > self.over)
@@ -101,9 +106,10 @@ class Parameter:
             and (self.most is None or number <= self.most)
         )
 
-    def allows(self, value: object, kind: Any) -> bool:
-        """Whether a value is of the field's type, if that can be checked, and within the limits."""
-        return _check(kind)(value) and self.holds(value)
+    def check(self, kind: Any) -> Callable[[object], bool]:
+        """What tells whether a value is of a type, as far as that is checked, and in the limits."""
+        is_of = _check(kind)
+        return lambda value: is_of(value) and self.holds(value)
 
     def words(self, kind: Any) -> str:
         """Which values are allowed, in words; empty if anything of the field's type is."""
@@ -172,7 +178,8 @@ class Parameter:
 
     def _within(self, value: Any) -> Any:
         if not self.holds(value):
-            raise ValueError(f"{self.text(value)}, expected {self.limits}")
+            shown = value if isinstance(value, tuple) else self.text(value)
+            raise ValueError(f"{shown}, expected {self.allowed or self.limits}")
         return value
 
 
@@ -212,12 +219,13 @@ def _or_words(schema: CoreSchema, words: dict[str, Any]) -> CoreSchema:
     )
 
 
-@cache
 def _check(kind: Any) -> Callable[[object], bool]:
     """Whether a value is of a type: numbers, words and classes are told, all else passes."""
     if kind in _NUMBERS:
         number = _NUMBERS[kind]
-        return lambda value: isinstance(value, number) and not isinstance(value, bool)
+        return lambda value: (
+            type(value) is kind or (isinstance(value, number) and not isinstance(value, bool))
+        )
     if isinstance(kind, type) and get_origin(kind) is None:
         return lambda value: isinstance(value, kind)
     origin, members = get_origin(kind), get_args(kind)
@@ -226,11 +234,19 @@ def _check(kind: Any) -> Callable[[object], bool]:
     if origin is Annotated:
         return _check(members[0])
     if origin in (Union, UnionType):
+        checks = [_check(one) for one in members if one is not NoneType]
+        if len(checks) == 1 < len(members):
+            (only,) = checks
+            return lambda value: value is None or only(value)
         checks = [_check(one) for one in members]
         return lambda value: any(check(value) for check in checks)
-    if origin is tuple and members[0] not in _NUMBERS and _class_name(members[0]):
-        check = _check(members[0])
-        return lambda value: isinstance(value, tuple) and all(check(one) for one in value)
+    if origin is tuple:
+        many, checks = members[-1] is ..., [_check(one) for one in members if one is not ...]
+        return lambda value: (
+            isinstance(value, tuple)
+            and (many or len(value) == len(checks))
+            and all(check(one) for check, one in zip(cycle(checks), value, strict=False))
+        )
     return lambda value: True
 
 
@@ -238,7 +254,7 @@ def _expected(kind: Any) -> str:
     """What a type allows, in words."""
     origin, members = get_origin(kind), get_args(kind)
     if origin is tuple:
-        return f"a tuple of {_class_name(members[0])}"
+        return f"a tuple of {_class_name(members[0])}".removesuffix(" of ")
     if origin is Literal:
         names = [str(one) for one in members]
     else:

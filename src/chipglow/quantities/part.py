@@ -30,11 +30,12 @@ PartType = TypeVar("PartType")
 
 
 class Declaration(NamedTuple):
-    """A field of a part that descriptions have: annotation, type and parameter."""
+    """A field of a part that descriptions have: annotation, type, parameter, and their check."""
 
     annotation: Any
     kind: Any
     parameter: Parameter
+    allows: Callable[[object], bool]
 
 
 class Part:
@@ -59,8 +60,7 @@ class Part:
 
     kind: ClassVar[str] = ""
     example: ClassVar[str] = ""
-    declared: ClassVar[Mapping[str, Declaration]] = {}
-    """What the fields declare, by their names."""
+    _declared: ClassVar[Mapping[str, Declaration]] = {}
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
@@ -69,7 +69,7 @@ class Part:
         own = inspect.get_annotations(cls)
         if any(isinstance(annotation, str) for annotation in own.values()):
             own = inspect.get_annotations(cls, eval_str=True)
-        inherited = [vars(base).get("declared", {}) for base in reversed(cls.__mro__[1:])]
+        inherited = [vars(base).get("_declared", {}) for base in reversed(cls.__mro__[1:])]
         declared = {name: one for each in inherited for name, one in each.items()}
         for name, annotation in own.items():
             metadata = getattr(annotation, "__metadata__", ())
@@ -77,31 +77,42 @@ class Part:
             if parameter is None:
                 declared.pop(name, None)
                 continue
-            declared[name] = Declaration(annotation, annotation.__origin__, parameter)
+            kind = annotation.__origin__
+            declared[name] = Declaration(annotation, kind, parameter, parameter.check(kind))
             # The dataclass, `help` and signatures see the plain type.
-            cls.__annotations__[name] = annotation.__origin__
-        cls.declared = declared
+            cls.__annotations__[name] = kind
+        cls._declared = declared
         if "__doc__" in vars(cls) and cls.__doc__ and declared:
             cls.__doc__ = _with_parameters(inspect.cleandoc(cls.__doc__), declared)
 
     def __post_init__(self) -> None:
-        for name, (_, kind, parameter) in self.declared.items():
+        for name, one in self._declared.items():
             value = getattr(self, name)
-            if not parameter.allows(value, kind):
-                raise parameter.refusal(f"{type(self).__name__}.{name}", value, kind)
+            if not one.allows(value):
+                raise one.parameter.refusal(f"{type(self).__name__}.{name}", value, one.kind)
 
     @classmethod
-    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+    def parameter(cls, name: str) -> Parameter:
+        """What a field declares, for a section of a description that has it too."""
+        return cls._declared[name].parameter
+
+    @classmethod
+    def parameters(cls) -> dict[str, Parameter]:
+        """What the fields declare, by their names."""
+        return {name: one.parameter for name, one in cls._declared.items()}
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:
         """Schema of a section of a description that has the declared fields."""
         if isabstract(cls) or "__dataclass_fields__" not in vars(cls):
             return core_schema.is_instance_schema(cls)
         fields = {
             one.name: core_schema.typed_dict_field(
-                handler.generate_schema(cls.declared[one.name].annotation),
+                handler.generate_schema(cls._declared[one.name].annotation),
                 required=one.default is MISSING and one.default_factory is MISSING,
             )
             for one in dataclass_fields(cls)
-            if one.name in cls.declared
+            if one.name in cls._declared
         }
         if cls.kind:
             kind = core_schema.typed_dict_field(
@@ -130,9 +141,7 @@ class Part:
         )
 
     @classmethod
-    def __get_pydantic_json_schema__(
-        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> Any:
         """JSON schema of the section."""
         return handler(schema) | {"title": cls.__name__, "description": first_sentence(cls)}
 
@@ -153,7 +162,7 @@ class Parameters(Section, Generic[PartType]):
             return super().__class_getitem__(part)
         defaults = {one.name: one.default for one in dataclass_fields(part)}
         fields: dict[str, Any] = {
-            name: (one.annotation, defaults[name]) for name, one in part.declared.items()
+            name: (one.annotation, defaults[name]) for name, one in part._declared.items()
         }
         made = create_model(f"{part.__name__}Section", __base__=cls, **fields)
         made.part = part
@@ -162,7 +171,7 @@ class Parameters(Section, Generic[PartType]):
     @property
     def values(self) -> dict[str, Any]:
         """What the parameters are, by their names."""
-        return {name: getattr(self, name) for name in self.part.declared}
+        return {name: getattr(self, name) for name in self.part._declared}
 
 
 class Family:
@@ -190,11 +199,6 @@ class Family:
         """Add a part, or a section that is written by hand.
 
         A class that is defined again, as by a notebook's cell, replaces the one before.
-
-        Raises
-        ------
-        ValueError
-            If the kind is empty or that of another class.
         """
         taken = self._own.get(kind, part)
         same = (taken.__module__, taken.__qualname__) == (part.__module__, part.__qualname__)
@@ -264,13 +268,7 @@ adapter: Final[Callable[[Any], TypeAdapter[Any]]] = cache(TypeAdapter)
 
 @cache
 def of_other_packages(group: str) -> dict[str, Any]:
-    """What other packages add by entry points, by their names; a warning for what cannot be loaded.
-
-    Parameters
-    ----------
-    group : str
-        Group of the entry points.
-    """
+    """What other packages add by entry points, by name; what cannot be loaded is a warning."""
     found = {}
     for entry in entry_points(group=group):
         try:
@@ -291,7 +289,7 @@ def _with_parameters(text: str, declared: Mapping[str, Declaration]) -> str:
     before, found, after = text.partition(title)
     rows = [
         f"{name} : {_type_text(kind, parameter)}\n    " + parameter.meaning.replace("\n", "\n    ")
-        for name, (_, kind, parameter) in declared.items()
+        for name, (_, kind, parameter, _) in declared.items()
     ]
     before = before if found else before + "\n\n"
     return "\n".join([before + title + "\n".join(rows), after]).rstrip() + "\n"

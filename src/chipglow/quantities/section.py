@@ -33,13 +33,7 @@ FileBeside = Annotated[str, AfterValidator(beside_the_study)]
 
 
 def known_keys(data: object, keys: Iterable[str]) -> Mapping[str, Any]:
-    """Data of a section; None is the section with its defaults.
-
-    Raises
-    ------
-    ValueError
-        If it is no mapping, or has an unknown key.
-    """
+    """Data of a section; None is the section with its defaults."""
     if data is None:
         return {}
     names = list(keys)

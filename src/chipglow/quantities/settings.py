@@ -76,8 +76,8 @@ def settings(section: Section | Part) -> dict[str, Setting]:
         found[one.path] = one
         if one.is_section:
             inner = settings(one.value)
-            found |= {f"{one.path}.{path}": replace(each, path=f"{one.path}.{path}")
-                      for path, each in inner.items()}  # fmt: skip
+            for path, each in inner.items():
+                found[f"{one.path}.{path}"] = replace(each, path=f"{one.path}.{path}")
     return found
 
 
@@ -103,7 +103,7 @@ def value_at(section: Any, path: str) -> Any:
             section = dict(enumerate(section))[int(key) if key.isdigit() else -1]
         elif isinstance(section, Mapping):
             section = section[key]
-        elif key in getattr(section, "declared", getattr(type(section), "model_fields", ())):
+        elif isinstance(section, Section | Part) and key in _declared(type(section)):
             section = getattr(section, key)
         else:
             raise LookupError(path)
@@ -129,10 +129,10 @@ def setting_at(section: Section | Part, path: str) -> Setting:
 
 
 def given(section: Section | Part) -> frozenset[str]:
-    """Fields that a description gave; those of a part that was made in Python are all given."""
+    """Fields that a description gave; all of a part that was made in Python."""
     if isinstance(section, Section):
         return frozenset(section.model_fields_set)
-    return getattr(section, "given", frozenset(section.declared))
+    return getattr(section, "given", frozenset(section.parameters()))
 
 
 def changed(section: Described, changes: Mapping[str, object]) -> Described:
@@ -151,41 +151,34 @@ def changed(section: Described, changes: Mapping[str, object]) -> Described:
     pydantic.ValidationError
         If a value is not possible; a ValueError.
     """
-    own = {path: value for path, value in changes.items() if "." not in path}
-    for name in dict.fromkeys(path.partition(".")[0] for path in changes if "." in path):
-        inner = {
-            path.partition(".")[2]: value
-            for path, value in changes.items()
-            if path.startswith(f"{name}.")
-        }
-        own[name] = changed(value_at(section, name), inner)
+    made: Described = adapter(type(section)).validate_python(_with_changes(section, changes))
+    return made
+
+
+def _with_changes(section: Any, changes: Mapping[str, object]) -> Any:
+    """What a description gave of a section, a mapping or a list, with the changes."""
     if isinstance(section, Mapping):
-        return {**section, **own}  # type: ignore[return-value]
-    if isinstance(section, tuple):
-        return tuple(  # type: ignore[return-value]
-            own.get(str(number), one) for number, one in enumerate(section)
-        )
-    if isinstance(section, Part):
-        kept = {name: getattr(section, name) for name in section.declared}
-        made = adapter(type(section)).validate_python({**kept, **own})
-        values: Any = {name: getattr(made, name) for name in own}
-        copy = replace(section, **values)
-        object.__setattr__(copy, "given", given(section) | own.keys())
-        return copy
-    kept = {name: getattr(section, name) for name in section.model_fields_set}
-    return type(section).model_validate({**kept, **own})
+        data = dict(section)
+    elif isinstance(section, tuple):
+        data = {str(number): one for number, one in enumerate(section)}
+    else:
+        data = {name: getattr(section, name) for name in given(section)}
+        if getattr(section, "kind", ""):
+            data["kind"] = section.kind
+    inner: dict[str, dict[str, object]] = {}
+    for path, value in changes.items():
+        name, dot, rest = path.partition(".")
+        if dot:
+            inner.setdefault(name, {})[rest] = value
+        else:
+            data[name] = value
+    for name, one in inner.items():
+        data[name] = _with_changes(value_at(section, name), one)
+    return tuple(data.values()) if isinstance(section, tuple) else data
 
 
 def field_tables(section: Section | Part, name: str) -> str:
-    """Tables in Markdown of a section with its values, and of the sections in it.
-
-    Parameters
-    ----------
-    section : Section or Part
-        The section.
-    name : str
-        Its key in the description; those of the sections in it follow after dots.
-    """
+    """Tables in Markdown of a section with this key, and of the sections in it."""
     return "\n".join(_table_lines(section, name))
 
 
@@ -214,8 +207,8 @@ def _declared(kind: Any) -> dict[str, tuple[Parameter, Any, Any, Any]]:
     if kind.kind:
         found["kind"] = (Parameter(first_sentence(kind)), str, kind.kind, str)
     for one in fields(kind):
-        if one.name in kind.declared:
-            annotation, plain, parameter = kind.declared[one.name]
+        if one.name in kind.parameters():
+            annotation, plain, parameter, _ = kind._declared[one.name]
             default = _default(one.default, one.default_factory)
             found[one.name] = parameter, plain, default, annotation
     return found

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil, cos, degrees, isfinite, pi, radians, sin, tan
+from math import ceil, cos, degrees, pi, radians, sin, tan
 from typing import Annotated, Final
 
 import numpy as np
@@ -208,24 +208,11 @@ class Hone(Part):
 
 
 @dataclass(frozen=True)
-class ToolGeometry(Tool):
+class ToolGeometry(Tool, Part):
     """A wedge with a prepared edge: rounded, chamfered or honed.
 
     The circle of the rounded edge touches the lines x = 0 and y = 0; so do the circle of a
     chamfer's lower corner and the ellipse of a hone.
-
-    Parameters
-    ----------
-    rake_angle : float
-        Rake angle in rad; negative where the rake face leans over the chip, as the paper's −7°.
-    clearance_angle : float
-        Clearance angle in rad.
-    edge_radius : float
-        Radius of the cutting edge in m, or of both corners of a chamfer. A hone takes its place.
-    chamfer : Chamfer, optional
-        The land between the faces.
-    hone : Hone, optional
-        An edge that is not round.
 
     Raises
     ------
@@ -234,16 +221,47 @@ class ToolGeometry(Tool):
         the chamfer, or if there are both a chamfer and a hone.
     """
 
-    rake_angle: float = radians(-7.0)
-    clearance_angle: float = radians(7.0)
-    edge_radius: float = 20e-6
-    chamfer: Chamfer | None = None
-    hone: Hone | None = None
+    rake_angle: Annotated[
+        float,
+        Parameter(
+            "Rake angle; negative: the rake face leans over the chip.",
+            ANGLE,
+            over=-STEEPEST_RAKE,
+            under=STEEPEST_RAKE,
+            allowed="over -60 deg, under 60 deg; a wedge of 5 deg or more must be left",
+        ),
+    ] = radians(-7.0)
+    clearance_angle: Annotated[
+        float,
+        Parameter(
+            "Angle between the tool's flank and the cut surface.",
+            ANGLE,
+            over=0.0,
+            under=LARGEST_CLEARANCE,
+        ),
+    ] = radians(7.0)
+    edge_radius: Annotated[
+        float, Parameter("Radius of the cutting edge, or of a chamfer's corners.", LENGTH, over=0.0)
+    ] = 20e-6
+    chamfer: Annotated[
+        Chamfer | None,
+        Parameter(
+            "Chamfer of the edge: the width between sharp corners, the angle from the rake face.",
+            allowed="none, or {width: 100 um, angle: 20 deg}",
+        ),
+    ] = None
+    hone: Annotated[
+        Hone | None,
+        Parameter(
+            "Hone instead of the edge's radius: how far from the sharp edge it begins on either "
+            "face.",
+            allowed="none, or {rake: 40 um, clearance: 20 um}",
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         check_angles(self.rake_angle, self.clearance_angle)
-        if not (isfinite(self.edge_radius) and self.edge_radius > 0):
-            raise ValueError(f"edge_radius: expected over 0 m, got {self.edge_radius!r} m")
         if self.chamfer and self.hone:
             raise ValueError("chamfer and hone: expected one or the other, got both")
         if self.chamfer:

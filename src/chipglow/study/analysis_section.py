@@ -16,7 +16,7 @@ Corners = tuple[PointOfScene, ...]
 class AnalysisSection(Settings[Plan]):
     """What is computed from the simulated measurement."""
 
-    exposures: Annotated[int, Parameter("Exposures, spread evenly over the scene.")] = 9
+    exposures: Annotated[int, Parameter("Exposures, spread evenly over the scene.", least=1)] = 9
     phases: Annotated[
         int,
         Parameter(

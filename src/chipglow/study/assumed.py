@@ -18,13 +18,7 @@ _HOW_FINELY: Final = {
 
 
 def left_to_the_paper(study: Study) -> Iterator[str]:
-    """What is the paper's in a study that is another, a sentence for each section.
-
-    Parameters
-    ----------
-    study : Study
-        The study; of the paper's own nothing is said.
-    """
+    """What is the paper's in a study that is another, a sentence for each section."""
     if study.is_papers:
         return
     sections = ["surface", "camera"] if study.scene else ["cutting", "surface", "camera"]

@@ -44,14 +44,7 @@ def cache_folder() -> Path:
 
 
 def scene_path(inputs: Mapping[str, Any]) -> Path:
-    """Where the scene computed from these inputs is, or would be.
-
-    Parameters
-    ----------
-    inputs : mapping
-        All that the scene depends on, of JSON's types: the settings in SI and the versions of the
-        solver and of the file format.
-    """
+    """Where the scene computed from these inputs is, or would be."""
     text = dumps(inputs, sort_keys=True, allow_nan=False)
     return cache_folder() / f"scene-{sha256(text.encode()).hexdigest()[:32]}.nc"
 

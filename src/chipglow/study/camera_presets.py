@@ -82,18 +82,7 @@ CAMERAS: Final[Mapping[str, CameraPreset]] = MappingProxyType(
 
 
 def with_preset(camera: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A camera's data with what its preset says and the data do not.
-
-    Parameters
-    ----------
-    camera : mapping
-        The section as a YAML file gives it.
-
-    Raises
-    ------
-    ValueError
-        If there is no such preset.
-    """
+    """A camera's data with what its preset says and the data do not."""
     name = camera.get("preset")
     if name in (None, "none"):
         return camera

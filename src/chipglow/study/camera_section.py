@@ -24,11 +24,8 @@ from chipglow.camera import (
 from chipglow.io.column_file import read_response
 from chipglow.quantities import FileBeside, Parameter, Settings
 from chipglow.quantities.units import (
-    FREQUENCY,
     LENGTH,
     POSITION,
-    TEMPERATURE,
-    TIME,
     WAVELENGTHS,
 )
 from chipglow.radiometry import Band
@@ -38,10 +35,6 @@ from chipglow.study.scaling import with_pitch
 
 FROM_DETECTOR: Final = "detector"
 """A lower range limit that follows from the detector."""
-
-PSFSection = Annotated[PSFChoice, PSFS]
-BlurSection = Annotated[BlurTerm, BLURS]
-OpticsTermSection = Annotated[OpticsTerm, OPTICS_TERMS]
 
 
 class CameraSection(Settings[Camera]):
@@ -67,14 +60,11 @@ class CameraSection(Settings[Camera]):
             allowed="none, or a file such as response.csv",
         ),
     ] = None
-    pitch: Annotated[float, Parameter("Distance between pixels, as seen on the scene.", LENGTH)] = (
-        6e-6
-    )
+    pitch: Annotated[float, Camera.parameter("pitch")] = Camera.pitch
     detector_pitch: Annotated[
         float | None,
         Parameter(
-            "The same on the detector, of its data sheet, in the place of pitch; with "
-            "magnification.",
+            "The same on the detector, of its data sheet, instead of pitch; with magnification.",
             LENGTH,
             over=0.0,
         ),
@@ -88,72 +78,45 @@ class CameraSection(Settings[Camera]):
         Parameter(
             "Columns and rows of the detector; none, and where the scene is smaller: as many as "
             "see the scene.",
+            least=1,
             allowed="none, or such as [640, 512]",
         ),
     ] = None
-    fill_factor: Annotated[float, Parameter("Fraction of a pixel's square that takes light.")] = 1.0
+    fill_factor: Annotated[float, Camera.parameter("fill_factor")] = Camera.fill_factor
     offset_right: Annotated[
-        float, Parameter("First pixel's corner from the scene's left edge.", POSITION)
+        float, Parameter("First pixel's corner from the scene's left edge.", POSITION, least=0.0)
     ] = 0.0
     offset_down: Annotated[
-        float, Parameter("First pixel's corner from the scene's upper edge.", POSITION)
+        float, Parameter("First pixel's corner from the scene's upper edge.", POSITION, least=0.0)
     ] = 0.0
     psf: Annotated[
-        PSFSection | None,
+        Annotated[PSFChoice, PSFS] | None,
         Parameter("Point spread function of the optics, or none."),
     ] = AnnularAperturePSF()
     blur: Annotated[
-        tuple[BlurSection, ...],
+        tuple[Annotated[BlurTerm, BLURS], ...],
         Parameter("What spreads light besides, a list: it is part of the point spread function."),
     ] = ()
     optics: Annotated[
-        tuple[OpticsTermSection, ...],
-        Parameter("What the optics do besides, a list in the order of the light."),
+        tuple[Annotated[OpticsTerm, OPTICS_TERMS], ...], Camera.parameter("optics")
     ] = ()
-    psf_order: Annotated[
-        Literal["optics", "detector"],
-        Parameter(
-            "detector (the paper's: on the pixels' values) or optics (on the samples, before the "
-            "sensors integrate)."
-        ),
-    ] = "detector"
-    integration_time: Annotated[float, Parameter("Exposure.", TIME)] = 10e-6
-    frame_rate: Annotated[float, Parameter("Frames a second.", FREQUENCY)] = 600.0
-    line_time: Annotated[
-        float | None,
-        Parameter(
-            "Rolling shutter: how much later each row's exposure begins than that of the row "
-            "above; none: a global shutter, all rows at once.",
-            TIME,
-            over=0.0,
-        ),
-    ] = None
+    psf_order: Annotated[Literal["optics", "detector"], Camera.parameter("psf_order")] = "detector"
+    integration_time: Annotated[float, Camera.parameter("integration_time")] = (
+        Camera.integration_time
+    )
+    frame_rate: Annotated[float, Camera.parameter("frame_rate")] = Camera.frame_rate
+    line_time: Annotated[float | None, Camera.parameter("line_time")] = None
     lower_limit: Annotated[
         float | Literal["detector"] | None,
-        Parameter(
-            "Radiance temperatures under this are flagged, not returned; or none. With a detector "
-            "it is the detector's, unless it is said.",
-            TEMPERATURE,
-            allowed="a temperature, detector or none",
+        replace(
+            Camera.parameter("lower_limit"),
+            meaning="Radiance temperatures under this are flagged, not returned; or none. With a "
+            "detector it is the detector's, unless it is said.",
+            allowed=f"{Camera.parameter('lower_limit').limits}; detector; or none",
         ),
-    ] = 573.15
-    reflected: Annotated[
-        float | None,
-        Parameter(
-            "Temperature of the surroundings that the surface reflects, or none.", TEMPERATURE
-        ),
-    ] = None
-
-    detector: Annotated[
-        Detector | None,
-        Parameter(
-            "Electrons, noise and counts of the detector, and the camera's own calibration; none: "
-            "the radiance is read as it is.",
-            allowed="none, or such as\n"
-            "{response: {kind: photon, quantum_efficiency: 0.8, element: 15 um, f_number: 2.5},\n"
-            "full_well: 7e6, bits: 14, terms: [{kind: shot-noise}]}",
-        ),
-    ] = None
+    ] = Camera.lower_limit
+    reflected: Annotated[float | None, Camera.parameter("reflected")] = None
+    detector: Annotated[Detector | None, Camera.parameter("detector")] = None
 
     @model_validator(mode="before")
     @classmethod
@@ -166,42 +129,21 @@ class CameraSection(Settings[Camera]):
         return camera
 
     def build(self, seed: int = 2010) -> Camera:
-        """The camera, with as many pixels as see the scene.
-
-        Parameters
-        ----------
-        seed : int
-            The study's: of the detector's noise.
-        """
-        band = self._band()
-        detector = self.detector
-        return Camera(
-            band=band,
-            pitch=self.pitch,
-            offset=(self.offset_right, self.offset_down),
-            fill_factor=self.fill_factor,
-            psf=self._psf(band),
-            psf_order=self.psf_order,
-            integration_time=self.integration_time,
-            frame_rate=self.frame_rate,
-            line_time=self.line_time,
-            lower_limit=self._lower_limit(band, detector),
-            reflected=self.reflected,
-            optics=self.optics,
-            detector=detector,
-            seed=seed,
-        )
+        """The camera, with as many pixels as see the scene."""
+        response = None if self.response is None else read_response(self.response)
+        band = Band(*self.band, response)
+        shared = Camera.parameters().keys() & type(self).model_fields.keys()
+        made = {
+            **{name: getattr(self, name) for name in shared},
+            "band": band,
+            "offset": (self.offset_right, self.offset_down),
+            "psf": self._psf(band),
+            "lower_limit": self._lower_limit(band),
+        }
+        return Camera(**made, seed=seed)
 
     def on(self, scene: Raster, seed: int = 2010) -> Camera:
-        """The camera on a scene, with no more pixels than its detector has.
-
-        Parameters
-        ----------
-        scene : Raster
-            The scene's samples.
-        seed : int
-            The study's: of the detector's noise.
-        """
+        """The camera on a scene, with no more pixels than its detector has."""
         camera = self.build(seed)
         if self.array is None:
             return camera
@@ -209,17 +151,13 @@ class CameraSection(Settings[Camera]):
         columns, rows = self.array
         return replace(camera, shape=(min(rows, seen.rows), min(columns, seen.columns)))
 
-    def _lower_limit(self, band: Band, detector: Detector | None) -> float | None:
+    def _lower_limit(self, band: Band) -> float | None:
         if self.lower_limit != FROM_DETECTOR:
             return self.lower_limit
-        if detector is None:
+        if self.detector is None:
             raise ValueError("lower_limit: detector, expected a detector beside it")
         point = OperationPoint(band, self.integration_time, self.frame_rate, self.fill_factor)
-        return lower_range_limit(detector, point)
-
-    def _band(self) -> Band:
-        response = None if self.response is None else read_response(self.response)
-        return Band(*self.band, response)
+        return lower_range_limit(self.detector, point)
 
     def _psf(self, band: Band) -> PointSpreadFunction | None:
         if self.psf is None:

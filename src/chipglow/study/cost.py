@@ -50,13 +50,7 @@ class Cost:
 
 
 def expected_cost(study: Study) -> Cost:
-    """What a study costs on this machine, from its sizes; right within a factor of two or so.
-
-    Parameters
-    ----------
-    study : Study
-        A study that cuts.
-    """
+    """What a study costs on this machine, from its sizes; right within a factor of two or so."""
     cutting, camera = study.cutting, study.camera
     view, window = cutting.field_of_view, cutting.window
     samples = view.rows * view.columns

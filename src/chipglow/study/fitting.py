@@ -47,18 +47,6 @@ def fit(study: Study, scene: Scene) -> Fitted:
 
     Textures then move by the mean velocities of their features, as the paper's did, and the tool
     is that of the study's section cutting.tool, if it is given there.
-
-    Parameters
-    ----------
-    study : Study
-        Says surfaces and tool.
-    scene : Scene
-        The scene.
-
-    Raises
-    ------
-    ValueError
-        If an emissivity map lies beside the scene.
     """
     surfaces = surfaces_of(study.surface, study.seed)
     notes = Notes()
@@ -148,13 +136,7 @@ def _too_coarse(study: Study, scene: Scene) -> Iterator[str]:
 
 
 def uncovered(surfaces: Mapping[str, Surface], scene: Raster) -> Iterator[str]:
-    """What emissivity maps leave of the scene, a sentence each.
-
-    Raises
-    ------
-    ValueError
-        If a map lies beside the scene.
-    """
+    """What emissivity maps leave of the scene, a sentence each."""
     for name, outer in surfaces.items():
         *_, surface = _layers(outer)
         if not isinstance(surface, MapSurface):

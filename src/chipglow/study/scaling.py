@@ -26,13 +26,6 @@ def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
     Lengths of the cut, the window and the view go with the feed, the time between frames with the
     time in which the chip moves as far; samples are a ninth of a pixel, and an exposure fits into
     what is kept. What the study says itself stays.
-
-    Parameters
-    ----------
-    study : mapping
-        Sections as a YAML file gives them.
-    from_file : bool
-        Whether it is from a file, where numbers without their unit are refused.
     """
     cutting, camera = (_section(study, name) for name in ("cutting", "camera"))
     if camera is not None:
@@ -87,21 +80,7 @@ def scaled(study: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
 
 
 def with_pitch(camera: Mapping[str, Any], from_file: bool = True) -> dict[str, Any]:
-    """A camera's data with the pitch on the scene that its data sheet makes.
-
-    Parameters
-    ----------
-    camera : mapping
-        The section as a YAML file gives it.
-    from_file : bool
-        As for `scaled`.
-
-    Raises
-    ------
-    ValueError
-        If only one of detector_pitch and magnification is given where both are needed, or they
-        make another pitch than is given.
-    """
+    """A camera's data with the pitch on the scene that its data sheet makes."""
     detector, magnification = (camera.get(name) for name in ("detector_pitch", "magnification"))
     if detector in (None, "none"):
         return dict(camera)

@@ -14,7 +14,7 @@ from chipglow.laboratory.emissivity import (
     read_measured_areas,
 )
 from chipglow.quantities import FileBeside, Parameter, Section
-from chipglow.quantities.units import LENGTH, WAVELENGTHS
+from chipglow.quantities.units import WAVELENGTHS
 from chipglow.radiometry import Band
 from chipglow.surface import (
     CHIP_1,
@@ -47,17 +47,14 @@ _FEATURE: Final = {"body": "chip"}
 """Features whose name in a study is another than that of the surface."""
 
 
-OxideSection = Annotated[Oxide, OXIDES]
-SpectralSection = Annotated[SpectralSurface, SPECTRA]
-DirectionalSection = Annotated[Direction, DIRECTIONS]
-ReflectionsSection = Annotated[SideShape, REFLECTIONS]
+_declared = FeatureSurface.parameter
 
 
 class ChipSection(Section):
     """Emissivity of one chip."""
 
-    body: Annotated[Emissivity, Parameter("Body of the segments.")]
-    shear_band: Annotated[Emissivity, Parameter("Shear bands: the paper's fissures.")]
+    body: Annotated[Emissivity, _declared("chip")]
+    shear_band: Annotated[Emissivity, _declared("shear_band")]
 
     @classmethod
     def __get_pydantic_json_schema__(
@@ -113,26 +110,13 @@ class FeaturesSection(Section):
             allowed="{} or names and files beside this one: {heated chip: emissivity.nc}",
         ),
     ] = Field(default_factory=dict)
-    workpiece: Annotated[
-        Emissivity, Parameter("The uncut workpiece; the paper assumed these numbers.")
-    ] = CHIP_1.workpiece
-    tool: Annotated[Emissivity, Parameter("The tool's side.")] = CHIP_1.tool
-    grain: Annotated[float, Parameter("Size of a grain of the emissivity's texture.", LENGTH)] = (
-        20e-6
-    )
-    follow: Annotated[
-        Literal["material", "mean", "none"],
-        Parameter(
-            "How textures move: material (each point keeps its own), mean (the paper's shift by "
-            "the feature's mean velocity) or none."
-        ),
-    ] = "material"
-    restore_standard_deviation: Annotated[
-        bool,
-        Parameter("Make up for the standard deviation that is lost when a texture is enlarged."),
-    ] = True
+    workpiece: Annotated[Emissivity, _declared("workpiece")] = FeatureSurface.workpiece
+    tool: Annotated[Emissivity, _declared("tool")] = FeatureSurface.tool
+    grain: Annotated[float, _declared("grain")] = FeatureSurface.grain
+    follow: Annotated[Literal["material", "mean", "none"], _declared("follow")] = "material"
+    restore_standard_deviation: Annotated[bool, _declared("restore_standard_deviation")] = True
     spectral: Annotated[
-        SpectralSection | None,
+        Annotated[SpectralSurface, SPECTRA] | None,
         Parameter(
             "How all these emissivities depend on the wavelength, for cameras of other bands; or "
             "none: they are grey."
@@ -145,19 +129,19 @@ class FeaturesSection(Section):
         ),
     ] = (3.8e-6, 5.1e-6)
     oxide: Annotated[
-        OxideSection | None,
+        Annotated[Oxide, OXIDES] | None,
         Parameter(
             "Oxide that grows on the material while it is in view, by its temperatures, or none."
         ),
     ] = None
     directional: Annotated[
-        DirectionalSection | None,
+        Annotated[Direction, DIRECTIONS] | None,
         Parameter(
             "How emissivities depend on the angle at which they are seen, or none: they do not."
         ),
     ] = None
     reflections: Annotated[
-        ReflectionsSection | None,
+        Annotated[SideShape, REFLECTIONS] | None,
         Parameter(
             "Reflections between the rake face and the chip's side, which flowed sideways, or none."
         ),
@@ -188,20 +172,7 @@ class FeaturesSection(Section):
         return (*self.chips, *self.maps, *self.measured)
 
     def build(self, seed: int) -> dict[str, Surface]:
-        """The surfaces by name.
-
-        Parameters
-        ----------
-        seed : int
-            Seed of the textures, the same for every chip: they differ by their numbers only.
-
-        Raises
-        ------
-        ValueError
-            If a file is no emissivity map.
-        OSError
-            If it is not there.
-        """
+        """The surfaces by name."""
         chips = {
             name: self._features(chip.body, chip.shear_band, seed)
             for name, chip in self.chips.items()
@@ -226,16 +197,9 @@ class FeaturesSection(Section):
         return {name: ReflectingSurface(bare, shape) for name, bare in surfaces.items()}
 
     def _features(self, chip: Emissivity, shear_band: Emissivity, seed: int) -> FeatureSurface:
-        return FeatureSurface(
-            chip=chip,
-            shear_band=shear_band,
-            workpiece=self.workpiece,
-            tool=self.tool,
-            grain=self.grain,
-            follow=self.follow,
-            seed=seed,
-            restore_standard_deviation=self.restore_standard_deviation,
-        )
+        shared = FeatureSurface.parameters().keys() & type(self).model_fields.keys()
+        values = {name: getattr(self, name) for name in shared}
+        return FeatureSurface(chip=chip, shear_band=shear_band, seed=seed, **values)
 
     def _measured(self, file: str, seed: int) -> FeatureTrends:
         try:
@@ -268,22 +232,7 @@ def surface_names(section: FeaturesSection | SurfaceChoice) -> tuple[str, ...]:
 
 
 def surfaces_of(section: FeaturesSection | SurfaceChoice, seed: int) -> dict[str, Surface]:
-    """The surfaces of a section by their names.
-
-    Parameters
-    ----------
-    section : FeaturesSection or SurfaceChoice
-        The section.
-    seed : int
-        Seed of the textures.
-
-    Raises
-    ------
-    ValueError
-        If one is not possible.
-    OSError
-        If a file is not there.
-    """
+    """The surfaces of a section by their names."""
     if isinstance(section, FeaturesSection):
         return section.build(seed)
     return {section.kind: section.surface()}

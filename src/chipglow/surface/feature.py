@@ -1,14 +1,16 @@
 """Emissivity by feature: workpiece, chip, shear band and tool, as the paper maps it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from chipglow.quantities import Parameter, Part
+from chipglow.quantities.units import LENGTH
 from chipglow.scene import Frame, Material, Raster, Scene
 from chipglow.surface.blend import (
     RATE_OF_CHIP,
@@ -33,25 +35,13 @@ FEATURES: Final = ("workpiece", "chip", "shear_band", "tool")
 _VOID, _TOOL = int(Material.VOID), int(Material.TOOL)
 
 
-@dataclass(frozen=True)
-class FeatureSurface(Surface):
-    """Emissivity of workpiece, chip, shear band and tool, each with a random texture.
+_WORKPIECE, _TOOL_SIDE = Emissivity(0.40, 0.03), Emissivity(0.58, 0.06)
+"""The paper's Table 1."""
 
-    Parameters
-    ----------
-    chip, shear_band, workpiece, tool : Emissivity
-        What each feature has. Workpiece and tool default to the paper's.
-    grain : float
-        Size of one deviate of the textures in m.
-    follow : {"material", "mean", "none"}
-        How the textures move. "material": each point keeps its own, by the scene's material
-        coordinates. "mean": the paper's way, each map is shifted by its feature's mean velocity.
-        "none": they stay where they are.
-    seed : int
-        Seed of the textures; each feature has an independent stream of it. By default that of the
-        paper's study.
-    restore_standard_deviation : bool
-        Make up for the standard deviation that enlarging takes from a map of deviates.
+
+@dataclass(frozen=True)
+class FeatureSurface(Surface, Part):
+    """Emissivity of workpiece, chip, shear band and tool, each with a random texture.
 
     Raises
     ------
@@ -67,22 +57,29 @@ class FeatureSurface(Surface):
     has emissivity 0.
     """
 
-    chip: Emissivity
-    shear_band: Emissivity
-    workpiece: Emissivity = field(default_factory=lambda: Emissivity(0.40, 0.03))
-    tool: Emissivity = field(default_factory=lambda: Emissivity(0.58, 0.06))
-    grain: float = 20e-6
-    follow: Literal["material", "mean", "none"] = "material"
-    seed: int = 2010
-    restore_standard_deviation: bool = True
-
-    def __post_init__(self) -> None:
-        if not 0 < self.grain < np.inf:
-            raise ValueError(f"grain: expected over 0 m, got {self.grain!r} m")
-        if self.follow not in ("material", "mean", "none"):
-            raise ValueError(f"follow: expected 'material', 'mean' or 'none', got {self.follow!r}")
-        if self.seed < 0:
-            raise ValueError(f"seed: expected 0 or more, got {self.seed!r}")
+    chip: Annotated[Emissivity, Parameter("Body of the chip's segments.")]
+    shear_band: Annotated[Emissivity, Parameter("Shear bands: the paper's fissures.")]
+    workpiece: Annotated[
+        Emissivity, Parameter("The uncut workpiece; the paper assumed these numbers.")
+    ] = _WORKPIECE
+    tool: Annotated[Emissivity, Parameter("The tool's side.")] = _TOOL_SIDE
+    grain: Annotated[
+        float, Parameter("Size of a grain of the emissivity's texture.", LENGTH, over=0.0)
+    ] = 20e-6
+    follow: Annotated[
+        Literal["material", "mean", "none"],
+        Parameter(
+            "How textures move: material (each point keeps its own, by the scene's material "
+            "coordinates), mean (the paper's shift by the feature's mean velocity) or none."
+        ),
+    ] = "material"
+    seed: Annotated[
+        int, Parameter("Seed of the textures; each feature has a stream of its own.", least=0)
+    ] = 2010
+    restore_standard_deviation: Annotated[
+        bool,
+        Parameter("Make up for the standard deviation that is lost when a texture is enlarged."),
+    ] = True
 
     @cached_property
     def textures(self) -> Mapping[str, Texture]:
