@@ -22,6 +22,7 @@ from chipglow.camera import expose, expose_all
 from chipglow.io import example_scene, is_measurement, open_scene
 from chipglow.io.sources import SourceError
 from chipglow.quantities.format import rounded_text
+from chipglow.scene import sample
 from chipglow.scene.lines import nearest
 from chipglow.study import Study, fit, load_study
 from chipglow.surface import CHIP_1, UniformSurface
@@ -88,8 +89,9 @@ def test_a_saved_study_gives_the_same_numbers(model, tmp_path, texts):
     np.testing.assert_array_equal(picture.error, expected.case_1)
     np.testing.assert_array_equal(picture.flagged, expected.flagged)
     place = LinePlace("line", study.analysis.lines["across the rake face"])
-    reference, error, _ = place.profile(expected)
-    np.testing.assert_array_equal(picture.lines["rake_line"].measured, reference + error)
+    points = place.line(expected.raster.spacing).points
+    measured = sample(expected.measured, expected.raster, points)
+    np.testing.assert_array_equal(picture.lines["rake_line"].measured, measured)
 
 
 def test_the_readout_is_that_of_the_pixel_and_the_sample(model):
@@ -117,6 +119,15 @@ def test_the_readout_is_that_of_the_pixel_and_the_sample(model):
     assert found.emissivity == nearest(laid, scene.raster, at)
 
 
+def test_a_surface_without_texture_has_no_error_by_it(model):
+    by_texture = model.changed(model.controls.initial, {"error_image": "texture"})
+    assert np.nanmax(np.abs(model.picture(by_texture, quick=True).error)) > 5
+    uniform = model.changed(by_texture, {"surface": "uniform"})
+    for quick in (True, False):
+        picture = model.picture(uniform, quick=quick)
+        assert picture.error.shape == picture.measured.shape and not picture.error.any()
+
+
 def test_draws_are_those_of_other_pixels_and_textures(model):
     state = model.controls.initial
     told = []
@@ -128,9 +139,9 @@ def test_draws_are_those_of_other_pixels_and_textures(model):
     exposure = camera.expose(model.opened.scene, surface.redrawn(1), state.start)
     errors = error_images(second, exposure)
     assert found.error.values[1, 1] == nearest(errors.case_1, errors.raster, state.cursor)
-    profile = LinePlace("line", state.line("band_line")).profile(errors)
-    # Measured less reference is the error but for rounding.
-    np.testing.assert_allclose(found.lines["band_line"][5], profile[0] + profile[1], atol=1e-9)
+    line = LinePlace("line", state.line("band_line")).line(errors.raster.spacing)
+    measured = sample(errors.measured, errors.raster, line.points)
+    np.testing.assert_array_equal(found.lines["band_line"][5], measured)
 
 
 def test_a_quick_look_is_the_same_scene_on_fewer_samples(model):
@@ -345,7 +356,7 @@ def test_two_sessions_on_one_scene_do_not_disturb_each_other(opened):
     second.change({"camera.pitch": "8 um"})
     assert first.settle() and second.settle()
     first.change({"surface.emissivity": "0.3"})
-    first.undo()
+    first.step(forward=False)
     assert first.settle()
     assert [session.state.study.camera.pitch for session in (first, second)] == [5e-6, 8e-6]
     assert [one.pictures[-1].raster.spacing for one in heard] == [5e-6, 8e-6]
@@ -361,21 +372,21 @@ def test_undo_goes_back_knob_by_knob(opened):
     for pitch in ("5.5 um", "6.5 um", "7 um"):
         session.change({"camera.pitch": pitch}, final=pitch == "7 um")
     session.change({"camera.psf": "none"})
-    session.undo()
+    session.step(forward=False)
     assert (session.state.study.camera.psf.kind, session.state.study.camera.pitch) == (
         "annular-aperture",
         7e-6,
     )
-    session.undo()
+    session.step(forward=False)
     assert session.state.study.camera.pitch == 5e-6
-    session.undo()
+    session.step(forward=False)
     assert session.state == session.model.controls.initial and not session.can_undo
-    session.redo()
-    session.redo()
+    session.step(forward=True)
+    session.step(forward=True)
     assert session.state.study.camera.pitch == 7e-6 and session.can_redo
     session.change({"camera.pitch": "9 um"})
     assert not session.can_redo
-    session.undo()
+    session.step(forward=False)
     assert session.state.study.camera.pitch == 7e-6
     session.end()
 

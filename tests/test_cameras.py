@@ -147,6 +147,7 @@ def test_stamps_that_do_not_ascend_give_way_to_the_frame_rate(tmp_path):
         read_recording(without)
 
 
+@pytest.mark.usefixtures("read_here")
 @pytest.mark.parametrize("pack", [files.plain, files.png, jpeg_ls])
 def test_a_picture_that_ends_before_the_missing_end_of_a_file_is_whole(tmp_path, pack):
     # Thermimage's SampleCSQ.csq lacks the four last bytes that its list of records tells of.

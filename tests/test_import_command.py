@@ -21,6 +21,8 @@ from chipglow.text import DescriptionError
 
 RUNNER = CliRunner()
 
+pytestmark = pytest.mark.usefixtures("read_here")
+
 
 @pytest.fixture
 def arrays(tmp_path):

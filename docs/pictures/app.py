@@ -45,7 +45,7 @@ def take(browser, url, size, theme, file):
     width, height = size
     page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=theme)
     page.set_default_timeout(180_000)
-    page.goto(f"{url}&netd=0.5+K")
+    page.goto(f"{url}&camera.detector=noise&camera.detector.terms.0.netd=0.5+K")
     page.locator("#status", has_text="Exact picture").wait_for()
     page.get_by_role("table", name="Parts of the error").wait_for()
     page.locator(".numbers.old").wait_for(state="detached")

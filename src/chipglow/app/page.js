@@ -2,7 +2,7 @@
 // content; what the user does goes back in messages.
 
 const BORDER = 46, GAP = 18, LEAST_FRAME = 180;
-const NARROW = 888; // width in pixels of the part beside the controls, which are 292 wide
+const NARROW = 888, LEAST_PAIR = 560; // widths in pixels of the part beside the controls
 const VIEW_WIDTH = 160; // µm
 const GRIP = 12; // pixels
 
@@ -69,8 +69,8 @@ export function render({ view, model, el }) {
       actions.append(button(text, () => send("save", name), { title }));
     }
     actions.append(
-      button("Undo", () => send("undo"), { id: "undo", title: "Ctrl+Z" }),
-      button("Redo", () => send("redo"), { id: "redo", title: "Ctrl+Y" }));
+      button("Undo", () => send("step", false), { id: "undo", title: "Ctrl+Z" }),
+      button("Redo", () => send("step", true), { id: "redo", title: "Ctrl+Y" }));
     if (!spec.embedded) {
       actions.append(button("Copy link", copyLink, { title: "A link that restores this state" }));
     }
@@ -342,9 +342,9 @@ export function render({ view, model, el }) {
   // A picture counts as painted when the browser had time for it: then come the curves along its
   // lines, and the next picture.
   function showPicture({ number, lines }) {
+    find(".numbers").classList.add("old"); // until those of this picture come
     requestAnimationFrame(() => setTimeout(() => {
       send("painted", number);
-      find(".numbers").classList.add("old"); // until those of this picture come
       for (const [name, data] of Object.entries(lines)) named(name).setv({ data }, { sync: false });
       const left = 80 - (performance.now() - stepped);
       if (playing) setTimeout(() => playing && step("start", 1), Math.max(left, 0));
@@ -395,14 +395,15 @@ export function render({ view, model, el }) {
     const height = Math.round(spec.embedded ? 900 : innerHeight);
     if (width < 1 || size === `${width}x${height}`) return false;
     size = `${width}x${height}`;
-    const count = Math.max(spec.images.length, 2);
-    const wide = (width - BORDER - (count - 1) * GAP) / count - 12;
+    const count = width < LEAST_PAIR ? 1 : Math.max(spec.images.length, 2);
+    const wide = (width - BORDER - (count - 1) * GAP) / count - (count === 1 ? 26 : 12);
     const tallest = Math.max(0.52 * height - 60, LEAST_FRAME);
     const frame = Math.trunc(Math.max(Math.min(wide, tallest / spec.shape), LEAST_FRAME));
     const below = Math.trunc(Math.max(Math.min(height - frame * spec.shape - 345, 330), 150));
     // Numbers stand beside the lines, or below them where it is narrow: see page.css.
     const numbers = width > NARROW ? 345 : 60;
-    const across = Math.trunc(Math.max((width - 2 * BORDER - numbers) / 2 - 20, LEAST_FRAME));
+    const pair = (width - 2 * BORDER - numbers) / 2 - 20;
+    const across = Math.trunc(Math.max(count === 1 ? wide : pair, LEAST_FRAME));
     for (const [name] of spec.figures) {
       const [frame_width, frame_height] = spec.images.includes(name)
         ? [frame, Math.trunc(frame * spec.shape)] : [across, below];
@@ -416,7 +417,7 @@ export function render({ view, model, el }) {
     const typing = event.target.type === "text", key = event.key.toLowerCase();
     if ((event.ctrlKey || event.metaKey) && "zy".includes(key) && !typing) {
       event.preventDefault();
-      send(key === "y" || event.shiftKey ? "redo" : "undo");
+      send("step", key === "y" || event.shiftKey);
     } else if (key === "enter" && typing) {
       event.preventDefault(); // a notebook would make no change of it
       event.target.dispatchEvent(new Event("change"));

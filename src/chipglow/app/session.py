@@ -135,7 +135,7 @@ class Session:
         self._pictures.ask(self.state)
 
     def change(self, texts: Mapping[str, str], final: bool = True) -> None:
-        """Set controls; only a final state can be returned to by `undo`.
+        """Set controls; only a final state is one that `step` goes to.
 
         Raises
         ------
@@ -167,15 +167,12 @@ class Session:
         """Whether there is a state that was undone."""
         return self._at + 1 < len(self._settled)
 
-    def undo(self) -> None:
-        """Go back to the state before."""
-        if self.state == self._settled[self._at]:
+    def step(self, forward: bool) -> None:
+        """Go back to the state before, or forward to the one that was undone last."""
+        if forward:
+            self._at = min(self._at + 1, len(self._settled) - 1)
+        elif self.state == self._settled[self._at]:
             self._at = max(self._at - 1, 0)
-        self.set(self._settled[self._at], final=False)
-
-    def redo(self) -> None:
-        """Go to the state that was undone last."""
-        self._at = min(self._at + 1, len(self._settled) - 1)
         self.set(self._settled[self._at], final=False)
 
     def draw(self, phases: int, textures: int) -> None:

@@ -74,18 +74,8 @@ class Page(JSComponent):  # type: ignore[misc]
 class View:
     """A page and its session.
 
-    Parameters
-    ----------
-    opened : Opened
-        Shown on the page.
-    texts : mapping, optional
-        Values of controls that a link gives.
-    link : mapping, optional
-        Other parameters of links to this page.
-    uploads : str
-        Maximum size of an uploaded file in words; empty if uploads are not possible.
-    embedded : bool
-        Whether it is part of another page, such as a notebook.
+    A link gives `texts` of controls and other parameters, `link`; `uploads` is the maximum size of
+    an uploaded file, empty if none is accepted; `embedded` marks a part of another page.
     """
 
     def __init__(
@@ -164,12 +154,8 @@ class View:
     def _on_move(self, texts: dict[str, str]) -> None:
         self._on_change(texts, final=False)
 
-    def _on_undo(self, _: None) -> None:
-        self.session.undo()
-        self._changed()
-
-    def _on_redo(self, _: None) -> None:
-        self.session.redo()
+    def _on_step(self, forward: bool) -> None:
+        self.session.step(forward)
         self._changed()
 
     def _changed(self) -> None:
@@ -382,7 +368,7 @@ def _celsius(kelvins: float) -> str:
 
 
 def _kelvins(kelvins: float) -> str:
-    return _minus(f"{kelvins:+.1f} K") if isfinite(kelvins) else "–"
+    return _minus(f"{round(kelvins, 1) + 0.0:+.1f} K") if isfinite(kelvins) else "–"
 
 
 def _minus(text: str) -> str:
