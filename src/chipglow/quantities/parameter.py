@@ -84,7 +84,7 @@ class Parameter:
 
     def refusal(self, name: str, value: object, kind: Any = float) -> ValueError:
         """The error for a value that is not allowed, in SI units."""
-        expected = "" if self.is_limited else self.allowed or _expected(kind)
+        expected = "" if self.is_limited else _expected(kind) or self.allowed
         expected = expected or self._limits(self._si_text)
         return ValueError(f"{name}: {self._si_text(value)}, expected {expected}")
 
@@ -251,22 +251,24 @@ def _check(kind: Any) -> Callable[[object], bool]:
 
 
 def _expected(kind: Any) -> str:
-    """What a type allows, in words."""
+    """What a type allows, in words; empty for what is not checked."""
     origin, members = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        return _expected(members[0])
     if origin is tuple:
-        return f"a tuple of {_class_name(members[0])}".removesuffix(" of ")
+        (first, *_), many = members, members[-1] is ...
+        of = _PLURALS.get(first) or _expected(first) or "values"
+        return f"a tuple of {of}" if many else f"{len(members)} {of}"
     if origin is Literal:
         names = [str(one) for one in members]
+    elif origin in (Union, UnionType):
+        names = [_expected(one) for one in members]
+    elif kind is NoneType:
+        return "None"
     else:
-        names = [_class_name(one) for one in (members if origin else (kind,))]
-        names = [*filter(None, names), *(["None"] if NoneType in members else [])]
-    return " or ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+        return _NAMES.get(kind) or str(getattr(kind, "__name__", ""))
+    return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
-def _class_name(kind: Any) -> str:
-    """What a class of the library, or a number, is called; empty for all else."""
-    kind = get_args(kind)[0] if get_origin(kind) is Annotated else kind
-    if kind in _NUMBERS:
-        return "a finite number" if kind is float else "a whole number"
-    own = isinstance(kind, type) and kind.__module__ != "builtins" and kind is not NoneType
-    return kind.__name__ if own else ""
+_NAMES: Final[dict[Any, str]] = {float: "a finite number", int: "a whole number", str: "a text"}
+_PLURALS: Final[dict[Any, str]] = {float: "finite numbers", int: "whole numbers", str: "texts"}

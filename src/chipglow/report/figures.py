@@ -145,11 +145,13 @@ def error_images(facts: Facts) -> Figure:
 
 
 def error_lines(facts: Facts) -> Figure | None:
-    """Draw temperatures and errors along every line across a place."""
+    """Draw temperatures and errors along the lines: of all segments or the shown exposure."""
     names = [] if "line" not in facts.data else list(facts.data.line.values)
     names = [name for name in names if name != "contact"]
     if not names:
         return None
+    number = int(facts.data.attrs["shown_instant"])
+    shown = slice(None) if facts.analysis.cut else slice(number, number + 1)
     factor, unit = drawing.length_unit(facts.analysis.raster)
     figure = drawing.new_figure(2.7 * len(names) + 0.8)
     rows = figure.subplots(len(names), 2, squeeze=False)
@@ -164,7 +166,7 @@ def error_lines(facts: Facts) -> Figure | None:
             (right, error, BLUE, "error"),
             (right, portion, VERMILLION, "PSF contribution"),
         ):
-            drawing.draw_mean(axes, at, _draws(values.values), colour, label)
+            drawing.draw_mean(axes, at, _draws(values[shown].values), colour, label)
         if facts.is_compared:
             _draw_published(right, str(name))
         left.set(title=_line_title(facts, str(name)), ylabel="radiance temperature / °C")

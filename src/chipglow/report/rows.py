@@ -250,13 +250,15 @@ def cause_rows(rows: list[Row]) -> list[CauseRow]:
 def _row(facts: Facts, key: str, here: float, kind: str = "", **more: Any) -> Row:
     """Return a row; `kind` names its texts if the key has none of its own."""
     template = texts()["rows"].get(key) or texts()["rows"][kind]
+    draws = more.get("draws")
+    decimals = _decimals(draws) if draws and template is texts()["rows"].get(kind) else 0
     names = {name: more.pop(name) for name in ("id", "name", "surface") if name in more}
     row = Row(
         key,
         facts.text(template["quantity"], **names),
         template["unit"],
         known(here),
-        template.get("decimals", 0),
+        template.get("decimals", decimals),
         facts.text(template["text"], **names),
         **more,
     )
@@ -330,9 +332,15 @@ def draws_text(draws: Distribution | None, scale: float = 1.0) -> str:
     """Return mean and standard deviation of draws in °C, with a decimal for small numbers."""
     if draws is None:
         return "–"
+    spread = draws.standard_deviation
+    return spread_text(scale * draws.mean, spread, "°C", _decimals(draws))
+
+
+def _decimals(draws: Distribution) -> int:
+    """Return one decimal for numbers below ten, else none."""
     deviation = draws.standard_deviation
     size = max(abs(draws.mean), deviation if isfinite(deviation) else 0.0)
-    return spread_text(scale * draws.mean, deviation, "°C", 0 if size >= 9.95 else 1)
+    return 0 if size >= 9.95 else 1
 
 
 def spread_text(

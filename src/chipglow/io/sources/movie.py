@@ -192,8 +192,6 @@ class MovieSource(Source, Part):
             value = getattr(self, name)
             if value is not None and not (isfinite(value) and value > 0):
                 raise ValueError(f"{name}: {value!r}, expected a finite number over 0")
-        if not all(isfinite(value) for value in self.origin):
-            raise ValueError(f"origin: {self.origin!r}, expected finite numbers of pixels")
         colours = [*(self.background or ()), *([self.tool_colour] if self.tool_colour else [])]
         for colour in colours:
             if len(colour) != 3 or not all(0 <= part <= 255 for part in colour):
