@@ -53,9 +53,11 @@ def write_dataset(data: xr.Dataset, path: str | os.PathLike[str]) -> None:
     }
     path = Path(path)
     with atomic_path(path) as temporary, KeptErrorFile(temporary) as sink:
-        data.drop_encoding().to_netcdf(sink, engine="h5netcdf", encoding=encoding)
-        append_digest(sink)
-        sink.check(path)
+        try:
+            data.drop_encoding().to_netcdf(sink, engine="h5netcdf", encoding=encoding)
+            append_digest(sink)
+        finally:
+            sink.check(path)  # the cause of what HDF5 says
 
 
 def is_measurement(path: str | os.PathLike[str]) -> bool:
