@@ -336,7 +336,7 @@ def test_a_full_disk_is_one_clear_error(tmp_path, limit, count):
     index, message = done.stdout.split(maxsplit=1)
     # HDF5 writes late; but the writer does not go on to the end, unless that is near.
     assert int(index) <= count // 2
-    assert message.strip().endswith("scene.nc: could not be written: File too large")
+    assert message.strip().endswith(f"File too large: '{tmp_path / 'scene.nc'}'")
     assert leftovers(tmp_path) == []
 
 

@@ -137,7 +137,7 @@ class KeptErrorFile(io.FileIO):
     def check(self, path: Path) -> None:
         """Raise the error that was kept, naming `path`."""
         if self._error is not None:
-            raise OSError(f"{path}: could not be written: {self._error.strerror}") from self._error
+            raise OSError(self._error.errno, self._error.strerror, str(path)) from self._error
 
 
 def check_output(path: Path) -> Path:

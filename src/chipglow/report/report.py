@@ -13,6 +13,7 @@ from chipglow import __version__
 from chipglow.analysis import Analysis, with_errors
 from chipglow.analysis.distribution import TOGETHER
 from chipglow.drawing import drawing
+from chipglow.io import write_dataset
 from chipglow.report import cut_figures, figures, paper
 from chipglow.report.answer import answer
 from chipglow.report.facts import Facts, texts
@@ -128,12 +129,7 @@ def _write_arrays(data: xr.Dataset, provenance: Mapping[str, str], path: Path) -
     written = with_errors(data).assign_attrs(
         {f"provenance_{name.replace(' ', '_')}": text for name, text in provenance.items()}
     )
-    packed = {
-        str(name): {"zlib": True, "complevel": 4}
-        for name, values in written.data_vars.items()
-        if values.ndim > 1
-    }
-    written.to_netcdf(path, engine="h5netcdf", encoding=packed)
+    write_dataset(written, path)
 
 
 @dataclass(frozen=True)
