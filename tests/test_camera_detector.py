@@ -376,7 +376,7 @@ def test_a_source_that_saturates_is_refused():
 
 @pytest.mark.parametrize(("field", "value"), [("detector", 3), ("seed", -1), ("seed", 1.5)])
 def test_a_camera_refuses_what_is_no_detector_or_seed(field, value):
-    with pytest.raises(ValueError, match=f"camera: {field} is {value}, expected"):
+    with pytest.raises(ValueError, match=f"Camera.{field}: {value}, expected"):
         Camera(**{field: value})
 
 
