@@ -7,8 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from chipglow.io.sources.mesh_block import Block
-from chipglow.io.sources.source import naming
-from chipglow.text import check_own_data
+from chipglow.io.sources.source import check_hdf5
 
 
 class MeshReader(ABC):
@@ -47,8 +46,7 @@ class MeshReader(ABC):
         for file in files:
             if not file.is_file():
                 raise FileNotFoundError(ENOENT, "there is no such file", str(file))
-            with naming(file):
-                check_own_data(file)
+            check_hdf5(file)
         self.files = files
         self.count = len(files)
         self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of {kind}"

@@ -9,8 +9,7 @@ from xml.parsers.expat import ExpatError, ParserCreate
 
 from chipglow.io.sources.mesh_block import Block
 from chipglow.io.sources.mesh_reader import MeshReader
-from chipglow.io.sources.source import SourceError, naming
-from chipglow.text import check_own_data
+from chipglow.io.sources.source import SourceError, check_hdf5
 
 KINDS: Final[Mapping[str, str]] = {
     ".vtu": "VTK XML",
@@ -188,8 +187,7 @@ def _check_references(file: Path) -> None:
         heavy = file.parent / name.decode(errors="replace").strip()
         if not heavy.is_file():
             raise SourceError(f"{file}: its data should be in {heavy.name}, which is not there")
-        with naming(heavy):
-            check_own_data(heavy)
+        check_hdf5(heavy)
 
 
 def _opened_xdmf(file: Path) -> Any:

@@ -5,13 +5,14 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chipglow.scene import Raster, SampledFrame
-from chipglow.text import Notes
+from chipglow.text import Notes, check_own_data
 
 
 class SourceError(ValueError):
@@ -61,6 +62,15 @@ def damaged(file: object, error: BaseException, kind: str = "") -> SourceError:
     return SourceError(
         f"{file}: cannot be read{as_kind}, it is damaged or of another kind ({said})"
     )
+
+
+def check_hdf5(file: Path) -> None:
+    """Refuse an HDF5 file that is damaged or takes data from other files."""
+    try:
+        with naming(file):
+            check_own_data(file)
+    except (OSError, RuntimeError, KeyError) as error:
+        raise damaged(file, error, "HDF5") from None
 
 
 @dataclass(frozen=True)
