@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from chipglow.io.sources.mesh_block import Block
-from chipglow.io.sources.source import naming
+from chipglow.io.sources.source import damaged, naming
 from chipglow.text import check_own_data
 
 
@@ -47,8 +47,11 @@ class MeshReader(ABC):
         for file in files:
             if not file.is_file():
                 raise FileNotFoundError(ENOENT, "there is no such file", str(file))
-            with naming(file):
-                check_own_data(file)
+            try:
+                with naming(file):
+                    check_own_data(file)
+            except OSError as error:  # of HDF5, not of the disk
+                raise damaged(file, error) from error
         self.files = files
         self.count = len(files)
         self.kind = f"mesh, {len(files)} file{'s' * (len(files) > 1)} of {kind}"

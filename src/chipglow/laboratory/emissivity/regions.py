@@ -101,7 +101,7 @@ class RegionsDescription(Settings[tuple[Region, ...]]):
     """A file of regions."""
 
     regions: Annotated[dict[str, RegionSection], Parameter("Regions by name.")] = Field(
-        default_factory=dict
+        default_factory=dict, validate_default=True
     )
 
     @field_validator("regions")
