@@ -52,11 +52,16 @@ def test_the_blocks_of_a_page_run(page, reader):
         reader.follow(block)
 
 
-def test_the_readme_shows_what_is_printed(quick_study, tmp_path, capsys):
-    """Its Python line by line; of `reproduce --quick` the rows, whose numbers depend on the CPU."""
-    _install, table, python, printed, *_ = blocks(ROOT / "README.md")
+def test_the_readmes_python_prints_what_is_shown(tmp_path, capsys):
+    _install, _table, python, printed, *_ = blocks(ROOT / "README.md")
     Reader(tmp_path).follow(python)
     assert capsys.readouterr().out == printed.text
+
+
+@pytest.mark.slow
+def test_the_readme_shows_the_rows_of_the_quick_study(quick_study):
+    """Their numbers depend on the processor."""
+    _install, table, *_ = blocks(ROOT / "README.md")
     for row in table.text.splitlines():
         assert row.strip().split("  ")[0] in quick_study.printed
 
