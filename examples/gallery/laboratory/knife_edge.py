@@ -23,7 +23,8 @@ from samples.edges import edge, measured
 
 from chipglow import AnnularAperturePSF, GaussianPSF, Measurement, edge_image, knife_edge
 from chipglow.laboratory.psf.figure import draw_knife_edge
-from chipglow.laboratory.psf.summary import sentences, with_uncertainty
+from chipglow.laboratory.psf.summary import sentences
+from chipglow.quantities.format import uncertain_text
 
 mirror = AnnularAperturePSF(4.45e-6)
 image = measured(edge(5.0, mirror), 573.15, 873.15, 1)
@@ -54,7 +55,7 @@ def in_temperature(measurement):
 def width(of):
     """The width of the Gaussian."""
     fit = of.fit("gaussian")
-    text = with_uncertainty(fit.fwhm * 1e6, fit.fwhm_uncertainty * 1e6)
+    text = uncertain_text(fit.fwhm * 1e6, fit.fwhm_uncertainty * 1e6)
     return f"{text} µm (reduced chi-squared {fit.reduced_chi_squared:.1f})"
 
 
