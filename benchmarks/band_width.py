@@ -9,6 +9,7 @@ textures and pixel phases. Scenes are kept in chipglow's cache. Prints a Markdow
 
 import sys
 
+from chipglow.quantities import changed
 from chipglow.report import result_rows
 from chipglow.study import Study, run
 
@@ -25,10 +26,7 @@ SHOWN = {
 
 def study_with(cell):
     """The quick study with another cell in um."""
-    study = Study.quick()
-    numerics = study.cutting.numerics.model_copy(update={"cell": cell * 1e-6})
-    cutting = study.cutting.model_copy(update={"numerics": numerics})
-    return study.model_copy(update={"cutting": cutting})
+    return changed(Study.quick(), {"cutting.numerics.cell": cell * 1e-6})
 
 
 def row(cell):

@@ -23,6 +23,7 @@ from experiments import aligned
 from chipglow.camera import Camera
 from chipglow.io import open_scene
 from chipglow.laboratory.chip import rake_grid
+from chipglow.quantities import changed
 from chipglow.scene import Material, Scene
 from chipglow.scene.lines import nearest
 from chipglow.study import Study, cut, load_study
@@ -76,9 +77,7 @@ class Face:
 
 def on_cells(study: Study, cell: float) -> Study:
     """The study with a cut on cells of another side in m."""
-    numerics = study.cutting.numerics.model_copy(update={"cell": cell})
-    cutting = study.cutting.model_copy(update={"numerics": numerics})
-    return study.model_copy(update={"cutting": cutting})
+    return changed(study, {"cutting.numerics.cell": cell})
 
 
 def with_hot_tool(scene: Scene, temperature: np.ndarray, material: np.ndarray) -> np.ndarray:

@@ -86,7 +86,7 @@ def reproduce_quick(folder):
     command = [sys.executable, "-c", "from chipglow.cli import main; main()"]
     run = subprocess.run(
         [*command, "reproduce", "--quick", "--out", str(folder / "run")],
-        env={**os.environ, "CHIPGLOW_CACHE": str(folder / "cache")},
+        env={**os.environ, "CHIPGLOW_CACHE": str(folder / "cache"), "COLUMNS": "160"},
         capture_output=True,
         text=True,
         timeout=MOST_SECONDS,

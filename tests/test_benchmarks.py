@@ -25,7 +25,7 @@ NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?|\bnan\b|\binf\b")
 # What each program is called with, and rows of its table with the numbers that each holds at least.
 PROGRAMS = {
     "app_latency.py": (
-        "--turns 2 --knobs Seed",
+        "--turns 2 --controls Seed",
         {"Seed": 5, "all": 4, "opened, with the process": 2, "memory": 3},
     ),
     "band_width.py": (COARSEST, {f"| {COARSEST} |": 7}),
