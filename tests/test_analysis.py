@@ -739,7 +739,7 @@ def test_a_study_that_can_not_be_is_refused(chip):
     surfaces = {"chip 1": CHIP_1}
     with pytest.raises(ValueError, match="surface 'chip 2' is not one of"):
         analyse(scene, surfaces, CAMERA, Plan())
-    plan = Plan(rake_surface="chip 1")
+    plan = Plan(rake_chip="chip 1")
     with pytest.raises(ValueError, match="expected an exposure's 2e-05 s"):
         analyse(scene, surfaces, replace(CAMERA, integration_time=2e-5), plan)
     for name in ("exposures", "phases", "textures", "line_step", "touching"):
@@ -755,7 +755,7 @@ def test_a_scene_without_tool_or_band_is_read_exposure_by_exposure(without):
     else:
         data["plastic_strain_rate"] = data["plastic_strain_rate"] * 0 + np.float32(1.0)
         data["plastic_strain_rate"].attrs["units"] = "1/s"
-    plan = Plan(exposures=2, phases=1, textures=1, rake_surface="chip 1")
+    plan = Plan(exposures=2, phases=1, textures=1, rake_chip="chip 1")
     result = analyse(Scene(data), {"chip 1": CHIP_1}, CAMERA, plan)
     assert result.cut is None
     reason = "the scene has no tool" if without == "tool" else "in any of the exposures"

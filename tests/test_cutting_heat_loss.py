@@ -217,7 +217,7 @@ def test_a_cut_loses_heat_if_asked_to():
 
 def test_a_study_names_the_surroundings():
     section = {"convection": "50 W/m^2/K", "emissivity": 0.8, "temperature": "25 degC"}
-    study = Study.model_validate({"cutting": {"surroundings": section}})
+    study = Study(**{"cutting": {"surroundings": section}})
     assert study.cutting.simulation().surroundings == Surroundings(50.0, 0.8, 298.15)
     assert Study().cutting.simulation().surroundings == Surroundings()
 

@@ -320,7 +320,7 @@ def test_placement_turns_places_and_vectors(tmp_path):
     places = np.stack([zero + 1e-3, table["y"], table["x"]], axis=1)
     velocity = np.stack([zero + 1, zero + 2, zero + 3], axis=1)
     np.savez(tmp_path / "p.npz", points=places, velocity=velocity, T=table["temperature"])
-    placement = Placement("z", "-y", (1e-6, 0.0))
+    placement = Placement("z", "-y", 1e-6)
     source = CloudSource(str(tmp_path / "p.npz"), placement=placement)
     left, right, bottom, top = source.survey().extent
     assert (left, right) == pytest.approx((-1e-6, COLUMNS * A - 1e-6))
@@ -490,7 +490,6 @@ def test_frames_that_differ_in_length(tmp_path):
 @pytest.mark.parametrize(
     ("changed", "text"),
     [
-        ({"files": ""}, "files"),
         ({"spacing": 0.0}, "spacing"),
         ({"thickness": -1.0}, "thickness"),
         ({"interval": float("inf")}, "interval"),

@@ -225,7 +225,7 @@ def test_corners_of_the_chip_are_read_and_written_as_they_are(arrays, tmp_path):
 @pytest.mark.parametrize(
     ("settings", "wrong"),
     [
-        (["units.length=degC"], "units: length: unknown unit 'degC'"),
+        (["units.length=degC"], "units.length: unknown unit 'degC'"),
         (["units.length=3"], "units.length"),
         (["interval=2"], "interval: 2 has no unit"),
         (["interval=-2 us"], "interval: -2 us is not over 0"),

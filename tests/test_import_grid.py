@@ -310,7 +310,7 @@ def test_placement_turns_positions_and_vectors(tmp_path):
     fields = {"T": a_stack()[:1], "V1": 2 * ones, "V2": 3 * ones}
     np.savez(tmp_path / "all.npz", **fields)
     # The scene's x is the file's -y, its y the file's x; its origin is in (1, 2) um.
-    placement = Placement("-y", "x", (2e-6, 1e-6))
+    placement = Placement("-y", "x", 2e-6, 1e-6)
     source = a_source(str(tmp_path / "all.npz"), placement=placement)
     left, right, bottom, top = source.survey().extent
     assert (left, right) == pytest.approx((2e-6 - TOP, 2e-6 - (Y[-1] - 1.5e-6)))
@@ -636,7 +636,6 @@ def test_coordinates_that_go_wrong(tmp_path):
         ({"interval": float("nan")}, "interval"),
         ({"axes": ("time", "x")}, "axes"),
         ({"files": {"heat": "T.npy"}}, "unknown field 'heat'"),
-        ({"files": ""}, "files"),
         ({"top": float("inf")}, "top"),
         ({"placement": Placement("x", "z")}, "no z"),
     ],

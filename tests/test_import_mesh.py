@@ -165,7 +165,7 @@ def test_units_and_placement(tmp_path):
     source = MeshSource(
         tmp_path / "mm.vtu",
         units=Units(length=Unit(1e-3), temperature=CELSIUS),
-        placement=Placement(horizontal="-z", vertical="x", origin=(WIDTH, 0.0)),
+        placement=Placement(horizontal="-z", vertical="x", origin_horizontal=WIDTH),
     )
     assert source.survey().extent == pytest.approx((0.0, WIDTH, 0.0, HEIGHT))
     frame = only_frame(source)
@@ -180,7 +180,7 @@ def test_components_of_velocity_follow_the_sign_of_their_axis(tmp_path):
     del grid.point_data["V"]
     grid.point_data["V1"], grid.point_data["V2"] = 3.0, 1.0
     grid.save(tmp_path / "chip.vtu")
-    source = MeshSource(tmp_path / "chip.vtu", placement=Placement("-x", "y", (WIDTH, 0.0)))
+    source = MeshSource(tmp_path / "chip.vtu", placement=Placement("-x", "y", WIDTH))
     frame = only_frame(source)
     assert (frame.fields["velocity_x"] == -3.0).all()
     assert (frame.fields["velocity_y"] == 1.0).all()

@@ -316,7 +316,7 @@ def test_heat_fraction_over_the_strain_rate(tmp_path: Path) -> None:
     assert listed == ["0.6 at 1 1/s", "0.9 at 1000 1/s"]
     shown = CliRunner().invoke(app, ["materials", str(path)])
     assert "0.9 at 1000 1/s" in shown.output
-    study = Study.model_validate({"cutting": {"workpiece": str(path)}})
+    study = Study(**{"cutting": {"workpiece": str(path)}})
     assert "0.6" in json.dumps(_inputs(study)["workpiece"]["taylor_quinney"])
 
 
@@ -338,7 +338,7 @@ def test_a_study_takes_a_file_beside_it(tmp_path: Path) -> None:
 
 def test_the_cache_knows_a_materials_numbers(tmp_path: Path) -> None:
     path = _write(tmp_path / "steel.yaml", "212 GPa", "200 GPa")
-    study = Study.model_validate({"cutting": {"workpiece": str(path)}})
+    study = Study(**{"cutting": {"workpiece": str(path)}})
     before = json.dumps(_inputs(study))
     path.write_text(path.read_text(encoding="utf-8").replace("name: AISI", "name: my"))
     assert json.dumps(_inputs(study)) == before
@@ -360,7 +360,7 @@ def test_the_cache_tells_laws_of_the_same_numbers_apart(monkeypatch: pytest.Monk
 
 
 def test_a_study_chooses_a_set() -> None:
-    study = Study.model_validate({"cutting": {"workpiece": "aisi-1045/ozel"}})
+    study = Study(**{"cutting": {"workpiece": "aisi-1045/ozel"}})
     ozel = study.cutting.simulation().workpiece
     assert isinstance(ozel.flow_stress, JohnsonCook)
     assert ozel.flow_stress.yield_stress == 451.6e6

@@ -151,8 +151,8 @@ def test_form_image_stands_alone():
 
 
 def test_terms_that_are_none_are_refused():
-    for wrong in ((0.9,), [Veil(0.1, 1e-4)], None):
-        with pytest.raises(ValueError, match=r"Camera\.optics: "):
+    for wrong in ((0.9,), Veil(0.1, 1e-4), None):
+        with pytest.raises(ValueError, match=r"Camera\.optics[.:]"):
             Camera(optics=wrong)
     for make in (
         lambda: OpticalElement(0.0),

@@ -12,6 +12,7 @@ from chipglow.analysis import Distribution, Plan, analyse
 from chipglow.analysis.reductions import Headline
 from chipglow.camera import AnnularAperturePSF, Camera
 from chipglow.cli import progress
+from chipglow.quantities import adapter
 from chipglow.radiometry import Band
 from chipglow.report import result_rows, write_report
 from chipglow.scene import Raster
@@ -130,7 +131,7 @@ def test_what_is_left_to_the_paper_is_said():
         assert name not in told, told
     assert list(left_to_the_paper(Study())) == []
     assert list(left_to_the_paper(Study.quick())) == []
-    whole = Study(**Study(**TITANIUM).model_dump(mode="json"))
+    whole = Study(**adapter(Study).dump_python(Study(**TITANIUM), mode="json"))
     assert list(left_to_the_paper(whole)) == []
 
 

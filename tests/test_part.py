@@ -22,7 +22,7 @@ from chipglow.quantities import Family, Parameter, Part, adapter, changed, setti
 from chipglow.quantities.units import LENGTH, TEMPERATURE
 from chipglow.scene import Raster
 from chipglow.study import Study, study_text
-from chipglow.text import commented_yaml, json_schema, problem
+from chipglow.text import commented_yaml, json_schema
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,12 @@ class Shelf(Part):
 def test_a_wrong_value_is_refused_in_python_with_its_limits():
     for values, message in (
         ({"width": 0.0}, "Shelf.width: 0 m, expected over 0 m, up to 2 m"),
-        ({"width": "1 m"}, "Shelf.width: '1 m', expected over 0 m, up to 2 m"),
+        ({"width": "3 m"}, "Shelf.width: 3000000 um, expected over 0 um, up to 2000000 um"),
+        ({"width": "3 s"}, "Shelf.width: '3 s' is not a length, expected one such as 6 um"),
         ({"width": float("nan")}, "Shelf.width: nan m, expected over 0 m, up to 2 m"),
         ({"width": 1.0, "boards": 0}, "Shelf.boards: 0, expected 1 or more"),
-        ({"width": 1.0, "boards": 2.5}, "Shelf.boards: 2.5, expected 1 or more"),
-        ({"width": 1.0, "boards": True}, "Shelf.boards: True, expected 1 or more"),
+        ({"width": 1.0, "boards": 2.5}, "Shelf.boards: 2.5, expected a valid integer"),
+        ({"width": 1.0, "boards": True}, "Shelf.boards: True, expected a valid integer"),
         ({"width": 1.0, "warmth": 3.0}, "Shelf.warmth: 3 K, expected 273.15 K or more"),
     ):
         with pytest.raises(ValueError, match="Shelf") as caught:
@@ -84,8 +85,9 @@ def test_a_description_gives_text_with_units_and_makes_the_part():
 
 
 def test_si_numbers_pass_from_python_only():
-    assert read({"width": 1.5}) == Shelf(1.5)
-    with pytest.raises(ValidationError, match="3000000 um, expected over 0 um"):
+    assert read({"width": 1.5}) == Shelf(1.5) == Shelf("150 cm")
+    assert (Shelf(1.5).given, Shelf(1.5, warmth=300.0).given) == ({"width"}, {"width", "warmth"})
+    with pytest.raises(ValidationError, match="3 m, expected over 0 m"):
         read({"width": 3.0})
     with pytest.raises(ValidationError, match="has no unit"):
         read_from_file({"width": 1.5})
@@ -112,9 +114,8 @@ def test_settings_are_listed_by_path_and_changed_by_path():
     assert other.camera.pitch == 5e-6
     assert other.cutting.friction.coefficient == 0.4
     assert study.camera.psf == GaussianPSF(8e-6)
-    with pytest.raises(ValidationError) as caught:
+    with pytest.raises(ValueError, match=r"^camera.psf.fwhm: -1 m, expected over 0 m, up to 0.1 m"):
         changed(study, {"camera.psf.fwhm": -1.0})
-    assert problem(caught.value).startswith("camera.psf.fwhm: -1.0 m is not over 0")
 
 
 def test_comment_schema_and_documentation_say_the_same():
@@ -157,7 +158,7 @@ def test_every_kind_has_an_example_that_a_study_reads(tmp_path):
     for kind, part in PSFS.parts.items():
         assert f"kind: {kind}" in part.example
     example = PSFS.parts["airy"].example.split("}")[0] + "}"
-    study = Study.model_validate({"camera": {"psf": yaml.safe_load(example), "magnification": 2.0}})
+    study = Study(**{"camera": {"psf": yaml.safe_load(example), "magnification": 2.0}})
     assert isinstance(study.camera.build().psf, PointSpreadFunction)
 
 
@@ -171,7 +172,7 @@ def test_a_file_of_a_psf_is_opened_once(tmp_path, monkeypatch):
 
     monkeypatch.setattr(psf, "_read_npy", counted)
     section = {"kind": "measured", "file": str(tmp_path / "psf.npy"), "spacing": "1 um"}
-    study = Study.model_validate({"camera": {"psf": section}})
+    study = Study(**{"camera": {"psf": section}})
     assert study.camera.build().psf == study.camera.on(Raster(0, 0, 1e-6, 12, 12)).psf
     assert len(opened) == 1
 
@@ -205,8 +206,8 @@ def test_the_templates_hold_their_json_schema(section, text):
 def test_the_schema_refuses_what_a_study_refuses(wrong):
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(wrong, json.loads(json_schema(Study)))
-    with pytest.raises(ValidationError):
-        Study.model_validate(wrong)
+    with pytest.raises(ValueError, match=r"expected|did you mean"):
+        Study(**wrong)
 
 
 def test_the_command_writes_the_schema(tmp_path, monkeypatch):

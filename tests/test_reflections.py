@@ -450,7 +450,7 @@ def test_without_a_camera_there_is_no_band():
 def test_a_study_switches_it_on():
     off = Study().surface.build(2010)
     section = {"kind": "features", "reflections": {"kind": "wedge", "angle": "60 deg"}}
-    on = Study.model_validate({"surface": section}).surface.build(2010)
+    on = Study(**{"surface": section}).surface.build(2010)
     assert off == {"chip 1": CHIP_1, "chip 2": CHIP_2}
     for name, bare in off.items():
         assert on[name].bare == bare
@@ -469,4 +469,4 @@ def test_a_study_switches_it_on():
 )
 def test_a_study_says_what_is_wrong(section, message):
     with pytest.raises(ValueError, match=message):
-        Study.model_validate({"surface": {"kind": "features", "reflections": section}})
+        Study(**{"surface": {"kind": "features", "reflections": section}})

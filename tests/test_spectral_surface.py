@@ -116,5 +116,5 @@ def test_impossible_tables_are_refused(rows, message):
     ],
 )
 def test_a_study_chooses_them(section, expected):
-    study = Study.model_validate({"surface": section})
+    study = Study(**{"surface": section})
     assert study.surface == expected

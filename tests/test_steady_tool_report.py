@@ -86,6 +86,6 @@ def test_the_study_differs_in_its_tool_only():
     steady = study.with_steady_tool()
     assert steady.cutting.simulation().tool_temperature is not None
     assert study.cutting.simulation().tool_temperature is None
-    back = steady.cutting.tool.model_copy(update={"temperature": None})
-    assert back.model_dump() == study.cutting.tool.model_dump()
+    back = replace(steady.cutting.tool, temperature=None)
+    assert back == study.cutting.tool
     assert steady.camera == study.camera

@@ -1,6 +1,6 @@
 import os
 import threading
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 from math import isfinite, radians
 from pathlib import Path
 
@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from analytic_chip import AnalyticChip
 from hypothesis import HealthCheck, given, settings, strategies as st
-from pydantic import ValidationError
 
 from chipglow.analysis import Plan
 from chipglow.camera import Camera, GaussianPSF, MeasuredPSF
 from chipglow.cutting import CuttingConditions, CuttingSimulation, Friction, Numerics, OutputWindow
 from chipglow.io import open_scene, read_tool_outline
 from chipglow.io.atomic import KeptErrorFile
-from chipglow.quantities import Part, Section, own_settings, units
+from chipglow.quantities import Part, own_settings, units
 from chipglow.scene import FIELD_UNITS, Chamfer, Hone, Material, Raster, Scene, ToolGeometry
 from chipglow.study import (
     Study,
@@ -146,10 +145,7 @@ def test_the_default_study_has_the_librarys_defaults():
     assert cutting.numerics == Numerics()
     assert cutting.window == OutputWindow()
     assert camera == Camera(psf_order="detector")
-    plan = study.analysis.build()
-    # The same widths, but for the rounding of n * 1e-6.
-    assert plan == replace(Plan(), psf_widths=plan.psf_widths)
-    np.testing.assert_allclose(plan.psf_widths, Plan().psf_widths, rtol=1e-15)
+    assert study.analysis == Plan()
     chips = study.surface.build(study.seed)
     assert list(chips.values()) == [CHIP_1, CHIP_2]
 
@@ -190,7 +186,7 @@ def fields_of(section):
         yield one.name
         values = one.value.values() if isinstance(one.value, dict) else [one.value]
         for part in values:
-            if isinstance(part, Section | Part):
+            if isinstance(part, Part):
                 yield from fields_of(part)
 
 
@@ -335,7 +331,7 @@ def load(text, folder):
             "camera.psf_order",
             "'pixels', expected 'optics' or 'detector'",
         ),
-        ("surface: {chips: {}}", "surface.chips", "is empty, expected one chip or more"),
+        ("surface: {chips: {}}", "surface", "chips: {} is empty, expected one chip or more"),
         (
             "surface: {chips: {a: chip-3}}",
             "surface.chips.a",
@@ -460,7 +456,7 @@ def test_a_study_in_python_takes_the_same_text():
     assert study.camera.pitch == 5e-6
     assert study.analysis.exposures == 3
     assert Study(camera={"pitch": 5e-6}) == Study(camera={"pitch": "5 um"})
-    with pytest.raises(ValidationError, match="frozen"):
+    with pytest.raises(FrozenInstanceError):
         study.seed = 4
 
 
@@ -519,7 +515,7 @@ def test_a_scene_is_computed_once_for_the_same_inputs(cache, runs):
     assert seen == [("cutting simulation", 0.0), ("cutting simulation", 1.0)]
     assert path.parent == cache
     assert is_cut(study)
-    other_camera = study.model_copy(update={"camera": Study(camera={"pitch": "5 um"}).camera})
+    other_camera = replace(study, camera=Study(camera={"pitch": "5 um"}).camera)
     assert cut(study) == cut(other_camera) == path
     assert len(runs) == 1
     scene = open_scene(path)

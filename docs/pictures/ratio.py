@@ -17,6 +17,7 @@ from chipglow.analysis.wavelengths import band_name
 from chipglow.camera import RatioCamera
 from chipglow.drawing import drawing
 from chipglow.drawing.scales import HEAT, KELVIN, SIGNED
+from chipglow.quantities import changed
 from chipglow.radiometry import Band, RatioThermometer
 from chipglow.report.wavelength_figure import draw_wavelengths
 from chipglow.surface import CHIP_1
@@ -51,11 +52,8 @@ def main() -> None:
 
 def study(quick: chipglow.study.Study, law: Any) -> chipglow.study.Study:
     """The quick study with a detector, more draws, and a law of the wavelength."""
-    settings = quick.model_dump(mode="json")
-    settings["camera"]["detector"] = DETECTOR
-    settings["surface"]["spectral"] = law
-    settings["analysis"] |= {"phases": 3, "textures": 2}
-    return chipglow.study.Study.model_validate(settings)
+    changes = {"camera.detector": DETECTOR, "surface.spectral": law}
+    return changed(quick, changes | {"analysis.phases": 3, "analysis.textures": 2})
 
 
 def print_thermometers() -> None:

@@ -18,5 +18,5 @@ def test_the_flow_stress_is_that_of_johnson_and_cook():
 
 
 def test_a_study_cuts_it():
-    study = Study.model_validate({"cutting": {"workpiece": str(STEEL)}})
+    study = Study(**{"cutting": {"workpiece": str(STEEL)}})
     assert study.cutting.simulation().workpiece == workpiece(str(STEEL))

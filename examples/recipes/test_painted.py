@@ -12,7 +12,7 @@ SECTION = {"kind": "painted", "bare": 0.2, "left": "30 um", "top": "-30 um", "wi
 
 
 def test_a_study_lays_the_paint_and_the_camera_sees_it_by_plancks_law():
-    study = Study.model_validate({"surface": SECTION})
+    study = Study(**{"surface": SECTION})
     surface = surfaces_of(study.surface, study.seed)["painted"]
     plate = {
         "temperature": np.full((3, 120, 120), 900.0, np.float32),
@@ -28,4 +28,4 @@ def test_a_study_lays_the_paint_and_the_camera_sees_it_by_plancks_law():
 
 def test_a_wrong_emissivity_is_one_line_with_its_limits():
     with pytest.raises(ValueError, match=r"surface\.paint\n.*1\.2, expected 0 to 1"):
-        Study.model_validate({"surface": {**SECTION, "paint": 1.2}})
+        Study(**{"surface": {**SECTION, "paint": 1.2}})

@@ -151,7 +151,7 @@ def analyse(
     if cut is not None:
         variables |= ridge_variables(cut.instants, measurements)
         variables |= history_variables(cut.forces, cut.chip)
-        attributes |= {"rake_surface": plan.rake_surface, "band_surface": plan.band_surface}
+        attributes |= {"rake_surface": plan.rake_chip, "band_surface": plan.band_chip}
     return Analysis(
         data=assembled(variables, attributes),
         plan=plan,
@@ -171,11 +171,11 @@ def analyse(
 def _segments(task: _Task) -> tuple[Segments | None, tuple[str, ...]]:
     """Segments of a cut; None and the reasons if the scene shows none or none are wanted."""
     plan, scene = task.plan, task.scene
-    if plan.places or not plan.cut:
+    if plan.all_places or not plan.cut:
         return None, ()
     if missing := tuple(lacking(scene)):
         return None, missing
-    for name in (plan.rake_surface, plan.band_surface):
+    for name in (plan.rake_chip, plan.band_chip):
         if name not in task.surfaces:
             raise ValueError(f"plan: surface {name!r} is not one of {list(task.surfaces)}")
     try:
@@ -191,10 +191,10 @@ def _cut_schedule(task: _Task, found: Segments) -> tuple[Schedule, Frame]:
     segments = found.segments
     used: list[tuple[str, list[list[Place]]]] = [
         (
-            plan.rake_surface,
+            plan.rake_chip,
             [[RakePlace("rake face", one.tool, one.contact_length, *reach)] for one in segments],
         ),
-        (plan.band_surface, [[BandPlace("shear band", one.band, *reach)] for one in segments]),
+        (plan.band_chip, [[BandPlace("shear band", one.band, *reach)] for one in segments]),
     ]
     random = any(_is_random(surfaces[name]) for name, _ in used)
     textures, phases = plan.textures if random else 1, plan.phases**2
@@ -226,7 +226,7 @@ def _scene_schedule(task: _Task) -> tuple[Schedule, Frame]:
     shown = int(np.argmax([float(scene.field("temperature", i).max()) for i in frames]))
     frame = scene.frame(frames[shown])
     places = tuple(_places(task, frame))
-    for place in plan.places:
+    for place in plan.all_places:
         place.check_within(task.camera.pixels(scene.raster))
     views, first = [], 0
     for name, surface in task.surfaces.items():
@@ -254,12 +254,12 @@ def _places(task: _Task, frame: Frame) -> Iterator[Place]:
     """The hottest pixel, the rake face if material touches it, then the user's places."""
     plan, scene = task.plan, task.scene
     yield HottestPlace()
-    if scene.tool is not None and not plan.places:
+    if scene.tool is not None and not plan.all_places:
         workpiece = frame.material == Material.WORKPIECE
         contact = contact_length(scene.raster, workpiece, scene.tool, plan.touching)
         if contact > 0:
             yield RakePlace("rake face", scene.tool, contact, plan.line_reach, plan.line_step)
-    yield from plan.places
+    yield from plan.all_places
 
 
 def _cut(task: _Task, found: Segments) -> Cut:

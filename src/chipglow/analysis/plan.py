@@ -1,31 +1,27 @@
 """What to analyse."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
+
+from pydantic import BeforeValidator
 
 from chipglow.analysis.error_images import ReferenceKind
-from chipglow.analysis.places import Place
+from chipglow.analysis.places import LinePlace, Place, PointPlace, RegionPlace
+from chipglow.laboratory.emissivity import RegionSection
+from chipglow.quantities import Parameter, Part
+from chipglow.quantities.units import Length, Position
+
+PointOfScene = tuple[Position, Position]
 
 
 @dataclass(frozen=True)
-class Plan:
-    """What to analyse of a scene.
+class Plan(Part):
+    """What is computed from the simulated measurement.
 
     Parameters
     ----------
-    exposures : int
-        Number of exposures, spread evenly over the scene's longest part without a gap.
-    phases, textures : int
-        How many values each reading is drawn for: positions of the pixels along each axis (3 makes
-        9), and textures of the emissivity.
-    rake_surface, band_surface : str
-        Names of the surfaces whose errors are read at the rake face (the paper: chip 2) and at
-        the shear band (the paper: chip 1) of a cut.
-    psf_widths : tuple of float
-        Full widths at half maximum of the point spread functions that are compared on a cut, in m.
-    reference : {"maximum", "mean", "centre", "true"}
-        What the measured temperatures are compared with.
     places : tuple of Place
-        Where the error is read, instead of the rake face and the shear band of a cut.
+        More places where the error is read.
     cut : bool
         Whether a scene that shows a cut is analysed segment by segment, at the rake face and the
         shear band. Otherwise the scene is analysed exposure by exposure.
@@ -42,15 +38,68 @@ class Plan:
         If a number is not positive, there are no widths, or two places have the same name.
     """
 
-    exposures: int = 9
-    phases: int = 3
-    textures: int = 5
-    rake_surface: str = "chip 2"
-    band_surface: str = "chip 1"
-    psf_widths: tuple[float, ...] = field(
-        default_factory=lambda: tuple(width * 1e-6 for width in range(4, 21))
-    )
-    reference: ReferenceKind = "maximum"
+    exposures: Annotated[int, Parameter("Exposures, spread evenly over the scene.", least=1)] = 9
+    phases: Annotated[
+        int,
+        Parameter(
+            "Positions of the pixels along each axis, evenly over a pixel, on which each headline "
+            "is drawn anew: 3 makes 9.",
+            least=1,
+        ),
+    ] = 3
+    textures: Annotated[
+        int,
+        Parameter(
+            "Textures of the emissivity on which each headline is drawn anew: of the study's seed "
+            "and those after it.",
+            least=1,
+        ),
+    ] = 5
+    rake_chip: Annotated[
+        str, Parameter("Chip whose errors are read at the rake face; the paper took its chip 2.")
+    ] = "chip 2"
+    band_chip: Annotated[
+        str, Parameter("Chip whose errors are read at the shear band; the paper took its chip 1.")
+    ] = "chip 1"
+    reference: Annotated[
+        ReferenceKind,
+        # YAML reads true as a truth value.
+        BeforeValidator(lambda value: "true" if value is True else value),
+        Parameter(
+            "What a pixel's measured temperature is compared with, in its square during the "
+            "exposure: the greatest radiance temperature (maximum, the paper's), that of the mean "
+            "radiance (mean), that in the middle of both (centre) or the greatest true "
+            "temperature (true)."
+        ),
+    ] = "maximum"
+    psf_widths: Annotated[
+        tuple[Length, ...],
+        Parameter(
+            "Full widths at half maximum of Gaussians for which the headline errors are shown."
+        ),
+    ] = tuple(width / 1e6 for width in range(4, 21))
+    points: Annotated[
+        dict[str, PointOfScene],
+        Parameter(
+            "Points by name where the error is read, in the place of rake face and shear band.",
+            allowed="{} or positions: {middle of the pool: [0 um, -20 um]}",
+        ),
+    ] = field(default_factory=dict)
+    lines: Annotated[
+        dict[str, tuple[PointOfScene, ...]],
+        Parameter(
+            "Lines by name, from corner to corner.",
+            allowed="{} or positions: {across: [[-100 um, 0 um], [100 um, 0 um]]}",
+        ),
+    ] = field(default_factory=dict)
+    regions: Annotated[
+        dict[str, RegionSection],
+        Parameter(
+            "Regions by name: a polygon, a rectangle or a circle.",
+            allowed="{} or {pad: {rectangle: [[0 um, 0 um], [100 um, -50 um]]}}; also {circle: "
+            "{centre: [0 um, 0 um], radius: 20 um}}",
+        ),
+    ] = field(default_factory=dict)
     places: tuple[Place, ...] = ()
     cut: bool = True
     line_reach: float = 60e-6
@@ -58,12 +107,23 @@ class Plan:
     touching: float = 3e-6
 
     def __post_init__(self) -> None:
-        for name in ("exposures", "phases", "textures", "line_reach", "line_step", "touching"):
+        super().__post_init__()
+        for name in ("line_reach", "line_step", "touching"):
             if not getattr(self, name) > 0:
-                raise ValueError(f"plan: {name} is {getattr(self, name)!r}, expected over 0")
-        if not self.psf_widths or min(self.psf_widths) <= 0:
-            raise ValueError(f"plan: psf_widths is {self.psf_widths!r}, expected lengths over 0 m")
-        names = [place.name for place in self.places]
+                raise ValueError(f"{name}: {getattr(self, name)!r}, expected over 0 m")
+        if not self.psf_widths:
+            raise ValueError("psf_widths: none, expected one length or more")
+        names = [place.name for place in self.all_places]
         for name in names:
             if names.count(name) > 1:
-                raise ValueError(f"plan: two places have the name {name!r}, expected unique names")
+                raise ValueError(f"two places have the name {name!r}, expected unique names")
+
+    @property
+    def all_places(self) -> tuple[Place, ...]:
+        """Where the error is read, instead of the rake face and the shear band of a cut."""
+        return (
+            *(PointPlace(name, point) for name, point in self.points.items()),
+            *(LinePlace(name, corners) for name, corners in self.lines.items()),
+            *(RegionPlace(name, one.region(name)) for name, one in self.regions.items()),
+            *self.places,
+        )

@@ -3,13 +3,14 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from math import hypot, isfinite, log
-from typing import Final, TypeAlias
+from math import hypot, log
+from typing import Annotated, Final, TypeAlias
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
+from pydantic import PlainSerializer, PlainValidator, ValidationInfo, WithJsonSchema
 
 from chipglow.analysis.cut import Progress, find_segments, spread_starts
 from chipglow.analysis.looks import pixel_phases
@@ -18,6 +19,8 @@ from chipglow.analysis.plan import Plan
 from chipglow.analysis.ratio_error import ideal_image, true_temperature
 from chipglow.camera import Camera, Exposure, expose_views, frame_weights
 from chipglow.camera.ratio_camera import views_of
+from chipglow.quantities import Parameter, Part
+from chipglow.quantities.units import INSTANT, POSITION, WAVELENGTHS
 from chipglow.radiometry import Band, RatioThermometer
 from chipglow.scene import Raster, Scene
 from chipglow.scene.lines import nearest
@@ -36,31 +39,74 @@ _NOISE_SHAPE: Final = (64, 64)
 """Elements over which the noise is determined."""
 
 
-@dataclass(frozen=True)
-class WavelengthPlan:
-    """Which bands are compared, and what is not known of them.
+def _band(value: object, info: ValidationInfo) -> Band:
+    if isinstance(value, Band):
+        return value
+    return Band(*WAVELENGTHS.parse_range(value, si=info.context is None))
 
-    The pixels of the second channel of a ratio are off by `misregistration` (m on the scene, in an
-    unknown direction) and exposed later by `delay` (s). `emissivity_uncertainty` is the relative
-    standard uncertainty of the emissivity that one band needs, `exponent_uncertainty` that of the
-    exponent by which the emissivity depends on the wavelength: 0 for a grey surface, −0.5 for a
-    bare metal (Hagen and Rubens). It makes the ratio of two emissivities the more uncertain the
+
+BandText = Annotated[
+    Band,
+    PlainValidator(_band),
+    PlainSerializer(lambda one: WAVELENGTHS.range_text((one.lower, one.upper)), when_used="json"),
+    WithJsonSchema({"type": "string", "examples": [WAVELENGTHS.example]}),
+]
+
+
+@dataclass(frozen=True)
+class WavelengthPlan(Part):
+    """Bands that are compared, alone and as ratios of two.
+
+    The uncertainty of the exponent makes the ratio of two emissivities the more uncertain the
     farther apart their bands are.
     """
 
-    bands: tuple[Band, ...]
-    misregistration: float = 0.0
-    delay: float = 0.0
-    emissivity_uncertainty: float = 0.1
-    exponent_uncertainty: float = 0.15
+    bands: Annotated[
+        tuple[BandText, ...],
+        Parameter(
+            "The bands; each pair of them is a ratio. The camera's diffraction is that of each "
+            "band."
+        ),
+    ] = (
+        Band(0.9e-6, 1.1e-6),
+        Band(1.5e-6, 1.7e-6),
+        Band(2.0e-6, 2.4e-6),
+        Band(3.2e-6, 3.8e-6),
+        Band(3.8e-6, 5.1e-6),
+        Band(8.0e-6, 9.5e-6),
+        Band(10e-6, 14e-6),
+    )
+    misregistration: Annotated[
+        float,
+        Parameter(
+            "How far the pixels of a ratio's second channel look beside those of the first, on "
+            "the scene, in a direction that is not known.",
+            POSITION,
+            least=0.0,
+        ),
+    ] = 1e-6
+    delay: Annotated[
+        float, Parameter("How much later the second channel is exposed.", INSTANT, least=0.0)
+    ] = 0.0
+    emissivity_uncertainty: Annotated[
+        float,
+        Parameter(
+            "Relative standard uncertainty of the emissivity that one band alone needs.", least=0.0
+        ),
+    ] = 0.1
+    exponent_uncertainty: Annotated[
+        float,
+        Parameter(
+            "Standard uncertainty of the exponent with which the emissivity goes with the "
+            "wavelength: 0 for a grey surface, as it is taken to be; -0.5 for a bare metal.",
+            least=0.0,
+        ),
+    ] = 0.15
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if len(self.bands) < 2 or len(set(self.bands)) < len(self.bands):
             raise ValueError(f"bands: {len(self.bands)}, expected two or more that differ")
-        for name in ("misregistration", "delay", "emissivity_uncertainty", "exponent_uncertainty"):
-            value = getattr(self, name)
-            if not (isfinite(value) and value >= 0):
-                raise ValueError(f"{name}: {value!r}, expected 0 or more")
 
     @property
     def pairs(self) -> Iterator[tuple[int, int]]:
@@ -183,8 +229,8 @@ def cut_spots(
         face = tool.rake_point(segment.contact_length / 2) + inside
         middle = segment.band.ridge.points[segment.band.middle]
         spots += [
-            Spot("rake face", plan.rake_surface, segment.start, face),
-            Spot("shear band", plan.band_surface, segment.start, middle),
+            Spot("rake face", plan.rake_chip, segment.start, face),
+            Spot("shear band", plan.band_chip, segment.start, middle),
         ]
     return spots
 
@@ -200,7 +246,7 @@ def point_spots(scene: Scene, camera: Camera, plan: Plan, surfaces: Sequence[str
             float(start),
             np.array(place.point),
         )
-        for place in plan.places
+        for place in plan.all_places
         if isinstance(place, PointPlace)
         for name in surfaces
         for start in starts

@@ -10,15 +10,13 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
-from chipglow.quantities import changed, setting_at, value_at
+from chipglow.quantities import changed, setting_at, unchecked, value_at
 from chipglow.quantities.units import INSTANT, POSITION, Quantity
 from chipglow.scene import Raster, Scene
 from chipglow.study import Study
 from chipglow.study.surface_section import FeaturesSection, surface_names
 from chipglow.surface import UniformEmissivity
-from chipglow.text.description import problem
 
 Point: TypeAlias = tuple[float, float]
 Corners: TypeAlias = tuple[Point, Point]
@@ -306,8 +304,6 @@ class Controls:
                 del new[path]
         try:
             return self.state(new)
-        except ValidationError as error:
-            raise ValueError(f"{self.named(texts)}: {problem(error)}") from None
         except ValueError as error:
             raise ValueError(f"{self.named(texts)}: {error}") from None
 
@@ -338,7 +334,7 @@ class Controls:
         start = self.row("start").value(texts["start"]) if "start" in texts else self.start
         return State(
             texts,
-            study.model_copy(update={"analysis": self._analysis(study, texts)}),
+            unchecked(study, analysis=self._analysis(study, texts)),
             start,
             words.get("scene_image", ""),
             words.get("error_image", ""),
@@ -352,7 +348,7 @@ class Controls:
             title: _places(texts[name]) if name in texts else given.lines[title]
             for name, title in LINES.items()
         }
-        return given.model_copy(update={"points": {CURSOR: cursor}, "lines": lines})
+        return unchecked(given, points={CURSOR: cursor}, lines=lines)
 
     def _first_text(self, path: str) -> str:
         if path in (CURSOR, *LINES):
@@ -414,7 +410,7 @@ def _with(study: Study, changes: Mapping[str, object]) -> Study:
             if path.startswith(f"{name}.")
         }
         update[name] = changed(update.get(name, getattr(study, name)), inner)
-    return study.model_copy(update=update)
+    return unchecked(study, **update)
 
 
 def _options(study: Study, scene: Scene) -> dict[str, dict[str, Option]]:
@@ -469,7 +465,7 @@ def _surfaces(study: Study) -> dict[str, Option]:
         one = {
             kind: {key: held[key] for key in held if key == name} for kind, held in kinds.items()
         }
-        surface = own if name == OWN else section.model_copy(update=one)
+        surface = own if name == OWN else unchecked(section, **one)
         analysis = changed(study.analysis, {"rake_chip": name, "band_chip": name})
         found[name] = Option(name.capitalize(), {"surface": surface, "analysis": analysis})
     return found | uniform

@@ -22,6 +22,7 @@ from chipglow.drawing.drawing import (
 )
 from chipglow.drawing.scales import BLUE, GREY, HEAT, KELVIN, PLAIN, SIGNED, VOID, ends
 from chipglow.io import StoredScene, write_dataset
+from chipglow.quantities import unchecked
 from chipglow.study import study_text
 
 View: TypeAlias = tuple[float, float, float, float]
@@ -35,7 +36,7 @@ def study_file(model: SceneModel, state: State) -> bytes:
     """Return the study of a state as YAML; it names the open scene if that is a file."""
     study, scene = state.study, model.opened.scene
     if model.opened.from_file and isinstance(scene, StoredScene):
-        study = study.model_copy(update={"scene": str(scene.path.resolve())})
+        study = unchecked(study, scene=str(scene.path.resolve()))
     start = model.controls.row("start").text(state.start)
     comment = f"# Exposure that begins at {start}:\n"
     if study.scene is not None:

@@ -15,6 +15,7 @@ from chipglow.camera import Measurement
 from chipglow.io import StoredScene, example_scene, is_measurement, open_scene, read_measurement
 from chipglow.io.sandbox import Sandbox, patience_for
 from chipglow.laboratory.chip import Instant, contact_length
+from chipglow.quantities import unchecked
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study import Study, cut, is_cut, load_study
 from chipglow.surface import UniformEmissivity
@@ -62,7 +63,7 @@ class OpenedScene:
             If the scene is shorter than the study's exposure.
         """
         if "plastic_strain" not in scene.fields and study.surface == Study().surface:
-            study = study.model_copy(update={"surface": UniformEmissivity(0.5)})
+            study = unchecked(study, surface=UniformEmissivity(0.5))
         duration = study.camera.on(scene.raster, study.seed).frame_duration(scene.raster)
         starts = spread_starts(scene, duration, 3)
         start = rounded(starts[len(starts) // 2])
@@ -164,10 +165,9 @@ def _results(folder: Path) -> OpenedScene:
 def _with_places(study: Study, places: Places) -> Study:
     """Return a study whose places are the cursor and the lines."""
     cursor, *lines = places
-    analysis = study.analysis.model_copy(
-        update={"points": {CURSOR: cursor}, "lines": dict(zip(LINES.values(), lines, strict=True))}
-    )
-    return study.model_copy(update={"analysis": analysis})
+    named = dict(zip(LINES.values(), lines, strict=True))
+    analysis = unchecked(study.analysis, points={CURSOR: cursor}, lines=named)
+    return unchecked(study, analysis=analysis)
 
 
 def _scene_places(scene: Scene, start: float, duration: float) -> Places:

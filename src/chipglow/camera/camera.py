@@ -37,7 +37,7 @@ from chipglow.camera.optics.terms import Blur
 from chipglow.camera.sweep import Check
 from chipglow.camera.warning import ChipglowWarning
 from chipglow.quantities import Parameter, Part
-from chipglow.quantities.units import FREQUENCY, LENGTH, POSITION, TEMPERATURE, TIME
+from chipglow.quantities.units import FREQUENCY, LENGTH, TEMPERATURE, TIME, Position
 from chipglow.radiometry import Band
 from chipglow.radiometry.band import TABLE_COLDEST, TABLE_HOTTEST
 from chipglow.scene import Raster, Scene
@@ -82,10 +82,9 @@ class Camera(Part):
         ),
     ] = None
     offset: Annotated[
-        tuple[float, float],
+        tuple[Position, Position],
         Parameter(
-            "Corner of the first pixel, right of and down from the scene's upper left corner.",
-            POSITION,
+            "Corner of the first pixel in m, right and down from the scene's upper left corner.",
             least=0.0,
         ),
     ] = (0.0, 0.0)

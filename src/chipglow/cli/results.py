@@ -16,6 +16,7 @@ from chipglow.cli.progress import progress_bars, say_where_it_starts
 from chipglow.cli.screen import current
 from chipglow.cutting import SOLVER_VERSION
 from chipglow.io import atomic_folder
+from chipglow.quantities import changed
 from chipglow.report import result_rows, write_report
 from chipglow.report.paper import CITATION, stands_beside
 from chipglow.study import Progress, Study, errors, run, study_text
@@ -137,7 +138,7 @@ def _titled(study: Study, analysis: Analysis) -> Study:
     if analysis.cut is not None or study.title != Study().title:
         return study
     of = Path(study.scene).name if study.scene is not None else "the cut"
-    return study.model_copy(update={"title": f"Measurement error of {of}"})
+    return changed(study, {"title": f"Measurement error of {of}"})
 
 
 def _provenance(study: Study) -> dict[str, str]:

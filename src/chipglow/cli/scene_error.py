@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from chipglow.quantities import changed
 from chipglow.study import Study, load_study
 from chipglow.surface import UniformEmissivity
 from chipglow.text import DescriptionError
@@ -16,4 +17,4 @@ def study_of(scene: Path, study: Path | None, emissivity: float | None) -> Study
         return known
     if not 0 <= emissivity <= 1:
         raise DescriptionError(f"--emissivity must be from 0 to 1, got {emissivity:g}")
-    return known.model_copy(update={"surface": UniformEmissivity(emissivity)})
+    return changed(known, {"surface": UniformEmissivity(emissivity)})

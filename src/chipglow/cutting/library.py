@@ -207,7 +207,7 @@ class _Reader:
         kind = data.get("kind") if isinstance(data, Mapping) else None
         if kind not in ("workpiece", "tool"):
             raise self._wrong("kind", kind, "workpiece or tool")
-        parts = tuple(ToolMaterial.parameters()) if kind == "tool" else _WORKPIECE_PARTS
+        parts = tuple(ToolMaterial.declared()) if kind == "tool" else _WORKPIECE_PARTS
         if isinstance(data, Mapping) and kind == "workpiece":
             parts = (*parts, *(one for one in _OPTIONAL if one in data))
         data = self._mapping("", data, (*_HEADER, *parts))
@@ -219,13 +219,13 @@ class _Reader:
         else:
             numbers = {
                 key: self._sourced(key, data[key], one)
-                for key, one in ToolMaterial.parameters().items()
+                for key, one in ToolMaterial.declared().items()
             }
             tool = self._build("tool", ToolMaterial, {"name": name, **numbers})
         return MaterialFile(name, description, tuple(self._properties), sets, tool)
 
     def _workpieces(self, name: str, data: Mapping[str, Any]) -> dict[str, WorkpieceMaterial]:
-        declared = WorkpieceMaterial.parameters()
+        declared = WorkpieceMaterial.declared()
         either = {
             key: self._constant_or_table(key, data[key], declared[key])
             for key in _CONSTANT_OR_TABLE
@@ -259,7 +259,7 @@ class _Reader:
         if data == "none":
             return None
         damage: JohnsonCookDamage = self._build(
-            "damage", JohnsonCookDamage, self._group("damage", data, JohnsonCookDamage.parameters())
+            "damage", JohnsonCookDamage, self._group("damage", data, JohnsonCookDamage.declared())
         )
         return damage
 
@@ -267,7 +267,7 @@ class _Reader:
         if data is None:
             return None
         place = "nonlocal_viscosity"
-        values = self._group(place, data, NonlocalViscosity.parameters())
+        values = self._group(place, data, NonlocalViscosity.declared())
         made: NonlocalViscosity = self._build(place, NonlocalViscosity, values)
         return made
 
@@ -301,7 +301,7 @@ class _Reader:
             raise self._wrong(f"{place}.law", law, f"one of {', '.join(sorted(FLOW_LAWS.kinds))}")
         if damage not in (None, "none"):
             raise self._wrong(f"{place}.damage", damage, "none, or to be left out")
-        values = self._group(place, rest, kind.parameters())
+        values = self._group(place, rest, kind.declared())
         return damage is None, self._build(place, kind, values)
 
     def _build(self, place: str, kind: Any, values: Mapping[str, Any]) -> Any:

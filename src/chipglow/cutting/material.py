@@ -135,10 +135,9 @@ class WorkpieceMaterial(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name, parameter in self.parameters().items():
+        for name, parameter in self.declared().items():
             for value in getattr(getattr(self, name), "values", ()):
-                if not parameter.holds(value):
-                    raise parameter.refusal(f"{type(self).__name__}.{name}", value)
+                parameter.check(f"{type(self).__name__}.{name}", value)
 
     def density_at(self, temperature: ArrayLike) -> NDArray[np.float64]:
         """Densities without stress in kg/m³ at temperatures in K, of the same shape."""

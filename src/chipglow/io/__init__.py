@@ -5,7 +5,6 @@ from chipglow.io.example_scene import example_scene
 from chipglow.io.import_description import (
     IMPORT_SOURCES,
     ImportDescription,
-    SourceSection,
     import_description,
     import_text,
     load_import,
@@ -36,7 +35,6 @@ __all__ = [
     "Import",
     "ImportDescription",
     "SceneWriter",
-    "SourceSection",
     "StoredScene",
     "ToolSection",
     "UnfinishedScene",

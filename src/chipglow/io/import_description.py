@@ -1,22 +1,18 @@
 """What the description of an import says: where fields are, what they mean, where to sample."""
 
 import re
-from abc import abstractmethod
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields, make_dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, Literal, Self
-
-from pydantic import Field, create_model, model_validator
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from chipglow.io.importing import Import, View
 from chipglow.io.sandbox import Isolated
-from chipglow.io.sources import Placement, Source, Units, lammps_dump
-from chipglow.io.sources.arrays import ARRAY_READERS
+from chipglow.io.sources import Placement, Units
 from chipglow.io.sources.cloud import CloudSource
 from chipglow.io.sources.conventions import SI_UNITS
 from chipglow.io.sources.grid import GridSource
-from chipglow.io.sources.mesh import MESH_READERS, MeshSource
+from chipglow.io.sources.mesh import MeshSource
 from chipglow.io.sources.movie import (
     FieldMovie,
     Legend,
@@ -27,119 +23,17 @@ from chipglow.io.sources.movie import (
 )
 from chipglow.io.sources.overlays import Box
 from chipglow.io.tool_section import ToolSection
-from chipglow.quantities import (
-    Family,
-    FileBeside,
-    Parameter,
-    Parameters,
-    Section,
-    Settings,
-)
-from chipglow.quantities.units import (
-    LENGTH,
-    POSITION,
-    TIME,
-    Unit,
-    parse_unit,
-)
+from chipglow.quantities import Family, FileBeside, Parameter, Part, adapter
+from chipglow.quantities.units import LENGTH, TIME, parse_unit
 from chipglow.scene.completion import Completion
 from chipglow.text import commented_yaml, described_by
 
 IMPORT_SOURCES: Final = Family("import_source")
-"""Kinds of sources; those of other packages are sections with their kind and endings, too."""
+"""Kinds of sources; those of other packages have a title and endings, too."""
 
 
-class UnitsSection(Settings[Units]):
-    """Units of the source."""
-
-    length: Annotated[
-        str, Parameter("Unit of positions and lengths.", allowed="m, mm, um, in, ...")
-    ] = "m"
-    time: Annotated[str, Parameter("Unit of times.", allowed="s, ms, us, ...")] = "s"
-    temperature: Annotated[str, Parameter("Unit of temperatures.", allowed="K, degC, degF")] = "K"
-    velocity: Annotated[
-        str | None,
-        Parameter(
-            "Unit of velocities; none: made of length and time.",
-            allowed="none, m/s, mm/s, m/min, ...",
-        ),
-    ] = None
-    strain_rate: Annotated[
-        str | None,
-        Parameter("Unit of strain rates; none: made of the time.", allowed="none, 1/s, 1/ms, ..."),
-    ] = None
-
-    def build(self) -> Units:
-        """The units."""
-        return Units(
-            length=self._unit("length", "m"),
-            time=self._unit("time", "s"),
-            temperature=self._unit("temperature", "K"),
-            velocity=None if self.velocity is None else self._unit("velocity", "m/s"),
-            strain_rate=None if self.strain_rate is None else self._unit("strain_rate", "1/s"),
-        )
-
-    def _unit(self, name: str, base: str) -> Unit:
-        try:
-            return parse_unit(getattr(self, name), base, name)
-        except ValueError as error:
-            raise ValueError(f"{name}: {error}") from None
-
-
-class PlacementSection(Settings[Placement]):
-    """How the source's axes lie in the scene, whose x runs along the cut and whose y goes up."""
-
-    horizontal: Annotated[
-        str,
-        Parameter(
-            "The source's axis along the workpiece's motion toward the tool.",
-            allowed="x, y, z, -x, -y, -z",
-        ),
-    ] = "x"
-    vertical: Annotated[
-        str,
-        Parameter(
-            "The source's axis from the cut surface into the chip.", allowed="x, y, z, -x, -y, -z"
-        ),
-    ] = "y"
-    origin_horizontal: Annotated[
-        float,
-        Parameter(
-            "Where the tip of the tool is on the horizontal axis, in the source's coordinates.",
-            POSITION,
-        ),
-    ] = 0.0
-    origin_vertical: Annotated[float, Parameter("The same on the vertical axis.", POSITION)] = 0.0
-
-    def build(self) -> Placement:
-        """The placement."""
-        origin = self.origin_horizontal, self.origin_vertical
-        return Placement(self.horizontal, self.vertical, origin)
-
-
-class SourceSection(Section):
-    """What is said of one kind of source.
-
-    Attributes
-    ----------
-    kind : str
-        Name of the kind, and of its section.
-    title : str
-        What such sources are, for the comment on the section.
-    endings : tuple of str
-        Endings of such files' names, in small letters.
-    """
-
-    kind: ClassVar[str]
-    title: ClassVar[str]
-    endings: ClassVar[tuple[str, ...]]
-
-    @abstractmethod
-    def source(self, whole: "ImportDescription") -> Source:
-        """The source that the whole describes."""
-
-
-class FieldMovieSection(Section):
+@dataclass(frozen=True)
+class FieldMovieSection(Part):
     """A movie of one field."""
 
     file: Annotated[FileBeside | None, Parameter("The movie.")] = None
@@ -171,10 +65,17 @@ class FieldMovieSection(Section):
     ] = None
 
 
-class MoviesSection(Section):
-    """Movies by their field, and how large their pixels are."""
+@dataclass(frozen=True)
+class MovieSection(MovieSource):
+    """Movies of fields with a colour scale, a movie a field."""
 
-    temperature: Annotated[FieldMovieSection, Parameter("The movie of the temperature.")] = Field(
+    title: ClassVar[str] = "a movie"
+    endings: ClassVar[tuple[str, ...]] = (
+        ".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif",
+    )  # fmt: skip
+    movies: Mapping[str, FieldMovie] = field(default_factory=dict)
+    metre_per_pixel: float = 0.0
+    temperature: Annotated[FieldMovieSection, Parameter("The movie of the temperature.")] = field(
         default_factory=FieldMovieSection
     )
     plastic_strain: Annotated[
@@ -194,16 +95,8 @@ class MoviesSection(Section):
     scale_to: Annotated[Pixel | None, Parameter("The other point.")] = None
     scale_length: Annotated[float | None, Parameter("Their distance.", LENGTH)] = None
 
-
-@IMPORT_SOURCES.part
-class MovieSection(SourceSection, Parameters[MovieSource], MoviesSection):
-    """Movies of fields with a colour scale, a movie a field."""
-
-    kind: ClassVar[str] = "movie"
-    title: ClassVar[str] = "a movie"
-    endings: ClassVar[tuple[str, ...]] = (
-        ".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".wmv", ".mpg", ".mpeg", ".gif",
-    )  # fmt: skip
+    def __post_init__(self) -> None:
+        Part.__post_init__(self)  # the movies follow
 
     def source(self, whole: "ImportDescription") -> MovieSource:
         """The source that this section describes."""
@@ -214,13 +107,13 @@ class MovieSection(SourceSection, Parameters[MovieSource], MoviesSection):
                 movies[name] = _field_movie(name, section, whole)
         return MovieSource(
             movies=movies,
-            metre_per_pixel=self._metre_per_pixel(),
+            metre_per_pixel=self._side(),
             frame_interval=whole.interval,
-            placement=whole.placement.build(),
-            **self.values,
+            placement=whole.placement,
+            **{name: getattr(self, name) for name in MovieSource.declared()},
         )
 
-    def _metre_per_pixel(self) -> float:
+    def _side(self) -> float:
         if self.pixel is not None:
             return self.pixel
         if self.scale_from is None or self.scale_to is None or self.scale_length is None:
@@ -275,88 +168,29 @@ _EXAMPLES: Final = {
 }
 
 
-@IMPORT_SOURCES.part
-class MeshSection(SourceSection, Parameters[MeshSource]):
-    """Finite-element results."""
-
-    kind: ClassVar[str] = "mesh"
-    title: ClassVar[str] = "a mesh"
-    endings: ClassVar[tuple[str, ...]] = (*MESH_READERS, "d3plot")
-
-    def source(self, whole: "ImportDescription") -> MeshSource:
-        """The source that this section describes."""
-        return MeshSource(
-            path=Path(whole.file),
-            names=whole.fields,
-            units=whole.units.build(),
-            placement=whole.placement.build(),
-            interval=whole.interval,
-            **self.values,
-        )
+for _kind, _source in (
+    ("movie", MovieSection),
+    ("mesh", MeshSource),
+    ("points", CloudSource),
+    ("grid", GridSource),
+):
+    IMPORT_SOURCES.add(_kind, _source)
 
 
-@IMPORT_SOURCES.part
-class PointsSection(SourceSection, Parameters[CloudSource]):
-    """Points, as of smoothed particles or material points."""
-
-    kind: ClassVar[str] = "points"
-    title: ClassVar[str] = "points"
-    # Most files of points have another ending: they are called by their kind.
-    endings: ClassVar[tuple[str, ...]] = lammps_dump.ENDINGS
-
-    def source(self, whole: "ImportDescription") -> CloudSource:
-        """The source that this section describes."""
-        return CloudSource(
-            files=whole.file,
-            names=whole.fields,
-            interval=whole.interval,
-            units=whole.units.build(),
-            placement=whole.placement.build(),
-            **self.values,
-        )
-
-
-@IMPORT_SOURCES.part
-class GridSection(SourceSection, Parameters[GridSource]):
-    """Arrays on a regular grid."""
-
-    kind: ClassVar[str] = "grid"
-    title: ClassVar[str] = "a grid"
-    endings: ClassVar[tuple[str, ...]] = tuple(ARRAY_READERS)
-
-    files: Annotated[
-        dict[str, FileBeside] | None,
-        Parameter(
-            "Files by the names of fields, in the place of source.",
-            allowed="none, or {temperature: T.npy, plastic_strain: strain.npy}",
-        ),
-    ] = None
-
-    def source(self, whole: "ImportDescription") -> GridSource:
-        """The source that this section describes."""
-        return GridSource(
-            files=self.files or whole.file,
-            names=whole.fields,
-            interval=whole.interval,
-            units=whole.units.build(),
-            placement=whole.placement.build(),
-            **self.values,
-        )
-
-
-class ImportDescription(Section):
+@dataclass(frozen=True)
+class ImportDescription(Part):
     """An import: which source, what its fields mean, where they are sampled."""
 
     source: Annotated[
         FileBeside | None, Parameter("The file, or a pattern for several: chip_*.vtu.")
     ] = None
-    kind: Annotated[
+    kind: Annotated[  # type: ignore[misc]
         Literal["movie", "mesh", "points", "grid"] | None,
         Parameter(
             "What the source is; none: the file's name says it.",
             allowed="movie, mesh, points, grid",
         ),
-    ] = None
+    ] = None  # type: ignore[assignment]
     fields: Annotated[
         dict[str, str],
         Parameter(
@@ -364,38 +198,39 @@ class ImportDescription(Section):
             allowed="{temperature: NT11, plastic_strain: PEEQ, plastic_strain_rate: ..., "
             "velocity: V}",
         ),
-    ] = Field(default_factory=dict)
-    units: Annotated[UnitsSection, Parameter("Units of the source: SI if nothing is said.")] = (
-        Field(default_factory=UnitsSection)
+    ] = field(default_factory=dict)
+    units: Annotated[Units, Parameter("Units of the source: SI if nothing is said.")] = field(
+        default_factory=Units
     )
     interval: Annotated[
         float | None, Parameter("Time from frame to frame; none: as the source says.", TIME)
     ] = None
-    placement: Annotated[PlacementSection, Parameter("How the source's axes lie in the scene.")] = (
-        Field(default_factory=PlacementSection)
+    placement: Annotated[Placement, Parameter("How the source's axes lie in the scene.")] = field(
+        default_factory=Placement
     )
-    field_of_view: Annotated[View, Parameter("Where the scene is sampled.")] = View()
+    field_of_view: Annotated[View, Parameter("Where the scene is sampled.")] = field(
+        default_factory=View
+    )
     tool: Annotated[
         ToolSection | None,
         Parameter("The tool's outline with its tip at the origin: what is in it is tool."),
     ] = None
     completion: Annotated[Completion, Parameter("What stands in for what the source lacks.")] = (
-        Completion()
+        field(default_factory=Completion)
     )
-    mesh: Annotated[MeshSection, Parameter("More of a mesh.")] = Field(default_factory=MeshSection)
-    movie: Annotated[MovieSection, Parameter("More of a movie.")] = Field(
+    mesh: Annotated[MeshSource, Parameter("More of a mesh.")] = field(default_factory=MeshSource)
+    movie: Annotated[MovieSection, Parameter("More of a movie.")] = field(
         default_factory=MovieSection
     )
-    points: Annotated[PointsSection, Parameter("More of points.")] = Field(
-        default_factory=PointsSection
+    points: Annotated[CloudSource, Parameter("More of points.")] = field(
+        default_factory=CloudSource
     )
-    grid: Annotated[GridSection, Parameter("More of a grid.")] = Field(default_factory=GridSection)
+    grid: Annotated[GridSource, Parameter("More of a grid.")] = field(default_factory=GridSource)
 
-    @model_validator(mode="after")
-    def _possible(self) -> Self:
+    def __post_init__(self) -> None:
+        super().__post_init__()
         if self.source or self.kind:
             self.build()
-        return self
 
     @property
     def file(self) -> str:
@@ -411,35 +246,48 @@ class ImportDescription(Section):
         name = Path(self.file).name.lower()
         if name.endswith((".csv", ".tsv")) and _has_header(Path(self.file)):
             return "points"
-        for kind, section in IMPORT_SOURCES.parts.items():
-            if name.endswith(section.endings):
+        for kind, source in IMPORT_SOURCES.parts.items():
+            if name.endswith(source.endings):
                 return kind
         raise ValueError(f"kind: {name!r} says none, expected {', '.join(IMPORT_SOURCES.kinds)}")
 
     def build(self) -> Import:
         """The import that is described."""
-        section: SourceSection = getattr(self, self.kind_of_source())
+        section = getattr(self, self.kind_of_source().replace("-", "_"))
+        is_movie = isinstance(section, MovieSection)
+        source = section.source(self) if is_movie else self._source(section)
         completion = self.completion
         tool = self.tool.build() if self.tool else None
         return Import(
-            Isolated(section.source(self), Path(self.source or "movie").name),
+            Isolated(source, Path(self.source or "movie").name),
             self.field_of_view,
             replace(completion, tool=tool),
-            self.model_dump(mode="json"),
+            adapter(type(self)).dump_python(self, mode="json"),
             self._assumptions(),
         )
+
+    def _source(self, section: Any) -> Any:
+        """A source with what the description says beside its section."""
+        said = {
+            "files": ("files" in section.declared() and section.files) or self.file,
+            "names": self.fields,
+            "interval": self.interval,
+            "units": self.units,
+            "placement": self.placement,
+        }
+        known = {one.name for one in fields(section)}
+        return replace(section, **{name: said[name] for name in said.keys() & known})
 
     def _assumptions(self) -> dict[str, str]:
         """Return assumptions that apply if the source contains a field, by the field's name."""
         assumptions: dict[str, str] = {}
         units = self.units
-        if units.velocity is None and (units.length, units.time) != ("m", "s"):
-            text = f"Velocities are in {units.length}/{units.time}, by units.length and units.time."
+        length, time = units.length.text, units.time.text
+        if units.velocity is None and (length, time) != ("m", "s"):
+            text = f"Velocities are in {length}/{time}, by units.length and units.time."
             assumptions |= {"velocity_x": text, "velocity_y": text}
-        if units.strain_rate is None and units.time != "s":
-            assumptions["plastic_strain_rate"] = (
-                f"Strain rates are in 1/{units.time}, from units.time."
-            )
+        if units.strain_rate is None and time != "s":
+            assumptions["plastic_strain_rate"] = f"Strain rates are in 1/{time}, from units.time."
         if self.tool is not None or self.movie.tool_colour is not None:
             assumptions["temperature"] = (
                 "Where the source has no temperature of the tool, it is "
@@ -451,19 +299,19 @@ class ImportDescription(Section):
 def import_description() -> type[ImportDescription]:
     """What describes an import, with the sections of the kinds that other packages add."""
     parts = IMPORT_SOURCES.parts
-    added = {
-        kind: part for kind, part in parts.items() if kind not in ImportDescription.model_fields
-    }
+    added = {kind: part for kind, part in parts.items() if kind not in ImportDescription.declared()}
     if not added:
         return ImportDescription
-    known = Parameter(
-        "What the source is; none: the file's name says it.", allowed=", ".join(parts)
-    )
-    fields: Any = {"kind": (Annotated[Literal[*parts] | None, known], None)}
+    kinds: Any = Literal[*parts]
+    known = replace(ImportDescription.parameter("kind"), allowed=", ".join(parts))
+    rows: list[Any] = [("kind", Annotated[kinds | None, known], None)]
     for kind, part in added.items():
-        more = Parameter(f"More of {part.title}.")
-        fields[kind] = (Annotated[part, more], Field(default_factory=part))
-    return create_model("ImportDescription", __base__=ImportDescription, **fields)
+        section = Annotated[part, Parameter(f"More of {part.title}.")]  # type: ignore[valid-type]
+        rows.append((kind.replace("-", "_"), section, field(default_factory=part)))
+    made: type[ImportDescription] = make_dataclass(
+        "ImportDescription", rows, bases=(ImportDescription,), frozen=True
+    )
+    return made
 
 
 def load_import(source: str | Path, settings: Iterable[str] = ()) -> ImportDescription:

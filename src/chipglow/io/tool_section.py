@@ -1,18 +1,25 @@
 """The cutting tool as a section of YAML files, and its outline as a file."""
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated
 
-from pydantic import field_validator, model_validator
+from pydantic import AfterValidator
 
 from chipglow.cutting import material_names, tool_material
 from chipglow.io.column_file import read_polyline
-from chipglow.quantities import FileBeside, Parameter, Settings
+from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.scene import Chamfer, Hone, Tool, ToolGeometry, ToolOutline, ToolOutlineError
 
 
-class ToolSection(Settings[Tool]):
+def _known(name: str) -> str:
+    tool_material(name)
+    return name
+
+
+@dataclass(frozen=True)
+class ToolSection(Part):
     """The cutting tool."""
 
     rake_angle: Annotated[float, ToolGeometry.parameter("rake_angle")] = ToolGeometry.rake_angle
@@ -31,28 +38,19 @@ class ToolSection(Settings[Tool]):
         ),
     ] = None
     material: Annotated[
-        str, Parameter("Material of the tool.", allowed=", ".join(material_names("tool")))
+        str,
+        AfterValidator(_known),
+        Parameter("Material of the tool.", allowed=", ".join(material_names("tool"))),
     ] = "carbide"
 
-    @field_validator("material")
-    @classmethod
-    def _known(cls, name: str) -> str:
-        tool_material(name)
-        return name
-
-    @model_validator(mode="after")
-    def _nothing_unused(self) -> Self:
-        if self.outline:
-            self._refuse_beside("outline", set(ToolSection.model_fields) - {"outline", "material"})
-        elif self.hone:
-            self._refuse_beside("hone", {"edge_radius"})
-        return self
-
-    def _refuse_beside(self, given: str, unused: set[str]) -> None:
-        default = type(self)()
-        for name in type(self).model_fields:
-            if name in unused and getattr(self, name) != getattr(default, name):
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        given = "outline" if self.outline else "hone" if self.hone else ""
+        unused = {"outline": ToolGeometry.declared(), "hone": ["edge_radius"]}.get(given, [])
+        for name in unused:
+            if getattr(self, name) != getattr(ToolGeometry, name):
                 raise ValueError(f"{name}: is not used beside {given}, expected one or the other")
+        self.build()
 
     def build(self) -> Tool:
         """The tool's outline."""
@@ -61,7 +59,7 @@ class ToolSection(Settings[Tool]):
                 return read_tool_outline(self.outline)
             except ValueError as error:
                 raise ValueError(f"outline: {error}") from None
-        return ToolGeometry(**{name: getattr(self, name) for name in ToolGeometry.parameters()})
+        return ToolGeometry(**{name: getattr(self, name) for name in ToolGeometry.declared()})
 
 
 def read_tool_outline(path: str | os.PathLike[str]) -> ToolOutline:

@@ -2,13 +2,20 @@
 
 from chipglow.quantities.format import quantity_text, rounded_text, uncertain_text
 from chipglow.quantities.parameter import Parameter
-from chipglow.quantities.part import Family, Parameters, Part, adapter, of_other_packages
-from chipglow.quantities.section import FileBeside, Section, Settings, beside_the_study
+from chipglow.quantities.part import (
+    Family,
+    FileBeside,
+    Part,
+    adapter,
+    beside_the_study,
+    of_other_packages,
+    problem,
+    unchecked,
+)
 from chipglow.quantities.settings import (
     Setting,
     changed,
     field_tables,
-    given,
     own_settings,
     setting_at,
     settings,
@@ -20,23 +27,21 @@ __all__ = [
     "Family",
     "FileBeside",
     "Parameter",
-    "Parameters",
     "Part",
     "Quantity",
-    "Section",
     "Setting",
-    "Settings",
     "adapter",
     "beside_the_study",
     "changed",
     "field_tables",
-    "given",
     "of_other_packages",
     "own_settings",
+    "problem",
     "quantity_text",
     "rounded_text",
     "setting_at",
     "settings",
     "uncertain_text",
+    "unchecked",
     "value_at",
 ]

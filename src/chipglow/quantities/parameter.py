@@ -2,17 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import cycle
 from math import isfinite
-from numbers import Integral, Real
 from types import NoneType, UnionType
-from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
+from typing import Any, Final, Literal, Union, get_args, get_origin
 
 from pydantic import (
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     SerializationInfo,
     SerializerFunctionWrapHandler,
+    ValidationInfo,
     ValidatorFunctionWrapHandler,
 )
 from pydantic.json_schema import JsonSchemaValue
@@ -20,7 +19,6 @@ from pydantic_core import CoreSchema, core_schema
 
 from chipglow.quantities.units import Quantity, is_bare_number
 
-_NUMBERS: Final[dict[Any, type]] = {float: Real, int: Integral}
 NONE: Final = "none"
 """How descriptions write None."""
 
@@ -55,16 +53,7 @@ class Parameter:
     @property
     def limits(self) -> str:
         """The limits in words, in the unit of descriptions."""
-        return self._limits(self.text)
-
-    @property
-    def is_limited(self) -> bool:
-        """Whether it has limits."""
-        return any(one is not None for one in (self.over, self.least, self.under, self.most))
-
-    def text(self, value: float) -> str:
-        """Text of a value, as descriptions write it."""
-        return f"{value:g}" if self.quantity is None else self.quantity.text(value)
+        return self._limits(self._text)
 
     def number(self, value: object) -> float:
         """SI number of a value as descriptions write it, with its unit if it has one.
@@ -80,53 +69,42 @@ class Parameter:
             number = float(str(value).replace("−", "-"))
         else:
             raise ValueError(f"{value!r}, expected a number without a unit")
-        return float(self._within(number))
+        self._check(number, self._text)
+        return number
 
-    def refusal(self, name: str, value: object, kind: Any = float) -> ValueError:
-        """The error for a value that is not allowed, in SI units."""
-        expected = "" if self.is_limited else _expected(kind) or self.allowed
-        expected = expected or self._limits(self._si_text)
-        return ValueError(f"{name}: {self._si_text(value)}, expected {expected}")
-
-    def holds(self, value: object) -> bool:
-        """Whether a value, or each of a tuple, is within the limits; only numbers have any."""
-        if isinstance(value, tuple):
-            return all(self.holds(one) for one in value)
-        if type(value) is float:  # the usual case, without the time that the others take
-            number = value
-        elif not isinstance(value, Real) or isinstance(value, bool):
-            return True
-        else:
-            number = float(value)
-        return (
-            isfinite(number)
-            and (self.over is None or number > self.over)
-            and (self.least is None or number >= self.least)
-            and (self.under is None or number < self.under)
-            and (self.most is None or number <= self.most)
-        )
-
-    def check(self, kind: Any) -> Callable[[object], bool]:
-        """What tells whether a value is of a type, as far as that is checked, and in the limits."""
-        is_of = _check(kind)
-        return lambda value: is_of(value) and self.holds(value)
+    def check(self, name: str, value: float) -> None:
+        """Raise a ValueError with this name if a number in SI units is outside the limits."""
+        try:
+            self._check(value, self._si_text)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
 
     def words(self, kind: Any) -> str:
         """Which values are allowed, in words; empty if anything of the field's type is."""
         none = f"{NONE}, or " if NoneType in get_args(kind) else ""
-        return self.allowed or (none + self.limits if self.is_limited else "")
+        return self.allowed or (none + self.limits if self._is_limited else "")
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Schema of a description's field: text with a unit or a plain value, within the limits."""
+        """Schema of a field: text with a unit or a plain value, within the limits.
+
+        Numbers in SI units pass from Python; what is read from a file, in a context, needs its
+        unit.
+        """
         plain, words = self._without_words(source)
         if self.quantity is None:
             schema = handler(plain)
             _take_lists(schema)
         else:
             schema = self.quantity.__get_pydantic_core_schema__(plain, handler)
-        schema = core_schema.no_info_after_validator_function(self._within, schema)
+            tables = tuple(one for one in get_args(plain) or (plain,) if one not in (float, ...))
+            if all(isinstance(one, type) for one in tables):
+                schema = core_schema.no_info_wrap_validator_function(
+                    lambda value, rest: value if isinstance(value, tables) else rest(value), schema
+                )
+        if self._is_limited:
+            schema = core_schema.with_info_wrap_validator_function(self._read, schema)
         return _or_words(schema, words) if words else schema
 
     def __get_pydantic_json_schema__(
@@ -145,6 +123,37 @@ class Parameter:
             json = {"anyOf": [json, {"enum": allowed}]}
         return json | {"description": self.meaning}
 
+    @property
+    def _is_limited(self) -> bool:
+        return any(one is not None for one in (self.over, self.least, self.under, self.most))
+
+    def _read(self, value: Any, rest: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+        """Check the limits: numbers in SI units first, so that the error shows them as given."""
+        if info.context is None and isinstance(value, int | float):
+            self._check(value, self._si_text)
+            return rest(value) if self.quantity is None else float(value)
+        read = rest(value)
+        self._check(read, self._text)
+        return read
+
+    def _check(self, value: Any, text: Callable[[float], str]) -> None:
+        """Refuse a number outside the limits, or a tuple with one; all else has none."""
+        if isinstance(value, tuple):
+            for one in value:
+                self._check(one, text)
+        elif type(value) in (int, float) and not self._holds(value):
+            expected = self.allowed or self._limits(text)
+            raise ValueError(f"{text(value)}, expected {expected}")
+
+    def _holds(self, number: Any) -> bool:
+        return (
+            isfinite(number)
+            and (self.over is None or number > self.over)
+            and (self.least is None or number >= self.least)
+            and (self.under is None or number < self.under)
+            and (self.most is None or number <= self.most)
+        )
+
     def _without_words(self, source: Any) -> tuple[Any, dict[str, Any]]:
         """The type of a value that is no word, and the words with what they stand for."""
         if get_origin(source) not in (Union, UnionType):
@@ -160,10 +169,11 @@ class Parameter:
                 rest.append(one)
         return Union[tuple(rest)], words  # noqa: UP007
 
-    def _si_text(self, value: object) -> str:
-        if not isinstance(value, Real) or isinstance(value, bool):
-            return repr(value)
-        return f"{float(value):g} {self.quantity.base if self.quantity else ''}".strip()
+    def _text(self, value: float) -> str:
+        return f"{value:g}" if self.quantity is None else self.quantity.text(value)
+
+    def _si_text(self, value: float) -> str:
+        return f"{value:g} {self.quantity.base if self.quantity else ''}".strip()
 
     def _limits(self, text: Callable[[float], str]) -> str:
         if self.least is not None and self.most is not None:
@@ -175,12 +185,6 @@ class Parameter:
             "" if self.most is None else f"up to {text(self.most)}",
         )
         return ", ".join(word for word in words if word) or "a finite number"
-
-    def _within(self, value: Any) -> Any:
-        if not self.holds(value):
-            shown = value if isinstance(value, tuple) else self.text(value)
-            raise ValueError(f"{shown}, expected {self.allowed or self.limits}")
-        return value
 
 
 def _take_lists(schema: Any) -> None:
@@ -197,7 +201,6 @@ def _take_lists(schema: Any) -> None:
 
 def _or_words(schema: CoreSchema, words: dict[str, Any]) -> CoreSchema:
     """Schema of a field that may also be one of some words."""
-    written = {value: word for word, value in words.items()}
 
     def read(given: object, rest: ValidatorFunctionWrapHandler) -> object:
         if given is None and NONE in words:
@@ -205,9 +208,9 @@ def _or_words(schema: CoreSchema, words: dict[str, Any]) -> CoreSchema:
         return words[given] if isinstance(given, str) and given in words else rest(given)
 
     def text(held: object, rest: SerializerFunctionWrapHandler, info: SerializationInfo) -> object:
-        if held is None or (isinstance(held, str) and held in written):
-            return written[held] if info.mode_is_json() else held
-        return rest(held)
+        if held is None:
+            return NONE if info.mode_is_json() else None
+        return held if isinstance(held, str) and held in words else rest(held)
 
     return core_schema.no_info_wrap_validator_function(
         read,
@@ -217,58 +220,3 @@ def _or_words(schema: CoreSchema, words: dict[str, Any]) -> CoreSchema:
             text, info_arg=True, schema=schema
         ),
     )
-
-
-def _check(kind: Any) -> Callable[[object], bool]:
-    """Whether a value is of a type: numbers, words and classes are told, all else passes."""
-    if kind in _NUMBERS:
-        number = _NUMBERS[kind]
-        return lambda value: (
-            type(value) is kind or (isinstance(value, number) and not isinstance(value, bool))
-        )
-    if isinstance(kind, type) and get_origin(kind) is None:
-        return lambda value: isinstance(value, kind)
-    origin, members = get_origin(kind), get_args(kind)
-    if origin is Literal:
-        return lambda value: isinstance(value, str | int) and value in members
-    if origin is Annotated:
-        return _check(members[0])
-    if origin in (Union, UnionType):
-        checks = [_check(one) for one in members if one is not NoneType]
-        if len(checks) == 1 < len(members):
-            (only,) = checks
-            return lambda value: value is None or only(value)
-        checks = [_check(one) for one in members]
-        return lambda value: any(check(value) for check in checks)
-    if origin is tuple:
-        many, checks = members[-1] is ..., [_check(one) for one in members if one is not ...]
-        return lambda value: (
-            isinstance(value, tuple)
-            and (many or len(value) == len(checks))
-            and all(check(one) for check, one in zip(cycle(checks), value, strict=False))
-        )
-    return lambda value: True
-
-
-def _expected(kind: Any) -> str:
-    """What a type allows, in words; empty for what is not checked."""
-    origin, members = get_origin(kind), get_args(kind)
-    if origin is Annotated:
-        return _expected(members[0])
-    if origin is tuple:
-        (first, *_), many = members, members[-1] is ...
-        of = _PLURALS.get(first) or _expected(first) or "values"
-        return f"a tuple of {of}" if many else f"{len(members)} {of}"
-    if origin is Literal:
-        names = [str(one) for one in members]
-    elif origin in (Union, UnionType):
-        names = [_expected(one) for one in members]
-    elif kind is NoneType:
-        return "None"
-    else:
-        return _NAMES.get(kind) or str(getattr(kind, "__name__", ""))
-    return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
-
-
-_NAMES: Final[dict[Any, str]] = {float: "a finite number", int: "a whole number", str: "a text"}
-_PLURALS: Final[dict[Any, str]] = {float: "finite numbers", int: "whole numbers", str: "texts"}

@@ -2,40 +2,55 @@
 
 import inspect
 import reprlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from copy import copy
 from dataclasses import MISSING, fields as dataclass_fields
+from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import entry_points
 from inspect import isabstract
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, NamedTuple, TypeVar
+from pathlib import Path
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Final,
+    Literal,
+    NamedTuple,
+    NotRequired,
+    Self,
+    TypeVar,
+)
 from warnings import warn
 
+import numpy as np
 from pydantic import (
+    AfterValidator,
+    ConfigDict,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     SerializationInfo,
-    SerializerFunctionWrapHandler,
     TypeAdapter,
-    ValidatorFunctionWrapHandler,
-    create_model,
+    ValidationError,
+    ValidationInfo,
 )
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
+from typing_extensions import TypedDict
 
 from chipglow.quantities.parameter import Parameter
-from chipglow.quantities.section import STRICT, Section, known_keys, naming_file
 
 Class = TypeVar("Class", bound=type)
-PartType = TypeVar("PartType")
+PartType = TypeVar("PartType", bound="Part")
 
 
 class Declaration(NamedTuple):
-    """A field of a part that descriptions have: annotation, type, parameter, and their check."""
+    """A field of a part that descriptions have: annotation, type and parameter."""
 
     annotation: Any
     kind: Any
     parameter: Parameter
-    allows: Callable[[object], bool]
 
 
 class Part:
@@ -43,7 +58,8 @@ class Part:
 
     From this one declaration come the check of the values, the section of descriptions with its
     comments, errors and JSON schema, and the parameters in the documentation. Fields without a
-    `Parameter` are not for descriptions.
+    `Parameter` are not for descriptions. The constructor takes SI numbers, and what a description
+    would give: text with units, and mappings for parts.
 
     Attributes
     ----------
@@ -51,15 +67,18 @@ class Part:
         Name by which descriptions choose it among its `Family`; empty for a part of no family.
     example : str
         How a description writes it, for the comment on the choice.
+    given : frozenset of str
+        Fields that were given when it was made; the others have their defaults.
 
     Raises
     ------
     ValueError
-        If a value is outside its limits.
+        If a value is not possible; the message names the field and what was expected.
     """
 
     kind: ClassVar[str] = ""
     example: ClassVar[str] = ""
+    given: frozenset[str]
     _declared: ClassVar[Mapping[str, Declaration]] = {}
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
@@ -77,101 +96,103 @@ class Part:
             if parameter is None:
                 declared.pop(name, None)
                 continue
-            kind = annotation.__origin__
-            declared[name] = Declaration(annotation, kind, parameter, parameter.check(kind))
+            declared[name] = Declaration(annotation, annotation.__origin__, parameter)
             # The dataclass, `help` and signatures see the plain type.
-            cls.__annotations__[name] = kind
+            cls.__annotations__[name] = annotation.__origin__
         cls._declared = declared
         if "__doc__" in vars(cls) and cls.__doc__ and declared:
             cls.__doc__ = _with_parameters(inspect.cleandoc(cls.__doc__), declared)
 
+    def __new__(cls, *args: Any, **values: Any) -> Self:
+        """Note which fields are given."""
+        part = super().__new__(cls)
+        names = [name for name, one in getattr(cls, "__dataclass_fields__", {}).items() if one.init]
+        object.__setattr__(part, "given", frozenset([*names[: len(args)], *values]))
+        return part
+
     def __post_init__(self) -> None:
-        for name, one in self._declared.items():
-            value = getattr(self, name)
-            if not one.allows(value):
-                raise one.parameter.refusal(f"{type(self).__name__}.{name}", value, one.kind)
+        values = {
+            name: value.item() if isinstance(value := getattr(self, name), np.generic) else value
+            for name in self._declared
+        }
+        given = {name: value for name, value in values.items() if name in self.given}
+        try:
+            completed = self.completed(given, False)
+            read = _section(type(self)).validate_python({**values, **completed})
+        except ValidationError as error:
+            raise ValueError(f"{type(self).__name__}.{problem(error)}") from None
+        for name in read.keys() - {"kind"}:
+            object.__setattr__(self, name, read[name])
+        object.__setattr__(self, "given", self.given | completed.keys())
+
+    @classmethod
+    def completed(cls, data: Any, from_file: bool) -> Any:
+        """Data of the section with what follows from them; numbers from a file need units."""
+        return data
 
     @classmethod
     def parameter(cls, name: str) -> Parameter:
-        """What a field declares, for a section of a description that has it too."""
+        """What a field declares, for another part that has it too."""
         return cls._declared[name].parameter
 
     @classmethod
-    def parameters(cls) -> dict[str, Parameter]:
+    def declared(cls) -> dict[str, Parameter]:
         """What the fields declare, by their names."""
         return {name: one.parameter for name, one in cls._declared.items()}
+
+    @classmethod
+    def defaults(cls) -> dict[str, Any]:
+        """The defaults of the declared fields that have one."""
+        found = {}
+        for one in dataclass_fields(cls):
+            if one.name in cls._declared:
+                if one.default_factory is not MISSING:
+                    found[one.name] = one.default_factory()
+                elif one.default is not MISSING:
+                    found[one.name] = one.default
+        return found
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:
         """Schema of a section of a description that has the declared fields."""
         if isabstract(cls) or "__dataclass_fields__" not in vars(cls):
             return core_schema.is_instance_schema(cls)
-        fields = {
-            one.name: core_schema.typed_dict_field(
-                handler.generate_schema(cls._declared[one.name].annotation),
-                required=one.default is MISSING and one.default_factory is MISSING,
-            )
-            for one in dataclass_fields(cls)
-            if one.name in cls._declared
-        }
-        if cls.kind:
-            kind = core_schema.typed_dict_field(
-                core_schema.literal_schema([cls.kind]), required=False
-            )
-            fields = {"kind": kind, **fields}
-        section = core_schema.typed_dict_schema(fields, extra_behavior="forbid", config=STRICT)
 
-        def read(data: object, rest: ValidatorFunctionWrapHandler) -> Part:
+        def read(data: object, info: ValidationInfo) -> Part:
             if isinstance(data, cls):
                 return data
-            values = rest(known_keys(data, fields))
+            from_file = bool(info.context)
+            data = _known_keys(cls.completed({} if data is None else data, from_file), _keys(cls))
+            values = _section(cls).validate_python(data, context=info.context)
             values.pop("kind", None)
-            with naming_file(values):
-                part = cls(**values)
-            object.__setattr__(part, "given", frozenset(values))
-            return part
+            with _naming_file(values):
+                return cls(**values)
 
-        def written(part: Part, rest: SerializerFunctionWrapHandler) -> Any:
-            return rest({name: getattr(part, name) for name in fields})
+        def written(part: Part, info: SerializationInfo) -> Any:
+            values = {name: getattr(part, name) for name in _keys(cls)}
+            return _section(cls).dump_python(values, mode=_mode(info))
 
-        return core_schema.no_info_wrap_validator_function(
+        return core_schema.with_info_plain_validator_function(
             read,
-            section,
-            serialization=core_schema.wrap_serializer_function_ser_schema(written, schema=section),
+            serialization=core_schema.plain_serializer_function_ser_schema(written, info_arg=True),
         )
 
     @classmethod
-    def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> Any:
-        """JSON schema of the section."""
-        return handler(schema) | {"title": cls.__name__, "description": first_sentence(cls)}
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: GetJsonSchemaHandler) -> Any:
+        """JSON schema of the section, with its defaults as YAML has them."""
+        json = handler.resolve_ref_schema(handler(_section(cls).core_schema))
+        plain = _section(cls).dump_python(cls.defaults(), mode="json", warnings=False)
+        for name, default in plain.items():
+            json["properties"][name]["default"] = default
+        return json | {"title": cls.__name__, "description": first_sentence(cls)}
 
 
-class Parameters(Section, Generic[PartType]):
-    """A section with the declared fields of a part: ``Parameters[MeshSource]``."""
-
-    part: ClassVar[Any]
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any: ...
-
-    @classmethod
-    def __class_getitem__(cls, part: Any) -> Any:
-        """Section of a part."""
-        if isinstance(part, TypeVar):
-            return super().__class_getitem__(part)
-        defaults = {one.name: one.default for one in dataclass_fields(part)}
-        fields: dict[str, Any] = {
-            name: (one.annotation, defaults[name]) for name, one in part._declared.items()
-        }
-        made = create_model(f"{part.__name__}Section", __base__=cls, **fields)
-        made.part = part
-        return made
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """What the parameters are, by their names."""
-        return {name: getattr(self, name) for name in self.part._declared}
+def unchecked(part: PartType, **values: Any) -> PartType:
+    """A copy of a part with other values, which nothing checks."""
+    made = copy(part)
+    for name, value in (values | {"given": part.given | values.keys()}).items():
+        object.__setattr__(made, name, value)
+    return made
 
 
 class Family:
@@ -196,7 +217,7 @@ class Family:
         return part
 
     def add(self, kind: str, part: Any) -> None:
-        """Add a part, or a section that is written by hand.
+        """Add a part.
 
         A class that is defined again, as by a notebook's cell, replaces the one before.
         """
@@ -233,9 +254,9 @@ class Family:
     ) -> CoreSchema:
         """Schema of the field: the section of the part whose kind is chosen."""
 
-        def chosen(value: Any, info: core_schema.ValidationInfo) -> Any:
+        def chosen(value: Any, info: ValidationInfo) -> Any:
             # Looked up when the field is read: parts may be added later.
-            if isinstance(value, Part | Section):
+            if isinstance(value, Part):
                 return value
             kind = value.get("kind") if isinstance(value, Mapping) else None
             part = self.find(kind)
@@ -245,9 +266,7 @@ class Family:
             return adapter(part).validate_python(value, context=info.context)
 
         def written(part: Any, info: SerializationInfo) -> Any:
-            return adapter(type(part)).dump_python(
-                part, mode="json" if info.mode_is_json() else "python"
-            )
+            return adapter(type(part)).dump_python(part, mode=_mode(info))
 
         return core_schema.with_info_plain_validator_function(
             chosen,
@@ -258,12 +277,27 @@ class Family:
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         """JSON schema: that of one of the parts."""
-        sections = [handler(adapter(part).core_schema) for part in self.parts.values()]
+        sections = [part.__get_pydantic_json_schema__({}, handler) for part in self.parts.values()]
         return {"oneOf": sections, "discriminator": {"propertyName": "kind"}}
 
 
 adapter: Final[Callable[[Any], TypeAdapter[Any]]] = cache(TypeAdapter)
-"""What reads and writes a part or a section, by its class."""
+"""What reads and writes a part, by its class."""
+
+
+def problem(error: ValidationError) -> str:
+    """The first problem in one line: field, value and what was expected."""
+    first = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "value_error":
+        message = str(first["ctx"]["error"])
+    elif first["type"] == "missing":
+        message = "is missing, expected a value"
+    else:
+        expectation = first["msg"].removeprefix("Input should be ").removeprefix("Value should be ")
+        message = f"{first['input']!r}, expected {expectation}"
+    message = message.removeprefix(f"{place.rpartition('.')[2]}: ")
+    return f"{place}: {message}" if place else message
 
 
 @cache
@@ -278,9 +312,80 @@ def of_other_packages(group: str) -> dict[str, Any]:
     return found
 
 
+def beside_the_study(file: str, info: ValidationInfo) -> str:
+    """Path of a file that a description names: relative to the description's folder.
+
+    A link keeps its own name, which says what kind of file it is.
+    """
+    path = Path((info.context or {}).get("folder") or ".", file)
+    try:
+        return str(path.parent.resolve() / path.name)
+    except (OSError, RuntimeError):  # Python 3.13 and later let a link to itself be
+        raise ValueError(f"{file!r}: its folder is a link to itself") from None
+
+
+FileBeside = Annotated[str, AfterValidator(beside_the_study)]
+"""A file that a description names."""
+
+
 def first_sentence(part: type) -> str:
     """The first paragraph of a class's documentation, in one line."""
     return " ".join((part.__doc__ or "").split("\n\n")[0].split())
+
+
+def _fields_of(part: Any) -> TypeAdapter[Any]:
+    defaults = part.defaults()
+    fields: dict[str, Any] = {"kind": NotRequired[Literal[part.kind]]} if part.kind else {}
+    for name in _keys(part):
+        if name in part._declared:
+            annotation = part._declared[name].annotation
+            fields[name] = NotRequired[annotation] if name in defaults else annotation
+    typed_dict: Any = TypedDict
+    section = typed_dict(part.__name__, fields)
+    section.__pydantic_config__ = _CONFIG
+    return TypeAdapter(section)
+
+
+_section: Final[Callable[[Any], TypeAdapter[Any]]] = cache(_fields_of)
+"""What reads and writes the declared fields of a part."""
+
+
+_CONFIG: Final = ConfigDict(
+    strict=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True
+)
+
+
+def _mode(info: SerializationInfo) -> Literal["json", "python"]:
+    return "json" if info.mode_is_json() else "python"
+
+
+def _keys(part: Any) -> list[str]:
+    """Keys of a part's section, in the order of its fields."""
+    names = [one.name for one in dataclass_fields(part) if one.name in part._declared]
+    return ["kind", *names] if part.kind else names
+
+
+def _known_keys(data: object, names: Iterable[str]) -> Mapping[str, Any]:
+    known = ", ".join(names)
+    if not isinstance(data, Mapping):
+        raise ValueError(f"{reprlib.repr(data)} is no section, expected keys of {known}")
+    for key in data:
+        if key not in names:
+            close = get_close_matches(str(key), names, n=1)
+            hint = f"did you mean {close[0]!r}?" if close else f"expected one of {known}"
+            raise ValueError(f"unknown key {key!r}, {hint}")
+    return data
+
+
+@contextmanager
+def _naming_file(values: Mapping[str, Any]) -> Iterator[None]:
+    """Name the field of a file that cannot be read, in a ValueError."""
+    try:
+        yield
+    except OSError as error:
+        named = [name for name, value in values.items() if str(value) == str(error.filename)]
+        place = ": ".join([*named, str(error.filename)])
+        raise ValueError(f"{place}: {error.strerror}, expected a file") from None
 
 
 def _with_parameters(text: str, declared: Mapping[str, Declaration]) -> str:
@@ -289,7 +394,7 @@ def _with_parameters(text: str, declared: Mapping[str, Declaration]) -> str:
     before, found, after = text.partition(title)
     rows = [
         f"{name} : {_type_text(kind, parameter)}\n    " + parameter.meaning.replace("\n", "\n    ")
-        for name, (_, kind, parameter, _) in declared.items()
+        for name, (_, kind, parameter) in declared.items()
     ]
     before = before if found else before + "\n\n"
     return "\n".join([before + title + "\n".join(rows), after]).rstrip() + "\n"

@@ -1,21 +1,18 @@
-"""The settings of a section or a part, one by one: for comments, tables, controls and options."""
+"""The settings of a part, one by one: for comments, tables, controls and options."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, dataclass, fields, replace
-from typing import Any, TypeVar, get_args
+from dataclasses import dataclass, replace
+from typing import Any, get_args
 
-from pydantic.fields import FieldInfo
+from pydantic import ValidationError
 
 from chipglow.quantities.parameter import Parameter
-from chipglow.quantities.part import Family, Part, adapter, first_sentence
-from chipglow.quantities.section import Section
-
-Described = TypeVar("Described", bound=Section | Part | tuple[Any, ...] | Mapping[str, Any])
+from chipglow.quantities.part import Family, Part, PartType, adapter, first_sentence, problem
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A field of a section or a part.
+    """A field of a part.
 
     Parameters
     ----------
@@ -26,7 +23,7 @@ class Setting:
     kind : type
         Type of its value.
     value : object
-        What it is, in SI units; a section or a part where it has settings itself.
+        What it is, in SI units; a part where it has settings itself.
     plain : object
         The same as YAML has it: text with a unit, a number, a list or a mapping.
     default : object
@@ -66,31 +63,37 @@ class Setting:
     @property
     def is_section(self) -> bool:
         """Whether it has settings itself."""
-        return isinstance(self.value, Section | Part)
+        return isinstance(self.value, Part)
 
 
-def settings(section: Section | Part) -> dict[str, Setting]:
-    """All settings of a section or a part and of those within it, by their paths."""
+def settings(part: Part) -> dict[str, Setting]:
+    """All settings of a part and of those within it, by their paths."""
     found = {}
-    for one in own_settings(section):
+    for one in own_settings(part):
         found[one.path] = one
         if one.is_section:
-            inner = settings(one.value)
-            for path, each in inner.items():
-                found[f"{one.path}.{path}"] = replace(each, path=f"{one.path}.{path}")
+            for path, inner in settings(one.value).items():
+                found[f"{one.path}.{path}"] = replace(inner, path=f"{one.path}.{path}")
     return found
 
 
-def own_settings(section: Section | Part) -> Iterator[Setting]:
-    """The settings of a section or a part itself, in their order."""
-    plain = adapter(type(section)).dump_python(section, mode="json")
-    for name, (parameter, kind, default, annotation) in _declared(type(section)).items():
+def own_settings(part: Part) -> Iterator[Setting]:
+    """The settings of a part itself, in their order."""
+    plain, defaults = adapter(type(part)).dump_python(part, mode="json"), part.defaults()
+    for name in plain:
+        value = getattr(part, name)
+        if name == "kind":
+            kind = Parameter(first_sentence(type(part)))
+            yield Setting(name, kind, str, value, value, value)
+            continue
+        annotation, type_of_value, parameter = part._declared[name]
         examples = next((family.examples for family in _families(annotation)), "")
-        value = getattr(section, name)
-        yield Setting(name, parameter, kind, value, plain[name], default, examples)
+        yield Setting(
+            name, parameter, type_of_value, value, plain[name], defaults.get(name), examples
+        )
 
 
-def value_at(section: Any, path: str) -> Any:
+def value_at(part: Any, path: str) -> Any:
     """Value of a setting by its path, which may lead through lists and mappings.
 
     Raises
@@ -99,18 +102,18 @@ def value_at(section: Any, path: str) -> Any:
         If there is no such setting.
     """
     for key in path.split("."):
-        if isinstance(section, tuple):
-            section = dict(enumerate(section))[int(key) if key.isdigit() else -1]
-        elif isinstance(section, Mapping):
-            section = section[key]
-        elif isinstance(section, Section | Part) and key in _declared(type(section)):
-            section = getattr(section, key)
+        if isinstance(part, tuple):
+            part = dict(enumerate(part))[int(key) if key.isdigit() else -1]
+        elif isinstance(part, Mapping):
+            part = part[key]
+        elif isinstance(part, Part) and (key in part.declared() or (key == "kind" and part.kind)):
+            part = getattr(part, key)
         else:
             raise LookupError(path)
-    return section
+    return part
 
 
-def setting_at(section: Section | Part, path: str) -> Setting:
+def setting_at(part: Part, path: str) -> Setting:
     """Setting by its path; one in a list or a mapping has unit and type of the whole.
 
     Raises
@@ -118,53 +121,48 @@ def setting_at(section: Section | Part, path: str) -> Setting:
     LookupError
         If there is no such setting.
     """
-    keys, at = path.split("."), 0
+    keys, owner, at = path.split("."), part, 0
     for count in range(1, len(keys)):
-        inner = value_at(section, ".".join(keys[:count]))
-        if isinstance(inner, Section | Part):
-            at = count
-    owner = value_at(section, ".".join(keys[:at])) if at else section
+        inner = value_at(part, ".".join(keys[:count]))
+        if isinstance(inner, Part):
+            owner, at = inner, count
     found = {one.name: one for one in own_settings(owner)}[keys[at]]
-    return replace(found, path=path, value=value_at(section, path))
+    return replace(found, path=path, value=value_at(part, path))
 
 
-def given(section: Section | Part) -> frozenset[str]:
-    """Fields that a description gave; all of a part that was made in Python."""
-    if isinstance(section, Section):
-        return frozenset(section.model_fields_set)
-    return getattr(section, "given", frozenset(section.parameters()))
-
-
-def changed(section: Described, changes: Mapping[str, object]) -> Described:
+def changed(part: PartType, changes: Mapping[str, object]) -> PartType:
     """A copy with other values, all of them checked.
 
     Parameters
     ----------
-    section : Section, Part, tuple or mapping
-        The section.
+    part : Part
+        The part.
     changes : mapping
         New values by their paths, as of `value_at`: numbers in SI units, text with units, mappings
         or parts.
 
     Raises
     ------
-    pydantic.ValidationError
-        If a value is not possible; a ValueError.
+    ValueError
+        If a value is not possible.
     """
-    made: Described = adapter(type(section)).validate_python(_with_changes(section, changes))
+    try:
+        made: PartType = adapter(type(part)).validate_python(_with_changes(part, changes))
+    except ValidationError as error:
+        raise ValueError(problem(error)) from None
     return made
 
 
-def _with_changes(section: Any, changes: Mapping[str, object]) -> Any:
-    """What a description gave of a section, a mapping or a list, with the changes."""
-    if isinstance(section, Mapping):
-        data = dict(section)
-    elif isinstance(section, tuple):
-        data = {str(number): one for number, one in enumerate(section)}
+def _with_changes(part: Any, changes: Mapping[str, object]) -> Any:
+    """What was given of a part, a mapping or a list, with the changes."""
+    if isinstance(part, Mapping):
+        data = dict(part)
+    elif isinstance(part, tuple):
+        data = {str(number): one for number, one in enumerate(part)}
     else:
-        data = {name: getattr(section, name) for name in given(section)}
-        if getattr(section, "kind", ""):
-            data["kind"] = section.kind
+        data = {name: getattr(part, name) for name in part.given & part.declared().keys()}
+        if part.kind:
+            data["kind"] = part.kind
     inner: dict[str, dict[str, object]] = {}
     for path, value in changes.items():
         name, dot, rest = path.partition(".")
@@ -173,21 +171,21 @@ def _with_changes(section: Any, changes: Mapping[str, object]) -> Any:
         else:
             data[name] = value
     for name, one in inner.items():
-        data[name] = _with_changes(value_at(section, name), one)
-    return tuple(data.values()) if isinstance(section, tuple) else data
+        data[name] = _with_changes(value_at(part, name), one)
+    return tuple(data.values()) if isinstance(part, tuple) else data
 
 
-def field_tables(section: Section | Part, name: str) -> str:
-    """Tables in Markdown of a section with this key, and of the sections in it."""
-    return "\n".join(_table_lines(section, name))
+def field_tables(part: Part, name: str) -> str:
+    """Tables in Markdown of a part with this key, and of the parts in it."""
+    return "\n".join(_table_lines(part, name))
 
 
-def _table_lines(section: Section | Part, name: str) -> Iterator[str]:
-    yield from (f"## `{name}`", "", first_sentence(type(section)), "")
+def _table_lines(part: Part, name: str) -> Iterator[str]:
+    yield from (f"## `{name}`", "", first_sentence(type(part)), "")
     yield "| field | meaning | unit | default | allowed |"
     yield "|---|---|---|---|---|"
     inner = []
-    for one in own_settings(section):
+    for one in own_settings(part):
         if one.is_section:
             inner.append(one)
             continue
@@ -199,40 +197,12 @@ def _table_lines(section: Section | Part, name: str) -> Iterator[str]:
         yield from _table_lines(one.value, f"{name}.{one.name}")
 
 
-def _declared(kind: Any) -> dict[str, tuple[Parameter, Any, Any, Any]]:
-    """Parameter, type, default and annotation of each field."""
-    if issubclass(kind, Section):
-        return {name: _of_model(one) for name, one in kind.model_fields.items()}
-    found = {}
-    if kind.kind:
-        found["kind"] = (Parameter(first_sentence(kind)), str, kind.kind, str)
-    for one in fields(kind):
-        if one.name in kind.parameters():
-            annotation, plain, parameter, _ = kind._declared[one.name]
-            default = _default(one.default, one.default_factory)
-            found[one.name] = parameter, plain, default, annotation
-    return found
-
-
-def _of_model(field: FieldInfo) -> tuple[Parameter, Any, Any, Any]:
-    parameters = [one for one in field.metadata if isinstance(one, Parameter)]
-    parameter = parameters[0] if parameters else Parameter(field.description or "")
-    default = None if field.is_required() else field.get_default(call_default_factory=True)
-    return parameter, field.annotation, default, (field.annotation, *field.metadata)
-
-
 def _families(annotation: Any) -> Iterator[Family]:
     if isinstance(annotation, Family):
         yield annotation
-    elif isinstance(annotation, tuple):
-        for one in annotation:
-            yield from _families(one)
     else:
-        yield from _families(getattr(annotation, "__metadata__", ()))
-        yield from _families(get_args(annotation))
-
-
-def _default(value: Any, factory: Any) -> Any:
-    if factory is not MISSING:
-        return factory()
-    return None if value is MISSING else value
+        yield from (
+            family
+            for inner in (*getattr(annotation, "__metadata__", ()), *get_args(annotation))
+            for family in _families(inner)
+        )

@@ -4,12 +4,11 @@ And units alone, as other people's files write them: ``degC``, ``m s-1``, ``us s
 """
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
 from functools import cache
 from math import isfinite
-from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any, Final, get_origin
 
 import numpy as np
@@ -61,6 +60,7 @@ class Unit:
 
     scale: float
     offset: float = 0.0
+    text: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         if not (isfinite(self.scale) and self.scale > 0 and isfinite(self.offset)):
@@ -75,7 +75,7 @@ SI: Final = Unit(1.0)
 CELSIUS: Final = Unit(1.0, 273.15)
 
 
-def parse_unit(text: str, base: str, field: str) -> Unit:
+def parse_unit(text: str, base: str, name: str) -> Unit:
     """A unit from its text in a file.
 
     Parameters
@@ -84,7 +84,7 @@ def parse_unit(text: str, base: str, field: str) -> Unit:
         The unit, as CF conventions, udunits or pint write it; a date after ``since`` is left out.
     base : str
         The SI unit of the same quantity; 1 for a mere number.
-    field : str
+    name : str
         What has this unit, as errors call it.
 
     Raises
@@ -96,32 +96,31 @@ def parse_unit(text: str, base: str, field: str) -> Unit:
     if base == "1" and clean.lower() in _NO_UNIT:
         return SI
     try:
-        zero, one = (_in_base(Decimal(value), clean, base) for value in (0, 1))
-    # A malformed or foreign unit ends in pint as anything from AssertionError to TokenError.
-    except Exception:
+        scale, offset = _scale_and_offset(clean, base)
+    except ValueError:
         expected = f"expected a unit such as {base}"
-        raise ValueError(f"unknown unit {text[:60]!r} of {field}, {expected}") from None
-    return Unit(float(one - zero), float(zero))
+        raise ValueError(f"unknown unit {text[:60]!r} of {name}, {expected}") from None
+    return Unit(float(scale), float(offset), text)
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """How a field of a study is written: which kind of quantity, and in which unit.
-
-    An annotation of pydantic fields: they take text and hold SI floats.
+    """Kind and unit of a setting: an annotation of fields that read text and hold SI floats.
 
     Parameters
     ----------
     kind : str
         Name of the quantity with its article, as errors call it.
     base : str
-        The SI unit of the value.
+        SI unit of the value.
     unit : str
-        The unit in which the value is written.
+        Unit in which the value is written.
     example : str
         A value as errors show it.
     positive : bool
         Whether the value in SI must be over 0.
+    is_difference : bool
+        Whether zeros of units do not count: 2 degC is then as much as 2 K.
     """
 
     kind: str
@@ -129,15 +128,18 @@ class Quantity:
     unit: str
     example: str
     positive: bool = True
+    is_difference: bool = False
 
-    def parse(self, value: object) -> float:
-        """SI number of a text such as ``10 us``.
+    def parse(self, value: object, si: bool = False) -> float:
+        """SI number of a text such as ``10 us``; if `si`, also of a number in SI units.
 
         Raises
         ------
         ValueError
             If the text has no unit, another quantity's unit, or a value that is out of range.
         """
+        if si and isinstance(value, int | float) and not isinstance(value, bool):
+            return self._checked(f"{value} {self.base}", float(value))
         if is_bare_number(value):
             raise ValueError(f"{value} has no unit, {self.expected}")
         match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
@@ -145,54 +147,41 @@ class Quantity:
             raise ValueError(self._not_this_kind(value))
         return self._to_base(str(value), match[1], match[2])
 
-    def parse_range(self, value: object) -> tuple[float, float]:
-        """SI limits of a text such as ``3.8-5.1 um``.
+    def parse_range(self, value: object, si: bool = False) -> tuple[float, float]:
+        """SI limits of a text such as ``3.8-5.1 um``; if `si`, also of two numbers in SI units.
 
         Raises
         ------
         ValueError
             As `parse`, and if the lower limit does not come first.
         """
-        match = _RANGE.fullmatch(value) if isinstance(value, str) else None
-        if match is None or not match[3]:
-            raise ValueError(
-                f"{value} has no unit, {self.expected}" if match else self._not_this_kind(value)
-            )
-        lower, upper = (self._to_base(str(value), match[i], match[3]) for i in (1, 2))
-        return self._ascending(str(value), lower, upper)
-
-    def si(self, value: object) -> float:
-        """SI number of a text with its unit, or of a number in SI units already.
-
-        Raises
-        ------
-        ValueError
-            As `parse`.
-        """
-        if isinstance(value, Real) and not isinstance(value, bool):
-            return self._checked(f"{value} {self.base}", float(value))
-        return self.parse(value)
-
-    def si_range(self, value: object) -> tuple[float, float]:
-        """SI limits of a text, or of a pair of numbers in SI units already; see `si`."""
-        if not isinstance(value, tuple) or len(value) != 2:
-            return self.parse_range(value)
-        return self._ascending(str(value), self.si(value[0]), self.si(value[1]))
+        if si and isinstance(value, tuple) and len(value) == 2:
+            lower, upper = (self.parse(limit, si) for limit in value)
+        else:
+            match = _RANGE.fullmatch(value) if isinstance(value, str) else None
+            if match is None:
+                raise ValueError(self._not_this_kind(value))
+            if not match[3]:
+                raise ValueError(f"{value} has no unit, {self.expected}")
+            lower, upper = (self._to_base(str(value), match[i], match[3]) for i in (1, 2))
+        if not lower < upper:
+            raise ValueError(f"{value} is reversed, {self.expected}, the lower limit first")
+        return lower, upper
 
     def text(self, value: float) -> str:
         """Shortest text in this quantity's unit that is read back as the same number."""
         number = self._number(value)
         if len(number) > _LONGEST_NUMBER:
-            number = self._fraction(value) or number
+            scale, offset = self._unit(self.unit)
+            exact = (Decimal(repr(value)) - offset) / scale
+            fraction = str(Fraction(exact).limit_denominator(_LARGEST_DENOMINATOR))
+            if re.fullmatch(f"-?{_FRACTION}", fraction) and self._si(fraction) == value:
+                number = fraction
         return f"{number} {self.unit}"
 
     def range_text(self, limits: tuple[float, float]) -> str:
         """Text of a range that is read back as the same numbers."""
         return f"{self._number(limits[0])}-{self._number(limits[1])} {self.unit}"
-
-    def written(self, value: float | tuple[float, float]) -> str:
-        """Text of a value or of a range's limits."""
-        return self.range_text(value) if isinstance(value, tuple) else self.text(value)
 
     @property
     def expected(self) -> str:
@@ -202,22 +191,11 @@ class Quantity:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Schema of a field with this annotation: one number, or a pair of limits.
-
-        SI numbers pass from Python; what is read from a file, in a context, needs its unit.
-        """
+        """Schema of one number or of a pair of limits; text from files needs its unit."""
         pair = get_origin(source) is tuple
-        parse, si, text = (
-            (self.parse_range, self.si_range, self.range_text)
-            if pair
-            else (self.parse, self.si, self.text)
-        )
-
-        def read(value: object, info: core_schema.ValidationInfo) -> object:
-            return si(value) if info.context is None else parse(value)
-
+        parse, text = (self.parse_range, self.range_text) if pair else (self.parse, self.text)
         return core_schema.with_info_plain_validator_function(
-            read,
+            lambda value, info: parse(value, si=info.context is None),
             serialization=core_schema.plain_serializer_function_ser_schema(text, when_used="json"),
         )
 
@@ -227,11 +205,19 @@ class Quantity:
         """JSON schema: a text with a unit."""
         return {"type": "string", "examples": [self.example]}
 
+    def _unit(self, unit: str) -> tuple[Decimal, Decimal]:
+        scale, offset = _scale_and_offset(unit, self.base)
+        return scale, Decimal(0) if self.is_difference else offset
+
+    def _si(self, number: str, unit: str = "") -> float:
+        scale, offset = self._unit(unit or self.unit)
+        numerator, _, denominator = number.partition("/")
+        return float(Decimal(numerator) / Decimal(denominator or 1) * scale + offset)
+
     def _to_base(self, value: str, number: str, unit: str) -> float:
         try:
-            result = float(self._exact(_decimal(number.replace("−", "-")), unit))
-        # 1/0, or a malformed or foreign unit: anything from AssertionError to TokenError.
-        except Exception:
+            result = self._si(number.replace("−", "-"), unit)
+        except (ValueError, ArithmeticError):
             raise ValueError(self._not_this_kind(value)) from None
         return self._checked(value, result)
 
@@ -239,55 +225,24 @@ class Quantity:
         if not isfinite(result):
             raise ValueError(f"{value} is not finite, {self.expected}")
         if self.positive and result <= 0:
-            raise ValueError(f"{value} is not over 0{self._zero}, {self.expected}")
+            zero = "0 K" if self.base == "K" else "0"
+            raise ValueError(f"{value} is not over {zero}, {self.expected}")
         return result
-
-    def _ascending(self, value: str, lower: float, upper: float) -> tuple[float, float]:
-        if not lower < upper:
-            raise ValueError(f"{value} is reversed, {self.expected}, the lower limit first")
-        return lower, upper
-
-    def _exact(self, number: Decimal, unit: str) -> Decimal:
-        return _in_base(number, unit, self.base)
 
     def _not_this_kind(self, value: object) -> str:
         return f"{value!r} is not {self.kind}, expected one such as {self.example}"
 
-    @property
-    def _zero(self) -> str:
-        return " K" if self.base == "K" else ""
-
-    def _fraction(self, value: float) -> str | None:
-        """A fraction that is read back as the same number, if there is a simple one."""
-        nearest = Fraction(self._in_unit(value)).limit_denominator(_LARGEST_DENOMINATOR)
-        text = str(nearest)
-        simple = re.fullmatch(f"-?{_FRACTION}", text) is not None
-        return text if simple and self._reads_back(text, value) else None
-
-    def _in_unit(self, value: float) -> Decimal:
-        exact = _registry().Quantity(Decimal(repr(value)), self.base).to(self.unit).magnitude
-        return Decimal(exact)
-
     def _number(self, value: float) -> str:
-        exact = self._in_unit(value)
+        scale, offset = self._unit(self.unit)
+        exact = (Decimal(repr(float(value))) - offset) / scale
         if exact == 0:
             return "0"
         for digits in range(1, _MOST_DIGITS):
             rounded = Decimal(f"{exact:.{digits}g}")
             number = f"{rounded:f}" if -7 < rounded.adjusted() < 12 else f"{rounded:g}"
-            if self._reads_back(number, value):
+            if self._si(number) == value:
                 return number
         raise ValueError(f"{value!r} {self.base} cannot be written in {self.unit}")
-
-    def _reads_back(self, number: str, value: float) -> bool:
-        return float(_in_base(_decimal(number), self.unit, self.base)) == value
-
-
-class Difference(Quantity):
-    """How a difference of temperatures is written: 2 degC is then as much as 2 K."""
-
-    def _exact(self, number: Decimal, unit: str) -> Decimal:
-        return super()._exact(number, unit) - super()._exact(Decimal(0), unit)
 
 
 def is_bare_number(value: object) -> bool:
@@ -336,15 +291,9 @@ FRACTURE_ENERGY: Final = Quantity("a fracture energy", "J/m^2", "kJ/m^2", "15 kJ
 DENSITY: Final = Quantity("a density", "kg/m^3", "kg/m^3", "7850 kg/m3")
 CONDUCTIVITY: Final = Quantity("a conductivity", "W/m/K", "W/m/K", "45 W/(m K)")
 HEAT_CAPACITY: Final = Quantity("a heat capacity", "J/kg/K", "J/kg/K", "480 J/(kg K)")
-TEMPERATURE_DIFFERENCE: Final = Difference(
-    "a difference of temperatures", "K", "K", "2 K", positive=False
+TEMPERATURE_DIFFERENCE: Final = Quantity(
+    "a difference of temperatures", "K", "K", "2 K", positive=False, is_difference=True
 )
-
-
-def _decimal(number: str) -> Decimal:
-    """A number, or a fraction such as 2/3."""
-    numerator, _, denominator = number.partition("/")
-    return Decimal(numerator) / Decimal(denominator or 1)
 
 
 @cache
@@ -356,17 +305,19 @@ def _registry() -> "UnitRegistry[Decimal]":
     return pint.UnitRegistry(non_int_type=Decimal)
 
 
-def _in_base(number: Decimal, unit: str, base: str) -> Decimal:
-    magnitude: Decimal = _registry().Quantity(number, _unit(unit)).to(base).magnitude
-    return magnitude
-
-
 @cache
-def _unit(text: str) -> Any:
+def _scale_and_offset(text: str, base: str) -> tuple[Decimal, Decimal]:
+    """Scale and offset of a unit to the SI unit of its quantity; a ValueError if it is another."""
     clean = text.strip()
     spelled = _SPELLINGS.get(clean.lower().replace(" ", "_"), clean)
     spelled = _BELOW.sub(lambda below: "/" + "/".join(below[1].split()), spelled)
     if not _TERMS.fullmatch(spelled):
         raise ValueError(f"{text!r} is no unit")
     written = re.sub(r"(?<=[\w°%])[\s.·]+(?=[A-Za-z°µμ])", "*", spelled)
-    return _registry().parse_units(_EXPONENT.sub(r"\1**\2", written))
+    try:
+        unit = _registry().parse_units(_EXPONENT.sub(r"\1**\2", written))
+        zero, one = (_registry().Quantity(Decimal(value), unit).to(base) for value in (0, 1))
+    # A malformed or foreign unit ends in pint as anything from AssertionError to TokenError.
+    except Exception:
+        raise ValueError(f"{text!r} is no unit such as {base}") from None
+    return one.magnitude - zero.magnitude, zero.magnitude

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import yaml
 
-from chipglow.quantities import Part, Section, given, own_settings
+from chipglow.quantities import Part, own_settings
 from chipglow.study.schema import Study
 from chipglow.study.surface_section import FeaturesSection
 
@@ -31,12 +31,12 @@ def left_to_the_paper(study: Study) -> Iterator[str]:
             yield f"Not said by the study and so the paper's, of {name}: {', '.join(left)}."
 
 
-def _unset(section: Section | Part, without: set[str], prefix: str) -> Iterator[str]:
+def _unset(section: Part, without: set[str], prefix: str) -> Iterator[str]:
     """Fields that nobody set, with their values as a study writes them."""
     for one in own_settings(section):
         if one.name in without or one.plain in ("none", []):
             continue
-        if one.name not in given(section):
+        if one.name not in section.given:
             yield f"{prefix}{one.name} {_written(one.plain)}"
         elif one.is_section:
             yield from _unset(one.value, {"kind"}, f"{prefix}{one.name}.")

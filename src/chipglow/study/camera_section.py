@@ -1,10 +1,8 @@
 """The section of the camera."""
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Annotated, Final, Literal
-
-from pydantic import ValidationInfo, model_validator
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, Final, Literal
 
 from chipglow.camera import (
     BLURS,
@@ -22,12 +20,8 @@ from chipglow.camera import (
     lower_range_limit,
 )
 from chipglow.io.column_file import read_response
-from chipglow.quantities import FileBeside, Parameter, Settings
-from chipglow.quantities.units import (
-    LENGTH,
-    POSITION,
-    WAVELENGTHS,
-)
+from chipglow.quantities import FileBeside, Parameter, Part
+from chipglow.quantities.units import LENGTH, POSITION, WAVELENGTHS
 from chipglow.radiometry import Band
 from chipglow.scene import Raster
 from chipglow.study.camera_presets import CAMERAS, with_preset
@@ -37,7 +31,8 @@ FROM_DETECTOR: Final = "detector"
 """A lower range limit that follows from the detector."""
 
 
-class CameraSection(Settings[Camera]):
+@dataclass(frozen=True)
+class CameraSection(Part):
     """The infrared camera."""
 
     preset: Annotated[
@@ -92,7 +87,7 @@ class CameraSection(Settings[Camera]):
     psf: Annotated[
         Annotated[PSFChoice, PSFS] | None,
         Parameter("Point spread function of the optics, or none."),
-    ] = AnnularAperturePSF()
+    ] = field(default_factory=AnnularAperturePSF)
     blur: Annotated[
         tuple[Annotated[BlurTerm, BLURS], ...],
         Parameter("What spreads light besides, a list: it is part of the point spread function."),
@@ -118,12 +113,16 @@ class CameraSection(Settings[Camera]):
     reflected: Annotated[float | None, Camera.parameter("reflected")] = None
     detector: Annotated[Detector | None, Camera.parameter("detector")] = None
 
-    @model_validator(mode="before")
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.build()
+
     @classmethod
-    def _pitch_on_the_scene(cls, data: object, info: ValidationInfo) -> object:
+    def completed(cls, data: Any, from_file: bool) -> Any:
+        """The data with what preset, detector and lens make."""
         if not isinstance(data, Mapping):
             return data
-        camera = with_pitch(with_preset(data), bool(info.context))
+        camera = with_pitch(with_preset(data), from_file)
         if camera.get("detector") not in (None, "none"):
             return {"lower_limit": "detector", **camera}
         return camera
@@ -132,7 +131,7 @@ class CameraSection(Settings[Camera]):
         """The camera, with as many pixels as see the scene."""
         response = None if self.response is None else read_response(self.response)
         band = Band(*self.band, response)
-        shared = Camera.parameters().keys() & type(self).model_fields.keys()
+        shared = Camera.declared().keys() & self.declared().keys()
         made = {
             **{name: getattr(self, name) for name in shared},
             "band": band,

@@ -20,7 +20,7 @@ from chipglow.cutting import (
 )
 from chipglow.cutting.conditions import INITIAL_TEMPERATURE
 from chipglow.io import ToolSection
-from chipglow.quantities import Parameter, Settings, beside_the_study
+from chipglow.quantities import Parameter, Part, beside_the_study
 from chipglow.quantities.units import LENGTH, POSITION, TEMPERATURE
 from chipglow.scene import Raster
 
@@ -30,7 +30,8 @@ STEADY: Final = "steady"
 """Temperature of a tool that has been cutting for long."""
 
 
-class FieldOfViewSection(Settings[Raster]):
+@dataclass(frozen=True)
+class FieldOfViewSection(Part):
     """Where the scene is sampled. The tip of the tool is near the origin, y points up."""
 
     left: Annotated[
@@ -50,11 +51,16 @@ class FieldOfViewSection(Settings[Raster]):
     rows: Annotated[int, Parameter("Samples from top to bottom.", least=1)] = 810
     columns: Annotated[int, Parameter("Samples from left to right.", least=1)] = 990
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.build()
+
     def build(self) -> Raster:
         """The grid of samples."""
         return Raster(self.left, self.top, self.spacing, self.rows, self.columns)
 
 
+@dataclass(frozen=True)
 class CutToolSection(ToolSection):
     """The cutting tool, and how warm it is."""
 
@@ -69,8 +75,8 @@ class CutToolSection(ToolSection):
             allowed=f"{INITIAL_TEMPERATURE.limits}; none; or steady",
         ),
     ] = None
-    body: Annotated[ToolBody, Parameter("What the heat of a steady tool flows through.")] = (
-        ToolBody()
+    body: Annotated[ToolBody, Parameter("What the heat of a steady tool flows through.")] = field(
+        default_factory=ToolBody
     )
 
     def start(self) -> float | ToolBody | None:

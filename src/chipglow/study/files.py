@@ -40,7 +40,7 @@ def study_text(study: Study) -> str:
 
     The section of the cut is left out where a scene takes its place and nothing was said of it.
     """
-    unused = {"cutting"} if study.scene and "cutting" not in study.model_fields_set else set()
+    unused = {"cutting"} if study.scene and "cutting" not in study.given else set()
     return commented_yaml(_HEADER, study, unused)
 
 

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-from chipglow.quantities import given
 from chipglow.scene import Material, Raster, Scene
 from chipglow.study.schema import Study
 from chipglow.study.surface_section import surfaces_of
@@ -51,7 +50,7 @@ def fit(study: Study, scene: Scene) -> Fitted:
     surfaces = surfaces_of(study.surface, study.seed)
     notes = Notes()
     assumed = notes.assumed
-    said = "cutting" in given(study) and "tool" in given(study.cutting)
+    said = "cutting" in study.given and "tool" in study.cutting.given
     if scene.tool is None and said:
         scene = scene.with_tool(study.cutting.tool.build())
         assumed.append("The scene has no tool: it is that of the study's section cutting.tool.")

@@ -189,7 +189,7 @@ def wavelengths(
             scene,
             fitted.surfaces,
             camera,
-            study.wavelengths.build(),
+            study.wavelengths,
             spots,
             plan.phases,
             plan.textures,
@@ -236,10 +236,10 @@ def _inputs(study: Study) -> dict[str, Any]:
     """All that a scene depends on."""
     simulation = study.cutting.simulation()
     tool = simulation.tool
+    cutting = adapter(type(study.cutting)).dump_python(study.cutting)
+    del cutting["tool"]["outline"]
     return {
-        "cutting": adapter(type(study.cutting)).dump_python(
-            study.cutting, exclude={"tool": {"outline"}}
-        ),
+        "cutting": cutting,
         "outline": tool.points if isinstance(tool, ToolOutline) else None,
         "workpiece": _numbers(simulation.workpiece),
         "law": type(simulation.workpiece.flow_stress).__qualname__,

@@ -88,7 +88,7 @@ def with_pitch(camera: Mapping[str, Any], from_file: bool = True) -> dict[str, A
         raise ValueError("magnification: is missing, expected it with detector_pitch")
     if not magnification > 0:
         raise ValueError(f"magnification: {magnification:g}, expected over 0")
-    pitch = (LENGTH.parse if from_file else LENGTH.si)(detector) / magnification
+    pitch = LENGTH.parse(detector, si=not from_file) / magnification
     given = _value(camera, "pitch", LENGTH, from_file) if "pitch" in camera else pitch
     if given is None or abs(given - pitch) > 1e-6 * pitch:
         raise ValueError(
@@ -113,6 +113,6 @@ def _value(
     if name not in section:
         return _PAPERS.get(name)
     try:
-        return (quantity.parse if from_file else quantity.si)(section[name])
+        return quantity.parse(section[name], si=not from_file)
     except ValueError:
         return None

@@ -1,22 +1,19 @@
 """What a study says: its sections, the paper's study as defaults, what they must have in common."""
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Annotated, Self
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, Self
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
-
-from chipglow.analysis import Plan
-from chipglow.quantities import FileBeside, Parameter, Section, changed
-from chipglow.study.analysis_section import AnalysisSection
+from chipglow.analysis import Plan, WavelengthPlan
+from chipglow.quantities import FileBeside, Parameter, Part, changed
 from chipglow.study.camera_section import CameraSection
 from chipglow.study.cutting_section import STEADY, CuttingSection
 from chipglow.study.scaling import scaled
 from chipglow.study.surface_section import FeaturesSection, SurfaceSection, surface_names
-from chipglow.study.wavelengths_section import WavelengthsSection
 
 
-class Study(Section):
+@dataclass(frozen=True)
+class Study(Part):
     """A study: the paper's by default.
 
     Sections take what a YAML file would give: text with units, or plain numbers where there is no
@@ -24,8 +21,8 @@ class Study(Section):
 
     Raises
     ------
-    pydantic.ValidationError
-        If a field is unknown or its value impossible; a ValueError.
+    ValueError
+        If a key of a section is unknown or a value impossible.
 
     Examples
     --------
@@ -49,30 +46,29 @@ class Study(Section):
     ] = None
     cutting: Annotated[
         CuttingSection, Parameter("The cutting simulation; defaults: the paper's Table 2.")
-    ] = Field(default_factory=CuttingSection)
+    ] = field(default_factory=CuttingSection)
     surface: Annotated[
         SurfaceSection, Parameter("Emissivities; defaults: the paper's Table 1.")
-    ] = FeaturesSection()
-    camera: Annotated[CameraSection, Parameter("The infrared camera.")] = Field(
+    ] = field(default_factory=FeaturesSection)
+    camera: Annotated[CameraSection, Parameter("The infrared camera.")] = field(
         default_factory=CameraSection
     )
-    analysis: Annotated[
-        AnalysisSection, Parameter("What is computed from the simulated measurement.")
-    ] = Field(default_factory=AnalysisSection)
+    analysis: Annotated[Plan, Parameter("What is computed from the simulated measurement.")] = (
+        field(default_factory=Plan)
+    )
 
     wavelengths: Annotated[
-        WavelengthsSection,
+        WavelengthPlan,
         Parameter("Bands that chipglow wavelengths compares, alone and as ratios."),
-    ] = Field(default_factory=WavelengthsSection)
+    ] = field(default_factory=WavelengthPlan)
 
     @property
     def plan(self) -> Plan:
         """What to analyse; a surface that is the only one is seen everywhere."""
-        plan = self.analysis.build()
         if isinstance(self.surface, FeaturesSection):
-            return plan
+            return self.analysis
         (name,) = surface_names(self.surface)
-        return replace(plan, rake_surface=name, band_surface=name)
+        return replace(self.analysis, rake_chip=name, band_chip=name)
 
     def with_steady_tool(self) -> Self:
         """The same study with a tool that has been cutting for long."""
@@ -98,52 +94,43 @@ class Study(Section):
     @classmethod
     def quick(cls) -> Self:
         """The paper's study on a coarse cell and coarse samples, for a first look and for tests."""
-        return cls.model_validate(
-            {
-                "title": "Quick look at the study of Heigel and Whitenton (2010)",
-                "cutting": {
-                    "numerics": {"cell": "20 um"},
-                    "window": {"interval": "0.5 us", "later_bands": 1},
-                    "field_of_view": {"spacing": "1.5 um", "rows": 360, "columns": 440},
-                },
-                "analysis": {
-                    "exposures": 5,
-                    "phases": 2,
-                    "textures": 2,
-                    "psf_widths": ["4 um", "8 um", "12 um", "20 um"],
-                },
-            }
-        )
+        title = "Quick look at the study of Heigel and Whitenton (2010)"
+        cutting = {
+            "numerics.cell": "20 um",
+            "window": {"interval": "0.5 us", "later_bands": 1},
+            "field_of_view": {"spacing": "1.5 um", "rows": 360, "columns": 440},
+        }
+        widths = ["4 um", "8 um", "12 um", "20 um"]
+        draws = {"exposures": 5, "phases": 2, "textures": 2, "psf_widths": widths}
+        paths = {f"cutting.{path}": value for path, value in cutting.items()}
+        return changed(cls(), {"title": title, **paths, "analysis": draws})
 
-    @model_validator(mode="before")
     @classmethod
-    def _scaled(cls, data: object, info: ValidationInfo) -> object:
-        return scaled(data, bool(info.context)) if isinstance(data, Mapping) else data
+    def completed(cls, data: Any, from_file: bool) -> Any:
+        """The data with the surface's usual kind, and with what follows from feed and camera."""
+        if not isinstance(data, Mapping):
+            return data
+        surface = data.get("surface", {})
+        if surface is None or isinstance(surface, Mapping):
+            data = {**data, "surface": {"kind": "features", **(surface or {})}}
+        return scaled(data, from_file)
 
-    @field_validator("surface", mode="before")
-    @classmethod
-    def _features_by_default(cls, surface: object) -> object:
-        if surface is None:
-            return {"kind": "features"}
-        if isinstance(surface, Mapping) and "kind" not in surface:
-            return {"kind": "features", **surface}
-        return surface
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.surface, FeaturesSection):
+            self._check_chips()
+        if self.scene is None:
+            self._check_camera()
 
-    @model_validator(mode="after")
-    def _chips_are_there(self) -> Self:
-        if not isinstance(self.surface, FeaturesSection):
-            return self
-        for field in ("rake_chip", "band_chip"):
-            name = getattr(self.analysis, field)
-            if name not in surface_names(self.surface):
-                known = ", ".join(surface_names(self.surface))
-                raise ValueError(f"analysis.{field}: {name!r} is unknown, expected one of {known}")
-        return self
+    def _check_chips(self) -> None:
+        for name in ("rake_chip", "band_chip"):
+            chip, known = getattr(self.analysis, name), surface_names(self.surface)
+            if chip not in known:
+                raise ValueError(
+                    f"analysis.{name}: {chip!r} is unknown, expected one of {', '.join(known)}"
+                )
 
-    @model_validator(mode="after")
-    def _camera_fits_scene(self) -> Self:
-        if self.scene is not None:
-            return self
+    def _check_camera(self) -> None:
         camera, cutting = self.camera, self.cutting
         if camera.integration_time > cutting.duration:
             raise ValueError(
@@ -168,4 +155,3 @@ class Study(Section):
                 f"camera.pitch: {camera.pitch * 1e6:g} um is larger than the field of view, "
                 f"expected up to the {extent * 1e6:g} um of cutting.field_of_view"
             )
-        return self

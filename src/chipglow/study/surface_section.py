@@ -1,19 +1,15 @@
 """The section of the surface: emissivities, the paper's Table 1 by default."""
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Annotated, Final, Literal, Self
-
-from pydantic import Field, GetJsonSchemaHandler, field_validator, model_validator
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from chipglow.laboratory.emissivity import (
     measured_features,
     read_emissivity_map,
     read_measured_areas,
 )
-from chipglow.quantities import FileBeside, Parameter, Section
+from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import WAVELENGTHS
 from chipglow.radiometry import Band
 from chipglow.surface import (
@@ -50,22 +46,22 @@ _FEATURE: Final = {"body": "chip"}
 _declared = FeatureSurface.parameter
 
 
-class ChipSection(Section):
+@dataclass(frozen=True)
+class ChipSection(Part):
     """Emissivity of one chip."""
 
     body: Annotated[Emissivity, _declared("chip")]
     shear_band: Annotated[Emissivity, _declared("shear_band")]
 
     @classmethod
-    def __get_pydantic_json_schema__(
-        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> Any:
         """JSON schema of the section, or the name of a chip."""
-        return {"anyOf": [handler(schema), {"enum": list(CHIPS)}]}
+        section = super().__get_pydantic_json_schema__(schema, handler)
+        return {"anyOf": [section, {"enum": list(CHIPS)}]}
 
-    @model_validator(mode="before")
     @classmethod
-    def _preset(cls, data: object) -> object:
+    def completed(cls, data: Any, from_file: bool) -> Any:
+        """The data, or those of the paper's chip of this name."""
         if not isinstance(data, str):
             return data
         if data not in CHIPS:
@@ -73,26 +69,25 @@ class ChipSection(Section):
         chip = CHIPS[data]
         return {"body": chip.chip, "shear_band": chip.shear_band}
 
-    @classmethod
-    def of(cls, surface: FeatureSurface) -> Self:
-        """Chip of a surface."""
-        return cls(body=surface.chip, shear_band=surface.shear_band)
 
+@SURFACES.part
+@dataclass(frozen=True)
+class FeaturesSection(Part):
+    """The emissivity of each feature of a chip, each with its texture."""
 
-class FeaturesSection(Section):
-    """Emissivity of the features of chips: the paper's maps."""
-
-    kind: Annotated[
-        Literal["features"],
-        Parameter("The emissivity of each feature of a chip, each with its texture."),
-    ] = "features"
+    kind: ClassVar[str] = "features"
     chips: Annotated[
         dict[str, ChipSection],
         Parameter(
             "Chips by name, each laid on the same scene. A chip is chip-1 or chip-2 (the paper's "
             "Table 1), or the numbers of its body and shear bands."
         ),
-    ] = Field(default={"chip 1": ChipSection.of(CHIP_1), "chip 2": ChipSection.of(CHIP_2)})
+    ] = field(
+        default_factory=lambda: {
+            f"chip {number}": ChipSection(one.chip, one.shear_band)
+            for number, one in ((1, CHIP_1), (2, CHIP_2))
+        }
+    )
     maps: Annotated[
         dict[str, FileBeside],
         Parameter(
@@ -101,7 +96,7 @@ class FeaturesSection(Section):
             "its line.",
             allowed="{} or names and files beside this one: {measured: emissivity.nc}",
         ),
-    ] = Field(default_factory=dict)
+    ] = field(default_factory=dict)
     measured: Annotated[
         dict[str, FileBeside],
         Parameter(
@@ -109,7 +104,7 @@ class FeaturesSection(Section):
             "workpiece and tool, if they are there) by their regions, over the temperature.",
             allowed="{} or names and files beside this one: {heated chip: emissivity.nc}",
         ),
-    ] = Field(default_factory=dict)
+    ] = field(default_factory=dict)
     workpiece: Annotated[Emissivity, _declared("workpiece")] = FeatureSurface.workpiece
     tool: Annotated[Emissivity, _declared("tool")] = FeatureSurface.tool
     grain: Annotated[float, _declared("grain")] = FeatureSurface.grain
@@ -147,15 +142,12 @@ class FeaturesSection(Section):
         ),
     ] = None
 
-    @field_validator("chips")
-    @classmethod
-    def _at_least_one(cls, chips: dict[str, ChipSection]) -> dict[str, ChipSection]:
-        if not chips:
-            raise ValueError("{} is empty, expected one chip or more, such as chip 1: chip-1")
-        return chips
-
-    @model_validator(mode="after")
-    def _different_names(self) -> Self:
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.chips:
+            raise ValueError(
+                "chips: {} is empty, expected one chip or more, such as chip 1: chip-1"
+            )
         for name in self.maps:
             if name in self.chips:
                 raise ValueError(f"maps: {name!r} is the name of a chip too, expected another")
@@ -164,7 +156,6 @@ class FeaturesSection(Section):
                 raise ValueError(
                     f"measured: {name!r} is the name of another chip too, expected its own"
                 )
-        return self
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -197,7 +188,7 @@ class FeaturesSection(Section):
         return {name: ReflectingSurface(bare, shape) for name, bare in surfaces.items()}
 
     def _features(self, chip: Emissivity, shear_band: Emissivity, seed: int) -> FeatureSurface:
-        shared = FeatureSurface.parameters().keys() & type(self).model_fields.keys()
+        shared = FeatureSurface.declared().keys() & self.declared().keys()
         values = {name: getattr(self, name) for name in shared}
         return FeatureSurface(chip=chip, shear_band=shear_band, seed=seed, **values)
 
@@ -220,8 +211,6 @@ class FeaturesSection(Section):
             bare, {_FEATURE.get(name, name): area.trend for name, area in areas.items()}
         )
 
-
-SURFACES.add("features", FeaturesSection)
 
 SurfaceSection = Annotated[FeaturesSection | SurfaceChoice, SURFACES]
 

@@ -4,7 +4,6 @@ from chipglow.text.description import (
     described_by,
     load_described,
     placed,
-    problem,
     validated,
 )
 from chipglow.text.notes import Notes
@@ -22,7 +21,6 @@ __all__ = [
     "load_described",
     "parse_yaml",
     "placed",
-    "problem",
     "read_small_text",
     "read_yaml",
     "validated",

@@ -1,32 +1,34 @@
-"""Sections from YAML files, with one line for whatever is wrong with them."""
+"""Parts from YAML files, with one line for whatever is wrong with them."""
 
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
+from chipglow.quantities import Part, adapter, problem
 from chipglow.text.yaml_file import DescriptionError, parse_yaml, read_yaml
 
-Kind = TypeVar("Kind", bound=BaseModel)
+Kind = TypeVar("Kind", bound=Part)
 
 
 def validated(kind: type[Kind], data: Any, name: str, folder: Path) -> Kind:
-    """Validate parsed YAML as a section; `folder` is where files that it names are looked up."""
+    """Validate parsed YAML as a part; `folder` is where files that it names are looked up."""
     try:
-        return kind.model_validate(data, context={"folder": folder.resolve()})
+        made: Kind = adapter(kind).validate_python(data, context={"folder": folder.resolve()})
     except ValidationError as error:
         raise DescriptionError(f"{name}: {problem(error)}") from None
+    return made
 
 
 def load_described(kind: type[Kind], path: str | Path) -> Kind:
-    """Read a section from a YAML file; files that it names are looked up beside it."""
+    """Read a part from a YAML file; files that it names are looked up beside it."""
     path = Path(path)
     return validated(kind, read_yaml(path), path.name, path.parent)
 
 
 def described_by(kind: type[Kind], path: Path, field: str, settings: Iterable[str]) -> Kind:
-    """Read a section from a YAML file, or make one that names another file in a field."""
+    """Read a part from a YAML file, or make one that names another file in a field."""
     described = path.suffix.lower() in (".yaml", ".yml")
     data = read_yaml(path) if described else {field: path.name}
     for setting in settings:
@@ -52,18 +54,3 @@ def placed(data: Any, names: list[str], value: Any) -> Any:
         return value
     inside = data if isinstance(data, dict) else {}
     return {**inside, names[0]: placed(inside.get(names[0]), names[1:], value)}
-
-
-def problem(error: ValidationError) -> str:
-    """Describe the first problem in one line: field, value and what was expected."""
-    first = error.errors(include_url=False)[0]
-    place = ".".join(str(part) for part in first["loc"])
-    if first["type"] == "value_error":
-        message = str(first["ctx"]["error"])
-    elif first["type"] == "missing":
-        message = "is missing, expected a value"
-    else:
-        expectation = first["msg"].removeprefix("Input should be ").removeprefix("Value should be ")
-        message = f"{first['input']!r}, expected {expectation}"
-    message = message.removeprefix(f"{place.rpartition('.')[2]}: ")
-    return f"{place}: {message}" if place else message

@@ -1,4 +1,4 @@
-"""Sections as commented YAML and JSON schemas."""
+"""Parts as commented YAML and JSON schemas."""
 
 import json
 import re
@@ -7,48 +7,25 @@ from textwrap import wrap
 from typing import Any, Final
 
 import yaml
-from pydantic import TypeAdapter
-from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue, NoDefault
-from pydantic_core import SchemaSerializer, core_schema
 
-from chipglow.quantities import Part, Section, adapter, own_settings
+from chipglow.quantities import Part, adapter, own_settings
 
 _WIDTH: Final = 90
 """Letters in a line of comment."""
 
 
-def commented_yaml(header: str, section: Section | Part, unused: Collection[str] = ()) -> str:
-    """Write a section as YAML, every field with a comment."""
+def commented_yaml(header: str, section: Part, unused: Collection[str] = ()) -> str:
+    """Write a part as YAML, every field with a comment."""
     return "\n".join([header, *_section_lines(section, "", unused)]) + "\n"
 
 
-class _TextDefaults(GenerateJsonSchema):
-    """Defaults as YAML has them: text with a unit."""
-
-    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
-        """Schema of a field with its default."""
-        json = self.generate_inner(schema["schema"])
-        default = self.get_default_value(schema)
-        if default is NoDefault:
-            return json
-        if default is None:
-            return json | {"default": "none"}
-        if isinstance(default, Section | Part):
-            return json | {"default": adapter(type(default)).dump_python(default, mode="json")}
-        text = SchemaSerializer(schema["schema"]).to_python(default, mode="json")
-        return json | {"default": text}
-
-
 def json_schema(kind: type) -> str:
-    """JSON schema of a section, by which editors check and complete YAML."""
+    """JSON schema of a part, by which editors check and complete YAML."""
     dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
-    schema = TypeAdapter(kind).json_schema(schema_generator=_TextDefaults)
-    return json.dumps(dialect | schema, indent=1) + "\n"
+    return json.dumps(dialect | adapter(kind).json_schema(), indent=1) + "\n"
 
 
-def _section_lines(
-    section: Section | Part, indent: str, unused: Collection[str] = ()
-) -> Iterator[str]:
+def _section_lines(section: Part, indent: str, unused: Collection[str] = ()) -> Iterator[str]:
     for one in own_settings(section):
         if one.name in unused:
             continue
@@ -62,7 +39,7 @@ def _section_lines(
 
 
 def _entry_lines(name: str, value: object, plain: Any, indent: str) -> Iterator[str]:
-    if isinstance(value, Section | Part):
+    if isinstance(value, Part):
         yield f"{indent}{_scalar(name)}:"
         yield from _section_lines(value, indent + "  ")
     elif isinstance(value, Mapping) and value:

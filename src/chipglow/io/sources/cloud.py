@@ -4,11 +4,12 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chipglow.io.sources import lammps_dump
 from chipglow.io.sources.conventions import (
     COMMON_NAMES,
     Placement,
@@ -80,7 +81,10 @@ class CloudSource(Source, Part):
         If an argument is out of range.
     """
 
-    files: str
+    title: ClassVar[str] = "points"
+    # Most files of points have another ending: they are called by their kind.
+    endings: ClassVar[tuple[str, ...]] = lammps_dump.ENDINGS
+    files: str = ""
     names: Mapping[str, str] = field(default_factory=dict)
     spacing: Annotated[
         float | None,
@@ -107,8 +111,6 @@ class CloudSource(Source, Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.files:
-            raise ValueError("files: there is none, expected a path")
         if self.interval is not None and not (isfinite(self.interval) and self.interval > 0):
             raise ValueError(f"interval: {self.interval!r}, expected over 0")
 

@@ -2,14 +2,15 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import isfinite
-from typing import Final, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic_core import CoreSchema, core_schema
 
 from chipglow.io.sources.source import SourceError
-from chipglow.quantities.units import SI, Unit
+from chipglow.quantities import Parameter, Part
+from chipglow.quantities.units import POSITION, SI, Unit, parse_unit
 from chipglow.scene import READABLE
 from chipglow.scene.scene import FIELD_UNITS, MATERIAL_COORDINATE_UNITS
 
@@ -95,23 +96,60 @@ def match_names(
     return result
 
 
+METRE, SECOND, KELVIN = (Unit(1.0, text=text) for text in ("m", "s", "K"))
+
+
 @dataclass(frozen=True)
-class Units:
-    """Units of a source.
+class _UnitText:
+    """Lets a field hold a unit that descriptions write as text."""
 
-    Parameters
-    ----------
-    length, time, temperature : Unit
-        Base units; SI if nothing is said.
-    velocity, strain_rate : Unit, optional
-        If they differ from those that length and time make.
-    """
+    name: str
+    base: str
 
-    length: Unit = SI
-    time: Unit = SI
-    temperature: Unit = SI
-    velocity: Unit | None = None
-    strain_rate: Unit | None = None
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+        """Schema of the field."""
+        return core_schema.no_info_plain_validator_function(
+            lambda value: (
+                value if isinstance(value, Unit) else parse_unit(str(value), self.base, self.name)
+            ),
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                lambda unit: unit.text, when_used="json"
+            ),
+        )
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: Any) -> dict[str, Any]:
+        """JSON schema of the field."""
+        return {"type": "string"}
+
+
+@dataclass(frozen=True)
+class Units(Part):
+    """Units of the source."""
+
+    length: Annotated[
+        Unit,
+        _UnitText("length", "m"),
+        Parameter("Unit of positions and lengths.", allowed="m, mm, um, in, ..."),
+    ] = METRE
+    time: Annotated[
+        Unit, _UnitText("time", "s"), Parameter("Unit of times.", allowed="s, ms, us, ...")
+    ] = SECOND
+    temperature: Annotated[
+        Unit,
+        _UnitText("temperature", "K"),
+        Parameter("Unit of temperatures.", allowed="K, degC, degF"),
+    ] = KELVIN
+    velocity: Annotated[
+        Annotated[Unit, _UnitText("velocity", "m/s")] | None,
+        Parameter(
+            "Unit of velocities; none: made of length and time.",
+            allowed="none, m/s, mm/s, m/min, ...",
+        ),
+    ] = None
+    strain_rate: Annotated[
+        Annotated[Unit, _UnitText("strain_rate", "1/s")] | None,
+        Parameter("Unit of strain rates; none: made of the time.", allowed="none, 1/s, 1/ms, ..."),
+    ] = None
 
     def of(self, name: str) -> Unit:
         """Unit of a field of a scene."""
@@ -130,17 +168,10 @@ _AXES: Final = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
-class Placement:
-    """How a source's axes lie in the scene, whose x runs along the cut and whose y goes up.
+class Placement(Part):
+    """How the source's axes lie in the scene, whose x runs along the cut and whose y goes up.
 
-    Parameters
-    ----------
-    horizontal, vertical : str
-        The source's axis along the scene's x and y: ``x``, ``y`` or ``z``, with ``-`` before it if
-        it points the other way.
-    origin : tuple of float
-        Where the scene's origin is, in m along the source's horizontal and vertical axis, before
-        a sign is changed.
+    A sign before an axis is changed after the origin is subtracted.
 
     Raises
     ------
@@ -148,18 +179,40 @@ class Placement:
         If an axis is unknown or used twice, or the origin is not finite.
     """
 
-    horizontal: str = "x"
-    vertical: str = "y"
-    origin: tuple[float, float] = (0.0, 0.0)
+    horizontal: Annotated[
+        str,
+        Parameter(
+            "The source's axis along the workpiece's motion toward the tool.",
+            allowed="x, y, z, -x, -y, -z",
+        ),
+    ] = "x"
+    vertical: Annotated[
+        str,
+        Parameter(
+            "The source's axis from the cut surface into the chip.", allowed="x, y, z, -x, -y, -z"
+        ),
+    ] = "y"
+    origin_horizontal: Annotated[
+        float,
+        Parameter(
+            "Where the tip of the tool is on the horizontal axis, in the source's coordinates.",
+            POSITION,
+        ),
+    ] = 0.0
+    origin_vertical: Annotated[float, Parameter("The same on the vertical axis.", POSITION)] = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name in ("horizontal", "vertical"):
             if getattr(self, name).removeprefix("-") not in _AXES:
                 raise ValueError(f"{name}: {getattr(self, name)!r}, expected x, y, z, -x, -y or -z")
         if self.axes[0] == self.axes[1]:
             raise ValueError(f"vertical: {self.vertical!r} is the horizontal axis too")
-        if not all(isfinite(value) for value in self.origin):
-            raise ValueError(f"origin: expected finite lengths, got {self.origin!r}")
+
+    @property
+    def origin(self) -> tuple[float, float]:
+        """Origin of the scene in m along the source's horizontal and vertical axis."""
+        return self.origin_horizontal, self.origin_vertical
 
     @property
     def axes(self) -> tuple[int, int]:

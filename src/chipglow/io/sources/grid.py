@@ -5,12 +5,13 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
 from math import isfinite, prod
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chipglow.io.sources.arrays import (
+    ARRAY_READERS,
     MOST_ON_A_SIDE,
     StoredArray,
     check_samples,
@@ -38,7 +39,7 @@ from chipglow.io.sources.source import (
     even_times,
     span_of,
 )
-from chipglow.quantities import Parameter, Part
+from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH, POSITION, SI, Unit
 from chipglow.scene import READABLE, Material, Raster, SampledFrame
 from chipglow.scene.regrid import regrid, taps
@@ -57,10 +58,6 @@ class GridSource(Source, Part):
 
     Parameters
     ----------
-    files : str or mapping
-        Path of the file that has all fields, or paths by the fields' names in a scene (and
-        ``material``). A path with ``*`` means several files, one a frame, numbers in their names in
-        order.
     names : mapping
         Name that a field has in its file, by its name in a scene; also of ``material`` (0 void,
         1 workpiece, 2 tool), ``time``, ``x`` and ``y``. Those not named are guessed.
@@ -77,7 +74,15 @@ class GridSource(Source, Part):
         If an argument is out of range.
     """
 
-    files: str | Mapping[str, str]
+    title: ClassVar[str] = "a grid"
+    endings: ClassVar[tuple[str, ...]] = tuple(ARRAY_READERS)
+    files: Annotated[
+        str | dict[str, FileBeside] | None,
+        Parameter(
+            "Files by the names of fields, in the place of source.",
+            allowed="none, or {temperature: T.npy, plastic_strain: strain.npy}",
+        ),
+    ] = None
     names: Mapping[str, str] = field(default_factory=dict)
     axes: Annotated[
         tuple[str, ...] | None,
@@ -109,9 +114,7 @@ class GridSource(Source, Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not self.files:
-            raise ValueError("files: there is none, expected a path or paths by field")
-        if not isinstance(self.files, str):
+        if isinstance(self.files, dict):
             unknown = sorted(set(self.files) - {*READABLE, "material"})
             if unknown:
                 raise ValueError(
@@ -130,7 +133,7 @@ class GridSource(Source, Part):
     @property
     def inputs(self) -> tuple[str, ...]:
         """The path or pattern, or those of the fields."""
-        return (self.files,) if isinstance(self.files, str) else tuple(self.files.values())
+        return tuple(self.files.values()) if isinstance(self.files, dict) else (str(self.files),)
 
     def survey(self) -> Survey:
         """Look at what is there; see `Source.survey`."""
@@ -368,7 +371,7 @@ def _choose(
         return {path: arrays}, find_fields(path, candidates, given, _KNOWN, notes)
     files: dict[str, Arrays] = {}
     chosen: dict[str, Chosen] = {}
-    for name, path in source.files.items():
+    for name, path in (source.files or {}).items():
         files[path] = files.get(path) or open_arrays(path, stack)
         candidates = _candidates(path, files[path], source)
         own = {name: given[name]} if name in given else {}

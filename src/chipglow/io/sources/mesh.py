@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, ClassVar, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +61,7 @@ class MeshSource(Source, Part):
 
     Parameters
     ----------
-    path : Path
+    files : Path
         A file with one mesh or with meshes over time, an LS-DYNA d3plot, or a pattern such as
         ``chip_*.vtu`` with a file for each time.
     names : mapping
@@ -83,7 +83,9 @@ class MeshSource(Source, Part):
         If a time is not finite, an interval is not positive, or both are given.
     """
 
-    path: Path
+    title: ClassVar[str] = "a mesh"
+    endings: ClassVar[tuple[str, ...]] = (*MESH_READERS, "d3plot")
+    files: Path = Path()
     names: Mapping[str, str] = field(default_factory=dict)
     units: Units = field(default_factory=Units)
     placement: Placement = field(default_factory=Placement)
@@ -113,6 +115,7 @@ class MeshSource(Source, Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        object.__setattr__(self, "files", Path(self.files))
         if not all(isfinite(time) for time in self.times):
             raise ValueError(f"times: expected finite times, got {self.times!r}")
         if self.interval is not None and not (isfinite(self.interval) and self.interval > 0):
@@ -125,9 +128,9 @@ class MeshSource(Source, Part):
     @property
     def inputs(self) -> tuple[str, ...]:
         """The path or pattern; with its folder if such files name others."""
-        suffix = self.path.suffix.lower()
+        suffix = self.files.suffix.lower()
         alone = suffix in (*mesh_vtk.ALONE, *mesh_meshio.KINDS, *mesh_tecplot.ENDINGS)
-        return (str(self.path),) if alone else (str(self.path), str(self.path.parent))
+        return (str(self.files),) if alone else (str(self.files), str(self.files.parent))
 
     def survey(self) -> Survey:
         """Look at the first and the last mesh; see `Source.survey`."""
@@ -170,16 +173,16 @@ class MeshSource(Source, Part):
         return {number: restricted.of_blocks(there) for number, there in ends.items()}, restricted
 
     def _reader(self) -> MeshReader:
-        required("pyvista", self.path, "mesh", "PyVista")
-        suffix = self.path.suffix.lower()
-        dyna = suffix in ("", ".d3plot") or "d3plot" in self.path.name.lower()
+        required("pyvista", self.files, "mesh", "PyVista")
+        suffix = self.files.suffix.lower()
+        dyna = suffix in ("", ".d3plot") or "d3plot" in self.files.name.lower()
         reader = MESH_READERS.get(suffix, DynaReader if dyna else None)
         if reader is None:
             known = " ".join(sorted(MESH_READERS))
             raise SourceError(
-                f"{self.path}: {suffix} is no mesh, expected d3plot or one of {known}"
+                f"{self.files}: {suffix} is no mesh, expected d3plot or one of {known}"
             )
-        return reader(files_of(self.path, gaps_allowed=bool(self.times)))
+        return reader(files_of(self.files, gaps_allowed=bool(self.times)))
 
     def _read(self, reader: MeshReader, number: int) -> tuple[Block, ...]:
         blocks = reader.read(number)
@@ -287,7 +290,7 @@ class MeshSource(Source, Part):
         if self.times:
             if len(self.times) != count:
                 raise SourceError(
-                    f"{self.path}: times: {len(self.times)} for {count} frames, expected {count}"
+                    f"{self.files}: times: {len(self.times)} for {count} frames, expected {count}"
                 )
             return np.array(self.times, np.float64)
         if self.interval is None and reader.times is not None:
@@ -309,7 +312,7 @@ class MeshSource(Source, Part):
             for name in ("displacement", "u")
             if name in names and names[name] not in found.values()
         ]
-        if moving and self.displacement is None and not _is_exodus(self.path):
+        if moving and self.displacement is None and not _is_exodus(self.files):
             sentences.append(f"Positions are those of the file; {moving[0]} is not added.")
         if not self.tool_parts:
             sentences.append("No part is named as tool: all elements are workpiece.")

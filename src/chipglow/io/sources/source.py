@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -127,8 +127,20 @@ class Source(ABC):
     """Someone else's fields.
 
     A source is a frozen dataclass that says where the fields are and what they mean; it opens files
-    only in its methods, so that it can be handed to another process.
+    only in its methods, so that it can be handed to another process. Its declared
+    fields are the section of an import's description, which sets the fields ``files``, ``names``,
+    ``units``, ``placement`` and ``interval``, as far as it has them; all need a default.
+
+    Attributes
+    ----------
+    title : str
+        What such sources are, for the comment on the section.
+    endings : tuple of str
+        Endings of such files' names, in small letters.
     """
+
+    title: ClassVar[str] = ""
+    endings: ClassVar[tuple[str, ...]] = ()
 
     @property
     def inputs(self) -> tuple[str, ...]:

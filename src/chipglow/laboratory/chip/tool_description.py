@@ -1,5 +1,6 @@
 """A tool as a file of its own, for the commands that need to know where the rake face is."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,7 @@ from chipglow.scene import PlacedTool, Tool
 from chipglow.text import load_described
 
 
+@dataclass(frozen=True)
 class ToolDescription(ToolSection):
     """A cutting tool and where it is."""
 

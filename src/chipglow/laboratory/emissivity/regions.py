@@ -1,13 +1,13 @@
 """What a file of regions says: named polygons, rectangles and circles of an image."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
-from pydantic import Field, PlainSerializer, PlainValidator, field_validator, model_validator
+from pydantic import PlainSerializer, PlainValidator
 
-from chipglow.quantities import Parameter, Section, Settings
+from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import POSITION
 from chipglow.scene import Circle, Polygon, Region
 from chipglow.scene.regions import Point
@@ -34,6 +34,8 @@ class Coordinate:
 
 def _coordinate(value: object) -> Coordinate:
     """A number of pixels, or a text with a unit of length."""
+    if isinstance(value, Coordinate):
+        return value
     if isinstance(value, int | float) and not isinstance(value, bool):
         return Coordinate(float(value), "pixel")
     try:
@@ -54,7 +56,8 @@ CoordinateField = Annotated[
 PointField = tuple[CoordinateField, CoordinateField]
 
 
-class CircleSection(Section):
+@dataclass(frozen=True)
+class CircleSection(Part):
     """A circle."""
 
     centre: Annotated[PointField, Parameter("Its middle.")] = (
@@ -64,7 +67,8 @@ class CircleSection(Section):
     radius: Annotated[CoordinateField, Parameter("Its radius.")] = Coordinate(0.0, "pixel")
 
 
-class RegionSection(Section):
+@dataclass(frozen=True)
+class RegionSection(Part):
     """One region: a polygon, a rectangle or a circle."""
 
     polygon: Annotated[tuple[PointField, ...] | None, Parameter("Corners in order.")] = None
@@ -74,14 +78,13 @@ class RegionSection(Section):
     circle: Annotated[CircleSection | None, Parameter("Centre and radius.")] = None
     feature: Annotated[str, Parameter("What it is a part of; by default its own name.")] = ""
 
-    @model_validator(mode="after")
-    def _one_shape(self) -> "RegionSection":
+    def __post_init__(self) -> None:
+        super().__post_init__()
         given = [name for name in _SHAPES if getattr(self, name) is not None]
         if len(given) != 1:
             found = " and ".join(given) or "no shape"
             raise ValueError(f"{found}, expected one of {', '.join(_SHAPES)}")
         self.region("region")
-        return self
 
     def region(self, name: str) -> Region:
         """The region that this section describes."""
@@ -97,19 +100,19 @@ class RegionSection(Section):
         return Region(name, shape, self.feature, unit)
 
 
-class RegionsDescription(Settings[tuple[Region, ...]]):
+@dataclass(frozen=True)
+class RegionsDescription(Part):
     """A file of regions."""
 
-    regions: Annotated[dict[str, RegionSection], Parameter("Regions by name.")] = Field(
-        default_factory=dict, validate_default=True
+    regions: Annotated[dict[str, RegionSection], Parameter("Regions by name.")] = field(
+        default_factory=dict
     )
 
-    @field_validator("regions")
-    @classmethod
-    def _at_least_one(cls, regions: dict[str, RegionSection]) -> dict[str, RegionSection]:
-        if not regions:
-            raise ValueError("there are none, expected 1 region or more")
-        return regions
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.regions:
+            raise ValueError("regions: there are none, expected 1 region or more")
+        self.build()
 
     def build(self) -> tuple[Region, ...]:
         """The regions."""

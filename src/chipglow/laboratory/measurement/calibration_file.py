@@ -1,14 +1,16 @@
 """A calibration as a YAML file holds it."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chipglow.camera import CalibrationFit, FittedCalibration, LinearCalibration, SakumaHattori
 from chipglow.io import atomic_path
-from chipglow.quantities import Parameter, Settings
+from chipglow.quantities import Parameter, Part
 from chipglow.quantities.units import (
     TEMPERATURE,
     TIME,
@@ -26,7 +28,8 @@ Rows = tuple[tuple[float, ...], ...]
 PointRow = tuple[float, float, float, float]
 
 
-class CalibrationDescription(Settings[FittedCalibration]):
+@dataclass(frozen=True, kw_only=True)
+class CalibrationDescription(Part):
     """A calibration of a camera's counts by blackbodies."""
 
     model: Annotated[
@@ -85,11 +88,12 @@ class CalibrationDescription(Settings[FittedCalibration]):
         calibration = fit.calibration
         band, response = calibration.band, calibration.band.response
         values = zip(calibration.NAMES, calibration.parameters.tolist(), strict=True)
-        points = (
+        points: Any = (
             fit.temperatures - 273.15, fit.counts, fit.residuals, fit.residuals_temperature
         )  # fmt: skip
-        return cls.model_construct(
-            model=calibration.kind,
+        model: Any = calibration.kind
+        return cls(
+            model=model,
             band=(band.lower, band.upper),
             response=_pairs(response) if isinstance(response, TabulatedResponse) else None,
             lowest=calibration.lowest,
@@ -100,9 +104,13 @@ class CalibrationDescription(Settings[FittedCalibration]):
             covariance=tuple(map(tuple, calibration.covariance.tolist())),
             warnings=calibration.warnings,
             points=tuple(
-                tuple(float(f"{value:.9g}") for value in row) for row in zip(*points, strict=True)
+                zip(*([float(f"{one:.9g}") for one in row] for row in points), strict=True)
             ),
         )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.build()
 
     def build(self) -> FittedCalibration:
         """The calibration."""
@@ -134,6 +142,10 @@ class CalibrationDescription(Settings[FittedCalibration]):
             raise ValueError("response: expected pairs of wavelength in um and response")
         wavelengths, values = zip(*self.response, strict=True)
         return TabulatedResponse(tuple(1e-6 * wavelength for wavelength in wavelengths), values)
+
+
+def _rounded(values: NDArray[np.float64]) -> list[float]:
+    return [float(f"{value:.9g}") for value in values]
 
 
 def _pairs(response: TabulatedResponse) -> tuple[tuple[float, ...], ...]:

@@ -1,7 +1,7 @@
 """Measurements as the laboratory's commands take them."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Final
@@ -253,7 +253,7 @@ class FlatFieldSources:
                 )
             return None
         # Which frames of which file are corrected makes no difference to what corrects them.
-        uniform = self._read(description.model_copy(update={"file": None, "frames": None}))
+        uniform = self._read(replace(description, file=None, frames=None))
         for name, found in (("high", uniform.high), ("low", uniform.low)):
             problem = None if found is None else _unsuitable(found, recording)
             if problem is not None:

@@ -2,18 +2,18 @@
 
 import re
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, ValidationInfo
 
 from chipglow.camera import Recording
 from chipglow.io.column_file import read_bad_pixels, read_response
 from chipglow.laboratory.measurement.radiometric_calibration import ImagePosition
-from chipglow.quantities import FileBeside, Parameter, Section, beside_the_study
+from chipglow.quantities import FileBeside, Parameter, Part, beside_the_study
 from chipglow.quantities.units import (
     LENGTH,
     TEMPERATURE,
@@ -71,7 +71,8 @@ def band_of(text: str) -> Band:
     return Band(*WAVELENGTHS.parse_range(text))
 
 
-class ObjectSection(Section):
+@dataclass(frozen=True)
+class ObjectSection(Part):
     """The camera's settings of the object, where the file does not say them or says them wrong."""
 
     emissivity: Annotated[
@@ -90,11 +91,13 @@ class ObjectSection(Section):
 
     def applied_to(self, recorded: ObjectParameters | None) -> ObjectParameters | None:
         """What the camera was set to: as recorded, but for what is said here."""
-        said: dict[str, float] = {name: value for name, value in self if value is not None}
+        values = ((name, getattr(self, name)) for name in self.declared())
+        said: dict[str, float] = {name: value for name, value in values if value is not None}
         return replace(recorded or ObjectParameters(), **said) if said else recorded
 
 
-class FlatFieldSection(Section):
+@dataclass(frozen=True)
+class FlatFieldSection(Part):
     """Frames of flat-field sources, such as a blackbody out of focus, by the same camera."""
 
     low: Annotated[
@@ -111,7 +114,8 @@ class FlatFieldSection(Section):
     ] = True
 
 
-class MeasurementDescription(Section):
+@dataclass(frozen=True)
+class MeasurementDescription(Part):
     """A measurement of a camera's file: what it holds, how it lies, what is done with it."""
 
     file: Annotated[
@@ -233,8 +237,8 @@ class MeasurementDescription(Section):
             "What the camera was set to for the object; none: as the file says. Of temperatures "
             "it is taken back: chipglow takes radiance as the camera received it."
         ),
-    ] = Field(default_factory=ObjectSection)
-    flat_field: Annotated[FlatFieldSection, Parameter("Frames of flat-field sources.")] = Field(
+    ] = field(default_factory=ObjectSection)
+    flat_field: Annotated[FlatFieldSection, Parameter("Frames of flat-field sources.")] = field(
         default_factory=FlatFieldSection
     )
 

@@ -1,22 +1,24 @@
 """What a list of images of apertures says."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from chipglow.quantities import Parameter
-from chipglow.quantities.section import FileBeside, Section
+from chipglow.quantities import FileBeside, Parameter, Part
 from chipglow.quantities.units import LENGTH
 from chipglow.text import load_described
 
 
-class ApertureSection(Section):
+@dataclass(frozen=True)
+class ApertureSection(Part):
     """An image of a round aperture."""
 
     file: Annotated[FileBeside, Parameter("The measurement.")]
     diameter: Annotated[float, Parameter("Diameter of the aperture on the object.", LENGTH)]
 
 
-class ApertureList(Section):
+@dataclass(frozen=True)
+class ApertureList(Part):
     """Images of apertures of several diameters before one source."""
 
     apertures: Annotated[tuple[ApertureSection, ...], Parameter("The images.")]

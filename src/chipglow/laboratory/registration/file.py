@@ -1,5 +1,6 @@
 """A registration as a file: written by ``chipglow register``, read by whoever maps images."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -8,7 +9,7 @@ import yaml
 
 from chipglow.io import atomic_path
 from chipglow.laboratory.registration.registration import Method, Model, Registration
-from chipglow.quantities import Parameter, Settings
+from chipglow.quantities import Parameter, Part
 from chipglow.text import DescriptionError, Notes, read_yaml, validated
 
 _Row = tuple[float, ...]
@@ -21,7 +22,8 @@ _HEAD: Final = """\
 """
 
 
-class RegistrationDescription(Settings[Registration]):
+@dataclass(frozen=True)
+class RegistrationDescription(Part):
     """A registration."""
 
     model: Annotated[Model, Parameter("What the matrix may be.")] = "affine"
@@ -37,6 +39,10 @@ class RegistrationDescription(Settings[Registration]):
     )
     assumed: Annotated[tuple[str, ...], Parameter("Assumptions.")] = ()
     warnings: Annotated[tuple[str, ...], Parameter("Reasons why it may be wrong.")] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.build()
 
     def build(self) -> Registration:
         """The registration."""
