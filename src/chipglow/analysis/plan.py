@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator
 
-from chipglow.analysis.error_images import ReferenceKind
+from chipglow.analysis.images import ReferenceKind
 from chipglow.analysis.places import LinePlace, Place, PointPlace, RegionPlace
 from chipglow.laboratory.emissivity import RegionSection
 from chipglow.quantities import Parameter, Part
