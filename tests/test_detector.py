@@ -1,5 +1,7 @@
 """The detector: mean and noise of its counts by theory, its limits, patterns and recordings."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st

@@ -23,7 +23,7 @@ def installed(monkeypatch, tmp_path_factory):
     metadata.mkdir()
     (metadata / "METADATA").write_text("Name: thermal-log\nVersion: 1.0\n")
     (metadata / "entry_points.txt").write_text(
-        "[chipglow.import_source]\nthermal-log = thermal_log:ThermalLogSection\n"
+        "[chipglow.import_source]\nthermal_log = thermal_log:ThermalLog\n"
     )
     monkeypatch.syspath_prepend(folder)
     # The reader's subprocess finds the module, too.
@@ -41,7 +41,7 @@ def written(folder, text=None):
 
 
 def test_the_scene_has_the_numbers_of_the_file(tmp_path):
-    wanted = load_import(written(tmp_path), ["thermal-log.offset=2.0"])
+    wanted = load_import(written(tmp_path), ["thermal_log.offset=2.0"])
     import_scene(wanted.build(), tmp_path / "scene.nc")
     scene = open_scene(tmp_path / "scene.nc")
     np.testing.assert_allclose(scene.data.temperature, FRAMES + 275.15, rtol=1e-6)
@@ -66,5 +66,5 @@ def test_damage_is_one_error(tmp_path):
 def test_a_description_knows_the_kind_and_its_section(tmp_path):
     text = import_text(import_description()())
     assert "# More of a thermal log." in text and "offset: 0.0" in text
-    with pytest.raises(DescriptionError, match=r"thermal-log: unknown key 'ofset', did you mean"):
-        load_import(written(tmp_path), ["thermal-log.ofset=2.0"])
+    with pytest.raises(DescriptionError, match=r"thermal_log: unknown key 'ofset', did you mean"):
+        load_import(written(tmp_path), ["thermal_log.ofset=2.0"])

@@ -3,7 +3,7 @@
 An entry point makes `chipglow import` read it; in the pyproject.toml of the package::
 
     [project.entry-points."chipglow.import_source"]
-    thermal-log = "thermal_log:ThermalLogSection"
+    thermal_log = "thermal_log:ThermalLog"
 
 The source is read in a subprocess, which imports the module: a class of a notebook does not do.
 """
@@ -16,36 +16,24 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from chipglow.io import ImportDescription, SourceSection
 from chipglow.io.sources import Source, SourceError, Survey
-from chipglow.quantities import Parameter
+from chipglow.quantities import Parameter, Part
 from chipglow.scene import Material, Raster, SampledFrame
 
 
-class ThermalLogSection(SourceSection):
-    """What an import says of a log."""
-
-    kind: ClassVar[str] = "thermal-log"
-    title: ClassVar[str] = "a thermal log"
-    endings: ClassVar[tuple[str, ...]] = (".tlog",)
-    offset: Annotated[float, Parameter("Added to the temperatures, in K.")] = 0.0
-
-    def source(self, whole: ImportDescription) -> Source:
-        """The source that the whole describes."""
-        return ThermalLog(Path(whole.file), self.offset)
-
-
 @dataclass(frozen=True)
-class ThermalLog(Source):
+class ThermalLog(Source, Part):
     """Temperatures in degC on a grid whose upper left corner is at 0, 0."""
 
-    path: Path
-    offset: float = 0.0
+    title: ClassVar[str] = "a thermal log"
+    endings: ClassVar[tuple[str, ...]] = (".tlog",)
+    files: str = ""
+    offset: Annotated[float, Parameter("Added to the temperatures, in K.")] = 0.0
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """The file."""
-        return (str(self.path),)
+        return (self.files,)
 
     def survey(self) -> Survey:
         """Look at what is there."""
@@ -75,11 +63,11 @@ class ThermalLog(Source):
 
     def _read(self) -> tuple[NDArray[np.float64], float, float]:
         """Temperatures of shape (time, y, x), spacing in m, interval in s."""
-        numbers = np.fromstring(self.path.read_text(encoding="utf-8"), sep=" ")
+        numbers = np.fromstring(Path(self.files).read_text(encoding="utf-8"), sep=" ")
         if len(numbers) < 4 or not (numbers[:4] > 0).all():
-            raise SourceError(f"{self.path}: no header, expected rows, columns, um and us")
+            raise SourceError(f"{self.files}: no header, expected rows, columns, um and us")
         rows, columns = numbers[:2].astype(int)
         frames, over = divmod(len(numbers) - 4, rows * columns)
         if over or not frames:
-            raise SourceError(f"{self.path}: expected whole frames of {rows} x {columns} numbers")
+            raise SourceError(f"{self.files}: expected whole frames of {rows} x {columns} numbers")
         return numbers[4:].reshape(frames, rows, columns), numbers[2] * 1e-6, numbers[3] * 1e-6

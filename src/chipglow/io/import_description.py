@@ -253,7 +253,7 @@ class ImportDescription(Part):
 
     def build(self) -> Import:
         """The import that is described."""
-        section = getattr(self, self.kind_of_source().replace("-", "_"))
+        section = getattr(self, self.kind_of_source())
         is_movie = isinstance(section, MovieSection)
         source = section.source(self) if is_movie else self._source(section)
         completion = self.completion
@@ -307,7 +307,7 @@ def import_description() -> type[ImportDescription]:
     rows: list[Any] = [("kind", Annotated[kinds | None, known], None)]
     for kind, part in added.items():
         section = Annotated[part, Parameter(f"More of {part.title}.")]  # type: ignore[valid-type]
-        rows.append((kind.replace("-", "_"), section, field(default_factory=part)))
+        rows.append((kind, section, field(default_factory=part)))
     made: type[ImportDescription] = make_dataclass(
         "ImportDescription", rows, bases=(ImportDescription,), frozen=True
     )
